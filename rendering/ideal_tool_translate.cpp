@@ -16,9 +16,8 @@ constexpr double kAtRest = 2e-12;    // of the size: the same without the skin
 constexpr double kExact = 1e-5;      // of the skin; what is nearer than this is rounding
 constexpr double kRounding = 0.125;  // of the skin; so much less of it is a skin
 constexpr double kLessSkin = 0.25;   // of the skin, in a gap where two do not fit, and so on
-constexpr double kInTheWay =
-    0.25;  // of a part's rounding; what the tool at rest is deeper in holds it
-constexpr double kSamePlace = 8;  // skins; within it a contact that comes back never left
+constexpr double kInTheWay = 0.25;   // of rounding; what a tool at rest is deeper in holds it
+constexpr double kSamePlace = 8;     // skins; within it a contact that comes back never left
 
 }  // namespace
 
@@ -128,7 +127,7 @@ bool IdealTool::let_go_of_slid_planes(bool at_rest) {
 /// Where the tool rests without the skin; sets the multipliers. False where rounding hides it.
 bool IdealTool::find_exact_place() {
   return planes_.nearest(Vec3(0), 0, kExact * group_.skin, exact_) ||
-         planes_.nearest(Vec3(0), 0, group_.skin / 8, exact_);
+         planes_.nearest(Vec3(0), 0, kRounding * group_.skin, exact_);
 }
 
 /// Whether planes hold the tool, a skin away, on facets of which it is past one without the skin:

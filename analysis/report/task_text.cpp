@@ -110,8 +110,7 @@ std::string explanation(const FunctionSettings& functions) {
               : "threshold is half-way from there to certainty";
   return text +
          ";\ndetect, same/different: guesses free. d': log-linear correction. Bayes: posterior "
-         "mean "
-         "of the threshold on a grid.\n";
+         "mean of the threshold on a grid.\n";
 }
 
 std::string magnitude_text(const TaskCell& cell) {

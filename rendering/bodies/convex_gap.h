@@ -39,8 +39,7 @@ struct GapMemory {
 struct Gap {
   Vec3 normal;          ///< unit, from a to b
   double distance = 0;  ///< between the planes that touch a and b; negative where they overlap
-  Vec3 on_a,
-      on_b;  ///< the points that are nearest, where the parts are apart by less than `enough`
+  Vec3 on_a, on_b;      ///< the nearest points, where they are apart by less than `enough`
 };
 
 /// The slab of largest distance. Gilbert, Johnson & Keerthi 1988, of both parts made smaller by

@@ -12,32 +12,16 @@ import signal
 import sqlite3
 import subprocess
 import sys
-import tempfile
 import time
 import unittest
 
-PALPATE, PROTOCOLS = sys.argv[1], pathlib.Path(sys.argv[2])
+from command_case import PALPATE, CommandCase
+
+PROTOCOLS = pathlib.Path(sys.argv[1])
 COMMANDS = ["accuracy", "analyze", "bench", "cluster", "devices", "export", "forget", "merge", "plan", "render", "replay", "run", "schedule", "simulate", "stability", "sweep", "validate"]
 
 
-class FromOutside(unittest.TestCase):
-    def setUp(self):
-        scratch = tempfile.TemporaryDirectory()
-        self.addCleanup(scratch.cleanup)
-        self.dir = pathlib.Path(scratch.name)
-
-    def palpate(self, *args, status=0):
-        done = subprocess.run([PALPATE, *map(str, args)], capture_output=True, text=True, timeout=300)
-        self.assertEqual(done.returncode, status, done.stdout + done.stderr)
-        return done
-
-    def write(self, name, text):
-        path = self.dir / name
-        path.write_text(text)
-        return path
-
-
-class Devices(FromOutside):
+class Devices(CommandCase):
     def test_what_needs_no_hardware_is_always_there_and_passes_its_test(self):
         out = self.dir / "devices.json"
         text = self.palpate("devices", "--device", "simulated", "--json", out).stdout
@@ -100,7 +84,7 @@ class Devices(FromOutside):
             self.palpate("devices", *wrong, status=2)
 
 
-class Usage(FromOutside):
+class Usage(CommandCase):
     def test_every_command_has_help_with_an_example(self):
         listed = self.palpate("--help").stdout
         for command in COMMANDS:
@@ -137,21 +121,21 @@ class Usage(FromOutside):
         self.assertEqual(done.returncode, 1)
 
 
-class Render(FromOutside):
+class Render(CommandCase):
     HEADER = "t,tip_x,tip_y,tip_z,tail_x,tail_y,tail_z\n"
     CUBE = '{"objects": [{"shape": "cube", "edge_m": 0.05, "stiffness_n_per_m": 800}]}'
 
     def render(self, scene, renderer, rows):
         path = self.HEADER + "".join(",".join(map(repr, row)) + "\n" for row in rows)
         out = self.dir / "out.csv"
-        self.palpate("render", "--scene", self.write("scene.json", scene), "--renderer", renderer, "--trajectory",
-                     self.write("path.csv", path), "--out", out, "--force")
+        self.palpate("render", "--scene", self.file("scene.json", scene), "--renderer", renderer, "--trajectory",
+                     self.file("path.csv", path), "--out", out, "--force")
         with open(out, newline="") as file:
             words = ("contact_type", "faults")
             return [{k: v if k in words else float(v) for k, v in row.items()} for row in csv.DictReader(file)]
 
     def test_explain_lists_what_runs_and_what_was_left_out(self):
-        scene, out = self.write("scene.json", self.CUBE), self.dir / "stages.json"
+        scene, out = self.file("scene.json", self.CUBE), self.dir / "stages.json"
         explain = ["render", "--scene", scene, "--renderer", "point", "--explain"]
         text = self.palpate(*explain, "--json", out).stdout
         report = json.loads(out.read_text())
@@ -206,11 +190,11 @@ class Render(FromOutside):
         self.assertEqual(list(rows[0])[-1], "faults")
 
     def test_poses_that_are_no_numbers_are_faults_and_counted(self):
-        path = self.write("path.csv", self.HEADER + "0,0,0,0.03,0,0,0.15\n1,nan,0,0.024,0,0,0.15\n"
+        path = self.file("path.csv", self.HEADER + "0,0,0,0.03,0,0,0.15\n1,nan,0,0.024,0,0,0.15\n"
                           "2,0,0,0.024,inf,0,0.15\n3,0,0,-1e308,0,0,0.15\n4,0,0,0.024,0,0,0.15\n")
         for renderer in ("point", "ray"):
             out = self.dir / f"{renderer}.csv"
-            done = self.palpate("render", "--scene", self.write("scene.json", self.CUBE), "--renderer", renderer,
+            done = self.palpate("render", "--scene", self.file("scene.json", self.CUBE), "--renderer", renderer,
                                 "--trajectory", path, "--out", out)
             with open(out, newline="") as file:
                 rows = list(csv.DictReader(file))
@@ -241,17 +225,17 @@ class Render(FromOutside):
         self.assertAlmostEqual(grip["ideal_tail_x"], at + 7 * (0.42 - at), 12)
 
     def test_sides_come_with_three_columns_or_none(self):
-        scene, out = self.write("scene.json", self.CUBE), self.dir / "out.csv"
+        scene, out = self.file("scene.json", self.CUBE), self.dir / "out.csv"
         for header, row, words in (("t,tip_x,tip_y,tip_z,tail_x,tail_y,tail_z,side_x,side_y", "0,0,0,1,0,0,2,1,0", "side_z"),
                                    (self.HEADER.strip() + ",side_x,side_y,side_z", "0,0,0,1,0,0,2", "ten numbers"),
                                    (self.HEADER.strip(), "0,0,0,1,0,0,2,1,0,0", "seven numbers")):
-            path = self.write("path.csv", f"{header}\n{row}\n")
+            path = self.file("path.csv", f"{header}\n{row}\n")
             done = self.palpate("render", "--scene", scene, "--renderer", "ray", "--trajectory", path, "--out", out, status=2)
             self.assertIn(words, done.stderr)
 
     def test_a_layer_that_nothing_is_left_for_is_refused_with_the_depth_that_is_possible(self):
         layers = '[{"depth_m": 0.02, "stiffness_n_per_m": 100}, {"depth_m": 0.025, "stiffness_n_per_m": 100}]'
-        scene = self.write("scene.json", '{"objects": [{"shape": "cube", "edge_m": 0.05, "layers": ' + layers + "}]}")
+        scene = self.file("scene.json", '{"objects": [{"shape": "cube", "edge_m": 0.05, "layers": ' + layers + "}]}")
         done = self.palpate("render", "--scene", scene, "--renderer", "ray", "--explain", status=2)
         self.assertIn("/objects/0/layers/1/depth_m: nothing of the object is left at a depth of 0.025 m", done.stderr)
         self.assertIn("expected less than 0.025 m", done.stderr)
@@ -265,9 +249,9 @@ class Render(FromOutside):
         self.assertAlmostEqual(row["force_z"], 4.0, 9)
 
     def test_paths_without_end_or_writer_are_refused_in_words(self):
-        scene, out, pipe = self.write("scene.json", self.CUBE), self.dir / "out.csv", self.dir / "pipe"
+        scene, out, pipe = self.file("scene.json", self.CUBE), self.dir / "out.csv", self.dir / "pipe"
         os.mkfifo(pipe)
-        long = self.write("long.csv", self.HEADER + "0," * 800_000 + "\n")
+        long = self.file("long.csv", self.HEADER + "0," * 800_000 + "\n")
         def render(path):
             return ["render", "--scene", scene, "--renderer", "ray", "--trajectory", path, "--out", out]
 
@@ -290,32 +274,32 @@ class Render(FromOutside):
         pipe, out = self.dir / "pipe", self.dir / "out.csv"
         os.mkfifo(pipe)
         with subprocess.Popen(["sh", "-c", f"sleep 0.2; printf '{self.HEADER}0,0,0,1,0,0,2\n' > {pipe}"]):
-            self.palpate("render", "--scene", self.write("scene.json", self.CUBE), "--renderer", "ray", "--trajectory",
+            self.palpate("render", "--scene", self.file("scene.json", self.CUBE), "--renderer", "ray", "--trajectory",
                          pipe, "--out", out)
         self.assertEqual(len(out.read_text().splitlines()), 2)
 
     def test_bad_input_lists_every_fault_and_writes_nothing(self):
-        scene = self.write("scene.json", '{"objects": [{"shape": "cube", "edge_m": -1, "colour": 3}, {"shape": "egg"}]}')
-        good = self.write("good.csv", self.HEADER + "0,0,0,1,0,0,2\n")
+        scene = self.file("scene.json", '{"objects": [{"shape": "cube", "edge_m": -1, "colour": 3}, {"shape": "egg"}]}')
+        good = self.file("good.csv", self.HEADER + "0,0,0,1,0,0,2\n")
         out = self.dir / "out.csv"
         done = self.palpate("render", "--scene", scene, "--renderer", "ray", "--trajectory", good, "--out", out, status=2)
         for place in ("/objects/0/edge_m", "/objects/0/colour", "/objects/1/shape"):
             self.assertIn(place, done.stderr)
-        self.write("open.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\n")
-        scene = self.write("scene.json", '{"objects": [{"shape": "cube", "edge_m": 1}, {"shape": "mesh", "file": "open.obj"}]}')
+        self.file("open.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\n")
+        scene = self.file("scene.json", '{"objects": [{"shape": "cube", "edge_m": 1}, {"shape": "mesh", "file": "open.obj"}]}')
         done = self.palpate("render", "--scene", scene, "--renderer", "ray", "--trajectory", good, "--out", out, status=2)
         for word in ("scene.json: /objects/1", "open.obj", "open"):
             self.assertIn(word, done.stderr)
-        scene = self.write("scene.json", self.CUBE)
+        scene = self.file("scene.json", self.CUBE)
         for text, place in (("t,x\n", "line 1"), (self.HEADER, "row"), (self.HEADER + "0,0,0,1,0,0\n1,a\n", "line 3"),
                             (self.HEADER + "1,0,0,1,0,0,2\n1,0,0,1,0,0,2\n", "line 3")):
             done = self.palpate("render", "--scene", scene, "--renderer", "ray", "--trajectory",
-                                self.write("bad.csv", text), "--out", out, status=2)
+                                self.file("bad.csv", text), "--out", out, status=2)
             self.assertIn(place, done.stderr)
         self.assertFalse(out.exists())
 
 
-class Simulate(FromOutside):
+class Simulate(CommandCase):
     def simulate(self, db, *more, status=0):
         return self.palpate("simulate", PROTOCOLS / "quick.json", "--db", db, *(more or ["--participants", 3]), status=status)
 
@@ -352,7 +336,7 @@ class Simulate(FromOutside):
         db = self.dir / "one.db"
         self.simulate(db)
         self.simulate(db, "--participants", 3, "--seed", 2, status=2)
-        patch = self.write("patch.json", '{"motor": {"reaction_delay_s": 0.02}}')
+        patch = self.file("patch.json", '{"motor": {"reaction_delay_s": 0.02}}')
         self.simulate(self.dir / "other.db", "--participants", 3, "--settings", patch)
         self.assertNotEqual(self.csv_of(db), self.csv_of(self.dir / "other.db"))
 
@@ -416,7 +400,7 @@ class Simulate(FromOutside):
         self.assertEqual(os.stat(db).st_mode & 0o777, 0o600)
 
 
-class Bench(FromOutside):
+class Bench(CommandCase):
     def test_rows_are_those_of_the_contract(self):
         path = self.dir / "bench.json"
         shown = self.palpate("bench", "--ticks", 1000, "--json", path).stdout

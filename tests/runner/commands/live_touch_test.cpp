@@ -101,17 +101,22 @@ TEST_F(LiveTouchTest, ADisplayThatStallsMakesNoTickLateAndLosesNone) {
   EXPECT_NEAR(moments.back().contacts[0].place.y, 0.025, 1e-9);
 }
 
+/// A cube that drifts with 10 mm/s, far from the hand.
+LiveTouch::Settings with_drifting_cube() {
+  LiveTouch::Settings settings = settings_of();
+  stimuli::ObjectSpec drifting;
+  drifting.shape = stimuli::ShapeKind::cube;
+  drifting.edge = 0.02;
+  drifting.pose.position = {0.2, 0, 0};
+  drifting.body.emplace().mass = 0.3;
+  drifting.body->velocity = {0, 0, 0.01};
+  settings.spec.objects.push_back(drifting);
+  return settings;
+}
+
 /// What moves is where it is in every moment, and goes where somebody draws it.
 TEST_F(LiveTouchTest, WhatMovesIsShownAndCanBeDrawn) {
-  LiveTouch::Settings settings = settings_of();
-  stimuli::ObjectSpec ball;
-  ball.shape = stimuli::ShapeKind::cube;
-  ball.edge = 0.02;
-  ball.pose.position = {0.2, 0, 0};
-  ball.body.emplace().mass = 0.3;
-  ball.body->velocity = {0, 0, 0.01};
-  settings.spec.objects.push_back(ball);
-  LiveTouch touch(device_, clock_, std::move(settings));
+  LiveTouch touch(device_, clock_, with_drifting_cube());
   clock_.start();
   ASSERT_TRUE(comes_true([&] { return touch.recorded() >= 1000; }));
   std::vector<SceneMoment> moments;
@@ -182,19 +187,6 @@ TEST_F(LiveTouchTest, WhileItIsHeldNothingIsFeltAndNothingHappens) {
   }));
   touch.hold(false);
   EXPECT_TRUE(comes_true([&] { return touch.recorded() > before + 100; })) << "it goes on";
-}
-
-/// A cube that drifts with 10 mm/s, far from the hand.
-LiveTouch::Settings with_drifting_cube() {
-  LiveTouch::Settings settings = settings_of();
-  stimuli::ObjectSpec drifting;
-  drifting.shape = stimuli::ShapeKind::cube;
-  drifting.edge = 0.02;
-  drifting.pose.position = {0.2, 0, 0};
-  drifting.body.emplace().mass = 0.3;
-  drifting.body->velocity = {0, 0, 0.01};
-  settings.spec.objects.push_back(drifting);
-  return settings;
 }
 
 /// Each moment is a tick after the one before, in time and in what moves.

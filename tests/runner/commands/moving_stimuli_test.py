@@ -6,27 +6,16 @@ import json
 import pathlib
 import shutil
 import sqlite3
-import subprocess
 import sys
-import tempfile
 import unittest
 
-sys.dont_write_bytecode = True
-PALPATE, PROTOCOLS = sys.argv[1], pathlib.Path(sys.argv[2])
+from command_case import CommandCase
+
+PROTOCOLS = pathlib.Path(sys.argv[1])
 BODY = [f"body_{what}" for what in ("x", "y", "z", "qw", "qx", "qy", "qz", "vx", "vy", "vz", "wx", "wy", "wz")]
 
 
-class MovingStimuli(unittest.TestCase):
-    def setUp(self):
-        scratch = tempfile.TemporaryDirectory()
-        self.addCleanup(scratch.cleanup)
-        self.dir = pathlib.Path(scratch.name)
-
-    def palpate(self, *args, status=0):
-        done = subprocess.run([PALPATE, *map(str, args)], capture_output=True, text=True, timeout=300)
-        self.assertEqual(done.returncode, status, done.stdout + done.stderr)
-        return done
-
+class MovingStimuli(CommandCase):
     def stimulus(self, scene, name):
         """The first object of a scene, heavy and slow enough to be found again."""
         found = json.loads((PROTOCOLS / "scenes" / f"{scene}.json").read_text())["objects"][0]

@@ -6,17 +6,15 @@ import json
 import math
 import pathlib
 import sqlite3
-import subprocess
 import sys
-import tempfile
 import unittest
 import zlib
+
+from command_case import CommandCase
 
 sys.dont_write_bytecode = True
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "data" / "store"))
 import seals  # noqa: E402
-
-PALPATE = sys.argv[1]
 
 
 def protocol(samples=True, **material):
@@ -27,17 +25,7 @@ def protocol(samples=True, **material):
             "response": {"keys": {"1": "sphere", "2": "cube"}, "time_out_s": 5}, "seed": 7}
 
 
-class Replay(unittest.TestCase):
-    def setUp(self):
-        scratch = tempfile.TemporaryDirectory()
-        self.addCleanup(scratch.cleanup)
-        self.dir = pathlib.Path(scratch.name)
-
-    def palpate(self, *args, status=0):
-        done = subprocess.run([PALPATE, *map(str, args)], capture_output=True, text=True, timeout=300)
-        self.assertEqual(done.returncode, status, done.stdout + done.stderr)
-        return done
-
+class Replay(CommandCase):
     @staticmethod
     def replace_samples(db, data):
         with sqlite3.connect(db) as base:

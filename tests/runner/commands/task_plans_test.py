@@ -2,13 +2,10 @@
 
 import csv
 import json
-import pathlib
-import subprocess
-import sys
-import tempfile
 import unittest
 
-PALPATE = sys.argv.pop(1)
+from command_case import CommandCase
+
 BALL = {"name": "ball", "shape": "sphere", "radius_m": 0.03, "subdivisions": 2, "stiffness_n_per_m": 300}
 DIE = {"name": "die", "shape": "cube", "edge_m": 0.05, "stiffness_n_per_m": 300}
 PROTOCOL = {
@@ -24,17 +21,7 @@ SPACE = {"version": 1, "parameters": [
     {"name": "delay", "of": "participant", "path": "/motor/reaction_delay_s", "distribution": "uniform", "low": 0.05, "high": 0.3}]}
 
 
-class TaskPlans(unittest.TestCase):
-    def setUp(self):
-        scratch = tempfile.TemporaryDirectory()
-        self.addCleanup(scratch.cleanup)
-        self.dir = pathlib.Path(scratch.name)
-
-    def palpate(self, *args, status=0):
-        done = subprocess.run([PALPATE, *map(str, args)], capture_output=True, text=True, timeout=500)
-        self.assertEqual(done.returncode, status, done.stdout + done.stderr)
-        return done
-
+class TaskPlans(CommandCase):
     def powers(self, *more, name="plan.json"):
         out = self.dir / name
         said = self.palpate("plan", *more, "--studies", 100, "--json", out, "--force").stdout
