@@ -1,6 +1,9 @@
 #include "protocols/procedures/portable_math.h"
 
+#include <array>
+#include <bit>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 
 namespace palpate::protocols {
@@ -12,6 +15,20 @@ constexpr double kLn2Low = 0x1.a39ef35793c76p-33;
 constexpr double kLog2E = 1.4426950408889634;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
+// 1 / n!
+constexpr auto kReciprocalFactorials = [] {
+  std::array<double, 16> all{1};
+  double factorial = 1;  // exact: 15! has 41 bits
+  for (int n = 1; n < 16; ++n) all[n] = 1 / (factorial *= n);
+  return all;
+}();
+
+/// x 2^k.
+double times_power_of_two(double x, int k) {
+  if (k < -1000 || k > 1000) return std::ldexp(x, k);
+  return x * std::bit_cast<double>(static_cast<std::uint64_t>(1023 + k) << 52);
+}
+
 }  // namespace
 
 double portable_exp(double x) {
@@ -21,9 +38,15 @@ double portable_exp(double x) {
   const double k = std::floor(x * kLog2E + 0.5);
   const double r = (x - k * kLn2High) - k * kLn2Low;
   // Taylor series, |r| <= ln(2) / 2: the term after the last is below 1e-19.
-  double sum = 1;
-  for (int n = 15; n >= 1; --n) sum = 1 + sum * r / n;
-  return std::ldexp(sum, static_cast<int>(k));
+  // Even and odd terms apart: neither waits for the other.
+  const double r2 = r * r;
+  double even = kReciprocalFactorials[14], odd = kReciprocalFactorials[15];
+  for (int n = 12; n >= 2; n -= 2) {
+    even = even * r2 + kReciprocalFactorials[n];
+    odd = odd * r2 + kReciprocalFactorials[n + 1];
+  }
+  const double beyond = (r2 * even + r * (r2 * odd)) + r;
+  return times_power_of_two(1 + beyond, static_cast<int>(k));
 }
 
 double portable_log(double x) {
