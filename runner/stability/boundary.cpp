@@ -41,6 +41,11 @@ double passive_damping(const LoopCase& loop, double stiffness) {
          std::abs(loop.virtual_damping) * lever2(loop);
 }
 
+bool is_stable(const LoopCase& loop, double stiffness, double damping) {
+  const LoopScene scene(loop.contact_case, loop.renderer, material_of(loop, stiffness));
+  return run_loop(settings_at(loop, stiffness, damping), scene).stable;
+}
+
 BoundaryPoint boundary_at(const LoopCase& loop, double stiffness) {
   const LoopSettings& s = loop.settings;
   BoundaryPoint point;
@@ -67,10 +72,7 @@ BoundaryPoint boundary_at(const LoopCase& loop, double stiffness) {
 }
 
 double stiffest_stable(const LoopCase& loop, double damping) {
-  const auto stable = [&](double stiffness) {
-    const LoopScene scene(loop.contact_case, loop.renderer, material_of(loop, stiffness));
-    return run_loop(settings_at(loop, stiffness, damping), scene).stable;
-  };
+  const auto stable = [&](double stiffness) { return is_stable(loop, stiffness, damping); };
   // In steps first: a stable stiffness beyond an unstable one would not count.
   constexpr double kStep = 1.15, kMost = 1e7;
   double low = 1;

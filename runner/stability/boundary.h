@@ -36,6 +36,10 @@ struct BoundaryPoint {
 /// the lever of a reach, touched at the virtual tip. Colgate & Schenkel 1997.
 double passive_damping(const LoopCase& loop, double stiffness);
 
+/// Whether the loop comes to rest, as run_loop() says, with this stiffness, N/m, and damping of
+/// each end, N s/m.
+bool is_stable(const LoopCase& loop, double stiffness, double damping);
+
 BoundaryPoint boundary_at(const LoopCase& loop, double stiffness);
 
 /// Largest stiffness, N/m, up to 10^7, up to which all are stable with this damping of each end.

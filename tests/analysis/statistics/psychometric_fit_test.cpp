@@ -17,6 +17,7 @@
 #include "analysis/statistics/psychometric_bayes.h"
 #include "analysis/statistics/psychometric_objective.h"
 #include "stimuli/random.h"
+#include "tests/shared/rounds.h"
 
 namespace palpate::analysis {
 namespace {
@@ -215,6 +216,7 @@ bool holds(const Interval& interval, double value) {
 }
 
 TEST(PsychometricFit, IntervalsCoverTheTruthIn200SimulatedStudies) {
+  const int studies = palpate::testing::rounds(100);  // for each of two seeds
   struct Case {
     const char* name;
     PsychometricModel model;
@@ -233,7 +235,7 @@ TEST(PsychometricFit, IntervalsCoverTheTruthIn200SimulatedStudies) {
     for (const std::uint64_t seed : {1U, 2U}) {
       stimuli::Random random(seed, {0xc0});
       int threshold = 0, slope = 0, bayes_threshold = 0, bayes_slope = 0, bayes_lapse = 0;
-      for (int study = 0; study < 200; ++study) {
+      for (int study = 0; study < studies; ++study) {
         const auto counts = simulate_counts(one.model, one.truth, random);
         const PsychometricFit fit = fit_psychometric(counts, one.model);
         ASSERT_EQ(fit.undefined, "");
@@ -254,10 +256,12 @@ TEST(PsychometricFit, IntervalsCoverTheTruthIn200SimulatedStudies) {
       bayes_slopes += bayes_slope;
       bayes_lapses += bayes_lapse;
     }
-    // Of 400 intervals 380 are expected, with a standard deviation of 4.4.
+    // Within three standard deviations of the number that is expected.
+    const double expected = 0.95 * 2 * studies, three_sd = 3 * std::sqrt(0.05 * expected);
     for (const int covered : {thresholds, slopes, bayes_thresholds, bayes_slopes, bayes_lapses})
-      EXPECT_GE(covered, 367) << one.name;
-    for (const int covered : {thresholds, slopes}) EXPECT_LE(covered, 393) << one.name;
+      EXPECT_GE(covered, expected - three_sd) << one.name;
+    for (const int covered : {thresholds, slopes})
+      EXPECT_LE(covered, expected + three_sd) << one.name;
   }
 }
 

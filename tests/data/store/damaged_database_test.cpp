@@ -16,6 +16,7 @@
 #include "data/store/store.h"
 #include "tests/data/store/seal_again.h"
 #include "tests/data/store/store_fixture.h"
+#include "tests/shared/rounds.h"
 
 namespace palpate::data {
 namespace {
@@ -112,7 +113,7 @@ TEST_F(DamagedDatabase, AnUndamagedDatabaseIsExported) {
 
 TEST_F(DamagedDatabase, DamagedBytesAnywhere) {
   std::mt19937 random(11);
-  for (int round = 0; round < 250; ++round) {
+  for (int round = 0; round < palpate::testing::rounds(80); ++round) {
     std::string damaged = original_;
     const int times = 1 + static_cast<int>(random() % 3);
     for (int i = 0; i < times; ++i) {
