@@ -148,6 +148,16 @@ def power(palpate, folder):
                     "--figure", IMAGES / "power.svg", "--force"], stdout=subprocess.DEVNULL, check=True)
 
 
+def sweep_gains(palpate, folder):
+    """The sweep of runner/participants/README.md, which takes half an hour."""
+    database = folder / "participants.sweep"
+    subprocess.run([palpate, "sweep", PROTOCOLS / "ho2000.json", "--space", PROTOCOLS / "spaces" / "participants.json",
+                    "--points", "2000", "--design", "lhs", "--seed", "1", "--participants", "2", "--repetitions", "20",
+                    "--participant-version", "3", "--jobs", str(os.cpu_count()), "--db", database], check=True)
+    subprocess.run([palpate, "analyze", "--sweep", database, "--figures", folder / "sweep"], stdout=subprocess.DEVNULL, check=True)
+    shutil.copyfile(folder / "sweep" / "gains.svg", IMAGES / "sweep-gains.svg")
+
+
 def example(name):
     """By the Python module of the same build, which takes minutes."""
     def make(palpate, folder):
@@ -191,7 +201,7 @@ def explore_window(palpate, folder):
 SCENES = ["fig3b-extended-probe", "fig13-two-objects", "fig14-dumbbells", "fig16-rocket", "fig17a-engine", "fig17b-instrument", "layers"]
 PICTURES = {**{name: scene(name) for name in SCENES},
             "explore-window": explore_window, "live-session": lambda *arguments: undisturbed(live_session, *arguments), "figure15": figure("figure15"),
-            "speedup": figure("speedup"), "power": power,
+            "speedup": figure("speedup"), "power": power, "sweep-gains": sweep_gains,
             "recover-parameters": example("recover_parameters"), "choose-sizes": example("choose_sizes")}
 
 
