@@ -30,6 +30,16 @@ void BodyContacts::find_near(double within, double extra) {
   while (wake_near());
 }
 
+bool BodyContacts::may_touch(std::uint32_t body, double within, double extra) {
+  begin_search();
+  for (std::uint32_t index = 0; index < world_.pairs.size() && state_.near_parts.empty(); ++index) {
+    const BodyPair& pair = world_.pairs[index];
+    if (pair.a == body || (!pair.obstacle && pair.b == body))
+      look_at_pair(index, within, extra, false);
+  }
+  return !state_.near_parts.empty();
+}
+
 /// What is awake wakes what it may touch, and all that sleeps with it.
 bool BodyContacts::wake_near() {
   if (state_.sleeping == 0) return false;
@@ -44,8 +54,7 @@ bool BodyContacts::wake_near() {
   return state_.sleeping < before;
 }
 
-void BodyContacts::look_for(double within, double extra, std::span<const char> chosen,
-                            bool places) {
+void BodyContacts::begin_search() {
   state_.near.clear();
   state_.near_parts.clear();
   state_.contacts.clear();
@@ -53,24 +62,34 @@ void BodyContacts::look_for(double within, double extra, std::span<const char> c
     state_.spin[i] =
         state_.sleep[i].asleep ? Vec3(0) : spin_of(world_.bodies[i].inertia, state_.motion[i]);
   std::fill(state_.placed.begin(), state_.placed.end(), 0);
-  const double fall = glm::length(world_.gravity) * within * within;
+}
+
+void BodyContacts::look_for(double within, double extra, std::span<const char> chosen,
+                            bool places) {
+  begin_search();
   for (std::uint32_t index = 0; index < world_.pairs.size(); ++index) {
     const BodyPair& pair = world_.pairs[index];
     if (state_.sleep[pair.a].asleep && (pair.obstacle || state_.sleep[pair.b].asleep)) continue;
     if (!chosen.empty() && !chosen[pair.a] && (pair.obstacle || !chosen[pair.b])) continue;
-    const BodyMotion& a = state_.motion[pair.a];
-    const Vec3 centre =
-        pair.obstacle ? world_.obstacles[pair.b].centre : state_.motion[pair.b].centre;
-    const Vec3 velocity = pair.obstacle ? Vec3(0) : state_.motion[pair.b].velocity;
-    const double radii =
-        world_.bodies[pair.a].radius +
-        (pair.obstacle ? world_.obstacles[pair.b].radius : world_.bodies[pair.b].radius);
-    const double reach = radii + kTouching + extra + (pair.obstacle ? fall : 0) +
-                         within * glm::length(velocity - a.velocity);
-    const Vec3 apart = centre - a.centre;
-    if (glm::dot(apart, apart) > reach * reach) continue;
-    find_in_pair(index, within, extra + (pair.obstacle ? fall : 0), places);
+    look_at_pair(index, within, extra, places);
   }
+}
+
+void BodyContacts::look_at_pair(std::uint32_t index, double within, double extra, bool places) {
+  const BodyPair& pair = world_.pairs[index];
+  const double fall = glm::length(world_.gravity) * within * within;
+  const BodyMotion& a = state_.motion[pair.a];
+  const Vec3 centre =
+      pair.obstacle ? world_.obstacles[pair.b].centre : state_.motion[pair.b].centre;
+  const Vec3 velocity = pair.obstacle ? Vec3(0) : state_.motion[pair.b].velocity;
+  const double radii =
+      world_.bodies[pair.a].radius +
+      (pair.obstacle ? world_.obstacles[pair.b].radius : world_.bodies[pair.b].radius);
+  const double reach = radii + kTouching + extra + (pair.obstacle ? fall : 0) +
+                       within * glm::length(velocity - a.velocity);
+  const Vec3 apart = centre - a.centre;
+  if (glm::dot(apart, apart) > reach * reach) return;
+  find_in_pair(index, within, extra + (pair.obstacle ? fall : 0), places);
 }
 
 void BodyContacts::place_parts(std::uint32_t body) {

@@ -27,6 +27,9 @@ class BodyContacts {
   /// The same without contacts, and with one of the parts of each pair that are near.
   void find_near(double within, double extra);
 
+  /// Whether anything is as near to a body that is awake as for find_near. Wakes nothing.
+  bool may_touch(std::uint32_t body, double within, double extra);
+
   /// Bodies that touch and approach each other part again, with the restitution of the pair.
   /// \param left  s, of the step \param step  s, the whole of it, of which kAtOnce is
   /// \return whether some did
@@ -54,6 +57,8 @@ class BodyContacts {
   void find_in_pair(std::uint32_t index, double within, double extra, bool places);
   void measure_parts(std::uint32_t index, std::uint32_t parts_index, double reach, bool places);
   double moved_since(const BodyPair& pair, const PairPlaces& measured) const;
+  void begin_search();
+  void look_at_pair(std::uint32_t index, double within, double extra, bool places);
   void look_for(double within, double extra, std::span<const char> chosen, bool places);
   bool wake_near();
   Gap gap_after(const BodyWorldState::NearParts& near, double time, double enough,

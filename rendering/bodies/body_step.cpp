@@ -109,4 +109,9 @@ bool mark_connected(const BodyWorld& world, BodyWorldState& state, double durati
   return touches;
 }
 
+bool touches_nothing(const BodyWorld& world, BodyWorldState& state, std::uint32_t body,
+                     double duration, double distance) {
+  return !BodyContacts(world, state).may_touch(body, duration, distance);
+}
+
 }  // namespace palpate::rendering

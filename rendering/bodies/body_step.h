@@ -3,6 +3,7 @@
 // bodies bounce, and the step goes on. What touches or may meet within the rest of the step is held
 // apart by impulses that solve a linear complementarity problem. Nothing here allocates.
 
+#include <cstdint>
 #include <span>
 
 #include "rendering/bodies/body_world.h"
@@ -24,5 +25,10 @@ void step_pressed(const BodyWorld& world, BodyWorldState& state, std::span<const
 /// \return whether a marked body has anything to touch
 bool mark_connected(const BodyWorld& world, BodyWorldState& state, double duration, double distance,
                     std::span<char> marked);
+
+/// Whether a body that is awake touches nothing, nor may within a step in which it goes so much
+/// farther, m. Wakes nothing.
+bool touches_nothing(const BodyWorld& world, BodyWorldState& state, std::uint32_t body,
+                     double duration, double distance);
 
 }  // namespace palpate::rendering

@@ -29,6 +29,7 @@ std::unique_ptr<MotionState> BodiesState::clone() const {
   copy->world.make_room();
   copy->contacts.reserve(most_contacts);
   copy->springs.reserve(most_contacts);
+  copy->means.reserve(inner.size());
   return copy;
 }
 
@@ -56,6 +57,8 @@ std::unique_ptr<MotionState> MovingBodies::initial_state() const {
   state->most_contacts = contacts;
   state->contacts.reserve(contacts);
   state->springs.reserve(contacts);
+  state->inner.resize(count, 1);
+  state->means.reserve(count);
   settle(*state, {});
   return state;
 }
@@ -73,26 +76,12 @@ Rendering MovingBodies::tick(const Renderer& renderer, RenderState& outer, const
   const bool touches = valid && sided;
   // A reading that is none: the bodies go on untouched.
   const LineProbe last = state.has_last || !touches ? state.last : probe;
-  Mat3 last_frame = state.has_last || !touches ? state.last_frame : frame;
+  const Mat3 last_frame = state.has_last || !touches ? state.last_frame : frame;
   const double time = dt > 0 ? std::min(dt, kLongestTick) : 0;
   state.world.dropped = false;
   const int steps = std::max(1, static_cast<int>(std::ceil(time / kLongestStep - 1e-9)));
-  for (int i = 0; i < steps; ++i) {
-    const auto at = [&](int k) {
-      if (k == steps) return probe;
-      const double f = static_cast<double>(k) / steps;
-      return LineProbe{last.tip + f * (probe.tip - last.tip),
-                       last.tail + f * (probe.tail - last.tail)};
-    };
-    const auto frame_at = [&](int k) {
-      if (!tool || k == steps) return frame;
-      if (k == 0) return last_frame;
-      const ToolPose from{last.tip, last.tail - last.tip, last_frame};
-      const ToolPose to{probe.tip, probe.tail - probe.tip, frame};
-      return between(from, to, static_cast<double>(k) / steps).frame;
-    };
-    step(renderer, state, {at(i), at(i + 1), frame_at(i), frame_at(i + 1), time / steps, touches});
-  }
+  const Stroke whole{last, probe, last_frame, frame, time, touches};
+  for (int i = 0; i < steps; ++i) step(renderer, state, part_of(whole, i, steps));
   state.fixed.measured_side = tool && touches ? frame[0] : outer.measured_side;
   Rendering fixed = renderer.tick(fixed_, state.fixed, probe, dt);
   if (touches) {
@@ -104,18 +93,57 @@ Rendering MovingBodies::tick(const Renderer& renderer, RenderState& outer, const
   return fixed;
 }
 
+/// One of so many parts of a stroke, equally long.
+MovingBodies::Stroke MovingBodies::part_of(const Stroke& stroke, int part, int parts) const {
+  if (parts == 1) return stroke;
+  const auto at = [&](int k) {
+    const double f = static_cast<double>(k) / parts;
+    return k == parts ? stroke.to
+                      : LineProbe{stroke.from.tip + f * (stroke.to.tip - stroke.from.tip),
+                                  stroke.from.tail + f * (stroke.to.tail - stroke.from.tail)};
+  };
+  const auto frame_at = [&](int k) {
+    if (fixed_.tool() == nullptr || k == parts) return stroke.frame_to;
+    if (k == 0) return stroke.frame_from;
+    const ToolPose from{stroke.from.tip, stroke.from.tail - stroke.from.tip, stroke.frame_from};
+    const ToolPose to{stroke.to.tip, stroke.to.tail - stroke.to.tip, stroke.frame_to};
+    return between(from, to, static_cast<double>(k) / parts).frame;
+  };
+  return {at(part),      at(part + 1), frame_at(part), frame_at(part + 1), stroke.duration / parts,
+          stroke.touches};
+}
+
 void MovingBodies::step(const Renderer& renderer, BodiesState& state, const Stroke& stroke) const {
   if (state.drawn.object >= 0) draw(state, stroke.duration);
+  for (std::size_t i = 0; i < world_.bodies.size(); ++i) {
+    const int inner = inner_steps(state, i, stroke);
+    state.inner[i] = inner > 1 && stays_alone(state, i, stroke) ? inner : 1;
+  }
   state.before = state.world.motion;
   if (stroke.duration > 0) step_bodies(world_, state.world, stroke.duration);
+  state.means.clear();
   if (stroke.touches) {
-    feel(renderer, state, stroke);
-    find_probe_contacts(state, stroke);
+    for (std::size_t i = 0; i < world_.bodies.size(); ++i) {
+      if (state.world.sleep[i].asleep) state.inner[i] = 1;
+      if (state.inner[i] > 1) step_finely(renderer, state, i, stroke);
+    }
+    state.contacts.clear();
+    for (std::size_t i = 0; i < world_.bodies.size(); ++i) {
+      if (state.inner[i] > 1) continue;
+      feel(renderer, state, i, stroke);
+      find_probe_contacts(state, i, stroke);
+    }
     for (const ProbeContact& contact : state.contacts) wake(state.world, contact.spring.body);
     if (stroke.duration > 0 && !state.contacts.empty()) {
       state.ahead = state.world.motion;
       push_held(state, stroke);
       for (ProbeContact& contact : state.contacts) push_sideways(state, contact, stroke.duration);
+    }
+    for (std::size_t i = 0; i < world_.bodies.size(); ++i) {
+      if (state.inner[i] == 1) remember_depth(state, i);
+    }
+    for (const ProbeContact& mean : state.means) {
+      if (state.contacts.size() < state.most_contacts) state.contacts.push_back(mean);
     }
   }
   for (std::size_t i = 0; i < world_.bodies.size(); ++i) {
@@ -153,56 +181,54 @@ void MovingBodies::draw(BodiesState& state, double duration) const {
   }
 }
 
-/// Renders each body in its frame, where it will be unless the probe holds it up.
-void MovingBodies::feel(const Renderer& renderer, BodiesState& state, const Stroke& stroke) const {
-  for (std::size_t i = 0; i < world_.bodies.size(); ++i) {
-    const Pose frame = state.shown[i] = pose_of(state, i);
-    RenderState& shape = state.shapes[i];
-    if (fixed_.tool() != nullptr)
-      shape.measured_side = glm::conjugate(frame.orientation) * stroke.frame_to[0];
-    state.felt[i] = renderer.tick(shapes_[i], shape, into(frame, stroke.to), stroke.duration);
-  }
+/// Renders a body in its frame, where it will be unless the probe holds it up.
+void MovingBodies::feel(const Renderer& renderer, BodiesState& state, std::size_t body,
+                        const Stroke& stroke) const {
+  const Pose frame = state.shown[body] = pose_of(state, body);
+  RenderState& shape = state.shapes[body];
+  if (fixed_.tool() != nullptr)
+    shape.measured_side = glm::conjugate(frame.orientation) * stroke.frame_to[0];
+  state.felt[body] = renderer.tick(shapes_[body], shape, into(frame, stroke.to), stroke.duration);
 }
 
-void MovingBodies::find_probe_contacts(BodiesState& state, const Stroke& stroke) const {
-  state.contacts.clear();
-  for (std::size_t i = 0; i < world_.bodies.size(); ++i) {
-    const Rendering& felt = state.felt[i];
-    const Scene& shape = shapes_[i];
-    const Pose frame = pose_of(state, i);
-    ProbeContact contact;
-    contact.spring.body = static_cast<std::uint32_t>(i);
-    if (felt.contacts == 0) {
-      if (state.held[i].holds) go_on(state, stroke, i);
-      continue;
-    }
-    if (!shape.features().unions) {
-      const Contact& c = felt.deepest;
-      contact.force = glm::dot(felt.force, c.normal);
-      contact.tangential = felt.force - contact.force * c.normal;
-      contact.spring.stiffness = shape.parts()[0].material.stiffness;
-      contact.spring.damping = shape.parts()[0].material.damping;
-      contact.spring.depth = c.depth;
-      contact.spring.normal = c.normal;
-      contact.spring.place = c.point;
-      contact.offset = felt.ideal.tip - into(frame, stroke.to.tip) - c.depth * c.normal;
-      place_contact(state, stroke, frame, c.depth * c.normal, contact);
-      continue;
-    }
-    for (const PlacedContact& c : state.shapes[i].unions.contacts) {
-      if (state.contacts.size() == state.most_contacts) return;
-      contact.force = c.loaded.force;
-      contact.offset = c.loaded.tangential_offset;
-      contact.tangential = c.loaded.stiffness * contact.offset;
-      contact.segment = c.segment;
-      contact.spring.group = static_cast<int>(c.group);
-      contact.spring.stiffness = c.loaded.stiffness;
-      contact.spring.damping = shape.parts()[c.loaded.part].material.damping;
-      contact.spring.depth = c.loaded.contact.depth;
-      contact.spring.normal = c.loaded.contact.normal;
-      contact.spring.place = c.place + contact.offset;
-      place_contact(state, stroke, frame, c.shift, contact);
-    }
+/// Adds a body's contacts with the probe.
+void MovingBodies::find_probe_contacts(BodiesState& state, std::size_t body,
+                                       const Stroke& stroke) const {
+  const Rendering& felt = state.felt[body];
+  const Scene& shape = shapes_[body];
+  const Pose frame = pose_of(state, body);
+  ProbeContact contact;
+  contact.spring.body = static_cast<std::uint32_t>(body);
+  if (felt.contacts == 0) {
+    if (state.held[body].holds) go_on(state, stroke, body);
+    return;
+  }
+  if (!shape.features().unions) {
+    const Contact& c = felt.deepest;
+    contact.force = glm::dot(felt.force, c.normal);
+    contact.tangential = felt.force - contact.force * c.normal;
+    contact.spring.stiffness = shape.parts()[0].material.stiffness;
+    contact.spring.damping = shape.parts()[0].material.damping;
+    contact.spring.depth = c.depth;
+    contact.spring.normal = c.normal;
+    contact.spring.place = c.point;
+    contact.offset = felt.ideal.tip - into(frame, stroke.to.tip) - c.depth * c.normal;
+    place_contact(state, stroke, frame, c.depth * c.normal, contact);
+    return;
+  }
+  for (const PlacedContact& c : state.shapes[body].unions.contacts) {
+    if (state.contacts.size() == state.most_contacts) return;
+    contact.force = c.loaded.force;
+    contact.offset = c.loaded.tangential_offset;
+    contact.tangential = c.loaded.stiffness * contact.offset;
+    contact.segment = c.segment;
+    contact.spring.group = static_cast<int>(c.group);
+    contact.spring.stiffness = c.loaded.stiffness;
+    contact.spring.damping = shape.parts()[c.loaded.part].material.damping;
+    contact.spring.depth = c.loaded.contact.depth;
+    contact.spring.normal = c.loaded.contact.normal;
+    contact.spring.place = c.place + contact.offset;
+    place_contact(state, stroke, frame, c.shift, contact);
   }
 }
 
@@ -272,7 +298,17 @@ void MovingBodies::place_contact(BodiesState& state, const Stroke& stroke, const
     const Vec3 spin = spin_of(world_.bodies[spring.body].inertia, motion);
     spring.closing =
         glm::dot(spring.normal, velocity_at(spin, motion, spring.place) - moved / stroke.duration);
+    // What nobody has pressed holds no energy: two parts that the probe is jammed between can move
+    // the ideal tool by centimetres where they have come nearer by micrometres. What hardly moves
+    // for it has its force nonetheless.
+    constexpr double kCreep = 0.01, kHardly = 0.01;  // m/s; m/s^2
+    const double way = (spring.closing > 0 ? 2 : 1) * spring.closing + kCreep;
+    const double pressed = state.held[spring.body].deepest + way * stroke.duration;
+    const double mass = world_.bodies[spring.body].inertia.mass;
+    if (spring.stiffness * spring.depth > kHardly * mass)
+      spring.depth = std::min(spring.depth, pressed);
   }
+  contact.depth_after = 0;
   contact.felt_depth = spring.stiffness > 0 ? contact.force / spring.stiffness : 0;
   if (spring.stiffness > 0 || spring.damping > 0) state.contacts.push_back(contact);
 }
@@ -291,14 +327,18 @@ void MovingBodies::settle(BodiesState& state, const Stroke& stroke) const {
     pose.moved.orientation =
         glm::normalize(motion.orientation * glm::conjugate(body.placed.orientation));
     pose.moved.position = motion.centre - pose.moved.orientation * body.placed.position;
-    RenderState& shape = state.shapes[i];
-    if (!shape.has_last || !stroke.touches) continue;
-    // From there the next tick's motion counts.
-    const Pose frame = pose_of(state, i);
-    shape.last = into(frame, stroke.to);
-    if (shape.unions.last.d != Vec3(0) || !shape.unions.pairs.empty())
-      shape.unions.last = into(frame, stroke.to, stroke.frame_to);
+    if (stroke.touches) settle_shape(state, i, stroke);
   }
+}
+
+/// From there the next step's motion counts.
+void MovingBodies::settle_shape(BodiesState& state, std::size_t body, const Stroke& stroke) const {
+  RenderState& shape = state.shapes[body];
+  if (!shape.has_last) return;
+  const Pose frame = pose_of(state, body);
+  shape.last = into(frame, stroke.to);
+  if (shape.unions.last.d != Vec3(0) || !shape.unions.pairs.empty())
+    shape.unions.last = into(frame, stroke.to, stroke.frame_to);
 }
 
 }  // namespace palpate::rendering

@@ -68,6 +68,7 @@ class BodiesState final : public MotionState {
     ProbeContact contact;
     Vec3 on_tool;  ///< m, of the place on the probe, in the frame of the tool
     ContactType type = ContactType::none;
+    double deepest = 0;     ///< m; of all springs that pressed at the end of the last step
     bool balanced = false;  ///< the next two are known
     double energy = 0;      ///< J, that the body has to have when it leaves the probe
     double leeway = 0;      ///< J, that steps may have lost or won of it and is not yet mended
@@ -76,6 +77,8 @@ class BodiesState final : public MotionState {
   std::size_t most_contacts = 0;
   std::vector<ProbeContact> contacts;
   std::vector<PressingSpring> springs;
+  std::vector<int> inner;  ///< of each body: steps that it makes of its own in a step; or 1
+  std::vector<ProbeContact> means;  ///< of bodies with such steps, over them
   BodyPull drawn;
   LineProbe last;
   Mat3 last_frame = Mat3(1);
@@ -100,8 +103,15 @@ class MovingBodies final : public SceneMotion {
   };
   void step(const Renderer& renderer, BodiesState& state, const Stroke& stroke) const;
   void draw(BodiesState& state, double duration) const;
-  void feel(const Renderer& renderer, BodiesState& state, const Stroke& stroke) const;
-  void find_probe_contacts(BodiesState& state, const Stroke& stroke) const;
+  Stroke part_of(const Stroke& stroke, int part, int parts) const;
+  int inner_steps(const BodiesState& state, std::size_t body, const Stroke& stroke) const;
+  bool stays_alone(BodiesState& state, std::size_t body, const Stroke& stroke) const;
+  void push_alone(BodiesState& state, std::size_t body, const Stroke& stroke) const;
+  void step_finely(const Renderer& renderer, BodiesState& state, std::size_t body,
+                   const Stroke& stroke) const;
+  void feel(const Renderer& renderer, BodiesState& state, std::size_t body,
+            const Stroke& stroke) const;
+  void find_probe_contacts(BodiesState& state, std::size_t body, const Stroke& stroke) const;
   void go_on(BodiesState& state, const Stroke& stroke, std::size_t body) const;
   void hold(BodiesState& state, const Stroke& stroke, const ProbeContact& contact) const;
   void place_contact(BodiesState& state, const Stroke& stroke, const Pose& frame, const Vec3& shift,
@@ -109,9 +119,13 @@ class MovingBodies final : public SceneMotion {
   void push_freely(BodiesState& state, ProbeContact& contact, double duration) const;
   void balance(BodiesState& state, ProbeContact& contact, const Vec3& moment,
                double duration) const;
+  void add_springs(BodiesState& state, std::size_t first, std::size_t end, double duration) const;
+  void push_pressed(BodiesState& state, double duration) const;
   void push_held(BodiesState& state, const Stroke& stroke) const;
+  void remember_depth(BodiesState& state, std::size_t body) const;
   void push_sideways(BodiesState& state, ProbeContact& contact, double duration) const;
   void settle(BodiesState& state, const Stroke& stroke) const;
+  void settle_shape(BodiesState& state, std::size_t body, const Stroke& stroke) const;
   Rendering sum(const Renderer& renderer, const BodiesState& state, const Rendering& fixed,
                 const LineProbe& probe) const;
   void add_body(const Renderer& renderer, const BodiesState& state, std::size_t body,

@@ -10,8 +10,11 @@
 
 namespace palpate::rendering {
 
-/// One spring on a body that touches nothing else: in closed form, with the normal and the lever in
-/// the middle of the step. Changes the body's motion.
+/// One spring on a body that touches nothing else: its impulse in closed form, given to the body as
+/// a blow at the mean time of that impulse, with the normal and the lever as they are then; before
+/// and after it the body moves freely. A bounce within a step so keeps the energy to rounding,
+/// however far the body turns in it: where speed, lever and inertia are of different times, it
+/// would not. Changes the body's motion.
 void MovingBodies::push_freely(BodiesState& state, ProbeContact& contact, double duration) const {
   PressingSpring& spring = contact.spring;
   const MovingBody& body = world_.bodies[spring.body];
@@ -32,21 +35,39 @@ void MovingBodies::push_freely(BodiesState& state, ProbeContact& contact, double
   const Vec3 first_place =
       known ? out_of({before.centre, before.orientation}, held.contact.spring.place)
             : contact.on_probe - contact.moved;
-  const Vec3 normal = glm::normalize(first_normal + spring.normal);
-  const Vec3 moment =
-      0.5 * glm::cross(first_place - before.centre + spring.place - motion.centre, normal);
-  const Quat middle = glm::normalize(before.orientation + motion.orientation);
-  const Vec3 turn = world_per_inertia(body.inertia, middle) * moment;
+  SpringStart start;
+  start.stiffness = spring.stiffness;
   const double first_closing =
       glm::dot(first_normal, velocity_at(spin_of(body.inertia, before), before, first_place) -
                                  contact.moved / duration);
-  SpringStart start;
-  start.stiffness = spring.stiffness;
-  start.mass = 1 / (body.inertia.per_mass + glm::dot(turn, moment));
   start.growth = (spring.closing - first_closing) / duration;
-  start.speed = first_closing;
-  start.depth = spring.depth - duration * (start.speed + 0.5 * duration * start.growth);
-  const SpringPass pass = pass_spring(start, duration);
+  const Quat out_of_world = glm::conjugate(motion.orientation);
+  const Vec3 last_normal = out_of_world * spring.normal;
+  const Vec3 from_normal = glm::conjugate(before.orientation) * first_normal;
+  const Vec3 from_place = glm::conjugate(before.orientation) * (first_place - before.centre);
+  const Vec3 last_place = out_of_world * (spring.place - motion.centre);
+  constexpr int kRounds = 2;
+  double when = 0.5 * duration;  // s; of the blow
+  BodyMotion struck;
+  Vec3 normal, moment;
+  SpringPass pass;
+  for (int round = 1;; ++round) {
+    struck = before;
+    move_freely(body.inertia, world_.gravity, body.of.damping, when, struck);
+    const double share = when / duration;
+    normal = struck.orientation * glm::normalize(glm::mix(from_normal, last_normal, share));
+    const Vec3 lever = known ? struck.orientation * glm::mix(from_place, last_place, share)
+                             : contact.on_probe - (1 - share) * contact.moved - struck.centre;
+    moment = glm::cross(lever, normal);
+    const Vec3 turn = world_per_inertia(body.inertia, struck.orientation) * moment;
+    start.mass = 1 / (body.inertia.per_mass + glm::dot(turn, moment));
+    start.speed = glm::dot(normal, struck.velocity - contact.moved / duration) +
+                  glm::dot(turn, struck.spin_momentum) - when * start.growth;
+    start.depth = spring.depth - duration * (start.speed + 0.5 * duration * start.growth);
+    pass = pass_spring(start, duration);
+    if (!(pass.impulse > 0) || round == kRounds) break;
+    when = std::clamp(duration - pass.double_impulse / pass.impulse, 0.0, duration);
+  }
   if (!held.holds) {
     const double depth = std::max(0.0, start.depth);
     held.energy = kinetic_energy(body.inertia, before) + 0.5 * spring.stiffness * depth * depth;
@@ -59,14 +80,14 @@ void MovingBodies::push_freely(BodiesState& state, ProbeContact& contact, double
   spring.impulse = pass.impulse;
   contact.pressing = normal;
   contact.depth_after = pass.depth;
-  const Vec3 mean_momentum =
-      0.5 * (before.spin_momentum + motion.spin_momentum) - pass.double_impulse / duration * moment;
-  motion.velocity -= pass.impulse * body.inertia.per_mass * normal;
-  motion.spin_momentum -= pass.impulse * moment;
-  motion.centre -= pass.double_impulse * body.inertia.per_mass * normal;
-  motion.orientation = turned_freely(body.inertia, mean_momentum, before.orientation, duration);
-  // The closed form is exact but for the body's turning in the step: of what the spring does along
-  // the body's way, the share that normal and lever turn by.
+  struck.velocity -= pass.impulse * body.inertia.per_mass * normal;
+  struck.spin_momentum -= pass.impulse * moment;
+  move_freely(body.inertia, world_.gravity, body.of.damping, duration - when, struck);
+  struck.centre -=
+      (pass.double_impulse - pass.impulse * (duration - when)) * body.inertia.per_mass * normal;
+  motion = struck;
+  // Where the spring is in touch over several steps, its depth is exact but for the body's turning
+  // in them: of what the spring does along the body's way, the share that normal and lever turn by.
   const double spin = std::max(glm::length(spin_of(body.inertia, before)),
                                glm::length(spin_of(body.inertia, motion)));
   const double speed = std::max(glm::length(before.velocity), glm::length(motion.velocity)) +
@@ -108,6 +129,34 @@ void MovingBodies::balance(BodiesState& state, ProbeContact& contact, const Vec3
   motion.spin_momentum -= impulse * moment;
 }
 
+/// What presses on a body in a step that holds it apart from other things, too.
+void MovingBodies::add_springs(BodiesState& state, std::size_t first, std::size_t end,
+                               double duration) const {
+  const std::uint32_t body = state.contacts[first].spring.body;
+  state.held[body].holds = false;
+  state.chosen[body] = 1;
+  for (std::size_t k = first; k < end; ++k) {
+    PressingSpring& spring = state.contacts[k].spring;
+    const BodyMotion &from = state.before[body], &to = state.ahead[body];
+    const Vec3 began =
+        from.orientation * (glm::conjugate(to.orientation) * (spring.place - to.centre)) +
+        from.centre;
+    spring.free_speed = -glm::dot(spring.normal, spring.place - began) / duration;
+    spring.impulse = 0;
+    state.springs.push_back(spring);
+  }
+}
+
+/// Moves the chosen bodies on from where they began, with the springs.
+void MovingBodies::push_pressed(BodiesState& state, double duration) const {
+  step_pressed(world_, state.world, state.chosen, state.springs, duration);
+  std::size_t next = 0;
+  for (ProbeContact& contact : state.contacts) {
+    if (next < state.springs.size() && state.springs[next].body == contact.spring.body)
+      contact.spring.impulse = state.springs[next++].impulse;
+  }
+}
+
 /// Gives the bodies what the probe pushes them with.
 void MovingBodies::push_held(BodiesState& state, const Stroke& stroke) const {
   const double duration = stroke.duration;
@@ -136,22 +185,8 @@ void MovingBodies::push_held(BodiesState& state, const Stroke& stroke) const {
         only.spring.normal = only.pressing;
       }
       state.world.motion[body] = alone ? pushed : state.ahead[body];
-    } else {
-      state.chosen[body] = 1;
     }
-    if (!alone) {
-      state.held[body].holds = false;
-      for (std::size_t k = first; k < end; ++k) {
-        PressingSpring& spring = state.contacts[k].spring;
-        const BodyMotion &from = state.before[body], &to = state.ahead[body];
-        const Vec3 began =
-            from.orientation * (glm::conjugate(to.orientation) * (spring.place - to.centre)) +
-            from.centre;
-        spring.free_speed = -glm::dot(spring.normal, spring.place - began) / duration;
-        spring.impulse = 0;
-        state.springs.push_back(spring);
-      }
-    }
+    if (!alone) add_springs(state, first, end, duration);
     first = end;
   }
   if (!state.springs.empty()) {
@@ -160,12 +195,15 @@ void MovingBodies::push_held(BodiesState& state, const Stroke& stroke) const {
     for (std::size_t i = 0; i < world_.bodies.size(); ++i) {
       if (!state.chosen[i]) state.world.motion[i] = state.before[i];
     }
-    step_pressed(world_, state.world, state.chosen, state.springs, duration);
-    std::size_t next = 0;
-    for (ProbeContact& contact : state.contacts) {
-      if (next < state.springs.size() && state.springs[next].body == contact.spring.body)
-        contact.spring.impulse = state.springs[next++].impulse;
-    }
+    push_pressed(state, duration);
+  }
+}
+
+void MovingBodies::remember_depth(BodiesState& state, std::size_t body) const {
+  double& deepest = state.held[body].deepest = 0;
+  for (const ProbeContact& contact : state.contacts) {
+    if (contact.spring.body == body)
+      deepest = std::max({deepest, contact.felt_depth, contact.depth_after});
   }
 }
 

@@ -91,6 +91,8 @@ BodyInertia inertia_of(const MassProperties& properties) {
   out.per_mass = 1 / properties.mass;
   out.inertia = properties.inertia;
   out.per_inertia = glm::inverse(properties.inertia);
+  const Mat3& inverse = out.per_inertia;
+  out.most_per_inertia = inverse[0][0] + inverse[1][1] + inverse[2][2];
   find_symmetry(out);
   return out;
 }

@@ -9,10 +9,11 @@ namespace palpate::rendering {
 
 /// What of a body does not change.
 struct BodyInertia {
-  double mass = 1;      ///< kg
-  double per_mass = 1;  ///< 1/kg
-  Mat3 inertia;         ///< kg m^2, about the centre of mass, in the body's axes
-  Mat3 per_inertia;     ///< its inverse
+  double mass = 1;              ///< kg
+  double per_mass = 1;          ///< 1/kg
+  Mat3 inertia;                 ///< kg m^2, about the centre of mass, in the body's axes
+  Mat3 per_inertia;             ///< its inverse
+  double most_per_inertia = 1;  ///< 1/(kg m^2); its trace: no axis has more
   /// Two principal moments are equal to 1e-10, or all three: it turns freely in closed form.
   bool symmetric = false;
   Vec3 axis{0, 0, 1};     ///< of the third, where it is symmetric
