@@ -40,7 +40,9 @@ TaskJson fit_json(const ParticipantFunction& one) {
   fit["determined"] = one.determined;
   fit["slope_at_bound"] = one.fit.slope_at_bound;
   fit["guess"] = one.fit.parameters.guess;
+  fit["guess_ci95"] = ends_json(one.fit.guess_ci95);
   fit["lapse"] = one.fit.parameters.lapse;
+  fit["lapse_ci95"] = ends_json(one.fit.lapse_ci95);
   fit["log_likelihood"] = one.fit.log_likelihood;
   fit["deviance"] = one.goodness.deviance;
   fit["deviance_p"] = maybe(one.goodness.p);

@@ -26,6 +26,9 @@ std::string with_interval(double value, const Interval& interval) {
          short_number(interval.high) + "]";
 }
 
+/// To 0.01 %: searches end so near to 0.
+double rounded_rate(double rate) { return std::round(rate * 1e4) / 1e4; }
+
 std::string optional_interval(const std::optional<double>& value,
                               const std::optional<Interval>& interval) {
   if (!value) return "undefined";
@@ -83,6 +86,10 @@ std::string function_line(const ParticipantFunction& one) {
   text += one.fit.slope_at_bound
               ? ", slope not determined"
               : ", slope " + with_interval(one.fit.parameters.slope, one.fit.slope_ci95);
+  if (one.model.lapse.free)
+    text += ", lapses " + with_interval(rounded_rate(one.fit.parameters.lapse),
+                                        {rounded_rate(one.fit.lapse_ci95.low),
+                                         rounded_rate(one.fit.lapse_ci95.high)});
   if (!one.determined) text += ", threshold NOT DETERMINED by these levels";
   if (one.goodness.p) text += ", fit p " + p_text(*one.goodness.p);
   if (one.posterior.undefined.empty())
@@ -99,10 +106,8 @@ std::string function_text(const ParticipantFunction& one) {
 }
 
 std::string explanation(const FunctionSettings& functions) {
-  const bool logarithmic = functions.scale != protocols::LevelScale::linear;
   std::string text = std::string("Intervals are of 95 %. Psychometric functions: ") +
                      to_string(functions.shape) +
-                     (logarithmic ? " over the logarithm (base 10) of levels" : "") +
                      ", lapses free up to 0.06; compare with levels on\none side of the standard: "
                      "guesses 1 / intervals, the ";
   text += functions.shape == protocols::PsychometricShape::weibull
@@ -111,6 +116,20 @@ std::string explanation(const FunctionSettings& functions) {
   return text +
          ";\ndetect, same/different: guesses free. d': log-linear correction. Bayes: posterior "
          "mean of the threshold on a grid.\n";
+}
+
+/// Where levels are taken as they are because nothing is known of their procedure.
+std::string scale_note(const TaskAnalysis& analysis) {
+  const bool unknown =
+      analysis.table.procedures.empty() && !analysis.functions.scale &&
+      std::any_of(analysis.cells.begin(), analysis.cells.end(), [](const auto& cell) {
+        return !cell.functions.empty() && cell.no_function.empty() &&
+               cell.scale == protocols::LevelScale::linear;
+      });
+  return unknown
+             ? "A table does not say on which scale an adaptive procedure has its levels: where "
+               "that is\nlogarithmic, give --scale log.\n"
+             : "";
 }
 
 std::string magnitude_text(const TaskCell& cell) {
@@ -155,6 +174,10 @@ std::string cell_text(const TaskCell& cell) {
   text += ": " + counted(cell.trials, "trial", "trials") + " of " +
           counted(cell.participants.size(), "participant", "participants") + ", " +
           std::to_string(cell.answered) + " answered\n";
+  if (!cell.functions.empty() && cell.no_function.empty())
+    text += cell.scale == protocols::LevelScale::linear
+                ? "  functions over the levels as they are\n"
+                : "  functions over the logarithm (base 10) of the levels\n";
   for (const ParticipantFunction& one : cell.functions) text += function_text(one);
   if (cell.magnitude) text += magnitude_text(cell);
   text += adjustment_text(cell);
@@ -244,7 +267,7 @@ std::string task_report_text(const TaskAnalysis& analysis) {
   for (const TaskComparison& one : analysis.renderers) text += comparison_text(one, true);
   for (const TaskComparison& one : analysis.conditions) text += comparison_text(one, false);
   if (analysis.accuracy) text += accuracy_text(*analysis.accuracy);
-  text += explanation(analysis.functions);
+  text += explanation(analysis.functions) + scale_note(analysis);
   if (analysis.identification)
     text += "\nTimes and accuracy of identification\n\n" + report_text(*analysis.identification);
   return text;

@@ -89,10 +89,9 @@ InformationTransfer information_transfer(const CountTable& counts) {
   result.plain = std::max(0.0, transfer(cells, rows, columns, sums.total));
   const double extra = static_cast<double>(sums.cells) - static_cast<double>(filled(sums.rows)) -
                        static_cast<double>(filled(sums.columns)) + 1;
-  // Without errors no cell beyond the diagonal is filled: the correction would exceed what there
-  // is.
-  result.corrected =
-      std::min(result.stimulus_entropy, *result.plain - extra / (2 * sums.total * std::log(2.0)));
+  // With few errors few cells beyond the diagonal are filled and `extra` is below 0, but counts of
+  // a sample never transmit too little on average.
+  result.corrected = *result.plain - std::max(0.0, extra) / (2 * sums.total * std::log(2.0));
   result.categories = std::exp2(std::max(0.0, *result.corrected));
   if (sums.total > 1) result.se = jackknife_error(counts, sums, cells, rows, columns);
   return result;

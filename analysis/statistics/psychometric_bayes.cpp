@@ -114,9 +114,10 @@ PsychometricPosterior psychometric_posterior(const std::vector<LevelCount>& coun
     return result;
   }
   const double half = 0.5 * (data.high - data.low);
-  PosteriorGrid coarse{PosteriorAxis(data.low - half, data.high + half, kCoarse),
-                       PosteriorAxis(data.least_log_slope(), data.most_log_slope(), kCoarse),
-                       rate_axis(model.guess), rate_axis(model.lapse)};
+  PosteriorGrid coarse{
+      PosteriorAxis(std::max(data.low - half, data.least), data.high + half, kCoarse),
+      PosteriorAxis(data.least_log_slope(), data.most_log_slope(), kCoarse), rate_axis(model.guess),
+      rate_axis(model.lapse)};
   add_marginals(coarse, data, model);
   const auto [t_low, t_high] = coarse.threshold.core();
   const auto [s_low, s_high] = coarse.log_slope.core();

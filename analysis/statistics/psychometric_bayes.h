@@ -8,7 +8,8 @@
 namespace palpate::analysis {
 
 /// Posterior of a psychometric function on a grid. Priors: threshold uniform on the scale over the
-/// levels and half their range beyond on both sides; log slope uniform over all that the levels can
+/// levels and half their range beyond on both sides, but not below 0 where all levels are above;
+/// log slope uniform over all that the levels can
 /// tell apart; free rates with density 10 (1 - rate)^9 up to their largest value (Schuett et al.
 /// 2016).
 struct PsychometricPosterior {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <utility>
 
 #include "analysis/statistics/psychometric_intervals.h"
@@ -24,6 +25,21 @@ std::string reason_not_to_fit(const std::vector<LevelCount>& counts, const Place
   return "";
 }
 
+/// Where answers change between two levels at once, every threshold between them is as good: then
+/// it is the middle, with the steepest slope.
+void take_middle_of_step(const PsychometricObjective& objective, const PlacedData& data,
+                         SimplexMinimum& best) {
+  const auto above = std::find_if(data.places.begin(), data.places.end(),
+                                  [&](double place) { return place > best.place[0]; });
+  if (above == data.places.begin() || above == data.places.end()) return;
+  std::vector<double> step = best.place;
+  step[0] = 0.5 * (*std::prev(above) + *above);
+  step[1] = data.most_log_slope();
+  const double value = objective(step);
+  constexpr double kSame = 1e-6;
+  if (value <= best.value + kSame) best = {std::move(step), value};
+}
+
 /// Point estimates alone, as the simulations need them.
 PsychometricFit fit_point(const std::vector<LevelCount>& counts, const PlacedData& data,
                           const PsychometricModel& model, const PsychometricSearch& search,
@@ -34,6 +50,7 @@ PsychometricFit fit_point(const std::vector<LevelCount>& counts, const PlacedDat
   if (!fit.undefined.empty()) return fit;
   const PsychometricObjective objective(data, model);
   best = objective.best(search, 1e-11);
+  take_middle_of_step(objective, data, best);
   const auto point = objective.point(best.place);
   fit.log_likelihood = -best.value;
   fit.parameters = {protocols::level_at(model.function.scale, point.threshold),
@@ -77,6 +94,8 @@ PsychometricFit fit_psychometric(const std::vector<LevelCount>& counts,
   if (!fit.undefined.empty()) return fit;
   fit.threshold_ci95 = threshold_interval(data, model, best);
   fit.slope_ci95 = slope_interval(data, model, best, std::log(fit.parameters.slope));
+  fit.guess_ci95 = rate_interval(data, model, best, PsychometricRate::guess);
+  fit.lapse_ci95 = rate_interval(data, model, best, PsychometricRate::lapse);
   return fit;
 }
 

@@ -39,9 +39,12 @@ struct PsychometricFit {
   double log_likelihood = 0;  ///< of the answers in their order: without binomial coefficients
   int trials = 0;
   /// 95 %, where twice the loss of profile log likelihood is the 0.95 quantile of chi squared with
-  /// one degree of freedom. An end is infinite (threshold: +-, or 0 and infinity on a logarithmic
-  /// scale) where the data exclude no value on that side.
+  /// one degree of freedom. An end is infinite (threshold: +-, or 0 and infinity where levels are
+  /// above 0) where the data exclude no value on that side.
   Interval threshold_ci95, slope_ci95;
+  /// Likewise; an end of a free rate is 0 or its most where no value on that side is excluded. Of a
+  /// constant: both ends are it.
+  Interval guess_ci95, lapse_ci95;
   bool slope_at_bound =
       false;  ///< answers change between two levels at once: no slope is too steep
 };

@@ -1,12 +1,11 @@
 #include "analysis/statistics/psychometric_intervals.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <optional>
 #include <utility>
 #include <vector>
-
-#include "analysis/statistics/psychometric_objective.h"
 
 namespace palpate::analysis {
 namespace {
@@ -17,13 +16,14 @@ constexpr double kHalfChiSquared95 = 0.5 * 3.841458820694124;
 constexpr double kOpenEnd = std::numeric_limits<double>::infinity();
 
 /// Where a profile that is above 0 at `inside` falls to 0, towards `limit`; nullopt where it does
-/// not.
+/// not, or `inside` is there already.
 template <class Profile>
 std::optional<double> profile_end(const Profile& profile, double inside, double step,
                                   double limit) {
   const auto beyond = [&](double place) { return step > 0 ? place >= limit : place <= limit; };
-  double at_inside = kHalfChiSquared95, outside = inside + step;
-  double at_outside = beyond(outside) ? 1 : profile(outside);
+  if (beyond(inside)) return std::nullopt;
+  double at_inside = kHalfChiSquared95, outside = beyond(inside + step) ? limit : inside + step;
+  double at_outside = profile(outside);
   while (at_outside > 0) {
     if (outside == limit) return std::nullopt;
     inside = outside;
@@ -53,16 +53,16 @@ std::optional<double> profile_end(const Profile& profile, double inside, double 
 
 /// Loss allowed less the smallest loss with a parameter held. Each search begins where the one
 /// before ended, and at the best place of a grid: there may be another valley.
+template <class Hold>
 class Profile {
  public:
-  using Hold = void (PsychometricObjective::*)(std::optional<double>);
-
+  /// \param hold  holds a parameter of an objective at a value
   Profile(const PsychometricObjective& objective, Hold hold, std::vector<double> start,
           double allowed)
       : objective_(objective), hold_(hold), place_(std::move(start)), allowed_(allowed) {}
 
   double operator()(double held) {
-    (objective_.*hold_)(held);
+    hold_(objective_, held);
     SimplexMinimum best = objective_.best_from(place_, 0.02, 1e-8);
     if (const auto start = objective_.other_start(best.place)) {
       SimplexMinimum other = objective_.best_from(*start, 0.1, 1e-8);
@@ -87,15 +87,17 @@ Interval threshold_interval(const PlacedData& data, const PsychometricModel& mod
   const std::vector<double> others(best.place.begin() + 1, best.place.end());
   const double allowed = best.value + kHalfChiSquared95;
   const double range = data.high - data.low, step = 0.05 * range;
-  Profile falling(objective, &PsychometricObjective::hold_threshold, others, allowed),
+  Profile falling(
+      objective, [](auto&held, double x) { held.hold_threshold(x); }, others, allowed),
       rising(falling);
   // Twenty ranges away from all levels: that is nowhere.
-  const auto low = profile_end([&](double x) { return falling(x); }, best.place[0], -step,
-                               data.low - 20 * range);
+  const double at = objective.point(best.place).threshold;
+  const auto low = profile_end([&](double x) { return falling(x); }, at, -step,
+                               std::max(data.low - 20 * range, data.least));
   const auto high =
-      profile_end([&](double x) { return rising(x); }, best.place[0], step, data.high + 20 * range);
+      profile_end([&](double x) { return rising(x); }, at, step, data.high + 20 * range);
   const LevelScale scale = model.function.scale;
-  const double nowhere = scale == LevelScale::linear ? -kOpenEnd : 0;
+  const double nowhere = scale == LevelScale::linear ? data.least : 0;
   return {low ? protocols::level_at(scale, *low) : nowhere,
           high ? protocols::level_at(scale, *high) : kOpenEnd};
 }
@@ -106,13 +108,33 @@ Interval slope_interval(const PlacedData& data, const PsychometricModel& model,
   std::vector<double> others = best.place;
   others.erase(others.begin() + 1);
   const double allowed = best.value + kHalfChiSquared95;
-  Profile falling(objective, &PsychometricObjective::hold_log_slope, others, allowed),
+  Profile falling(
+      objective, [](auto&held, double x) { held.hold_log_slope(x); }, others, allowed),
       rising(falling);
   const auto low =
       profile_end([&](double x) { return falling(x); }, log_slope, -0.2, data.least_log_slope());
   const auto high =
       profile_end([&](double x) { return rising(x); }, log_slope, 0.2, data.most_log_slope());
   return {low ? std::exp(*low) : 0, high ? std::exp(*high) : kOpenEnd};
+}
+
+Interval rate_interval(const PlacedData& data, const PsychometricModel& model,
+                       const SimplexMinimum& best, PsychometricRate rate) {
+  const PsychometricObjective objective(data, model);
+  const RateModel& of = rate == PsychometricRate::guess ? model.guess : model.lapse;
+  if (!of.free) return {of.value, of.value};
+  const auto point = objective.point(best.place);
+  const double at = rate == PsychometricRate::guess ? point.guess : point.lapse;
+  std::vector<double> others = best.place;
+  const bool after_guess = rate == PsychometricRate::lapse && model.guess.free;
+  others.erase(others.begin() + (after_guess ? 3 : 2));
+  const double allowed = best.value + kHalfChiSquared95, step = 0.1 * of.most;
+  Profile falling(
+      objective, [rate](auto&held, double x) { held.hold_rate(rate, x); }, others, allowed),
+      rising(falling);
+  const auto low = profile_end([&](double x) { return falling(x); }, at, -step, 0);
+  const auto high = profile_end([&](double x) { return rising(x); }, at, step, of.most);
+  return {low.value_or(0), high.value_or(of.most)};
 }
 
 }  // namespace palpate::analysis

@@ -2,7 +2,7 @@
 // Intervals of 95 % by the profile likelihood: what is held in them, twice the loss of log
 // likelihood stays below the 0.95 quantile of chi squared with one degree of freedom.
 
-#include "analysis/statistics/psychometric_likelihood.h"
+#include "analysis/statistics/psychometric_objective.h"
 #include "analysis/statistics/simplex.h"
 
 namespace palpate::analysis {
@@ -13,5 +13,8 @@ Interval threshold_interval(const PlacedData& data, const PsychometricModel& mod
 /// Of the slope. \param log_slope  of the fit
 Interval slope_interval(const PlacedData& data, const PsychometricModel& model,
                         const SimplexMinimum& best, double log_slope);
+/// Of the guess or lapse rate, within 0 and its most; of a constant, the constant twice.
+Interval rate_interval(const PlacedData& data, const PsychometricModel& model,
+                       const SimplexMinimum& best, PsychometricRate rate);
 
 }  // namespace palpate::analysis

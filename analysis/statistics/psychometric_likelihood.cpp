@@ -11,7 +11,7 @@ double PlacedData::most_log_slope() const { return std::log(40 / spacing); }
 PlacedData place_counts(const std::vector<LevelCount>& counts,
                         const protocols::PsychometricFunction& function) {
   PlacedData data;
-  std::vector<double> places;
+  std::vector<double>& places = data.places;
   for (const LevelCount& count : counts) {
     const double place = protocols::scale_position(function.scale, count.level);
     data.counts.push_back(
@@ -23,6 +23,7 @@ PlacedData place_counts(const std::vector<LevelCount>& counts,
   if (places.empty()) return data;
   data.low = places.front();
   data.high = places.back();
+  if (function.scale == protocols::LevelScale::linear && data.low > 0) data.least = 0;
   for (std::size_t i = 1; i < places.size(); ++i) {
     const double distance = places[i] - places[i - 1];
     if (data.spacing == 0 || distance < data.spacing) data.spacing = distance;

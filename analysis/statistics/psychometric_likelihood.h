@@ -1,6 +1,7 @@
 #pragma once
 // The likelihood that the fits of psychometric functions share.
 
+#include <limits>
 #include <vector>
 
 #include "analysis/statistics/psychometric_fit.h"
@@ -15,8 +16,12 @@ struct PlacedCount {
 
 struct PlacedData {
   std::vector<PlacedCount> counts;
-  double low = 0, high = 0;  ///< finite places
-  double spacing = 0;        ///< smallest distance of two places; 0: one place only
+  std::vector<double> places;  ///< finite ones, each once, in order
+  double low = 0, high = 0;    ///< the first and the last
+  double spacing = 0;          ///< smallest distance of two places; 0: one place only
+  /// No threshold is below: 0 on a linear scale of levels that are all above 0, as those of sizes
+  /// and stiffnesses are; else -infinity.
+  double least = -std::numeric_limits<double>::infinity();
 
   /// Slopes beyond are flat or a step, as far as these levels can tell.
   double least_log_slope() const;

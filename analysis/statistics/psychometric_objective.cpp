@@ -16,16 +16,23 @@ double rate_of(const RateModel& rate, double x) {
   return rate.most * s * s;
 }
 
+bool searched(const RateModel& rate, const std::optional<double>& held) {
+  return rate.free && !held;
+}
+
 }  // namespace
 
 PsychometricObjective::Point PsychometricObjective::point(const std::vector<double>& x) const {
   std::size_t i = 0;
   Point p{};
-  p.threshold = threshold_ ? *threshold_ : x[i++];
+  p.threshold = std::max(threshold_ ? *threshold_ : x[i++], data_.least);
   p.log_slope = std::clamp(log_slope_ ? *log_slope_ : x[i++], data_.least_log_slope(),
                            data_.most_log_slope());
-  p.guess = model_.guess.free ? rate_of(model_.guess, x[i++]) : model_.guess.value;
-  p.lapse = model_.lapse.free ? rate_of(model_.lapse, x[i++]) : model_.lapse.value;
+  const auto rate = [&](const RateModel& model, const std::optional<double>& held) {
+    return searched(model, held) ? rate_of(model, x[i++]) : held.value_or(model.value);
+  };
+  p.guess = rate(model_.guess, guess_);
+  p.lapse = rate(model_.lapse, lapse_);
   return p;
 }
 
@@ -48,7 +55,12 @@ SimplexMinimum PsychometricObjective::best(const PsychometricSearch& search,
                                            double tolerance) const {
   SimplexMinimum found;
   found.value = kWorst;
-  for (const Start& start : starts_of_grid(search)) {
+  std::vector<Start> starts = starts_of_grid(search);
+  // What a quick search finds is found by any other as well.
+  if (search.starts > kQuickSearch.starts) {
+    for (Start& start : starts_of_grid(kQuickSearch)) starts.push_back(std::move(start));
+  }
+  for (const Start& start : starts) {
     SimplexMinimum one = best_from(start.place, 0.1, tolerance);
     if (one.value < found.value) found = std::move(one);
   }
@@ -69,8 +81,9 @@ std::optional<std::vector<double>> PsychometricObjective::other_start(
 /// Rates of the grid, as best_from takes them: near 0 and near their most.
 std::vector<std::vector<double>> PsychometricObjective::rates_of_grid() const {
   std::vector<std::vector<double>> all{{}};
-  for (const RateModel* rate : {&model_.guess, &model_.lapse}) {
-    if (!rate->free) continue;
+  const std::size_t rates =
+      (searched(model_.guess, guess_) ? 1U : 0U) + (searched(model_.lapse, lapse_) ? 1U : 0U);
+  for (std::size_t i = 0; i < rates; ++i) {
     std::vector<std::vector<double>> longer;
     for (const std::vector<double>& one : all) {
       for (const double x : {0.25, 1.3}) {

@@ -18,8 +18,10 @@ struct PsychometricSearch {
 /// Of a fit, and of the refits of simulations.
 inline constexpr PsychometricSearch kWholeSearch{}, kQuickSearch{11, 9, 1};
 
-/// Minus log likelihood over (threshold on the scale, log slope, free rates), any of the first two
-/// held. A free rate is most sin^2(x): never outside 0 .. most.
+enum class PsychometricRate { guess, lapse };
+
+/// Minus log likelihood over (threshold on the scale, log slope, free rates), one of them held or
+/// none. A free rate is most sin^2(x): never outside 0 .. most.
 class PsychometricObjective {
  public:
   /// Both must outlive it.
@@ -32,6 +34,9 @@ class PsychometricObjective {
 
   void hold_threshold(std::optional<double> value) { threshold_ = value; }
   void hold_log_slope(std::optional<double> value) { log_slope_ = value; }
+  void hold_rate(PsychometricRate rate, std::optional<double> value) {
+    (rate == PsychometricRate::guess ? guess_ : lapse_) = value;
+  }
 
   Point point(const std::vector<double>& x) const;
   double operator()(const std::vector<double>& x) const;
@@ -40,7 +45,7 @@ class PsychometricObjective {
   SimplexMinimum best_from(const std::vector<double>& start, double step, double tolerance) const;
   /// The best point from the best starts of a grid: the likelihood may have several maxima.
   SimplexMinimum best(const PsychometricSearch& search, double tolerance) const;
-  /// With one of threshold and slope held: the best place of a grid, if that is far from `place`.
+  /// With a parameter held: the best place of a grid, if that is far from `place`.
   std::optional<std::vector<double>> other_start(const std::vector<double>& place) const;
 
  private:
@@ -55,7 +60,7 @@ class PsychometricObjective {
 
   const PlacedData& data_;
   const PsychometricModel& model_;
-  std::optional<double> threshold_, log_slope_;
+  std::optional<double> threshold_, log_slope_, guess_, lapse_;  ///< held
 };
 
 }  // namespace palpate::analysis

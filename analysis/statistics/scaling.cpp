@@ -1,5 +1,6 @@
 #include "analysis/statistics/scaling.h"
 
+#include <algorithm>
 #include <boost/math/distributions/students_t.hpp>
 #include <cmath>
 #include <map>
@@ -103,6 +104,11 @@ std::vector<Adjustment> adjustments(const std::vector<AdjustmentTrial>& trials) 
     result.settings = all.size();
     result.pse = mean(all);
     result.pse_ci95 = mean_interval(all);
+    const bool all_above_zero = std::all_of(own.begin(), own.end(), [](const auto& trial) {
+      return trial.setting > 0 && trial.standard > 0;
+    });
+    if (result.pse_ci95 && all_above_zero)
+      result.pse_ci95->low = std::max(0.0, result.pse_ci95->low);
     result.constant_error = result.pse - own.front().standard;
     if (!above.empty() && !below.empty()) result.start_effect = mean(above) - mean(below);
     double squares = 0, df = 0;

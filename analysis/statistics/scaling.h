@@ -61,7 +61,7 @@ struct Adjustment {
   std::size_t participant = 0;
   std::size_t settings = 0;
   double pse = 0;                      ///< mean setting
-  std::optional<Interval> pse_ci95;    ///< t
+  std::optional<Interval> pse_ci95;    ///< t; not below 0 where all is above
   double constant_error = 0;           ///< PSE less standard
   std::optional<double> sd;            ///< of the settings about the mean of their direction
   std::optional<double> jnd;           ///< 0.6745 sd: half of the settings lie within

@@ -128,8 +128,7 @@ ParticipantFunction function_of(const std::string& participant, const Trials& tr
   result.fit.undefined = cell.no_function;
   result.posterior.undefined = cell.no_function;
   if (!cell.no_function.empty()) return result;
-  result.model.function = {context.settings.shape, context.settings.scale,
-                           easier_of(result.counts)};
+  result.model.function = {context.settings.shape, cell.scale, easier_of(result.counts)};
   if (cell.forced_choice) result.model.guess.value = 1.0 / cell.intervals;
   std::vector<LevelCount> counts = result.counts;
   if (catches) {
@@ -149,9 +148,36 @@ ParticipantFunction function_of(const std::string& participant, const Trials& tr
     result.determined = threshold >= result.counts.front().level &&
                         threshold <= result.counts.back().level && std::isfinite(ends.low) &&
                         std::isfinite(ends.high) &&
-                        (ends.low > 0 || result.model.function.scale == LevelScale::linear);
+                        (ends.low > 0 || result.counts.front().level <= 0);
   }
   return result;
+}
+
+/// At least three levels above 0, each as many times the one below as the others.
+bool equal_ratios(const std::vector<LevelCount>& counts) {
+  constexpr double kRounded = 1e-3;  // of a step: levels are written with few digits
+  if (counts.size() < 3 || counts.front().level <= 0) return false;
+  const auto step = [&](std::size_t i) { return std::log(counts[i].level / counts[i - 1].level); };
+  for (std::size_t i = 2; i < counts.size(); ++i) {
+    if (std::abs(step(i) - step(1)) > kRounded * step(1)) return false;
+  }
+  return true;
+}
+
+/// Of the functions of a cell's trials.
+LevelScale scale_of(const Trials& trials, const Context& context) {
+  if (context.settings.scale) return *context.settings.scale;
+  if (context.settings.shape == protocols::PsychometricShape::weibull) return LevelScale::log10;
+  bool adaptive = false;
+  for (const TaskTrial* trial : trials) {
+    for (const protocols::ProcedureSpec& spec : specs_of(*trial, context.table)) {
+      const std::optional<LevelScale> scale = scale_of_adaptive(spec);
+      if (scale == LevelScale::linear) return LevelScale::linear;
+      adaptive |= scale.has_value();
+    }
+  }
+  return adaptive || equal_ratios(counts_of_levels(trials)) ? LevelScale::log10
+                                                            : LevelScale::linear;
 }
 
 void add_functions(TaskCell& cell, const Trials& trials, const Context& context) {
@@ -169,7 +195,8 @@ void add_functions(TaskCell& cell, const Trials& trials, const Context& context)
   if (compares && above && below && (cell.same_different || cell.intervals > 2))
     cell.no_function =
         "levels lie on both sides of the standard: successes are no monotonic function of them";
-  if (cell.no_function.empty() && context.settings.scale != LevelScale::linear &&
+  cell.scale = scale_of(trials, context);
+  if (cell.no_function.empty() && cell.scale != LevelScale::linear &&
       std::any_of(trials.begin(), trials.end(),
                   [](const TaskTrial* trial) { return trial->level && *trial->level < 0; }))
     cell.no_function = "levels below 0 have no place on a logarithmic scale";

@@ -23,8 +23,10 @@ namespace palpate::analysis {
 /// Which psychometric functions are fitted, and how their goodness of fit is judged.
 struct FunctionSettings {
   protocols::PsychometricShape shape = protocols::PsychometricShape::logistic;
-  /// Weibull functions: not linear.
-  protocols::LevelScale scale = protocols::LevelScale::linear;
+  /// Of the levels; Weibull functions: not linear. None: log10 of Weibull functions, of blocks
+  /// whose adaptive procedures have a logarithmic scale, and of constant levels (or of unknown
+  /// procedures) that are at least three and equally spaced by their ratios; else linear.
+  std::optional<protocols::LevelScale> scale;
   int simulations = 199;  ///< of each goodness of fit; 0: without p
   std::uint64_t seed = 2026;
 };
@@ -63,8 +65,9 @@ struct TaskCell {
   /// compare: 1 / `intervals` of the answers succeed without a difference: all levels lie on one
   /// side of the standard.
   bool forced_choice = false;
-  bool same_different = false;            ///< compare: that is what is answered
-  int intervals = 2;                      ///< compare
+  bool same_different = false;  ///< compare: that is what is answered
+  int intervals = 2;            ///< compare
+  protocols::LevelScale scale = protocols::LevelScale::linear;  ///< of its functions
   std::string no_function;                ///< why no psychometric function is fitted; empty: one is
   std::vector<std::string> participants;  ///< that `magnitude`, `adjustments` number
   std::vector<ParticipantFunction> functions;      ///< compare, detect

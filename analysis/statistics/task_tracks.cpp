@@ -27,19 +27,24 @@ std::vector<std::size_t> reversals_of(const Track& track) {
   return turns;
 }
 
+const protocols::BlockProcedures* block_of(const TaskTrial& trial, const TaskTable& table) {
+  const auto protocol = table.procedures.find(trial.protocol_sha256);
+  if (protocol == table.procedures.end()) return nullptr;
+  const auto block = protocol->second.find(trial.block_name);
+  return block == protocol->second.end() ? nullptr : &block->second;
+}
+
 std::optional<TrackProcedure> procedure_of(const Track& track, const TaskTrial& trial,
                                            const TaskTable& table) {
-  const auto protocol = table.procedures.find(trial.protocol_sha256);
-  if (protocol == table.procedures.end()) return std::nullopt;
-  const auto block = protocol->second.find(trial.block_name);
-  if (block == protocol->second.end() || block->second.specs.empty()) return std::nullopt;
+  const protocols::BlockProcedures* const block = block_of(trial, table);
+  if (block == nullptr || block->specs.empty()) return std::nullopt;
   int number = 0;
   std::from_chars(track.name.data(), track.name.data() + track.name.size(), number);
   if (number < 1) return std::nullopt;
   TrackProcedure result;
-  result.spec = block->second.spec_of(number);
+  result.spec = block->spec_of(number);
   if (std::holds_alternative<protocols::ConstantStimuli>(result.spec)) return std::nullopt;
-  protocols::Procedure procedure = block->second.begin(trial.participant_number, number);
+  protocols::Procedure procedure = block->begin(trial.participant_number, number);
   for (std::size_t i = 0; i < track.levels.size(); ++i)
     procedure.record({track.levels[i], track.successes[i]});
   result.estimate = procedure.estimate();
@@ -54,6 +59,20 @@ const char* kind_of(const protocols::ProcedureSpec& spec) {
   if (std::holds_alternative<protocols::Staircase>(spec)) return "staircase";
   if (std::holds_alternative<protocols::QuestPlus>(spec)) return "quest_plus";
   return std::holds_alternative<protocols::Limits>(spec) ? "limits" : "constant";
+}
+
+std::optional<protocols::LevelScale> scale_of_adaptive(const protocols::ProcedureSpec& spec) {
+  if (const auto* staircase = std::get_if<protocols::Staircase>(&spec)) return staircase->scale;
+  if (const auto* quest = std::get_if<protocols::QuestPlus>(&spec)) return quest->function.scale;
+  if (const auto* limits = std::get_if<protocols::Limits>(&spec)) return limits->scale;
+  return std::nullopt;
+}
+
+const std::vector<protocols::ProcedureSpec>& specs_of(const TaskTrial& trial,
+                                                      const TaskTable& table) {
+  static const std::vector<protocols::ProcedureSpec> kNone;
+  const protocols::BlockProcedures* const block = block_of(trial, table);
+  return block == nullptr ? kNone : block->specs;
 }
 
 std::vector<Track> tracks_of(const std::vector<const TaskTrial*>& trials, const TaskTable& table) {

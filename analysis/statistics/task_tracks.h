@@ -23,6 +23,12 @@ struct TrackProcedure {
 const char* kind_of(
     const protocols::ProcedureSpec& spec);  ///< as protocols say it: "staircase", ...
 
+/// The scale on which an adaptive procedure has its levels; nullopt: it is none.
+std::optional<protocols::LevelScale> scale_of_adaptive(const protocols::ProcedureSpec& spec);
+/// The procedures of a trial's block; empty: none, or its protocol is not in the source.
+const std::vector<protocols::ProcedureSpec>& specs_of(const TaskTrial& trial,
+                                                      const TaskTable& table);
+
 /// The trials of a track in order, those without an answer left out.
 struct Track {
   std::string name;

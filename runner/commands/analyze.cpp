@@ -68,7 +68,6 @@ analysis::FunctionSettings function_settings(const boost::program_options::varia
     settings.shape = PsychometricShape::normal;
   } else if (function == "weibull") {
     settings.shape = PsychometricShape::weibull;
-    settings.scale = LevelScale::log10;
   } else if (function != "logistic") {
     throw UsageError("--function: expected logistic, normal or weibull, found '" +
                      stimuli::printable(function) + "'");
@@ -181,7 +180,7 @@ int analyze_command(const std::vector<std::string>& args) {
   add("function", po::value(&function)->default_value("logistic")->value_name("NAME"),
       "psychometric function of tasks: logistic, normal or weibull");
   add("scale", po::value(&scale)->value_name("NAME"),
-      "of the levels of psychometric functions: linear or log; default: linear, of weibull log");
+      "of the levels of psychometric functions: linear or log; default: the procedure's");
   const auto values = line.parse(args);
   if (!values) return 0;
   check(*values, settings, line.usage);

@@ -173,6 +173,9 @@ class Tasks(unittest.TestCase):
                     self.assertAlmostEqual(fit["threshold"] / case["threshold"], 1, delta=1e-4)
                     self.assertAlmostEqual(fit["slope"] / case["slope"], 1, delta=2e-3)
                     self.assertAlmostEqual(fit["lapse"], case["fitted_lapse"], delta=1e-4)
+                    for end, value in zip(("lapse_low", "lapse_high"), fit["lapse_ci95"]):
+                        self.assertAlmostEqual(value, case[end], delta=1e-4)
+                    self.assertEqual(fit["guess_ci95"], [case["guess"]] * 2)
                     for end, value in zip(("threshold_low", "threshold_high"), fit["threshold_ci95"]):
                         self.assertAlmostEqual(value / case[end], 1, delta=1e-3)
                     if case["guess"] == 0.5:
@@ -183,6 +186,50 @@ class Tasks(unittest.TestCase):
                                     "weibull": lambda p: math.log10(-math.log(1 - p))}[function]
                         ratio = 10 ** ((quartile(0.75) - quartile(0.25)) / 2 / fit["slope"])
                         self.assertAlmostEqual(fit["weber_fraction"], ratio - 1, delta=1e-6)
+
+    def scales(self, *more):
+        done = subprocess.run([PALPATE, "analyze", *more, "--json", self.path / "scales.json", "--force"], capture_output=True,
+                              text=True)
+        self.assertEqual((done.returncode, done.stderr), (0, ""))
+        cells = json.loads((self.path / "scales.json").read_text())["cells"]
+        return {cell["block_name"]: cell["psychometric_functions"][0]["fit"]["scale"] for cell in cells}, done.stdout
+
+    def test_levels_are_taken_on_the_scale_that_their_procedure_has(self):
+        ball = {"shape": "sphere", "radius_m": 0.025, "subdivisions": 1, "stiffness_n_per_m": 400}
+        compare = {"task": "compare", "stimuli": ["ball"], "standard": "ball", "level": {"path": "/radius_m"}}
+        stairs = {"kind": "staircase", "start": 0.034, "min": 0.026, "max": 0.036, "stop": {"trials": 12}}
+        constant = {"kind": "constant", "repetitions": 4}
+        logs = stairs | {"scale": "log", "steps": [0.02]}
+        procedures = {
+            "even": constant | {"levels": [0.027, 0.03, 0.033]},
+            "ratios": constant | {"levels": {"from": 0.026, "to": 0.036, "count": 5, "spacing": "log"}},
+            "metres": stairs | {"steps": [0.001]}, "logs": logs,
+            "mixed": [stairs | {"steps": [0.001]}, logs]}
+        (self.path / "p.json").write_text(json.dumps({
+            "version": 2, "name": "scales", "renderers": ["ray"], "orientation": "fixed", "stimuli": [{"name": "ball"} | ball],
+            "blocks": [{"name": name, **compare, "procedure": one} for name, one in procedures.items()]}))
+        db = self.path / "scales.db"
+        subprocess.run([PALPATE, "simulate", self.path / "p.json", "--db", db, "--participants", "1"], check=True,
+                       capture_output=True)
+        expected = {"even": "linear", "ratios": "log", "metres": "linear", "logs": "log", "mixed": "linear"}
+        found, text = self.scales("--db", db)
+        self.assertEqual(found, expected)
+        for block, scale in expected.items():
+            words = {"linear": "levels as they are", "log": "logarithm (base 10) of the levels"}[scale]
+            self.assertRegex(text, rf"compare, {block}, .*\n  functions over the {words.replace('(', '[(]').replace(')', '[)]')}\n")
+        self.assertNotIn("[-", text, "no size is below 0")
+        for wish in ("linear", "log"):
+            self.assertEqual(set(self.scales("--db", db, "--scale", wish)[0].values()), {wish})
+        self.assertEqual(set(self.scales("--db", db, "--function", "weibull")[0].values()), {"log"})
+        # A table has no protocol: levels alone tell.
+        table = self.path / "scales.csv"
+        subprocess.run([PALPATE, "export", "--db", db, "--format", "csv", "--out", table], check=True, capture_output=True)
+        self.assertNotIn("--scale log", text)
+        found, text = self.scales("--csv", table)
+        self.assertIn("give --scale log", text)
+        self.assertNotIn("[-", text)
+        self.assertNotIn("--scale log", self.scales("--csv", table, "--scale", "linear")[1])
+        self.assertEqual((found["even"], found["ratios"]), ("linear", "log"))
 
     def test_functions_are_refused_where_they_have_no_meaning(self):
         self.write(rows_of_a_study(1)[:50])

@@ -9,6 +9,7 @@
 #include <cmath>
 #include <cstdio>
 #include <fstream>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <utility>
 #include <vector>
@@ -79,6 +80,15 @@ TEST(PsychometricFit, AgreesWithR) {
     near(fit.threshold_ci95.high, "threshold_high");
     near(fit.slope_ci95.low, "slope_low");
     near(fit.slope_ci95.high, "slope_high");
+    const auto rate_near = [&one](double value, const char* key) {
+      if (one.contains(key) && one[key].is_number()) {
+        EXPECT_NEAR(value, one[key].get<double>(), 1e-4) << key;
+      }
+    };
+    rate_near(fit.lapse_ci95.low, "lapse_low");
+    rate_near(fit.lapse_ci95.high, "lapse_high");
+    rate_near(fit.guess_ci95.low, "guess_low");
+    rate_near(fit.guess_ci95.high, "guess_high");
   }
 }
 
@@ -166,6 +176,80 @@ TEST(PsychometricFit, AStepHasASlopeAtItsBoundAndAThresholdBetween) {
   EXPECT_LT(fit.parameters.threshold, 3);
   EXPECT_TRUE(std::isinf(fit.slope_ci95.high));
   EXPECT_GT(fit.slope_ci95.low, 0);
+  // Any between is as good: the middle, which a mirrored study has mirrored.
+  PsychometricModel model;
+  model.lapse = {0, true, 0.06};
+  for (const double middle : {0.0, 500.0}) {
+    const PsychometricFit step = fit_psychometric(
+        {{middle - 20, 4, 0}, {middle - 10, 4, 0}, {middle + 10, 4, 4}, {middle + 20, 4, 4}},
+        model);
+    EXPECT_TRUE(step.slope_at_bound);
+    EXPECT_NEAR(step.parameters.threshold, middle, 1e-9);
+    EXPECT_NEAR(step.threshold_ci95.high - middle, middle - step.threshold_ci95.low, 1e-2);
+  }
+}
+
+TEST(PsychometricFit, NoThresholdOfLevelsAboveZeroIsBelowIt) {
+  // Nearly always right: where guessing turns into certainty, nobody knows.
+  PsychometricModel model;
+  model.guess.value = 0.5;
+  const std::vector<LevelCount> counts{
+      {0.025, 20, 19}, {0.026, 20, 18}, {0.03, 20, 19}, {0.034, 20, 19}};
+  for (const LevelScale scale : {LevelScale::linear, LevelScale::log10}) {
+    model.function.scale = scale;
+    const PsychometricFit fit = fit_psychometric(counts, model);
+    EXPECT_GE(fit.parameters.threshold, 0);
+    EXPECT_EQ(fit.threshold_ci95.low, 0);
+    const PsychometricPosterior posterior = psychometric_posterior(counts, model);
+    EXPECT_GE(posterior.threshold_ci95.low, 0);
+  }
+  // Levels from 1 to 100: half their range below the least would be -48.
+  model.function.scale = LevelScale::linear;
+  const PsychometricPosterior wide =
+      psychometric_posterior({{1, 20, 15}, {50, 20, 15}, {100, 20, 16}}, model);
+  EXPECT_GE(wide.threshold_ci95.low, 0);
+  // Levels on both sides of 0, as angles: any threshold is possible.
+  std::vector<LevelCount> angles = counts;
+  for (LevelCount& count : angles) count.level = 1000 * count.level - 30;
+  EXPECT_EQ(fit_psychometric(angles, model).threshold_ci95.low,
+            -std::numeric_limits<double>::infinity());
+}
+
+TEST(PsychometricFit, ARateHasAnIntervalWithinItsLimits) {
+  // By the definition: what is held, its profile likelihood over a grid of threshold and slope.
+  PsychometricModel model;
+  model.guess.value = 0.5;
+  model.lapse = {0, true, 0.06};
+  const std::vector<LevelCount> counts{{1, 60, 31}, {2, 60, 33}, {3, 60, 42},
+                                       {4, 60, 54}, {5, 60, 59}, {8, 300, 297}};
+  const auto loss_at = [&](double lapse) {
+    double least = 1e300;
+    for (double threshold = 2.5; threshold < 4; threshold += 0.005) {
+      for (double slope = 0.8; slope < 6; slope *= 1.01) {
+        double loss = 0;
+        for (const auto& [level, n, k] : counts) {
+          const double p = 0.5 + (0.5 - lapse) / (1 + std::exp(-slope * (level - threshold)));
+          loss -= k * std::log(p) + (n - k) * std::log1p(-p);
+        }
+        least = std::min(least, loss);
+      }
+    }
+    return least;
+  };
+  const PsychometricFit fit = fit_psychometric(counts, model);
+  const double allowed = -fit.log_likelihood + 0.5 * 3.841458820694124;
+  ASSERT_GT(fit.lapse_ci95.low, 0);
+  ASSERT_LT(fit.lapse_ci95.high, 0.06);
+  EXPECT_NEAR(loss_at(fit.lapse_ci95.low), allowed, 2e-3);
+  EXPECT_NEAR(loss_at(fit.lapse_ci95.high), allowed, 2e-3);
+  EXPECT_LT(fit.lapse_ci95.low, fit.parameters.lapse);
+  EXPECT_LT(fit.parameters.lapse, fit.lapse_ci95.high);
+  // Few trials tell nothing: all that is possible. A constant has no width.
+  const PsychometricFit few = fit_psychometric({{1, 10, 5}, {2, 10, 7}, {3, 10, 9}}, model);
+  EXPECT_EQ(few.lapse_ci95.low, 0);
+  EXPECT_EQ(few.lapse_ci95.high, 0.06);
+  EXPECT_EQ(few.guess_ci95.low, 0.5);
+  EXPECT_EQ(few.guess_ci95.high, 0.5);
 }
 
 TEST(PsychometricFit, AThresholdOutsideTheLevelsHasAnOpenInterval) {
@@ -231,34 +315,40 @@ TEST(PsychometricFit, IntervalsCoverTheTruthIn200SimulatedStudies) {
        {4, 0.7, 0.5, 0.03}},
   };
   for (const Case& one : cases) {
-    int thresholds = 0, slopes = 0, bayes_thresholds = 0, bayes_slopes = 0, bayes_lapses = 0;
+    int thresholds = 0, slopes = 0, lapses = 0;
+    int bayes_thresholds = 0, bayes_slopes = 0, bayes_lapses = 0;
     for (const std::uint64_t seed : {1U, 2U}) {
       stimuli::Random random(seed, {0xc0});
-      int threshold = 0, slope = 0, bayes_threshold = 0, bayes_slope = 0, bayes_lapse = 0;
+      int threshold = 0, slope = 0, lapse = 0;
+      int bayes_threshold = 0, bayes_slope = 0, bayes_lapse = 0;
       for (int study = 0; study < studies; ++study) {
         const auto counts = simulate_counts(one.model, one.truth, random);
         const PsychometricFit fit = fit_psychometric(counts, one.model);
         ASSERT_EQ(fit.undefined, "");
         threshold += holds(fit.threshold_ci95, one.truth.threshold) ? 1 : 0;
         slope += holds(fit.slope_ci95, one.truth.slope) ? 1 : 0;
+        lapse += holds(fit.lapse_ci95, one.truth.lapse) ? 1 : 0;
         const PsychometricPosterior posterior = psychometric_posterior(counts, one.model);
         bayes_threshold += holds(posterior.threshold_ci95, one.truth.threshold) ? 1 : 0;
         bayes_slope += holds(posterior.slope_ci95, one.truth.slope) ? 1 : 0;
         bayes_lapse += holds(posterior.lapse_ci95, one.truth.lapse) ? 1 : 0;
       }
       std::printf(
-          "%s, seed %llu: intervals hold threshold %d, slope (JND) %d; Bayes %d, %d, lapse %d\n",
-          one.name, static_cast<unsigned long long>(seed), threshold, slope, bayes_threshold,
+          "%s, seed %llu: intervals hold threshold %d, slope (JND) %d, lapse %d; Bayes %d, %d, "
+          "%d\n",
+          one.name, static_cast<unsigned long long>(seed), threshold, slope, lapse, bayes_threshold,
           bayes_slope, bayes_lapse);
       thresholds += threshold;
       slopes += slope;
+      lapses += lapse;
       bayes_thresholds += bayes_threshold;
       bayes_slopes += bayes_slope;
       bayes_lapses += bayes_lapse;
     }
     // Within three standard deviations of the number that is expected.
     const double expected = 0.95 * 2 * studies, three_sd = 3 * std::sqrt(0.05 * expected);
-    for (const int covered : {thresholds, slopes, bayes_thresholds, bayes_slopes, bayes_lapses})
+    for (const int covered :
+         {thresholds, slopes, lapses, bayes_thresholds, bayes_slopes, bayes_lapses})
       EXPECT_GE(covered, expected - three_sd) << one.name;
     for (const int covered : {thresholds, slopes})
       EXPECT_LE(covered, expected + three_sd) << one.name;
@@ -308,7 +398,7 @@ TEST(PsychometricFit, QuickRefitsGiveTheGoodnessOfWholeOnes) {
     }
     std::printf("seed %llu: p of quick and of whole refits differ by %.4f at most; %d missed\n",
                 static_cast<unsigned long long>(seed), most, missed);
-    EXPECT_LE(missed, kRefits / 1000);
+    EXPECT_EQ(missed, 0);
     // The noise of 199 refits is 0.035 at p = 0.5 and 0.015 at p = 0.05.
     EXPECT_LT(most, 0.015);
   }
@@ -336,11 +426,11 @@ TEST(PsychometricPosterior, EqualsADenseGrid) {
   PsychometricModel model;
   model.guess.value = 0.5;
   const PsychometricPosterior posterior = psychometric_posterior(counts, model);
-  // The same priors on a grid of 800 x 800 by the definition: thresholds -1 .. 7, slopes by their
-  // log from 0.1 / 4 to 40 / 1.
+  // The same priors on a grid of 800 x 800 by the definition: thresholds 0 .. 7 (half the range
+  // below would be -1), slopes by their log from 0.1 / 4 to 40 / 1.
   double sum = 0, mean_threshold = 0, square = 0, mean_log_slope = 0;
   for (int i = 0; i < 800; ++i) {
-    const double t = -1 + 8 * (i + 0.5) / 800;
+    const double t = 7 * (i + 0.5) / 800;
     for (int j = 0; j < 800; ++j) {
       const double s = std::log(0.025) + std::log(1600) * (j + 0.5) / 800;
       double weight = 1;

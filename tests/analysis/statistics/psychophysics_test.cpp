@@ -164,6 +164,9 @@ TEST(AdjustmentSettings, SpreadIsAboutTheMeanOfEachDirection) {
   EXPECT_NEAR(*result[0].sd, std::sqrt(2), 1e-12);
   EXPECT_NEAR(*result[0].jnd, 0.67449 * std::sqrt(2), 1e-5);
   EXPECT_EQ(adjustments({{0, 1, 2, true}})[0].sd, std::nullopt);
+  // Two lengths: their t interval would reach far below 0. Angles may.
+  EXPECT_EQ(adjustments({{0, 0.03, 0.035, true}, {0, 0.03, 0.021, false}})[0].pse_ci95->low, 0);
+  EXPECT_LT(adjustments({{0, 0, 35, true}, {0, 0, 21, false}})[0].pse_ci95->low, -50);
 }
 
 TEST(Information, ClosedForms) {
@@ -177,6 +180,9 @@ TEST(Information, ClosedForms) {
   EXPECT_NEAR(*noisy.plain, 1 + 0.25 * std::log2(0.25) + 0.75 * std::log2(0.75), 1e-12);
   EXPECT_NEAR(*noisy.corrected, *noisy.plain - 1 / (160 * std::log(2)), 1e-12);
   EXPECT_EQ(information_transfer({{0, 0}, {0, 0}}).undefined, "no answers");
+  // One error in 30: four cells of nine are filled, and the bias is not below 0.
+  const InformationTransfer few = information_transfer({{10, 0, 0}, {0, 9, 1}, {0, 0, 10}});
+  EXPECT_EQ(*few.corrected, *few.plain);
 }
 
 /// Means over simulated studies of four stimuli of which half are identified, the rest guessed.

@@ -38,6 +38,7 @@ class Screen final : public ParticipantScreen {
     if (shown) shown(page);
   }
   std::vector<KeyPress> keys() override {
+    if (pressed) return pressed();
     if (!wrong_key.empty()) return {{std::exchange(wrong_key, {}), clock_.now_ns()}};
     if (clock_.now_ns() < shown_ns_ + takes_ns) return {};
     if (kind == Page::Kind::text) return {{"space", clock_.now_ns()}};
@@ -49,7 +50,8 @@ class Screen final : public ParticipantScreen {
   std::vector<std::string> texts;
   std::vector<Page> pages;
   std::function<void(const Page&)> shown;
-  std::string wrong_key;  ///< pressed once
+  std::function<std::vector<KeyPress>()> pressed;  ///< in place of all else
+  std::string wrong_key;                           ///< pressed once
   std::atomic<bool> answers{true};
   std::int64_t takes_ns = 0;  ///< to read or to answer
   std::function<void()> on_feedback;
