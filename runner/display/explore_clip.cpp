@@ -6,33 +6,33 @@
 namespace palpate::runner {
 
 ExploreClip::ExploreClip(const Timeline& timeline, const Camera& camera)
-    : renderer_(SceneRenderer::live_quality()),
-      animation_(kWide, kHigh),
-      camera_(camera),
-      from_(std::max(timeline.first(), timeline.now() - kSpan)),
-      to_(timeline.now() > timeline.first() ? timeline.now()
-                                            : std::min(timeline.last(), from_ + kSpan)),
-      next_(from_) {
+    : renderer_(SceneRenderer::live_quality()), animation_(kWide, kHigh), camera_(camera) {
   camera_.resize(kWide, kHigh);
+  const double from = std::max(timeline.first(), timeline.now() - kSpan);
+  const double to =
+      timeline.now() > timeline.first() ? timeline.now() : std::min(timeline.last(), from + kSpan);
+  const auto& all = timeline.moments();
+  for (int i = 0; from + i * kEvery <= to; ++i) {
+    const auto after = std::ranges::upper_bound(all, from + i * kEvery, {}, time_of);
+    moments_.push_back(after != all.begin() ? *std::prev(after) : all.front());
+  }
 }
 
-std::optional<std::string> ExploreClip::go_on(const Timeline& timeline, const Draw& draw,
-                                              const Theme& theme) {
-  const auto& moments = timeline.moments();
-  const auto after = std::ranges::upper_bound(moments, next_, {}, time_of);
-  if (after != moments.begin()) {
-    renderer_.draw(draw(*std::prev(after)), camera_, theme, kWide, kHigh);
-    animation_.add(renderer_.pixels(), next_ - from_);
-    next_ += kEvery;
-  } else {
-    next_ = moments.empty() ? to_ + kEvery : time_of(moments.front());  // dropped meanwhile
+bool ExploreClip::go_on(const Draw& draw, const Theme& theme) {
+  if (drawn_ < moments_.size()) {
+    renderer_.draw(draw(moments_[drawn_]), camera_, theme, kWide, kHigh);
+    animation_.add(renderer_.pixels(), static_cast<double>(drawn_) * kEvery);
+    ++drawn_;
   }
-  if (next_ <= to_) return std::nullopt;
-  return animation_.finish(std::max(next_ - from_, kEvery));
+  return drawn_ == moments_.size();
 }
 
 double ExploreClip::done() const {
-  return to_ > from_ ? std::clamp((next_ - from_) / (to_ - from_), 0.0, 1.0) : 1;
+  return moments_.empty() ? 1 : static_cast<double>(drawn_) / static_cast<double>(moments_.size());
+}
+
+std::string ExploreClip::finish() {
+  return drawn_ > 0 ? animation_.finish(static_cast<double>(drawn_) * kEvery) : std::string();
 }
 
 }  // namespace palpate::runner

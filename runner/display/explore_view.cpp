@@ -3,6 +3,7 @@
 #include <imgui.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <cstdint>
 #include <glm/geometric.hpp>
@@ -121,14 +122,36 @@ void ExploreView::keep_clip() {
   clip_ = std::make_unique<ExploreClip>(timeline_, camera_);
 }
 
+/// One picture more of it. \return whether that was the last
+bool ExploreView::draw_clip() {
+  const auto draw = [this](const SceneMoment& moment) { return picture(&moment); };
+  return clip_->go_on(draw, dark_ ? dark_theme() : light_theme());
+}
+
+void ExploreView::end_clip() {
+  const std::string clip = clip_->finish();
+  clip_.reset();
+  note_ = clip.empty() ? "" : settings_.keep_picture(clip, ".webp");
+}
+
+/// As many pictures as a frame has time for, at least one.
 void ExploreView::continue_clip() {
   if (clip_ == nullptr) return;
-  const auto draw = [this](const SceneMoment& moment) { return picture(&moment); };
-  const std::optional<std::string> clip =
-      clip_->go_on(timeline_, draw, dark_ ? dark_theme() : light_theme());
-  if (!clip) return;
-  clip_.reset();
-  note_ = settings_.keep_picture(*clip, ".webp");
+  constexpr std::chrono::milliseconds kShare(30);
+  const auto began = std::chrono::steady_clock::now();
+  do {
+    if (!draw_clip()) continue;
+    end_clip();
+    return;
+  } while (std::chrono::steady_clock::now() - began < kShare);
+}
+
+std::string ExploreView::finish_clip(const std::function<bool(double)>& go_on) {
+  if (clip_ == nullptr) return {};
+  while (go_on(clip_->done()) && !draw_clip()) {
+  }
+  end_clip();
+  return note_;
 }
 
 void ExploreView::draw(double seconds, const Modifiers& modifiers) {

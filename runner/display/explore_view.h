@@ -2,6 +2,7 @@
 // What the window of a scene shows: its panels, and what they keep from frame to frame.
 
 #include <array>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -32,6 +33,10 @@ class ExploreView {
   void keep_picture();
   void keep_clip();
 
+  /// Draws what is left of a clip and keeps it; less of it where `go_on`, asked before each picture
+  /// with what is done (0 to 1), says no. \return what keep_picture said; empty where none is drawn
+  std::string finish_clip(const std::function<bool(double)>& go_on);
+
  private:
   void take_moments(double seconds);
   void draw_scene(const Modifiers& modifiers, float width, float height);
@@ -51,6 +56,8 @@ class ExploreView {
   void draw_material();
   ScenePicture picture(const SceneMoment* moment) const;
   void continue_clip();
+  bool draw_clip();
+  void end_clip();
 
   ExploreSettings settings_;
   TouchSource& source_;

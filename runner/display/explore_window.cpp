@@ -9,6 +9,8 @@
 
 #include <algorithm>
 #include <chrono>
+#include <iostream>
+#include <string>
 
 #include "runner/display/explore_view.h"
 #include "runner/display/imgui_context.h"
@@ -61,6 +63,7 @@ class ExploreWindow {
           glfwWaitEventsTimeout(next - now);
       }
       source_.emergency_zero();
+      finish_clip();
       close();
     } catch (const DisplayLost&) {
       // Without a display OpenGL and GLFW must not be called: leak what they hold.
@@ -98,6 +101,27 @@ class ExploreWindow {
     flag_when_destroyed(window_, gone_);
     handle_display_errors();
     glfwShowWindow(window_);
+  }
+
+  /// A clip that is still drawn is kept: all of it, or, where the end is asked for by a signal or
+  /// once more by the user, what has been drawn.
+  void finish_clip() {
+    if (gone_ || was_destroyed(window_)) return;
+    glfwMakeContextCurrent(window_);
+    glfwSetWindowShouldClose(window_, GLFW_FALSE);
+    int shown = -1;
+    const std::string kept = view_->finish_clip([&](double done) {
+      glfwPollEvents();
+      if (connection_lost()) throw DisplayLost();
+      const int percent = static_cast<int>(100 * done);
+      if (percent != shown) {
+        shown = percent;
+        const std::string title = "Keeping the clip: " + std::to_string(percent) + " %";
+        glfwSetWindowTitle(window_, title.c_str());
+      }
+      return !ended() && !gone_ && glfwWindowShouldClose(window_) == GLFW_FALSE;
+    });
+    if (!kept.empty()) std::cout << kept << std::endl;
   }
 
   void close() {

@@ -150,6 +150,34 @@ class ExploreWindow(unittest.TestCase):
         self.assertLessEqual(data.count(b"ANMF"), 11)
         self.assertEqual(self.end(), 0)
 
+    def press_c_for_a_long_clip(self):
+        """4 s: 101 pictures, which take longer than the test waits before it ends the window."""
+        path = self.folder / "path.csv"
+        path.write_text("t,tip_x,tip_y,tip_z,tail_x,tail_y,tail_z\n" + "".join(
+            f"{0.01 * k},0,0,{0.05 - 0.00006 * k},0,0.01,{0.17 - 0.00006 * k}\n" for k in range(401)))
+        self.open("--trajectory", path, "--pictures", self.folder / "kept")
+        time.sleep(6)  # to the end of the path
+        self.screen.key("c")
+        time.sleep(2)
+
+    def kept_clip(self):
+        (clip,) = (self.folder / "kept").glob("*.webp")
+        data = clip.read_bytes()
+        self.assertEqual((data[:4], data[8:12]), (b"RIFF", b"WEBP"))
+        self.assertIn("scene-1.webp", self.program.stdout.read())
+        return max(1, data.count(b"ANMF"))  # one picture is no animation
+
+    def test_a_clip_is_finished_when_the_window_is_closed(self):
+        self.press_c_for_a_long_clip()
+        self.screen.ask_to_close(self.window)
+        self.assertEqual(self.program.wait(timeout=120), 0)
+        self.assertGreaterEqual(self.kept_clip(), 90)
+
+    def test_of_a_clip_is_kept_what_was_drawn_before_a_signal(self):
+        self.press_c_for_a_long_clip()
+        self.assertEqual(self.end(), 0)
+        self.assertGreaterEqual(self.kept_clip(), 1)
+
     def test_what_cannot_be_pulled_says_so(self):
         self.open()
         words = lambda: self.pixels(20, int(0.72 * self.height), int(0.6 * self.width), 30)

@@ -1,5 +1,6 @@
 """A display in memory, with keyboard, pointer and a camera: Xvfb, xdotool, ImageMagick."""
 
+import ctypes
 import os
 import shutil
 import signal
@@ -95,6 +96,23 @@ class VirtualScreen:
     def focus(self, window):
         self.do("windowfocus", window)
         wait_for("the keyboard", lambda: self.do("getwindowfocus").strip() == window)
+
+    def ask_to_close(self, window):
+        """As the cross of a window's frame does; xdotool of Debian 12 can only destroy it."""
+        x11 = ctypes.CDLL("libX11.so.6")
+        for name in ("XOpenDisplay", "XInternAtom"):
+            getattr(x11, name).restype = ctypes.c_void_p
+        display = ctypes.c_void_p(x11.XOpenDisplay(self.environment["DISPLAY"].encode()))
+        atom = lambda name: x11.XInternAtom(display, name, 0)
+
+        class ClientMessage(ctypes.Structure):
+            _fields_ = [("type", ctypes.c_int), ("serial", ctypes.c_ulong), ("send_event", ctypes.c_int),
+                        ("display", ctypes.c_void_p), ("window", ctypes.c_ulong), ("message_type", ctypes.c_ulong),
+                        ("format", ctypes.c_int), ("data", ctypes.c_long * 5), ("room", ctypes.c_long * 24)]
+        message = ClientMessage(type=33, window=int(window), message_type=atom(b"WM_PROTOCOLS"), format=32)
+        message.data[0] = atom(b"WM_DELETE_WINDOW")
+        x11.XSendEvent(display, ctypes.c_ulong(int(window)), 0, ctypes.c_long(0), ctypes.byref(message))
+        x11.XCloseDisplay(display)
 
     def size(self, window):
         words = dict(line.split("=") for line in self.do(
