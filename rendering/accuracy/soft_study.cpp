@@ -7,6 +7,7 @@
 #include <memory>
 #include <utility>
 
+#include "rendering/accuracy/line_contact.h"
 #include "rendering/bodies/soft/soft_coupling.h"
 #include "stimuli/random.h"
 
@@ -97,20 +98,15 @@ struct PressedSlab {
   double step_ns = 0;
 };
 
-/// \param goal  m; the virtual tool is that deep
-PressedSlab press_slab(const Vec3& size, int resolution, const SoftContactSettings& contact,
-                       const PlacedTool& tool, const Vec3& above, double goal, const Clock& now) {
-  stimuli::ObjectSpec spec;
-  spec.shape = stimuli::ShapeKind::box;
-  spec.size = size;
-  stimuli::SolidMesh mesh = stimuli::mesh_of_primitive(spec, resolution);
-  const double half = size.z / 2;
+/// \param half  m, of the slab's height. \param goal  m; the virtual tool is that deep
+PressedSlab press_slab(stimuli::SolidMesh mesh, double half, double poisson,
+                       const SoftContactSettings& contact, const PlacedTool& tool,
+                       const Vec3& above, double goal, const Clock& now) {
   const auto held = nodes_where(mesh, [&](const Vec3& p) { return p.z < -0.999 * half; });
   PressedSlab pressed;
   pressed.body = std::make_shared<const SoftBody>(
       std::move(mesh), held,
-      SoftSettings{.material = {.young = kYoungModulus, .poisson = kPoissonRatio},
-                   .step = kStepTime});
+      SoftSettings{.material = {.young = kYoungModulus, .poisson = poisson}, .step = kStepTime});
   const SoftObject object(pressed.body, contact, 0);
   SoftObjectState state = initial_state(object);
   Vec3 at = above;
@@ -130,14 +126,21 @@ PressedSlab press_slab(const Vec3& size, int resolution, const SoftContactSettin
   return pressed;
 }
 
+stimuli::SolidMesh box_mesh(const Vec3& size, int resolution) {
+  stimuli::ObjectSpec spec;
+  spec.shape = stimuli::ShapeKind::box;
+  spec.size = size;
+  return stimuli::mesh_of_primitive(spec, resolution);
+}
+
 SoftRow ball(int resolution, const Clock& now) {
   constexpr double kBall = 0.02, kHigh = 0.05;
   PlacedTool tool;
   tool.count = 1;
   tool.segments[0] = {Vec3(0), Vec3(0)};
-  const PressedSlab pressed =
-      press_slab({0.1, 0.1, kHigh}, resolution, {.radius = kBall, .stiffness = 1e5, .most = 128},
-                 tool, {0.0003, 0.0002, 0}, 0.004, now);
+  const PressedSlab pressed = press_slab(
+      box_mesh({0.1, 0.1, kHigh}, resolution), kHigh / 2, kPoissonRatio,
+      {.radius = kBall, .stiffness = 1e5, .most = 128}, tool, {0.0003, 0.0002, 0}, 0.004, now);
   // Dimitriadis et al. 2002, bonded to its base, for incompressible layers; Hertz for thick ones.
   const double x = std::sqrt(kBall * pressed.sunk) / kHigh;
   const double thin = 1 + x * (1.133 + x * (1.283 + x * (0.769 + x * 0.0975)));
@@ -154,8 +157,29 @@ PressedSlab lying(int resolution, const Clock& now) {
   PlacedTool tool;
   tool.count = 1;
   tool.segments[0] = {Vec3(-0.06, 0, 0), Vec3(0.12, 0, 0)};
-  return press_slab({0.1, 0.1, 0.04}, resolution, {.radius = 0.01, .stiffness = 1e5, .most = 128},
-                    tool, {0, 0.0002, 0}, 0.008, now);
+  return press_slab(box_mesh({0.1, 0.1, 0.04}, resolution), 0.02, kPoissonRatio,
+                    {.radius = 0.01, .stiffness = 1e5, .most = 128}, tool, {0, 0.0002, 0}, 0.008,
+                    now);
+}
+
+/// Hertz's cylinder. Poisson's ratio 0: then sides that are free are in plane strain.
+/// \param resolution  elements over the slab's width
+SoftRow line(int resolution, const Clock& now) {
+  constexpr double kWide = 0.16, kLong = 0.02;
+  const LineContact contact{.young = kYoungModulus, .poisson = 0};
+  PlacedTool tool;
+  tool.count = 1;
+  tool.segments[0] = {Vec3(0, -kLong, 0), Vec3(0, 2 * kLong, 0)};
+  const PressedSlab pressed = press_slab(
+      stimuli::mesh_of_box({kWide, kLong, contact.thickness},
+                           {resolution, 2, std::max(2, 3 * resolution / 8)}),
+      contact.thickness / 2, contact.poisson,
+      {.radius = contact.radius, .stiffness = 1e5, .most = 128}, tool, {0.0003, 0, 0}, 0.0025, now);
+  SoftRow row = row_of("cylinder on a slab, " + std::to_string(resolution) + " across",
+                       "Hertz, on a bonded layer", pressed.body->mesh(), pressed.force,
+                       kLong * line_force(contact, pressed.sunk), "N");
+  row.step_ns = pressed.step_ns;
+  return row;
 }
 
 /// A cylinder lying across, pressed by a fifth of the thickness; the truth is the finest mesh's.
@@ -231,6 +255,8 @@ std::vector<SoftRow> soft_study(bool quick, const std::function<double()>& now,
     rows.push_back(ball(resolution, now));
     progress(0.5);
   }
+  for (const int across : quick ? std::vector{8, 16} : std::vector{8, 16, 32})
+    rows.push_back(line(across, now));
   add_cylinder(quick, now, rows);
   return rows;
 }
