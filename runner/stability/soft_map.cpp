@@ -9,15 +9,16 @@
 
 #include "rendering/bodies/soft/soft_build.h"
 #include "rendering/bodies/soft/soft_coupling.h"
+#include "stimuli/random.h"
 #include "stimuli/solids/solid_mesh.h"
 
 namespace palpate::runner {
 namespace {
 
-constexpr double kModuli[] = {1e3, 1e4, 1e5, 1e6, 1e7};               // Pa
-constexpr double kRates[] = {62.5, 125, 250, 500, 1000};              // Hz
-constexpr double kSprings[] = {200, 800, 3000};                       // N/m
-constexpr double kHalf = 0.015, kPressed = 0.003, kSoftTick = 0.001;  // m, m, s
+constexpr double kModuli[] = {1e3, 1e4, 1e5, 1e6, 1e7};   // Pa
+constexpr double kRates[] = {62.5, 125, 250, 500, 1000};  // Hz
+constexpr double kSprings[] = {200, 800, 3000};           // N/m
+constexpr double kHalf = 0.015, kSoftTick = 0.001;        // m, s
 constexpr int kHeldTicks = 1500, kWatchedTicks = 200;
 
 rendering::SoftObject slab(const SoftCase& what) {
@@ -62,13 +63,13 @@ SoftSwing press_and_hold(const SoftCase& what) {
   SoftSwing out{.what = what};
   out.accepted = rendering::coupling_is_stable(
       {.young = what.young, .poisson = what.poisson, .damping = what.damping}, what.rate);
-  Vec3 at(0.0003, 0.0002, kHalf + what.radius + 0.0005);
-  const double goal = kHalf + what.radius - kPressed;
+  Vec3 at(what.x, what.y, kHalf + what.radius + 0.0005);
+  const double goal = kHalf + what.radius - what.depth;
   double low = std::numeric_limits<double>::infinity(), high = -low, sum = 0;
-  constexpr double kFall = 2e-5;  // m, in a tick
-  const int falling = static_cast<int>((at.z - goal) / kFall) + 1;
+  const double fall = what.speed * kSoftTick;
+  const int falling = static_cast<int>((at.z - goal) / fall) + 1;
   for (int i = 0; i < falling + kHeldTicks; ++i) {
-    const double step = std::max(-kFall, goal - at.z);
+    const double step = std::max(-fall, goal - at.z);
     at.z += step;
     const double force = rendering::advance(object, state, at, tool, std::abs(step), kSoftTick).z;
     out.finite = out.finite && std::isfinite(force);
@@ -94,6 +95,18 @@ std::vector<SoftCase> soft_cases() {
           out.push_back({young, spring, rate, tool.radius, tool.poisson, tool.damping});
       }
     }
+  }
+  return out;
+}
+
+std::vector<SoftCase> soft_cases_elsewhere(std::uint64_t seed) {
+  stimuli::Random random(seed);
+  std::vector<SoftCase> out = soft_cases();
+  for (SoftCase& one : out) {
+    one.x = 0.04 * (random.unit() - 0.5);
+    one.y = 0.04 * (random.unit() - 0.5);
+    one.depth = 0.001 + 0.005 * random.unit();
+    one.speed = 0.005 * std::pow(40, random.unit());
   }
   return out;
 }

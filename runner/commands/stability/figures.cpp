@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <string>
 #include <utility>
 #include <vector>
@@ -10,6 +11,7 @@
 #include "analysis/figures/axes.h"
 #include "analysis/figures/marks.h"
 #include "analysis/figures/palette.h"
+#include "analysis/text.h"
 #include "runner/commands/accuracy/report.h"
 #include "runner/commands/stability/report.h"
 
@@ -60,6 +62,11 @@ void add_curve(analysis::Panel& panel, const BoundaryCurve& curve, analysis::Rol
   if (theory.x.size() > 1) panel.marks.push_back(std::move(theory));
 }
 
+/// "20 kPa", "1 MPa"
+std::string in_pascals(double modulus) {
+  return modulus < 1e6 ? significant(modulus / 1e3) + " kPa" : significant(modulus / 1e6) + " MPa";
+}
+
 }  // namespace
 
 analysis::Figure stability_figure(const StabilityReport& report) {
@@ -91,6 +98,73 @@ analysis::Figure stability_figure(const StabilityReport& report) {
     add_curve(panel, curve, analysis::line_role(row));
     add_name(panel, curve.name, analysis::line_role(row), row);
     ++row;
+  }
+  return figure;
+}
+
+analysis::Figure soft_map_figure(const std::vector<SoftSwing>& map) {
+  constexpr double kCellWidth = 64, kCellHeight = 19;  // px
+  analysis::Figure figure;
+  figure.id = "soft-stability";
+  int allowed = 0, settled = 0;
+  for (const SoftSwing& one : map) {
+    allowed += one.accepted;
+    settled += one.accepted && one.settles();
+  }
+  figure.title =
+      "A tool held still on a soft body: where scenes may have it, the force comes to rest";
+  figure.subtitle =
+      "Swing of the force in % of it, highest less lowest of the last 0.2 s. Amber: "
+      "refused. Blue: " +
+      std::to_string(settled) + " of " + std::to_string(allowed) +
+      " that scenes may have within 1 %.";
+  figure.description =
+      "Stability of soft bodies. A panel for each tool and material; rows are moduli and contact "
+      "springs, columns the rate of the body's steps, numbers the swing of the force in percent.";
+  figure.max_row_width = kRoom;
+  std::vector<std::string> rates, rows;
+  for (const SoftSwing& one : map) {
+    const SoftCase& what = one.what;
+    const std::string title = "tool of " + significant(1000 * what.radius) + " mm, Poisson " +
+                              significant(what.poisson) + ", damping " +
+                              significant(1000 * what.damping) + " ms";
+    const auto slot = [](std::vector<std::string>& names, const std::string& name) {
+      const auto at = std::find(names.begin(), names.end(), name) - names.begin();
+      if (at == std::ssize(names)) names.push_back(name);
+      return static_cast<double>(at);
+    };
+    if (figure.panels.empty() || figure.panels.back().title != title) {
+      figure.panels.emplace_back();
+      figure.panels.back().title = title;
+    }
+    const std::string rate = analysis::fixed(what.rate, what.rate < 100 ? 1 : 0);
+    const double x = slot(rates, rate),
+                 y = slot(rows, in_pascals(what.young) + ", " + significant(what.stiffness / 1000) +
+                                    " kN/m");
+    analysis::Panel& panel = figure.panels.back();
+    const std::string swing = one.finite ? significant(100 * one.swing) : "no number";
+    // Rows are turned about once their number is known.
+    panel.marks.push_back(analysis::rect_mark(
+        one.accepted ? analysis::Role::point : analysis::Role::amber, x + 0.03, -y - 0.05, x + 0.97,
+        -y - 0.95, one.settles() ? (one.accepted ? 0.16 : 0.25) : 0.8,
+        title + ", " + rows[static_cast<std::size_t>(y)] + ", " + rate + " Hz: " + swing + " %" +
+            (one.accepted ? "" : ", refused")));
+    // Less than a hundredth of a percent is nothing that a number need say.
+    analysis::Mark text =
+        analysis::text_mark(one.settles() ? analysis::Role::ink : analysis::Role::page, x + 0.5,
+                            -y - 0.5, one.finite && one.swing < 1e-4 ? "0" : swing, 11);
+    text.dy = 4;
+    panel.marks.push_back(std::move(text));
+  }
+  for (analysis::Panel& panel : figure.panels) {
+    panel.x = analysis::names_axis(rates, rates.size(), "rate of the body's steps (Hz)");
+    panel.y = analysis::names_axis(rows, rows.size(), "");
+    for (analysis::Tick& tick : panel.y.ticks) tick.at = panel.y.high - tick.at;
+    for (analysis::Mark& mark : panel.marks) {
+      for (double& y : mark.y) y += panel.y.high;
+    }
+    panel.width = kCellWidth * static_cast<double>(rates.size());
+    panel.height = kCellHeight * static_cast<double>(rows.size());
   }
   return figure;
 }

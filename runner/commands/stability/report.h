@@ -9,6 +9,7 @@
 #include "analysis/report/tables.h"
 #include "runner/stability/boundary.h"
 #include "runner/stability/integrators.h"
+#include "runner/stability/soft_map.h"
 
 namespace palpate::runner {
 
@@ -48,6 +49,8 @@ nlohmann::ordered_json stability_json(const StabilityReport& report);
 analysis::Figure stability_figure(const StabilityReport& report);
 /// Error over run time of the integrators.
 analysis::Figure integrator_figure(const StabilityReport& report);
+/// Swing of the force on soft bodies, by modulus, spring and rate, a panel for each tool.
+analysis::Figure soft_map_figure(const std::vector<SoftSwing>& map);
 std::string stability_page(const StabilityReport& report);
 
 }  // namespace palpate::runner

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <atomic>
+#include <cstdint>
 #include <functional>
 #include <iostream>
 #include <string>
@@ -188,19 +189,13 @@ StabilityReport study(bool full, int jobs) {
   return report;
 }
 
-/// The map of soft bodies. \return the exit code
-int study_soft(int jobs) {
-  const std::vector<SoftCase> cases = soft_cases();
+std::vector<SoftSwing> study_soft(const std::vector<SoftCase>& cases, int jobs) {
   std::vector<SoftSwing> map(cases.size());
   std::vector<std::function<void()>> tasks;
   for (std::size_t i = 0; i < cases.size(); ++i)
     tasks.emplace_back([&, i] { map[i] = press_and_hold(cases[i]); });
   run_all(tasks, jobs);
-  std::cout << soft_map_text(map);
-  return std::ranges::all_of(map,
-                             [](const SoftSwing& one) { return !one.accepted || one.settles(); })
-             ? 0
-             : 1;
+  return map;
 }
 
 }  // namespace
@@ -209,7 +204,7 @@ int stability_command(const std::vector<std::string>& args) {
   CommandLine line;
   line.usage =
       "palpate stability [--full] [--report FILE.html] [--json FILE]\n"
-      "       palpate stability --soft";
+      "       palpate stability --soft [--seed S] [--figure FILE.svg]";
   line.summary =
       "At what stiffness does a contact become unstable (buzz)? Simulates the closed loop of\n"
       "hand, two devices and renderer against a wall, an edge, a sphere, two objects and a body\n"
@@ -222,10 +217,13 @@ int stability_command(const std::vector<std::string>& args) {
       "  palpate stability --full --report stability.html --json stability.json";
   std::string json, page, figure;
   int jobs = 0;
+  std::uint64_t seed = 0;
   auto add = line.options.add_options();
   namespace po = boost::program_options;
   add("full", "four stiffnesses a decade instead of one");
   add("soft", "the map of soft bodies alone: moduli, springs, rates of the body (a minute)");
+  add("seed", po::value(&seed)->value_name("S"),
+      "with --soft: other places, depths and speeds, as drawn with this seed");
   add("report", po::value(&page)->value_name("FILE"),
       "write a report with figures as an HTML page");
   add("figure", po::value(&figure)->value_name("FILE"), "write the map as SVG");
@@ -240,12 +238,20 @@ int stability_command(const std::vector<std::string>& args) {
   Outputs outputs(*values, {"json", "report", "figure"}, {});
   if (jobs == 0) jobs = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
   if (values->count("soft") > 0) {
-    for (const char* const other : {"full", "report", "figure", "json"}) {
+    for (const char* const other : {"full", "report", "json"}) {
       if (values->count(other) > 0)
         throw UsageError(std::string("--soft: expected without --") + other);
     }
-    return study_soft(jobs);
+    const std::vector<SoftSwing> map =
+        study_soft(values->count("seed") > 0 ? soft_cases_elsewhere(seed) : soft_cases(), jobs);
+    if (outputs.wanted("figure"))
+      outputs.put("figure", analysis::figure_svg(soft_map_figure(map), analysis::light_palette()));
+    outputs.write();
+    std::cout << soft_map_text(map);
+    const auto is_good = [](const SoftSwing& one) { return !one.accepted || one.settles(); };
+    return std::ranges::all_of(map, is_good) ? 0 : 1;
   }
+  if (values->count("seed") > 0) throw UsageError("--seed: expected with --soft");
   const StabilityReport report = study(values->count("full") > 0, jobs);
   if (outputs.wanted("json")) outputs.put("json", stability_json(report).dump(1) + "\n");
   if (outputs.wanted("figure"))

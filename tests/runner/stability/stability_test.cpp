@@ -216,5 +216,21 @@ TEST(SoftMap, ScenesHaveWhatComesToRestAndNotWhatSwings) {
   EXPECT_FALSE(wild.accepted);
 }
 
+TEST(SoftMap, ScenesHaveWhatComesToRestElsewhereAsWell) {
+  const std::vector<SoftCase> cases = soft_cases_elsewhere(3), others = soft_cases_elsewhere(4);
+  ASSERT_EQ(cases.size(), soft_cases().size());
+  EXPECT_NE(cases[0].x, others[0].x);
+  int tried = 0;
+  for (std::size_t i = 0; i < cases.size(); i += 16) {
+    EXPECT_LT(std::max(std::abs(cases[i].x), std::abs(cases[i].y)), 0.02);
+    const SoftSwing swing = press_and_hold(cases[i]);
+    EXPECT_TRUE(swing.finite);
+    if (!swing.accepted) continue;
+    EXPECT_TRUE(swing.settles()) << i << " " << swing.swing;
+    ++tried;
+  }
+  EXPECT_GT(tried, 9);
+}
+
 }  // namespace
 }  // namespace palpate::runner
