@@ -9,6 +9,7 @@
 #include <numbers>
 #include <sstream>
 #include <utility>
+#include <vector>
 
 #include "rendering/first_contact.h"
 #include "rendering/verification/entry_feature.h"
@@ -138,12 +139,36 @@ class Walk {
       counts_.turned_elsewhere += elsewhere;
       return;
     }
+    // A step may have led through a thin part and past it: then another feature holds the probe.
+    if (elsewhere && !is_outside_until(local, *time)) return;
     ++counts_.passages;
     if (elsewhere) {
       ++counts_.passed_through;
       report(held ? "held elsewhere, depth off by" : "passed through, depth",
              held ? r.deepest.depth - at_end.depth : at_end.depth, local);
     }
+  }
+
+  /// Whether the probe is outside until it enters, at a fraction of the tick: at all times it is
+  /// farther away than it moves until one at which its distance was measured. False also where
+  /// that would take too many looks.
+  bool is_outside_until(const LineProbe& local, double entry) const {
+    constexpr int kMostLooks = 100'000;
+    constexpr double kAtEntry = 1e-6;  // of the tick; so long before it nothing is told
+    const double motion =
+        std::max(glm::length(local.tip - last_.tip), glm::length(local.tail - last_.tail));
+    std::vector<std::pair<double, double>> left{{0, entry}};
+    for (int look = 0; look < kMostLooks && !left.empty(); ++look) {
+      const auto [from, to] = left.back();
+      left.pop_back();
+      const double middle = 0.5 * (from + to);
+      if (from > entry - kAtEntry ||
+          reference_gap(*mesh_, interpolated(last_, local, middle)) > 0.5 * (to - from) * motion)
+        continue;
+      left.emplace_back(from, middle);
+      left.emplace_back(middle, to);
+    }
+    return left.empty();
   }
 
   /// Whether the ideal probe lies well inside a facet of M: at its rim rounding decides which facet
