@@ -158,6 +158,11 @@ def sweep_gains(palpate, folder):
     shutil.copyfile(folder / "sweep" / "gains.svg", IMAGES / "sweep-gains.svg")
 
 
+def soft_stability(palpate, folder):
+    subprocess.run([palpate, "stability", "--soft", "--figure", IMAGES / "soft-stability.svg", "--force"], stdout=subprocess.DEVNULL,
+                   check=True)
+
+
 def example(name):
     """By the Python module of the same build, which takes minutes."""
     def make(palpate, folder):
@@ -201,7 +206,7 @@ def explore_window(palpate, folder):
 SCENES = ["fig3b-extended-probe", "fig13-two-objects", "fig14-dumbbells", "fig16-rocket", "fig17a-engine", "fig17b-instrument", "layers"]
 PICTURES = {**{name: scene(name) for name in SCENES},
             "explore-window": explore_window, "live-session": lambda *arguments: undisturbed(live_session, *arguments), "figure15": figure("figure15"),
-            "speedup": figure("speedup"), "power": power, "sweep-gains": sweep_gains,
+            "speedup": figure("speedup"), "power": power, "sweep-gains": sweep_gains, "soft-stability": soft_stability,
             "recover-parameters": example("recover_parameters"), "choose-sizes": example("choose_sizes")}
 
 
