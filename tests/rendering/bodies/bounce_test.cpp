@@ -257,7 +257,7 @@ TEST(Bounce, FastOnTheTipItGetsNoEnergyAndTheHandItsMomentum) {
 
 /// A stylus that still comes between the balls of a dumbbell that turns: where both meet it, from
 /// opposite sides, the ideal stylus is centimetres away although nobody has pressed it so far.
-TEST(Bounce, DumbbellsThatTurnOnAStylusGetNoEnergy) {
+TEST(Bounce, DumbbellsThatTurnOnAStylusGetLittleEnergy) {
   stimuli::Random random(105);
   const Mesh ball = mesh_of(stimuli::icosphere(0.02, 3));
   const Mesh bar = mesh_of(stimuli::cylinder(0.008, 0.06, 24));
@@ -284,7 +284,7 @@ TEST(Bounce, DumbbellsThatTurnOnAStylusGetNoEnergy) {
       touches |= ray_renderer().tick(scene, state, probe, i == 0 ? 0 : 1e-3).contacts > 0;
       most = std::max(most, energy_of(scene, state));
     }
-    EXPECT_LE(most, 1.3 * before) << trial;
+    EXPECT_LE(most, 1.3 * before) << trial;  // found: up to 1.25, where it jams the stylus
     touched += touches ? 1 : 0;
   }
   EXPECT_GT(touched, 80);
