@@ -134,13 +134,8 @@ class ExploreWindow(unittest.TestCase):
         self.assertEqual(self.end(), 0)
 
     def test_a_clip_is_kept_of_what_was_seen(self):
-        # 0.4 s; a picture each 40 ms, which a machine without a graphics card draws in seconds when it is busy.
-        path = self.folder / "path.csv"
-        path.write_text("t,tip_x,tip_y,tip_z,tail_x,tail_y,tail_z\n" + "".join(
-            f"{0.01 * k},0,0,{0.05 - 0.0006 * k},0,0.01,{0.17 - 0.0006 * k}\n" for k in range(41)))
-        self.open("--trajectory", path, "--pictures", self.folder / "kept")
-        time.sleep(2)  # to the end of the path
-        self.screen.key("c")
+        # A picture each 40 ms, which a machine without a graphics card draws in seconds when it is busy.
+        self.press_c_after(0.4)
         clip = wait_for("the clip", lambda: list((self.folder / "kept").glob("scene-1.webp")))[0]
         self.screen.keep(self.window, "explore_clip")
         data = clip.read_bytes()
@@ -150,14 +145,19 @@ class ExploreWindow(unittest.TestCase):
         self.assertLessEqual(data.count(b"ANMF"), 11)
         self.assertEqual(self.end(), 0)
 
-    def press_c_for_a_long_clip(self):
-        """4 s: 101 pictures, which take longer than the test waits before it ends the window."""
+    def press_c_after(self, seconds):
+        """For a clip of a path that so long goes 24 mm down."""
         path = self.folder / "path.csv"
+        steps = round(100 * seconds)
         path.write_text("t,tip_x,tip_y,tip_z,tail_x,tail_y,tail_z\n" + "".join(
-            f"{0.01 * k},0,0,{0.05 - 0.00006 * k},0,0.01,{0.17 - 0.00006 * k}\n" for k in range(401)))
+            f"{0.01 * k},0,0,{0.05 - 0.024 * k / steps},0,0.01,{0.17 - 0.024 * k / steps}\n" for k in range(steps + 1)))
         self.open("--trajectory", path, "--pictures", self.folder / "kept")
-        time.sleep(6)  # to the end of the path
+        time.sleep(seconds + 2)  # to the end of the path
         self.screen.key("c")
+
+    def press_c_for_a_long_clip(self):
+        """101 pictures, which take longer than the test waits before it ends the window."""
+        self.press_c_after(4)
         time.sleep(2)
 
     def kept_clip(self):
