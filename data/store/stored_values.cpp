@@ -65,6 +65,9 @@ void require_valid_record(const StoredTrial& trial) {
   require_amount(trial, "response_time", record.response_time);
   require_amount(trial, "first_contact_time", record.first_contact_time.value_or(0));
   require_amount(trial, "max_force", record.max_force);
+  require_amount(trial, "contact_share", record.contact_share.value_or(0));
+  if (record.contact_share.value_or(0) > 1) throw_damaged(trial, "contact_share", "is above 1");
+  require_amount(trial, "edge_dwell", record.edge_dwell.value_or(0));
 }
 
 }  // namespace palpate::data

@@ -171,15 +171,15 @@ struct PathBuilder {
       const Vec3 along = glm::normalize(v1 - v0);
       const Vec3 normal = mesh.facets()[edge.left].normal;
       const Vec3 across = glm::cross(normal, along);
-      const Vec3 directions[] = {along, across, normal, unit_or_x(along + across),
-                                 unit_or_x(pick(mesh.vertices()) - v0)};
-      Vec3 direction = unit_or_x(directions[random.below(5)] + tiny() * random_direction(random));
+      const std::array directions{along, across, normal, unit_or_x(along + across),
+                                  unit_or_x(pick(mesh.vertices()) - v0)};
+      Vec3 direction = unit_or_x(pick(directions) + tiny() * random_direction(random));
       if (random.below(2)) direction = -direction;
       const Vec3 touch = random.below(2) ? v0 : v0 + random.unit() * (v1 - v0);
-      const Vec3 motions[] = {normal, along, across, direction,
-                              unit_or_x(normal + mesh.facets()[edge.right].normal)};
-      const Vec3 motion = motions[random.below(5)];
-      const Vec3 second = motions[random.below(5)];
+      const std::array motions{normal, along, across, direction,
+                               unit_or_x(normal + mesh.facets()[edge.right].normal)};
+      const Vec3 motion = pick(motions);
+      const Vec3 second = pick(motions);
       const double fraction = side && random.below(2)
                                   ? random.unit()
                                   : (side ? static_cast<double>(random.below(2)) : 0);

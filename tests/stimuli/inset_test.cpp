@@ -23,11 +23,6 @@
 namespace palpate::stimuli {
 namespace {
 
-struct HalfSpace {
-  Vec3 normal;
-  double offset;
-};
-
 std::vector<HalfSpace> moved_planes(const ConvexMesh& mesh, double depth) {
   std::vector<HalfSpace> planes;
   for (const Facet& facet : mesh.facets()) planes.push_back({facet.normal, facet.offset - depth});
@@ -231,6 +226,34 @@ TEST(Inset, OfAPlateStaysAPlate) {
     expect_as_defined(mesh, 0.001 * share, *in);
   }
   EXPECT_FALSE(inset(mesh, 0.001));
+}
+
+TEST(Inset, ACornerOfManyPlanesThatRoundingTakesApartIsOneCorner) {
+  // A pyramid of 48 sides whose planes miss its apex by about 1e-12 of its size.
+  constexpr double kSize = 0.06;
+  constexpr int kSides = 48;
+  Random random(36);
+  for (int body = 0; body < 20; ++body) {
+    const Quat rotation = uniform_rotation(random);
+    const Vec3 apex = rotation * Vec3(0, 0, 0.5 * kSize);
+    std::vector<HalfSpace> planes{{rotation * Vec3(0, 0, -1), 0.5 * kSize}};
+    for (int i = 0; i < kSides; ++i) {
+      const double angle = 2 * M_PI * i / kSides;
+      const Vec3 normal = rotation * glm::normalize(Vec3(std::cos(angle), std::sin(angle), 1));
+      planes.push_back({normal, glm::dot(normal, apex) + 1e-12 * kSize * random.normal()});
+    }
+    const auto pyramid = body_behind(planes, Vec3(0), kSize);
+    EXPECT_EQ(pyramid->facets().size(), kSides + 1U);
+    std::size_t at_base = 0;
+    for (const Vec3& v : pyramid->vertices()) {
+      EXPECT_LE(furthest_outside(planes, v), 1e-9 * kSize);
+      if (glm::distance(v, apex) > 1e-7 * kSize) {
+        EXPECT_NEAR(glm::distance(v, -apex), kSize / std::cos(M_PI / kSides), 1e-9 * kSize);
+        ++at_base;
+      }
+    }
+    EXPECT_EQ(at_base, kSides);
+  }
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <utility>
 
 #include "tests/data/export/csv_fixture.h"
 
@@ -35,6 +36,14 @@ TEST_F(ExportCsv, TheCodebookDescribesEveryColumnAndBit) {
     if (row.at("column") == "shape") shapes[row.at("value")] = row.at("meaning");
   }
   EXPECT_EQ(described, rows()[0]);
+  std::map<std::pair<std::string, std::string>, std::string> column_of;
+  for (std::size_t i = 1; i < book.size(); ++i) {
+    const auto row = by_name(book, i);
+    if (!row.at("value").empty()) continue;
+    const auto [other, fresh] =
+        column_of.emplace(std::pair(row.at("table"), row.at("meaning")), row.at("column"));
+    EXPECT_TRUE(fresh) << row.at("column") << " is described as " << other->second << " is";
+  }
   EXPECT_EQ(bits.at("16"), "force-limited: ...");
   EXPECT_EQ(bits.at("2048"), "old-reading: ...");
   EXPECT_TRUE(shapes.contains("'-cube")) << "as it stands in the table";

@@ -72,6 +72,17 @@ TEST_F(Merging, OverlappingSessionsOfOneParticipantAreAConflict) {
   EXPECT_TRUE(contains(refusal({a_, b_}), "sessions 1 and 2 were at the same time"));
 }
 
+TEST_F(Merging, ASessionLastsUntilItsLastRunHasEnded) {
+  {
+    Store a = open_station(a_), b = open_station(b_);
+    record_session(a, "P1", 1, 1);
+    record_session(b, "P1", 1, 2);
+  }
+  // The second run of session 1 began half a day before session 2, long after which it was closed.
+  record_otherwise(a_, "UPDATE runs SET ended_ns = ended_ns + 86400000000000 WHERE id = 2");
+  EXPECT_TRUE(contains(refusal({a_, b_}), "sessions 1 and 2 were at the same time"));
+}
+
 TEST_F(Merging, DifferentProtocolsUnderOneNameAreRefused) {
   {
     Store a = open_station(a_), b = open_station(b_);

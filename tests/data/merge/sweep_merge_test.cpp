@@ -1,5 +1,8 @@
 #include "data/merge/sweep_merge.h"
 
+#include <functional>
+#include <utility>
+
 #include "tests/data/store/sweep_fixture.h"
 
 namespace palpate::data {
@@ -69,6 +72,32 @@ TEST_F(SweepMerges, AnotherPlanIsRefusedWithWhatDiffers) {
   other.seed = 7;
   make_sweep(folder_ / "b.sweep", {2}, false, other);
   expect_refused({a, folder_ / "b.sweep"}, "seed: 18446744073709551615 and 7");
+}
+
+TEST(SweepPlans, EveryDifferenceIsNamedAndNoOther) {
+  const SweepPlan plan = a_sweep_plan();
+  EXPECT_TRUE(differences(plan, plan).empty());
+  // What changes a field, and how the sentence about it must begin.
+  const std::vector<std::pair<std::string, std::function<void(SweepPlan&)>>> changes{
+      {"protocol", [](SweepPlan& p) { p.protocol = R"({"name": "other"})"; }},
+      {"contents of the files", [](SweepPlan& p) { p.files_sha256 = std::string(64, 'a'); }},
+      {"settings of the participant", [](SweepPlan& p) { p.settings = R"({"motor": {}})"; }},
+      {"space", [](SweepPlan& p) { p.space = R"({"version": 1})"; }},
+      {"design: \"lhs\" and \"grid\"", [](SweepPlan& p) { p.design = "grid"; }},
+      {"points: 20 and 21", [](SweepPlan& p) { p.points = 21; }},
+      {"seed", [](SweepPlan& p) { p.seed = 2; }},
+      {"participants: 3 and 4", [](SweepPlan& p) { p.participants = 4; }},
+      {"program version", [](SweepPlan& p) { p.program_version = "1.2.4"; }},
+      {"parameters", [](SweepPlan& p) { p.parameters.pop_back(); }},
+      {"shapes", [](SweepPlan& p) { p.shapes.front() = "cap"; }},
+      {"renderers", [](SweepPlan& p) { std::swap(p.renderers[0], p.renderers[1]); }}};
+  for (const auto& [begin, change] : changes) {
+    SweepPlan other = plan;
+    change(other);
+    const std::vector<std::string> said = differences(plan, other);
+    ASSERT_EQ(said.size(), 1U) << begin;
+    EXPECT_TRUE(said[0].starts_with(begin)) << said[0];
+  }
 }
 
 TEST_F(SweepMerges, FilesThatAreWrittenToMissOrExistAreRefused) {

@@ -96,6 +96,21 @@ class DamagedDatabase : public ::testing::Test {
           << name;
     }
   }
+  /// As a program writes it that does not care about CHECKs.
+  void write_forbidden(const std::string& sql) {
+    SQLite::Database db(path_, SQLite::OPEN_READWRITE);
+    db.exec(
+        "PRAGMA ignore_check_constraints = ON; PRAGMA foreign_keys = OFF; PRAGMA "
+        "legacy_alter_table = ON");
+    db.exec(sql);
+    // Who makes such a file can make its seals as well.
+    SQLite::Transaction transaction(db);
+    try {
+      seal_again(db);
+      transaction.commit();
+    } catch (const SQLite::Exception&) {
+    }
+  }
   void clean() {
     for (const auto& entry : fs::directory_iterator(folder_.path())) {
       if (entry.path().filename() != "out") fs::remove_all(entry.path());
@@ -262,20 +277,7 @@ TEST_F(DamagedDatabase, ValuesThatPalpateNeverWrites) {
   for (const Crafted& one : all) {
     clean();
     write_file(path_, original_);
-    {
-      SQLite::Database db(path_, SQLite::OPEN_READWRITE);
-      db.exec(
-          "PRAGMA ignore_check_constraints = ON; PRAGMA foreign_keys = OFF; PRAGMA "
-          "legacy_alter_table = ON");
-      db.exec(one.sql);
-      // Who makes such a file can make its seals as well.
-      SQLite::Transaction transaction(db);
-      try {
-        seal_again(db);
-        transaction.commit();
-      } catch (const SQLite::Exception&) {
-      }
-    }
+    write_forbidden(one.sql);
     const int done = use(path_);
     if (*one.expectation == '\0') {
       EXPECT_EQ(done, 9) << one.what << ": " << refusals_;
@@ -300,6 +302,23 @@ TEST_F(DamagedDatabase, TextsComeOutOfTheCsvAsTheyWentInButForTheGuard) {
       contains(error_of([&] { export_bids(store, folder_ / "out/bids2", ExportSettings{}); }),
                "cannot be written to a TSV file"));
   EXPECT_FALSE(fs::exists(folder_ / "out/bids2"));
+}
+
+TEST_F(DamagedDatabase, WhatTheSchemaForbidsIsFoundByAWriterAtOnceByAReaderWhenItReadsIt) {
+  for (const char* const forbidden :
+       {"trial = 0", "attempt = 0", "block = 0", "practice = 2", "response = NULL", "correct = 2",
+        "timed_out = 2", "timed_out = 1", "response_time = NULL", "onset_ns = NULL", "ticks = -1",
+        "missed_ticks = -1", "faults = -1", "started_inside = 2", "max_force = NULL",
+        "contact_share = 1.001", "contact_share = -0.001", "edge_dwell = -1"}) {
+    clean();
+    write_file(path_, original_);
+    write_forbidden("UPDATE attempts SET " + std::string(forbidden) + " WHERE id = 2");
+    EXPECT_THROW(Store::open(path_, Store::Mode::write_or_create), StoreError) << forbidden;
+    EXPECT_THROW(
+        Store::open(path_, Store::Mode::read_only).for_each_trial([](const StoredTrial&) {}),
+        StoreError)
+        << forbidden;
+  }
 }
 
 TEST_F(DamagedDatabase, ARowHiddenByADamagedIndexIsDetected) {
