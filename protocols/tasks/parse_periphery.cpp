@@ -40,8 +40,23 @@ bool is_joystick_input(std::string_view name) {
 /// A printable character, or a byte as "0x00" to "0xff".
 bool is_box_byte(std::string_view name) {
   if (name.size() == 1) return name[0] > ' ' && name[0] < '\x7f';
-  const auto hexadecimal = [](char c) { return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'f'); };
+  const auto hexadecimal = [](char c) {
+    return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'f') || (c >= 'A' && c <= 'F');
+  };
   return name.size() == 4 && name.starts_with("0x") && hexadecimal(name[2]) && hexadecimal(name[3]);
+}
+
+/// "0x41" and "A" are one byte, of which nobody could say what it stands for.
+void check_bytes(ObjectReader& reader, const std::map<std::string, std::string>& box) {
+  std::map<int, std::string> seen;
+  for (const auto& [name, key] : box) {
+    if (!is_box_byte(name)) continue;
+    const int byte = name.size() == 1 ? name[0] : std::stoi(name, nullptr, 16);
+    const auto [first, is_new] = seen.emplace(byte, name);
+    if (!is_new)
+      reader.faults().add(child_pointer(reader.pointer("box"), name),
+                          "is the same byte as '" + first->second + "'");
+  }
 }
 
 void read_mapping(ObjectReader& reader, const char* key, std::map<std::string, std::string>& out,
@@ -84,6 +99,7 @@ void read_periphery(ObjectReader& reader, Protocol& protocol) {
                  "'right', N from 1");
     read_mapping(section, "box", protocol.responses.box, is_box_byte,
                  "expected a printable character, or a byte as '0x00' to '0xff'");
+    check_bytes(section, protocol.responses.box);
   });
 }
 

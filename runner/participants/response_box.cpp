@@ -9,6 +9,7 @@
 #include <array>
 #include <cerrno>
 #include <charconv>
+#include <cstdio>
 #include <cstring>
 #include <stdexcept>
 #include <utility>
@@ -32,11 +33,10 @@ std::pair<std::string, speed_t> port_of(const std::string& name) {
   const std::size_t colon = name.rfind(':');
   int baud = kUsualBaud;
   std::string path = name;
-  if (colon != std::string::npos) {
-    const char* const end = name.data() + name.size();
-    const auto [at, error] = std::from_chars(name.data() + colon + 1, end, baud);
-    if (error != std::errc() || at != end)
-      throw std::invalid_argument("no serial port '" + name + "'; expected PATH[:BAUD]");
+  const std::size_t digits = name.find_first_not_of("0123456789", colon + 1);
+  if (colon != std::string::npos && colon + 1 < name.size() && digits == std::string::npos) {
+    if (std::from_chars(name.data() + colon + 1, name.data() + name.size(), baud).ec != std::errc())
+      baud = 0;
     path = name.substr(0, colon);
   }
   const auto* const speed = std::find_if(kSpeeds.begin(), kSpeeds.end(),
@@ -109,7 +109,12 @@ void ResponseBox::listen() noexcept {
     if (got <= 0) break;
     for (ssize_t i = 0; i < got; ++i) {
       const auto key = keys_.find(bytes[static_cast<std::size_t>(i)]);
-      if (key == keys_.end()) continue;
+      if (key == keys_.end()) {
+        const unsigned char byte = bytes[static_cast<std::size_t>(i)];
+        int none = -1;
+        if (byte != '\r' && byte != '\n') unknown_.compare_exchange_strong(none, byte);
+        continue;
+      }
       if (key->second == "escape") emergency_();
       presses_.add({key->second, now});
     }
@@ -117,9 +122,23 @@ void ResponseBox::listen() noexcept {
   failed_ = true;
 }
 
+std::optional<unsigned char> ResponseBox::unknown_byte() const {
+  const int byte = unknown_.load();
+  if (byte < 0) return std::nullopt;
+  return static_cast<unsigned char>(byte);
+}
+
 std::string ScreenWithBox::trouble() const {
   if (box_.failed())
     return "the response box is gone: the keyboard answers; plug it in and start again to have it";
+  if (const auto byte = box_.unknown_byte()) {
+    char text[160];
+    std::snprintf(text, sizeof text,
+                  "the response box sent a byte that stands for no key (0x%02x): is its speed that "
+                  "of --response-box, and is the byte among the protocol's responses?",
+                  static_cast<unsigned>(*byte));
+    return text;
+  }
   return screen_.trouble();
 }
 

@@ -6,6 +6,7 @@
 #include <atomic>
 #include <functional>
 #include <map>
+#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
@@ -17,7 +18,8 @@ namespace palpate::runner {
 
 class ResponseBox {
  public:
-  /// \param name  "PATH" or "PATH:BAUD", 9600 where it is not said; 8N1
+  /// \param name  "PATH" or "PATH:BAUD", 9600 where it is not said; 8N1. A colon of the path's own
+  /// (/dev/serial/by-path/...) is none before a speed
   /// \param keys  byte ("1", "0x05") -> name of a key; empty: printable characters are themselves.
   /// "escape" is the emergency
   /// \param clock  time-stamps bytes on arrival; must outlive it
@@ -33,6 +35,8 @@ class ResponseBox {
   std::vector<KeyPress> take() { return presses_.take(); }
   /// It was unplugged, or its port fails: nothing comes any more.
   bool failed() const { return failed_.load(); }
+  /// The first byte that stood for no key; line ends are none. nullopt: there was none
+  std::optional<unsigned char> unknown_byte() const;
 
  private:
   void listen() noexcept;
@@ -44,6 +48,7 @@ class ResponseBox {
   termios before_{};
   EventQueue<KeyPress> presses_;
   std::atomic<bool> failed_{false};
+  std::atomic<int> unknown_{-1};  ///< byte; -1: none
   std::jthread thread_;
 };
 

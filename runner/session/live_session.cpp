@@ -1,6 +1,7 @@
 #include "runner/session/live_session.h"
 
 #include <cstring>
+#include <nlohmann/json.hpp>
 #include <utility>
 
 namespace palpate::runner {
@@ -145,7 +146,11 @@ void LiveSession::attend() {
     throw EndOfSession(data::RunEnd::aborted, "the participant's screen was closed", true);
   if (std::string trouble = station_.screen.trouble(); trouble != told_trouble_) {
     told_trouble_ = std::move(trouble);
-    if (!told_trouble_.empty()) say(told_trouble_);
+    if (!told_trouble_.empty()) {
+      say(told_trouble_);
+      const nlohmann::ordered_json event = {{"input_trouble", told_trouble_}};
+      station_.record.note(station_.clock.now_ns(), event.dump());
+    }
   }
   monitor_.show_if_due();
   forces_.end_without_guard();

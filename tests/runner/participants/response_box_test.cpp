@@ -105,11 +105,44 @@ TEST_F(Box, OneThatIsGoneIsToldAndTheKeyboardStays) {
   EXPECT_EQ(screen.keys().front().key, "k");
 }
 
+// As of a box at another speed, whose bytes come as others.
+TEST_F(Box, AByteThatStandsForNoKeyIsTold) {
+  ResponseBox box(terminal_.path, {{"A", "1"}}, clock_, [] {});
+  class Keyboard final : public ParticipantScreen {
+   public:
+    void show(const Page&) override {}
+    std::vector<KeyPress> keys() override { return {}; }
+    bool open() const override { return true; }
+  } keyboard;
+  ScreenWithBox screen(keyboard, box);
+  terminal_.send("A\r\nA");
+  std::size_t known = 0;
+  EXPECT_TRUE(comes([&] { return (known += screen.keys().size()) == 2; }));
+  EXPECT_EQ(screen.trouble(), "");
+  terminal_.send("\xf3Q");
+  EXPECT_TRUE(comes([&] { return !screen.trouble().empty(); }));
+  EXPECT_NE(screen.trouble().find("0xf3"), std::string::npos) << screen.trouble();
+}
+
+// udev's names of ports by their places have colons.
+TEST_F(Box, APathMayHaveColons) {
+  const std::string folder = testing::TempDir();
+  const std::string path = folder + "/pci-0000:00:14.0-usb-0:2:1.0-port0";
+  unlink(path.c_str());
+  ASSERT_EQ(symlink(terminal_.path.c_str(), path.c_str()), 0);
+  EXPECT_NO_THROW(ResponseBox(path, {}, clock_, [] {}));
+  EXPECT_NO_THROW(ResponseBox(path + ":19200", {}, clock_, [] {}));
+  unlink(path.c_str());
+}
+
 TEST_F(Box, WhatIsNoPortIsRefused) {
   EXPECT_THROW(ResponseBox("/dev/null", {}, clock_, [] {}), std::runtime_error);
   EXPECT_THROW(ResponseBox("/no/such", {}, clock_, [] {}), std::runtime_error);
   EXPECT_THROW(ResponseBox(terminal_.path + ":123", {}, clock_, [] {}), std::invalid_argument);
-  EXPECT_THROW(ResponseBox(terminal_.path + ":x", {}, clock_, [] {}), std::invalid_argument);
+  EXPECT_THROW(ResponseBox(terminal_.path + ":99999999999", {}, clock_, [] {}),
+               std::invalid_argument);
+  EXPECT_THROW(ResponseBox(terminal_.path + ":x", {}, clock_, [] {}), std::runtime_error);
+  EXPECT_THROW(ResponseBox(":9600", {}, clock_, [] {}), std::invalid_argument);
   EXPECT_NO_THROW(ResponseBox(terminal_.path + ":115200", {}, clock_, [] {}));
 }
 
