@@ -1,47 +1,30 @@
-"""Proposes the levels of adaptive blocks to `palpate run` or `palpate simulate` (--ask SOCKET).
-
-    python3 propose_levels.py levels.sock &
-    palpate simulate protocols/stiffness-2afc.json --db asked.db --participants 1 --ask levels.sock
-
-Accelerated stochastic approximation (Kesten 1958): smaller steps the more often the answers have turned.
-"""
+"""Proposes levels: python3 propose_levels.py levels.sock & palpate simulate P.json --db F --ask levels.sock
+Accelerated stochastic approximation (Kesten 1958): smaller steps the more often the answers have turned."""
 import json
+import pathlib
 import socketserver
 import sys
-
 TARGET = 0.75  # share of successes at which it converges
 
-
-class Track:
-    def __init__(self, level, step):
-        self.level, self.step, self.shown, self.turns, self.before = level, step, 0, 0, None
-
-    def learn(self, success):
-        self.turns += self.before is not None and self.before != success
-        self.before, self.shown = success, self.shown + 1
-        self.level -= self.step / (self.shown if self.shown < 3 else 2 + self.turns) * (success - TARGET)
-
+def next_level(ask, trials):
+    level, turned = ask["own"], 0
+    for n, trial in enumerate(trials):
+        turned += n > 0 and trial["success"] != trials[n - 1]["success"]
+        step = (ask["most"] - ask["least"]) / (n + 1 if n < 2 else 2 + turned)
+        level = trial["level"] - step * (trial["success"] - TARGET)
+    return min(max(level, ask["least"]), ask["most"])
 
 class Session(socketserver.StreamRequestHandler):
     def handle(self):
-        tracks, trials = {}, []
-        for line in self.rfile:
-            message = json.loads(line)
-            if message["type"] == "begin":
-                trials = message["history"]  # of a session that goes on
-            elif message["type"] == "tell":
-                trials.append(message)
-            elif message["type"] == "ask":
-                least, most = message["least"], message["most"]
-                track = tracks.setdefault((message["block"], message["track"]), Track(message["own"], most - least))
-                for trial in [t for t in trials if (t["block"], t["track"]) == (message["block"], message["track"])]:
-                    trials.remove(trial)
-                    if trial["answered"] and not trial["catch_trial"]:
-                        track.learn(trial["success"])
-                answer = {"type": "level", "trial": message["trial"], "level": min(max(track.level, least), most)}
-                self.wfile.write((json.dumps(answer) + "\n").encode())
+        trials = []
+        for message in map(json.loads, self.rfile):
+            trials += message.get("history", [message] if message["type"] == "tell" else [])
+            if message["type"] == "ask":
+                own = [t for t in trials if all(t[key] == message[key] for key in ("block", "track"))]
+                level = next_level(message, [t for t in own if t["answered"] and not t["catch_trial"]])
+                answer = {"type": "level", "trial": message["trial"], "level": level}
+                self.wfile.write(json.dumps(answer).encode() + b"\n")
 
-
-if __name__ == "__main__":
-    with socketserver.UnixStreamServer(sys.argv[1], Session) as server:
-        server.serve_forever()
+if pathlib.Path(sys.argv[1]).is_socket():
+    pathlib.Path(sys.argv[1]).unlink()  # left behind by an earlier run
+socketserver.UnixStreamServer(sys.argv[1], Session).serve_forever()

@@ -7,6 +7,7 @@ import sqlite3
 import subprocess
 import sys
 import threading
+import time
 import unittest
 
 from command_case import PALPATE, CommandCase
@@ -126,6 +127,30 @@ class AskLevel(CommandCase):
         self.assertEqual((len(levels), self.events(db)), (TRIALS, []))
         self.assertGreater(len(set(levels)), 3)
         self.assertTrue(all(300 <= one <= 600 for one in levels))
+        # Kesten's rule, from the answers on record: the first two steps whole and half, then by turns of the answers.
+        answers = [row["success"] == "1" for row in self.exported(db)[1] if row["block_name"] == "stairs"]
+        turns = 0
+        for at in range(TRIALS - 1):
+            turns += at > 0 and answers[at] != answers[at - 1]
+            divisor = at + 1 if at < 2 else 2 + turns
+            expected = levels[at] - 300 / divisor * (answers[at] - 0.75)
+            self.assertAlmostEqual(levels[at + 1], min(max(expected, 300), 600), places=6)
+        # Ended by force, it leaves its socket behind, and begins again in spite of that.
+        program.kill()
+        program.wait()
+        again = subprocess.Popen([sys.executable, EXAMPLE, str(path)])
+        self.addCleanup(again.wait)
+        self.addCleanup(again.terminate)
+        deadline = time.monotonic() + 60
+        while subprocess.run([PALPATE, "simulate", self.protocol, "--db", self.dir / "again.db", "--participants", "1",
+                              "--ask", path], capture_output=True).returncode != 0:  # not there yet
+            self.assertIsNone(again.poll())
+            self.assertLess(time.monotonic(), deadline)
+        self.assertEqual(self.levels(self.dir / "again.db"), levels)
+
+    def test_the_program_that_is_shipped_has_thirty_lines(self):
+        with open(EXAMPLE) as text:
+            self.assertLessEqual(len(text.readlines()), 30)
 
     def own_procedure(self):
         db = self.dir / "own.db"
