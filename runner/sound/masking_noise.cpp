@@ -32,46 +32,59 @@ std::array<double, 2> pitches_of(Tone tone) {
   return {};
 }
 
-/// Adds a tone to the samples after begin().
+/// Adds tones to the samples. One that begins fades out the one before, which would click.
 class ToneSignal {
  public:
   ToneSignal(double level_db, double rate)
       : amplitude_(std::sqrt(2) * std::pow(10, level_db / 20)), rate_(rate) {}
   void begin(Tone tone) {
-    pitches_ = pitches_of(tone);
-    part_ = 0;
-    at_ = 0;
+    older_ = newest_;
+    older_.over = std::min(older_.over, older_.at + kEdge);
+    newest_ = {pitches_of(tone), 0, 0};
+    for (const double pitch : newest_.pitches) newest_.over += pitch > 0 ? kLength : 0;
   }
+  bool silent() const { return newest_.at >= newest_.over && older_.at >= older_.over; }
   void add(std::vector<double>& samples) {
-    for (double& sample : samples) {
-      if (part_ >= pitches_.size() || pitches_[part_] == 0) return;
-      const double edge = std::min({1.0, at_ / kEdge, (kLength - at_) / kEdge});
-      sample += amplitude_ * edge * std::sin(2 * M_PI * pitches_[part_] * at_);
-      at_ += 1 / rate_;
-      if (at_ < kLength) continue;
-      at_ = 0;
-      ++part_;
-    }
+    for (double& sample : samples) sample += next(older_) + next(newest_);
   }
 
  private:
   static constexpr double kLength = 0.1, kEdge = 0.01;  // s, of a part
+  struct Playing {
+    std::array<double, 2> pitches{};
+    double at = 0, over = 0;  // s since it began; when it ends
+  };
 
-  double amplitude_, rate_, at_ = 0;
-  std::array<double, 2> pitches_{};
-  std::size_t part_ = 2;
+  double next(Playing& tone) const {
+    if (tone.at >= tone.over) return 0;
+    const std::size_t part = tone.at < kLength ? 0 : 1;
+    const double at = tone.at - (part == 0 ? 0 : kLength);
+    const double edge =
+        std::min({1.0, at / kEdge, (kLength - at) / kEdge, (tone.over - tone.at) / kEdge});
+    tone.at += 1 / rate_;
+    return amplitude_ * std::max(edge, 0.0) * std::sin(2 * M_PI * tone.pitches[part] * at);
+  }
+
+  double amplitude_, rate_;
+  Playing newest_, older_;
 };
 
 }  // namespace
 
 NoisePlayer::NoisePlayer(const protocols::MaskingNoise& noise, std::uint64_t seed,
-                         const std::string& device, Opener open)
-    : noise_(noise), seed_(seed), device_(device), open_(std::move(open)), output_(open_(device_)) {
+                         const std::string& device, Opener open, std::optional<double> tones_db)
+    : noise_(noise),
+      tones_db_(tones_db.value_or(noise.level_db)),
+      seed_(seed),
+      device_(device),
+      open_(std::move(open)),
+      output_(open_(device_)) {
   start();
 }
 
 NoisePlayer::NoisePlayer(double level_db, const std::string& device, Opener open)
     : noise_{protocols::NoiseKind::pink, level_db},
+      tones_db_(level_db),
       has_noise_(false),
       seed_(0),
       device_(device),
@@ -114,14 +127,14 @@ void NoisePlayer::play() noexcept {
   using Clock = std::chrono::steady_clock;
   const double rate = output_->rate();
   NoiseSignal signal(noise_, rate, seed_);
-  ToneSignal tone(noise_.level_db, rate);
+  ToneSignal tone(tones_db_, rate);
   std::vector<double> samples(static_cast<std::size_t>(kBlock * rate));
   std::vector<std::int16_t> frames(2 * samples.size());
   const auto pace =
       std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(kPace * kBlock));
   Clock::time_point due = Clock::now();
   try {
-    while (!quit_ || !signal.silent()) {
+    while (!quit_ || !signal.silent() || !tone.silent()) {
       signal.turn(on_ && has_noise_);
       const bool heard = !signal.silent();
       signal.fill(samples);
@@ -153,7 +166,7 @@ void NoisePlayer::play() noexcept {
 std::string to_json_text(const NoisePlayer& player) {
   if (!player.has_noise()) {
     const nlohmann::ordered_json event = {{"sounds", "on"},
-                                          {"level_db", player.noise().level_db},
+                                          {"level_db", player.tones_db()},
                                           {"device", player.device()},
                                           {"rate_hz", player.rate()},
                                           {"latency_s", player.latency()}};
@@ -162,6 +175,7 @@ std::string to_json_text(const NoisePlayer& player) {
   const nlohmann::ordered_json event = {{"masking_noise", "on"},
                                         {"kind", protocols::to_string(player.noise().kind)},
                                         {"level_db", player.noise().level_db},
+                                        {"tones_level_db", player.tones_db()},
                                         {"seed", player.seed()},
                                         {"device", player.device()},
                                         {"rate_hz", player.rate()},

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <thread>
 
@@ -30,10 +31,11 @@ class NoisePlayer {
   using Opener = std::function<std::unique_ptr<SoundOutput>(const std::string& device)>;
 
   /// Opens the output and plays silence. \param open  called again after a failure (unplugged
-  /// headphones).
+  /// headphones). \param tones_db  level of tones, root mean square, dB re full scale; none: the
+  /// noise's
   /// \throws SoundError
   NoisePlayer(const protocols::MaskingNoise& noise, std::uint64_t seed, const std::string& device,
-              Opener open = open_sound);
+              Opener open = open_sound, std::optional<double> tones_db = {});
   /// Tones without noise. \param level_db  root mean square, dB re full scale
   NoisePlayer(double level_db, const std::string& device, Opener open = open_sound);
   /// Fades out.
@@ -45,7 +47,7 @@ class NoisePlayer {
   void turn_on();
   /// Fades out; returns at once.
   void turn_off();
-  /// A short tone as loud as the noise, heard latency() later; returns at once.
+  /// A short tone, heard latency() later; returns at once. One that sounds still is faded out.
   void tone(Tone which = Tone::go) {
     tone_ = which;
     tones_.fetch_add(1);
@@ -55,7 +57,8 @@ class NoisePlayer {
   bool failed() const { return failed_.load(); }
   NoiseReport report() const;  ///< also after turn_off, until the next turn_on
   const protocols::MaskingNoise& noise() const { return noise_; }
-  bool has_noise() const { return has_noise_; }  ///< false: tones alone, of noise().level_db
+  bool has_noise() const { return has_noise_; }  ///< false: tones alone
+  double tones_db() const { return tones_db_; }  ///< dB re full scale, root mean square
   std::uint64_t seed() const { return seed_; }
   const std::string& device() const { return device_; }
   double rate() const { return output_->rate(); }     ///< Hz
@@ -66,6 +69,7 @@ class NoisePlayer {
   void play() noexcept;
 
   const protocols::MaskingNoise noise_;
+  const double tones_db_;
   const bool has_noise_ = true;
   const std::uint64_t seed_;
   const std::string device_;

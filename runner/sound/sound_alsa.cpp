@@ -15,7 +15,7 @@ constexpr unsigned kBuffer_us = 200'000;  // longest delay of the player's threa
 SoundError no_sound(const std::string& device, const std::string& what) {
   return SoundError("no sound from '" + device + "': " + what +
                     "\nplug in headphones and name them by --sound-device ('aplay -L' lists what "
-                    "there is); --without-noise runs the session without the masking noise");
+                    "there is); --without-noise runs the session without masking noise and sounds");
 }
 
 /// Silences ALSA's messages: the SoundError has the reason.

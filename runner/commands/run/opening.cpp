@@ -81,8 +81,10 @@ std::unique_ptr<NoisePlayer> open_noise(const RunSettings& settings,
     if (!protocol.sounds) return nullptr;
     return std::make_unique<NoisePlayer>(protocol.sounds->level_db, settings.sound_device);
   }
+  std::optional<double> tones_db;
+  if (protocol.sounds) tones_db = protocol.sounds->level_db;
   return std::make_unique<NoisePlayer>(*protocol.masking_noise, protocol.seed,
-                                       settings.sound_device);
+                                       settings.sound_device, open_sound, tones_db);
 }
 
 std::unique_ptr<ResponseBox> open_response_box(const RunSettings& settings,

@@ -109,8 +109,10 @@ void tell(LiveSession& session, const LiveStation& station, const Beforehand& kn
   }
   if (!known.limited.empty())
     record.note(began_ns, to_json_text(known.limited, station.device, station.protocol.servo_rate));
-  if (station.protocol.sounds && station.noise == nullptr)
+  if (station.protocol.sounds && station.noise == nullptr) {
     session.say("WITHOUT the protocol's sounds");
+    record.note(began_ns, R"({"sounds":"left out"})");
+  }
   if (station.protocol.masking_noise && station.noise == nullptr) {
     session.say("WITHOUT the protocol's masking noise");
     record.note(began_ns, R"({"masking_noise":"left out"})");

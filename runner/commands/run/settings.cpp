@@ -130,13 +130,16 @@ std::optional<RunSettings> parse_run_settings(const std::vector<std::string>& ar
       ("without-calibration", po::bool_switch(&settings.without_calibration),
        "run although the calibration is missing or stale")  //
       ("sound-device", po::value(&settings.sound_device)->value_name("NAME"),
-       "ALSA device of the headphones, where the protocol has masking noise; default: default")  //
+       "ALSA device of the headphones, where the protocol has masking noise or sounds; default: "
+       "default")  //
       ("without-noise", po::bool_switch(&settings.without_noise),
-       "run without the protocol's masking noise");
+       "run without the protocol's masking noise and sounds");
   line.positional_names = {"PROTOCOL.json"};
   const auto values = line.parse(args);
   if (!values) return std::nullopt;
   settings.protocol = (*values)["PROTOCOL.json"].as<std::string>();
+  if (values->count("response-box") > 0 && settings.response_box.empty())
+    throw UsageError("--response-box: expected PATH[:BAUD] of a serial port");
   if (values->count("number") > 0) settings.number = number;
   if (values->count("session") > 0) settings.session = session;
   if (values->count("response-latency") > 0) settings.response_latency = latency;

@@ -3,7 +3,13 @@
 Usage: task_run_test.py PALPATE
 """
 
+import array
 import hashlib
+import json
+import math
+import os
+import pty
+import time
 import unittest
 
 from task_case import Task
@@ -186,6 +192,81 @@ class ZeroForce(Task):
         self.assertEqual(self.sql("SELECT answer FROM page_answers WHERE item = 'age'"), [("42",)])
         self.assertEqual(self.sql("SELECT DISTINCT cut_off_reason FROM attempts WHERE state = 'cut_off'"),
                          [("zero force was asked for",)])
+
+
+class Periphery(Task):
+    IDENT = {"responses": {"box": {"A": "1", "B": "2", "0x05": "space"}}}
+
+    def notes(self):
+        return [json.loads(text) for (text,) in self.sql("SELECT text FROM notes ORDER BY id") if text.startswith("{")]
+
+    def test_a_response_box_that_is_unplugged_in_a_trial(self):
+        box, plug = pty.openpty()
+        terminal = self.start("ident", options=["--response-box", os.ttyname(plug)], **self.IDENT)
+        self.play(terminal, ("WELCOME", ""))
+        os.write(box, b"\x05")
+        self.play(terminal, ("ABOUT SHAPES", ""))
+        os.write(box, b"\x05")
+        self.play(terminal, ("MORE ABOUT SHAPES", ""))
+        os.write(box, b"\x05")
+        self.play(terminal, ("[trial, ", ""))
+        os.write(box, b"\x00z" + b"AB" * 200)  # one answer, and none of the next trial
+        self.play(terminal, ("stands for no key (0x00)", ""), ("[trial, ", ""))
+        os.close(box)
+        os.close(plug)
+        self.play(terminal, ("the response box is gone: the keyboard answers", "2"), ("GOOD BYE", " "))
+        self.end(terminal)
+        self.assertEqual([row["response"] for row in self.export()], ["ball", "box"])
+        told = [note["input_trouble"] for note in self.notes() if "input_trouble" in note]
+        self.assertEqual(len(told), 2, told)
+        self.assertIn("0x00", told[0])
+        self.assertIn("gone", told[1])
+        self.assertEqual(self.sql("SELECT response_device FROM runs"), [("keyboard, serial response box",)])
+
+    def test_tones_are_what_they_should_be_and_on_record(self):
+        sound = self.dir / "sound.raw"
+        terminal = self.start("ident", options=["--sound-device", f"file:{sound},raw"], home={"rest_s": 0.5},
+                              sounds={"ready": True, "go": True, "feedback": True, "level_db": -18})
+        self.play(terminal, ("WELCOME", " "), ("ABOUT", " "), ("MORE", " "), ("[trial, ", ""))
+        time.sleep(0.3)
+        self.play(terminal, ("", "1"), ("[trial, ", ""))
+        time.sleep(0.3)
+        self.play(terminal, ("", "1"), ("GOOD BYE", " "))
+        self.end(terminal)
+        left = array.array("h", sound.read_bytes())[0::2]
+        rate = 48000
+        tones, begin = [], None
+        for at in range(0, len(left), 480):
+            if any(left[at:at + 480]) and begin is None:
+                begin = at
+            elif begin is not None and not any(left[at:at + 480]):
+                tones.append(left[begin:at])
+                begin = None
+
+        def pitch(tone, at):  # Hz, of 40 ms
+            part = tone[int(at * rate):int((at + 0.04) * rate)]
+            return sum(a < 0 <= b for a, b in zip(part, part[1:])) / 0.04
+        self.assertEqual(len(tones), 6, "ready, go, feedback, twice")
+        pitches = [[round(pitch(tone, at), -1) for at in (0.03, 0.13) if at < len(tone) / rate - 0.02] for tone in tones]
+        for heard, expected in zip(pitches[0:2] + pitches[3:5], [[440], [880]] * 2):
+            self.assertAlmostEqual(heard[0], expected[0], delta=30)
+        feedback = sorted([pitches[2], pitches[5]])
+        self.assertAlmostEqual(feedback[0][0], 220, delta=30)  # wrong
+        for heard, expected in zip(feedback[1], (660, 990)):  # right
+            self.assertAlmostEqual(heard, expected, delta=30)
+        for tone in tones:
+            steady = tone[960:3840]
+            level = 10 * math.log10(sum(x * x for x in steady) / len(steady) / 32767 ** 2)
+            self.assertAlmostEqual(level, -18, delta=0.5)
+        self.assertEqual([note["level_db"] for note in self.notes() if note.get("sounds") == "on"], [-18])
+
+    def test_sounds_that_are_left_out_are_on_record(self):
+        terminal = self.start("ident", options=["--without-noise", "--sound-device", "none such"],
+                              sounds={"go": True})
+        self.play(terminal, ("WITHOUT the protocol's sounds", ""), ("WELCOME", " "), ("ABOUT", " "), ("MORE", " "),
+                  ("[trial, ", "1"), ("[trial, ", "1"), ("GOOD BYE", " "))
+        self.end(terminal)
+        self.assertEqual([note for note in self.notes() if "sounds" in note], [{"sounds": "left out"}])
 
 
 class Killed(Task):

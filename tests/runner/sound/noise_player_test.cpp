@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <cmath>
 #include <mutex>
 #include <thread>
 #include <vector>
@@ -100,6 +101,38 @@ TEST_F(Players, PlayOneToneOnRequest) {
     EXPECT_NEAR(static_cast<double>(heard()), 2 * 0.1 * 8000, 50);  // a sine crosses zero
   }
   EXPECT_FALSE(noise->on());
+}
+
+// A sine of amplitude a and pitch f moves by 2 pi f a / rate a sample at most; its edges of 10 ms
+// add a / (0.01 rate). Cut off in the middle it would jump by up to a.
+TEST_F(Players, ToneThatCutsAnotherShortOrTheEndDoesNotClick) {
+  constexpr double kRate = 8000, kTonesDb = -12;
+  const auto slope = [&](double pitch) {
+    const double amplitude = std::sqrt(2.0) * std::pow(10, kTonesDb / 20);
+    return amplitude * (2 * M_PI * pitch + 1 / 0.01) / kRate;
+  };
+  for (int i = 0; i < 8; ++i) {
+    auto noise = std::make_unique<NoisePlayer>(
+        protocols::MaskingNoise{protocols::NoiseKind::white, -60}, 1, "ear",
+        [this](const std::string&) { return std::make_unique<Headphones>(ear_); }, kTonesDb);
+    const auto before = static_cast<std::ptrdiff_t>(ear_.count());
+    const auto heard = [&] { return static_cast<std::ptrdiff_t>(ear_.count()) - before; };
+    noise->tone(Tone::ready);
+    const auto part = static_cast<std::ptrdiff_t>(2 * 0.02 * kRate);  // a block
+    wait_for([&] { return heard() >= (2 + i % 4) * part; });
+    noise->tone(Tone::wrong);
+    wait_for([&] { return heard() >= (4 + i) * part; });
+    noise.reset();
+    double largest = 0, last = 0;
+    const std::lock_guard lock(ear_.mutex);
+    for (std::size_t k = static_cast<std::size_t>(before); k < ear_.heard.size(); k += 2) {
+      const double now = ear_.heard[k] / 32767.0;
+      largest = std::max(largest, std::abs(now - last));
+      last = now;
+    }
+    EXPECT_LT(std::max(largest, std::abs(last)), slope(440) + slope(220));
+    EXPECT_GT(largest, slope(220) / 4) << "tones have a level of their own";
+  }
 }
 
 TEST_F(Players, PlayTheSameOnBothChannels) {
