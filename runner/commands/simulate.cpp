@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
@@ -11,6 +12,7 @@
 #include <vector>
 
 #include "protocols/parse.h"
+#include "protocols/tasks/levels.h"
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/progress_line.h"
 #include "runner/commands/shared/shard.h"
@@ -107,6 +109,33 @@ void print_summary(const protocols::Protocol& protocol, const std::string& datab
               progress.simulated_seconds / seconds);
 }
 
+/// Blocks of which a tenth or more had no answer, and what would help.
+void print_unanswered(const protocols::Protocol& protocol, const StudyProgress& progress) {
+  for (const protocols::TaskBlock& block : protocol.blocks) {
+    const auto found = progress.by_block.find(block.name);
+    if (found == progress.by_block.end()) continue;
+    const auto& [trials, unanswered] = found->second;
+    if (unanswered * 10 < trials || unanswered == 0) continue;
+    std::fprintf(stderr, "block '%s': %lld of %lld trials had no answer within time_out_s = %g s",
+                 stimuli::printable(block.name).c_str(), static_cast<long long>(unanswered),
+                 static_cast<long long>(trials), block.time_out);
+    const auto standard =
+        block.standard ? protocols::own_level(protocol, block, *block.standard) : std::nullopt;
+    if (block.task == protocols::TaskKind::adjust && standard && !block.starts.empty()) {
+      double farthest = 0;
+      for (const double start : block.starts)
+        farthest = std::max(farthest, std::abs(start - *standard));
+      std::fprintf(stderr,
+                   "; from its starts it is up to %.0f turns to the standard: a longer "
+                   "time_out_s, a larger turn or nearer starts may help",
+                   std::ceil(farthest / block.turn));
+    } else {
+      std::fprintf(stderr, ": a longer time_out_s may help");
+    }
+    std::fprintf(stderr, "\n");
+  }
+}
+
 }  // namespace
 
 int simulate_command(const std::vector<std::string>& args) {
@@ -133,6 +162,7 @@ int simulate_command(const std::vector<std::string>& args) {
   line.clear();
   const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
   print_summary(protocol, store.path(), simulated, plan.seed, progress, took.count());
+  print_unanswered(protocol, progress);
   if (progress.recorded < progress.expected) {
     std::fprintf(stderr, "stopped; the same command resumes from here\n");
     return 1;

@@ -18,6 +18,7 @@ void TaskJudgement::begin(const protocols::Trial& trial, const stimuli::Random& 
   random_ = random;
   estimates_.clear();
   own_.reset();
+  turns_ = 1;
   standard_.reset();
   evidence_ = 0;
 }
@@ -59,13 +60,19 @@ void TaskJudgement::feel(const protocols::Interval& interval, const Felt& felt) 
     standard.stimulus = *block().standard;
     reference = level_of(standard);
   }
+  feels_standard_ = interval.standard;
+  if (!felt.touched && block().task == TaskKind::adjust) {  // nobody has to answer yet
+    (interval.standard ? standard_ : own_).reset();
+    return;
+  }
   if (const auto levels = protocols::levels_of(block()); !felt.touched && !levels.empty())
     last_level_ = levels.front() + random_.unit() * (levels.back() - levels.front());
   const double sd = felt.noisy ? 0 : noise_of_difference(reference) / std::sqrt(2.0);
   const double estimate = last_level_ + sd * random_.normal();
   estimates_.push_back(estimate);
-  feels_standard_ = interval.standard;
   (interval.standard ? standard_ : own_) = estimate;
+  if (!interval.standard) shown_ = level_of(interval);
+  noise_ = noise_of_difference(reference);
 }
 
 /// Index of the interval that is chosen.
@@ -105,10 +112,14 @@ int TaskJudgement::detected() {
 /// Feels the other one first, then turns and feels again.
 int TaskJudgement::adjusted() {
   if (!own_ || !standard_) return index_of("switch");
+  const TaskBlock& asked = block();
   const double apart = *standard_ - *own_;
-  if (std::abs(apart) <= block().turn / 2) return index_of("done");
+  if (std::abs(apart) <= std::max(asked.turn / 2, noise_)) return index_of("done");
   if (feels_standard_) return index_of("switch");
-  return index_of(apart > 0 ? "up" : "down");
+  const bool up = apart > 0;
+  if (up ? shown_ >= *asked.most : shown_ <= *asked.least) return index_of("done");
+  turns_ = static_cast<int>(std::max(1L, std::lround(std::min(std::abs(apart) / asked.turn, 1e6))));
+  return index_of(up ? "up" : "down");
 }
 
 int TaskJudgement::identified() {

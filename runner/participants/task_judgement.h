@@ -8,7 +8,10 @@
 //             same_different: differ by more than sd
 //   detect    "yes" by a psychometric function (protocols/tasks/typical_participant.h)
 //   rate      number = level^exponent, times exp(noise)
-//   adjust    turns towards the standard until the estimates are less than half a turn apart
+//   adjust    feels both; turns as many times as it would take if what was felt were true; feels
+//   what it
+//             turned again; done when they are "same" by the criterion above, or less than half a
+//             turn apart, or when it turns no further. What it did not touch it goes back to
 //   identify  what differs in stiffness alone: the stimulus whose stiffness is nearest, as a ratio,
 //   to
 //             the estimate; shapes: SimulatedParticipant; else right, but for lapses
@@ -53,6 +56,8 @@ class TaskJudgement {
   void feel(const protocols::Interval& interval, const Felt& felt);
   /// The answer: index into TaskBlock::answers; rate without a scale: into nothing.
   int answer();
+  /// adjust: key presses of the last answer, where it turns.
+  int turns() const { return turns_; }
   double number();  ///< rate: a number typed
   int confidence(int steps) const;
 
@@ -72,6 +77,9 @@ class TaskJudgement {
   stimuli::Random random_{0};
   std::vector<double> estimates_;         ///< of the intervals so far
   std::optional<double> own_, standard_;  ///< adjust: as felt last
+  double shown_ = 0;                      ///< adjust: level that own_ is of
+  double noise_ = 0;                      ///< sd of a difference from the standard
+  int turns_ = 1;
   bool feels_standard_ = false;
   double last_level_ = 0;
   bool measured_ = false;  ///< the last one was

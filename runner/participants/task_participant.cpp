@@ -115,6 +115,7 @@ Answer TaskParticipant::answer(std::int64_t time_ns) {
     given.number = judgement_.number();
   } else {
     given.stimulus = judgement_.answer();
+    given.times = judgement_.turns();
   }
   return given;
 }

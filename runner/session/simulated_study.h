@@ -5,6 +5,7 @@
 #include <atomic>
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -30,6 +31,10 @@ struct StudyProgress {
   std::int64_t expected = 0;     ///< in all, as far as is known
   std::int64_t this_run = 0;     ///< recorded since this call
   double simulated_seconds = 0;  ///< of session time since this call
+  struct Answers {
+    std::int64_t trials = 0, unanswered = 0;
+  };
+  std::map<std::string, Answers> by_block = {};  ///< version 2: since this call
 };
 
 struct LimitedForSimulation {

@@ -211,11 +211,13 @@ TEST_F(TaskSession, RatesAndAdjusts) {
     EXPECT_NEAR(*task.number, 300, 150);
     EXPECT_GT(task.intervals.size(), 2U);
     EXPECT_EQ(task.intervals.front().onset_ns, trial.onset_ns);
-    // From one interval of its own to the next, the level moves by a turn at most.
+    // From one interval of its own to the next, the level moves by whole turns, within the limits.
     double level = *task.level;
     for (const data::IntervalRecord& interval : task.intervals) {
       if (interval.standard) continue;
-      EXPECT_LE(std::abs(*interval.level - level), 40);
+      const double turns = (*interval.level - level) / 40;
+      EXPECT_TRUE(turns == std::round(turns) || *interval.level == 100 || *interval.level == 600)
+          << *interval.level;
       level = *interval.level;
     }
     EXPECT_EQ(level, *task.number);
