@@ -126,7 +126,9 @@ class Recover(unittest.TestCase):
         found = json.loads(self.recovered("stiffness-2afc.json", "--format", "json"))
         rows = list(csv.DictReader(io.StringIO(self.recovered("stiffness-2afc.json", "--format", "csv"), newline="")))
         table = self.recovered("stiffness-2afc.json")
-        self.assertIn("SIMULATED", table)
+        head, *lines = table.splitlines()
+        self.assertRegex(head, "^200 SIMULATED .*, seed 1; bias and spread on the scale of the procedure$")
+        self.assertEqual(len(lines), 2 * len(found["procedures"]))
         for one, row in zip(found["procedures"], rows, strict=True):
             self.assertEqual({key: float(row[key]) for key in ("bias", "spread", "true_threshold", "mean_trials")},
                              {key: one[key] for key in ("bias", "spread", "true_threshold", "mean_trials")})

@@ -203,6 +203,20 @@ TEST(Labels, GoToTheLeftAtTheRightEnd) {
   EXPECT_EQ(placed_labels(panel, panel.width)[0].anchor, -1);
 }
 
+TEST(Labels, StayInThePanelEvenWhereAPointIsInTheWay) {
+  // At the right end, with a point where the label goes: beside that, not out of the panel.
+  Panel panel = panel_of(0, 10, 0, 10);
+  panel.marks.push_back(label_at(9.9, 5, "cylinder"));
+  for (const double at : {9.3, 8.9, 8.6}) {
+    panel.marks.push_back(label_at(at, 5, ""));
+  }
+  const auto texts = placed_labels(panel, panel.width);
+  const Mark& text = texts.front();
+  const double left = 400 * text.x[0] / 10 + text.dx -
+                      (text.anchor > 0 ? text_width(text.text, text.size, text.bold) : 0);
+  EXPECT_LE(left + text_width(text.text, text.size, text.bold), 412);
+}
+
 TEST(Labels, AvoidEachOtherThePointsAndIntervals) {
   Panel panel = panel_of(0, 10, 0, 10);
   const std::vector<std::pair<double, double>> points{

@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <sstream>
@@ -51,6 +52,18 @@ TEST(Power, OfOneShapeIsThatOfTheTTest) {
   EXPECT_EQ(first.any, first.found[0]);
   const Power second = simulate_power(model_of(0.2, 0, 0.5, {0.12}), {6, 76}, settings_of(20'000));
   EXPECT_NEAR(second.proportion(second.found[0]), 0.199626, 0.01);
+}
+
+TEST(Power, TellsHowManyStudiesAreDoneUpToTheLast) {
+  std::vector<std::size_t> told;
+  PowerSettings settings = settings_of(1'000);
+  settings.progress = [&](std::size_t done) { told.push_back(done); };
+  const Power power = simulate_power(model_of(0.1, 0.1, 0.4, {0.2}), {4, 4}, settings);
+  EXPECT_EQ(power.studies, 1'000U);
+  ASSERT_FALSE(told.empty());
+  EXPECT_TRUE(std::ranges::is_sorted(told));
+  EXPECT_GT(told.front(), 0U);
+  EXPECT_EQ(told.back(), 1'000U);
 }
 
 TEST(Power, WithoutEffectsTheFamilyErrsAsOftenAsAlphaSays) {

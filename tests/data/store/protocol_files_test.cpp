@@ -88,7 +88,7 @@ TEST_F(ProtocolFiles, AreMergedAndToldApart) {
   EXPECT_TRUE(contains(error_of([&] {
                          merge(folder_ / "no.db", {path_, other});
                        }),
-                       "meshes/wedge.obj of protocol ho2000 differs"));
+                       other + ": meshes/wedge.obj of protocol ho2000 differs"));
 }
 
 TEST_F(ProtocolFiles, ARunMayBeShownWithOtherTexts) {

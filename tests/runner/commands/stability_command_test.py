@@ -23,10 +23,26 @@ class Stability(unittest.TestCase):
         self.assertEqual(done.returncode, status, done.stdout + done.stderr)
         return done
 
+    def assert_aligned(self, text):
+        """In each table names begin or end below their header, numbers end there. A table is as many cells a line."""
+        cells = [[match.span() for match in re.finditer(r"\S+(?: \S+)*", line)] for line in text.splitlines()]
+        lines, checked, header = text.splitlines(), 0, None
+        for number, spans in enumerate(cells):
+            if header is None or len(spans) != len(cells[header]) or len(spans) < 3:
+                header = number if len(spans) >= 3 else None
+                continue
+            words = [lines[number][begin:end] for begin, end in spans]
+            numeric = [re.fullmatch(r"-?[\d.]+(e[+-]\d+)?", word) is not None for word in words]
+            for (begin, end), (from_, to), is_number, word in zip(spans, cells[header], numeric, words):
+                self.assertTrue(end == to or begin == from_ and not is_number, (lines[header], lines[number], word))
+            checked += 1
+        self.assertGreater(checked, 50)
+
     def test_answers_in_text_numbers_and_pictures(self):
         numbers, figure, page = self.dir / "s.json", self.dir / "s.svg", self.dir / "s.html"
         done = self.stability("--json", numbers, "--figure", figure, "--report", page)
         self.assertIn("is the theory's", done.stdout)
+        self.assert_aligned(done.stdout)
         result = json.loads(numbers.read_text())
         self.assertLess(result["worst_disagreement"], 0.05)
         self.assertEqual(result["unsafe_points"], 0)

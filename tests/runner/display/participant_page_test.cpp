@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cstdlib>
 #include <fstream>
+#include <utility>
+#include <vector>
 
 #include "runner/display/window.h"
 
@@ -147,6 +149,35 @@ TEST(ParticipantPage, AChecklistInANarrowWindowKeepsItsTextSize) {
   EXPECT_TRUE(border_is_clear(image));
   page.checklist.instruction += page.checklist.instruction;
   EXPECT_GT(inked_rows(draw_page(page, 389, 728)), inked_rows(image)) << "more text, more lines";
+}
+
+TEST(ParticipantPage, EachStateOfAStepHasAMarkOfItsOwnShape) {
+  // Whoever sees no colours tells them apart, too.
+  using State = Checklist::Step::State;
+  std::vector<std::vector<bool>> shapes;
+  std::vector<int> bands;
+  for (const State state : {State::to_do, State::now, State::done, State::left_out}) {
+    Page page;
+    page.kind = Page::Kind::checklist;
+    page.checklist.steps = {{"", state}};
+    page.checklist.instruction = "Wait";
+    const Image image = draw_page(page, 1280, 800);
+    std::vector<bool> inked(image.pixels.size());
+    std::transform(image.pixels.begin(), image.pixels.end(), inked.begin(),
+                   [](auto pixel) { return pixel != ground_colour(); });
+    int separate = 0;
+    bool before = false;
+    for (int y = 0; y < image.height; ++y) {
+      const auto row = inked.begin() + static_cast<std::ptrdiff_t>(y) * image.width;
+      const bool now = std::find(row, row + image.width, true) != row + image.width;
+      separate += now && !before;
+      before = now;
+    }
+    bands.push_back(separate);
+    for (const std::vector<bool>& other : shapes) EXPECT_NE(inked, other) << shapes.size();
+    shapes.push_back(std::move(inked));
+  }
+  for (const int separate : bands) EXPECT_EQ(separate, bands[0]) << "a mark is missing";
 }
 
 TEST(ParticipantPage, EveryScriptFitsTheScreen) {

@@ -1,0 +1,182 @@
+// What every report must have, whatever its numbers: names for all of them, and no empty text.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "analysis/figures/figures.h"
+#include "analysis/input/trial_table_builder.h"
+#include "analysis/report/report_json.h"
+#include "analysis/report/tables.h"
+#include "analysis/statistics/analysis.h"
+#include "analysis/text.h"
+#include "stimuli/random.h"
+
+namespace palpate::analysis {
+namespace {
+namespace documents {
+
+using Json = nlohmann::ordered_json;
+
+/// Eight participants, four shapes; with `limit` above 0 some trials end there (s).
+Analysis study_with(const std::vector<std::string>& renderers, double limit = 0) {
+  TrialTableBuilder builder;
+  stimuli::Random random(7);
+  for (int p = 0; p < 8; ++p) {
+    int trial = 0;
+    for (std::size_t r = 0; r < renderers.size(); ++r) {
+      for (const char* const shape : {"sphere", "cone", "cylinder", "cube"}) {
+        for (int i = 0; i < 6; ++i) {
+          RawTrial raw;
+          raw.participant = "P" + std::to_string(p);
+          raw.renderer = renderers[(r + static_cast<std::size_t>(p)) % renderers.size()];
+          raw.shape = shape;
+          raw.trial = ++trial;
+          raw.response_time = 6 * std::exp(0.3 * random.normal());
+          raw.timed_out = limit > 0 && raw.response_time > limit;
+          if (raw.timed_out) raw.response_time = limit;
+          raw.correct = !raw.timed_out && random.unit() < 0.9;
+          if (!raw.timed_out) raw.response = raw.correct ? shape : "sphere";
+          if (raw.response == raw.shape) raw.correct = true;
+          builder.add(raw);
+        }
+      }
+    }
+  }
+  TrialTable table = builder.finish({});
+  table.provenance.source = "made up";
+  return analyze(std::move(table), {}, "1.2.3");
+}
+
+const std::vector<Analysis>& studies() {
+  static const std::vector<Analysis> all{study_with({"point", "ray"}),
+                                         study_with({"point", "ray"}, 8),
+                                         study_with({"point", "ray", "plane"}, 9)};
+  return all;
+}
+
+void expect_named(const Json& value, const std::string& path) {
+  if (value.is_object()) {
+    for (const auto& [name, member] : value.items()) {
+      EXPECT_NE(name, "") << "in " << path;
+      expect_named(member, path + "/" + name);
+    }
+    // An undefined quantity says why, a defined one does not.
+    if (value.contains("status") && value["status"] != "ok") {
+      EXPECT_TRUE(value.contains("reason")) << path;
+    }
+  } else if (value.is_array()) {
+    for (std::size_t i = 0; i < value.size(); ++i)
+      expect_named(value[i], path + "/" + std::to_string(i));
+  } else if (value.is_string()) {
+    EXPECT_NE(value.get<std::string>(), "") << path;
+  }
+}
+
+TEST(Documents, EveryNumberOfTheJsonHasANameAndEveryTextWords) {
+  for (const Analysis& analysis : studies()) expect_named(Json::parse(report_json(analysis)), "");
+}
+
+TEST(Documents, TablesHaveACaptionANameForEachColumnAndNoEmptyNote) {
+  for (const Analysis& analysis : studies()) {
+    for (const Table& table : all_tables(analysis)) {
+      EXPECT_NE(table.caption, "");
+      EXPECT_LE(table.n_names, table.header.size()) << table.caption;
+      for (const std::string& name : table.header) EXPECT_NE(name, "") << table.caption;
+      for (const std::string& note : table.notes) EXPECT_NE(note, "") << table.caption;
+      for (const auto& row : table.rows) {
+        ASSERT_EQ(row.size(), table.header.size()) << table.caption;
+        EXPECT_NE(row[0], "") << table.caption;
+      }
+    }
+  }
+}
+
+TEST(Documents, NamesStandInTheFirstColumnsOfATableNumbersInTheOthers) {
+  const auto number = [](const std::string& cell) {
+    return cell.find_first_of("0123456789") != std::string::npos;
+  };
+  for (const Analysis& analysis : studies()) {
+    std::vector<Table> tables = all_tables(analysis);
+    std::erase_if(tables, [](const Table& table) {
+      return table.caption.find("data") != std::string::npos ||  // of provenance: texts
+             table.header.size() == 2;
+    });
+    EXPECT_GT(tables.size(), 8U);
+    for (const Table& table : tables) {
+      for (std::size_t c = 0; c < table.header.size() && !table.rows.empty(); ++c) {
+        const bool any =
+            std::ranges::any_of(table.rows, [&](const auto& row) { return number(row[c]); });
+        if (c < table.n_names) {
+          EXPECT_FALSE(any) << table.caption << ": " << table.header[c];
+        }
+      }
+    }
+  }
+}
+
+TEST(Documents, AxesOfNumbersSayWhatTheyShowAxesOfNamesNeedNot) {
+  for (const Analysis& analysis : studies()) {
+    const std::vector<Figure> figures = figures_of(analysis, {});
+    EXPECT_GE(figures.size(), 7U);
+    for (const Figure& figure : figures) {
+      EXPECT_NE(figure.title, "");
+      EXPECT_NE(figure.subtitle, "") << figure.id;
+      EXPECT_NE(figure.description, "") << figure.id;
+      for (const std::string& note : figure.notes) EXPECT_NE(note, "") << figure.id;
+      for (const LegendEntry& entry : figure.legend) EXPECT_NE(entry.label, "") << figure.id;
+      for (const Panel& panel : figure.panels) {
+        for (const FigureAxis* const axis : {&panel.x, &panel.y}) {
+          ASSERT_FALSE(axis->ticks.empty()) << figure.id;
+          EXPECT_LT(axis->low, axis->high) << figure.id;
+          // Which way the answers of a confusion matrix run must be said, too.
+          const bool shapes =
+              axis->names && axis->ticks.front().label == analysis.table.shapes.front();
+          if (shapes && figure.id != "confusion") {
+            EXPECT_EQ(axis->title, "") << figure.id;
+          } else if (!axis->names) {
+            EXPECT_NE(axis->title, "") << figure.id;
+          }
+        }
+      }
+    }
+  }
+}
+
+TEST(Documents, TheAnovasTablePrintsEachCorrectionUnderItsName) {
+  for (const Analysis& analysis : studies()) {
+    const Table table = anova_table(analysis);
+    ASSERT_EQ(table.rows.size(), analysis.rm_anova.effects.size());
+    int corrected = 0;
+    for (std::size_t i = 0; i < table.rows.size(); ++i) {
+      const AnovaEffect& effect = analysis.rm_anova.effects[i];
+      const Sphericity& sphericity = effect.sphericity;
+      const auto cell = [&](const std::string& name) {
+        const auto at = std::ranges::find(table.header, name);
+        return at == table.header.end()
+                   ? std::string("no such column")
+                   : table.rows[i][static_cast<std::size_t>(at - table.header.begin())];
+      };
+      EXPECT_EQ(cell("effect"), effect.name);
+      if (!sphericity.gg_epsilon) continue;
+      ++corrected;
+      // Three digits: half a unit of the last is 0.0005.
+      EXPECT_NEAR(std::stod(cell("W")), *sphericity.mauchly_w, 0.00051);
+      EXPECT_NEAR(std::stod(cell("ε GG")), *sphericity.gg_epsilon, 0.00051);
+      EXPECT_NEAR(std::stod(cell("ε HF")), *sphericity.hf_epsilon_used, 0.00051);
+      EXPECT_EQ(cell("ε GG").size(), 5U);
+      EXPECT_EQ(cell("ε HF").size(), 5U);
+      EXPECT_EQ(cell("W").size(), 5U);
+    }
+    EXPECT_GE(corrected, 2);
+  }
+}
+
+}  // namespace documents
+}  // namespace
+}  // namespace palpate::analysis
