@@ -218,6 +218,30 @@ TEST(Parse, ReadsAScene) {
   EXPECT_EQ(objects[2].parts.size(), 1u);
 }
 
+TEST(ParseScene, AToolHasOneToSixteenSegments) {
+  const auto faults_with = [](int segments) {
+    std::string list;
+    for (int i = 0; i < segments; ++i) {
+      list += (i == 0 ? "" : ", ");
+      list += R"({"from_m": [0, 0, 0], "to_m": [0, 0, 0.1]})";
+    }
+    try {
+      const SceneSpec scene = parse_scene_text(
+          R"({"objects": [{"shape": "cube", "edge_m": 0.05}], "tool": {"segments": [)" + list +
+              "]}}",
+          "s.json");
+      EXPECT_EQ(scene.tool.segments.size(), static_cast<std::size_t>(segments));
+      return std::string();
+    } catch (const InputError& error) {
+      return error.faults().at(0).location;
+    }
+  };
+  EXPECT_EQ(faults_with(1), "");
+  EXPECT_EQ(faults_with(16), "");
+  EXPECT_EQ(faults_with(17), "/tool/segments");
+  EXPECT_EQ(faults_with(0), "/tool/segments");
+}
+
 TEST(Parse, ReadsASceneWithToolReachAndLayers) {
   const SceneSpec scene = parse_scene(kFolder + "good/scene-tool.json");
   ASSERT_EQ(scene.objects.size(), 1u);

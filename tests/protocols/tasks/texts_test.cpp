@@ -5,6 +5,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <fstream>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <set>
 
@@ -50,6 +52,19 @@ TEST(Texts, AreListedOnceEachAndTranslateToThemselves) {
   translate(same, "xx", texts_json(protocol), "texts.xx.json");
   EXPECT_EQ(texts_of(same), texts_of(protocol));
   EXPECT_EQ(same.sha256, protocol.sha256);
+}
+
+TEST(Texts, EachIsUnderItsKeyInTheFile) {
+  const std::string path = PALPATE_SOURCE_DIR "/tests/protocols/good/everything-v2.json";
+  std::ifstream in(path);
+  json document = json::parse(in);
+  for (auto& [name, text] : document["texts"].items()) text = "the " + name;
+  const Protocol protocol = parse_protocol_text(document.dump(), path);
+  std::map<std::string, std::string> found;
+  for (const auto& [key, text] : texts_of(protocol)) found[key] = text;
+  EXPECT_GE(document["texts"].size(), 16U);
+  for (const auto& [name, text] : document["texts"].items())
+    EXPECT_EQ(found["texts." + name], text) << name;
 }
 
 TEST(Texts, AreReplacedEveryOneButWhatIsStoredStays) {

@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -63,6 +64,35 @@ TEST(Search, DoesNotDependOnWhoWalks) {
   EXPECT_EQ(shared.passages, whole.passages);
   EXPECT_EQ(shared.worst_penetration, whole.worst_penetration);
   EXPECT_NE(search_ticks(20'000, 8).in_contact, whole.in_contact);
+}
+
+TEST(Search, CountsAddUpEachWithItsOwn) {
+  const auto counters = [](SearchCounts& c) {
+    return std::array{&c.walks,      &c.ticks,           &c.in_contact,     &c.entries,
+                      &c.missed,     &c.phantom,         &c.walked_finely,  &c.passages,
+                      &c.shallow,    &c.floating,        &c.passed_through, &c.penetrating,
+                      &c.not_finite, &c.endless,         &c.wrong_force,    &c.faulted,
+                      &c.fallbacks,  &c.turned_elsewhere};
+  };
+  SearchCounts one, other;
+  for (std::size_t i = 0; i < counters(one).size(); ++i) {
+    *counters(one)[i] = i + 1;
+    *counters(other)[i] = 1000 * (i + 1);
+  }
+  one.worst_penetration = 3e-12;
+  other.worst_penetration = 2e-12;
+  one.faults.resize(7);
+  other.faults.resize(7);
+  other.faults[2].tick = 99;
+  one += other;
+  for (std::size_t i = 0; i < counters(one).size(); ++i)
+    EXPECT_EQ(*counters(one)[i], 1001 * (i + 1)) << i;
+  EXPECT_EQ(one.worst_penetration, 3e-12);
+  ASSERT_EQ(one.faults.size(), SearchCounts::kFaultsKept);
+  EXPECT_EQ(one.faults[9].tick, 99U);
+  EXPECT_EQ(one.wrong(), one.missed + one.passed_through + one.phantom + one.penetrating +
+                             one.floating + one.shallow + one.wrong_force + one.not_finite +
+                             one.endless + one.faulted);
 }
 
 /// A renderer that goes wrong now and then.
