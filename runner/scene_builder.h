@@ -87,6 +87,8 @@ class StimulusLibrary {
   double reach(int stimulus) const { return reaches_[stimulus]; }
   /// Of the stimulus as the protocol has it, not turned.
   const SharpEdges& edges(int stimulus) const { return edges_[static_cast<std::size_t>(stimulus)]; }
+  /// Null: the stimulus is not soft.
+  const rendering::SoftObject* soft(std::size_t stimulus) const { return soft_[stimulus].get(); }
 
  private:
   std::vector<std::vector<rendering::SceneObject>> with_sides_, without_sides_;  ///< by stimulus

@@ -38,7 +38,7 @@ struct Material {
 /// What makes an object give.
 struct Soft {
   enum class Fixed {
-    base,    ///< the lowest nodes, local frame; of a sphere a tenth of its height
+    base,    ///< the lowest nodes, local frame, at least three; of a sphere a tenth of its height
     none,    ///< it moves freely
     points,  ///< the node nearest to each of `points`
   };

@@ -8,6 +8,7 @@
 #include "protocols/schedule.h"
 #include "protocols/tasks/texts.h"
 #include "runner/commands/shared/command.h"
+#include "runner/commands/shared/scene_notes.h"
 #include "runner/commands/shared/task_words.h"
 #include "runner/devices/registry.h"
 #include "runner/devices/simulated.h"
@@ -145,12 +146,12 @@ void print_verdict(const std::string& what, const std::vector<std::string>& reas
 }
 
 /// Whether each kind of device and simulated participants can show the protocol; if not, why.
-void print_fitness(const protocols::Protocol& protocol, std::ostream& out) {
+void print_fitness(const protocols::Protocol& protocol, const StimulusLibrary& library,
+                   std::ostream& out) {
   DeviceConfig config;
   config.rate = protocol.servo_rate;
   config.stylus_length = protocol.stylus.length;
   config.stylus_grip = protocol.stylus.grip;
-  const StimulusLibrary library(protocol);
   out << "  can be shown by (run --device NAME)\n";
   for (const DeviceKind& kind : device_kinds()) {
     const DeviceCapabilities can = nominal_capabilities(kind, config);
@@ -207,7 +208,14 @@ int validate_command(const std::vector<std::string>& args) {
   print_summary(protocol, std::cout);
   for (const protocols::StimulusSpec& stimulus : protocol.stimuli)
     print_overlaps(stimulus.object, stimulus.name, std::cout);
-  print_fitness(protocol, std::cout);
+  const StimulusLibrary library(protocol);
+  for (std::size_t i = 0; i < protocol.stimuli.size(); ++i) {
+    const rendering::SoftObject* const soft = library.soft(i);
+    const auto felt = soft != nullptr ? elements_felt(*soft) : std::nullopt;
+    if (felt)
+      std::cout << "  note        stimulus " << protocol.stimuli[i].name << ": " << *felt << "\n";
+  }
+  print_fitness(protocol, library, std::cout);
   return 0;
 }
 

@@ -25,13 +25,16 @@ struct SoftSwing {
   SoftCase what;
   double force = 0;      ///< N, mean, once it is held
   double swing = 0;      ///< share of it: highest less lowest over the last 0.2 s
+  double held = 0;       ///< s, until then
   bool finite = true;    ///< every force was a number
   bool accepted = true;  ///< a scene may have this rate with this modulus
   /// At rest as far as a hand can tell.
-  bool settles() const { return finite && swing <= 0.01; }
+  bool settles() const { return finite && swing <= kAtRest; }
+  static constexpr double kAtRest = 0.01;
 };
 
-/// A slab, 60 x 60 x 30 mm, pressed by an upright tool that is then held still for 1.5 s.
+/// A slab, 60 x 60 x 30 mm, pressed by an upright tool that is then held still for 1.5 s; where it
+/// still swings, as one without damping does, up to 12 s.
 SoftSwing press_and_hold(const SoftCase& what);
 
 /// 1 kPa to 10 MPa, 0.2 to 3 kN/m, 62.5 to 1000 Hz, tools of 2 and 10 mm, with plain and with

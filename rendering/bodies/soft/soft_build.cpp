@@ -7,6 +7,7 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <limits>
+#include <numeric>
 #include <set>
 #include <stdexcept>
 #include <string>
@@ -21,12 +22,15 @@ namespace {
 
 constexpr double kShare = 0.25;                                  // of the time between two steps
 constexpr std::array kRates{1000.0, 500.0, 250.0, 125.0, 62.5};  // Hz
-// A soft body at the lowest rate swings under a thick tool with a stiff spring (a tenth of the
-// force at 62.5 Hz and 10 kPa): rendering/README.md has the map.
-constexpr double kLowRate = 100;       // Hz
-constexpr double kLowRateYoung = 1e5;  // Pa
-// One that is very soft and hardly damped swings under stiff springs below this rate.
-constexpr double kSwingingYoung = 1e4, kSwingingDamping = 0.01, kSwingingRate = 400;  // Pa, s, Hz
+// A body that is stepped more slowly goes on swinging under a stiff spring or a thick tool, however
+// long it is held: rendering/README.md has the map.
+struct LeastRate {
+  double below_young;       // Pa
+  double damped, undamped;  // Hz
+};
+constexpr std::array kLeastRates{LeastRate{1e4, 400, 400}, LeastRate{2e4, 200, 200},
+                                 LeastRate{1e6, 100, 200}};
+constexpr double kHardlyDamped = 0.01;             // s; less than that
 constexpr double kLeastFill = 20;                  // by nodes^(4/3), of solids as long as high
 constexpr double kBase = 0.01, kBallBase = 0.1;    // of the height
 constexpr double kShortest = 0.001, kLongest = 2;  // m, of an object
@@ -65,20 +69,46 @@ void check_extent(const stimuli::SolidMesh& mesh) {
          in_thousandths(kShortest) + " to " + in_thousandths(kLongest) + " mm (files are in m)");
 }
 
+/// Whether three of them make a triangle: fewer hold a body as a hinge does.
+bool span_a_plane(const std::vector<Vec3>& nodes, const std::vector<std::uint32_t>& which) {
+  constexpr double kFlat = 1e-6;  // of the longest side's square
+  if (which.size() < 3) return false;
+  const Vec3& first = nodes[which[0]];
+  const auto farther = [&](std::uint32_t a, std::uint32_t b) {
+    return glm::distance(nodes[a], first) < glm::distance(nodes[b], first);
+  };
+  const Vec3 along = nodes[*std::max_element(which.begin(), which.end(), farther)] - first;
+  return std::any_of(which.begin(), which.end(), [&](std::uint32_t i) {
+    return glm::length(glm::cross(along, nodes[i] - first)) > kFlat * glm::dot(along, along);
+  });
+}
+
+/// The lowest nodes, up to a share of the height, or higher until they hold the body.
+std::vector<std::uint32_t> base_of(const std::vector<Vec3>& nodes, double share) {
+  std::vector<std::uint32_t> upwards(nodes.size());
+  std::iota(upwards.begin(), upwards.end(), 0U);
+  std::stable_sort(upwards.begin(), upwards.end(),
+                   [&](std::uint32_t a, std::uint32_t b) { return nodes[a].z < nodes[b].z; });
+  const double low = nodes[upwards.front()].z, height = nodes[upwards.back()].z - low;
+  std::vector<std::uint32_t> base;
+  for (const std::uint32_t i : upwards) {
+    const double rise = nodes[i].z - low;
+    // Nodes at one height belong together, whatever the rounding.
+    const bool level = !base.empty() && nodes[i].z <= nodes[base.back()].z + 1e-9 * height;
+    if (rise > share * height && !level && span_a_plane(nodes, base)) break;
+    base.push_back(i);
+  }
+  return base;
+}
+
 std::vector<std::uint32_t> fixed_nodes(const stimuli::ObjectSpec& spec,
                                        const stimuli::SolidMesh& mesh) {
   const std::vector<Vec3>& nodes = mesh.nodes;
   std::set<std::uint32_t> fixed;
   if (spec.soft->fixed == stimuli::Soft::Fixed::base) {
-    double low = std::numeric_limits<double>::infinity(), high = -low;
-    for (const Vec3& p : nodes) {
-      low = std::min(low, p.z);
-      high = std::max(high, p.z);
-    }
-    const double share = spec.shape == stimuli::ShapeKind::sphere ? kBallBase : kBase;
-    for (std::uint32_t i = 0; i < nodes.size(); ++i) {
-      if (nodes[i].z <= low + share * (high - low)) fixed.insert(i);
-    }
+    const std::vector<std::uint32_t> base =
+        base_of(nodes, spec.shape == stimuli::ShapeKind::sphere ? kBallBase : kBase);
+    fixed.insert(base.begin(), base.end());
   }
   if (spec.soft->fixed == stimuli::Soft::Fixed::points) {
     // An element's side, of one that is as long as high.
@@ -177,9 +207,11 @@ Meshed meshed(const stimuli::ObjectSpec& spec, const SoftSettings& settings) {
 }  // namespace
 
 bool coupling_is_stable(const SoftMaterial& material, double rate) {
-  if (rate < kLowRate && material.young < kLowRateYoung) return false;
-  const bool swings = material.young < kSwingingYoung && material.damping < kSwingingDamping;
-  return !swings || rate >= kSwingingRate;
+  for (const LeastRate& least : kLeastRates) {
+    if (material.young < least.below_young)
+      return rate >= (material.damping < kHardlyDamped ? least.undamped : least.damped);
+  }
+  return true;
 }
 
 double step_cost(std::size_t hexahedra, std::size_t tetrahedra, std::size_t factor_entries) {

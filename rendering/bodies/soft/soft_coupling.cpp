@@ -51,6 +51,13 @@ void take_due_step(const SoftObject& object, SoftObjectState& state) {
 
 }  // namespace
 
+double SoftObject::node_spacing() const {
+  double area = 0;
+  for (const auto& [i, j, k] : surface.triangles())
+    area += 0.5 * glm::length(glm::cross(rest[j] - rest[i], rest[k] - rest[i]));
+  return std::sqrt(area / static_cast<double>(rest.size()));
+}
+
 SoftObjectState initial_state(const SoftObject& object) {
   SoftObjectState state;
   state.body = object.body->rest();

@@ -22,6 +22,9 @@ struct SoftObject {
       : body(std::move(what)), surface(*body), contact(how), object(index) {
     for (const std::uint32_t node : body->surface_nodes()) rest.push_back(body->mesh().nodes[node]);
   }
+  /// m, between neighbouring nodes of the surface at rest, in the mean: a tool whose radius is less
+  /// than that feels the elements.
+  double node_spacing() const;
 
   std::shared_ptr<const SoftBody> body;
   SoftSurface surface;

@@ -38,7 +38,7 @@ void explain_scene(Outputs& outputs, const rendering::Scene& scene,
     if (!spec.objects[i].soft)
       add_overlaps(spec.objects[i], "/objects/" + std::to_string(i), explanation.notes);
   }
-  for (std::string& note : objects_passed_through(spec))
+  for (std::string& note : scene_notes(spec, scene))
     explanation.notes.push_back(std::move(note));
   std::cout << to_text(explanation);
   outputs.put("json", to_json(explanation).dump(2) + "\n");
@@ -109,7 +109,7 @@ int render_command(const std::vector<std::string>& args) {
   outputs.put("out", table.text());
   outputs.put("bodies", bodies.text());
   outputs.write();
-  for (const std::string& note : objects_passed_through(spec))
+  for (const std::string& note : scene_notes(spec, scene))
     std::cerr << stimuli::printable(scene_path) << ": " << note << '\n';
   std::cerr << stimuli::printable_lines(table.warnings(trajectory));
   return 0;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <cstdio>
 #include <glm/geometric.hpp>
 
 namespace palpate::runner {
@@ -21,6 +22,28 @@ std::vector<std::string> objects_passed_through(const protocols::SceneSpec& scen
       notes.push_back(place +
                       "is soft, not fixed, and falls through the other objects: soft ones "
                       "touch nothing but the tool");
+  }
+  return notes;
+}
+
+std::optional<std::string> elements_felt(const rendering::SoftObject& object) {
+  const double spacing = object.node_spacing(), radius = object.contact.radius;
+  if (spacing <= radius) return std::nullopt;
+  char text[240];
+  std::snprintf(text, sizeof text,
+                "the nodes of its elements are %.1f mm apart and the tool has a radius of %.1f mm: "
+                "a tool that slides over it feels each of them; expected a tool/radius_m of the "
+                "spacing or more, or a higher soft/resolution",
+                1000 * spacing, 1000 * radius);
+  return text;
+}
+
+std::vector<std::string> scene_notes(const protocols::SceneSpec& spec,
+                                     const rendering::Scene& scene) {
+  std::vector<std::string> notes = objects_passed_through(spec);
+  for (const auto& object : rendering::soft_objects(scene)) {
+    if (const auto felt = elements_felt(*object))
+      notes.push_back("/objects/" + std::to_string(object->object) + ": " + *felt);
   }
   return notes;
 }

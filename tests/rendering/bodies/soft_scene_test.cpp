@@ -136,6 +136,32 @@ TEST(SoftScene, WithoutAResolutionItHasTheHighestThatCanBeStepped) {
   EXPECT_TRUE(coupling_is_stable({.young = 20000}, 1 / found->body->settings().step));
 }
 
+TEST(SoftScene, ABallIsHeldAgainstTurningHoweverCoarse) {
+  for (const int resolution : {2, 3, 4, 5, 8}) {
+    stimuli::ObjectSpec spec = soft_cube(20000);
+    spec.shape = stimuli::ShapeKind::sphere;
+    spec.radius = 0.03;
+    spec.soft->resolution = resolution;
+    const auto ball = build_soft_object(spec, Pose{}, {});
+    const SoftBody& body = *ball->body;
+    SoftState state = body.rest();
+    std::uint32_t top = 0;
+    for (std::uint32_t i = 0; i < body.surface_nodes().size(); ++i) {
+      if (ball->rest[i].z > ball->rest[top].z) top = i;
+    }
+    const std::vector<NodeForce> aside{{top, {0.05, 0.03, 0}}};  // N
+    const auto seconds = [&](double s) { return static_cast<int>(s / body.settings().step); };
+    for (int i = 0; i < seconds(1); ++i) body.step(state, aside);
+    const std::uint32_t node = body.surface_nodes()[top];
+    EXPECT_GT(state.x[node].x, ball->rest[top].x + 1e-4) << resolution;
+    for (int i = 0; i < seconds(6); ++i) body.step(state, {});
+    double most = 0;
+    for (std::size_t i = 0; i < state.x.size(); ++i)
+      most = std::max(most, glm::distance(state.x[i], body.mesh().nodes[i]));
+    EXPECT_LT(most, 1e-6) << resolution;
+  }
+}
+
 TEST(SoftScene, FixedPointsAreOnTheObject) {
   stimuli::ObjectSpec spec = soft_cube(20000);
   spec.soft->fixed = stimuli::Soft::Fixed::points;

@@ -41,10 +41,31 @@ class Soft(CommandCase):
             scene = self.file("scene.json", {"objects": objects, "gravity_m_per_s2": [0, 0, -9.81]})
             done = self.palpate("render", "--scene", scene, "--renderer", "ray", "--trajectory", path,
                                 "--out", self.dir / "out.csv", "--force")
-            self.assertEqual(done.stderr.count("/objects/"), 1 if said else 0)
+            falls = [line for line in done.stderr.splitlines() if "touch nothing but the tool" in line]
+            self.assertEqual(len(falls), 1 if said else 0)
             self.assertIn(said, done.stderr)
             explained = self.palpate("render", "--scene", scene, "--renderer", "ray", "--explain").stdout
             self.assertIn(said, explained)
+
+    def test_elements_that_a_tool_feels_are_told(self):
+        path = self.file("path.csv", "t,tip_x,tip_y,tip_z,tail_x,tail_y,tail_z\n0,1,0,0,1,0,0.1\n0.01,1,0,0,1,0,0.1\n")
+        hand = {"segments": [{"from_m": [0, 0, 0], "to_m": [0, 0, 0.1]}]}
+        # A cube of 60 mm with n x n squares a side has 6 n^2 + 2 nodes on 21,600 mm^2.
+        for n, radius, spacing in ((3, 0.002, "19.6"), (3, 0.019, "19.6"), (3, 0.0197, ""), (6, 0.009, "10.0"), (6, 0.0101, "")):
+            cube = {"shape": "cube", "edge_m": 0.06, "soft": {"young_pa": 20000, "resolution": n}}
+            scene = self.file("scene.json", {"objects": [cube], "tool": {**hand, "radius_m": radius}})
+            protocol = self.file("study.json", {
+                "version": 2, "name": "study", "renderers": ["ray"], "orientation": "fixed", "seed": 1, "tool": {**hand, "radius_m": radius},
+                "stimuli": [{"name": "one", **cube}, {"name": "hard", "shape": "cube", "edge_m": 0.06}],
+                "blocks": [{"name": "which", "task": "identify", "stimuli": ["one", "hard"], "keys": {"1": "one", "2": "hard"}, "repetitions": 1}]})
+            felt = f"the nodes of its elements are {spacing} mm apart and the tool has a radius of {1000 * radius:.1f} mm"
+            for command in (["render", "--scene", scene, "--renderer", "ray", "--explain"],
+                            ["render", "--scene", scene, "--renderer", "ray", "--trajectory", path, "--out", self.dir / "out.csv", "--force"],
+                            ["validate", protocol]):
+                done = self.palpate(*command)
+                self.assertEqual((done.stdout + done.stderr).count("mm apart"), 1 if spacing else 0, (n, radius, command[0]))
+                if spacing:
+                    self.assertIn(felt, done.stdout + done.stderr)
 
     def test_what_was_felt_on_a_soft_block_is_replayed_to_the_bit(self):
         protocol = self.file("felt.json", {
