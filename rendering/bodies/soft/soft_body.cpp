@@ -62,6 +62,8 @@ SoftBody::SoftBody(stimuli::SolidMesh mesh, const std::vector<std::uint32_t>& fi
       free_nodes_(unmarked(is_fixed_)),
       factor_(factorised(solid_, is_fixed_, free_nodes_, settings)),
       surface_(stimuli::surface_of(mesh_)) {
+  for (const Vec3& node : mesh_.nodes)
+    extent_ = std::max(extent_, glm::distance(node, mesh_.nodes.front()));
   find_surface();
   if (settings.compliance) find_compliance();
 }

@@ -98,6 +98,7 @@ class SoftBody {
   stimuli::SolidMesh mesh_;
   SoftSettings settings_;
   Solid solid_;
+  double extent_ = 0;  ///< m, of the body at rest, from its first node
   std::vector<bool> is_fixed_;
   std::vector<std::uint32_t> free_nodes_;
   Factor factor_;

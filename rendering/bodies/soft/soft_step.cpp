@@ -11,11 +11,17 @@ namespace palpate::rendering {
 namespace {
 
 constexpr double kArmijo = 1e-4;  // of the decrease that the slope promises
-constexpr int kHalvings = 12;
+constexpr int kHalvings = 30;
 constexpr double kRounding = 1e-14;  // of the energy: less is no increase
 // Where a whole step lowers the potential by this share of what the quadratic model says, or less
 // than 1 / it, the model does not hold, and another iteration is worth its time.
 constexpr double kTrusted = 0.9;
+
+double longest(const std::vector<Vec3>& ways) {
+  double square = 0;
+  for (const Vec3& way : ways) square = std::max(square, glm::dot(way, way));
+  return std::sqrt(square);
+}
 
 double dot(const std::vector<Vec3>& a, const std::vector<Vec3>& b) {
   double sum = 0;
@@ -31,16 +37,18 @@ SoftBody::LineSearch SoftBody::search_line(SoftState& state, double& change) con
   const double slope = dot(state.trial_gradient, state.step);
   const double rounding = kRounding * (std::abs(state.energy) + std::abs(change));
   if (!(-slope > rounding)) return LineSearch::stays;
-  double part = 1;
+  // Where elements are inside out the stiffness at rest may promise ways of many times the body.
+  const double most = longest(state.step);
+  double part = most > extent_ ? extent_ / most : 1;
   for (int halving = 0; halving <= kHalvings; ++halving, part *= 0.5) {
     for (std::size_t i = 0; i < state.trial.size(); ++i) state.trial[i] += part * state.step[i];
     const double there = change_at_trial(state);
     if (there <= change + kArmijo * part * slope + rounding) {
       const double share = (change - there) / (-0.5 * slope);
       change = there;
-      if (halving > 0) ++state.shortened;
-      return halving == 0 && share > kTrusted && share < 1 / kTrusted ? LineSearch::as_expected
-                                                                      : LineSearch::moves;
+      if (part < 1) ++state.shortened;
+      return part == 1 && share > kTrusted && share < 1 / kTrusted ? LineSearch::as_expected
+                                                                   : LineSearch::moves;
     }
     for (std::size_t i = 0; i < state.trial.size(); ++i) state.trial[i] -= part * state.step[i];
     state.next_is_trial = false;
