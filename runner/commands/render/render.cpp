@@ -38,8 +38,7 @@ void explain_scene(Outputs& outputs, const rendering::Scene& scene,
     if (!spec.objects[i].soft)
       add_overlaps(spec.objects[i], "/objects/" + std::to_string(i), explanation.notes);
   }
-  for (std::string& note : scene_notes(spec, scene))
-    explanation.notes.push_back(std::move(note));
+  for (std::string& note : scene_notes(spec, scene)) explanation.notes.push_back(std::move(note));
   std::cout << to_text(explanation);
   outputs.put("json", to_json(explanation).dump(2) + "\n");
   outputs.write();
