@@ -206,6 +206,18 @@ TEST(FoundText, ShowsSixtyCharactersAtMost) {
   EXPECT_EQ(found_text(numbers).size(), std::string(", found ").size() + 60);
 }
 
+TEST(FoundText, BeginsWithTheValueAsItIsWritten) {
+  std::string letters;
+  for (int i = 0; i < 200; ++i) letters += static_cast<char>('a' + i % 26);
+  for (const nlohmann::json& value :
+       {nlohmann::json(letters), nlohmann::json::array({letters, letters}),
+        nlohmann::json{{"k", letters}}, nlohmann::json(12345.5), nlohmann::json("short")}) {
+    const std::string whole = value.dump(), shown = found_text(value);
+    const std::string begin = shown.substr(std::string(", found ").size(), 40);
+    EXPECT_TRUE(whole.starts_with(begin)) << shown;
+  }
+}
+
 TEST(ObjectReader, UnknownKeysAreNamedWithTheNearestKnown) {
   bool truth = false;
   const auto read = [&](ObjectReader& reader) {

@@ -57,6 +57,22 @@ std::vector<std::string> answers_of_block(const std::string& task, const json& m
 
 using Places = std::vector<std::string>;
 
+TEST(Answers, OfALevelThatIsSetAreTurnsTheOtherObjectAndTheEnd) {
+  const std::vector<std::string> all =
+      answers_of_block("adjust", {{"standard", "ball"},
+                                  {"level", {{"path", "/stiffness_n_per_m"}}},
+                                  {"min", 100},
+                                  {"max", 500},
+                                  {"turn", 50},
+                                  {"starts", {200}},
+                                  {"repetitions", 2}});
+  ASSERT_EQ(all.size(), 4U);
+  EXPECT_TRUE(all[0].ends_with(" down -")) << all[0];
+  EXPECT_TRUE(all[1].ends_with(" up +")) << all[1];
+  EXPECT_TRUE(all[2].ends_with(" switch switch")) << all[2];
+  EXPECT_TRUE(all[3].ends_with(" done done")) << all[3];
+}
+
 TEST(Answers, AreNumberedInOrderWhereNoKeysAreNamed) {
   EXPECT_EQ(answers_of_block("compare", json::object()), (Places{"1 1 1", "2 2 2"}));
   EXPECT_EQ(answers_of_block("compare", {{"intervals", 3}}), (Places{"1 1 1", "2 2 2", "3 3 3"}));

@@ -104,9 +104,15 @@ TEST(TaskPlan, FollowsEachStaircaseByItsOwnAnswers) {
 
 TEST(TaskPlan, HasTheShareOfCatchTrialsInWhichNothingIsShown) {
   int catches = 0, all = 0;
+  std::map<decltype(Trial::renderer), int> of_renderer, catches_of_renderer;
+  std::map<int, std::set<decltype(Trial::renderer)>> of_track;
   for (const Trial& trial : worked_off(TaskPlan(parsed(task_study()), 1, 1))) {
     if (trial.task_block != 2) continue;
     ++all;
+    ++of_renderer[trial.renderer];
+    of_track[trial.track].insert(trial.renderer);
+    if (trial.catch_trial) ++catches_of_renderer[trial.renderer];
+    EXPECT_EQ(trial.intervals.at(0).renderer, trial.renderer);
     ASSERT_EQ(trial.intervals.size(), 1U);
     EXPECT_EQ(trial.intervals[0].stimulus, trial.catch_trial ? -1 : 1);
     EXPECT_EQ(trial.level.has_value(), !trial.catch_trial);
@@ -114,6 +120,13 @@ TEST(TaskPlan, HasTheShareOfCatchTrialsInWhichNothingIsShown) {
   }
   EXPECT_EQ(all, 24);  // 3 levels x 3 x 2 renderers, and a quarter of all
   EXPECT_EQ(catches, 6);
+  // As many with each renderer, and each in the track of its renderer.
+  ASSERT_EQ(of_renderer.size(), 2U);
+  for (const auto& [renderer, count] : of_renderer) {
+    EXPECT_EQ(count, 12);
+    EXPECT_EQ(catches_of_renderer[renderer], 3);
+  }
+  for (const auto& [track, renderers] : of_track) EXPECT_EQ(renderers.size(), 1U) << track;
 }
 
 TEST(TaskPlan, SpreadsCatchTrialsOverAnAdaptiveBlock) {
