@@ -34,6 +34,15 @@ const protocols::BlockProcedures* block_of(const TaskTrial& trial, const TaskTab
   return block == protocol->second.end() ? nullptr : &block->second;
 }
 
+/// False where the protocol says that a track is something else.
+bool may_be_staircase(const Track& track, const TaskTrial& trial, const TaskTable& table) {
+  const protocols::BlockProcedures* const block = block_of(trial, table);
+  if (block == nullptr || block->specs.empty()) return true;
+  int number = 0;
+  std::from_chars(track.name.data(), track.name.data() + track.name.size(), number);
+  return number < 1 || std::holds_alternative<protocols::Staircase>(block->spec_of(number));
+}
+
 std::optional<TrackProcedure> procedure_of(const Track& track, const TaskTrial& trial,
                                            const TaskTable& table) {
   const protocols::BlockProcedures* const block = block_of(trial, table);
@@ -90,7 +99,7 @@ std::vector<Track> tracks_of(const std::vector<const TaskTrial*>& trials, const 
       track.levels.push_back(*trial->level);
       track.successes.push_back(trial->success);
     }
-    track.reversals = reversals_of(track);
+    if (may_be_staircase(track, *own.front(), table)) track.reversals = reversals_of(track);
     track.procedure = procedure_of(track, *own.front(), table);
     tracks.push_back(std::move(track));
   }

@@ -41,8 +41,11 @@ std::int64_t SampleSlots::next() {
   if (index_++ == 0) return slot_ = sample.tick;
   const SampleRecord& before = samples[index_ - 2];
   if (sample.tick <= before.tick) {
-    if (const std::int64_t begin = begin_of_next_interval(); begin > slot_)
-      return slot_ = begin + sample.tick;
+    // One that begins at the very time at which the one before has ended (an adjustment goes on)
+    // comes in the next slot; each of them may have put off the others by one.
+    const std::int64_t begin = begin_of_next_interval();
+    if (begin >= 0 && begin + interval_ > slot_)
+      return slot_ = std::max(begin + sample.tick, slot_ + 1);
   }
   double step = static_cast<double>(sample.tick) - static_cast<double>(before.tick);
   if (step == 1 && sample.period_ns > 0) {

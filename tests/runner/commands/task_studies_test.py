@@ -2,6 +2,7 @@
 Usage: task_studies_test.py PALPATE PROTOCOLS"""
 
 import csv
+import gzip
 import hashlib
 import io
 import json
@@ -49,10 +50,18 @@ class TaskStudies(CommandCase):
                     for one in cell.get("psychometric_functions", []):
                         scales.add(one["fit"]["scale"])
                         for track in one.get("tracks", []):
-                            track.pop("procedure", None)
+                            kind = track.pop("procedure", {"kind": "constant"})["kind"]
+                            if kind != "staircase":  # which the export, where each could be one, does not know
+                                self.assertEqual(track.pop("reversal_trials"), [], kind)
                 self.assertLessEqual(len(scales), 1)
                 known = ["--scale", *scales] if scales else []
-                self.assertEqual(self.numbers("--csv", self.dir / f"{name}.csv", *known)["cells"], found["cells"])
+                exported = self.numbers("--csv", self.dir / f"{name}.csv", *known)["cells"]
+                for cell, own in zip(exported, found["cells"]):
+                    for one, same in zip(cell.get("psychometric_functions", []), own.get("psychometric_functions", [])):
+                        for track, as_stored in zip(one.get("tracks", []), same.get("tracks", [])):
+                            if "reversal_trials" not in as_stored:
+                                track.pop("reversal_trials")
+                self.assertEqual(exported, found["cells"])
                 self.assertEqual(scales, {"log"} if name == "size-questplus" else scales - {"log"})
                 for kind in ("bids", "psych-ds"):
                     folder = self.dir / f"{name}-{kind}"
@@ -239,6 +248,35 @@ class TaskStudies(CommandCase):
             rows = list(csv.DictReader(io.StringIO(table.read_text())))
             self.assertEqual({row["interval"] for row in rows}, {"1", "2"})
             self.assertEqual([row["t"] for row in rows if row["tick"] == "0"], ["0", "0"])
+
+    def test_samples_of_an_adjustment_are_exported_in_all_its_intervals(self):
+        """After a turn an interval begins at the time at which the one before has ended."""
+        protocol = self.file("turned.json", {
+            "version": 2, "name": "turned", "renderers": ["point"], "orientation": "fixed", "home": {"rest_s": 0.1},
+            "samples": True, "servo": {"rate_hz": 500},
+            "stimuli": [{"name": "ball", "shape": "sphere", "radius_m": 0.02, "subdivisions": 2, "stiffness_n_per_m": 200}],
+            "blocks": [{"name": "equal", "task": "adjust", "stimuli": ["ball"], "standard": "ball",
+                        "level": {"path": "/stiffness_n_per_m"}, "min": 100, "max": 500, "turn": 20,
+                        "starts": [120, 480], "repetitions": 3}]})
+        db = self.simulated(protocol, "turned", participants=1)
+        rows = self.exported(db)[1]
+        ends = [row["interval_ends"].split(";") for row in rows]
+        onsets = [row["interval_onsets"].split(";") for row in rows]
+        self.assertTrue(any(begin == end for some, others in zip(onsets, ends) for begin, end in zip(some[1:], others)),
+                        (onsets, ends))
+        ticks = [int(row["ticks"]) for row in rows]
+        self.palpate("export", "--db", db, "--format", "bids", "--out", self.dir / "bids")
+        motion, = (self.dir / "bids").rglob("*_physio.tsv.gz")
+        lines = [line.split("\t") for line in gzip.decompress(motion.read_bytes()).decode().splitlines()]
+        felt = [line for line in lines if line[0] != "n/a"]
+        self.assertEqual([sum(line[0] == str(trial + 1) for line in felt) for trial in range(len(rows))], ticks)
+        for trial, some in enumerate(onsets):
+            self.assertEqual({line[1] for line in felt if line[0] == str(trial + 1)},
+                             {str(one + 1) for one in range(len(some))})
+        self.palpate("export", "--db", db, "--format", "psych-ds", "--out", self.dir / "psych")
+        samples = sum(text.count("\n") - 1 for path in (self.dir / "psych").rglob("*haptic_data.csv")
+                      for text in [path.read_text()])
+        self.assertEqual(samples, sum(ticks))
 
 
 if __name__ == "__main__":
