@@ -37,6 +37,7 @@ void KeyboardRespondent::set_progress(std::size_t done, std::size_t trials) {
 void KeyboardRespondent::show(Page page) {
   page_ = std::move(page);
   reply_until_ns_ = 0;
+  early_ = false;
   screen_.show(page_);
 }
 
@@ -152,6 +153,7 @@ void KeyboardRespondent::begin_trial(const protocols::Trial& trial) {
   page.kind = Page::Kind::neutral;
   page.keys = keys_;
   show(std::move(page));
+  early_ = true;
   screen_.keys();
   cue_ = Cue::none;
   cue_since_ns_ = 0;
@@ -177,6 +179,8 @@ void KeyboardRespondent::show_cue(const Sample& sample) {
     if (cue == Cue::go) page_.text = interval_text();
     const bool types = cue == Cue::go && view_.answers && task()->answers.empty();
     page_.typing = types ? Page::Typing::number : Page::Typing::none;
+    least_ = task()->least;
+    most_ = task()->most;
     page_.wheel =
         cue == Cue::go && task()->task == protocols::TaskKind::adjust && by_ == AnswerBy::keys;
   }
@@ -225,7 +229,10 @@ void KeyboardRespondent::listen(const Sample& sample) {
 }
 
 std::optional<Answer> KeyboardRespondent::step(const Sample& sample) {
-  if (sample.phase == Phase::feeling && onset_ns_ == 0) onset_ns_ = sample.time_ns;
+  if (sample.phase == Phase::feeling && onset_ns_ == 0) {
+    onset_ns_ = sample.time_ns;
+    early_ = false;
+  }
   show_cue(sample);
   listen(sample);
   if (pending_ && onset_ns_ > 0 && sample.time_ns >= pending_->time_ns) return pending_;

@@ -46,7 +46,8 @@ class KeyboardRespondent final : public Respondent {
   std::string ask(const protocols::PageSpec& page, const protocols::PageItem& item) override;
 
   /// What the participant has said: a key, its label or a number; "": on to the next.
-  /// \return  false: nothing of the kind is asked now
+  /// \return  false: nothing of the kind is asked now, a number is out of range, or forces are not
+  /// on
   bool spoken(const std::string& answer, std::int64_t time_ns);
   /// To be called while no trial is felt, where the device's buttons answer: button n stands for
   /// the n-th key of a page, any goes on where there are none. \param newest  sample of the servo
@@ -82,7 +83,8 @@ class KeyboardRespondent final : public Respondent {
   bool listen_to_task(const KeyPress& press);  ///< false: to be heard after a turn
   std::optional<Answer> typed_answer(const std::string& key);
   bool type(const std::string& key);  ///< false: the key is not for typing
-  std::optional<double> typed_number(std::optional<double> least, std::optional<double> most) const;
+  static std::optional<double> number_in(const std::string& typed, std::optional<double> least,
+                                         std::optional<double> most);
   void reply_with(const std::string& text);
   void refuse_number(std::optional<double> least, std::optional<double> most);
   KeyPress wait_for_key(std::int64_t since_ns);
@@ -108,7 +110,9 @@ class KeyboardRespondent final : public Respondent {
   std::optional<Answer> pending_;  ///< given, until the servo's samples have reached its time
   int task_block_ = -1;            ///< of the trial; -1: version 1
   IntervalView view_;
-  std::vector<KeyPress> spoken_;  ///< as keys, or pressed and not looked at yet
+  bool early_ = false;  ///< a trial or interval is prepared, and cannot be answered yet
+  std::optional<double> least_, most_;  ///< of the number that is typed
+  std::vector<KeyPress> spoken_;        ///< as keys, or pressed and not looked at yet
 };
 
 }  // namespace palpate::runner

@@ -4,6 +4,7 @@
 #include <array>
 #include <bit>
 #include <charconv>
+#include <cmath>
 #include <cstddef>
 #include <utility>
 
@@ -88,6 +89,7 @@ void KeyboardRespondent::begin_interval(const protocols::Trial&, const IntervalV
   page.keys = keys_;
   if (!view.felt) page.text = interval_text();
   show(std::move(page));
+  early_ = true;
   take_keys();
   cue_ = Cue::none;
   cue_since_ns_ = 0;
@@ -148,13 +150,13 @@ bool KeyboardRespondent::type(const std::string& key) {
   return true;
 }
 
-std::optional<double> KeyboardRespondent::typed_number(std::optional<double> least,
-                                                       std::optional<double> most) const {
+std::optional<double> KeyboardRespondent::number_in(const std::string& typed,
+                                                    std::optional<double> least,
+                                                    std::optional<double> most) {
   double number = 0;
-  const std::string& typed = page_.typed;
   const char* const end = typed.data() + typed.size();
   const auto [at, error] = std::from_chars(typed.data(), end, number);
-  if (error != std::errc{} || at != end) return std::nullopt;
+  if (error != std::errc{} || at != end || !std::isfinite(number)) return std::nullopt;
   if ((least && number < *least) || (most && number > *most)) return std::nullopt;
   return number + 0.0;  // -0 is 0
 }
@@ -172,7 +174,7 @@ std::optional<Answer> KeyboardRespondent::typed_answer(const std::string& key) {
     if (!type(key)) reply();
     return std::nullopt;
   }
-  const auto number = typed_number(asked.least, asked.most);
+  const auto number = number_in(page_.typed, asked.least, asked.most);
   if (!number) {
     refuse_number(asked.least, asked.most);
     return std::nullopt;
@@ -236,9 +238,15 @@ void KeyboardRespondent::look_at_buttons(const Sample& newest) {
 }
 
 bool KeyboardRespondent::spoken(const std::string& answer, std::int64_t time_ns) {
+  if (early_) return false;
   if (answer.empty()) {
     spoken_.push_back({"space", time_ns});
     return true;
+  }
+  if (page_.typing == Page::Typing::number) {
+    std::string number = answer;
+    std::replace(number.begin(), number.end(), ',', '.');
+    if (!number_in(number, least_, most_)) return false;
   }
   if (page_.typing != Page::Typing::none) {
     while (!page_.typed.empty()) type("backspace");
@@ -336,6 +344,8 @@ std::string KeyboardRespondent::ask_typed(const protocols::PageItem& item) {
   const bool text = item.kind == protocols::PageItem::Kind::text;
   Page page = between_trials(Page::Kind::message, item.question);
   page.typing = text ? Page::Typing::text : Page::Typing::number;
+  least_ = item.least;
+  most_ = item.most;
   show(std::move(page));
   while (true) {
     const KeyPress press = wait_for_key(since_ns);
@@ -346,7 +356,7 @@ std::string KeyboardRespondent::ask_typed(const protocols::PageItem& item) {
     const std::string& typed = page_.typed;
     const bool blank = typed.find_first_not_of(' ') == std::string::npos;
     if (blank && !item.required) return "";
-    if (!text && typed_number(item.least, item.most)) return typed;
+    if (!text && number_in(typed, item.least, item.most)) return typed;
     if (text && !blank) return typed;
     if (text) {
       reply_with(protocol_.texts.answer_first);

@@ -215,7 +215,9 @@ void LiveSession::obey(const ConsoleCommand& command) {
       if (station_.answer_by != AnswerBy::experimenter) {
         say("the participant answers; --spoken lets the experimenter do it");
       } else if (!respondent_.spoken(command.text, command.time_ns)) {
-        say("'" + command.text + "' is no answer now");
+        say("'" + command.text +
+            "' is no answer now: forces are not on yet, it is none of the answers, or it is out of "
+            "range");
       }
       break;
     case Kind::quit:

@@ -200,6 +200,18 @@ TEST_F(KeyboardTasks, SpokenAnswersAreTypedByTheExperimenterAlone) {
   EXPECT_FALSE(answer(2));
   EXPECT_TRUE(person_->spoken("12,5", clock_.now_ns()));
   EXPECT_EQ(answer()->number, 12.5);
+  // What nothing comes of is told to who has typed it: too early, again, or no number in the range.
+  begin(1, {});
+  EXPECT_FALSE(person_->spoken("12", clock_.now_ns()));
+  EXPECT_FALSE(answer(2));
+  for (const char* words : {"51", "-1", "many", "1 2", "inf"})
+    EXPECT_FALSE(person_->spoken(words, clock_.now_ns())) << words;
+  EXPECT_FALSE(answer());
+  EXPECT_TRUE(screen_.replies.empty()) << "and the participant's page does not blame anybody";
+  EXPECT_TRUE(person_->spoken("7", clock_.now_ns()));
+  EXPECT_EQ(answer()->number, 7);
+  begin(0, {});
+  EXPECT_FALSE(person_->spoken("2", clock_.now_ns()));
   begin(1, {1, 2, false, true, nullptr});
   EXPECT_FALSE(answer(2));
   EXPECT_TRUE(person_->spoken("", clock_.now_ns()));
