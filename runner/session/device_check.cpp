@@ -147,6 +147,41 @@ std::string workspace_fault(const protocols::Protocol& protocol, double radius,
                   " m with '", device.name, "': move /workspace/centre_m or change /reach/factor");
 }
 
+/// One sentence for all levels of a stimulus that fail the same check, of which there may be
+/// hundreds: about the last one, and how many there are besides.
+class StimulusFaults {
+ public:
+  enum class Check { material, workspace };
+  /// \param name  of the stimulus; at a level: "NAME at LEVEL"
+  void add(const std::string& name, Check check, const std::string& fault) {
+    const std::size_t at = name.rfind(" at ");
+    for (Group& group : groups_) {
+      if (at == std::string::npos || group.check != check || group.of != name.substr(0, at))
+        continue;
+      ++group.others;
+      group.last = name;
+      group.fault = fault;
+      return;
+    }
+    groups_.push_back({check, at == std::string::npos ? "" : name.substr(0, at), name, fault, 0});
+  }
+  void append_to(std::vector<std::string>& out) const {
+    for (const Group& group : groups_) {
+      out.push_back("stimulus '" + group.last + "'" + group.fault);
+      if (group.others > 0)
+        out.back() += sentence("; likewise ", group.others, " other levels of '", group.of, "'");
+    }
+  }
+
+ private:
+  struct Group {
+    Check check;
+    std::string of, last, fault;  ///< of: ""  where it is no level
+    int others;
+  };
+  std::vector<Group> groups_;
+};
+
 }  // namespace
 
 double felt_gain(const protocols::Protocol& protocol) {
@@ -304,6 +339,7 @@ std::vector<std::string> incompatibilities(const protocols::Protocol& protocol,
         device.max_rate, " Hz");
   }
   const std::vector<protocols::StimulusSpec> shown = protocols::with_all_levels(protocol).stimuli;
+  StimulusFaults faults;
   for (std::size_t i = 0; i < shown.size(); ++i) {
     const protocols::StimulusSpec& stimulus = shown[i];
     bool refused = false;
@@ -312,11 +348,13 @@ std::vector<std::string> incompatibilities(const protocols::Protocol& protocol,
                                             felt_gain(protocol), protocol.passivity_controller);
       if (device.actuated_freedom == 0 || can.reason.empty()) return;
       refused = true;
-      add("stimulus '", stimulus.name, "' has ", of_parts, can.reason, ": soften /material, raise ",
-          "/servo/rate_hz, ", protocol.reach ? "lessen /reach/factor, " : "",
-          passivity_advice(protocol, material, device, can),
-          protocol.version == 2 ? "or keep the levels below"
-                                : "or have it limited by /servo/material_limit \"limit\"");
+      faults.add(stimulus.name, StimulusFaults::Check::material,
+                 sentence(" has ", of_parts, can.reason, ": soften /material, raise ",
+                          "/servo/rate_hz, ", protocol.reach ? "lessen /reach/factor, " : "",
+                          passivity_advice(protocol, material, device, can),
+                          protocol.version == 2
+                              ? "or keep the levels below"
+                              : "or have it limited by /servo/material_limit \"limit\""));
     };
     visit_materials(stimulus.object,
                     [&](const stimuli::Material& material) { check_material(material, ""); });
@@ -324,8 +362,9 @@ std::vector<std::string> incompatibilities(const protocols::Protocol& protocol,
     const double radius =
         (library.reach(static_cast<int>(i)) + protocol.home.margin) / protocol.workspace.scale;
     const std::string fault = workspace_fault(protocol, radius, device);
-    if (!fault.empty()) add("stimulus '", stimulus.name, "'", fault);
+    if (!fault.empty()) faults.add(stimulus.name, StimulusFaults::Check::workspace, fault);
   }
+  faults.append_to(out);
   return out;
 }
 

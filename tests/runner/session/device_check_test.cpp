@@ -6,6 +6,7 @@
 
 #include <cmath>
 
+#include "protocols/parse.h"
 #include "stimuli/object_spec.h"
 
 namespace palpate::runner {
@@ -47,6 +48,26 @@ stimuli::Material of(double stiffness, double damping = 0) {
 double share(const stimuli::Material& material, const DeviceCapabilities& device,
              double rate = 1000, double scale = 1, bool controlled = false) {
   return showable(material, device, rate, scale, controlled).fraction;
+}
+
+TEST(DeviceCheck, LevelsThatFailAlikeAreOneSentence) {
+  const protocols::Protocol protocol = protocols::parse_protocol_text(
+      R"({"version": 2, "name": "levels", "renderers": ["point"],
+          "stimuli": [{"name": "ball", "shape": "sphere", "radius_m": 0.02, "subdivisions": 1,
+                       "stiffness_n_per_m": 100},
+                      {"name": "die", "shape": "cube", "edge_m": 3, "stiffness_n_per_m": 100}],
+          "blocks": [{"name": "b", "task": "compare", "stimuli": ["ball"], "standard": "ball",
+                      "level": {"path": "/radius_m"},
+                      "procedure": {"kind": "constant", "levels": [0.021, 2, 3, 4],
+                                    "repetitions": 1}},
+                     {"name": "i", "task": "identify", "stimuli": ["ball", "die"],
+                      "repetitions": 1}]})",
+      "levels.json");
+  const auto refused = incompatibilities(protocol, StimulusLibrary(protocol), some_device());
+  ASSERT_EQ(refused.size(), 2u);  // the die, and the ball at three of its levels
+  EXPECT_NE(refused[0].find("'die'"), std::string::npos) << refused[0];
+  EXPECT_NE(refused[1].find("'ball at 4'"), std::string::npos) << refused[1];
+  EXPECT_NE(refused[1].find("2 other levels of 'ball'"), std::string::npos) << refused[1];
 }
 
 TEST(DeviceCheck, AStimulusMayFillTheWorkspaceAndNoMore) {
