@@ -2,6 +2,7 @@
 #include <cstddef>
 #include <set>
 #include <stdexcept>
+#include <string_view>
 #include <utility>
 
 #include "protocols/tasks/parse_blocks.h"
@@ -15,7 +16,7 @@ using nlohmann::json;
 constexpr std::size_t kMostPages = 100, kMostItems = 100, kMostChoices = 20;
 constexpr NumberRange kPageNumber{-1e12, 1e12};
 constexpr std::uintmax_t kMostPictureBytes = 8 << 20;
-constexpr const char* kPngBegins = "\x89PNG\r\n\x1a\n";
+constexpr std::string_view kPngBegins = "\x89PNG\r\n\x1a\n";
 
 void read_choices(ObjectReader& reader, PageItem& item) {
   const bool asks = item.kind == PageItem::Kind::choice || item.kind == PageItem::Kind::scale;
@@ -91,6 +92,38 @@ void read_place(ObjectReader& reader, const Protocol& protocol, PageSpec& page) 
   }
 }
 
+/// The big-endian number at `at`.
+std::uint64_t number_in(const std::string& bytes, std::size_t at) {
+  std::uint64_t number = 0;
+  for (std::size_t i = 0; i < 4; ++i)
+    number = number << 8U | static_cast<unsigned char>(bytes[at + i]);
+  return number;
+}
+
+/// Why a file that begins as PNG would not be shown: its chunks (length, kind, data, checksum) do
+/// not lead to IEND, or it needs too much memory. Empty: it would.
+std::string png_fault(const std::string& bytes) {
+  constexpr std::uint64_t kMostPixels = 32'000'000;
+  constexpr std::size_t kFrame = 12, kHeader = 8;  // bytes of a chunk without data; before it
+  std::size_t at = kPngBegins.size();
+  for (bool first = true; bytes.size() - at >= kFrame; first = false) {
+    const std::uint64_t length = number_in(bytes, at);
+    const std::string kind = bytes.substr(at + 4, 4);
+    if (length > bytes.size() - at - kFrame || first != (kind == "IHDR")) break;
+    if (kind == "IEND") return "";
+    if (first) {
+      if (length < kHeader) break;
+      const std::uint64_t wide = number_in(bytes, at + 8), high = number_in(bytes, at + 12);
+      if (wide * high == 0) break;
+      if (wide * high > kMostPixels)
+        return "has " + std::to_string(wide) + " x " + std::to_string(high) +
+               " pixels, of which 32 million are possible";
+    }
+    at += kFrame + length;
+  }
+  return "is damaged or cut off";
+}
+
 /// Its bytes; none and a fault where it is no picture.
 std::shared_ptr<const std::string> read_picture(const std::string& name, const std::string& pointer,
                                                 const MeshFiles& files, FaultList& faults) {
@@ -108,6 +141,12 @@ std::shared_ptr<const std::string> read_picture(const std::string& name, const s
   }
   if (!bytes.starts_with(kPngBegins)) {
     faults.add(pointer, "expected a PNG file; '" + name + "' is none");
+    return nullptr;
+  }
+  // Of what is on record, nothing is refused any more.
+  const std::string fault = files.stored.contains(name) ? "" : png_fault(bytes);
+  if (!fault.empty()) {
+    faults.add(pointer, "expected a PNG file; '" + name + "' " + fault);
     return nullptr;
   }
   return std::make_shared<const std::string>(std::move(bytes));

@@ -9,6 +9,7 @@ namespace palpate::runner {
 namespace {
 
 constexpr double kSmallestUnit = 14;  // px, at scale 1
+constexpr double kMostKeys = 0.55;    // of the height, for the answer keys
 constexpr std::size_t kMostScreens = 200;
 constexpr double kSmallestSize = 0.45;  // of the normal size; below it text is truncated instead
 
@@ -57,7 +58,7 @@ class PageLayout {
         width_(width),
         unit_(std::max({2.0, std::min(height / 34, width / 46),
                         std::min({kSmallestUnit * ui_scale, height / 16, width / 20})})),
-        keys_(canvas, page, unit_, 0.94 * width) {
+        keys_(canvas, page, unit_, 0.94 * width, kMostKeys * height) {
     const double margin = 2.5 * unit_;
     const bool goes_on = page.kind == Page::Kind::text;
     const bool typing = page.typing != Page::Typing::none;
@@ -110,6 +111,10 @@ class PageLayout {
  private:
   void draw_line(const std::string& text, double size, double top, const Colour& colour) const {
     TextBlock words(canvas_, text, size);
+    while (words.size().width > 0.94 * width_ && size > kSmallestSize * unit_) {
+      size *= 0.94;
+      words.set_size(size);
+    }
     if (words.size().width > 0.94 * width_) words.cut_at_width(0.94 * width_);
     words.draw(canvas_, (width_ - std::min(words.size().width, 0.94 * width_)) / 2, top, colour);
   }

@@ -7,7 +7,8 @@
 namespace palpate::runner {
 namespace {
 
-constexpr double kKeycapHeight = 2.3, kRowHeight = 5.2;  // units
+constexpr double kKeycapHeight = 2.3;   // units
+constexpr double kSmallestKeys = 0.45;  // of the normal size
 
 void draw_keycap(cairo_t* canvas, double x, double y, double width, double height) {
   const double radius = 0.18 * height;
@@ -47,46 +48,115 @@ std::string keycap_label(const std::string& key) {
 
 }  // namespace
 
-KeyMap::KeyMap(cairo_t* canvas, const Page& page, double unit, double width) : unit_(unit) {
-  double right = 0;
-  items_.reserve(page.keys.size());
-  for (const auto& [key, answer] : page.keys) {
-    Item item{TextBlock(canvas, keycap_label(key), 1.15 * unit),
-              TextBlock(canvas, answer, unit),
-              0,
-              0,
-              0,
-              0};
-    item.answer.cut_at_width(std::min(item.answer.size().width + 2, 12 * unit));
-    item.cap_width = std::max(kKeycapHeight * unit, item.key.size().width + 1.2 * unit);
-    item.width = std::max(item.cap_width, item.answer.size().width) + 2 * unit;
-    if (rows_.empty() || right + item.width > width) {
-      rows_.push_back(0);
-      right = 0;
+KeyMap::KeyMap(cairo_t* canvas, const Page& page, double unit, double width, double room)
+    : unit_(unit) {
+  if (page.keys.empty()) return;
+  if (lay_side_by_side(canvas, page, width) && height_ <= room) return;
+  for (const double share : {1.0, 0.85, 0.7, 0.55, kSmallestKeys}) {
+    unit_ = share * unit;
+    for (int columns = 1; columns <= 3; ++columns) {
+      if (lay_in_columns(canvas, page, 0.9 * width, room, columns)) return;
     }
-    item.row = rows_.size() - 1;
-    item.x = right;
-    right += item.width;
-    rows_.back() = right;
-    items_.push_back(std::move(item));
   }
+  unit_ = unit;
+  lay_side_by_side(canvas, page, width);  // too much for any: cut off
 }
 
-double KeyMap::height() const {
-  return items_.empty() ? 0 : (static_cast<double>(rows_.size()) * kRowHeight - 0.8) * unit_;
+/// \return  whether it is as it should be: nothing cut off, and a question's answers in one row
+bool KeyMap::lay_side_by_side(cairo_t* canvas, const Page& page, double width) {
+  constexpr double kRowHeight = 5.2, kWidest = 12;  // units
+  items_.clear();
+  bool whole = true;
+  std::vector<double> rows;  // px, how wide each is
+  std::vector<std::size_t> row_of;
+  for (const auto& [key, answer] : page.keys) {
+    Item item{TextBlock(canvas, keycap_label(key), 1.15 * unit_),
+              TextBlock(canvas, answer, unit_),
+              0,
+              0,
+              0,
+              0,
+              0,
+              (kKeycapHeight + 0.45) * unit_};
+    whole = whole && item.answer.size().width <= kWidest * unit_;
+    item.answer.cut_at_width(std::min(item.answer.size().width + 2, kWidest * unit_));
+    item.cap_width = std::max(kKeycapHeight * unit_, item.key.size().width + 1.2 * unit_);
+    item.width = std::max(item.cap_width, item.answer.size().width) + 2 * unit_;
+    if (rows.empty() || rows.back() + item.width > width) rows.push_back(0);
+    row_of.push_back(rows.size() - 1);
+    item.x = rows.back() + (item.width - item.cap_width) / 2;
+    item.answer_x = rows.back() + (item.width - item.answer.size().width) / 2;
+    rows.back() += item.width;
+    items_.push_back(std::move(item));
+  }
+  for (std::size_t i = 0; i < items_.size(); ++i) {
+    Item& item = items_[i];
+    const double top = static_cast<double>(row_of[i]) * kRowHeight * unit_;
+    item.x -= rows[row_of[i]] / 2;
+    item.answer_x -= rows[row_of[i]] / 2;
+    item.y += top;
+    item.answer_y += top;
+  }
+  height_ = (static_cast<double>(rows.size()) * kRowHeight - 0.8) * unit_;
+  return whole && (page.kind != Page::Kind::text || rows.size() == 1);
+}
+
+/// \return  whether it fits
+bool KeyMap::lay_in_columns(cairo_t* canvas, const Page& page, double width, double room,
+                            int columns) {
+  constexpr double kGap = 0.5;  // units, between one and the next
+  const std::size_t each = (page.keys.size() + static_cast<std::size_t>(columns) - 1) /
+                           static_cast<std::size_t>(columns);
+  double cap_width = kKeycapHeight * unit_;
+  for (const auto& [key, answer] : page.keys)
+    cap_width = std::max(
+        cap_width, TextBlock(canvas, keycap_label(key), 1.15 * unit_).size().width + 1.2 * unit_);
+  const double text_left = cap_width + 0.8 * unit_;
+  const double most = width / columns - text_left - unit_;
+  if (most < 6 * unit_ && columns > 1) return false;
+  items_.clear();
+  height_ = 0;
+  double left = 0, y = 0, widest = 0;
+  for (std::size_t i = 0; i < page.keys.size(); ++i) {
+    if (i > 0 && i % each == 0) {
+      left += text_left + widest + unit_;
+      y = widest = 0;
+    }
+    const auto& [key, answer] = page.keys[i];
+    Item item{TextBlock(canvas, keycap_label(key), 1.15 * unit_),
+              TextBlock(canvas, answer, unit_, std::max(most, unit_)),
+              cap_width,
+              0,
+              left,
+              y,
+              left + text_left,
+              y};
+    const Size size = item.answer.size();
+    const double high = std::max(kKeycapHeight * unit_, size.height);
+    item.y += (high - kKeycapHeight * unit_) / 2;
+    item.answer_y += (high - size.height) / 2;
+    widest = std::max(widest, size.width);
+    height_ = std::max(height_, y + high);
+    y += high + kGap * unit_;
+    items_.push_back(std::move(item));
+  }
+  const double all = left + text_left + widest;
+  for (Item& item : items_) {
+    item.x -= all / 2;
+    item.answer_x -= all / 2;
+  }
+  return height_ <= room && all <= 1.06 * width;
 }
 
 void KeyMap::draw(cairo_t* canvas, double middle, double top) const {
   for (const Item& item : items_) {
-    const double centre = middle - rows_[item.row] / 2 + item.x + item.width / 2;
-    const double y = top + static_cast<double>(item.row) * kRowHeight * unit_;
-    draw_keycap(canvas, std::round(centre - item.cap_width / 2), std::round(y),
-                std::round(item.cap_width), std::round(kKeycapHeight * unit_));
-    const Size key = item.key.size(), answer = item.answer.size();
-    item.key.draw(canvas, centre - key.width / 2, y + (kKeycapHeight * unit_ - key.height) / 2,
-                  kText);
-    item.answer.draw(canvas, centre - answer.width / 2, y + (kKeycapHeight + 0.45) * unit_,
-                     kQuietInk);
+    const double left = middle + item.x, y = top + item.y;
+    draw_keycap(canvas, std::round(left), std::round(y), std::round(item.cap_width),
+                std::round(kKeycapHeight * unit_));
+    const Size key = item.key.size();
+    item.key.draw(canvas, left + (item.cap_width - key.width) / 2,
+                  y + (kKeycapHeight * unit_ - key.height) / 2, kText);
+    item.answer.draw(canvas, middle + item.answer_x, top + item.answer_y, kQuietInk);
   }
 }
 

@@ -9,22 +9,27 @@ namespace palpate::runner {
 
 inline constexpr double kTextSize = 1.4;  ///< units, of a text to read
 
-/// The answer keys with their labels, in as many rows as needed.
+/// The answer keys with their labels: side by side, or, where a label would be cut off or there are
+/// too many, one below the other in up to three columns, smaller where they must be.
 class KeyMap {
  public:
-  KeyMap(cairo_t* canvas, const Page& page, double unit, double width);
-  double height() const;
+  /// \param room  px, the height that it may have where that is possible at all
+  KeyMap(cairo_t* canvas, const Page& page, double unit, double width, double room);
+  double height() const { return height_; }
   void draw(cairo_t* canvas, double middle, double top) const;
 
  private:
   struct Item {
     TextBlock key, answer;
-    double cap_width, width, x;
-    std::size_t row;
+    double cap_width, width;
+    double x, y;  ///< of the key's left upper edge, from the middle and the top
+    double answer_x, answer_y;
   };
-  double unit_;
+  bool lay_side_by_side(cairo_t* canvas, const Page& page, double width);
+  bool lay_in_columns(cairo_t* canvas, const Page& page, double width, double room, int columns);
+
+  double unit_, height_ = 0;
   std::vector<Item> items_;
-  std::vector<double> rows_;  ///< px, how wide each row is
 };
 
 /// A picture of the space bar with an arrow: "press to go on" without words.

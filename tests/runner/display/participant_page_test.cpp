@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cstdlib>
 #include <fstream>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -138,6 +139,21 @@ TEST(ParticipantPage, AReplyInABreakKeepsItsDistanceFromTheEdge) {
   }
 }
 
+// The range stands at its end.
+TEST(ParticipantPage, AReplyIsShownWholeInANarrowWindow) {
+  for (const auto& [width, height, scale] :
+       {std::tuple{310, 560, 1.0}, {620, 800, 2.0}, {1280, 800, 1.0}}) {
+    Page page;
+    page.kind = Page::Kind::message;
+    page.typing = Page::Typing::number;
+    page.text = "Wie alt sind Sie?";
+    page.reply = "Please type another number: (18 \u2013 99)";
+    const Image one = draw_page(page, width, height, {scale, 0});
+    page.reply = "Please type another number: (18 \u2013 90)";
+    EXPECT_NE(draw_page(page, width, height, {scale, 0}).pixels, one.pixels) << width;
+  }
+}
+
 TEST(ParticipantPage, AChecklistInANarrowWindowKeepsItsTextSize) {
   Page page;
   page.kind = Page::Kind::checklist;
@@ -240,6 +256,52 @@ TEST(ParticipantPage, HostileTextStaysOnTheScreen) {
   for (const auto& [width, height] : {std::pair{1, 1}, {40, 30}, {200, 2000}, {3840, 200}}) {
     const Image image = draw_page(page, width, height);
     EXPECT_EQ(image.pixels.size(), static_cast<std::size_t>(width) * height);
+  }
+}
+
+// An answer that is not shown to its end cannot be chosen: whatever letter of it is another one,
+// the picture is another one, and so with the question.
+TEST(ParticipantPage, TheAnswersOfAQuestionAreShownWholeBesideIt) {
+  const std::string tail = ", je nachdem, was ich gerade tue, und manchmal auch keine von beiden";
+  std::vector<std::vector<std::string>> answers(3);
+  for (int i = 0; i < 20; ++i)
+    answers[0].push_back("Land Nummer " + std::to_string(i + 1) + " mit langem Namen");
+  answers[1] = {"links", "rechts", "beide gleich" + tail};
+  for (const char* const step : {"gar nicht", "ein wenig", "mittel", "ziemlich", "sehr",
+                                 "au\u00dferordentlich", "unertr\u00e4glich"})
+    answers[2].emplace_back(step);
+  struct Screen {
+    int width, height;
+    double ui_scale;
+  };
+  for (const Screen& screen : {Screen{620, 800, 1},
+                               {1280, 800, 1},
+                               {800, 600, 1},
+                               {640, 480, 1},
+                               {1280, 1000, 2},
+                               {620, 800, 2},
+                               {3840, 2160, 2}}) {
+    for (std::size_t list = 0; list < answers.size(); ++list) {
+      const auto shown = [&](std::size_t changed) {  // the last letter of one, or of the question
+        Page page;
+        page.kind = Page::Kind::text;
+        page.text = "Wie ist es bei Ihne";
+        page.text += changed == answers[list].size() ? "m" : "n";
+        for (std::size_t i = 0; i < answers[list].size(); ++i) {
+          page.keys.emplace_back(std::string(1, static_cast<char>('a' + i)), answers[list][i]);
+          if (i == changed) page.keys.back().second.back() = 'W';
+        }
+        return draw_page(page, screen.width, screen.height, {screen.ui_scale, 0});
+      };
+      const Image plain = shown(answers[list].size() + 1);
+      const std::string name = std::to_string(list) + "-" + std::to_string(screen.width) + "x" +
+                               std::to_string(screen.height) + "-" +
+                               std::to_string(static_cast<int>(screen.ui_scale));
+      keep(plain, "answers" + name);
+      EXPECT_TRUE(border_is_clear(plain)) << name;
+      for (std::size_t i = 0; i <= answers[list].size(); ++i)
+        EXPECT_NE(shown(i).pixels, plain.pixels) << name << ", " << i;
+    }
   }
 }
 
