@@ -87,7 +87,7 @@ SoftSwing press_and_hold(const SoftCase& what) {
   int held = kHeldTicks;
   for (int i = 0; i < falling + held - kWatchedTicks; ++i) tick();
   watch();
-  for (; !out.settles() && held < kLongestHeldTicks; held += kWatchedTicks) watch();
+  for (; out.accepted && !out.settles() && held < kLongestHeldTicks; held += kWatchedTicks) watch();
   out.held = held * kSoftTick;
   return out;
 }

@@ -33,8 +33,8 @@ struct SoftSwing {
   static constexpr double kAtRest = 0.01;
 };
 
-/// A slab, 60 x 60 x 30 mm, pressed by an upright tool that is then held still for 1.5 s; where it
-/// still swings, as one without damping does, up to 12 s.
+/// A slab, 60 x 60 x 30 mm, pressed by an upright tool that is then held still for 1.5 s; where
+/// scenes may have it and it still swings, as one without damping does, up to 12 s.
 SoftSwing press_and_hold(const SoftCase& what);
 
 /// 1 kPa to 10 MPa, 0.2 to 3 kN/m, 62.5 to 1000 Hz, tools of 2 and 10 mm, with plain and with

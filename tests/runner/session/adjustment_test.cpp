@@ -7,6 +7,7 @@
 #include <atomic>
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <filesystem>
 #include <random>
 #include <string>
@@ -39,9 +40,8 @@ Settings simulated(std::uint64_t seed) {
                       "level": {"path": "/stiffness_n_per_m"}, "min": 100, "max": 600, "turn": 20,
                       "starts": [150, 550], "repetitions": 20}]})",
       "adjustments.json");
-  const std::filesystem::path file =
-      std::filesystem::path(testing::TempDir()) / ("adjustments" + std::to_string(seed) + ".db");
-  std::filesystem::remove(file);
+  std::string pattern = testing::TempDir() + "palpate-adjustments-XXXXXX";
+  const std::filesystem::path folder = mkdtemp(pattern.data()), file = folder / "study.db";
   StudyProgress progress;
   {
     data::Store store = data::Store::open(file.string(), data::Store::Mode::write_or_create);
@@ -63,7 +63,7 @@ Settings simulated(std::uint64_t seed) {
   for (const double number : numbers) found.mean += number / static_cast<double>(numbers.size());
   for (const double number : numbers) found.sd += std::pow(number - found.mean, 2);
   found.sd = std::sqrt(found.sd / static_cast<double>(numbers.size() - 1));
-  std::filesystem::remove(file);
+  std::filesystem::remove_all(folder);
   return found;
 }
 
