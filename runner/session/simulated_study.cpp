@@ -12,6 +12,7 @@
 #include <thread>
 #include <utility>
 
+#include "protocols/difference.h"
 #include "runner/participants/simulated.h"
 #include "runner/session/device_check.h"
 #include "runner/session/protocol_info.h"
@@ -144,11 +145,25 @@ void run_session(const SimulatedStudy& study, const Work& work, std::size_t inde
                         log, halting);
 }
 
+/// A participant who is there under two texts of one protocol would be counted twice.
+void refuse_changed(data::Store& store, const data::ProtocolInfo& now) {
+  for (const data::ProtocolInfo& before : store.protocols()) {
+    if (before.name != now.name || before.sha256 == now.sha256 ||
+        store.participants(before.sha256).empty())
+      continue;
+    throw data::StoreRefused(
+        store.path() + ": holds participants of another text of protocol '" + now.name + "' (" +
+        protocols::in_words(protocols::difference(before.text, now.text)) +
+        "); use that text, give the changed protocol another name, or use another database");
+  }
+}
+
 std::vector<Work> unfinished_work(const protocols::Protocol& protocol, data::Store& store,
                                   const SimulatedSettings& settings, const StudyPlan& plan,
                                   StudyProgress& progress) {
   std::vector<Work> todo;
   const data::ProtocolInfo info = info_of(protocol);
+  refuse_changed(store, info);
   for (int number = plan.before + 1; number <= plan.participants; ++number) {
     const data::Participant participant =
         store.enrol(info, simulated_code(number), number, true, plan.seed);

@@ -162,6 +162,25 @@ class Simulate(CommandCase):
         self.simulate(self.dir / "other.db", "--participants", 3, "--settings", patch)
         self.assertNotEqual(self.csv_of(db), self.csv_of(self.dir / "other.db"))
 
+    def test_a_changed_protocol_does_not_mix_into_one_database(self):
+        db, text = self.dir / "one.db", json.loads((PROTOCOLS / "quick.json").read_text())
+        text["$schema"] = str(PROTOCOLS / "protocol.schema.json")
+
+        def simulate(people, status=0, **changed):
+            path = self.file("mine.json", json.dumps({**text, **changed}))
+            return self.palpate("simulate", path, "--db", db, "--participants", people, status=status)
+
+        simulate(1)
+        before = db.read_bytes()
+        for people in (1, 2):
+            for changed, words in (({"repetitions": text["repetitions"] + 1}, "stimuli and order: /repetitions"), ({"title": "Once more"}, "only texts: /title")):
+                refused = simulate(people, status=2, **changed)
+                self.assertIn(words, refused.stderr)
+                self.assertIn("give the changed protocol another name", refused.stderr)
+        self.assertEqual(db.read_bytes(), before)
+        simulate(2)  # the text that it began with
+        simulate(1, name="renamed", repetitions=text["repetitions"] + 1)
+
     def test_versions_are_chosen_and_do_not_mix_into_one_database(self):
         seen = {}
         for version in (1, 2, 3):
