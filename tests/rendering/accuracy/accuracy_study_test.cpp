@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <set>
 
 #include "rendering/accuracy/study.h"
@@ -73,6 +74,23 @@ TEST(AccuracyStudy, EveryNthTickGivesTheSameAnswersThere) {
     EXPECT_LE(b[i].polyhedron_errors.depth.worst, a[i].polyhedron_errors.depth.worst + 1e-15);
   }
   EXPECT_TRUE(fewer);
+}
+
+/// Every look at the polyhedron visits all its facets and edges; each path may end within a stride.
+TEST(AccuracyStudy, KeepsToTheBudgetOfVisitsAndUsesIt) {
+  AccuracySettings settings = tiny();
+  settings.paths = 3;
+  settings.most_triangles = 20;
+  for (const double visits : {1000.0, 1500.0, 3000.0}) {
+    settings.visits = visits;
+    for (const AccuracyRow& row : accuracy_study(
+             settings, [] { return 0.0; }, [](double) {})) {
+      const auto features = static_cast<double>(row.facets + row.edges);
+      const auto ticks = static_cast<double>(row.polyhedron_errors.ticks);
+      EXPECT_LE(ticks * features, visits + settings.paths * features) << row.shape << row.method;
+      EXPECT_GE(ticks * features, 0.5 * std::min(visits, 180 * features)) << row.shape;
+    }
+  }
 }
 
 AccuracyRow row(int triangles, const char* probe, double depth, double normal, std::size_t lost) {

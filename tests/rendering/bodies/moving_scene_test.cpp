@@ -66,6 +66,29 @@ TEST(MovingScene, PushedOffItsMiddleItTurnsAndMomentaBalance) {
   EXPECT_NEAR(glm::distance(angular_momentum(body_world_of(scene), inner), -moment), 0, 1e-5);
 }
 
+/// What strikes a stylus fast makes steps of its own within a tick. The ideal stylus is the virtual
+/// one moved out of the body, not turned, however the body is turned.
+TEST(MovingScene, WhatStrikesFastDoesNotTurnTheIdealStylus) {
+  for (const double angle : {0.0, 0.4, 1.2, 2.5}) {
+    BodyScene s;
+    s.moves(box_mesh(Vec3(0.05)), {{-0.06, 0, 0}, {std::cos(angle / 2), std::sin(angle / 2), 0, 0}},
+            0.05)
+        .velocity = {3, 0, 0};
+    const Scene scene = s.scene();
+    RenderState state = scene.initial_state();
+    const LineProbe probe = pointing({0, 0, 0});
+    ray_renderer().tick(scene, state, probe, 0);
+    int touched = 0;
+    for (int i = 0; i < 60; ++i) {
+      const Rendering r = ray_renderer().tick(scene, state, probe, 1e-3);
+      if (r.contacts == 0) continue;
+      ++touched;
+      EXPECT_LT(glm::distance(r.ideal.tail - r.ideal.tip, probe.tail - probe.tip), 1e-9) << angle;
+    }
+    EXPECT_GT(touched, 3) << angle;
+  }
+}
+
 TEST(MovingScene, BetweenTipAndWallForceIsStiffnessTimesDepth) {
   for (const double mass : {1e-3, 0.1}) {
     for (const double stiffness : {1000.0, 5e4}) {

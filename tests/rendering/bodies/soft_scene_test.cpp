@@ -207,6 +207,44 @@ TEST(SoftScene, ShapesToBeDrawnMoveUnderTheTool) {
           .empty());
 }
 
+/// Steps made elsewhere: asked for and taken there, and no view but what comes from there.
+class CountingStepper final : public SoftStepper {
+ public:
+  void ask(std::span<const NodeForce> forces) noexcept override {
+    ++asked;
+    forced += forces.empty() ? 0 : 1;
+  }
+  bool ready() const noexcept override { return asked > 0; }
+  bool take(SoftView& view) noexcept override {
+    ++taken;
+    for (Vec3& x : view.x) x.z -= 1e-6;
+    return true;
+  }
+  int asked = 0, forced = 0, taken = 0;
+};
+
+TEST(SoftScene, StepsAreMadeWhereTheyWereGivenTo) {
+  stimuli::ObjectSpec spec = soft_cube(20000);
+  Pose aside;
+  aside.position.y = 0.2;
+  const Scene scene = soft_scene(
+      Scene({}, true), {},
+      {build_soft_object(spec, Pose{}, {}), build_soft_object(spec, aside, {})}, true, {});
+  RenderState state = scene.initial_state();
+  CountingStepper first, second;
+  SoftStepper* const steppers[] = {&first, &second};
+  step_elsewhere(state, steppers);
+  const double before = soft_shapes(scene, state)[0].now[0].z;
+  press(ray_renderer(), scene, state, 0.002, 0.004);
+  for (const CountingStepper* one : {&first, &second}) {
+    EXPECT_GT(one->asked, 10);
+    EXPECT_LE(std::abs(one->asked - one->taken), 1);
+  }
+  EXPECT_GT(first.forced, 10);  // under the tool
+  EXPECT_EQ(second.forced, 0);
+  EXPECT_NEAR(before - soft_shapes(scene, state)[0].now[0].z, 1e-6 * first.taken, 1e-12);
+}
+
 TEST(SoftScene, WhatCannotBeSteppedInTimeIsRefused) {
   stimuli::ObjectSpec fine = soft_cube(20000);
   fine.soft->resolution = 18;
