@@ -140,6 +140,40 @@ TEST(MixedModel, ConvergesWhereverTheVariancesLie) {
   }
 }
 
+/// Two participants with gaps: some variances are so badly known that no interval is finite.
+TEST(MixedModel, SaysOfEveryEstimateWithoutAnIntervalWhy) {
+  int few = 0, defined = 0;
+  const auto look = [&](const ModelEstimate& one) {
+    ASSERT_TRUE(one.estimate && one.se);
+    EXPECT_EQ(one.undefined.empty(), one.t && one.p && one.ci95) << one.undefined;
+    EXPECT_EQ(one.ci95.has_value(), one.p.has_value());
+    if (one.ci95) {
+      ++defined;
+      EXPECT_TRUE(std::isfinite(one.ci95->low) && std::isfinite(one.ci95->high));
+      EXPECT_LE(one.ci95->low, *one.estimate);
+      EXPECT_GE(one.ci95->high, *one.estimate);
+    } else if (one.df_satterthwaite && *one.df_satterthwaite < 1e-3) {
+      ++few;
+      EXPECT_EQ(one.undefined, "too few degrees of freedom");
+    }
+  };
+  for (std::uint64_t seed = 1; seed <= 60; ++seed) {
+    stimuli::Random random(seed, {7});
+    const auto drawn = [&random] { return std::pow(10.0, -4 + 5 * random.unit()); };
+    const double intercept = drawn(), slope = drawn(), residual = drawn();
+    ParticipantCells cells = participant_cells_of(2, 2, intercept, slope, residual, seed);
+    for (int gap = 0; gap < 2; ++gap)
+      cells[random.below(2)][random.below(2)][random.below(2)] = ParticipantCell{};
+    const MixedModel model = mixed_model(cells, kTwo, kShapes);
+    for (const FixedEffect& effect : model.fixed_effects) look(effect.value);
+    for (const auto& renderer : model.contrasts)
+      for (const ModelEstimate& contrast : renderer)
+        if (contrast.estimate) look(contrast);
+  }
+  EXPECT_GT(few, 0);
+  EXPECT_GT(defined, 100);
+}
+
 TEST(MixedModel, RefusesWhatWouldTakeHours) {
   const auto reason = [](std::size_t n_renderers, std::size_t n_shapes) {
     ParticipantCells participants(n_renderers, {n_shapes, std::vector<ParticipantCell>(3)});
