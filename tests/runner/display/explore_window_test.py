@@ -90,6 +90,39 @@ class ExploreWindow(unittest.TestCase):
         self.assertEqual((self.folder / "kept" / "scene-1.png").read_bytes()[1:4], b"PNG")
         self.assertEqual(self.end(), 0)
 
+    def test_the_tool_is_thicker_in_the_window_than_in_files(self):
+        """A view on a screen is smaller than a picture in a paper."""
+        self.scene.write_text(json.dumps({"objects": SCENE["objects"][:1]}))
+        path = self.folder / "still.csv"
+        path.write_text("t,tip_x,tip_y,tip_z,tail_x,tail_y,tail_z\n" + "".join(
+            f"{0.01 * k},0.01,-0.05,0.01,-0.11,-0.05,0.01\n" for k in range(20)))
+        done = subprocess.run([PALPATE, "explore", self.scene, "--trajectory", path, "--frames", self.folder / "frames", "--every", "1s"],
+                              text=True, capture_output=True, env=self.screen.environment)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.open("--trajectory", path, "--pictures", self.folder / "kept")
+        time.sleep(1)
+        self.screen.key("s")
+        kept = wait_for("the picture", lambda: list((self.folder / "kept").glob("scene-1.png")))[0]
+        self.assertEqual(self.end(), 0)
+        ratio = self.thickness(kept) / self.thickness(self.folder / "frames" / "frame-00000.png")
+        self.assertGreater(ratio, 1.1)
+        self.assertLess(ratio, 1.6)
+
+    def thickness(self, picture):
+        """Of the rod before the blue cube, over the cube's height: whatever the camera's distance."""
+        wide, high = map(int, subprocess.run(["identify", "-format", "%w %h", picture], check=True, capture_output=True, text=True).stdout.split())
+        seen = subprocess.run(["convert", picture, "-depth", "8", "rgb:-"], check=True, capture_output=True).stdout
+        blue = [b > 90 and b - r > 40 for r, b in zip(seen[0::3], seen[2::3])]
+        cube = [row for row in range(high) if any(blue[row * wide:(row + 1) * wide])]
+        between = []
+        for x in range(wide):
+            rows = [row for row in cube if blue[row * wide + x]]
+            if len(rows) > len(cube) / 3:
+                between.append(rows[-1] - rows[0] + 1 - len(rows))
+        rod = sorted(rows for rows in between if rows > 3)
+        self.assertGreater(len(rod), 50)
+        return rod[len(rod) // 2] / len(cube)
+
     def allow_forces(self):
         """Presses 'Allow forces again', the green button somewhere below the red words, until these are gone. A machine that
         stands still trips the servo at any time, and why forces are off can take several lines."""
