@@ -95,6 +95,7 @@ class Run:
         good, output = self.copy.make(every)
         if not good:
             raise Failed("Without a mutant the copy cannot be built:\n" + output[-3000:])
+        self.users, self.users_in_program = self.copy.users(self.targets), self.copy.users(["palpate"])
         self.programs = [Program(self.copy, name, self.copy.build / folder / name, tested)
                          for name, folder, tested in programs]
         known = self.results.parent / "times.json"  # of programs that have not changed since
@@ -112,7 +113,7 @@ class Run:
             self.palpate = digest(self.copy.build / "runner/palpate")
             self.commands = [t for t in self.command_tests() if t.measure(10 * self.options.longest)]
             self.commands.sort(key=lambda t: t.seconds)
-        self.objects = {path: digest(path) for path in self.copy.build.rglob("*.o")}
+        self.objects = {str(path.relative_to(self.copy.build)): digest(path) for path in self.copy.build.rglob("*.o")}
 
     def killer(self, mutant):
         inside = pathlib.Path(*pathlib.Path(mutant["file"]).parts[1:])
@@ -127,8 +128,6 @@ class Run:
 
     def killer_by_command(self):
         """Of what the test programs do not notice; the program itself is built for these alone."""
-        if not self.commands or len(self.copy.dependants(["palpate"])) > self.options.most_objects:
-            return None
         if not self.copy.make(["palpate"])[0] or digest(self.copy.build / "runner/palpate") == self.palpate:
             return None
         return next(filter(None, (command.killer() for command in self.commands)), None)
@@ -136,24 +135,28 @@ class Run:
     def attempt(self, mutant):
         """(result, by which test or why)"""
         asserting = "#define _GLIBCXX_ASSERTIONS\n" if mutant["file"].endswith(".cpp") else ""
+        file = str(locate(self.copy.source, mutant)[0].relative_to(self.copy.source))
+        tested, used = self.users.get(file, ()), self.users_in_program.get(file, ()) if self.commands else ()
+        if not tested and not used:
+            return "survived", "not in a test program"
+        if min(len(objects) for objects in (tested, used) if objects) > self.options.most_objects:
+            return "skipped", f"{len(tested or used)} objects depend on it"
         with applied(self.copy.source, mutant, asserting):
-            objects = self.copy.dependants(self.targets)
-            if len(objects) > self.options.most_objects:
-                return "skipped", f"{len(objects)} objects depend on it"
-            if objects and not self.copy.make(self.targets)[0]:
-                return "not compiled", ""
-            if killer := self.killer(mutant):
+            if 0 < len(tested) <= self.options.most_objects:
+                if not self.copy.make(self.targets)[0]:
+                    return "not compiled", ""
+                if killer := self.killer(mutant):
+                    return "killed", killer
+            if 0 < len(used) <= self.options.most_objects and (killer := self.killer_by_command()):
                 return "killed", killer
-            objects = objects or self.copy.dependants(["palpate"])
-            if killer := self.killer_by_command():
-                return "killed", killer
+        objects = {*tested, *used}
+        if len(objects) > 2 * self.options.most_objects:
+            return "survived", ""
         with applied(self.copy.source, mutant):
-            begin = time.time()
-            self.copy.make(objects)
-            fresh = [p for p in self.copy.build.rglob("*.o") if p.stat().st_mtime >= begin - 1]
-            if fresh and all(digest(p) == self.objects.get(p) for p in fresh):
+            self.copy.make(sorted(objects))
+            if all(digest(self.copy.build / name) == self.objects.get(name) for name in objects):
                 return "equivalent", "the same machine code"
-        return "survived", "" if fresh else "not in a test program"
+        return "survived", ""
 
     def read(self):
         return [json.loads(line) for line in self.results.read_text().splitlines()] if self.results.exists() else []

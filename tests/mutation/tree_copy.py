@@ -2,7 +2,6 @@
 import contextlib
 import os
 import pathlib
-import re
 import resource
 import shutil
 import signal
@@ -83,10 +82,19 @@ class Copy:
         code, output = self.run(["ninja", "-C", self.build, "-j", str(self.jobs), *targets], None, confined=False)
         return code == 0, output
 
-    def dependants(self, targets):
-        """The objects that the next build would compile."""
-        done = subprocess.run(["ninja", "-C", self.build, "-n", *targets], capture_output=True, text=True)
-        return re.findall(r"Building CXX object (\S+)", done.stdout)
+    def users(self, targets):
+        """{source or header, from the tree's top: the objects of these targets that are made of it}; once they are built."""
+        def listed(*words):
+            return subprocess.run(["ninja", "-C", self.build, "-t", *words], capture_output=True, text=True).stdout.splitlines()
+        wanted = {line for line in listed("inputs", *targets) if line.endswith(".o")}
+        found, objects = {}, None
+        for line in listed("deps"):
+            if line[:1].strip():
+                objects = line.split(": #deps")[0]
+            elif line.strip() and objects in wanted:
+                path = os.path.normpath(self.build / line.strip())
+                found.setdefault(os.path.relpath(path, self.source), set()).add(objects)
+        return found
 
     def run(self, command, limit, folder=None, confined=True):
         """(exit code, output); the code is None when the time was up."""
