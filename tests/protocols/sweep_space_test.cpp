@@ -31,8 +31,13 @@ TEST(SweepSpace, AcceptsGoodFilesAndThePublishedOnes) {
   for (const std::string& folder :
        {kSpaces + "good", std::string(PALPATE_SOURCE_DIR "/protocols/spaces")}) {
     EXPECT_FALSE(spaces(folder).empty());
-    for (const fs::path& file : spaces(folder))
-      EXPECT_NO_THROW(parse_sweep_space(file.string())) << file;
+    for (const fs::path& file : spaces(folder)) {
+      std::ostringstream whole;
+      whole << std::ifstream(file).rdbuf();
+      SweepSpace space;
+      EXPECT_NO_THROW(space = parse_sweep_space(file.string())) << file;
+      EXPECT_EQ(space.source_text, whole.str()) << "kept with the study, byte for byte";
+    }
   }
 }
 
