@@ -131,6 +131,8 @@ std::optional<unsigned char> ResponseBox::unknown_byte() const {
 std::string ScreenWithBox::trouble() const {
   if (box_.failed())
     return "the response box is gone: the keyboard answers; plug it in and start again to have it";
+  const std::string trouble = screen_.trouble();
+  if (!trouble.empty()) return trouble;  // more than a byte of no key
   if (const auto byte = box_.unknown_byte()) {
     char text[160];
     std::snprintf(text, sizeof text,
@@ -139,7 +141,7 @@ std::string ScreenWithBox::trouble() const {
                   static_cast<unsigned>(*byte));
     return text;
   }
-  return screen_.trouble();
+  return {};
 }
 
 std::vector<KeyPress> ScreenWithBox::keys() {

@@ -23,9 +23,9 @@ struct SoftCase {
 
 struct SoftSwing {
   SoftCase what;
-  double force = 0;      ///< N, mean, once it is held
-  double swing = 0;      ///< share of it: highest less lowest over the last 0.2 s
-  double held = 0;       ///< s, until then
+  double force = 0;  ///< N, mean, once it is held
+  double swing = 0;  ///< share of it: highest less lowest over the last 0.2 s, or 1 s of what rings
+  double held = 0;   ///< s, until then
   bool finite = true;    ///< every force was a number
   bool accepted = true;  ///< a scene may have this rate with this modulus
   /// At rest as far as a hand can tell.
@@ -33,8 +33,8 @@ struct SoftSwing {
   static constexpr double kAtRest = 0.01;
 };
 
-/// A slab, 60 x 60 x 30 mm, pressed by an upright tool that is then held still for 1.5 s; where
-/// scenes may have it and it still swings, as one without damping does, up to 12 s.
+/// A slab, 60 x 60 x 30 mm, pressed by an upright tool that is then held still for 1.5 s. Without
+/// damping, where scenes may have it and it still swings then: up to 12.5 s.
 SoftSwing press_and_hold(const SoftCase& what);
 
 /// 1 kPa to 10 MPa, 0.2 to 3 kN/m, 62.5 to 1000 Hz, tools of 2 and 10 mm, with plain and with
