@@ -13,6 +13,9 @@
 namespace palpate::rendering {
 namespace {
 
+/// The nearby parts are those within so many reaches: the whole tree is seldom searched.
+constexpr double kNearbyReaches = 4;
+
 /// A segment, to which many points are compared.
 struct Line {
   Line() = default;
@@ -50,10 +53,11 @@ void consider(const Scene& scene, RenderState& state, const Distance2& distance2
   }
 }
 
-/// Spheres of parts that are out of reach, and no nearer than the nearest part that is, are passed
-/// over.
+/// Lists the parts that are at most `reach` away, m, and what the others keep. Spheres of parts
+/// that are farther than both are passed over.
 template <class Distance2>
-void search_tree(const Scene& scene, RenderState& state, const Distance2& distance2, double step) {
+void search_tree(const Scene& scene, NearbyParts& nearby, const Distance2& distance2,
+                 double reach) {
   struct Open {
     std::uint32_t node = 0;
     double distance2 = 0;  // m^2, from the middle of its sphere to the probe
@@ -61,17 +65,23 @@ void search_tree(const Scene& scene, RenderState& state, const Distance2& distan
   const auto& nodes = scene.part_tree().nodes();
   const auto& order = scene.part_tree().order();
   const auto& spheres = scene.node_spheres();
-  const double reach = step + kReachShare * scene.most_radius();
+  nearby.parts.clear();
+  nearby.clearance = std::numeric_limits<double>::infinity();
   std::array<Open, 64> stack{};  // halves at each level: 2^32 parts need 32
   std::size_t count = 0;
   stack[count++] = {0, distance2(spheres[0].centre)};
   while (count > 0) {
     const Open at = stack[--count];
-    const double far = std::max(reach, state.clearance) + spheres[at.node].radius;
+    const double far = std::max(reach, nearby.clearance) + spheres[at.node].radius;
     if (at.distance2 > far * far) continue;
     const BoundingTree::Node& node = nodes[at.node];
     for (std::uint32_t i = node.first; i < node.first + node.count; ++i) {
-      if (!in_contact(state, order[i])) consider(scene, state, distance2, step, order[i]);
+      const ScenePart& part = scene.parts()[order[i]];
+      const double gap = std::sqrt(distance2(part.sphere_centre)) - part.sphere_radius;
+      if (gap <= reach)
+        nearby.parts.push_back(order[i]);
+      else
+        nearby.clearance = std::min(nearby.clearance, gap);
     }
     if (node.count > 0) continue;
     Open near{at.node + 1, distance2(spheres[at.node + 1].centre)};
@@ -84,23 +94,39 @@ void search_tree(const Scene& scene, RenderState& state, const Distance2& distan
 
 /// \param distance2  from a point to the probe, m^2
 /// \param step       m, how far the probe may have moved past a part
+/// \param moved      m, how far any point of the probe is from where the nearby parts were listed
+/// \return whether these were listed anew
 template <class Distance2>
-void list_near_parts(const Scene& scene, RenderState& state, const Distance2& distance2,
-                     double step) {
+bool list_near_parts(const Scene& scene, RenderState& state, const Distance2& distance2,
+                     double step, double moved) {
   state.clearance = std::numeric_limits<double>::infinity();
-  if (!scene.part_tree().nodes().empty()) {
-    std::erase_if(state.near_parts, [&](std::uint32_t i) { return !in_contact(state, i); });
-    search_tree(scene, state, distance2, step);
-    std::sort(state.near_parts.begin(), state.near_parts.end());
-    return;
+  if (scene.part_tree().nodes().empty()) {
+    state.near_parts.clear();
+    for (std::uint32_t i = 0; i < scene.parts().size(); ++i) {
+      if (in_contact(state, i))
+        state.near_parts.push_back(i);
+      else
+        consider(scene, state, distance2, step, i);
+    }
+    return false;
   }
-  state.near_parts.clear();
-  for (std::uint32_t i = 0; i < scene.parts().size(); ++i) {
-    if (in_contact(state, i))
-      state.near_parts.push_back(i);
-    else
-      consider(scene, state, distance2, step, i);
+  const double room = kReachShare * scene.most_radius(), reach = step + room;
+  double others = state.nearby.clearance - moved;
+  const bool anew = !(others > reach);
+  if (anew) {
+    search_tree(scene, state.nearby, distance2, kNearbyReaches * reach);
+    others = state.nearby.clearance;
   }
+  std::erase_if(state.near_parts, [&](std::uint32_t i) { return !in_contact(state, i); });
+  for (const std::uint32_t i : state.nearby.parts) {
+    if (!in_contact(state, i)) consider(scene, state, distance2, step, i);
+  }
+  state.clearance = std::min(state.clearance, others);
+  // A leap lists too many, and so may a crowd: for no longer than it takes to list fewer.
+  if (step > room || state.clearance == std::numeric_limits<double>::infinity())
+    state.clearance = std::min(state.clearance, room);
+  std::sort(state.near_parts.begin(), state.near_parts.end());
+  return anew;
 }
 
 }  // namespace
@@ -135,7 +161,8 @@ void update_near_parts(const Scene& scene, RenderState& state, const LineProbe& 
     for (std::size_t j = 0; j < placed.count; ++j) least = std::min(least, lines[j].distance2(p));
     return least;
   };
-  list_near_parts(scene, state, distance2, step + slack);
+  if (list_near_parts(scene, state, distance2, step + slack, moved(tool, memory.nearby_pose)))
+    memory.nearby_pose = tool;
 }
 
 void rebuild_near_parts(const Scene& scene, RenderState& state, const LineProbe& probe) {
@@ -145,8 +172,11 @@ void rebuild_near_parts(const Scene& scene, RenderState& state, const LineProbe&
                                      : 0;
   state.near_parts_pose = probe;
   const Line line(probe.tip, probe.tail - probe.tip);
-  list_near_parts(
-      scene, state, [&](const Vec3& p) { return line.distance2(p); }, step);
+  const LineProbe& listed = state.nearby.pose;
+  const double moved =
+      std::max(glm::length(probe.tip - listed.tip), glm::length(probe.tail - listed.tail));
+  const auto distance2 = [&](const Vec3& p) { return line.distance2(p); };
+  if (list_near_parts(scene, state, distance2, step, moved)) state.nearby.pose = probe;
 }
 
 }  // namespace palpate::rendering

@@ -178,6 +178,7 @@ RenderState Scene::initial_state() const {
   RenderState state;
   state.parts.resize(parts_.size());
   state.near_parts.reserve(parts_.size());
+  if (!part_tree_.nodes().empty()) state.nearby.parts.reserve(parts_.size());
   if (!features().several_parts) state.near_parts.push_back(0);  // a single part is always near
   state.contacts.reserve(parts_.size());
   if (motion_) state.motion = OwnedMotion(motion_->initial_state());

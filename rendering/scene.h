@@ -110,12 +110,20 @@ struct PartState {
   FrictionState friction;       ///< where the material has friction
 };
 
+/// Of many parts, those around the probe, from which the near ones are chosen; in any order.
+struct NearbyParts {
+  std::vector<std::uint32_t> parts;
+  LineProbe pose;        ///< the probe when they were listed; of a tool see UnionMemory
+  double clearance = 0;  ///< m; so far from the probe the other parts were at least
+};
+
 /// A renderer's whole memory between ticks. Copy it to replay from here.
 struct RenderState {
   std::vector<PartState> parts;
   std::vector<std::uint32_t> near_parts;  ///< in order; the others are out of reach for now
   LineProbe near_parts_pose;              ///< the probe when near_parts was last rebuilt
   double clearance = 0;  ///< m; within it of near_parts_pose the other parts are out of reach
+  NearbyParts nearby;    ///< empty where the scene has no tree of parts
   LineProbe last;        ///< last valid pose
   bool has_last = false;
   /// Of the tool, world frame, where the caller senses it: written before a tick. Its part at right

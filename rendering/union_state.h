@@ -125,6 +125,7 @@ struct UnionMemory {
   PlacedTool before, turned;            ///< the ideal tool in hand, before it turns and turned
   ToolPose last;                        ///< the virtual tool at the last tick
   ToolPose near_pose;                   ///< the same when the list of near parts was rebuilt
+  ToolPose nearby_pose;                 ///< the same of the nearby parts
   bool exceptions = false;              ///< some object is off or behind, or some layer broken
   double reach = 0;                     ///< m, from the virtual tool to the farthest ideal tool
   double most_lag = 0;                  ///< rad, of the ideal tools of this tick

@@ -118,6 +118,7 @@ nlohmann::ordered_json to_json(const std::vector<TickCost>& rows) {
     };
     number("median_ns", r.median_ns);
     number("p99_ns", r.p99_ns);
+    number("p99_highest_ns", r.p99_highest_ns);
     number("max_ns", r.max_ns);
     row["allocations"] = r.allocations;
     row["empty_loop_ns"] = r.empty_loop_ns;
@@ -138,7 +139,8 @@ int bench_command(const std::vector<std::string>& args) {
   line.usage = "palpate bench [--json FILE [--force]] [--ticks N]";
   line.summary =
       "Measures the run time of the renderers' ticks on this machine, each tick separately,\n"
-      "in nanoseconds. Quit other programs first.";
+      "in nanoseconds, in five rounds of the same ticks: what other programs take away is not the\n"
+      "tick's. Quit them nevertheless: they slow down all rounds.";
   line.example =
       "  palpate bench                       a table, about a minute\n"
       "  palpate bench --json bench.json     the same for programs\n";
@@ -163,8 +165,9 @@ int bench_command(const std::vector<std::string>& args) {
   });
   std::cout
       << "A tick, ns (max: us). An empty tick takes " << rows[0].empty_loop_ns
-      << ", which is subtracted in the net median. The maximum is mostly due to the operating "
-         "system.\n"
+      << ", which is subtracted in the net median. Median and p99 of the least disturbed of "
+      << kTickRounds
+      << " rounds of the same ticks;\nthe maximum is mostly due to the operating system.\n"
          "Stylus at 0.1 m/s; contact 1 to 2 mm deep; free: 1 to 2 mm off the bounding sphere; "
          "first_contact: in a new trial each. Where a tool is named, the target is that of p99.\n\n"
       << table(rows) << "\n"
