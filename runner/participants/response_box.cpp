@@ -131,7 +131,7 @@ std::optional<unsigned char> ResponseBox::unknown_byte() const {
 std::string ScreenWithBox::trouble() const {
   if (box_.failed())
     return "the response box is gone: the keyboard answers; plug it in and start again to have it";
-  const std::string trouble = screen_.trouble();
+  std::string trouble = screen_.trouble();
   if (!trouble.empty()) return trouble;  // more than a byte of no key
   if (const auto byte = box_.unknown_byte()) {
     char text[160];
