@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "protocols/parse.h"
+#include "tests/shared/prose.h"
 
 namespace palpate::protocols {
 namespace {
@@ -36,21 +37,6 @@ std::vector<Fault> faults_of_scene(const std::string& text) {
   return {};
 }
 
-/// What is wrong with the form of a refusal; empty: nothing.
-std::string flaw(const std::string& text) {
-  for (const char* twice : {"  ", " ,", " ;", ",,", ", ,", "()", "(,", "''", ": ;", ":;", " )"})
-    if (text.find(twice) != std::string::npos) return std::string("'") + twice + "' within";
-  const std::string ends = " ,:;(-/";
-  if (ends.find(text.front()) != std::string::npos) return "begins in the middle";
-  if (ends.find(text.back()) != std::string::npos) return "ends in the middle";
-  for (const char* last : {" of", " and", " or", " from", " to", " than", " a", " the", " up"})
-    if (text.ends_with(last)) return std::string("ends with") + last;
-  int open = 0;
-  for (const char c : text) open += (c == '(') - (c == ')');
-  if (open != 0) return "a bracket is not closed";
-  return "";
-}
-
 TEST(Refusals, AreWholeSentencesThatSayWhatWouldDo) {
   int count = 0;
   for (const auto& entry : fs::directory_iterator(PALPATE_SOURCE_DIR "/tests/protocols/bad")) {
@@ -60,7 +46,7 @@ TEST(Refusals, AreWholeSentencesThatSayWhatWouldDo) {
       const std::string& text = fault.expected;
       SCOPED_TRACE(entry.path().filename().string() + " " + fault.location + ": " + text);
       ASSERT_GE(text.size(), 12U);
-      EXPECT_EQ(flaw(text), "");
+      EXPECT_EQ(palpate::testing::flaw_of(text), "");
       // What would do there, or which of the keys; else a sentence, with a verb.
       bool says = false;
       for (const char* word : {"expected ", "missing; ", "unknown key; ", "at most ", "cannot be ",

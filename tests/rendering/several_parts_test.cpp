@@ -304,6 +304,34 @@ TEST(SeveralPartsOfTheSide, StickAcrossASeamFeelsOneForce) {
   }
 }
 
+/// Small boxes here and there; a stylus comes down on one of them with its side, however far from
+/// its tip and however little it moves: as if that one were alone.
+TEST(SeveralPartsOnTheSide, EachIsFoundWhereverOnTheStylusItIs) {
+  const auto at = [](double x, int object) {
+    return placed_object(box({x - 0.004, -0.004, -0.008}, {x + 0.004, 0.004, 0}), {}, kSpring,
+                         object);
+  };
+  for (const double along : {0.002, 0.03, 0.06, 0.09, 0.115}) {
+    for (const double height : {0.012, 0.03, 0.08}) {
+      const Scene alone({at(along, 0)}),
+          several({at(along, 0), at(-0.2, 1), at(0.35, 2), at(0.6, 3), at(-0.7, 4)});
+      RenderState a = alone.initial_state(), b = several.initial_state();
+      int felt = 0;
+      for (int i = 0; i <= 400; ++i) {
+        const double z = height - (height + 0.002) * std::min(1.0, i / 350.0);
+        const LineProbe probe{{0, 0.001, z}, {0.12, 0.0005, z}};
+        const Rendering expected = ray_renderer().tick(alone, a, probe, kTick);
+        const Rendering found = ray_renderer().tick(several, b, probe, kTick);
+        ASSERT_LE(glm::length(found.force - expected.force), 1e-12) << along << " " << i;
+        ASSERT_LE(glm::length(found.torque - expected.torque), 1e-12) << along << " " << i;
+        ASSERT_EQ(found.object, expected.object);
+        felt += found.contacts > 0;
+      }
+      EXPECT_GT(felt, 30) << along;
+    }
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(Both, SeveralParts, ::testing::Values(&point_renderer(), &ray_renderer()),
                          [](const auto& parameter) {
                            return std::string(parameter.param->name());

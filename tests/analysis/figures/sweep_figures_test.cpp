@@ -6,6 +6,7 @@
 #include <set>
 
 #include "stimuli/random.h"
+#include "tests/analysis/figures/figure_form.h"
 #include "tests/analysis/sweep_table_fixture.h"
 
 namespace palpate::analysis {
@@ -60,6 +61,24 @@ TEST(SweepFigures, ChosenPointsAreOfTheWholeDesign) {
   for (const Mark& dot : dots_of(saltelli, "scatter"))
     ++samples[static_cast<std::size_t>(std::stoi(dot.text.substr(6)) - 1) % 5];
   for (const int n : samples) EXPECT_NEAR(n, 80, 32);  // 4 standard deviations
+}
+
+TEST(SweepFigures, HaveTheirForm) {
+  stimuli::Random random(3);
+  const auto draw = [&] { return random.unit(); };
+  for (const SweepTable& table :
+       {table_of("grid", grid_points(2, 7), mostly_first),
+        table_of("saltelli", saltelli_points(3, 200, draw), mostly_first)}) {
+    const std::vector<Figure> figures = sweep_figures(analyze_sweep(table, "", "1"));
+    EXPECT_GE(figures.size(), 2U);
+    for (const Figure& figure : figures) {
+      expect_form(figure);
+      EXPECT_EQ(figure.label, "SIMULATED PARTICIPANTS");
+      // Of how many points, of which design, and how large each is.
+      const std::string points = std::to_string(table.rows()) + " points (" + table.design + "), ";
+      EXPECT_EQ(figure.subtitle, points + "1 participant and 1 repetition each");
+    }
+  }
 }
 
 TEST(SweepFigures, AreTheSameEachTime) {

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <fstream>
 #include <string>
@@ -269,6 +270,25 @@ TEST_F(TrialsCsv, TheSameRowsTwiceAreRefusedARepeatedPlaceIsWarnedOf) {
   EXPECT_NE(repeated.warnings[0].find("(lines 2 and 3)"), std::string::npos);
   const std::string late = "P1,1,1,2,ray,cone,,0,NA\n";
   expect_fault(kHeader + row + late + late, "file", "(lines 3 and 4)");
+}
+
+// Ten are named, of more how many they are.
+TEST_F(TrialsCsv, NamesTenRowsThatRepeatOthersAndCountsTheRest) {
+  for (const int repeats : {1, 9, 10, 11, 13}) {
+    std::string text = kHeader;
+    for (int i = 1; i <= repeats; ++i) {
+      for (const char* time : {"2.5", "3.5"})
+        text += "P1,1,1," + std::to_string(i) + ",ray,cone,cone,1," + time + "\n";
+    }
+    const TrialTable table = read(text);
+    ASSERT_EQ(table.warnings.size(), 1U);
+    std::string expected = "(";
+    for (int i = 0; i < std::min(repeats, 10); ++i)
+      expected += (i == 0 ? "lines " : ", ") + std::to_string(2 * i + 2) + " and " +
+                  std::to_string(2 * i + 3);
+    if (repeats > 10) expected += ", and " + std::to_string(repeats - 10) + " more";
+    EXPECT_NE(table.warnings[0].find(expected + ")"), std::string::npos) << table.warnings[0];
+  }
 }
 
 TEST_F(TrialsCsv, TimeOutsNeedNoTime) {

@@ -16,6 +16,8 @@
 #include "analysis/statistics/analysis.h"
 #include "analysis/text.h"
 #include "stimuli/random.h"
+#include "tests/analysis/figures/figure_form.h"
+#include "tests/shared/prose.h"
 
 namespace palpate::analysis {
 namespace {
@@ -143,6 +145,62 @@ TEST(Documents, AxesOfNumbersSayWhatTheyShowAxesOfNamesNeedNot) {
             EXPECT_NE(axis->title, "") << figure.id;
           }
         }
+      }
+    }
+  }
+}
+
+/// Servo periods of two decades for every renderer.
+StudyRecord record_with_servo(const Analysis& analysis) {
+  StudyRecord record;
+  for (const std::string& renderer : analysis.table.renderers) {
+    ServoQuality& servo = record.servo.emplace_back();
+    servo.renderer = renderer;
+    servo.ticks = 5000;
+    servo.longest_period = 0.01;
+    for (const std::size_t bin : {10U, 20U, 30U}) {
+      servo.longest_periods[bin] += 2;
+      servo.n_trials += 2;
+    }
+  }
+  return record;
+}
+
+TEST(Documents, FiguresHaveTheirFormAndTheirOrder) {
+  for (const Analysis& analysis : studies()) {
+    std::vector<std::string> ids;
+    for (const Figure& figure : figures_of(analysis, record_with_servo(analysis))) {
+      ids.push_back(figure.id);
+      testing::expect_form(figure);
+    }
+    EXPECT_EQ(ids, (std::vector<std::string>{"figure15", "speedup", "times", "confusion",
+                                             "speed-accuracy", "learning", "order", "servo",
+                                             "exclusions"}));
+  }
+}
+
+void expect_whole(const Json& value, const std::string& path) {
+  if (value.is_string()) {
+    EXPECT_EQ(palpate::testing::flaw_of(value.get<std::string>()), "") << path << ": " << value;
+  }
+  if (!value.is_structured()) return;
+  for (const auto& [name, member] : value.items()) expect_whole(member, path + "/" + name);
+}
+
+TEST(Documents, TextsAreWhole) {
+  for (const Analysis& analysis : studies()) {
+    expect_whole(Json::parse(report_json(analysis)), "");
+    for (const Table& table : all_tables(analysis)) {
+      EXPECT_EQ(palpate::testing::flaw_of(table.caption), "") << table.caption;
+      for (const std::string& note : table.notes)
+        EXPECT_EQ(palpate::testing::flaw_of(note), "") << note;
+      for (const std::string& name : table.header)
+        EXPECT_EQ(palpate::testing::flaw_of(name), "") << table.caption << ": " << name;
+      for (const auto& row : table.rows) {
+        for (const std::string& cell : row)
+          if (!cell.empty()) {
+            EXPECT_EQ(palpate::testing::flaw_of(cell), "") << table.caption << ": " << cell;
+          }
       }
     }
   }

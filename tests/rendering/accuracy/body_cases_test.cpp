@@ -132,6 +132,21 @@ TEST(BodyCases, AStruckRodKeepsWhatThereWas) {
   EXPECT_NEAR(rod.error(at), 0.1, 1e-12) << "of the speed before";
 }
 
+TEST(BodyCases, MomentumIsRelativeToAllThereIsInTheBeginning) {
+  const BodyCase six = case_of("six that fly");
+  std::vector<double> masses;
+  double all = 0;  // kg m/s
+  for (const BodyBox& box : six.boxes) {
+    masses.push_back(box.mass);
+    all += box.mass * glm::length(box.velocity);
+  }
+  for (std::size_t i = 0; i < masses.size(); ++i) {
+    std::vector<BoxMotion> at = beginning(six);
+    at[i].velocity += Vec3(0.3, 0, -0.4);
+    EXPECT_NEAR(six.error(at), 0.5 * masses[i] / all, 1e-12) << i;
+  }
+}
+
 TEST(BodyCases, WhatRestsIsOffItsPlaceByMillimetres) {
   for (const char* name : {"10 kg", "stack"}) {
     const BodyCase one = case_of(name);
