@@ -53,9 +53,6 @@ inline void expect_form(const Figure& figure) {
       if (mark.kind == Mark::Kind::text || mark.kind == Mark::Kind::label) {
         EXPECT_NE(mark.text, "") << "a text at " << mark.x.front();
       }
-      if (mark.kind == Mark::Kind::rect || mark.kind == Mark::Kind::symbol) {
-        EXPECT_EQ(flaw_of(mark.text), "") << "what the pointer is told there: " << mark.text;
-      }
       EXPECT_GT(mark.opacity, 0);
       EXPECT_LE(mark.opacity, 1);
     }

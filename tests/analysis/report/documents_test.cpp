@@ -172,6 +172,13 @@ TEST(Documents, FiguresHaveTheirFormAndTheirOrder) {
     for (const Figure& figure : figures_of(analysis, record_with_servo(analysis))) {
       ids.push_back(figure.id);
       testing::expect_form(figure);
+      for (const Panel& panel : figure.panels) {
+        for (const Mark& mark : panel.marks) {
+          if (mark.kind != Mark::Kind::rect && mark.kind != Mark::Kind::symbol) continue;
+          EXPECT_EQ(palpate::testing::flaw_of(mark.text), "")
+              << figure.id << ": what the pointer is told there: " << mark.text;
+        }
+      }
     }
     EXPECT_EQ(ids, (std::vector<std::string>{"figure15", "speedup", "times", "confusion",
                                              "speed-accuracy", "learning", "order", "servo",
