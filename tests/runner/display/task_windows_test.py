@@ -170,6 +170,35 @@ class TaskWindows(WindowCase):
         self.assertEqual(self.tasks()[0]["number"], -7.25)
         self.end()
 
+    def test_pages_after_the_last_trial(self):
+        pages = [
+            {"name": "thanks", "kind": "instructions", "when": "after", "text": "Two questions more."},
+            {"name": "strain", "kind": "questionnaire", "when": "after", "items": [
+                {"name": "tired", "kind": "choice", "question": "Are you tired?", "choices": ["yes", "no"]},
+                {"name": "why", "kind": "text", "question": "Anything else?"}]}]
+        self.start(NUMBER, pages=pages)
+        wait_for("a trial", lambda: self.screen.key("space") or self.rows("SELECT 1 FROM attempts"))
+        time.sleep(1)
+        before = self.screen.settled_picture(self.participant)
+        self.type("12")
+        typed = self.page("after_rate", before)
+        self.press_until(self.tasks, "Return")
+        thanks = self.page("after_thanks", typed)
+        self.assertEqual(self.rows("SELECT count(*) FROM page_answers"), [(0,)])
+        self.press_until(lambda: self.screen.picture(self.participant) != thanks, "space")
+        self.page("after_choice", thanks)
+        self.press("2", then=True, name="after_text_empty")
+        self.type("No, nothing.")
+        self.page("after_text")
+        self.screen.key("Return")  # the answers of a page are kept together
+        wait_for("the answers", lambda: len(self.rows("SELECT 1 FROM page_answers")) == 2)
+        self.assertEqual(self.rows("SELECT page, item, answer FROM page_answers ORDER BY id"),
+                         [("strain", "tired", "no"), ("strain", "why", "No, nothing.")])
+        time.sleep(1)
+        self.screen.keep(self.participant, "after_end")
+        self.end()
+        self.assertEqual(self.rows("SELECT count(*) FROM attempts WHERE state = 'completed'"), [(1,)])
+
     def test_two_intervals_confidence_and_the_wheel(self):
         self.start(COMPARE, ADJUST)
         wait_for("a trial", lambda: self.screen.key("space") or self.rows("SELECT 1 FROM attempts"))
