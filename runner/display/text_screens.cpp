@@ -43,8 +43,7 @@ std::string checklist_text(const Checklist& list) {
   std::string choices;
   for (const auto& [kind, meaning] : list.choices) {
     choices += choices.empty() ? " (" : "; ";
-    choices += text_command(kind);
-    choices += ": " + meaning;
+    choices += "':" + std::string(text_command(kind)) + "': " + meaning;
   }
   return text + choices + (choices.empty() ? "\n" : ")\n");
 }

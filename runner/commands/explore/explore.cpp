@@ -7,7 +7,6 @@
 #include "runner/commands/render/forces.h"
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/outputs.h"
-#include "runner/commands/shared/scene_notes.h"
 #include "stimuli/printable.h"
 
 namespace palpate::runner {
@@ -71,10 +70,10 @@ int draw_pictures(const po::variables_map& values, const rendering::Renderer& re
   const std::string scene_path = text_of(values, "SCENE.json");
   const protocols::SceneSpec spec = protocols::parse_scene(scene_path);
   for (const stimuli::ObjectSpec& object : spec.objects) outputs.protect(object);
-  for (const std::string& note : objects_passed_through(spec))
-    std::cerr << stimuli::printable(scene_path) << ": " << note << '\n';
   const std::vector<TimedPose> poses = read_trajectory(text_of(values, "trajectory"));
   DrawnFrames drawn = draw_frames(scene_path, spec, renderer, poses, settings);
+  for (const std::string& note : drawn.notes)
+    std::cerr << stimuli::printable(scene_path) << ": " << note << '\n';
   outputs.put("animation", std::move(drawn.animation));
   outputs.write();
   std::cout << drawn.pictures << " pictures of " << settings.size.width << " x "

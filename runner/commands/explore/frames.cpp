@@ -15,6 +15,7 @@
 #include "runner/commands/render/forces.h"
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/progress_line.h"
+#include "runner/commands/shared/scene_notes.h"
 #include "runner/display/scene/painter.h"
 #include "runner/display/scene/scene_drawing.h"
 #include "runner/safety/fault_table.h"
@@ -182,6 +183,7 @@ DrawnFrames draw_frames(const std::string& scene_path, const protocols::SceneSpe
   DrawnFrames out{.pictures = touched.moments.size(),
                   .animation = {},
                   .seconds = poses.back().t - poses.front().t,
+                  .notes = scene_notes(spec, scene),
                   .tick_median_ns = median,
                   .tick_p99_ns = p99};
   if (settings.animate)

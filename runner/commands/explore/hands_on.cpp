@@ -12,6 +12,7 @@
 #include "runner/commands/run/opening.h"
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/outputs.h"
+#include "runner/commands/shared/scene_notes.h"
 #include "runner/commands/shared/stop_signal.h"
 #include "runner/display/explore_window.h"
 #include "runner/safety/fault_signals.h"
@@ -59,7 +60,10 @@ ExploreSettings window_settings(const protocols::SceneSpec& spec,
                                 const rendering::Renderer& renderer,
                                 const HandsOnSettings& settings) {
   SceneDrawing drawing(spec.objects, tool_of(spec.tool));
-  drawing.add_compiled(build_scene(settings.scene_path, spec, renderer));
+  const rendering::Scene scene = build_scene(settings.scene_path, spec, renderer);
+  for (const std::string& note : scene_notes(spec, scene))
+    std::cerr << stimuli::printable(settings.scene_path) << ": " << note << '\n';
+  drawing.add_compiled(scene);
   ExploreSettings out{.title = fs::path(settings.scene_path).filename().string(),
                       .objects = spec.objects,
                       .drawing = std::move(drawing),

@@ -61,6 +61,7 @@ class Soft(CommandCase):
             felt = f"the nodes of its elements are {spacing} mm apart and the tool has a radius of {1000 * radius:.1f} mm"
             for command in (["render", "--scene", scene, "--renderer", "ray", "--explain"],
                             ["render", "--scene", scene, "--renderer", "ray", "--trajectory", path, "--out", self.dir / "out.csv", "--force"],
+                            ["explore", scene, "--trajectory", path, "--frames", self.dir / "frames", "--size", "320x200", "--force"],
                             ["validate", protocol]):
                 done = self.palpate(*command)
                 self.assertEqual((done.stdout + done.stderr).count("mm apart"), 1 if spacing else 0, (n, radius, command[0]))

@@ -159,7 +159,7 @@ TEST_F(TextScreens, TheChecklistNamesTheStepThatIsDueAndItsCommands) {
   state.checklist.instruction = "home the device";
   state.checklist.choices = {{ConsoleCommand::Kind::go_on, "it is home"},
                              {ConsoleCommand::Kind::quit, "end"}};
-  EXPECT_EQ(console(state), "* step 3 of 4: home the device (go: it is home; quit: end)\n");
+  EXPECT_EQ(console(state), "* step 3 of 4: home the device (':go': it is home; ':quit': end)\n");
 }
 
 TEST_F(TextScreens, KeysAndCommandsArriveInOrderAndOnce) {
