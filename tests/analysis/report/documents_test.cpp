@@ -11,6 +11,7 @@
 
 #include "analysis/figures/figures.h"
 #include "analysis/input/trial_table_builder.h"
+#include "analysis/report/reduction_cards.h"
 #include "analysis/report/report_json.h"
 #include "analysis/report/tables.h"
 #include "analysis/statistics/analysis.h"
@@ -211,6 +212,67 @@ TEST(Documents, TextsAreWhole) {
       }
     }
   }
+}
+
+/// Numbers in a text, in its order; "-" and the true minus sign before them count.
+std::vector<double> numbers_in(const std::string& text) {
+  std::vector<double> out;
+  const std::string digits = "0123456789";
+  for (std::size_t at = text.find_first_of(digits); at < text.size();
+       at = text.find_first_of(digits, at)) {
+    std::size_t length = 0;
+    const double value = std::stod(text.substr(at), &length);
+    const bool minus = at > 0 && (text[at - 1] == '-' || text.substr(0, at).ends_with("\u2212"));
+    out.push_back(minus ? -value : value);
+    at += length;
+  }
+  return out;
+}
+
+/// The numbers of a card from a word on, rounded to one digit: 0.05 is half a unit of the last.
+void expect_card_numbers(const std::string& card, const std::string& from,
+                         const std::vector<double>& expected) {
+  const std::size_t at = card.find(from);
+  ASSERT_NE(at, std::string::npos) << from << ": " << card;
+  const std::vector<double> found = numbers_in(card.substr(at + from.size()));
+  ASSERT_GE(found.size(), expected.size()) << card;
+  for (std::size_t i = 0; i < expected.size(); ++i)
+    EXPECT_NEAR(found[i], expected[i], 0.0501) << from << " " << i << ": " << card;
+}
+
+TEST(Documents, CardsHaveTheNumbersOfTheStatistics) {
+  int with_time_outs = 0;
+  for (const Analysis& analysis : studies()) {
+    std::string all;
+    put_reduction_cards(all, analysis);
+    std::vector<std::string> cards;
+    for (std::size_t at = all.find("<li"); at != std::string::npos; at = all.find("<li", at + 1))
+      cards.push_back(all.substr(at, all.find("</li>", at) - at));
+    std::size_t next = 0;
+    for (const Comparison& comparison : analysis.comparisons) {
+      for (std::size_t s = 0; s < comparison.shapes.size(); ++s) {
+        ASSERT_LT(next, cards.size());
+        const std::string& card = cards[next++];
+        const PairedShape& shape = comparison.shapes[s];
+        expect_card_numbers(card, "class=\"value\">",
+                            {std::fabs(*shape.percent_reduction_geometric)});
+        const Interval ends = percent_reduction(*shape.t_test.log_ratio_ci95);
+        expect_card_numbers(card, "95\u00a0% interval", {ends.low, ends.high});
+        if (comparison.censored.empty() || comparison.censored[s].n_censored == 0) continue;
+        const CensoredEstimate& censored = comparison.censored[s];
+        if (!censored.log_ratio || !censored.log_ratio_ci95) continue;
+        ++with_time_outs;
+        const Interval wide = percent_reduction(*censored.log_ratio_ci95);
+        expect_card_numbers(
+            card, "with its",
+            {static_cast<double>(censored.n_censored), percent_reduction(*censored.log_ratio)});
+        expect_card_numbers(card.substr(card.find("as censored times")), "(",
+                            {wide.low, wide.high});
+      }
+    }
+    EXPECT_EQ(next, cards.size());
+  }
+  EXPECT_GT(with_time_outs, 4);
 }
 
 TEST(Documents, TheAnovasTablePrintsEachCorrectionUnderItsName) {
