@@ -79,7 +79,6 @@ BodyWorldState initial_state(const BodyWorld& world) {
 ConvexPlace place_of(const CollidingPart& part, const Pose& frame) {
   ConvexPlace place;
   place.mesh = part.mesh.get();
-  place.map = part.trees ? part.trees->support_map() : nullptr;
   place.axes = glm::mat3_cast(frame.orientation * part.pose.orientation);
   place.position = frame.orientation * part.pose.position + frame.position;
   place.inside = part.inside;

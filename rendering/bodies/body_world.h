@@ -16,7 +16,6 @@ namespace palpate::rendering {
 /// A convex part of a body, or one that stands still.
 struct CollidingPart {
   std::shared_ptr<const stimuli::ConvexMesh> mesh;
-  std::shared_ptr<const ContactTrees> trees;
   Pose pose;    ///< in the body's frame, whose origin is the centre of mass; of what stands still
                 ///< in the world's
   Vec3 inside;  ///< mesh frame

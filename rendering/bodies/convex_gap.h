@@ -16,10 +16,9 @@ namespace palpate::rendering {
 /// A convex part where it is now.
 struct ConvexPlace {
   const stimuli::ConvexMesh* mesh = nullptr;
-  const SupportMap* map = nullptr;  ///< of the mesh, where it has one
-  Mat3 axes;                        ///< rotation from the mesh frame
-  Vec3 position;                    ///< of the mesh frame's origin
-  Vec3 inside;                      ///< a point inside, mesh frame
+  Mat3 axes;      ///< rotation from the mesh frame
+  Vec3 position;  ///< of the mesh frame's origin
+  Vec3 inside;    ///< a point inside, mesh frame
 
   Vec3 world_point(const Vec3& local) const { return axes * local + position; }
   /// Into the mesh frame, of a direction.

@@ -25,7 +25,6 @@ Pose inverse(const Pose& pose) {
 CollidingPart colliding(const SceneObject& part, const Pose& in_frame) {
   CollidingPart out;
   out.mesh = part.mesh;
-  out.trees = part.trees;
   out.pose = in_frame;
   for (const Vec3& vertex : part.mesh->vertices())
     out.inside += vertex / static_cast<double>(part.mesh->vertices().size());
