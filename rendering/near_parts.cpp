@@ -13,9 +13,6 @@
 namespace palpate::rendering {
 namespace {
 
-/// The nearby parts are those within so many reaches: the whole tree is seldom searched.
-constexpr double kNearbyReaches = 4;
-
 /// A segment, to which many points are compared.
 struct Line {
   Line() = default;
@@ -53,11 +50,15 @@ void consider(const Scene& scene, RenderState& state, const Distance2& distance2
   }
 }
 
-/// Lists the parts that are at most `reach` away, m, and what the others keep. Spheres of parts
-/// that are farther than both are passed over.
+/// m, that a part may come nearer before it is near.
+double room_before(const ScenePart& part, double gap) {
+  return gap - kReachShare * part.sphere_radius;
+}
+
+/// Lists the parts that may come near within `room`, m, and how much of it the others have. Spheres
+/// of parts that have more than both are passed over.
 template <class Distance2>
-void search_tree(const Scene& scene, NearbyParts& nearby, const Distance2& distance2,
-                 double reach) {
+void search_tree(const Scene& scene, NearbyParts& nearby, const Distance2& distance2, double room) {
   struct Open {
     std::uint32_t node = 0;
     double distance2 = 0;  // m^2, from the middle of its sphere to the probe
@@ -66,22 +67,24 @@ void search_tree(const Scene& scene, NearbyParts& nearby, const Distance2& dista
   const auto& order = scene.part_tree().order();
   const auto& spheres = scene.node_spheres();
   nearby.parts.clear();
-  nearby.clearance = std::numeric_limits<double>::infinity();
+  nearby.room = std::numeric_limits<double>::infinity();
   std::array<Open, 64> stack{};  // halves at each level: 2^32 parts need 32
   std::size_t count = 0;
   stack[count++] = {0, distance2(spheres[0].centre)};
   while (count > 0) {
     const Open at = stack[--count];
-    const double far = std::max(reach, nearby.clearance) + spheres[at.node].radius;
+    // No part's sphere is larger than the one that holds it.
+    const double far = std::max(room, nearby.room) + (1 + kReachShare) * spheres[at.node].radius;
     if (at.distance2 > far * far) continue;
     const BoundingTree::Node& node = nodes[at.node];
     for (std::uint32_t i = node.first; i < node.first + node.count; ++i) {
       const ScenePart& part = scene.parts()[order[i]];
-      const double gap = std::sqrt(distance2(part.sphere_centre)) - part.sphere_radius;
-      if (gap <= reach)
+      const double own =
+          room_before(part, std::sqrt(distance2(part.sphere_centre)) - part.sphere_radius);
+      if (own <= room)
         nearby.parts.push_back(order[i]);
       else
-        nearby.clearance = std::min(nearby.clearance, gap);
+        nearby.room = std::min(nearby.room, own);
     }
     if (node.count > 0) continue;
     Open near{at.node + 1, distance2(spheres[at.node + 1].centre)};
@@ -110,21 +113,24 @@ bool list_near_parts(const Scene& scene, RenderState& state, const Distance2& di
     }
     return false;
   }
-  const double room = kReachShare * scene.most_radius(), reach = step + room;
-  double others = state.nearby.clearance - moved;
-  const bool anew = !(others > reach);
+  // A leap lists too many, and so may a crowd: for no longer than it takes to list fewer.
+  const double mean = scene.mean_radius(), soon = kReachShare * mean;
+  const bool leaps = step > soon;
+  double others = state.nearby.room - moved;  // m, at least, of every part that is not nearby
+  const bool anew = !(others > step);
   if (anew) {
-    search_tree(scene, state.nearby, distance2, kNearbyReaches * reach);
-    others = state.nearby.clearance;
+    search_tree(scene, state.nearby, distance2, step + mean);
+    others = state.nearby.room;
+    if (state.nearby.parts.size() > Scene::kFewParts)
+      state.nearby.room = std::min(others, leaps ? soon : 2 * mean);
   }
   std::erase_if(state.near_parts, [&](std::uint32_t i) { return !in_contact(state, i); });
   for (const std::uint32_t i : state.nearby.parts) {
     if (!in_contact(state, i)) consider(scene, state, distance2, step, i);
   }
   state.clearance = std::min(state.clearance, others);
-  // A leap lists too many, and so may a crowd: for no longer than it takes to list fewer.
-  if (step > room || state.clearance == std::numeric_limits<double>::infinity())
-    state.clearance = std::min(state.clearance, room);
+  if (leaps || state.clearance == std::numeric_limits<double>::infinity())
+    state.clearance = std::min(state.clearance, soon);
   std::sort(state.near_parts.begin(), state.near_parts.end());
   return anew;
 }

@@ -134,7 +134,7 @@ void Scene::index_parts() {
   for (const ScenePart& part : parts_) {
     boxes.push_back(
         {part.sphere_centre - part.sphere_radius, part.sphere_centre + part.sphere_radius});
-    most_radius_ = std::max(most_radius_, part.sphere_radius);
+    mean_radius_ += part.sphere_radius / static_cast<double>(parts_.size());
   }
   part_tree_ = BoundingTree(boxes);
   const auto& nodes = part_tree_.nodes();

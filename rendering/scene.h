@@ -113,8 +113,8 @@ struct PartState {
 /// Of many parts, those around the probe, from which the near ones are chosen; in any order.
 struct NearbyParts {
   std::vector<std::uint32_t> parts;
-  LineProbe pose;        ///< the probe when they were listed; of a tool see UnionMemory
-  double clearance = 0;  ///< m; so far from the probe the other parts were at least
+  LineProbe pose;   ///< the probe when they were listed; of a tool see UnionMemory
+  double room = 0;  ///< m; the others are out of reach until the probe has moved so far
 };
 
 /// A renderer's whole memory between ticks. Copy it to replay from here.
@@ -166,7 +166,7 @@ class Scene {
   };
   /// About all parts of each node of the tree.
   const std::vector<Sphere>& node_spheres() const { return node_spheres_; }
-  double most_radius() const { return most_radius_; }  ///< m, of those spheres
+  double mean_radius() const { return mean_radius_; }  ///< m, of the parts' spheres
   std::size_t segments() const { return tool_.segments.empty() ? 1 : tool_.segments.size(); }
   RenderState initial_state() const;
 
@@ -185,7 +185,7 @@ class Scene {
   std::shared_ptr<const SceneMotion> motion_;
   BoundingTree part_tree_;
   std::vector<Sphere> node_spheres_;
-  double most_radius_ = 0;
+  double mean_radius_ = 0;
 };
 
 /// Of the radius: room to move before the list of near parts must be rebuilt.

@@ -22,8 +22,10 @@ Vec3 any_within(stimuli::Random& random, double radius) {
 }
 
 /// Objects of a ball, a box and another that overlap, 10 to 30 mm, anywhere in a cube.
-/// \param half  m, half the cube's edge
-Scene crowd(std::uint64_t seed, std::size_t count, double half, Tool tool = {}) {
+/// \param half   m, half the cube's edge
+/// \param floor  a ball of 3 m below them
+Scene crowd(std::uint64_t seed, std::size_t count, double half, Tool tool = {},
+            bool floor = false) {
   stimuli::Random random(seed, {});
   const auto ball = std::make_shared<const stimuli::ConvexMesh>(stimuli::icosphere(0.01, 1));
   const auto box = std::make_shared<const stimuli::ConvexMesh>(stimuli::cube(0.03));
@@ -34,6 +36,13 @@ Scene crowd(std::uint64_t seed, std::size_t count, double half, Tool tool = {}) 
     object.object = static_cast<int>(i / 3);  // three convex parts each
     object.pose.position = i % 3 == 0 ? any_within(random, half)
                                       : objects.back().pose.position + any_within(random, 0.01);
+    objects.push_back(std::move(object));
+  }
+  if (floor) {
+    SceneObject object;
+    object.mesh = std::make_shared<const stimuli::ConvexMesh>(stimuli::icosphere(1.5, 2));
+    object.object = static_cast<int>(count);
+    object.pose.position = {0, 0, -1.5 - half};
     objects.push_back(std::move(object));
   }
   return Scene(std::move(objects), true, std::move(tool));
@@ -66,11 +75,11 @@ double gap(const ScenePart& part, const LineProbe& probe) {
 
 TEST(NearParts, ListWhatTheProbeMayMeetWhereverItLeaps) {
   for (std::uint64_t seed = 1; seed <= 5; ++seed) {
-    const Scene scene = crowd(seed, 300, 0.3);
+    const Scene scene = crowd(seed, 300, 0.3, {}, seed % 2 == 0);
     ASSERT_GT(scene.parts().size(), Scene::kFewParts);
     RenderState state = scene.initial_state();
     Hand hand(seed);
-    std::size_t listed = 0;
+    std::size_t listed = 0, nearby = 0;
     for (int tick = 0; tick < 4000; ++tick) {
       const LineProbe probe = hand.next();
       update_near_parts(scene, state, probe);
@@ -84,10 +93,12 @@ TEST(NearParts, ListWhatTheProbeMayMeetWhereverItLeaps) {
         ASSERT_GE(gap(part, state.near_parts_pose) + 1e-12, state.clearance) << i;
       }
       listed += state.near_parts.size();
+      nearby += state.nearby.parts.size();
       state.last = probe;
       state.has_last = true;
     }
-    EXPECT_LT(static_cast<double>(listed) / 4000, 60);  // of 300
+    EXPECT_LT(static_cast<double>(listed) / 4000, 60) << seed;  // of 300
+    EXPECT_LT(static_cast<double>(nearby) / 4000, 100) << seed;
   }
 }
 
@@ -105,7 +116,7 @@ TEST(NearParts, OldListsChangeNoBitOfAForce) {
       Hand hand(seed);
       for (int tick = 0; tick < 6000; ++tick) {
         const LineProbe probe = hand.next();
-        fresh.clearance = fresh.nearby.clearance = 0;  // lists anew
+        fresh.clearance = fresh.nearby.room = 0;  // lists anew
         const Rendering a = renderer.tick(scene, kept, probe, 0.001);
         const Rendering b = renderer.tick(scene, fresh, probe, 0.001);
         ASSERT_EQ(a.contacts, b.contacts) << seed << ", " << tick;
