@@ -165,6 +165,11 @@ TEST(Answers, ScalesRiseAndHaveTwoToElevenLabels) {
             Places{scale + "/1/label"});
 }
 
+TEST(Answers, StepsOfAScaleHaveNoOtherKeys) {
+  const json steps = {{{"label", "low"}}, {{"label", "high"}, {"lable", "high"}}};
+  EXPECT_EQ(faults_of_block("rate", {{"scale", steps}}), Places{"/blocks/0/scale/1/lable"});
+}
+
 TEST(Answers, ConfidenceHasAScale) {
   EXPECT_EQ(faults_of_block("compare", {{"confidence", {{"scale", scale_of(4)}}}}), Places{});
   EXPECT_EQ(faults_of_block("compare", {{"confidence", json::object()}}),
