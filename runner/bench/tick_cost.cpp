@@ -200,9 +200,8 @@ std::vector<TickCost> measure_tick_costs(
            bench.target_ns);
       keep(least_disturbed([&] { return time_free_space(timer, *renderer, bench, ticks); }), "free",
            std::max(kFreeTarget, bench.target_ns));
-      keep(least_disturbed([&] {
-             return time_first_contact(timer, *renderer, bench, settings.approaches / kTickRounds);
-           }),
+      keep(least_disturbed(
+               [&] { return time_first_contact(timer, *renderer, bench, settings.approaches); }),
            "first_contact", kFirstTarget);
     }
   }

@@ -19,8 +19,8 @@ struct TickCost {
   std::string renderer;              ///< point or ray
   std::string state;                 ///< contact, free (1 to 2 mm off the object), first_contact
   std::size_t ticks = 0;             ///< timed; all of them in that state
-  double median_ns = 0, p99_ns = 0;  ///< of the round in which it is the lowest
-  double p99_highest_ns = 0;         ///< of the round in which it is the highest
+  double median_ns = 0, p99_ns = 0;  ///< each of the round in which it is lowest
+  double p99_highest_ns = 0;         ///< of the round in which it is highest
   double max_ns = 0;                 ///< of all rounds
   std::size_t allocations = 0;       ///< on the heap, in all timed ticks
   double empty_loop_ns = 0;
@@ -36,7 +36,7 @@ struct TickCost {
 
 struct TickCostSettings {
   std::size_t ticks = 200'000;    ///< a row, in all its rounds
-  std::size_t approaches = 1000;  ///< for a row of first contacts, each in a new trial
+  std::size_t approaches = 1000;  ///< a round of first contacts, each in a new trial
 };
 
 /// A path at 0.1 m/s over icospheres of 30 mm radius (20 to 327,680 triangles), the paper's other

@@ -48,9 +48,9 @@ Factor::Factor(std::size_t size, const std::vector<MatrixEntry>& entries) {
       const auto column = first + static_cast<Eigen::Index>(c);
       const double* const value = lower.valuePtr() + lower.outerIndexPtr()[column];
       const std::size_t in_triangle = panel.columns - c;
-      float* const triangle = values_.data() + panel.triangle + c * panel.columns + c;
+      double* const triangle = values_.data() + panel.triangle + c * panel.columns + c;
       std::copy(value, value + in_triangle, triangle);
-      triangle[0] = static_cast<float>(1 / *value);
+      triangle[0] = 1 / triangle[0];
       std::copy(value + in_triangle, value + in_triangle + panel.rows,
                 values_.data() + panel.below + c * panel.rows);
     }
@@ -74,8 +74,8 @@ void Factor::solve_sides(double* b, double* work) const {
     const std::size_t rows = panel.rows;
     std::fill(gathered, gathered + rows * kSides, 0.0);
     for (std::size_t c = 0; c < panel.columns; ++c) {
-      const float* const triangle = values_.data() + panel.triangle + c * panel.columns;
-      const float* const below = values_.data() + panel.below + c * rows;
+      const double* const triangle = values_.data() + panel.triangle + c * panel.columns;
+      const double* const below = values_.data() + panel.below + c * rows;
       double x[kSides];
       for (std::size_t s = 0; s < kSides; ++s)
         x[s] = own[c * kSides + s] = own[c * kSides + s] * triangle[c];
@@ -102,8 +102,8 @@ void Factor::solve_sides(double* b, double* work) const {
         gathered[k * kSides + s] = work[where[k] * kSides + s];
     }
     for (std::size_t c = panel.columns; c-- > 0;) {
-      const float* const triangle = values_.data() + panel.triangle + c * panel.columns;
-      const float* const below = values_.data() + panel.below + c * rows;
+      const double* const triangle = values_.data() + panel.triangle + c * panel.columns;
+      const double* const below = values_.data() + panel.below + c * rows;
       double x[kSides];
       for (std::size_t s = 0; s < kSides; ++s) x[s] = own[c * kSides + s];
       for (std::size_t k = c + 1; k < panel.columns; ++k) {

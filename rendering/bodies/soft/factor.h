@@ -1,10 +1,6 @@
 #pragma once
 // A symmetric positive definite sparse matrix, factorised once (Cholesky, approximate minimum
 // degree order: Eigen's) and solved with often. Pure.
-//
-// The factor is kept in single precision: a solution waits for its memory, and is good to some 1e-7
-// of the matrix. That is enough for directions of a descent whose gradient is exact, and for a
-// local compliance.
 
 #include <cstdint>
 #include <span>
@@ -48,7 +44,7 @@ class Factor {
   std::vector<std::uint32_t> order_;  ///< of the matrix's row i: row order_[i] of the factor
   std::vector<Panel> panels_;
   std::vector<std::uint32_t> rows_;
-  std::vector<float> values_;
+  std::vector<double> values_;
   std::size_t entries_ = 0;
 };
 

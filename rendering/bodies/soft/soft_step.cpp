@@ -31,6 +31,17 @@ double dot(const std::vector<Vec3>& a, const std::vector<Vec3>& b) {
 
 }  // namespace
 
+/// m, that the body moves in a step as a whole, if nothing holds it.
+double SoftBody::rigid_way(const SoftState& state) const noexcept {
+  Vec3 momentum(0);
+  double mass = 0;
+  for (const std::uint32_t i : free_nodes_) {
+    momentum += solid_.masses()[i] * state.v[i];
+    mass += solid_.masses()[i];
+  }
+  return settings_.step * glm::length(momentum / mass + settings_.step * settings_.gravity);
+}
+
 /// From state.trial along state.step to what lowers the potential, which is put into state.trial.
 /// \param change  the potential at the trial; changed with it
 SoftBody::LineSearch SoftBody::search_line(SoftState& state, double& change) const noexcept {
@@ -38,8 +49,8 @@ SoftBody::LineSearch SoftBody::search_line(SoftState& state, double& change) con
   const double rounding = kRounding * (std::abs(state.energy) + std::abs(change));
   if (!(-slope > rounding)) return LineSearch::stays;
   // Where elements are inside out the stiffness at rest may promise ways of many times the body.
-  const double most = longest(state.step);
-  double part = most > extent_ ? extent_ / most : 1;
+  const double most = longest(state.step), whole = extent_ + rigid_way(state);
+  double part = most > whole ? whole / most : 1;
   for (int halving = 0; halving <= kHalvings; ++halving, part *= 0.5) {
     for (std::size_t i = 0; i < state.trial.size(); ++i) state.trial[i] += part * state.step[i];
     const double there = change_at_trial(state);
