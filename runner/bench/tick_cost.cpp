@@ -94,7 +94,7 @@ TickCost time_free_space(TickTimer& timer, const rendering::Renderer& renderer, 
   rendering::RenderState state = bench.scene.initial_state();
   ScriptedHand hand(renderer, false);
   double depth = -kRadius;
-  for (std::size_t i = 0; i < 4 * ticks && timer.ticks() < ticks; ++i) {
+  for (std::size_t i = 0; i < kWarm + 4 * ticks && timer.ticks() < ticks; ++i) {
     const rendering::LineProbe probe = hand.next(depth);
     if (i < kWarm) {
       renderer.tick(bench.scene, state, probe, TickTimer::kTick);

@@ -94,7 +94,7 @@ class SoftBody {
   void find_trial_gradient(SoftState& state) const noexcept;
   enum class LineSearch { stays, moves, as_expected };  ///< by the quadratic model
   LineSearch search_line(SoftState& state, double& change) const noexcept;
-  double rigid_way(const SoftState& state) const noexcept;
+  Vec3 rigid_way(const SoftState& state) const noexcept;
 
   stimuli::SolidMesh mesh_;
   SoftSettings settings_;

@@ -31,15 +31,17 @@ double dot(const std::vector<Vec3>& a, const std::vector<Vec3>& b) {
 
 }  // namespace
 
-/// m, that the body moves in a step as a whole, if nothing holds it.
-double SoftBody::rigid_way(const SoftState& state) const noexcept {
+/// m, that the body moves in a step as a whole, if nothing holds it: no search for the least
+/// potential may take its momentum.
+Vec3 SoftBody::rigid_way(const SoftState& state) const noexcept {
+  if (free_nodes_.size() < state.x.size()) return Vec3(0);
   Vec3 momentum(0);
   double mass = 0;
-  for (const std::uint32_t i : free_nodes_) {
+  for (std::size_t i = 0; i < state.x.size(); ++i) {
     momentum += solid_.masses()[i] * state.v[i];
     mass += solid_.masses()[i];
   }
-  return settings_.step * glm::length(momentum / mass + settings_.step * settings_.gravity);
+  return settings_.step * (momentum / mass + settings_.step * settings_.gravity);
 }
 
 /// From state.trial along state.step to what lowers the potential, which is put into state.trial.
@@ -49,8 +51,8 @@ SoftBody::LineSearch SoftBody::search_line(SoftState& state, double& change) con
   const double rounding = kRounding * (std::abs(state.energy) + std::abs(change));
   if (!(-slope > rounding)) return LineSearch::stays;
   // Where elements are inside out the stiffness at rest may promise ways of many times the body.
-  const double most = longest(state.step), whole = extent_ + rigid_way(state);
-  double part = most > whole ? whole / most : 1;
+  const double most = longest(state.step);
+  double part = most > extent_ ? extent_ / most : 1;
   for (int halving = 0; halving <= kHalvings; ++halving, part *= 0.5) {
     for (std::size_t i = 0; i < state.trial.size(); ++i) state.trial[i] += part * state.step[i];
     const double there = change_at_trial(state);
@@ -71,16 +73,18 @@ void SoftBody::step(SoftState& state, std::span<const NodeForce> forces) const n
   const double h = settings_.step;
   add_forces(state, forces);
   ++state.steps;
-  for (std::size_t i = 0; i < state.x.size(); ++i) {
-    state.trial[i] = state.x[i];
-    state.trial_gradient[i] = is_fixed_[i]
-                                  ? Vec3(0)
-                                  : state.gradient[i] - state.load[i] -
-                                        solid_.masses()[i] * (state.v[i] / h + settings_.gravity);
-  }
-  state.step = state.ahead;
-  state.next_is_trial = false;
+  const Vec3 way = rigid_way(state);
   double change = 0;
+  for (std::size_t i = 0; i < state.x.size(); ++i) {
+    const double mass = solid_.masses()[i];
+    const Vec3 pull = state.load[i] + mass * (state.v[i] / h + settings_.gravity);
+    const Vec3 inertia = mass / (h * h) * way;
+    state.trial[i] = state.x[i] + way;
+    state.trial_gradient[i] = is_fixed_[i] ? Vec3(0) : state.gradient[i] - pull + inertia;
+    state.step[i] = state.ahead[i] - way;
+    change += glm::dot(way, 0.5 * inertia - pull);
+  }
+  state.next_is_trial = false;
   LineSearch found = search_line(state, change);
   for (int iteration = 1; found == LineSearch::moves && iteration < settings_.iterations;
        ++iteration) {

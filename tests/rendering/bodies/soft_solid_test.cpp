@@ -272,6 +272,29 @@ TEST(SoftSolid, ASmallBodyFallsAsFastAsALargeOne) {
   }
 }
 
+TEST(SoftSolid, ABodyThatWasPushedKeepsItsMomentum) {
+  // Of a milligram's thirtieth, which the guard often stops.
+  const stimuli::SolidMesh mesh = stimuli::mesh_of_box({0.001, 0.001, 0.0003}, {10, 10, 3});
+  const SoftBody body(
+      mesh, {}, {.material = {.young = 1e5, .density = 100}, .step = 0.004, .compliance = false});
+  SoftState state = body.rest();
+  const auto momentum = [&] {
+    Vec3 sum(0);
+    for (std::size_t i = 0; i < state.v.size(); ++i) sum += body.solid().masses()[i] * state.v[i];
+    return sum;
+  };
+  std::uint32_t node = 0;
+  for (std::uint32_t i = 0; i < mesh.nodes.size(); ++i) {
+    if (mesh.nodes[i].x > 0.00049) node = i;
+  }
+  const NodeForce push{body.surface_index(node), {0, 0, 7.5e-10}};
+  for (int i = 0; i < 5; ++i) body.step(state, {&push, 1});
+  const Vec3 given = momentum();
+  EXPECT_GT(given.z, 0);
+  for (int i = 0; i < 250; ++i) body.step(state, {});
+  EXPECT_LT(glm::distance(momentum(), given), 1e-5 * glm::length(given));
+}
+
 enum class Abuse { sudden, twist, inversion, shake, strike, no_number };
 
 void set_abused_shape(Abuse abuse, SoftState& state) {
