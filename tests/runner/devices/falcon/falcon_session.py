@@ -87,7 +87,7 @@ class FalconSession(unittest.TestCase):
             came = terminal.wait_for("was a weak push to the right felt?", "the force direction check failed")
             if came.startswith("was"):
                 return farthest
-            terminal.wait_for("(go: push)")
+            terminal.wait_for("(':go': push)")
 
     def participants(self):
         if not self.database.exists():

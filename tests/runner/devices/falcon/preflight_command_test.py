@@ -23,7 +23,7 @@ class Preflight(FalconSession):
         self.control.tell("shake 1 0.035")
         terminal.wait_for("limits: forces of up to ")
         limits = re.search(r"up to ([\d.]+) N at each end \(the device's own limit: ([\d.]+) N\)", terminal.text)
-        terminal.wait_for("(go: push)")
+        terminal.wait_for("(':go': push)")
         limits = limits or re.search(r"up to ([\d.]+) N at each end \(the device's own limit: ([\d.]+) N\)",
                                      terminal.text)
         self.assertEqual(float(limits[1]), min(6.0, float(limits[2])))
@@ -70,7 +70,7 @@ class Preflight(FalconSession):
 
     def test_a_push_that_is_not_felt_ends_it_before_anything_is_recorded(self):
         terminal = self.run_session("--calibration", self.calibration(0))
-        terminal.wait_for("(go: push)")
+        terminal.wait_for("(':go': push)")
         self.pushed_and_felt(terminal)
         terminal.type(":quit\n")
         self.assertEqual(terminal.finish(), 0, terminal.text)
@@ -83,7 +83,7 @@ class Preflight(FalconSession):
 
     def test_a_withdrawal_in_the_pre_flight_is_on_record_with_its_notes(self):
         terminal = self.run_session("--calibration", self.calibration(0))
-        terminal.wait_for("(go: push)")
+        terminal.wait_for("(':go': push)")
         terminal.type(":note the grip is cold\n")
         terminal.wait_for("note: the grip is cold")
         terminal.type(":quit WITHDRAWN, is cold\n")
@@ -97,7 +97,7 @@ class Preflight(FalconSession):
 
     def test_ended_in_the_pre_flight_with_trials_on_record_these_are_counted(self):
         terminal = self.run_session("--calibration", self.calibration(0))
-        terminal.wait_for("(go: push)")
+        terminal.wait_for("(':go': push)")
         self.pushed_and_felt(terminal)
         terminal.type(":note a note\n:go\n")
         terminal.wait_for("move the stylus")
@@ -114,7 +114,7 @@ class Preflight(FalconSession):
         self.assertIn("a note", self.notes())
         again = self.run_session("--calibration", self.calibration(0))
         again.wait_for("1 of 2 trials done, last run ")
-        again.wait_for("(go: push)")
+        again.wait_for("(':go': push)")
         again.type(":note another\n:quit\n")
         self.assertEqual(again.finish(), 0, again.text)
         self.assertIn("1 of 2 trials on record; aborted", again.text)
@@ -129,7 +129,7 @@ class Preflight(FalconSession):
         self.database = disk / "study.db"
         last = self.folder / "last.json"
         terminal = self.run_session("--calibration", self.calibration(0), emulator=["--last", last])
-        terminal.wait_for("(go: push)")
+        terminal.wait_for("(':go': push)")
         self.pushed_and_felt(terminal)
         terminal.type(":go\n")
         terminal.wait_for("move the stylus")
@@ -184,7 +184,7 @@ class Preflight(FalconSession):
         self.assertFalse(self.database.exists())
         for options in (("--calibration", stale), ()):
             terminal = self.run_session("--without-calibration", *options)
-            terminal.wait_for("(go: push)")
+            terminal.wait_for("(':go': push)")
             self.pushed_and_felt(terminal)
             terminal.type(":go\n")
             terminal.wait_for("move the stylus")

@@ -16,7 +16,7 @@ class Replug(FalconSession):
     def begin(self):
         """A session behind its pre-flight."""
         terminal = self.run_session("--calibration", self.calibration(0), emulator=["--last", self.folder / "last.json"])
-        terminal.wait_for("(go: push)")
+        terminal.wait_for("(':go': push)")
         self.pushed_and_felt(terminal)
         terminal.type(":go\n")
         terminal.wait_for("move the stylus")
@@ -91,12 +91,12 @@ class Replug(FalconSession):
 
     def test_unplugged_in_the_pre_flight(self):
         terminal = self.run_session("--calibration", self.calibration(0))
-        terminal.wait_for("(go: push)")
+        terminal.wait_for("(':go': push)")
         self.control.tell("unplug 1")
         terminal.wait_for("the device is unplugged: plug it in again; after that ':clear'")
         self.control.tell("plug 1")
         terminal.type(":clear\n")
-        terminal.wait_for("(go: push)")
+        terminal.wait_for("(':go': push)")
         self.pushed_and_felt(terminal)
         terminal.type(":quit\n")
         self.assertEqual(terminal.finish(), 0, terminal.text)
