@@ -256,6 +256,28 @@ TEST(UnionSearch, FindsContactsOffTheirPlace) {
   EXPECT_GT(search_with(Broken::How::aside).off_place, 100u);
 }
 
+TEST(UnionSearch, SaysWhereToLook) {
+  const Broken broken(Broken::How::weak);
+  std::uint64_t walk = 4;
+  UnionCounts counts = search_union(broken, 3, walk);
+  while (counts.faults.empty()) counts = search_union(broken, 3, ++walk);
+  const SearchFault& fault = counts.faults.front();
+  EXPECT_EQ(fault.seed, 3u);
+  EXPECT_EQ(fault.walk, walk);
+  EXPECT_LT(fault.tick, counts.ticks);
+  // The walk cut off before that tick has nothing wrong, and with it the same.
+  UnionWalk drawn = random_union_walk(3, walk, kTicksPerWalk);
+  drawn.path.resize(fault.tick);
+  EXPECT_EQ(search_union(broken, drawn).wrong(), 0u);
+  drawn = random_union_walk(3, walk, kTicksPerWalk);
+  drawn.path.resize(fault.tick + 1);
+  const UnionCounts again = search_union(broken, drawn, 8, 9);
+  ASSERT_EQ(again.faults.size(), 1u);
+  EXPECT_EQ(again.faults[0].what, fault.what);
+  EXPECT_EQ(again.faults[0].seed, 8u);
+  EXPECT_EQ(again.faults[0].walk, 9u);
+}
+
 TEST(UnionSearch, FindsWhatIsNotFinite) {
   EXPECT_GT(search_with(Broken::How::infinite).not_finite, 3u);
 }
