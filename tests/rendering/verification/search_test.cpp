@@ -75,6 +75,7 @@ TEST(Search, CountsAddUpEachWithItsOwn) {
                       &c.fallbacks,  &c.turned_elsewhere};
   };
   SearchCounts one, other;
+  for (const std::uint64_t* const count : counters(one)) EXPECT_EQ(*count, 0U);
   for (std::size_t i = 0; i < counters(one).size(); ++i) {
     *counters(one)[i] = i + 1;
     *counters(other)[i] = 1000 * (i + 1);

@@ -152,6 +152,18 @@ TEST(UnionSearch, DoesNotDependOnWhoWalks) {
   EXPECT_NE(search_unions(8, 0, 9).in_contact, whole.in_contact);
 }
 
+TEST(UnionSearch, CountsNothingOfNoWalks) {
+  const UnionCounts none = search_unions(7, 0, 0);
+  for (const std::uint64_t count :
+       {none.walks, none.ticks, none.in_contact, none.several, none.inside, none.not_minimal,
+        none.wrong_force, none.wrong_torque, none.off_place, none.not_finite, none.faulted,
+        none.lagged, none.capped, none.released, none.on_edge, none.in_gap, none.torques,
+        none.compared, none.elsewhere})
+    EXPECT_EQ(count, 0U);
+  EXPECT_EQ(none.worst_penetration, 0);
+  EXPECT_EQ(none.worst_descent, 0);
+}
+
 TEST(UnionSearch, DrawsAllKindsOfWalks) {
   std::set<std::size_t> parts, segments;
   int still = 0;
