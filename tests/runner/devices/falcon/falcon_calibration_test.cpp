@@ -8,6 +8,7 @@
 
 #include "protocols/parse.h"
 #include "runner/devices/falcon/calibration.h"
+#include "runner/devices/falcon/open.h"
 #include "runner/devices/falcon/serial.h"
 
 namespace palpate::runner::falcon {
@@ -146,6 +147,46 @@ TEST(FalconCalibration, MissingAndStaleAreReported) {
   EXPECT_NE(all.text.find("274 days ago"), std::string::npos) << all.text;
   EXPECT_EQ(judge_pair(calibration, "A1", "B2", kNow).state, CalibrationState::good);
   EXPECT_EQ(judge_pair(calibration, "B2", "A1", kNow).state, CalibrationState::missing);
+}
+
+TEST(FalconCalibration, VerdictsNameTheDevicesAndWhatToDo) {
+  const Calibration calibration = example();
+  EXPECT_EQ(judge_forces(calibration, {"A1"}, kNow).text,
+            "force of the Falcon A1: made 2026-10-31T11:00:00Z, 1 days ago");
+  EXPECT_EQ(judge_pair(calibration, "A1", "B2", kNow).text,
+            "registration of the Falcons A1 (tip) and B2 (tail): made 2026-10-30T00:00:00Z, 2 days "
+            "ago");
+  EXPECT_EQ(judge_pair(calibration, "B2", "A1", kNow).text,
+            "registration of the Falcons B2 (tip) and A1 (tail): none is stored; run palpate "
+            "devices --calibrate");
+  EXPECT_EQ(judge_forces(calibration, {"B2"}, kNow).text,
+            "force of the Falcon B2: made 2026-01-31T11:00:00.5Z, 274 days ago; run palpate "
+            "devices --calibrate again");
+  const CalibrationVerdict all =
+      both(judge_forces(calibration, {"A1"}, kNow), judge_pair(calibration, "B2", "A1", kNow));
+  EXPECT_EQ(all.state, CalibrationState::missing) << "the worse of both";
+  EXPECT_EQ(all.text, judge_forces(calibration, {"A1"}, kNow).text + "\n" +
+                          judge_pair(calibration, "B2", "A1", kNow).text);
+}
+
+TEST(FalconCalibration, TwoFalconsWithoutARegistrationAreNotOpened) {
+  DeviceConfig config;
+  config.serials = {"A1", "B2"};
+  const auto fault_of = [&] {
+    try {
+      open_falcon2(config);
+    } catch (const protocols::InputError& error) {
+      return std::string(error.what());
+    }
+    return std::string("opened");
+  };
+  const std::string none = fault_of();
+  for (const char* const part :
+       {"(no calibration file)", "/pairs", "Falcons A1 (tip) and B2 (tail)",
+        "palpate devices --calibrate --device falcon2"})
+    EXPECT_NE(none.find(part), std::string::npos) << none;
+  config.calibration = ::testing::TempDir() + "no-such-calibration.json";
+  EXPECT_NE(fault_of().find(config.calibration), std::string::npos) << fault_of();
 }
 
 TEST(FalconCalibration, OneFromTheFutureIsStale) {

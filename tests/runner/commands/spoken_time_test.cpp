@@ -1,0 +1,88 @@
+// "today 09:30", "yesterday 15:02": by the calendar of the place, held against that of <chrono>.
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <cstdint>
+#include <cstdlib>
+#include <ctime>
+#include <string>
+
+#include "runner/commands/run/resumption.h"
+
+namespace palpate::runner {
+namespace {
+namespace spoken_times {
+
+using std::chrono::days;
+using std::chrono::sys_days;
+
+constexpr std::int64_t kHour = 3'600'000'000'000;  // ns
+
+/// The day at a place, without its clock.
+sys_days day_of(std::int64_t utc_ns) {
+  const std::time_t seconds = utc_ns / 1'000'000'000;
+  std::tm at{};
+  localtime_r(&seconds, &at);
+  return std::chrono::year(at.tm_year + 1900) /
+         std::chrono::month(static_cast<unsigned>(at.tm_mon) + 1) /
+         std::chrono::day(static_cast<unsigned>(at.tm_mday));
+}
+
+class SpokenTime : public ::testing::Test {
+ protected:
+  SpokenTime() {
+    if (const char* const before = std::getenv("TZ")) before_ = before;
+  }
+  ~SpokenTime() override {
+    before_.empty() ? ::unsetenv("TZ") : ::setenv("TZ", before_.c_str(), 1);
+    ::tzset();
+  }
+  static void stand_in(const char* rules) {
+    ::setenv("TZ", rules, 1);
+    ::tzset();
+  }
+  std::string before_;
+};
+
+TEST_F(SpokenTime, IsTodayYesterdayOrADate) {
+  stand_in("UTC0");
+  const std::int64_t now = 1'772'323'200'000'000'000 + kHour / 2;  // 2026-03-01 00:30
+  EXPECT_EQ(spoken_time(now, now), "today 00:30");
+  EXPECT_EQ(spoken_time(now - kHour / 2, now), "today 00:00");
+  EXPECT_EQ(spoken_time(now - kHour, now), "yesterday 23:30");
+  EXPECT_EQ(spoken_time(now - 24 * kHour, now), "yesterday 00:30");
+  EXPECT_EQ(spoken_time(now - 25 * kHour, now), "2026-02-27 23:30");
+  EXPECT_EQ(spoken_time(now + 24 * kHour, now), "2026-03-02 00:30") << "a clock that was set back";
+}
+
+/// Central Europe: a day of 23 hours in March, one of 25 in October; and half an hour's change.
+TEST_F(SpokenTime, GoesByTheCalendarWhereClocksAreChanged) {
+  for (const char* const rules :
+       {"CET-1CEST,M3.5.0,M10.5.0/3", "UTC0", "LHST-10:30LHDT-11,M10.1.0,M4.1.0",
+        "EST5EDT,M3.2.0,M11.1.0", "XXX3YYY,M3.5.0/0,M10.5.0/0"}) {
+    stand_in(rules);
+    // From 2025-12-30 over a year, at odd hours.
+    for (std::int64_t at = 1'767'052'800; at < 1'767'052'800 + 372LL * 86400;
+         at += 5 * 3600 + 1740) {
+      const std::int64_t now = at * 1'000'000'000;
+      for (const std::int64_t ago : {0, 1, 12, 23, 24, 25, 36, 47, 48, 49}) {
+        const std::int64_t then = now - ago * kHour;
+        const std::string said = spoken_time(then, now);
+        const days apart = day_of(now) - day_of(then);
+        const std::string word = said.substr(0, said.find(' '));
+        if (apart == days(0)) {
+          ASSERT_EQ(word, "today") << rules << " " << at << " " << ago;
+        } else if (apart == days(1)) {
+          ASSERT_EQ(word, "yesterday") << rules << " " << at << " " << ago;
+        } else {
+          ASSERT_EQ(word.size(), 10U) << rules << " " << at << " " << ago << said;
+        }
+      }
+    }
+  }
+}
+
+}  // namespace spoken_times
+}  // namespace
+}  // namespace palpate::runner
