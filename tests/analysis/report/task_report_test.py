@@ -14,7 +14,7 @@ import unittest
 import xml.etree.ElementTree as xml
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent))
-from tasks_command_test import COLUMNS, PALPATE, rows_of_a_study  # takes PALPATE from the command line
+from task_study import COLUMNS, PALPATE, rows_of_a_study  # takes PALPATE from the command line
 
 SVG = "{http://www.w3.org/2000/svg}"
 

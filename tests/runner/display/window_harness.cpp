@@ -1,4 +1,4 @@
-// Windows without a session, for windows_test.py. Standard input says what to show, a line each;
+// Windows without a session, for windows_test.py and one_monitor_test.py. Standard input says what to show, a line each;
 // standard output says what was pressed.
 //   page KIND TEXT      text, neutral, go, feedback, message, break or checklist; the keys are
 //                       those of the paper

@@ -1,0 +1,184 @@
+"""Psychometric functions that palpate analyze fits: which form, scale and guesses, and where they have no meaning."""
+
+import json
+import math
+import pathlib
+import random
+import statistics
+import subprocess
+import unittest
+
+from task_study import PALPATE, PEOPLE, TaskStudy, logistic, rows_of_a_study
+
+FIXTURES = pathlib.Path(__file__).with_name("fixtures")
+
+
+class PsychometricFunctions(TaskStudy):
+    def test_levels_on_one_side_of_the_standard_are_a_forced_choice(self):
+        draw = random.Random(3)
+        rows = []
+        for row in rows_of_a_study(1):
+            if row["task"] == "compare":
+                row["level"] = 500 + 0.5 * (row["level"] - 290)
+                row["success"] = int(draw.random() < 0.5 + 0.5 * logistic((row["level"] - 600) / 20))
+                rows.append(row)
+        self.write(rows)
+        self.assertEqual(self.analyze("--json", self.path / "forced.json").returncode, 0)
+        for cell in json.loads((self.path / "forced.json").read_text())["cells"]:
+            self.assertTrue(cell["forced_choice"])
+            for one in cell["psychometric_functions"]:
+                self.assertEqual(one["fit"]["guess"], 0.5)
+                self.assertAlmostEqual(one["fit"]["threshold"], 600, delta=30)
+
+    def test_functions_by_command_are_those_of_r(self):
+        """Maximum likelihood by R's optim on the definition (fixtures/make_psychophysics.R): of a comparison about a standard,
+        and of a forced choice. The JND of a forced choice is measured half-way from guessing to certainty, of a Weibull
+        function by its inverse."""
+        for case in json.loads((FIXTURES / "psychophysics.json").read_text())["by_command"]:
+            function, scale = case["name"].split()
+            standard = 500 if case["guess"] == 0 else 100
+            rows = [{"participant_id": "T1", "session": 1, "block": 1, "trial": 1000 * place + i + 1, "renderer": "ray", "shape": "ball",
+                     "response": "2", "correct": 1, "task": "compare", "block_name": "b", "track": 1, "level": level,
+                     "standard_level": standard, "success": int(i < k)}
+                    for place, (level, n, k) in enumerate(zip(case["levels"], case["n"], case["k"])) for i in range(n)]
+            self.write(rows)
+            for chosen in ([["--scale", scale]] if function != "weibull" else [[], ["--scale", "log"]]):
+                with self.subTest(case["name"], guess=case["guess"], chosen=chosen):
+                    done = self.analyze("--function", function, *chosen, "--json", self.path / "one.json", "--force")
+                    self.assertEqual((done.returncode, done.stderr), (0, ""))
+                    self.assertIn(f"Psychometric functions: {function}", done.stdout)
+                    cell, = json.loads((self.path / "one.json").read_text())["cells"]
+                    fit = cell["psychometric_functions"][0]["fit"]
+                    self.assertEqual((fit["function"], fit["scale"], fit["guess"]), (function, scale, case["guess"]))
+                    self.assertAlmostEqual(fit["log_likelihood"], case["log_likelihood"], delta=1e-6)
+                    self.assertAlmostEqual(fit["threshold"] / case["threshold"], 1, delta=1e-4)
+                    self.assertAlmostEqual(fit["slope"] / case["slope"], 1, delta=2e-3)
+                    self.assertAlmostEqual(fit["lapse"], case["fitted_lapse"], delta=1e-4)
+                    for end, value in zip(("lapse_low", "lapse_high"), fit["lapse_ci95"]):
+                        self.assertAlmostEqual(value, case[end], delta=1e-4)
+                    self.assertEqual(fit["guess_ci95"], [case["guess"]] * 2)
+                    for end, value in zip(("threshold_low", "threshold_high"), fit["threshold_ci95"]):
+                        self.assertAlmostEqual(value / case[end], 1, delta=1e-3)
+                    if case["guess"] == 0.5:
+                        half_way = fit["threshold"] * (math.log(2) ** (1 / fit["slope"]) if function == "weibull" else 1)
+                        self.assertAlmostEqual(fit["jnd"], half_way - standard, delta=1e-6 * standard)
+                    elif scale == "log":
+                        quartile = {"logistic": lambda p: math.log(p / (1 - p)), "normal": statistics.NormalDist().inv_cdf,
+                                    "weibull": lambda p: math.log10(-math.log(1 - p))}[function]
+                        ratio = 10 ** ((quartile(0.75) - quartile(0.25)) / 2 / fit["slope"])
+                        self.assertAlmostEqual(fit["weber_fraction"], ratio - 1, delta=1e-6)
+
+    def scales(self, *more):
+        done = subprocess.run([PALPATE, "analyze", *more, "--json", self.path / "scales.json", "--force"], capture_output=True,
+                              text=True)
+        self.assertEqual((done.returncode, done.stderr), (0, ""))
+        cells = json.loads((self.path / "scales.json").read_text())["cells"]
+        return {cell["block_name"]: cell["psychometric_functions"][0]["fit"]["scale"] for cell in cells}, done.stdout
+
+    def test_levels_are_taken_on_the_scale_that_their_procedure_has(self):
+        ball = {"shape": "sphere", "radius_m": 0.025, "subdivisions": 1, "stiffness_n_per_m": 400}
+        compare = {"task": "compare", "stimuli": ["ball"], "standard": "ball", "level": {"path": "/radius_m"}}
+        stairs = {"kind": "staircase", "start": 0.034, "min": 0.026, "max": 0.036, "stop": {"trials": 12}}
+        constant = {"kind": "constant", "repetitions": 4}
+        logs = stairs | {"scale": "log", "steps": [0.02]}
+        procedures = {
+            "even": constant | {"levels": [0.027, 0.03, 0.033]},
+            "ratios": constant | {"levels": {"from": 0.026, "to": 0.036, "count": 5, "spacing": "log"}},
+            "metres": stairs | {"steps": [0.001]}, "logs": logs,
+            "mixed": [stairs | {"steps": [0.001]}, logs]}
+        (self.path / "p.json").write_text(json.dumps({
+            "version": 2, "name": "scales", "renderers": ["ray"], "orientation": "fixed", "stimuli": [{"name": "ball"} | ball],
+            "blocks": [{"name": name, **compare, "procedure": one} for name, one in procedures.items()]}))
+        db = self.path / "scales.db"
+        subprocess.run([PALPATE, "simulate", self.path / "p.json", "--db", db, "--participants", "1"], check=True,
+                       capture_output=True)
+        expected = {"even": "linear", "ratios": "log", "metres": "linear", "logs": "log", "mixed": "linear"}
+        found, text = self.scales("--db", db)
+        self.assertEqual(found, expected)
+        for block, scale in expected.items():
+            words = {"linear": "levels as they are", "log": "logarithm (base 10) of the levels"}[scale]
+            self.assertRegex(text, rf"compare, {block}, .*\n  functions over the {words.replace('(', '[(]').replace(')', '[)]')}\n")
+        self.assertNotIn("[-", text, "no size is below 0")
+        for wish in ("linear", "log"):
+            self.assertEqual(set(self.scales("--db", db, "--scale", wish)[0].values()), {wish})
+        self.assertEqual(set(self.scales("--db", db, "--function", "weibull")[0].values()), {"log"})
+        # A table has no protocol: levels alone tell.
+        table = self.path / "scales.csv"
+        subprocess.run([PALPATE, "export", "--db", db, "--format", "csv", "--out", table], check=True, capture_output=True)
+        self.assertNotIn("--scale log", text)
+        found, text = self.scales("--csv", table)
+        self.assertIn("give --scale log", text)
+        self.assertNotIn("[-", text)
+        self.assertNotIn("--scale log", self.scales("--csv", table, "--scale", "linear")[1])
+        self.assertEqual((found["even"], found["ratios"]), ("linear", "log"))
+
+    def test_functions_are_refused_where_they_have_no_meaning(self):
+        self.write(rows_of_a_study(1)[:50])
+        for wrong, said in ((["--function", "gumbel"], "logistic, normal or weibull"), (["--scale", "db"], "linear or log"),
+                            (["--function", "weibull", "--scale", "linear"], "log with --function weibull")):
+            done = self.analyze(*wrong)
+            self.assertEqual(done.returncode, 2, wrong)
+            self.assertIn(said, done.stderr)
+        rows = [row | {"level": row["level"] - 400} for row in rows_of_a_study(1) if row["task"] == "compare"]
+        self.write(rows)
+        done = self.analyze("--scale", "log")
+        self.assertEqual(done.returncode, 0)
+        self.assertIn("levels below 0 have no place on a logarithmic scale", done.stdout)
+
+    def test_catch_trials_tell_guesses_on_a_logarithmic_scale_too(self):
+        draw = random.Random(8)
+        for function in ("logistic", "normal", "weibull"):
+            rows = [{"participant_id": "T1", "session": 1, "block": 1, "trial": i + 1, "renderer": "ray", "shape": "bump", "correct": "",
+                     "task": "detect", "block_name": "b", "track": 1, "level": level or "", "catch_trial": int(level == 0),
+                     "success": int(draw.random() < 0.2 + 0.78 * (1 - math.exp(-(level / 2) ** 3))), "response": "yes"}
+                    for i, level in enumerate([0, 0, 0.5, 1, 1.5, 2, 2.5, 3, 4] * 60)]
+            self.write(rows)
+            done = self.analyze("--function", function, "--scale", "log", "--json", self.path / "one.json", "--force")
+            self.assertEqual((done.returncode, done.stderr), (0, ""))
+            one, = json.loads((self.path / "one.json").read_text())["cells"][0]["psychometric_functions"]
+            false_alarms = sum(row["success"] for row in rows if row["catch_trial"]) / 120
+            self.assertAlmostEqual(one["fit"]["guess"], false_alarms, delta=0.09)
+            self.assertAlmostEqual(one["fit"]["threshold"], 2 if function == "weibull" else 1.77, delta=0.35)
+            self.assertTrue(one["fit"]["determined"])
+            self.assertAlmostEqual(one["bayes"]["threshold"], one["fit"]["threshold"], delta=0.15)
+
+    def test_three_intervals_are_guessed_by_a_third(self):
+        rows = [{**row, "interval_onsets": "0;1;2"} for row in self.forced(random.Random(5), 350, 1 / 3)]
+        cell, = self.found(rows)["cells"]
+        self.assertEqual((cell["n_intervals"], cell["forced_choice"]), (3, True))
+        held = 0
+        for one in cell["psychometric_functions"]:
+            fit = one["fit"]
+            self.assertAlmostEqual(fit["guess"], 1 / 3)
+            self.assertIsNone(fit["pse"])
+            # The JND of a forced choice is the threshold's distance from the standard, in text and JSON alike.
+            self.assertAlmostEqual(fit["jnd"], fit["threshold"] - 300)
+            self.assertAlmostEqual(fit["weber_fraction"], fit["jnd"] / 300)
+            self.assertAlmostEqual(fit["jnd_ci95"][0], fit["threshold_ci95"][0] - 300)
+            held += fit["threshold_ci95"][0] <= 350 <= fit["threshold_ci95"][1]
+        self.assertGreaterEqual(held, PEOPLE - 2)
+        both = [{**row, "standard_level": 350} for row in rows]
+        cell, = self.found(both)["cells"]
+        self.assertIn("both sides", cell["psychometric_functions"][0]["fit"]["reason"])
+
+    def test_same_different_has_guesses_of_its_catch_trials_and_a_d_prime(self):
+        draw = random.Random(6)
+        rows = self.forced(draw, 350, 0.2)
+        for row in rows:
+            row["response"] = "different" if row["success"] else "same"
+        for person in range(PEOPLE):
+            for i in range(160):
+                success = int(draw.random() < 0.2)
+                rows.append({**rows[0], "participant_id": f"T{person}", "trial": 100000 + i, "level": "", "catch_trial": 1,
+                             "success": success, "response": "different" if success else "same"})
+        cell, = self.found(rows)["cells"]
+        self.assertEqual((cell["same_different"], cell["forced_choice"]), (True, False))
+        for one in cell["psychometric_functions"]:
+            self.assertAlmostEqual(one["fit"]["guess"], 0.2, delta=0.1)
+            self.assertAlmostEqual(one["fit"]["threshold"], 350, delta=15)
+            self.assertIsNone(one["fit"]["pse"])
+            self.assertGreater(one["detectability"]["d_prime"], 1)
+
+
+if __name__ == "__main__":
+    unittest.main()
