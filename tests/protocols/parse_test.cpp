@@ -11,6 +11,7 @@
 
 #include "protocols/sha256.h"
 #include "stimuli/random.h"
+#include "tests/protocols/parsed_faults.h"
 #include "tests/shared/peak_memory.h"
 
 namespace palpate::protocols {
@@ -39,29 +40,14 @@ std::vector<fs::path> json_files(const fs::path& folder) {
   return files;
 }
 
-bool is_scene(const fs::path& path) { return path.filename().string().rfind("scene", 0) == 0; }
-
-void parse(const fs::path& path) {
-  if (is_scene(path)) {
-    parse_scene(path.string());
-  } else {
-    parse_protocol(path.string());
-  }
-}
-
 std::vector<Fault> faults_of(const std::string& text) {
-  try {
-    parse_protocol_text(text, "p.json");
-  } catch (const InputError& error) {
-    return error.faults();
-  }
-  return {};
+  return faults_when([&] { parse_protocol_text(text, "p.json"); });
 }
 
 TEST(Parse, AcceptsGoodFiles) {
   const std::vector<fs::path> files = json_files(kFolder + "good");
   EXPECT_EQ(files.size(), 8u);
-  for (const fs::path& file : files) EXPECT_NO_THROW(parse(file)) << file;
+  for (const fs::path& file : files) EXPECT_NO_THROW(parse_file(file)) << file;
 }
 
 TEST(Parse, AcceptsThePublishedProtocols) {
@@ -81,7 +67,7 @@ TEST(Parse, NamesEveryFaultOfBadFiles) {
     std::istringstream lines(text_of(fs::path(file).replace_extension(".faults")));
     for (std::string line; std::getline(lines, line);) expected.push_back(line);
     try {
-      parse(file);
+      parse_file(file);
     } catch (const InputError& error) {
       for (const Fault& fault : error.faults()) {
         EXPECT_EQ(fault.file, file);

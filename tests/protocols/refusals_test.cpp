@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "protocols/parse.h"
+#include "tests/protocols/parsed_faults.h"
 #include "tests/shared/prose.h"
 
 namespace palpate::protocols {
@@ -15,33 +16,15 @@ namespace refusals {
 
 namespace fs = std::filesystem;
 
-std::vector<Fault> faults_of_file(const fs::path& file) {
-  try {
-    if (file.filename().string().rfind("scene-", 0) == 0) {
-      parse_scene(file.string());
-    } else {
-      parse_protocol(file.string());
-    }
-  } catch (const InputError& error) {
-    return error.faults();
-  }
-  return {};
-}
-
 std::vector<Fault> faults_of_scene(const std::string& text) {
-  try {
-    parse_scene_text(text, "s.json");
-  } catch (const InputError& error) {
-    return error.faults();
-  }
-  return {};
+  return faults_when([&] { parse_scene_text(text, "s.json"); });
 }
 
 TEST(Refusals, AreWholeSentencesThatSayWhatWouldDo) {
   int count = 0;
   for (const auto& entry : fs::directory_iterator(PALPATE_SOURCE_DIR "/tests/protocols/bad")) {
     if (entry.path().extension() != ".json") continue;
-    for (const Fault& fault : faults_of_file(entry.path())) {
+    for (const Fault& fault : faults_when([&] { parse_file(entry.path()); })) {
       ++count;
       const std::string& text = fault.expected;
       SCOPED_TRACE(entry.path().filename().string() + " " + fault.location + ": " + text);

@@ -14,6 +14,7 @@
 
 #include "stimuli/primitives.h"
 #include "tests/shared/random_polyhedron.h"
+#include "tests/shared/temporary_folder.h"
 #include "tests/stimuli/mesh_invariants.h"
 
 namespace palpate::stimuli {
@@ -24,16 +25,9 @@ using testing::triangulated;
 
 class MeshFile : public ::testing::Test {
  protected:
-  void SetUp() override {
-    std::string pattern = ::testing::TempDir() + "/mesh_file_XXXXXX";
-    ASSERT_NE(mkdtemp(pattern.data()), nullptr);
-    folder_ = pattern;
-  }
-  void TearDown() override { std::filesystem::remove_all(folder_); }
-
   std::string write(const std::string& name, const std::string& bytes) const {
     std::ofstream(folder_ / name, std::ios::binary) << bytes;
-    return (folder_ / name).string();
+    return folder_ / name;
   }
 
   PolygonSoup read(const std::string& name, const std::string& bytes) const {
@@ -45,7 +39,7 @@ class MeshFile : public ::testing::Test {
       read(name, bytes);
     } catch (const MeshError& error) {
       for (const std::string& fault : error.faults()) {
-        EXPECT_TRUE(fault.starts_with((folder_ / name).string() + ": ")) << fault;
+        EXPECT_TRUE(fault.starts_with((folder_ / name) + ": ")) << fault;
       }
       return error.faults();
     }
@@ -61,7 +55,7 @@ class MeshFile : public ::testing::Test {
         << "expected " << text << " in " << ::testing::PrintToString(found);
   }
 
-  std::filesystem::path folder_;
+  const testing::TemporaryFolder folder_;
 };
 
 std::string printed(const char* format, double value) {
@@ -357,9 +351,9 @@ TEST_F(MeshFileSurface, FaultsOfAnStlHaveItsPlacesAndCoordinates) {
 
 TEST_F(MeshFile, OtherThingsThanMeshFilesAreRefused) {
   expect_fault("a.ply", "ply", ".obj, .stl, .gltf or .glb");
-  EXPECT_THROW(read_mesh_file((folder_ / "none.obj").string()), MeshError);
+  EXPECT_THROW(read_mesh_file(folder_ / "none.obj"), MeshError);
   std::filesystem::create_directory(folder_ / "folder.stl");
-  EXPECT_THROW(read_mesh_file((folder_ / "folder.stl").string()), MeshError);
+  EXPECT_THROW(read_mesh_file(folder_ / "folder.stl"), MeshError);
   EXPECT_THROW(read_mesh_file("/dev/null"), MeshError);
   EXPECT_THROW(read_mesh_file(""), MeshError);
 }

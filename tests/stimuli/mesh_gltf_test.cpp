@@ -9,6 +9,7 @@
 
 #include "stimuli/mesh_file.h"
 #include "stimuli/parts/convex_parts.h"
+#include "tests/shared/temporary_folder.h"
 #include "tests/stimuli/gltf_box.h"
 
 namespace palpate::stimuli {
@@ -155,13 +156,9 @@ TEST(MeshGltf, ABinaryFileIsTheSame) {
 class MeshGltfBuffers : public ::testing::Test {
  protected:
   void SetUp() override {
-    std::string pattern = ::testing::TempDir() + "/mesh_gltf_XXXXXX";
-    ASSERT_NE(mkdtemp(pattern.data()), nullptr);
-    folder_ = pattern;
     std::filesystem::create_directories(folder_ / "inner" / "data");
     path_ = (folder_ / "inner" / "box.gltf").string();
   }
-  void TearDown() override { std::filesystem::remove_all(folder_); }
 
   void write_buffer(const std::string& name) const {
     std::ofstream(folder_ / "inner" / name, std::ios::binary) << gltf::box_buffer();
@@ -179,7 +176,8 @@ class MeshGltfBuffers : public ::testing::Test {
     }
   }
 
-  std::filesystem::path folder_;
+  const testing::TemporaryFolder temporary_;
+  const std::filesystem::path folder_ = temporary_.path();
   std::string path_;
 };
 

@@ -12,6 +12,7 @@
 #include "stimuli/orientation.h"
 #include "stimuli/primitives.h"
 #include "stimuli/random.h"
+#include "tests/shared/temporary_folder.h"
 #include "tests/stimuli/part_checks.h"
 
 namespace palpate::stimuli {
@@ -68,8 +69,9 @@ TEST(CommonVolume, OfSolidsInAnyOrientationIsThatOfSampledPoints) {
 }
 
 TEST(GroupOverlaps, NameTheGroupsAndHowMuch) {
-  const auto notes = [](double apart) {
-    const std::string path = ::testing::TempDir() + "overlapping_groups.obj";
+  const testing::TemporaryFolder folder;
+  const auto notes = [&](double apart) {
+    const std::string path = folder / "overlapping_groups.obj";
     std::ofstream file(path);
     for (int b = 0; b < 2; ++b) {
       file << "g box" << b << "\n";

@@ -1,16 +1,15 @@
 // The CSV reader: accepted forms, and faults with their location.
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <cstdio>
 #include <fstream>
 #include <string>
 #include <vector>
 
 #include "analysis/input/trials.h"
 #include "protocols/parse.h"
+#include "tests/shared/temporary_folder.h"
 
 namespace palpate::analysis {
 namespace {
@@ -22,8 +21,6 @@ const std::string kNul(1, '\0');
 
 class TrialsCsv : public ::testing::Test {
  protected:
-  ~TrialsCsv() override { std::remove(path_.c_str()); }
-
   TrialTable read(const std::string& text) {
     std::ofstream(path_, std::ios::binary) << text;
     return read_trials_csv(path_);
@@ -46,8 +43,8 @@ class TrialsCsv : public ::testing::Test {
     EXPECT_NE(found[0].expected.find(words), std::string::npos) << found[0].expected;
   }
 
-  const std::string path_ =
-      ::testing::TempDir() + "palpate_trials_" + std::to_string(::getpid()) + ".csv";
+  const palpate::testing::TemporaryFolder folder_;
+  const std::string path_ = folder_ / "trials.csv";
 };
 
 TEST_F(TrialsCsv, ReadsTheNineColumns) {

@@ -1,9 +1,7 @@
 // Trials and servo timing read from a database.
 
 #include <gtest/gtest.h>
-#include <stdlib.h>
 
-#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -12,19 +10,13 @@
 #include "data/files/checksum.h"
 #include "data/store/store.h"
 #include "protocols/parse.h"
+#include "tests/shared/temporary_folder.h"
 
 namespace palpate::analysis {
 namespace {
 
 class TrialsStore : public ::testing::Test {
  protected:
-  TrialsStore() {
-    std::string pattern = ::testing::TempDir() + "palpate_XXXXXX";
-    folder_ = ::mkdtemp(pattern.data());
-    path_ = folder_ + "/study.db";
-  }
-  ~TrialsStore() override { std::filesystem::remove_all(folder_); }
-
   static data::TrialRecord trial(int number, const std::string& renderer, const std::string& shape,
                                  const std::string& response) {
     data::TrialRecord record;
@@ -57,7 +49,8 @@ class TrialsStore : public ::testing::Test {
     store.end_run(run, data::RunEnd::done, 1'000'000'000'000LL);
   }
 
-  std::string folder_, path_;
+  const palpate::testing::TemporaryFolder folder_;
+  const std::string path_ = folder_ / "study.db";
 };
 
 TEST_F(TrialsStore, ReadsCompletedTrials) {
@@ -156,7 +149,7 @@ TEST_F(TrialsStore, PracticeAloneIsNothingToAnalyse) {
   practice.practice = true;
   study({practice});
   EXPECT_THROW(read_trials_store(path_), protocols::InputError);
-  EXPECT_THROW(read_trials_store(folder_ + "/none.db"), data::StoreRefused);
+  EXPECT_THROW(read_trials_store(folder_ / "none.db"), data::StoreRefused);
 }
 
 }  // namespace

@@ -1,34 +1,19 @@
 #pragma once
-// A folder of its own for every test, and values that differ in every field.
+// Values that differ in every field, and a database in a folder of its own.
 
 #include <gtest/gtest.h>
 
-#include <cstdlib>
-#include <filesystem>
 #include <fstream>
 #include <iterator>
-#include <stdexcept>
 #include <string>
 
 #include "data/files/checksum.h"
 #include "data/store/store.h"
+#include "tests/shared/temporary_folder.h"
 
 namespace palpate::data::testing {
 
-class TemporaryFolder {
- public:
-  TemporaryFolder() : path_(::testing::TempDir() + "palpate-store-XXXXXX") {
-    if (::mkdtemp(path_.data()) == nullptr) throw std::runtime_error("no temporary folder");
-  }
-  ~TemporaryFolder() { std::filesystem::remove_all(path_); }
-  TemporaryFolder(const TemporaryFolder&) = delete;
-  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-  const std::string& path() const { return path_; }
-  std::string operator/(const std::string& name) const { return path_ + "/" + name; }
-
- private:
-  std::string path_;
-};
+using palpate::testing::TemporaryFolder;
 
 /// \param variant  another letter, another text
 inline ProtocolInfo a_protocol(char variant = 'a') {

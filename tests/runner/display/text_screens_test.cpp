@@ -23,7 +23,7 @@ std::string written(EventQueue<Output>& out, int file) {
   return text;
 }
 
-class TextScreens : public testing::Test {
+class TextScreens : public ::testing::Test {
  protected:
   std::string page(const Page& page) {
     screen_.show(page);

@@ -1,5 +1,5 @@
-// Windows without a session, for windows_test.py and one_monitor_test.py. Standard input says what to show, a line each;
-// standard output says what was pressed.
+// Windows without a session, for windows_test.py and one_monitor_test.py. Standard input says what
+// to show, a line each; standard output says what was pressed.
 //   page KIND TEXT      text, neutral, go, feedback, message, break or checklist; the keys are
 //                       those of the paper
 //   state SHAPE FAULTS [WORD]  a console in a trial, or in the state that the word says; "tool": a

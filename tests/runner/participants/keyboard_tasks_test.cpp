@@ -66,7 +66,7 @@ class Nobody final : public Attendant {
   std::vector<SoundCue> sounds;
 };
 
-class KeyboardTasks : public testing::Test {
+class KeyboardTasks : public ::testing::Test {
  protected:
   KeyboardRespondent& person(AnswerBy by = AnswerBy::keys) {
     person_.emplace(protocol_, screen_, nobody_, clock_, by);

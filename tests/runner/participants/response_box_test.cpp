@@ -13,6 +13,7 @@
 #include <thread>
 
 #include "runner/servo/realtime.h"
+#include "tests/shared/temporary_folder.h"
 
 namespace palpate::runner {
 namespace {
@@ -49,7 +50,7 @@ bool comes(const Condition& condition) {
   return condition();
 }
 
-class Box : public testing::Test {
+class Box : public ::testing::Test {
  protected:
   std::string keys_after(const std::string& bytes, const Mapping& mapping, std::size_t count) {
     ResponseBox box(terminal_.path, mapping, clock_, [this] { ++emergencies_; });
@@ -126,13 +127,11 @@ TEST_F(Box, AByteThatStandsForNoKeyIsTold) {
 
 // udev's names of ports by their places have colons.
 TEST_F(Box, APathMayHaveColons) {
-  const std::string folder = testing::TempDir();
-  const std::string path = folder + "/pci-0000:00:14.0-usb-0:2:1.0-port0";
-  unlink(path.c_str());
+  const palpate::testing::TemporaryFolder folder;
+  const std::string path = folder / "pci-0000:00:14.0-usb-0:2:1.0-port0";
   ASSERT_EQ(symlink(terminal_.path.c_str(), path.c_str()), 0);
   EXPECT_NO_THROW(ResponseBox(path, {}, clock_, [] {}));
   EXPECT_NO_THROW(ResponseBox(path + ":19200", {}, clock_, [] {}));
-  unlink(path.c_str());
 }
 
 TEST_F(Box, WhatIsNoPortIsRefused) {

@@ -8,7 +8,6 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
-#include <filesystem>
 #include <random>
 #include <string>
 #include <vector>
@@ -17,6 +16,7 @@
 #include "protocols/parse.h"
 #include "runner/participants/simulated_settings.h"
 #include "runner/session/simulated_study.h"
+#include "tests/shared/temporary_folder.h"
 
 namespace palpate::runner {
 namespace {
@@ -40,11 +40,11 @@ Settings simulated(std::uint64_t seed) {
                       "level": {"path": "/stiffness_n_per_m"}, "min": 100, "max": 600, "turn": 20,
                       "starts": [150, 550], "repetitions": 20}]})",
       "adjustments.json");
-  std::string pattern = testing::TempDir() + "palpate-adjustments-XXXXXX";
-  const std::filesystem::path folder = mkdtemp(pattern.data()), file = folder / "study.db";
+  const palpate::testing::TemporaryFolder folder;
+  const std::string file = folder / "study.db";
   StudyProgress progress;
   {
-    data::Store store = data::Store::open(file.string(), data::Store::Mode::write_or_create);
+    data::Store store = data::Store::open(file, data::Store::Mode::write_or_create);
     StudyPlan plan;
     plan.participants = kParticipants;
     plan.seed = seed;
@@ -53,7 +53,7 @@ Settings simulated(std::uint64_t seed) {
   }
   Settings found;
   std::vector<double> numbers;
-  data::Store store = data::Store::open(file.string(), data::Store::Mode::read_only);
+  data::Store store = data::Store::open(file, data::Store::Mode::read_only);
   store.for_each_trial([&](const data::StoredTrial& trial) {
     if (trial.record.task->number) numbers.push_back(*trial.record.task->number);
     found.unanswered += trial.record.timed_out ? 1 : 0;
@@ -63,7 +63,6 @@ Settings simulated(std::uint64_t seed) {
   for (const double number : numbers) found.mean += number / static_cast<double>(numbers.size());
   for (const double number : numbers) found.sd += std::pow(number - found.mean, 2);
   found.sd = std::sqrt(found.sd / static_cast<double>(numbers.size() - 1));
-  std::filesystem::remove_all(folder);
   return found;
 }
 

@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
-#include <filesystem>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -15,6 +14,7 @@
 #include "protocols/parse.h"
 #include "runner/servo/realtime.h"
 #include "runner/session/live_session.h"
+#include "tests/shared/temporary_folder.h"
 
 namespace palpate::runner::testing {
 
@@ -128,14 +128,8 @@ class Collected final : public MarkerSink {
 class LiveSessions : public ::testing::Test {
  protected:
   LiveSessions() {
-    std::string pattern = ::testing::TempDir() + "live-XXXXXX";
-    folder_ = mkdtemp(pattern.data());
     store_.emplace(data::Store::open(folder_ / "live.db", data::Store::Mode::write_or_create));
     participant_ = store_->enrol(info_of(protocol_), "P01");
-  }
-  ~LiveSessions() override {
-    store_.reset();
-    std::filesystem::remove_all(folder_);
   }
 
   LiveSession::Outcome run(Device& device, AnswerBy by = AnswerBy::keys) {
@@ -183,13 +177,13 @@ class LiveSessions : public ::testing::Test {
 
   protocols::Protocol protocol_ = protocols::parse_protocol_text(kProtocol, "live.json");
   StimulusLibrary library_{protocol_};
+  const palpate::testing::TemporaryFolder folder_;
   RealClock clock_;
   Screen screen_{clock_};
   Console console_{clock_};
   std::vector<Marker> markers_;
   int signal_ = 0;
   std::unique_ptr<NoisePlayer> noise_;
-  std::filesystem::path folder_;
   std::optional<data::Store> store_;
   data::Participant participant_;
 };

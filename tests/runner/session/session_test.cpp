@@ -3,12 +3,12 @@
 #include <gtest/gtest.h>
 
 #include <deque>
-#include <filesystem>
 #include <limits>
 #include <string>
 
 #include "runner/session/run_record.h"
 #include "tests/runner/session/session_case.h"
+#include "tests/shared/temporary_folder.h"
 
 namespace palpate::runner {
 namespace {
@@ -110,8 +110,7 @@ TEST(Session, AFaultCutsTheTrialOffWithZeroForce) {
 
 // The way of a live session into the store: begun on disk, cut off by a fault, shown again.
 TEST(Session, ACutOffTrialIsShownAgainAndBothAttemptsAreOnRecord) {
-  std::string pattern = ::testing::TempDir() + "session-XXXXXX";
-  const std::filesystem::path folder = mkdtemp(pattern.data());
+  const palpate::testing::TemporaryFolder folder;
   {
     SessionBench bench;
     const protocols::Protocol& protocol = bench.protocol;
@@ -154,7 +153,6 @@ TEST(Session, ACutOffTrialIsShownAgainAndBothAttemptsAreOnRecord) {
       EXPECT_EQ(record.attempt, record.trial == 3 ? 2 : 1);
     }
   }
-  std::filesystem::remove_all(folder);
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 #include "data/store/store.h"
 #include "protocols/parse.h"
 #include "runner/session/simulated_study.h"
+#include "tests/shared/temporary_folder.h"
 
 namespace palpate::runner {
 namespace {
@@ -18,12 +19,6 @@ namespace fs = std::filesystem;
 
 class SimulatedSolids : public ::testing::Test {
  protected:
-  SimulatedSolids() {
-    std::string pattern = ::testing::TempDir() + "solids-XXXXXX";
-    folder_ = mkdtemp(pattern.data());
-  }
-  ~SimulatedSolids() override { fs::remove_all(folder_); }
-
   StudyProgress simulate(const protocols::Protocol& protocol, const SimulatedSettings& settings,
                          int participants) const {
     data::Store store = data::Store::open(db(), data::Store::Mode::write_or_create);
@@ -48,7 +43,7 @@ class SimulatedSolids : public ::testing::Test {
     return found;
   }
 
-  fs::path folder_;
+  const palpate::testing::TemporaryFolder folder_;
 };
 
 // One presentation of each object under each renderer, through servo, renderers, session and store.
@@ -81,7 +76,7 @@ TEST_F(SimulatedSolids, ATrialThatCannotBeginEndsTheStudyAndKeepsWhatWasDone) {
   const protocols::Protocol protocol =
       protocols::parse_protocol(PALPATE_SOURCE_DIR "/protocols/quick.json");
   std::ofstream(folder_ / "near.json") << R"({"motor": {"approach_distance_m": 0.06}})";
-  const SimulatedSettings near = load_simulated_settings((folder_ / "near.json").string());
+  const SimulatedSettings near = load_simulated_settings(folder_ / "near.json");
   for (int attempt = 0; attempt < 2; ++attempt) {  // it stops at the same place again
     try {
       simulate(protocol, near, 1);

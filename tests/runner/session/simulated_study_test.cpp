@@ -20,6 +20,7 @@
 #include "protocols/sha256.h"
 #include "runner/session/replay_comparison.h"
 #include "stimuli/random.h"
+#include "tests/shared/temporary_folder.h"
 
 namespace palpate::runner {
 namespace {
@@ -28,12 +29,6 @@ namespace fs = std::filesystem;
 
 class SimulatedStudy : public ::testing::Test {
  protected:
-  SimulatedStudy() {
-    std::string pattern = ::testing::TempDir() + "study-XXXXXX";
-    folder_ = mkdtemp(pattern.data());
-  }
-  ~SimulatedStudy() override { fs::remove_all(folder_); }
-
   /// Two short sessions for each participant, so that simulation of the whole takes a second.
   protocols::Protocol protocol(const std::string& more = "") const {
     return protocols::parse_protocol_text(
@@ -78,7 +73,7 @@ class SimulatedStudy : public ::testing::Test {
   /// study when the test fails.
   void expect_frozen(int version) const;
 
-  fs::path folder_;
+  const palpate::testing::TemporaryFolder folder_;
 };
 
 TEST_F(SimulatedStudy, IsTheSameForAnyNumberOfJobs) {

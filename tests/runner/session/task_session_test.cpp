@@ -2,12 +2,10 @@
 // and the same database whatever the interruptions.
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
 #include <cmath>
-#include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <sstream>
@@ -22,6 +20,7 @@
 #include "runner/session/replay_comparison.h"
 #include "runner/session/simulated_session.h"
 #include "runner/session/simulated_study.h"
+#include "tests/shared/temporary_folder.h"
 
 namespace palpate::runner {
 namespace {
@@ -58,16 +57,9 @@ protocols::Protocol parsed_study(const json& document) {
   return protocols::parse_protocol_text(document.dump(), "study.json");
 }
 
-class TaskSession : public testing::Test {
+class TaskSession : public ::testing::Test {
  protected:
-  void SetUp() override {
-    folder_ = std::filesystem::temp_directory_path() /
-              ("palpate-task-session-" + std::to_string(::getpid()));
-    std::filesystem::create_directories(folder_);
-  }
-  void TearDown() override { std::filesystem::remove_all(folder_); }
-
-  std::string path(const std::string& name) const { return (folder_ / name).string(); }
+  std::string path(const std::string& name) const { return folder_ / name; }
 
   static void simulate(const protocols::Protocol& protocol, const std::string& database) {
     data::Store store = data::Store::open(database, data::Store::Mode::write_or_create);
@@ -94,7 +86,7 @@ class TaskSession : public testing::Test {
     return text.str();
   }
 
-  std::filesystem::path folder_;
+  const palpate::testing::TemporaryFolder folder_;
 };
 
 TEST_F(TaskSession, RecordsEveryIntervalOfAComparison) {

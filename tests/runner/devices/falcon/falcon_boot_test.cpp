@@ -1,6 +1,5 @@
 #include <gtest/gtest.h>
 
-#include <filesystem>
 #include <fstream>
 #include <span>
 #include <string>
@@ -12,6 +11,7 @@
 #include "stimuli/random.h"
 #include "tests/runner/devices/falcon/emulator.h"
 #include "tests/runner/devices/falcon/fake_transport.h"
+#include "tests/shared/temporary_folder.h"
 
 namespace palpate::runner::falcon {
 namespace {
@@ -214,12 +214,12 @@ TEST(FalconImage, NamesAFileThatIsMissingOrAFolder) {
 
 TEST(FalconImage, ReadsAFile) {
   const auto bytes = synthetic_image(64);
-  const std::string file = ::testing::TempDir() + "falcon_image_test.bin";
+  const palpate::testing::TemporaryFolder folder;
+  const std::string file = folder / "image.bin";
   std::ofstream(file, std::ios::binary)
       .write(reinterpret_cast<const char*>(bytes.data()),
              static_cast<std::streamsize>(bytes.size()));
   EXPECT_EQ(read_image(file).bytes, bytes);
-  std::filesystem::remove(file);
 }
 
 }  // namespace

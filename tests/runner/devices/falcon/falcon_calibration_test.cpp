@@ -10,6 +10,7 @@
 #include "runner/devices/falcon/calibration.h"
 #include "runner/devices/falcon/open.h"
 #include "runner/devices/falcon/serial.h"
+#include "tests/shared/temporary_folder.h"
 
 namespace palpate::runner::falcon {
 namespace {
@@ -108,7 +109,8 @@ TEST(FalconCalibration, AScaleFarFromAFalconsIsImplausible) {
 }
 
 TEST(FalconCalibration, AFileThatOthersCanWriteIsRefused) {
-  const std::string path = ::testing::TempDir() + "calibration-of-others.json";
+  const palpate::testing::TemporaryFolder folder;
+  const std::string path = folder / "calibration-of-others.json";
   std::ofstream(path) << to_json(example());
   for (const mode_t mode : {0600, 0644, 0400}) {
     ASSERT_EQ(::chmod(path.c_str(), mode), 0);
@@ -122,7 +124,6 @@ TEST(FalconCalibration, AFileThatOthersCanWriteIsRefused) {
   if (::chown(path.c_str(), 65534, 65534) == 0 && ::geteuid() != 65534) {  // root alone may
     EXPECT_THROW(read_calibration(path), protocols::InputError);
   }
-  ::unlink(path.c_str());
 }
 
 TEST(FalconSerial, IsSanitisedAndTruncated) {

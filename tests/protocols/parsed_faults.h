@@ -1,0 +1,37 @@
+#pragma once
+// What is found wrong with the protocols and scenes of tests.
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "protocols/parse.h"
+
+namespace palpate::protocols {
+
+/// Whether a file of the tests is a scene; else it is a protocol.
+inline bool is_scene(const std::filesystem::path& path) {
+  return path.filename().string().rfind("scene", 0) == 0;
+}
+
+/// Reads a scene or a protocol.
+inline void parse_file(const std::filesystem::path& path) {
+  if (is_scene(path)) {
+    parse_scene(path.string());
+  } else {
+    parse_protocol(path.string());
+  }
+}
+
+/// The faults of the InputError that `parse` throws; none where it throws none.
+template <class Parse>
+std::vector<Fault> faults_when(Parse&& parse) {
+  try {
+    parse();
+  } catch (const InputError& error) {
+    return error.faults();
+  }
+  return {};
+}
+
+}  // namespace palpate::protocols
