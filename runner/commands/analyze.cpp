@@ -143,11 +143,9 @@ int analyze_command(const std::vector<std::string>& args) {
       "shape with intervals and tests, accuracy, learning and exclusions. In data with other\n"
       "renderers each is compared with the first (point if it is among them). The conclusion\n"
       "and the tables go to stdout. Existing files are replaced only with --force.\n"
-      "Of a sweep: in what share of the settings a pattern holds, how the gains are spread, and "
-      "what\n"
-      "they depend on (Sobol indices of a saltelli design, rank correlations of others).\n"
-      "Of protocols of version 2 (databases, exports with a column 'task'): thresholds, PSE "
-      "and\n"
+      "Of a sweep: in what share of the settings a pattern holds, how the gains are spread, and\n"
+      "what they depend on (Sobol indices of a saltelli design, rank correlations of others).\n"
+      "Of protocols of version 2 (databases, exports with a column 'task'): thresholds, PSE and\n"
       "JND, d', magnitude estimation, adjustment, information and confidence, by task.";
   line.example =
       "  palpate analyze --db study.db\n"

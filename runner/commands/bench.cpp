@@ -140,9 +140,8 @@ int bench_command(const std::vector<std::string>& args) {
   line.usage = "palpate bench [--json FILE [--force]] [--ticks N]";
   line.summary =
       "Measures the run time of the renderers' ticks on this machine, each tick separately,\n"
-      "in nanoseconds, in five rounds of the same ticks, of which the lowest median and the "
-      "lowest\n"
-      "99th percentile are kept: what other programs take away is not the tick's. Quit them\n"
+      "in nanoseconds, in five rounds of the same ticks. The lowest median and the lowest 99th\n"
+      "percentile are kept: what other programs take away is not the tick's. Quit them\n"
       "nevertheless: they slow down all rounds.";
   line.example =
       "  palpate bench                       a table, about a minute\n"

@@ -43,12 +43,11 @@ std::optional<SimulateSettings> parse_simulate_settings(const std::vector<std::s
       "palpate simulate PROTOCOL.json --db FILE [--participants N] [--seed S] [--jobs J]\n"
       "       [--shard K/N|auto] [--ask SOCKET]";
   line.summary =
-      "Runs the whole study with simulated participants through the renderers, device layer, "
-      "session and\n"
-      "store that live participants use. Their data is labelled simulated. Run again, it resumes "
-      "where it\n"
-      "stopped; the same seed gives the same data, whatever the jobs and interruptions, and in\n"
-      "shards: several machines take a part of the participants each, palpate merge has them all.";
+      "Runs the whole study with simulated participants through the renderers, device layer,\n"
+      "session and store that live participants use. Their data is labelled simulated. Run\n"
+      "again, it resumes where it stopped; the same seed gives the same data, whatever the jobs\n"
+      "and interruptions, and in shards: several machines take a part of the participants each,\n"
+      "palpate merge has them all.";
   line.example =
       "  palpate simulate protocols/quick.json --db quick.db --participants 2    a minute's try\n"
       "  palpate simulate protocols/ho2000.json --db study.db                    the paper's "

@@ -45,12 +45,10 @@ int accuracy_command(const std::vector<std::string>& args) {
       "[--json FILE]";
   line.summary =
       "Error of the rendered forces against run time: every method over every tessellation of\n"
-      "every analytic shape, and which tessellation to choose; contact with concave objects and "
-      "with\n"
-      "tools of several segments, beside simpler ways to do it; soft bodies. Takes four minutes, "
-      "with --quick "
-      "half\n"
-      "a minute. Status 1 when a tick of the search is wrong or an extreme case fails.";
+      "every analytic shape, and which tessellation to choose; contact with concave objects and\n"
+      "with tools of several segments, beside simpler ways to do it; soft bodies. Takes four\n"
+      "minutes, with --quick half a minute. Status 1 when a tick of the search is wrong or an\n"
+      "extreme case fails.";
   line.example =
       "  palpate accuracy --quick\n"
       "  palpate accuracy --report accuracy.html --json accuracy.json\n"

@@ -242,11 +242,9 @@ void describe(CommandLine& line) {
       "       palpate cluster status DIR\n"
       "       palpate cluster submit DIR";
   line.summary =
-      "Runs a sweep or a simulated study as one array job on Slurm, and a job after it that "
-      "merges\n"
-      "its shards and analyses them. DIR, which all nodes must see, gets shards, logs, scripts "
-      "and\n"
-      "results.\n"
+      "Runs a sweep or a simulated study as one array job on Slurm, and a job after it that\n"
+      "merges its shards and analyses them. DIR, which all nodes must see, gets shards, logs,\n"
+      "scripts and results.\n"
       "status: what is done, runs, waits or stopped, and the time left. submit: shards that are\n"
       "not done (a task was killed, its time ran out) go on where they were.";
   line.example =

@@ -109,11 +109,11 @@ int explore_command(const std::vector<std::string>& args) {
       "               [--renderer point|ray] [--size 1280x720] [--every 16ms]\n"
       "               [--view YAW,PITCH[,ZOOM]] [--labels] [--force]";
   line.summary =
-      "Touches a scene in a window, with the mouse, a device or a recorded path; or draws it along "
-      "a path without a display (--frames, --animation). Shown are the objects, the ideal tool "
-      "(where it would be if objects were solid), the virtual one (orange, as the hand holds it), "
-      "each contact place with the force on the tool, and the torque on the hand (violet). In the "
-      "window Esc and F12 command zero force.";
+      "Touches a scene in a window, with the mouse, a device or a recorded path; or draws it\n"
+      "along a path without a display (--frames, --animation). Shown are the objects, the ideal\n"
+      "tool (where it would be if objects were solid), the virtual one (orange, as the hand\n"
+      "holds it), each contact place with the force on the tool, and the torque on the hand\n"
+      "(violet). In the window Esc and F12 command zero force.";
   line.example =
       "  palpate explore protocols/scenes/fig17a-engine.json\n"
       "  palpate explore protocols/scenes/fig17a-engine.json \\\n"

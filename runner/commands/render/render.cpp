@@ -53,10 +53,10 @@ int render_command(const std::vector<std::string>& args) {
       "               [--bodies B.csv] [--force]\n"
       "       palpate render --scene SCENE.json --renderer point|ray --explain [--json FILE]";
   line.summary =
-      "Renders the forces along a recorded path, offline: one row out for each row in, with the "
-      "faults of its tick in the column 'faults'; --bodies writes where moving objects are. Or, "
-      "with --explain, lists the stages of a tick "
-      "over the scene, which are left out and why, and what each costs.";
+      "Renders the forces along a recorded path, offline: one row out for each row in, with the\n"
+      "faults of its tick in the column 'faults'; --bodies writes where moving objects are. Or,\n"
+      "with --explain, lists the stages of a tick over the scene, which are left out and why,\n"
+      "and what each costs.";
   line.example =
       "  palpate render --scene cube.json --renderer ray --trajectory path.csv --out forces.csv\n"
       "  palpate render --scene cube.json --renderer ray --explain\n";

@@ -51,12 +51,11 @@ std::optional<RunSettings> parse_run_settings(const std::vector<std::string>& ar
   CommandLine line;
   line.usage = "palpate run PROTOCOL.json --db FILE --participant CODE [--number N] --device NAME";
   line.summary =
-      "A live session: resumes an unfinished one, else begins the next. Every trial is on disk "
-      "before\nthe next one starts. The participant answers with the protocol's keys; Escape or "
-      "F12 turns the\nforces off (emergency). 'palpate devices' lists the devices. A new "
-      "participant is "
-      "enrolled when the first trial begins;\na code that is not in the database yet is asked "
-      "about first.";
+      "A live session: resumes an unfinished one, else begins the next. Every trial is on disk\n"
+      "before the next one starts. The participant answers with the protocol's keys; Escape or\n"
+      "F12 turns the forces off (emergency). 'palpate devices' lists the devices. A new\n"
+      "participant is enrolled when the first trial begins; a code that is not in the database\n"
+      "yet is asked about first.";
   line.example =
       "  palpate run protocols/ho2000.json --db study.db --participant P03 --device falcon2 "
       "--hand right --consent 2024-05\n"

@@ -39,14 +39,12 @@ void add_options(CommandLine& line, RunSettings& settings) {
       "       [--seed S] [--participants N] [--repetitions R] [--jobs J] [--shard K/N|auto]";
   line.summary =
       "Simulates a study at each of many points of a space of settings: of the simulated\n"
-      "participant and of the protocol. FILE gets a row a point: its settings, and per shape and\n"
-      "renderer times, accuracy, time-outs, contact, gains with standard errors, or why it "
-      "failed,\n"
-      "which does not end the sweep. Started again, it goes on where it stopped or was killed. "
-      "The\n"
-      "same plan gives the same file, to the byte, whatever the jobs, shards and interruptions.\n"
-      "Where to go from there: palpate analyze --sweep FILE, palpate export --format csv, and\n"
-      "palpate merge for shards.";
+      "participant and of the protocol. FILE gets a row a point: its settings, and per shape\n"
+      "and renderer times, accuracy, time-outs, contact, gains with standard errors, or why it\n"
+      "failed, which does not end the sweep. Started again, it goes on where it stopped or was\n"
+      "killed. The same plan gives the same file, to the byte, whatever the jobs, shards and\n"
+      "interruptions. Where to go from there: palpate analyze --sweep FILE, palpate export\n"
+      "--format csv, and palpate merge for shards.";
   line.example =
       "  palpate sweep protocols/quick.json --space protocols/spaces/small.json --points 8 \\\n"
       "      --participants 2 --repetitions 2 --db small.sweep              half a minute's try\n"
