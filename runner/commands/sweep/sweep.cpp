@@ -149,6 +149,7 @@ std::int64_t run_points(const Sweep& sweep, data::SweepFile& file, PointQueue& q
     queue.worker_done(error);
   };
   std::vector<std::jthread> threads;
+  threads.reserve(static_cast<std::size_t>(workers));
   for (int i = 0; i < workers; ++i) threads.emplace_back(work);
   ProgressLine line("points");
   std::int64_t done = before;
