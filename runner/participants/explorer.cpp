@@ -48,7 +48,7 @@ HandTarget Explorer::begin(stimuli::Random random) {
   now_ = 0;
   draw_approach();
   motion_ = Motion::approach;
-  last_contact_ = {};
+  last_normal_ = Vec3(0);
   since_choice_ = settings_.heading.interval;
   turn_left_ = 0;
   tip_ = start_;
@@ -71,20 +71,21 @@ void Explorer::draw_approach() {
   goal_axis_ = glm::normalize(goal_axis_);
 }
 
-HandTarget Explorer::step(const TouchState& now, const rendering::LineProbe& stylus) {
-  const TouchState known = past_[now_];
-  past_[now_] = now;
-  now_ = (now_ + 1) % past_.size();
-  const Vec3 v = velocity(known);
+HandTarget Explorer::step(const TouchState& now, const Vec3& stylus_tip, const Vec3& stylus_axis) {
+  TouchState& oldest = past_[now_];
+  const Vec3 v = velocity(oldest);
+  oldest.contact = now.contact;
+  if (now.contact) oldest = now;
+  if (++now_ == past_.size()) now_ = 0;
   tip_ += tick_ * v;
   turn_axis();
-  limit_force(stylus);
+  limit_force(stylus_tip + grip_ * stylus_axis);
   return {tip_ + grip_ * axis_, v, axis_};
 }
 
 Vec3 Explorer::velocity(const TouchState& known) {
   const auto& motor = settings_.motor;
-  if (known.contact) last_contact_ = known;
+  if (known.contact) last_normal_ = known.normal;
   left_ -= tick_;
   since_choice_ += tick_;
   switch (motion_) {
@@ -129,8 +130,8 @@ Vec3 Explorer::search() {
   turn_left_ = 0;
   switch (settings_.search.after_loss) {
     case AfterLoss::press_on:
-      return speed * unit_or(-last_contact_.normal + settings_.search.press_on_pull * to_centre,
-                             Vec3(0, 0, -1));
+      return speed *
+             unit_or(-last_normal_ + settings_.search.press_on_pull * to_centre, Vec3(0, 0, -1));
     case AfterLoss::turn_to_centre:
       heading_ = unit_or(heading_ + settings_.search.pull_to_centre * tick_ * to_centre, heading_);
       break;
@@ -145,7 +146,7 @@ bool Explorer::wants_heading() const {
 }
 
 void Explorer::turn_to(const Vec3& heading) {
-  const double across = glm::dot(glm::cross(heading_, heading), last_contact_.normal);
+  const double across = glm::dot(glm::cross(heading_, heading), last_normal_);
   turn_rate_ = std::atan2(across, glm::dot(heading_, heading)) / settings_.heading.turning_time;
   turn_left_ = settings_.heading.turning_time;
   since_choice_ = 0;
@@ -197,8 +198,7 @@ void Explorer::turn_axis() {
   axis_ = glm::normalize(turn_cosine_ * axis_ + turn_sine_ * side);
 }
 
-void Explorer::limit_force(const rendering::LineProbe& stylus) {
-  const Vec3 held = stylus.tip + grip_ * unit_or(stylus.tail - stylus.tip, axis_);
+void Explorer::limit_force(const Vec3& held) {
   const Vec3 offset = tip_ + grip_ * axis_ - held;
   const double length2 = glm::dot(offset, offset);
   if (length2 < (1 - 1e-12) * max_offset_ * max_offset_) return;  // whatever the roundings

@@ -28,14 +28,14 @@ class Explorer {
 
   /// Starts a trial with a random approach. \return its start pose
   HandTarget begin(stimuli::Random random);
-  /// One tick. `stylus` and `now` are those of this tick; contact in `now` has an effect only after
-  /// the reaction delay.
-  HandTarget step(const TouchState& now, const rendering::LineProbe& stylus);
+  /// One tick. `now` and the stylus are those of this tick; contact in `now` has an effect only
+  /// after the reaction delay. \param stylus_axis  unit, tip to tail
+  HandTarget step(const TouchState& now, const Vec3& stylus_tip, const Vec3& stylus_axis);
 
   /// Whether it slides and a heading is to be chosen (settings.heading); until the next turn_to.
   bool wants_heading() const;
   /// Normal of the contact that it knows of, and its heading across it; unit. While it slides.
-  const Vec3& known_normal() const { return last_contact_.normal; }
+  const Vec3& known_normal() const { return last_normal_; }
   const Vec3& heading() const { return heading_; }
   /// Turns from the present heading to this one, both across the known normal, in
   /// settings.heading.turning_time.
@@ -50,7 +50,7 @@ class Explorer {
   Vec3 slide(const TouchState& known);
   Vec3 move_to_start();
   void turn_axis();
-  void limit_force(const rendering::LineProbe& stylus);
+  void limit_force(const Vec3& held);
 
   SimulatedSettings settings_;
   double grip_, tick_;
@@ -66,7 +66,7 @@ class Explorer {
   Vec3 tip_, axis_{0, 0, 1};               ///< target pose
   Vec3 start_, aim_, goal_axis_{0, 0, 1};  ///< of the approach
   Vec3 heading_;                           ///< unit
-  TouchState last_contact_;                ///< that it knows of
+  Vec3 last_normal_;                       ///< unit; of the last contact that it knows of
   double since_choice_ = 0;                ///< s
   double turn_rate_ = 0, turn_left_ = 0;   ///< rad/s and s, of a turn to a chosen heading
   double left_ = 0;                        ///< s left of this motion

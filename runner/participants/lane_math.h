@@ -49,6 +49,9 @@ inline float log(float x) {
   return static_cast<float>(n) * 0.693147181f + 2.0f * f * series;
 }
 
+/// ln Phi(x) is zero from here on, to the bit.
+inline constexpr float kLogNormalCdfIsZero = 6.0f;
+
 /// ln Phi(x), Phi the standard normal distribution function.
 /// Absolute error below 5e-6 for x > -5, relative error below 1e-6 beyond.
 inline float log_normal_cdf(float x) {

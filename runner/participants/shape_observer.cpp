@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <limits>
 #include <stdexcept>
 #include <string>
 #include <type_traits>
@@ -30,6 +31,9 @@ struct Query {
   float direction_precision = 0;  // 1/rad^2
   float inverse_sd = 0;           // 1 / sqrt v, 1/m
   float free_space_weight = 0;
+  /// Without contact: a shape whose bounding sphere is smaller than this is so far from the stylus
+  /// that to feel nothing is certain, in every orientation. m; negative: none is.
+  float surely_free = -1;
 
   float kept = 0;       // share of the earlier evidence
   float forgotten = 0;  // the rest
@@ -126,6 +130,14 @@ Query make_query(const Percept& percept, const ObserverSettings& settings) {
   query.inverse_scale = static_cast<float>(1 / settings.soft_min_scale);
   query.torque_floor = static_cast<float>(settings.torque_floor);
 
+  if (!percept.contact) {
+    constexpr double kErrors = 0.001;  // m; of the search along the line, and roundings
+    const double along = length > 0 ? glm::dot(-percept.tip, span) / (length * length) : 0;
+    const double away = glm::length(percept.tip + std::clamp(along, 0.0, 1.0) * span);
+    query.surely_free =
+        static_cast<float>(away - lane::kLogNormalCdfIsZero * std::sqrt(variance) - kErrors);
+  }
+
   const double kept =
       settings.forgetting ? std::exp(-1 / (settings.percept_rate * settings.memory)) : 1;
   query.kept = static_cast<float>(kept);
@@ -180,12 +192,34 @@ float log_prior(const ShapeHypotheses& hypotheses, const ShapeHypotheses::Shape&
       -std::log(static_cast<double>(hypotheses.shapes().size()) * shape.count));
 }
 
+/// m, about the shape's centre; infinite where it is not known.
+float bounding_radius(const ShapeHypotheses::Shape& shape) {
+  if (shape.field) return std::numeric_limits<float>::infinity();
+  switch (shape.kind) {
+    case stimuli::ShapeKind::sphere:
+      return shape.radius;
+    case stimuli::ShapeKind::cone:
+    case stimuli::ShapeKind::cylinder:
+      return std::hypot(shape.radius, shape.half_size);
+    case stimuli::ShapeKind::cube:
+      return std::sqrt(3.0f) * shape.half_size;
+    default:
+      return std::numeric_limits<float>::infinity();
+  }
+}
+
 /// L of all hypotheses of one shape after a percept.
 template <class ShapeLine>
 void update_shape(const ShapeHypotheses& hypotheses, const ShapeHypotheses::Shape& shape,
                   const Query& query, const ObserverSettings& settings, float* log_posterior) {
   const float regained = query.forgotten * log_prior(hypotheses, shape);
   const auto floor = static_cast<float>(settings.floor);
+  if (bounding_radius(shape) < query.surely_free) {
+    const int blocks = (shape.count + kBlock - 1) / kBlock;
+    for (int h = shape.first; h < shape.first + blocks * kBlock; ++h)
+      log_posterior[h] = query.kept * log_posterior[h] + regained;  // likelihood 1
+    return;
+  }
   for (int first = shape.first; first < shape.first + shape.count; first += kBlock) {
     const ShapeLine line(hypotheses, shape, first, query.line);
     float log_likelihood[kBlock];

@@ -61,6 +61,7 @@ SimulatedParticipant::SimulatedParticipant(const SimulatedSettings& own,
       wall_stiffness_(protocol.material.stiffness),
       period_(1 / protocol.servo_rate),
       low_pass_(1 - std::exp(-period_ / own.percept.force_low_pass)),
+      surely_unfelt2_((1 - 1e-12) * own.percept.force_threshold * own.percept.force_threshold),
       seed_(seed),
       number_(number),
       workspace_(workspace_of(protocol)),
@@ -80,7 +81,9 @@ void SimulatedParticipant::begin_trial(const protocols::Trial& trial) {
   trial_ = trial;
   ticks_before_ = 0;
   random_ = stream(1);
-  stylus_.reset(in_device(explorer_.begin(stream(2))));
+  HandTarget start = explorer_.begin(stream(2));
+  put_in_device(start);
+  stylus_.reset(start);
   heading_random_ = stream(3);  // its own, so that the hand's and the percepts' stay as they are
   observer_.reset();
   ray_ = renderer_for(trial.renderer).side_contact();
@@ -98,19 +101,16 @@ std::optional<Answer> SimulatedParticipant::step(const Sample& sample) {
     return std::nullopt;  // rests in the home zone
   }
   const double time = sample.tick * period_;
-  const TouchState touch = sense_touch(sample);
-  TouchState known = touch;
-  known.normal = explored(touch.normal);
-  known.surface = explored(touch.surface);
-  stylus_.set_target(
-      in_device(explorer_.step(known, {explored(sample.probe.tip), explored(sample.probe.tail)})));
+  const SensedStylus stylus(sample.probe);
+  const TouchState touch = sense_touch(sample, stylus);
+  move_hand(touch, sample.probe.tip, stylus.axis);
   if (answer_at_) {
     if (time < *answer_at_) return std::nullopt;
     return Answer{observer_.best(), sample.time_ns};
   }
   if (time >= next_percept_) {
     next_percept_ += 1 / settings_.observer.percept_rate;
-    percept_ = perceive(sample, touch);
+    percept_ = perceive(sample, stylus, touch);
     observer_.update(*percept_);
     if (observer_.decided()) answer_at_ = time + settings_.non_decision;
   }
@@ -150,37 +150,53 @@ Vec3 SimulatedParticipant::explored_in_world(const Vec3& explored) const {
   return far_ ? hand_side_ * explored : explored;
 }
 
-HandTarget SimulatedParticipant::in_device(HandTarget target) const {
-  target.grip = explored_in_world(target.grip);
-  target.velocity = explored_in_world(target.velocity);
-  target.axis = explored_in_world(target.axis);
+void SimulatedParticipant::move_hand(const TouchState& touch, const Vec3& tip, const Vec3& axis) {
+  HandTarget target;
+  if (far_) {
+    const TouchState known{touch.contact, explored(touch.normal), explored(touch.surface),
+                           touch.along};
+    target = explorer_.step(known, explored(tip), explored(axis));
+  } else {
+    target = explorer_.step(touch, tip, axis);
+  }
+  put_in_device(target);
+  stylus_.set_target(target);
+}
+
+void SimulatedParticipant::put_in_device(HandTarget& target) const {
+  if (far_) {
+    target.grip = explored_in_world(target.grip);
+    target.velocity = explored_in_world(target.velocity);
+    target.axis = explored_in_world(target.axis);
+  }
   if (workspace_.reach && workspace_.reach->in_world)
     target.grip = unstretched(*workspace_.reach, {target.grip, target.grip}).tip;
   target.grip = workspace_.to_device(target.grip);
   target.velocity /= workspace_.shift_gain();
-  return target;
 }
 
-TouchState SimulatedParticipant::sense_touch(const Sample& sample) {
-  const Vec3 stylus = sample.probe.tail - sample.probe.tip;
+SimulatedParticipant::SensedStylus::SensedStylus(const rendering::LineProbe& probe)
+    : span(probe.tail - probe.tip), length(glm::length(span)), axis(span / length) {}
+
+TouchState SimulatedParticipant::sense_touch(const Sample& sample, const SensedStylus& stylus) {
   // Who holds a stylus knows its lever, and tells from the hand what happens at its ends.
   const rendering::EndForces ends{sample.device1, sample.device2};
   const rendering::EndForces forces =
       workspace_.reach ? rendering::on_virtual(*workspace_.reach, ends) : ends;
   force_ += low_pass_ * (forces.tip + forces.tail - force_);
-  torque_ += low_pass_ * (glm::cross(stylus, forces.tail) - torque_);
+  torque_ += low_pass_ * (glm::cross(stylus.span, forces.tail) - torque_);
   TouchState touch;
-  const double strength = glm::length(force_);
+  const double strength2 = glm::dot(force_, force_);
+  if (strength2 < surely_unfelt2_) return touch;  // most ticks without contact need no root
+  const double strength = std::sqrt(strength2);
   touch.contact = strength > settings_.percept.force_threshold;
   if (!touch.contact) return touch;
   touch.normal = force_ / strength;
-  const double length = glm::length(stylus);
-  const Vec3 axis = stylus / length;
-  const Vec3 lever = glm::cross(axis, force_);
+  const Vec3 lever = glm::cross(stylus.axis, force_);
   const double lever2 = glm::dot(lever, lever);
   along_known_ = ray_ && lever2 > 0.01 * strength * strength;
-  if (along_known_) touch.along = std::clamp(glm::dot(lever, torque_) / lever2, 0.0, length);
-  touch.surface = sample.probe.tip + touch.along * axis + force_ / wall_stiffness_;
+  if (along_known_) touch.along = std::clamp(glm::dot(lever, torque_) / lever2, 0.0, stylus.length);
+  touch.surface = sample.probe.tip + touch.along * stylus.axis + force_ / wall_stiffness_;
   return touch;
 }
 
@@ -197,7 +213,8 @@ void SimulatedParticipant::choose_heading(const Sample& sample, const TouchState
   explorer_.turn_to(explored(heading_choice_.choose(observer_, stylus, heading_random_)));
 }
 
-Percept SimulatedParticipant::perceive(const Sample& sample, const TouchState& touch) {
+Percept SimulatedParticipant::perceive(const Sample& sample, const SensedStylus& stylus,
+                                       const TouchState& touch) {
   const auto noise = [this](double sd) {
     return sd * Vec3(random_.normal(), random_.normal(), random_.normal());
   };
@@ -208,11 +225,9 @@ Percept SimulatedParticipant::perceive(const Sample& sample, const TouchState& t
   Percept percept;
   percept.contact = touch.contact;
   percept.ray = ray_;
-  const Vec3 stylus = sample.probe.tail - sample.probe.tip;
-  const double length = glm::length(stylus);
   percept.tip = sample.probe.tip - centre_error_ + noise(settings_.observer.contact_sd);
   if (touch.contact) percept.tip += perceived_shift();
-  percept.tail = percept.tip + length * tilted(stylus / length, settings_.percept.axis_sd);
+  percept.tail = percept.tip + stylus.length * tilted(stylus.axis, settings_.percept.axis_sd);
   if (touch.contact) {
     percept.direction = tilted(touch.normal, settings_.observer.direction_sd);
     if (touched_) {
@@ -223,8 +238,8 @@ Percept SimulatedParticipant::perceive(const Sample& sample, const TouchState& t
     touched_tip_ = sample.probe.tip;
     touched_normal_ = touch.normal;
     if (along_known_) {
-      percept.along =
-          std::clamp(touch.along + settings_.observer.along_sd * random_.normal(), 0.0, length);
+      percept.along = std::clamp(touch.along + settings_.observer.along_sd * random_.normal(), 0.0,
+                                 stylus.length);
     }
   }
   return percept;

@@ -41,18 +41,28 @@ class SimulatedParticipant final : public Respondent {
 
  private:
   void wait_for_time_zero(const Sample& sample);
-  HandTarget in_device(HandTarget target) const;
+  /// The stylus of a sample, as both the hand and the percepts need it.
+  struct SensedStylus {
+    explicit SensedStylus(const rendering::LineProbe& probe);
+    Vec3 span;      ///< m, tip to tail
+    double length;  ///< m
+    Vec3 axis;      ///< unit
+  };
+  void move_hand(const TouchState& touch, const Vec3& tip, const Vec3& axis);
+  /// From the explorer's frame to the device's.
+  void put_in_device(HandTarget& target) const;
   Vec3 explored(const Vec3& world) const;
   Vec3 explored_in_world(const Vec3& explored) const;
-  TouchState sense_touch(const Sample& sample);
+  TouchState sense_touch(const Sample& sample, const SensedStylus& stylus);
   Vec3 perceived_shift() const;
-  Percept perceive(const Sample& sample, const TouchState& touch);
+  Percept perceive(const Sample& sample, const SensedStylus& stylus, const TouchState& touch);
   void choose_heading(const Sample& sample, const TouchState& touch);
 
   SimulatedSettings settings_;
   SimulatedStylus& stylus_;
   const protocols::Protocol& protocol_;
   double wall_stiffness_, period_, low_pass_;
+  double surely_unfelt2_;  ///< N^2; below it a force is not felt, whatever the roundings
   std::uint64_t seed_;
   int number_;
   WorkspaceMap workspace_;

@@ -5,6 +5,8 @@
 #include <cstddef>
 #include <glm/geometric.hpp>
 #include <limits>
+#include <memory>
+#include <new>
 #include <utility>
 
 #include "rendering/tool_pose.h"
@@ -116,10 +118,11 @@ bool Servo::at_home(const rendering::LineProbe& probe) noexcept {
 void Servo::keep_time() noexcept {
   clock_.wait_until(due_ns_);
   const std::int64_t now = clock_.now_ns();
-  const std::int64_t late = (now - due_ns_) / period_ns_;  // whole ticks that were missed
+  const std::int64_t behind = now - due_ns_;
+  const std::int64_t late = behind < period_ns_ ? 0 : behind / period_ns_;  // whole ticks missed
   sample_.period_ns = sample_.time_ns > 0 ? now - sample_.time_ns : period_ns_;
   sample_.time_ns = now;
-  sample_.lateness_ns = now - due_ns_;
+  sample_.lateness_ns = behind;
   due_ns_ += (late + 1) * period_ns_;
   late_in_a_row_ =
       late > 0 ? late_in_a_row_ + static_cast<int>(std::min<std::int64_t>(late, kMissedInARow)) : 0;
@@ -199,8 +202,10 @@ const Sample& Servo::tick() noexcept {
     limiter_.release();  // the ramp begins with the forces
     return sample_;
   }
-  sample_.rendering = shown_->renderer->tick(shown_->scene, shown_->state, sample_.probe,
-                                             static_cast<double>(sample_.period_ns) * 1e-9);
+  // Made in its place: an assignment would copy it.
+  std::destroy_at(&sample_.rendering);
+  ::new (&sample_.rendering) rendering::Rendering(shown_->renderer->tick(
+      shown_->scene, shown_->state, sample_.probe, static_cast<double>(sample_.period_ns) * 1e-9));
   if (workspace_.reach) sample_.rendering = rendering::felt(*workspace_.reach, sample_.rendering);
   sample_.bodies = static_cast<std::uint8_t>(bodies().size());
   sample_.faults |= sample_.rendering.faults;

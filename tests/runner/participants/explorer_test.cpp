@@ -18,6 +18,11 @@ rendering::LineProbe held_at(const HandTarget& target) {
   return {target.grip - kFromTip * target.axis, target.grip + (kLength - kFromTip) * target.axis};
 }
 
+/// One tick of a hand whose stylus is there.
+HandTarget step(Explorer& hand, const TouchState& felt, const rendering::LineProbe& stylus) {
+  return hand.step(felt, stylus.tip, glm::normalize(stylus.tail - stylus.tip));
+}
+
 bool same(const HandTarget& a, const HandTarget& b) {
   return a.grip == b.grip && a.velocity == b.velocity && a.axis == b.axis;
 }
@@ -35,12 +40,12 @@ TEST(Explorer, ActsOnContactAfterTheReactionDelay) {
     for (int tick = 0; tick < kTouch + ticks; ++tick) {
       TouchState felt;
       if (tick >= kTouch) felt = {true, Vec3(0, 0, 1), held_at(target).tip, 0};
-      const HandTarget other = free.step({}, held_at(target));
-      target = touching.step(felt, held_at(target));
+      const HandTarget other = step(free, {}, held_at(target));
+      target = step(touching, felt, held_at(target));
       ASSERT_TRUE(same(target, other)) << "delay " << ticks << ", tick " << tick;
     }
     const rendering::LineProbe stylus = held_at(target);
-    EXPECT_FALSE(same(touching.step({}, stylus), free.step({}, stylus))) << "delay " << ticks;
+    EXPECT_FALSE(same(step(touching, {}, stylus), step(free, {}, stylus))) << "delay " << ticks;
   }
 }
 
@@ -53,12 +58,12 @@ TouchState felt_below(const HandTarget& target) {
 struct AfterLossOfContact {
   explicit AfterLossOfContact(const SimulatedSettings& settings)
       : hand(settings, kFromTip, kStiffness, kPeriod), target(hand.begin(stimuli::Random(6))) {
-    for (int tick = 0; tick < 100; ++tick) target = hand.step(felt_below(target), held_at(target));
+    for (int tick = 0; tick < 100; ++tick) target = step(hand, felt_below(target), held_at(target));
     slid = hand.heading();
     before = held_at(target).tip;
-    target = hand.step({}, held_at(target));  // known one tick later
+    target = step(hand, {}, held_at(target));  // known one tick later
     before = held_at(target).tip;
-    target = hand.step({}, held_at(target));
+    target = step(hand, {}, held_at(target));
   }
   Explorer hand;
   HandTarget target;
@@ -98,21 +103,21 @@ TEST(Explorer, TurnsToTheChosenHeadingInItsTime) {
     int waited = 0;
     while (!hand.wants_heading()) {
       ASSERT_LT(++waited, 10) << "it slides from the second tick on";
-      target = hand.step(felt_below(target), held_at(target));
+      target = step(hand, felt_below(target), held_at(target));
     }
     const Vec3 from = hand.heading(), side = glm::cross(hand.known_normal(), from);
     const Vec3 goal = std::cos(angle) * from + std::sin(angle) * side;
     hand.turn_to(goal);
     EXPECT_FALSE(hand.wants_heading());
-    for (int tick = 0; tick < 50; ++tick) target = hand.step(felt_below(target), held_at(target));
+    for (int tick = 0; tick < 50; ++tick) target = step(hand, felt_below(target), held_at(target));
     const Vec3 half = std::cos(angle / 2) * from + std::sin(angle / 2) * side;
     EXPECT_LT(glm::length(hand.heading() - half), 1e-4) << angle;
     for (int tick = 50; tick < 299; ++tick) {
-      target = hand.step(felt_below(target), held_at(target));
+      target = step(hand, felt_below(target), held_at(target));
       EXPECT_FALSE(hand.wants_heading()) << "tick " << tick;
     }
     EXPECT_LT(glm::length(hand.heading() - goal), 1e-4) << angle;
-    hand.step(felt_below(target), held_at(target));
+    step(hand, felt_below(target), held_at(target));
     EXPECT_TRUE(hand.wants_heading()) << "0.3 s are over";
   }
 }
@@ -121,7 +126,7 @@ TEST(Explorer, WantsNoHeadingWhereItWanders) {
   Explorer hand(quick_hand(2), kFromTip, kStiffness, kPeriod);
   HandTarget target = hand.begin(stimuli::Random(7));
   for (int tick = 0; tick < 1000; ++tick) {
-    target = hand.step(felt_below(target), held_at(target));
+    target = step(hand, felt_below(target), held_at(target));
     ASSERT_FALSE(hand.wants_heading());
   }
 }

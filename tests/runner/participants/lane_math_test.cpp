@@ -43,5 +43,11 @@ TEST(LaneMath, LogNormalCdfIsWithinItsBound) {
   }
 }
 
+TEST(LaneMath, LogNormalCdfIsZeroWhereItSaysSo) {
+  EXPECT_NE(lane::log_normal_cdf(5.0f), 0.0f);
+  for (float x = lane::kLogNormalCdfIsZero; x < 1e6f; x *= 1.000001f)
+    ASSERT_EQ(lane::log_normal_cdf(x), 0.0f) << x;
+}
+
 }  // namespace
 }  // namespace palpate::runner

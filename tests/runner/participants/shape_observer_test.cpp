@@ -147,6 +147,36 @@ TEST(ShapeObserver, ResetRestoresThePrior) {
   for (int s = 0; s < 4; ++s) EXPECT_EQ(observer.probability(s), fresh.probability(s));
 }
 
+// Far from a shape its orientation cannot matter, and is not looked at: from how far on is no
+// guess.
+TEST(ShapeObserver, FeelingNothingAgreesWithTheFormulasFromNearToFar) {
+  std::vector<stimuli::ObjectSpec> slender = four_shapes();
+  slender[1].radius = slender[2].radius = 0.01;
+  slender[1].height = 0.12;
+  slender[2].height = 0.16;
+  const ShapeHypotheses hypotheses(slender);
+  ObserverSettings settings;
+  settings.free_space_weight = 1;
+  stimuli::Random random(16);
+  double least = 1, most = 0;  // of the spheres' probabilities: near and far are both tried
+  for (int n = 0; n < 80; ++n) {
+    ShapeObserver observer(hypotheses, settings);
+    test::ReferenceObserver reference(slender, hypotheses, settings);
+    Percept p;
+    p.ray = n % 2 == 1;
+    p.tip = (0.03 + 0.0009 * n) * random_direction(random);
+    p.tail = p.tip + 0.12 * random_direction(random);
+    observer.update(p);
+    reference.update(p);
+    const std::vector<double> expected = reference.probabilities();
+    for (int s = 0; s < 4; ++s)
+      ASSERT_NEAR(observer.probability(s), expected[static_cast<std::size_t>(s)], 3e-6) << n;
+    least = std::min(least, expected[0]);
+    most = std::max(most, expected[0]);
+  }
+  EXPECT_GT(most - least, 0.01);
+}
+
 TEST(ShapeObserver, AgreesWithTheFormulasInDoublePrecision) {
   const ShapeHypotheses hypotheses(four_shapes());
   const ObserverSettings settings;
