@@ -10,10 +10,7 @@
 #include <vector>
 
 #include "runner/display/window.h"
-
-// Pango and fontconfig keep their fonts, for each thread, until the process ends; LeakSanitizer
-// cannot see where. It asks this function whether it is wanted.
-extern "C" int __lsan_is_turned_off() { return 1; }  // NOLINT(bugprone-reserved-identifier)
+#include "tests/runner/display/kept_fonts.h"
 
 namespace palpate::runner {
 namespace {

@@ -11,6 +11,7 @@
 #include "runner/display/scene/display_error.h"
 #include "runner/display/scene/painter.h"
 #include "runner/display/scene/scene_drawing.h"
+#include "tests/runner/display/kept_fonts.h"
 
 namespace palpate::runner {
 namespace {
