@@ -150,7 +150,7 @@ class Broken final : public Renderer {
   /// One tick in some fifty, by its pose alone.
   static bool unlucky(const LineProbe& probe) {
     const double x = std::abs(probe.tip.x);
-    return x > 0 && static_cast<std::uint64_t>(x / 1e-17 * 0.37) % 53 == 0;
+    return x > 0 && std::fmod(std::floor(x / 1e-17 * 0.37), 53) == 0;
   }
   static void move(Rendering& r, double out) {
     r.ideal.tip += out * r.deepest.normal;
