@@ -63,7 +63,6 @@ class Cutter {
     for (const auto& [angle, point] : order) {
       if (corners.empty() || corners.back() != point) corners.push_back(point);
     }
-    while (corners.size() > 1 && corners.back() == corners.front()) corners.pop_back();
     return corners;
   }
 

@@ -31,12 +31,13 @@ Analysis study_with(const std::vector<std::string>& renderers, double limit = 0)
   TrialTableBuilder builder;
   stimuli::Random random(7);
   for (int p = 0; p < 8; ++p) {
+    const std::string participant = "P" + std::to_string(p);
     int trial = 0;
     for (std::size_t r = 0; r < renderers.size(); ++r) {
       for (const char* const shape : {"sphere", "cone", "cylinder", "cube"}) {
         for (int i = 0; i < 6; ++i) {
           RawTrial raw;
-          raw.participant = "P" + std::to_string(p);
+          raw.participant = participant;
           raw.renderer = renderers[(r + static_cast<std::size_t>(p)) % renderers.size()];
           raw.shape = shape;
           raw.trial = ++trial;
