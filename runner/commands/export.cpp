@@ -154,14 +154,12 @@ void add_options(CommandLine& line) {
       "has the true onset_utc unless --times relative is given.\n"
       "Texts that a spreadsheet would run as formulas (beginning with = + - @) get a ' in front;\n"
       "analyze --csv removes it.";
-  line.example =
-      "  palpate export --db study.db --format csv --out trials.csv\n"
-      "  palpate export --db study.db --format csv --out trials.csv --codebook codebook.csv\n"
-      "  palpate export --db study.db --format bids --out study-bids\n"
-      "  palpate export --db people.sweep --format csv --out people.csv         a sweep: a row a "
-      "point\n"
-      "  palpate export --db study.db --format psych-ds --out study-psychds --force\n"
-      "      (replaces an earlier export; a folder that palpate did not make is never replaced)";
+  line.example = R"(  palpate export --db study.db --format csv --out trials.csv
+  palpate export --db study.db --format csv --out trials.csv --codebook codebook.csv
+  palpate export --db study.db --format bids --out study-bids
+  palpate export --db people.sweep --format csv --out people.csv         a sweep: a row a point
+  palpate export --db study.db --format psych-ds --out study-psychds --force
+      (replaces an earlier export; a folder that palpate did not make is never replaced))";
   auto add = line.options.add_options();
   add("db", po::value<std::string>()->required()->value_name("FILE"),
       "the study's database, or a sweep's file (csv only)");

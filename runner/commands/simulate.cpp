@@ -49,11 +49,10 @@ std::optional<SimulateSettings> parse_simulate_settings(const std::vector<std::s
       "and interruptions, and in shards: several machines take a part of the participants each,\n"
       "palpate merge has them all.";
   line.example =
-      "  palpate simulate protocols/quick.json --db quick.db --participants 2    a minute's try\n"
-      "  palpate simulate protocols/ho2000.json --db study.db                    the paper's "
-      "study\n"
-      "  palpate simulate protocols/ho2000.json --db study.db --participants 20  more of the "
-      "same\n";
+      R"(  palpate simulate protocols/quick.json --db quick.db --participants 2    a minute's try
+  palpate simulate protocols/ho2000.json --db study.db                    the paper's study
+  palpate simulate protocols/ho2000.json --db study.db --participants 20  more of the same
+)";
   line.options.add_options()  //
       ("db", po::value(&settings.database)->required()->value_name("FILE"),
        "database; created or resumed");

@@ -176,11 +176,9 @@ int validate_command(const std::vector<std::string>& args) {
   line.summary =
       "Checks a protocol with its meshes and its schedule, and lists all faults. Says which\n"
       "devices can show it, whether it can be simulated, and what prevents the others.";
-  line.example =
-      "  palpate validate protocols/ho2000.json\n"
-      "  palpate validate protocols/roughness-magnitude.json --texts > texts.de.json   to be "
-      "translated\n"
-      "  palpate validate protocols/roughness-magnitude.json --language de";
+  line.example = R"(  palpate validate protocols/ho2000.json
+  palpate validate protocols/roughness-magnitude.json --texts > texts.de.json   to be translated
+  palpate validate protocols/roughness-magnitude.json --language de)";
   std::string language;
   bool texts = false;
   line.options.add_options()  //

@@ -248,15 +248,13 @@ void describe(CommandLine& line) {
       "status: what is done, runs, waits or stopped, and the time left. submit: shards that are\n"
       "not done (a task was killed, its time ran out) go on where they were.";
   line.example =
-      "  palpate cluster sweep protocols/ho2000.json --space protocols/spaces/participants.json "
-      "\\\n"
-      "      --points 20000 --repetitions 20 --shards 64 --time 02:00:00 --dir people\n"
-      "  palpate cluster simulate protocols/ho2000.json --participants 5000 --shards 50 --dir "
-      "many\n"
-      "  palpate cluster plan --db pilot.db --test model --trials 10,20,40,76 --dir power\n"
-      "  palpate cluster status people\n"
-      "  parallel --sshloginfile hosts \"$PWD\"/people/shard.sh ::: $(seq 64) && people/finish.sh\n"
-      "      (GNU parallel, without Slurm; DIR begun with --no-submit)";
+      R"(  palpate cluster sweep protocols/ho2000.json --space protocols/spaces/participants.json \
+      --points 20000 --repetitions 20 --shards 64 --time 02:00:00 --dir people
+  palpate cluster simulate protocols/ho2000.json --participants 5000 --shards 50 --dir many
+  palpate cluster plan --db pilot.db --test model --trials 10,20,40,76 --dir power
+  palpate cluster status people
+  parallel --sshloginfile hosts "$PWD"/people/shard.sh ::: $(seq 64) && people/finish.sh
+      (GNU parallel, without Slurm; DIR begun with --no-submit))";
 }
 
 void add_shards(CommandLine& line, ClusterSettings& settings) {

@@ -204,12 +204,11 @@ void add_options(CommandLine& line) {
   line.summary =
       "Lists the connected devices with their limits and self-tests; measures whether this\n"
       "machine keeps the servo's timing; calibrates forces. Self-tests command zero force.";
-  line.example =
-      "  palpate devices                                       what is there\n"
-      "  palpate devices --device falcon --firmware nvent.bin  opens one and tests it\n"
-      "  palpate devices --timing --seconds 60                 is this machine fit at 1 kHz?\n"
-      "  palpate devices --calibrate --device falcon --calibration lab.json --weights "
-      "0.1,0.2,0.4\n";
+  line.example = R"(  palpate devices                                       what is there
+  palpate devices --device falcon --firmware nvent.bin  opens one and tests it
+  palpate devices --timing --seconds 60                 is this machine fit at 1 kHz?
+  palpate devices --calibrate --device falcon --calibration lab.json --weights 0.1,0.2,0.4
+)";
   line.options.add_options()                                                                //
       ("device", po::value<std::string>()->value_name("NAME"), "only this kind of device")  //
       ("serial", po::value<std::vector<std::string>>()->value_name("S"),

@@ -36,19 +36,17 @@ void read_known(const std::string& file, const analysis::StudyModel& model,
 int plan_command(const std::vector<std::string>& args) {
   CommandLine line;
   line.usage =
-      "palpate plan (--db FILE | --csv FILE | --gain-sd SD --residual-sd SD) [--effect "
-      "SHAPE=PERCENT,...]\n       palpate plan --jnd-effect PERCENT [--weber W]";
+      R"(palpate plan (--db FILE | --csv FILE | --gain-sd SD --residual-sd SD) [--effect SHAPE=PERCENT,...]
+       palpate plan --jnd-effect PERCENT [--weber W])";
   line.summary =
       "Sample size planning: the number of participants and trials that find an effect with a\n"
       "given power. Studies are simulated from the mixed model fitted to a pilot, or from given\n"
       "standard deviations, and tested as analyze tests them. Standard deviations are of the\n"
       "natural log of the time.";
-  line.example =
-      "  palpate plan --db pilot.db --effect cone=22,cube=11 --power 0.9\n"
-      "  palpate plan --gain-sd 0.15 --residual-sd 0.5 --effect cone=15 --participants 4-60 \\\n"
-      "      --trials 20,40 --json plan.json --figure power.svg\n"
-      "  palpate plan --jnd-effect 20 --weber 0.1 --trials 70,140 --participants 6-30   "
-      "(thresholds)";
+  line.example = R"(  palpate plan --db pilot.db --effect cone=22,cube=11 --power 0.9
+  palpate plan --gain-sd 0.15 --residual-sd 0.5 --effect cone=15 --participants 4-60 \
+      --trials 20,40 --json plan.json --figure power.svg
+  palpate plan --jnd-effect 20 --weber 0.1 --trials 70,140 --participants 6-30   (thresholds))";
   PlanOptions options;
   add_plan_options(line, options);
   ThresholdOptions thresholds;

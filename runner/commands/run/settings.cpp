@@ -57,11 +57,10 @@ std::optional<RunSettings> parse_run_settings(const std::vector<std::string>& ar
       "participant is enrolled when the first trial begins; a code that is not in the database\n"
       "yet is asked about first.";
   line.example =
-      "  palpate run protocols/ho2000.json --db study.db --participant P03 --device falcon2 "
-      "--hand right --consent 2024-05\n"
-      "  palpate run protocols/quick.json --db try.db --participant T1 --device mouse\n"
-      "  palpate run protocols/quick.json --db try.db --participant T2 --device simulated "
-      "--no-window\n";
+      R"(  palpate run protocols/ho2000.json --db study.db --participant P03 --device falcon2 --hand right --consent 2024-05
+  palpate run protocols/quick.json --db try.db --participant T1 --device mouse
+  palpate run protocols/quick.json --db try.db --participant T2 --device simulated --no-window
+)";
   RunSettings settings;
   int number = 0, session = 0;
   double latency = 0, scale = 0;

@@ -46,14 +46,12 @@ void add_options(CommandLine& line, RunSettings& settings) {
       "interruptions. Where to go from there: palpate analyze --sweep FILE, palpate export\n"
       "--format csv, and palpate merge for shards.";
   line.example =
-      "  palpate sweep protocols/quick.json --space protocols/spaces/small.json --points 8 \\\n"
-      "      --participants 2 --repetitions 2 --db small.sweep              half a minute's try\n"
-      "  palpate sweep protocols/ho2000.json --space protocols/spaces/participants.json \\\n"
-      "      --points 2000 --repetitions 20 --db people.sweep               an hour or two\n"
-      "  palpate sweep ... --points 2000 --shard 3/8 --db shard3.sweep      the third of eight "
-      "parts\n"
-      "  palpate sweep ... --print-point 17                                 what point 17 is, as "
-      "JSON";
+      R"(  palpate sweep protocols/quick.json --space protocols/spaces/small.json --points 8 \
+      --participants 2 --repetitions 2 --db small.sweep              half a minute's try
+  palpate sweep protocols/ho2000.json --space protocols/spaces/participants.json \
+      --points 2000 --repetitions 20 --db people.sweep               an hour or two
+  palpate sweep ... --points 2000 --shard 3/8 --db shard3.sweep      the third of eight parts
+  palpate sweep ... --print-point 17                                 what point 17 is, as JSON)";
   add_sweep_options(line, settings.sweep);
   line.options.add_options()  //
       ("jobs", po::value(&settings.jobs)->default_value(settings.jobs)->value_name("J"),
