@@ -16,10 +16,11 @@ PROGRAM_ONLY = {
     "keys-given-twice", "labels-alike", "layers-out-of-order", "material-twice", "max-run-alone", "min-distance-too-far", "more-blocks-than-repetitions",
     "more-sessions-than-trials", "quaternions", "same-names", "stimulus-without-key", "surface-without-layers",
     "too-many-trials", "tool-radius", "tool-segment-without-length", "two-keys",
-    "v2-adjust-limits", "v2-answer-without-key", "v2-easier-of-the-other-side", "v2-labels-alike", "v2-level-of-another-shape", "v2-level-out-of-range",
+    "v2-adjust-limits", "v2-answer-without-key", "v2-criterion-with-an-adaptive-procedure", "v2-easier-of-the-other-side", "v2-labels-alike", "v2-level-axis-of-no-length", "v2-level-nowhere",
+    "v2-level-of-another-shape", "v2-level-out-of-range",
     "v2-names-alike", "v2-order-of-an-adaptive-block", "v2-order-without-solution", "v2-page-before-unknown-block",
     "v2-renderer-not-of-the-protocol", "v2-same-different-of-three", "v2-scale-falls", "v2-sessions-in-order",
-    "v2-first-session", "v2-no-time-to-answer", "v2-picture-damaged", "v2-picture-files", "v2-practice-counts", "v2-standard-without-the-number", "v2-two-keys", "v2-unknown-stimuli",
+    "v2-first-session", "v2-no-time-to-answer", "v2-picture-damaged", "v2-picture-files", "v2-practice-counts", "v2-standard-without-the-number", "v2-too-many-trials", "v2-two-keys", "v2-unknown-stimuli",
 }
 # The same, of sweep spaces.
 SPACES_PROGRAM_ONLY = {"limits-in-order", "names-twice", "normal-far-away", "values-set-twice"}

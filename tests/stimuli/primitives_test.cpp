@@ -123,11 +123,32 @@ TEST(Primitives, ImpossibleSizesAreRefused) {
     EXPECT_THROW(box(Vec3(1, 1, bad)), std::invalid_argument);
     EXPECT_THROW(box(Vec3(bad, 1, 1)), std::invalid_argument);
   }
-  EXPECT_THROW(icosphere(1, -1), std::invalid_argument);
-  EXPECT_THROW(icosphere(1, 9), std::invalid_argument);
-  EXPECT_THROW(cone(1, 1, 2), std::invalid_argument);
-  EXPECT_THROW(cylinder(1, 1, -64), std::invalid_argument);
-  EXPECT_THROW(cylinder(1, 1, std::numeric_limits<int>::max()), std::invalid_argument);
+}
+
+template <class Make>
+std::string refusal_of(Make&& make) {
+  try {
+    make();
+  } catch (const std::invalid_argument& error) {
+    return error.what();
+  }
+  return "taken";
+}
+
+TEST(Primitives, ARefusalNamesTheShapeTheNumberAndWhatItMayBe) {
+  EXPECT_EQ(refusal_of([] { cone(-0.5, 1, 8); }),
+            "cone: the radius must be a length above 0 m, not -0.500000");
+  EXPECT_EQ(refusal_of([] { cylinder(1, 0, 8); }),
+            "cylinder: the height must be a length above 0 m, not 0.000000");
+  for (const int bad : {-1, 9})
+    EXPECT_EQ(refusal_of([&] { icosphere(1, bad); }),
+              "sphere: the number of subdivisions must be from 0 to 8, not " + std::to_string(bad));
+  EXPECT_EQ(refusal_of([] { cone(1, 1, 2); }),
+            "cone: the number of segments must be from 3 to 65536, not 2");
+  for (const int bad : {-64, 65537, std::numeric_limits<int>::max()})
+    EXPECT_EQ(
+        refusal_of([&] { cylinder(1, 1, bad); }),
+        "cylinder: the number of segments must be from 3 to 65536, not " + std::to_string(bad));
 }
 
 }  // namespace

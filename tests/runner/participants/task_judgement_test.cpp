@@ -1,0 +1,361 @@
+// Simulated judgements against what task_judgement.h says they are: shares of many draws against
+// closed forms of the normal distribution (4 standard errors), and single ones without noise.
+
+#include "runner/participants/task_judgement.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "protocols/parse.h"
+
+namespace palpate::runner {
+namespace {
+namespace judged {
+
+using protocols::Interval;
+using protocols::Trial;
+
+constexpr int kDraws = 4000;
+
+double normal_cdf(double z) { return 0.5 * std::erfc(-z / std::numbers::sqrt2); }
+
+/// A protocol of one block about a sphere of 400 N/m. \param keys  of the block, beside its name
+protocols::Protocol study(const std::string& keys) {
+  return protocols::parse_protocol_text(
+      R"({"version": 2, "name": "j", "renderers": ["ray"], "stimuli": [
+        {"name": "ball", "shape": "sphere", "radius_m": 0.03, "stiffness_n_per_m": 400},
+        {"name": "soft", "shape": "sphere", "radius_m": 0.03, "stiffness_n_per_m": 100},
+        {"name": "mid", "shape": "sphere", "radius_m": 0.03, "stiffness_n_per_m": 200}],
+        "blocks": [{"name": "b", )" +
+          keys + "}]}",
+      "j.json");
+}
+
+std::string constant(const std::string& levels) {
+  return R"("stimuli": ["ball"], "level": {"path": "/stiffness_n_per_m"},
+            "procedure": {"kind": "constant", "levels": [)" +
+         levels + R"(], "repetitions": 1})";
+}
+
+std::string compare(const std::string& more = "") {
+  return R"("task": "compare", "standard": "ball", )" + constant("300, 500") + more;
+}
+
+Trial trial_of(int stimulus = 0) {
+  Trial trial;
+  trial.task_block = 0;
+  trial.stimulus = stimulus;
+  return trial;
+}
+
+const Interval kStandard{0, {}, {}, true};
+Interval at(double level) { return {0, {}, level, false}; }
+
+/// Settings of somebody who never errs and feels exactly.
+JudgementSettings exact() {
+  JudgementSettings settings;
+  settings.weber = settings.turn_sd = settings.lapse = settings.number_sd = 0;
+  settings.false_alarm = 0;
+  return settings;
+}
+
+/// The name of the answer to some intervals.
+class Judge {
+ public:
+  explicit Judge(const std::string& keys, const JudgementSettings& settings = {})
+      : protocol_(study(keys)), judgement_(protocol_, settings) {}
+
+  std::string answer(const std::vector<Interval>& intervals, const TaskJudgement::Felt& felt = {},
+                     Trial trial = trial_of()) {
+    judgement_.begin(trial, stimuli::Random(7, {++draw_}));
+    for (const Interval& interval : intervals) judgement_.feel(interval, felt);
+    return named(judgement_.answer());
+  }
+  std::string named(int answer) const {
+    return protocol_.blocks[0].answers.at(static_cast<std::size_t>(answer)).name;
+  }
+  double share(const std::string& name, const std::vector<Interval>& intervals,
+               const TaskJudgement::Felt& felt = {}, const Trial& trial = trial_of()) {
+    int count = 0;
+    for (int k = 0; k < kDraws; ++k) count += answer(intervals, felt, trial) == name;
+    return static_cast<double>(count) / kDraws;
+  }
+  TaskJudgement& judgement() { return judgement_; }
+  const protocols::Protocol& protocol() const { return protocol_; }
+
+ private:
+  protocols::Protocol protocol_;
+  TaskJudgement judgement_;
+  std::uint64_t draw_ = 0;
+};
+
+void expect_share(double found, double expected, const std::string& where) {
+  const double error = std::sqrt(std::max(expected * (1 - expected), 1e-3) / kDraws);
+  EXPECT_NEAR(found, expected, 4 * error) << where;
+}
+
+TEST(TaskJudgement, ComparesAsTheNormalDistributionSays) {
+  Judge larger(compare()), smaller(compare(R"(, "asks": "smaller")"));
+  for (const double level : {320.0, 380.0, 400.0, 440.0}) {
+    const double chosen = 0.02 / 2 + 0.98 * normal_cdf((level - 400) / (0.15 * 400));
+    const std::string where = std::to_string(level);
+    expect_share(larger.share("2", {kStandard, at(level)}), chosen, where);
+    expect_share(larger.share("1", {at(level), kStandard}), chosen, where + " first");
+    expect_share(smaller.share("1", {kStandard, at(level)}), chosen, where + " smaller");
+  }
+}
+
+TEST(TaskJudgement, OfThreeIntervalsTheLargestEstimateIsChosen) {
+  Judge judge(compare(R"(, "intervals": 3)"));
+  expect_share(judge.share("3", {kStandard, kStandard, at(400)}), 1.0 / 3, "all alike");
+  EXPECT_GT(judge.share("2", {kStandard, at(700), kStandard}), 0.96);
+}
+
+TEST(TaskJudgement, DifferentIsWhatDiffersByMoreThanOneStandardDeviation) {
+  Judge judge(compare(R"(, "answer": "same_different")"));
+  const double sd = 0.15 * 400;
+  for (const double level : {400.0, 450.0, 520.0}) {
+    const double d = level - 400;
+    const double apart = normal_cdf((d - sd) / sd) + normal_cdf((-d - sd) / sd);
+    expect_share(judge.share("different", {kStandard, at(level)}), 0.02 / 2 + 0.98 * apart,
+                 std::to_string(level));
+  }
+  JudgementSettings sure;
+  sure.lapse = 0;
+  Judge measuring(compare(R"(, "answer": "same_different")"), sure);
+  TaskJudgement& judgement = measuring.judgement();
+  for (const double apart : {59.0, -59.0, 61.0, -61.0}) {  // with its noise already: sd 60
+    judgement.begin(trial_of(), stimuli::Random(1));
+    judgement.feel(kStandard, {400, true, true});
+    judgement.feel(at(300), {400 + apart, true, true});
+    EXPECT_EQ(measuring.named(judgement.answer()), std::abs(apart) > 60 ? "different" : "same");
+  }
+}
+
+TEST(TaskJudgement, WhatWasNotTouchedIsAnyLevelOfTheBlock) {
+  // Two levels at random in 300 to 500, each with noise: as often one as the other, whatever they
+  // are.
+  Judge judge(compare());
+  expect_share(judge.share("2", {kStandard, at(500)}, {{}, false, false}), 0.5, "untouched");
+}
+
+TEST(TaskJudgement, DetectsByItsPsychometricFunction) {
+  Judge judge(R"("task": "detect", "catch_trials": 0.2, )" + constant("200, 400, 1200"));
+  Trial shown = trial_of();
+  for (const double level : {500.0, 700.0, 800.0}) {
+    shown.level = level;  // threshold in the middle of 200 to 1200, sd a tenth of that range
+    const double yes = 0.05 + (1 - 0.05 - 0.02) * normal_cdf((level - 700) / 100);
+    expect_share(judge.share("yes", {at(level)}, {}, shown), yes, std::to_string(level));
+    expect_share(judge.share("yes", {at(level)}, {{}, false, false}, shown), 0.05, "untouched");
+  }
+  shown.catch_trial = true;
+  expect_share(judge.share("yes", {Interval{-1, {}, {}, false}}, {}, shown), 0.05, "nothing");
+  shown.catch_trial = false;
+  shown.level.reset();
+  expect_share(judge.share("yes", {at(400)}, {}, shown), 0.98, "without a level");
+}
+
+TEST(TaskJudgement, NumbersAreAPowerOfTheLevel) {
+  JudgementSettings settings = exact();
+  settings.exponent = 0.5;
+  Judge free(R"("task": "rate", )" + constant("100, 900"), settings);
+  Judge anchored(R"("task": "rate", "standard": "ball", "modulus": 30, "min": 1, "max": 40, )" +
+                     constant("100, 900"),
+                 settings);
+  free.judgement().begin(trial_of(), stimuli::Random(1));
+  free.judgement().feel(at(900), {});
+  EXPECT_DOUBLE_EQ(free.judgement().number(), 300);
+  free.judgement().feel(at(400), {123.456, true, true});  // as the hand met it
+  EXPECT_DOUBLE_EQ(free.judgement().number(), std::round(1000 * std::sqrt(123.456)) / 100);
+  const auto rated = [&](double level) {
+    anchored.judgement().begin(trial_of(), stimuli::Random(1));
+    anchored.judgement().feel(kStandard, {});
+    anchored.judgement().feel(at(level), {});
+    return anchored.judgement().number();
+  };
+  EXPECT_DOUBLE_EQ(rated(400), 30);
+  EXPECT_DOUBLE_EQ(rated(100), 15);
+  EXPECT_DOUBLE_EQ(rated(900), 40);  // 45 is beyond "max"
+  EXPECT_DOUBLE_EQ(rated(0.01), 1);
+}
+
+TEST(TaskJudgement, NumbersScatterLogNormally) {
+  JudgementSettings settings = exact();
+  settings.number_sd = 0.2;
+  Judge judge(R"("task": "rate", )" + constant("100, 900"), settings);
+  double sum = 0, squares = 0;
+  for (int k = 0; k < kDraws; ++k) {
+    judge.judgement().begin(trial_of(), stimuli::Random(3, {static_cast<std::uint64_t>(k)}));
+    judge.judgement().feel(at(400), {});
+    const double log = std::log(judge.judgement().number() / (10 * std::pow(400, 0.8)));
+    sum += log;
+    squares += log * log;
+  }
+  const double mean = sum / kDraws, sd = std::sqrt(squares / kDraws - mean * mean);
+  EXPECT_NEAR(mean, 0, 4 * 0.2 / std::sqrt(kDraws));
+  EXPECT_NEAR(sd, 0.2, 4 * 0.2 / std::sqrt(2.0 * kDraws));
+}
+
+TEST(TaskJudgement, AStepOfAScaleIsTheNearestAmongAllLevels) {
+  Judge judge(R"("task": "rate", "scale": [{"label": "a"}, {"label": "b"}, {"label": "c"},
+                 {"label": "d"}, {"label": "e"}], )" +
+                  constant("100, 500"),
+              exact());
+  for (const auto& [level, step] : std::initializer_list<std::pair<double, const char*>>{
+           {100, "1"}, {149, "1"}, {151, "2"}, {300, "3"}, {349, "3"}, {351, "4"}, {500, "5"}})
+    EXPECT_EQ(judge.answer({at(level)}), step) << level;
+  EXPECT_EQ(judge.answer({at(300)}, {1e4, true, true}), "5");
+  EXPECT_EQ(judge.answer({at(300)}, {1.0, true, true}), "1");
+}
+
+class Adjusting : public ::testing::Test {
+ protected:
+  std::string next(const Interval& felt, bool touched = true) {
+    judge_.judgement().feel(felt, {{}, false, touched});
+    return judge_.named(judge_.judgement().answer());
+  }
+  void SetUp() override { judge_.judgement().begin(trial_of(), stimuli::Random(1)); }
+
+  Judge judge_{R"("task": "adjust", "stimuli": ["ball"], "standard": "ball",
+                  "level": {"path": "/stiffness_n_per_m"}, "min": 100, "max": 500, "turn": 10,
+                  "starts": [150])",
+               exact()};
+};
+
+TEST_F(Adjusting, FeelsBothThenTurnsAsOftenAsItTakes) {
+  EXPECT_EQ(next(at(150)), "switch");
+  EXPECT_EQ(judge_.judgement().turns(), 1);
+  EXPECT_EQ(next(kStandard), "switch");  // it turns where it feels what it turns
+  EXPECT_EQ(next(at(150)), "up");
+  EXPECT_EQ(judge_.judgement().turns(), 25);
+  EXPECT_EQ(next(at(466)), "down");
+  EXPECT_EQ(judge_.judgement().turns(), 7);
+  EXPECT_EQ(next(at(406)), "down");
+  EXPECT_EQ(judge_.judgement().turns(), 1);
+  EXPECT_EQ(next(at(405)), "done");  // half a turn
+}
+
+TEST_F(Adjusting, EndsWhereItTurnsNoFarther) {
+  next(kStandard);
+  EXPECT_EQ(next(at(100)), "up");
+  judge_.judgement().begin(trial_of(), stimuli::Random(1));
+  judge_.judgement().feel(kStandard, {900.0, true, true});
+  judge_.judgement().feel(at(499), {499.0, true, true});
+  EXPECT_EQ(judge_.named(judge_.judgement().answer()), "up");
+  judge_.judgement().feel(at(500), {500.0, true, true});
+  EXPECT_EQ(judge_.named(judge_.judgement().answer()), "done");
+  judge_.judgement().begin(trial_of(), stimuli::Random(1));
+  judge_.judgement().feel(kStandard, {20.0, true, true});
+  judge_.judgement().feel(at(101), {101.0, true, true});
+  EXPECT_EQ(judge_.named(judge_.judgement().answer()), "down");
+  judge_.judgement().feel(at(100), {100.0, true, true});
+  EXPECT_EQ(judge_.named(judge_.judgement().answer()), "done");
+}
+
+TEST_F(Adjusting, GoesBackToWhatItDidNotTouch) {
+  EXPECT_EQ(next(at(150)), "switch");
+  EXPECT_EQ(next(kStandard, false), "switch");
+  EXPECT_EQ(next(at(150)), "switch");  // the standard is still unknown
+  EXPECT_EQ(next(kStandard), "switch");
+  EXPECT_EQ(next(at(150)), "up");
+  EXPECT_EQ(next(at(150), false), "switch");
+}
+
+TEST(TaskJudgement, AdjustsUntilTheyAreTheSameByOneStandardDeviation) {
+  JudgementSettings settings = exact();
+  settings.weber = 0.15;
+  Judge judge(R"("task": "adjust", "stimuli": ["ball"], "standard": "ball",
+                 "level": {"path": "/stiffness_n_per_m"}, "min": 100, "max": 500, "turn": 10,
+                 "starts": [150])",
+              settings);
+  for (const double level : {341.0, 339.0}) {  // 400 less 15 %
+    judge.judgement().begin(trial_of(), stimuli::Random(1));
+    judge.judgement().feel(kStandard, {400.0, true, true});
+    judge.judgement().feel(at(level), {level, true, true});
+    EXPECT_EQ(judge.named(judge.judgement().answer()), level > 340 ? "done" : "up");
+  }
+}
+
+TEST(TaskJudgement, IdentifiesTheNearestStiffnessAsARatio) {
+  Judge judge(R"("task": "identify", "stimuli": ["ball", "soft", "mid"], "repetitions": 1)",
+              exact());
+  const auto named = [&](double stiffness) {
+    return judge.answer({Interval{0, {}, {}, false}}, {stiffness, false, true});
+  };
+  EXPECT_EQ(named(139), "soft");  // the geometric mean of 100 and 200 is 141.4
+  EXPECT_EQ(named(144), "mid");
+  EXPECT_EQ(named(280), "mid");  // of 200 and 400: 282.8
+  EXPECT_EQ(named(286), "ball");
+  // Nothing measured: right.
+  EXPECT_EQ(judge.answer({Interval{2, {}, {}, false}}, {}, trial_of(2)), "mid");
+}
+
+TEST(TaskJudgement, LapsesGiveAnyAnswer) {
+  JudgementSettings settings = exact();
+  settings.lapse = 0.3;
+  Judge judge(R"("task": "identify", "stimuli": ["ball", "soft", "mid"], "repetitions": 1)",
+              settings);
+  expect_share(judge.share("soft", {Interval{2, {}, {}, false}}, {}, trial_of(2)), 0.1, "one");
+  expect_share(judge.share("mid", {Interval{2, {}, {}, false}}, {}, trial_of(2)), 0.8, "right");
+}
+
+TEST(TaskJudgement, IsTheSurerTheClearerWhatWasFelt) {
+  JudgementSettings settings;
+  settings.lapse = 0;
+  Judge judge(compare(), settings);
+  const auto confidence = [&](double apart) {  // the sd of a difference is 60
+    judge.judgement().begin(trial_of(), stimuli::Random(1));
+    judge.judgement().feel(kStandard, {400.0, true, true});
+    judge.judgement().feel(at(500), {400 + apart, true, true});
+    judge.judgement().answer();
+    return judge.judgement().confidence(4);
+  };
+  EXPECT_EQ(confidence(1), 0);
+  EXPECT_EQ(confidence(29), 0);  // each of four steps is half a standard deviation
+  EXPECT_EQ(confidence(31), 1);
+  EXPECT_EQ(confidence(-61), 2);
+  EXPECT_EQ(confidence(91), 3);
+  EXPECT_EQ(confidence(1000), 3);
+}
+
+TEST(TaskJudgement, TurnsAreFeltWithTheSameNoiseEverywhere) {
+  JudgementSettings settings;
+  settings.lapse = 0;
+  Judge judge(R"("task": "compare", "standard": "ball", "stimuli": ["ball"],
+                 "level": {"path": "/orientation", "axis": [0, 0, 1]},
+                 "procedure": {"kind": "constant", "levels": [-6, 6], "repetitions": 1})",
+              settings);
+  for (const double level : {-3.0, 2.0, 6.0})
+    expect_share(judge.share("2", {kStandard, at(level)}), normal_cdf(level / 3),
+                 std::to_string(level));
+}
+
+TEST(TaskJudgement, WhereTheStandardIsZeroTheLargestLevelSetsTheNoise) {
+  JudgementSettings settings;
+  settings.lapse = 0;
+  const protocols::Protocol protocol = protocols::parse_protocol_text(
+      R"({"version": 2, "name": "j", "renderers": ["ray"], "stimuli": [
+        {"name": "still", "shape": "sphere", "radius_m": 0.03, "friction_static": 0, "friction_dynamic": 0}],
+        "blocks": [{"name": "b", "task": "compare", "standard": "still", "stimuli": ["still"],
+          "level": {"path": "/friction_static"},
+          "procedure": {"kind": "constant", "levels": [0.2, 0.8], "repetitions": 1}}]})",
+      "j.json");
+  TaskJudgement judgement(protocol, settings);
+  int second = 0;
+  for (int k = 0; k < kDraws; ++k) {
+    judgement.begin(trial_of(), stimuli::Random(5, {static_cast<std::uint64_t>(k)}));
+    judgement.feel(kStandard, {});
+    judgement.feel(at(0.2), {});
+    second += judgement.answer();
+  }
+  expect_share(static_cast<double>(second) / kDraws, normal_cdf(0.2 / (0.15 * 0.8)), "friction");
+}
+
+}  // namespace judged
+}  // namespace
+}  // namespace palpate::runner
