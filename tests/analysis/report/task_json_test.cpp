@@ -1,0 +1,254 @@
+// Every number of an analysis of tasks stands in its JSON under its own name.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <nlohmann/json.hpp>
+
+#include "analysis/report/task_report.h"
+#include "tests/analysis/report/task_report_fixture.h"
+
+namespace palpate::analysis {
+namespace {
+
+using testing::difference_of;
+using testing::full_function;
+using testing::named_cell;
+using testing::track_of;
+using Expected = nlohmann::json;
+
+Expected json_of(const TaskAnalysis& analysis) {
+  return Expected::parse(task_report_json(analysis, "1.2"));
+}
+
+Expected json_of_cell(TaskCell cell) {
+  TaskAnalysis analysis;
+  analysis.cells.push_back(std::move(cell));
+  return json_of(analysis)["cells"][0];
+}
+
+TEST(TaskJson, HeadCountsWhatWasRead) {
+  TaskAnalysis analysis;
+  analysis.table.source = "study.csv";
+  analysis.table.trials.resize(3);
+  analysis.table.n_practice = 2;
+  Expected expected = Expected::parse(R"({"version": 1, "simulated": false, "source": "study.csv",
+      "program_version": "1.2", "n_trials": 3, "n_practice": 2, "cells": [],
+      "renderer_comparisons": [], "condition_comparisons": []})");
+  EXPECT_EQ(json_of(analysis), expected);
+  analysis.table.simulated = true;
+  expected["simulated"] = true;
+  EXPECT_EQ(json_of(analysis), expected);
+  const std::string text = task_report_json(analysis, "1.2");
+  EXPECT_EQ(text.substr(0, 17), "{\n \"version\": 1,\n");
+  EXPECT_EQ(text.back(), '\n');
+}
+
+TEST(TaskJson, AFunctionWithEverything) {
+  TaskCell cell = named_cell("compare", "stiff", "ball", "ray");
+  cell.trials = 30;
+  cell.answered = 22;
+  cell.judged = 21;
+  cell.correct = 20;
+  cell.standard_level = 300;
+  cell.forced_choice = true;
+  cell.intervals = 3;
+  cell.functions = {full_function("Anna")};
+  const Expected expected = Expected::parse(R"({
+    "task": "compare", "block_name": "stiff", "shape": "ball", "renderer": "ray", "n_trials": 30,
+    "n_answered": 22, "n_judged": 21, "n_correct": 20, "standard_level": 300.0,
+    "forced_choice": true, "same_different": false, "n_intervals": 3,
+    "psychometric_functions": [{
+      "participant_id": "Anna",
+      "levels": [{"level": 200.0, "trials": 10, "successes": 1},
+                 {"level": 400.0, "trials": 12, "successes": 9}],
+      "fit": {"status": "ok", "function": "normal", "scale": "db",
+              "threshold": 301.25, "threshold_ci95": [281.5, 322.75],
+              "slope": 2.5, "slope_ci95": [1.25, 4.75], "determined": true, "slope_at_bound": false,
+              "guess": 0.125, "guess_ci95": [0.0625, 0.25],
+              "lapse": 0.03126, "lapse_ci95": [0.00004, 0.06], "log_likelihood": -7.25,
+              "deviance": 3.5, "deviance_p": 0.0416, "pse": 303.5, "pse_ci95": [2.0, 4.0],
+              "jnd": 21.75, "jnd_ci95": [1.5, 33.25], "weber_fraction": 0.0625,
+              "weber_fraction_ci95": [0.03125, 0.09375]},
+      "bayes": {"status": "ok", "threshold": 305.5, "threshold_ci95": [285.5, 325.5],
+                "slope": 2.75, "slope_ci95": [1.75, 5.25], "guess": 0.1875,
+                "guess_ci95": [0.09375, 0.28125], "lapse": 0.015625,
+                "lapse_ci95": [0.0078125, 0.046875]},
+      "detectability": {"status": "ok", "d_prime": 1.625, "d_prime_ci95": [1.125, 2.125],
+                        "criterion": -0.375, "criterion_ci95": [-0.625, -0.25]}}],
+    "confidence": {"status": "undefined", "reason": "nobody was asked"}})");
+  EXPECT_EQ(json_of_cell(cell), expected);
+}
+
+TEST(TaskJson, WhatIsNotDefinedSaysWhyAndInfiniteEndsAreNull) {
+  TaskCell cell = named_cell("detect", "", "", "");
+  cell.functions = {full_function("B")};
+  ParticipantFunction& one = cell.functions[0];
+  one.counts.clear();
+  one.fit.threshold_ci95.low = -std::numeric_limits<double>::infinity();
+  one.figures = {};
+  one.goodness.p.reset();
+  one.determined = false;
+  one.fit.slope_at_bound = true;
+  one.posterior.undefined = "no grid";
+  one.detectability = {};
+  one.detectability.undefined = "no noise";
+  Expected found = json_of_cell(cell);
+  EXPECT_EQ(found["n_intervals"], Expected());
+  EXPECT_EQ(found["standard_level"], Expected());
+  found = found["psychometric_functions"][0];
+  const Expected ends = {nullptr, 322.75};
+  EXPECT_EQ(found["fit"]["threshold_ci95"], ends);
+  EXPECT_EQ(found["fit"]["jnd"], Expected());
+  EXPECT_EQ(found["fit"]["jnd_ci95"], Expected());
+  EXPECT_EQ(found["fit"]["deviance_p"], Expected());
+  EXPECT_EQ(found["fit"]["determined"], false);
+  EXPECT_EQ(found["fit"]["slope_at_bound"], true);
+  EXPECT_EQ(found["bayes"], Expected::parse(R"({"status": "undefined", "reason": "no grid"})"));
+  EXPECT_EQ(found["detectability"],
+            Expected::parse(R"({"status": "undefined", "reason": "no noise"})"));
+  one.fit.undefined = "one level";
+  EXPECT_EQ(json_of_cell(cell)["psychometric_functions"][0]["fit"],
+            Expected::parse(R"({"status": "undefined", "reason": "one level"})"));
+}
+
+TEST(TaskJson, TracksCountTheirTrialsFromOne) {
+  TaskCell cell = named_cell("compare", "", "", "");
+  cell.functions.resize(1);
+  const protocols::Estimate estimate{2.5, 0.25, 7.5, 0.5, 0.04, 40, 11, 3};
+  cell.functions[0].tracks = {track_of("7", protocols::Staircase{}, estimate)};
+  TrackProcedure& procedure = *cell.functions[0].tracks[0].procedure;
+  procedure.target = 0.75;
+  procedure.fitted_level = 2.25;
+  const auto tracks = [&] { return json_of_cell(cell)["psychometric_functions"][0]["tracks"]; };
+  Expected expected = Expected::parse(R"([{"track": "7", "levels": [4.0, 2.0, 3.0],
+    "successes": [true, false, true], "reversal_trials": [2],
+    "procedure": {"kind": "staircase", "threshold": 2.5, "threshold_scale_sd": 0.25, "slope": 7.5,
+      "guess": 0.5, "lapse": 0.04, "n_trials": 40, "n_reversals": 11, "n_at_limit": 3,
+      "converges_at": 0.75, "fit_level_there": 2.25}}])");
+  EXPECT_EQ(tracks(), expected);
+  protocols::QuestPlus quest;
+  quest.function = {protocols::PsychometricShape::weibull, protocols::LevelScale::log10,
+                    protocols::Easier::higher};
+  procedure = {quest, {}, std::nullopt, std::nullopt};
+  expected[0]["procedure"] = Expected::parse(R"({"kind": "quest_plus", "threshold": null,
+      "threshold_scale_sd": null, "slope": null, "guess": null, "lapse": null, "n_trials": 0,
+      "n_reversals": 0, "n_at_limit": 0, "converges_at": null, "fit_level_there": null,
+      "function": "weibull", "scale": "log"})");
+  EXPECT_EQ(tracks(), expected);
+  cell.functions[0].tracks[0].procedure.reset();
+  expected[0].erase("procedure");
+  EXPECT_EQ(tracks(), expected);
+}
+
+TEST(TaskJson, NumbersSettingsAnswersAndConfidence) {
+  TaskCell cell = named_cell("rate", "", "", "");
+  cell.participants = {"A", "B"};
+  cell.magnitude.emplace();
+  cell.magnitude->exponent = 0.75;
+  cell.magnitude->exponent_ci95 = Interval{0.5, 1.25};
+  cell.magnitude->without_logarithm = 4;
+  cell.magnitude->lines = {{"", 1, 9, 3, 0.625, -0.5, 0.9375, 0.0625}};
+  cell.magnitude->means = {{300, 12.5, Interval{11.5, 13.75}, 2}};
+  cell.adjustments = {{1, 4, 502.5, Interval{490, 515}, 2.25, 11, 7.5, 5.5}};
+  const InformationTransfer pooled{"", 40, 2, 1.25, 1.125, 2.25, 0.0625};
+  cell.information = pooled;
+  cell.informations = {{"", 20, 1.75, 1.5, 1.375, 2.5, 0.125},
+                       {"", 20, 1.875, 0.5, -0.25, 1, 0.25}};
+  cell.information_mean = 0.5625;
+  cell.information_ci95 = Interval{-0.5, 1.625};
+  cell.confidence = {};
+  cell.confidence.area = 0.6875;
+  cell.confidence.area_ci95 = Interval{0.5625, 0.8125};
+  cell.same_different = true;
+  const Expected found = json_of_cell(cell);
+  EXPECT_EQ(found["same_different"], true);
+  EXPECT_EQ(found["magnitude_estimation"], Expected::parse(R"({"exponent": 0.75,
+    "exponent_ci95": [0.5, 1.25], "n_without_logarithm": 4,
+    "participants": [{"participant_id": "B", "exponent": 0.625, "exponent_se": 0.0625,
+                      "log10_scale": -0.5, "r_squared": 0.9375}],
+    "levels": [{"level": 300.0, "geometric_mean": 12.5, "ci95": [11.5, 13.75],
+                "n_participants": 2}]})"));
+  EXPECT_EQ(found["adjustments"], Expected::parse(R"([{"participant_id": "B", "n_settings": 4,
+    "pse": 502.5, "pse_ci95": [490.0, 515.0], "constant_error": 2.25, "sd": 11.0, "jnd": 7.5,
+    "start_effect": 5.5}])"));
+  EXPECT_EQ(found["information_transfer"], Expected::parse(R"({"bits": 1.25,
+    "bits_corrected": 1.125, "se": 0.0625, "stimulus_entropy_bits": 2.0, "categories": 2.25,
+    "mean_of_participants_bits_corrected": 0.5625, "mean_of_participants_ci95": [-0.5, 1.625],
+    "participants": [
+      {"participant_id": "A", "bits": 1.5, "bits_corrected": 1.375, "se": 0.125,
+       "stimulus_entropy_bits": 1.75, "categories": 2.5},
+      {"participant_id": "B", "bits": 0.5, "bits_corrected": -0.25, "se": 0.25,
+       "stimulus_entropy_bits": 1.875, "categories": 1.0}]})"));
+  EXPECT_EQ(found["confidence"], Expected::parse(R"({"status": "ok", "type2_roc_area": 0.6875,
+    "ci95": [0.5625, 0.8125]})"));
+}
+
+TEST(TaskJson, Comparisons) {
+  TaskComparison one;
+  one.task = "compare";
+  one.measure = "jnd";
+  one.block_name = "stiff";
+  one.shape = "ball";
+  one.renderer = "ray";
+  one.conditions = {"first", "second"};
+  one.logarithms = true;
+  one.n_undetermined = 2;
+  one.comparison.participant_sd = 0.5;
+  one.comparison.residual_sd = 0.25;
+  one.comparison.differences = {difference_of(1, 6, -0.75)};
+  ConditionDifference& difference = one.comparison.differences[0];
+  difference.t_test = {"", 9, 8, -2.5, 5, 0.03125, Interval{-1.5, -0.125}, 0.0625};
+  difference.effect_size.dz = -1.125;
+  difference.mixed_estimate = -0.625;
+  difference.mixed_se = 0.375;
+  TaskAnalysis analysis;
+  analysis.renderers = {one};
+  one.comparison = {};
+  one.comparison.undefined = "nothing";
+  one.logarithms = false;
+  analysis.conditions = {one};
+  const Expected found = json_of(analysis);
+  EXPECT_EQ(found["renderer_comparisons"], Expected::parse(R"([{"task": "compare",
+    "measure": "jnd", "block_name": "stiff", "shape": "ball", "reference": "first",
+    "natural_logarithms": true, "n_undetermined": 2, "status": "ok", "participant_sd": 0.5,
+    "residual_sd": 0.25, "differences": [{"renderer": "second", "n_pairs": 6, "mean": -0.75,
+      "ci95": [-1.5, -0.125], "t": -2.5, "p": 0.03125, "p_holm": 0.0625, "dz": -1.125,
+      "mixed_estimate": -0.625, "mixed_se": 0.375}]}])"));
+  EXPECT_EQ(found["condition_comparisons"], Expected::parse(R"([{"task": "compare",
+    "measure": "jnd", "renderer": "ray", "reference": "first", "natural_logarithms": false,
+    "n_undetermined": 2, "status": "undefined", "reason": "nothing", "participant_sd": null,
+    "residual_sd": null}])"));
+  analysis.conditions[0].comparison.differences = {difference_of(1, 0, 0)};
+  EXPECT_EQ(json_of(analysis)["condition_comparisons"][0]["differences"][0]["condition"], "second");
+}
+
+TEST(TaskJson, AccuracyOfIdentification) {
+  TaskAnalysis analysis;
+  MixedLogistic& model = analysis.accuracy.emplace();
+  model.undefined = "all were right";
+  Expected expected = Expected::parse(R"j({"status": "undefined", "reason": "all were right",
+    "model": "correct ~ renderer + shape + (1 | participant)"})j");
+  EXPECT_EQ(json_of(analysis)["accuracy_model"], expected);
+  model.undefined = "";
+  model.participants = 7;
+  model.trials = 70;
+  model.log_likelihood = -12.5;
+  model.coefficients = {{"rendererray", 0, 0.25, 2.5, 0.03125, {-0.5, 0.75}}};
+  expected = Expected::parse(R"j({"model": "correct ~ renderer + shape + (1 | participant)",
+    "status": "ok", "n_participants": 7, "n_trials": 70, "logLik": -12.5, "participant_sd": null,
+    "fixed_effects": {"rendererray": {"log_odds": 0.0, "se": 0.25, "z": 2.5, "p": 0.03125,
+      "ci95": [-0.5, 0.75], "odds_ratio": 1.0}}})j");
+  EXPECT_EQ(json_of(analysis)["accuracy_model"], expected);
+  model.coefficients[0].estimate = std::log(3);
+  model.random_sds = {0.875};
+  model.singular = true;
+  const Expected found = json_of(analysis)["accuracy_model"];
+  EXPECT_EQ(found["status"], "singular");
+  EXPECT_EQ(found["participant_sd"], 0.875);
+  EXPECT_NEAR(found["fixed_effects"]["rendererray"]["odds_ratio"].get<double>(), 3, 1e-12);
+}
+
+}  // namespace
+}  // namespace palpate::analysis

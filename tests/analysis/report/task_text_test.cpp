@@ -1,0 +1,298 @@
+// What a terminal shows of an analysis of tasks, whole and word for word.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "analysis/report/task_report.h"
+#include "tests/analysis/report/task_report_fixture.h"
+
+namespace palpate::analysis {
+namespace {
+
+using testing::difference_of;
+using testing::full_function;
+using testing::named_cell;
+using testing::track_of;
+
+const char* const kLogisticText =
+    "Intervals are of 95 %. Psychometric functions: logistic, lapses free up to 0.06; compare with "
+    "levels on\none side of the standard: guesses 1 / intervals, the threshold is half-way from "
+    "there to certainty;\ndetect, same/different: guesses free. d': log-linear correction. Bayes: "
+    "posterior mean of the threshold on a grid.\n";
+
+std::string text_of_cell(TaskCell cell) {
+  TaskAnalysis analysis;
+  analysis.cells.push_back(std::move(cell));
+  const std::string text = task_report_text(analysis);
+  return text.substr(0, text.find("Intervals are"));
+}
+
+std::string line_of_function(const ParticipantFunction& one) {
+  TaskCell cell = named_cell("compare", "", "ball", "");
+  cell.functions = {one};
+  const std::string head =
+      "compare, ball: 0 trials of 0 participants, 0 answered\n"
+      "  functions over the levels as they are\n";
+  std::string text = text_of_cell(cell);
+  EXPECT_EQ(text.substr(0, head.size()), head);
+  text = text.substr(head.size());
+  EXPECT_EQ(text.substr(text.size() - 2), "\n\n");
+  return text.substr(0, text.size() - 2);
+}
+
+TEST(TaskText, AnEmptyAnalysisSaysHowItIsDone) {
+  TaskAnalysis analysis;
+  EXPECT_EQ(task_report_text(analysis), kLogisticText);
+  analysis.table.simulated = true;
+  EXPECT_EQ(task_report_text(analysis), std::string("SIMULATED PARTICIPANTS\n\n") + kLogisticText);
+  analysis.functions.shape = protocols::PsychometricShape::weibull;
+  EXPECT_EQ(
+      task_report_text(analysis),
+      "SIMULATED PARTICIPANTS\n\n"
+      "Intervals are of 95 %. Psychometric functions: weibull, lapses free up to 0.06; compare "
+      "with levels on\none side of the standard: guesses 1 / intervals, the JND is measured "
+      "half-way from there to certainty (threshold: at 63 %);\ndetect, same/different: guesses "
+      "free. d': log-linear correction. Bayes: posterior mean of the threshold on a grid.\n");
+}
+
+TEST(TaskText, AFunctionWithEverything) {
+  EXPECT_EQ(
+      line_of_function(full_function("Anna")),
+      "  Anna        PSE 303.5 [2, 4], JND 21.75 [1.5, 33.25], Weber fraction 0.0625, slope "
+      "2.5 [1.25, 4.75], lapses 0.0313 [0, 0.06], fit p 0.042; Bayes 305.5 [285.5, 325.5], d' "
+      "1.625 [1.125, 2.125], criterion -0.375 [-0.625, -0.25]");
+}
+
+TEST(TaskText, WhatAFunctionLacksIsLeftOut) {
+  ParticipantFunction one = full_function("Anna");
+  one.figures = {};
+  one.model.lapse.free = false;
+  one.goodness.p.reset();
+  one.posterior.undefined = "no grid";
+  one.detectability = {};
+  const double infinity = std::numeric_limits<double>::infinity();
+  one.fit.threshold_ci95 = {-infinity, infinity};
+  EXPECT_EQ(line_of_function(one),
+            "  Anna        threshold 301.2 [-inf, inf], slope 2.5 [1.25, 4.75]");
+  one.determined = false;
+  one.fit.slope_at_bound = true;
+  one.figures.jnd = 12345.678;
+  EXPECT_EQ(line_of_function(one),
+            "  Anna        threshold 301.2 [-inf, inf], JND 1.235e+04, slope not determined, "
+            "threshold NOT DETERMINED by these levels");
+  one.fit.undefined = "one level only";
+  EXPECT_EQ(line_of_function(one), "  Anna        no function: one level only");
+  one.detectability.d_prime = 2;
+  EXPECT_EQ(line_of_function(one),
+            "  Anna        no function: one level only, d' 2, criterion undefined");
+}
+
+TEST(TaskText, ProceduresOfTracks) {
+  ParticipantFunction one;
+  one.participant = "B";
+  one.fit.undefined = "none";
+  const protocols::Staircase staircase;
+  protocols::QuestPlus quest;
+  quest.function = {protocols::PsychometricShape::weibull, protocols::LevelScale::decibel,
+                    protocols::Easier::higher};
+  protocols::Estimate estimate;
+  estimate.trials = 1;
+  one.tracks = {Track{}, track_of("1", staircase, estimate)};
+  estimate = {2.5, 0.25, 7.5, 0.5, 0.04, 40, 1, 3};
+  one.tracks.push_back(track_of("2", staircase, estimate));
+  one.tracks.back().procedure->target = 0.70711;
+  estimate.reversals = 0;
+  one.tracks.push_back(track_of("3", quest, estimate));
+  estimate.reversals = 9;
+  one.tracks.push_back(track_of("4", protocols::Limits{}, estimate));
+  estimate.at_limit = 0;
+  one.tracks.push_back(track_of("5", staircase, estimate));
+  one.tracks.back().procedure->target = 0.5;
+  one.tracks.back().procedure->fitted_level = 2.25;
+  EXPECT_EQ(line_of_function(one),
+            "  B           no function: none\n"
+            "    track 1, staircase: no estimate; 1 trial\n"
+            "    track 2, staircase: 2.5, its reversals' mean, where it converges at 70.7 % "
+            "successes; 40 trials, 1 reversal, 3 at an end of its range\n"
+            "    track 3, QUEST+: threshold 2.5, slope 7.5, means of its posterior (weibull, db); "
+            "40 trials, 3 series without a change\n"
+            "    track 4, limits: 2.5, mean of where the answer changed; 40 trials, 9 reversals, 3 "
+            "series without a change\n"
+            "    track 5, staircase: 2.5, its reversals' mean, where it converges at 50.0 % "
+            "successes; the function is there at 2.25; 40 trials, 9 reversals");
+}
+
+TEST(TaskText, CellsOfNumbersSettingsAnswersAndConfidence) {
+  TaskCell rated = named_cell("rate", "size", "", "ray");
+  rated.trials = 2;
+  rated.participants = {"A", "B"};
+  rated.answered = 1;
+  rated.magnitude.emplace();
+  StevensLine line;
+  line.participant = 1;
+  line.exponent = 0.625;
+  line.r_squared = 0.9375;
+  rated.magnitude->lines.push_back(line);
+  line = {};
+  line.undefined = "one level";
+  rated.magnitude->lines.push_back(line);
+  rated.magnitude->means = {{300, 12.5, Interval{11.5, 13.75}, 2}, {600, 19.5, std::nullopt, 1}};
+  const std::string lines =
+      "rate, size, ray: 2 trials of 2 participants, 1 answered\n"
+      "  B           exponent 0.625, r2 0.9375\n"
+      "  A           one level\n";
+  const std::string levels =
+      "  level 300: geometric mean 12.5 [11.5, 13.75]\n"
+      "  level 600: geometric mean 19.5\n";
+  EXPECT_EQ(text_of_cell(rated), lines + levels + "\n");
+  rated.magnitude->exponent = 0.75;
+  rated.magnitude->exponent_ci95 = Interval{0.5, 1.25};
+  rated.magnitude->without_logarithm = 1;
+  EXPECT_EQ(text_of_cell(rated),
+            lines + "  exponent over participants 0.75 [0.5, 1.25]\n" + levels +
+                "  1 answer of 0 or below left out: they have no logarithm\n\n");
+
+  TaskCell set = named_cell("adjust", "match", "ball", "point");
+  set.trials = 1;
+  set.participants = {"Carl"};
+  set.adjustments = {{0, 4, 502.5, Interval{490, 515}, 2.25, 11, 7.5, 5.5},
+                     {0, 1, 499, {}, -1, {}, {}, {}}};
+  set.confidence.area = 0.6875;
+  set.confidence.area_ci95 = Interval{0.5625, 0.8125};
+  EXPECT_EQ(
+      text_of_cell(set),
+      "adjust, match, ball, point: 1 trial of 1 participant, 0 answered\n"
+      "  Carl        PSE 502.5 [490, 515], constant error 2.25, JND 7.5, from above less from "
+      "below 5.5\n"
+      "  Carl        PSE 499, constant error -1\n"
+      "  confidence: area under the type 2 ROC 0.6875 [0.5625, 0.8125]\n\n");
+
+  TaskCell named = named_cell("identify", "shapes", "", "ray");
+  named.information.emplace();
+  const std::string head = "identify, shapes, ray: 0 trials of 0 participants, 0 answered\n";
+  EXPECT_EQ(text_of_cell(named), head + "\n");
+  named.information->plain = 1.25;
+  named.information->stimulus_entropy = 2;
+  named.information->corrected = 1.125;
+  named.information->categories = 2.182;
+  const std::string bits =
+      head +
+      "  information transfer 1.25 bit of 2; less the bias of few trials 1.125 bit, 2.182 "
+      "categories";
+  EXPECT_EQ(text_of_cell(named), bits + "\n\n");
+  named.information_mean = 1.5;
+  named.information_ci95 = Interval{1.375, 1.75};
+  EXPECT_EQ(text_of_cell(named), bits + "; mean of the participants' 1.5 [1.375, 1.75]\n\n");
+  named.information->corrected = -0.5;  // no information is not less than none
+  EXPECT_NE(text_of_cell(named).find("few trials 0 bit"), std::string::npos);
+}
+
+TEST(TaskText, ATableThatSaysNothingOfItsScaleIsPointedOut) {
+  const std::string note =
+      "A table does not say on which scale an adaptive procedure has its levels: where that "
+      "is\nlogarithmic, give --scale log.\n";
+  TaskAnalysis analysis;
+  analysis.cells = {named_cell("detect", "", "", "ray")};
+  const auto is_noted = [&] {
+    return task_report_text(analysis).find(kLogisticText + note) != std::string::npos;
+  };
+  EXPECT_FALSE(is_noted()) << "no functions";
+  analysis.cells[0].functions.resize(1);
+  EXPECT_TRUE(is_noted());
+  analysis.cells[0].scale = protocols::LevelScale::log10;
+  EXPECT_FALSE(is_noted());
+  EXPECT_NE(
+      task_report_text(analysis).find("\n  functions over the logarithm (base 10) of the levels\n"),
+      std::string::npos);
+  analysis.cells[0].scale = protocols::LevelScale::linear;
+  analysis.cells[0].no_function = "both sides";
+  EXPECT_FALSE(is_noted());
+  EXPECT_EQ(task_report_text(analysis).find("functions over"), std::string::npos);
+  analysis.cells[0].no_function = "";
+  analysis.functions.scale = protocols::LevelScale::linear;
+  EXPECT_FALSE(is_noted()) << "it was asked for";
+  analysis.functions.scale.reset();
+  analysis.table.procedures["ab"];
+  EXPECT_FALSE(is_noted()) << "a database says it";
+}
+
+std::string text_of_comparison(const TaskComparison& one, bool of_renderers) {
+  TaskAnalysis analysis;
+  (of_renderers ? analysis.renderers : analysis.conditions).push_back(one);
+  const std::string text = task_report_text(analysis);
+  return text.substr(0, text.find("Intervals are"));
+}
+
+TEST(TaskText, Comparisons) {
+  TaskComparison one;
+  one.task = "compare";
+  one.measure = "threshold";
+  one.block_name = "stiff";
+  one.shape = "ball";
+  one.conditions = {"point", "ray", "line"};
+  one.comparison.differences = {difference_of(1, 6, 2.5), difference_of(2, 0, 9)};
+  TTest& test = one.comparison.differences[0].t_test;
+  test.log_ratio_ci95 = Interval{1.5, 3.5};
+  test.p = 0.0312;
+  test.p_holm = 0.0624;
+  one.comparison.differences[0].mixed_estimate = 2.75;
+  EXPECT_EQ(text_of_comparison(one, true),
+            "Thresholds by renderer, compare, stiff, ball (differences)\n"
+            "  ray - point: 2.5 [1.5, 3.5], p 0.031 (Holm 0.062); mixed model 2.75 (6 pairs)\n"
+            "  line - point: no participant has both\n\n");
+
+  one = {};
+  one.task = "detect";
+  one.renderer = "ray";
+  one.measure = "jnd";
+  one.logarithms = true;
+  one.n_undetermined = 2;
+  one.conditions = {"a, ball", "b, ball"};
+  one.comparison.differences = {difference_of(1, 1, std::log(0.5))};
+  one.comparison.differences[0].t_test.p_holm = 0.5;  // of one comparison it is no other than p
+  one.comparison.differences[0].t_test.p = 0.5;
+  one.comparison.differences[0].mixed_estimate = std::log(2);
+  one.comparison.differences[0].t_test.log_ratio_ci95 = Interval{std::log(0.25), std::log(4)};
+  EXPECT_EQ(text_of_comparison(one, false),
+            "JNDs by block and stimulus, detect, ray (ratios)\n"
+            "  2 functions left out: no threshold among the levels shown\n"
+            "  b, ball / a, ball: 0.5 [0.25, 4], p 0.500; mixed model 2 (1 pair)\n\n");
+
+  one.comparison.differences.clear();
+  one.n_undetermined = 1;
+  one.comparison.undefined = "nothing to compare";
+  one.measure = "pse";
+  EXPECT_EQ(text_of_comparison(one, false),
+            "PSEs by block and stimulus, detect, ray (ratios)\n"
+            "  nothing to compare\n"
+            "  1 function left out: no threshold among the levels shown\n\n");
+  one.measure = "exponent";
+  EXPECT_EQ(text_of_comparison(one, false).substr(0, 10), "Exponents ");
+}
+
+TEST(TaskText, AccuracyOfIdentification) {
+  TaskAnalysis analysis;
+  MixedLogistic& model = analysis.accuracy.emplace();
+  const std::string head =
+      "Accuracy of identification, mixed logistic model: correct ~ renderer + shape + (1 | "
+      "participant)\n";
+  model.undefined = "all were right";
+  EXPECT_EQ(task_report_text(analysis), head + "  undefined: all were right\n\n" + kLogisticText);
+  model.undefined = "";
+  model.coefficients = {{"(Intercept)", std::log(3), 9, 9, 0.0004, {std::log(2), std::log(5)}},
+                        {"rendererray", std::log(1.5), 9, 9, 0.2, {std::log(0.75), std::log(2.5)}}};
+  const std::string odds = head +
+                           "  (Intercept)       odds 3 [2, 5], p <0.001\n"
+                           "  rendererray       odds ratio 1.5 [0.75, 2.5], p 0.200\n";
+  EXPECT_EQ(task_report_text(analysis), odds + "\n" + kLogisticText);
+  model.random_sds = {0.875, 5};
+  const std::string spread = "  standard deviation of the participants' log odds 0.875";
+  EXPECT_EQ(task_report_text(analysis), odds + spread + "\n\n" + kLogisticText);
+  model.singular = true;
+  EXPECT_EQ(task_report_text(analysis), odds + spread + " (singular)\n\n" + kLogisticText);
+}
+
+}  // namespace
+}  // namespace palpate::analysis
