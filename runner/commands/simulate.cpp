@@ -46,8 +46,8 @@ std::optional<SimulateSettings> parse_simulate_settings(const std::vector<std::s
       "Runs the whole study with simulated participants through the renderers, device layer,\n"
       "session and store that live participants use. Their data is labelled simulated. Run\n"
       "again, it resumes where it stopped; the same seed gives the same data, whatever the jobs\n"
-      "and interruptions, and in shards: several machines take a part of the participants each,\n"
-      "palpate merge has them all.";
+      "and interruptions. With --shard several machines simulate a part of the participants each;\n"
+      "palpate merge joins the parts, with the same data.";
   line.example =
       R"(  palpate simulate protocols/quick.json --db quick.db --participants 2    a minute's try
   palpate simulate protocols/ho2000.json --db study.db                    the paper's study

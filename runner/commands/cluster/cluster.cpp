@@ -242,11 +242,11 @@ void describe(CommandLine& line) {
       "       palpate cluster status DIR\n"
       "       palpate cluster submit DIR";
   line.summary =
-      "Runs a sweep or a simulated study as one array job on Slurm, and a job after it that\n"
-      "merges its shards and analyses them. DIR, which all nodes must see, gets shards, logs,\n"
-      "scripts and results.\n"
-      "status: what is done, runs, waits or stopped, and the time left. submit: shards that are\n"
-      "not done (a task was killed, its time ran out) go on where they were.";
+      "Runs a sweep, a simulated study or the power curves of a plan as one array job on Slurm,\n"
+      "and a job after it that merges its shards and analyses them. DIR, which all nodes must\n"
+      "see, gets shards, logs, scripts and results.\n"
+      "status: which shards are done, running, waiting or stopped, and the time left. submit:\n"
+      "resumes shards that are not done (a task was killed, its time ran out).";
   line.example =
       R"(  palpate cluster sweep protocols/ho2000.json --space protocols/spaces/participants.json \
       --points 20000 --repetitions 20 --shards 64 --time 02:00:00 --dir people

@@ -200,18 +200,20 @@ int calibrate_pair(const DeviceConfig& config, const po::variables_map& values) 
 }  // namespace
 
 void add_calibrate_options(po::options_description& options) {
-  options.add_options()("weights", po::value<std::string>()->default_value("0.1,0.2,0.4"),
-                        "--calibrate falcon: masses to hang at the grip in turn, kg")(
-      "gravity", po::value<double>()->default_value(9.80665),
-      "--calibrate falcon: at this place, m/s^2")(
-      "sweep-seconds", po::value<double>()->default_value(4),
-      "--calibrate falcon: time of each of the two slow movements up and down while weighing, "
-      "s")("stylus-length", po::value<double>()->default_value(0.12),
-           "--calibrate falcon2: between the centres of the grips on the stylus, m")(
-      "offset", po::value<std::string>()->default_value("0,0,0"),
+  auto add = options.add_options();
+  add("weights", po::value<std::string>()->default_value("0.1,0.2,0.4")->value_name("KG,..."),
+      "--calibrate falcon: masses to hang at the grip in turn, kg");
+  add("gravity", po::value<double>()->default_value(9.80665, "9.80665")->value_name("G"),
+      "--calibrate falcon: at this place, m/s^2");
+  add("sweep-seconds", po::value<double>()->default_value(4)->value_name("S"),
+      "--calibrate falcon: time of each of the two slow movements up and down while weighing, s");
+  add("stylus-length", po::value<double>()->default_value(0.12, "0.12")->value_name("L"),
+      "--calibrate falcon2: between the centres of the grips on the stylus, m");
+  add("offset", po::value<std::string>()->default_value("0,0,0")->value_name("X,Y,Z"),
       "--calibrate falcon2: from the tip's grip to the tail's while points are taken, x,y,z in m; "
-      "0,0,0: pinned together")("points", po::value<int>()->default_value(8),
-                                "--calibrate falcon2: number of points to take");
+      "0,0,0: pinned together");
+  add("points", po::value<int>()->default_value(8)->value_name("N"),
+      "--calibrate falcon2: number of points to take");
 }
 
 int calibrate_devices(const std::string& device, const DeviceConfig& config,

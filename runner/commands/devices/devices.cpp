@@ -222,7 +222,7 @@ void add_options(CommandLine& line) {
       ("guarded", "--timing: with the device in a guard process, as a Falcon is")                 //
       ("no-fifo", "--timing: without real-time priority")                                         //
       ("no-realtime", "--timing: without any real-time right")                                    //
-      ("core", po::value<int>()->default_value(-1)->value_name("N"),
+      ("core", po::value<int>()->default_value(-1, "any")->value_name("N"),
        "--timing: on this processor only")                                                  //
       ("calibrate", "guided calibration of a device")                                       //
       ("json", po::value<std::string>()->value_name("FILE"), "write the findings as JSON")  //

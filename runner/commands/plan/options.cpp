@@ -140,8 +140,10 @@ void add_plan_options(CommandLine& line, PlanOptions& options) {
       "wanted reductions of time with the ray (of a pilot of other renderers: with its second "
       "renderer), or one number for all shapes; default for ray: the paper's, cone=22,cube=11, or "
       "where there is neither, 11");
-  add("power", po::value(&options.power)->default_value(0.8, "0.8"), "wanted power");
-  add("alpha", po::value(&options.alpha)->default_value(0.05, "0.05"), "of the tests, after Holm");
+  add("power", po::value(&options.power)->default_value(0.8, "0.8")->value_name("P"),
+      "wanted power");
+  add("alpha", po::value(&options.alpha)->default_value(0.05, "0.05")->value_name("P"),
+      "of the tests, after Holm");
   add("goal", po::value(&options.goal)->default_value("all")->value_name("all|any"),
       "find every shape with an effect, or at least one");
   add("participants", po::value(&options.participants)->default_value("2-100")->value_name("A-B"),
@@ -164,7 +166,7 @@ void add_plan_options(CommandLine& line, PlanOptions& options) {
       "of trials that give a time; a pilot's, or 1");
   add("studies", po::value(&options.studies)->value_name("N"),
       "simulated for each power; default 10000, with --test model 1000");
-  add("seed", po::value(&options.seed)->default_value(2000), "of the simulation");
+  add("seed", po::value(&options.seed)->default_value(2000)->value_name("S"), "of the simulation");
 }
 
 analysis::Pilot starting_point(const PlanOptions& options, const po::variables_map& values) {

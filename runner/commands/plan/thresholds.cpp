@@ -58,7 +58,7 @@ void add_threshold_options(CommandLine& line, ThresholdOptions& options) {
   add("jnd-effect", po::value(&options.effect)->value_name("PERCENT"),
       "of thresholds instead of times: how much smaller the JND is with the second renderer or "
       "condition; --trials are those of a participant with each, --participants a range");
-  add("weber", po::value(&options.weber)->default_value(0.1, "0.1"),
+  add("weber", po::value(&options.weber)->default_value(0.1, "0.1")->value_name("W"),
       "JND / standard with the first condition");
   add("jnd-sd", po::value(&options.participant_sd)->default_value(0.3, "0.3")->value_name("SD"),
       "of participants' log JND");
