@@ -106,6 +106,7 @@ TEST(TaskText, ProceduresOfTracks) {
   estimate.reversals = 0;
   one.tracks.push_back(track_of("3", quest, estimate));
   estimate.reversals = 9;
+  estimate.at_limit = 1;
   one.tracks.push_back(track_of("4", protocols::Limits{}, estimate));
   estimate.at_limit = 0;
   one.tracks.push_back(track_of("5", staircase, estimate));
@@ -118,7 +119,7 @@ TEST(TaskText, ProceduresOfTracks) {
             "successes; 40 trials, 1 reversal, 3 at an end of its range\n"
             "    track 3, QUEST+: threshold 2.5, slope 7.5, means of its posterior (weibull, db); "
             "40 trials, 3 series without a change\n"
-            "    track 4, limits: 2.5, mean of where the answer changed; 40 trials, 9 reversals, 3 "
+            "    track 4, limits: 2.5, mean of where the answer changed; 40 trials, 9 reversals, 1 "
             "series without a change\n"
             "    track 5, staircase: 2.5, its reversals' mean, where it converges at 50.0 % "
             "successes; the function is there at 2.25; 40 trials, 9 reversals");

@@ -147,6 +147,17 @@ TEST(LevelPercept, AnEdgeOfABoxIsTwiceAsFarAsItsFaces) {
   EXPECT_NEAR(percept.length().value_or(0), 0.04 + 0.005 / (0.5 * 3 / 5), 5e-5);
 }
 
+TEST(LevelPercept, ATurnedObjectIsFeltWhereItStands) {
+  const auto protocol = study({R"("shape": "box", "size_m": [0.04, 0.05, 0.06],
+      "orientation_wxyz": [0.8, 0, 0, 0.6])"},
+                              "/size_m/0", "0.03, 0.05");
+  LevelPercept percept(protocol);
+  percept.begin(trial_of(kTurned), at(0.04));
+  const Quat place = kTurned * Quat(0.8, 0, 0, 0.6);
+  percept.add(touch(place * Vec3(0.021, 0.01, -0.02)));
+  EXPECT_NEAR(percept.length().value_or(0), 0.042, 1e-9);
+}
+
 TEST(LevelPercept, OfACompoundThePartThatIsNearCounts) {
   const auto protocol = study({R"("shape": "compound", "parts": [
       {"shape": "sphere", "radius_m": 0.02, "position_m": [-0.03, 0, 0]},
