@@ -69,8 +69,8 @@ TEST(Cell, OfABoxHasItsMeasures) {
   EXPECT_NEAR(bulk.volume, 0.04 * 0.03 * 0.05, 1e-18);
   EXPECT_NEAR(bulk.area, 2 * (0.04 * 0.03 + 0.03 * 0.05 + 0.05 * 0.04), 1e-16);
   EXPECT_LT(glm::length(bulk.middle - 0.5 * (kLow + kHigh)), 1e-16);
-  EXPECT_EQ(bulk_of({}).volume, 0);
-  EXPECT_EQ(bulk_of({}).area, 0);
+  EXPECT_EQ(bulk_of(Cell().faces).volume, 0);
+  EXPECT_EQ(bulk_of(Cell().faces).area, 0);
 }
 
 /// The mean of all faces' corners, each as often as faces meet there.
