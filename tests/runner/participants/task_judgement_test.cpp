@@ -8,91 +8,25 @@
 #include <cmath>
 #include <numbers>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "protocols/parse.h"
+#include "tests/runner/participants/judge.h"
 
-namespace palpate::runner {
+namespace palpate::runner::judged {
 namespace {
-namespace judged {
-
-using protocols::Interval;
-using protocols::Trial;
 
 constexpr int kDraws = 4000;
 
 double normal_cdf(double z) { return 0.5 * std::erfc(-z / std::numbers::sqrt2); }
 
-/// A protocol of one block about a sphere of 400 N/m. \param keys  of the block, beside its name
-protocols::Protocol study(const std::string& keys) {
-  return protocols::parse_protocol_text(
-      R"({"version": 2, "name": "j", "renderers": ["ray"], "stimuli": [
-        {"name": "ball", "shape": "sphere", "radius_m": 0.03, "stiffness_n_per_m": 400},
-        {"name": "soft", "shape": "sphere", "radius_m": 0.03, "stiffness_n_per_m": 100},
-        {"name": "mid", "shape": "sphere", "radius_m": 0.03, "stiffness_n_per_m": 200}],
-        "blocks": [{"name": "b", )" +
-          keys + "}]}",
-      "j.json");
+/// Share of the draws that give the answer `name`.
+double share(Judge& judge, const std::string& name, const std::vector<Interval>& intervals,
+             const TaskJudgement::Felt& felt = {}, const Trial& trial = trial_of()) {
+  int count = 0;
+  for (int k = 0; k < kDraws; ++k) count += judge.answer(intervals, felt, trial) == name;
+  return static_cast<double>(count) / kDraws;
 }
-
-std::string constant(const std::string& levels) {
-  return R"("stimuli": ["ball"], "level": {"path": "/stiffness_n_per_m"},
-            "procedure": {"kind": "constant", "levels": [)" +
-         levels + R"(], "repetitions": 1})";
-}
-
-std::string compare(const std::string& more = "") {
-  return R"("task": "compare", "standard": "ball", )" + constant("300, 500") + more;
-}
-
-Trial trial_of(int stimulus = 0) {
-  Trial trial;
-  trial.task_block = 0;
-  trial.stimulus = stimulus;
-  return trial;
-}
-
-const Interval kStandard{0, {}, {}, true};
-Interval at(double level) { return {0, {}, level, false}; }
-
-/// Settings of somebody who never errs and feels exactly.
-JudgementSettings exact() {
-  JudgementSettings settings;
-  settings.weber = settings.turn_sd = settings.lapse = settings.number_sd = 0;
-  settings.false_alarm = 0;
-  return settings;
-}
-
-/// The name of the answer to some intervals.
-class Judge {
- public:
-  explicit Judge(const std::string& keys, const JudgementSettings& settings = {})
-      : protocol_(study(keys)), judgement_(protocol_, settings) {}
-
-  std::string answer(const std::vector<Interval>& intervals, const TaskJudgement::Felt& felt = {},
-                     Trial trial = trial_of()) {
-    judgement_.begin(trial, stimuli::Random(7, {++draw_}));
-    for (const Interval& interval : intervals) judgement_.feel(interval, felt);
-    return named(judgement_.answer());
-  }
-  std::string named(int answer) const {
-    return protocol_.blocks[0].answers.at(static_cast<std::size_t>(answer)).name;
-  }
-  double share(const std::string& name, const std::vector<Interval>& intervals,
-               const TaskJudgement::Felt& felt = {}, const Trial& trial = trial_of()) {
-    int count = 0;
-    for (int k = 0; k < kDraws; ++k) count += answer(intervals, felt, trial) == name;
-    return static_cast<double>(count) / kDraws;
-  }
-  TaskJudgement& judgement() { return judgement_; }
-  const protocols::Protocol& protocol() const { return protocol_; }
-
- private:
-  protocols::Protocol protocol_;
-  TaskJudgement judgement_;
-  std::uint64_t draw_ = 0;
-};
 
 void expect_share(double found, double expected, const std::string& where) {
   const double error = std::sqrt(std::max(expected * (1 - expected), 1e-3) / kDraws);
@@ -104,16 +38,16 @@ TEST(TaskJudgement, ComparesAsTheNormalDistributionSays) {
   for (const double level : {320.0, 380.0, 400.0, 440.0}) {
     const double chosen = 0.02 / 2 + 0.98 * normal_cdf((level - 400) / (0.15 * 400));
     const std::string where = std::to_string(level);
-    expect_share(larger.share("2", {kStandard, at(level)}), chosen, where);
-    expect_share(larger.share("1", {at(level), kStandard}), chosen, where + " first");
-    expect_share(smaller.share("1", {kStandard, at(level)}), chosen, where + " smaller");
+    expect_share(share(larger, "2", {kStandard, at(level)}), chosen, where);
+    expect_share(share(larger, "1", {at(level), kStandard}), chosen, where + " first");
+    expect_share(share(smaller, "1", {kStandard, at(level)}), chosen, where + " smaller");
   }
 }
 
 TEST(TaskJudgement, OfThreeIntervalsTheLargestEstimateIsChosen) {
   Judge judge(compare(R"(, "intervals": 3)"));
-  expect_share(judge.share("3", {kStandard, kStandard, at(400)}), 1.0 / 3, "all alike");
-  EXPECT_GT(judge.share("2", {kStandard, at(700), kStandard}), 0.96);
+  expect_share(share(judge, "3", {kStandard, kStandard, at(400)}), 1.0 / 3, "all alike");
+  EXPECT_GT(share(judge, "2", {kStandard, at(700), kStandard}), 0.96);
 }
 
 TEST(TaskJudgement, DifferentIsWhatDiffersByMoreThanOneStandardDeviation) {
@@ -122,7 +56,7 @@ TEST(TaskJudgement, DifferentIsWhatDiffersByMoreThanOneStandardDeviation) {
   for (const double level : {400.0, 450.0, 520.0}) {
     const double d = level - 400;
     const double apart = normal_cdf((d - sd) / sd) + normal_cdf((-d - sd) / sd);
-    expect_share(judge.share("different", {kStandard, at(level)}), 0.02 / 2 + 0.98 * apart,
+    expect_share(share(judge, "different", {kStandard, at(level)}), 0.02 / 2 + 0.98 * apart,
                  std::to_string(level));
   }
   JudgementSettings sure;
@@ -141,7 +75,7 @@ TEST(TaskJudgement, WhatWasNotTouchedIsAnyLevelOfTheBlock) {
   // Two levels at random in 300 to 500, each with noise: as often one as the other, whatever they
   // are.
   Judge judge(compare());
-  expect_share(judge.share("2", {kStandard, at(500)}, {{}, false, false}), 0.5, "untouched");
+  expect_share(share(judge, "2", {kStandard, at(500)}, {{}, false, false}), 0.5, "untouched");
 }
 
 TEST(TaskJudgement, DetectsByItsPsychometricFunction) {
@@ -150,14 +84,14 @@ TEST(TaskJudgement, DetectsByItsPsychometricFunction) {
   for (const double level : {500.0, 700.0, 800.0}) {
     shown.level = level;  // threshold in the middle of 200 to 1200, sd a tenth of that range
     const double yes = 0.05 + (1 - 0.05 - 0.02) * normal_cdf((level - 700) / 100);
-    expect_share(judge.share("yes", {at(level)}, {}, shown), yes, std::to_string(level));
-    expect_share(judge.share("yes", {at(level)}, {{}, false, false}, shown), 0.05, "untouched");
+    expect_share(share(judge, "yes", {at(level)}, {}, shown), yes, std::to_string(level));
+    expect_share(share(judge, "yes", {at(level)}, {{}, false, false}, shown), 0.05, "untouched");
   }
   shown.catch_trial = true;
-  expect_share(judge.share("yes", {Interval{-1, {}, {}, false}}, {}, shown), 0.05, "nothing");
+  expect_share(share(judge, "yes", {Interval{-1, {}, {}, false}}, {}, shown), 0.05, "nothing");
   shown.catch_trial = false;
   shown.level.reset();
-  expect_share(judge.share("yes", {at(400)}, {}, shown), 0.98, "without a level");
+  expect_share(share(judge, "yes", {at(400)}, {}, shown), 0.98, "without a level");
 }
 
 TEST(TaskJudgement, NumbersAreAPowerOfTheLevel) {
@@ -213,74 +147,6 @@ TEST(TaskJudgement, AStepOfAScaleIsTheNearestAmongAllLevels) {
   EXPECT_EQ(judge.answer({at(300)}, {1.0, true, true}), "1");
 }
 
-class Adjusting : public ::testing::Test {
- protected:
-  std::string next(const Interval& felt, bool touched = true) {
-    judge_.judgement().feel(felt, {{}, false, touched});
-    return judge_.named(judge_.judgement().answer());
-  }
-  void SetUp() override { judge_.judgement().begin(trial_of(), stimuli::Random(1)); }
-
-  Judge judge_{R"("task": "adjust", "stimuli": ["ball"], "standard": "ball",
-                  "level": {"path": "/stiffness_n_per_m"}, "min": 100, "max": 500, "turn": 10,
-                  "starts": [150])",
-               exact()};
-};
-
-TEST_F(Adjusting, FeelsBothThenTurnsAsOftenAsItTakes) {
-  EXPECT_EQ(next(at(150)), "switch");
-  EXPECT_EQ(judge_.judgement().turns(), 1);
-  EXPECT_EQ(next(kStandard), "switch");  // it turns where it feels what it turns
-  EXPECT_EQ(next(at(150)), "up");
-  EXPECT_EQ(judge_.judgement().turns(), 25);
-  EXPECT_EQ(next(at(466)), "down");
-  EXPECT_EQ(judge_.judgement().turns(), 7);
-  EXPECT_EQ(next(at(406)), "down");
-  EXPECT_EQ(judge_.judgement().turns(), 1);
-  EXPECT_EQ(next(at(405)), "done");  // half a turn
-}
-
-TEST_F(Adjusting, EndsWhereItTurnsNoFarther) {
-  next(kStandard);
-  EXPECT_EQ(next(at(100)), "up");
-  judge_.judgement().begin(trial_of(), stimuli::Random(1));
-  judge_.judgement().feel(kStandard, {900.0, true, true});
-  judge_.judgement().feel(at(499), {499.0, true, true});
-  EXPECT_EQ(judge_.named(judge_.judgement().answer()), "up");
-  judge_.judgement().feel(at(500), {500.0, true, true});
-  EXPECT_EQ(judge_.named(judge_.judgement().answer()), "done");
-  judge_.judgement().begin(trial_of(), stimuli::Random(1));
-  judge_.judgement().feel(kStandard, {20.0, true, true});
-  judge_.judgement().feel(at(101), {101.0, true, true});
-  EXPECT_EQ(judge_.named(judge_.judgement().answer()), "down");
-  judge_.judgement().feel(at(100), {100.0, true, true});
-  EXPECT_EQ(judge_.named(judge_.judgement().answer()), "done");
-}
-
-TEST_F(Adjusting, GoesBackToWhatItDidNotTouch) {
-  EXPECT_EQ(next(at(150)), "switch");
-  EXPECT_EQ(next(kStandard, false), "switch");
-  EXPECT_EQ(next(at(150)), "switch");  // the standard is still unknown
-  EXPECT_EQ(next(kStandard), "switch");
-  EXPECT_EQ(next(at(150)), "up");
-  EXPECT_EQ(next(at(150), false), "switch");
-}
-
-TEST(TaskJudgement, AdjustsUntilTheyAreTheSameByOneStandardDeviation) {
-  JudgementSettings settings = exact();
-  settings.weber = 0.15;
-  Judge judge(R"("task": "adjust", "stimuli": ["ball"], "standard": "ball",
-                 "level": {"path": "/stiffness_n_per_m"}, "min": 100, "max": 500, "turn": 10,
-                 "starts": [150])",
-              settings);
-  for (const double level : {341.0, 339.0}) {  // 400 less 15 %
-    judge.judgement().begin(trial_of(), stimuli::Random(1));
-    judge.judgement().feel(kStandard, {400.0, true, true});
-    judge.judgement().feel(at(level), {level, true, true});
-    EXPECT_EQ(judge.named(judge.judgement().answer()), level > 340 ? "done" : "up");
-  }
-}
-
 TEST(TaskJudgement, IdentifiesTheNearestStiffnessAsARatio) {
   Judge judge(R"("task": "identify", "stimuli": ["ball", "soft", "mid"], "repetitions": 1)",
               exact());
@@ -300,8 +166,8 @@ TEST(TaskJudgement, LapsesGiveAnyAnswer) {
   settings.lapse = 0.3;
   Judge judge(R"("task": "identify", "stimuli": ["ball", "soft", "mid"], "repetitions": 1)",
               settings);
-  expect_share(judge.share("soft", {Interval{2, {}, {}, false}}, {}, trial_of(2)), 0.1, "one");
-  expect_share(judge.share("mid", {Interval{2, {}, {}, false}}, {}, trial_of(2)), 0.8, "right");
+  expect_share(share(judge, "soft", {Interval{2, {}, {}, false}}, {}, trial_of(2)), 0.1, "one");
+  expect_share(share(judge, "mid", {Interval{2, {}, {}, false}}, {}, trial_of(2)), 0.8, "right");
 }
 
 TEST(TaskJudgement, IsTheSurerTheClearerWhatWasFelt) {
@@ -323,6 +189,57 @@ TEST(TaskJudgement, IsTheSurerTheClearerWhatWasFelt) {
   EXPECT_EQ(confidence(1000), 3);
 }
 
+TEST(TaskJudgement, IsAsSureAsItsAnswerIsLikely) {
+  Judge detecting(R"("task": "detect", "catch_trials": 0.2, )" + constant("200, 1200"));
+  const auto sure = [&](double level) {
+    Trial shown = trial_of();
+    shown.level = level;
+    detecting.answer({at(level)}, {}, shown);
+    return detecting.judgement().confidence(10);
+  };
+  EXPECT_EQ(sure(700), 0);  // "yes" by 0.515
+  EXPECT_EQ(sure(785), 5);  // by 0.05 + 0.93 Phi(0.85) = 0.796: 2 (0.796 - 0.5) of ten steps is 5.9
+  EXPECT_EQ(sure(2000), 9);  // by 0.98
+  Judge naming(R"("task": "identify", "stimuli": ["ball", "soft", "mid"], "repetitions": 1)", [] {
+    JudgementSettings settings = exact();
+    settings.weber = 0.15;
+    return settings;
+  }());
+  naming.answer({Interval{0, {}, {}, false}}, {200.0, true, true});
+  EXPECT_EQ(naming.judgement().confidence(10), 9);
+  naming.answer({Interval{0, {}, {}, false}}, {230.0, true, true});  // ln(1.15) / 0.15 = 0.93
+  EXPECT_EQ(naming.judgement().confidence(10), 5);
+  naming.answer({Interval{0, {}, {}, false}}, {280.0, true, true});  // 2.24: more than two
+  EXPECT_EQ(naming.judgement().confidence(10), 0);
+  naming.answer({Interval{2, {}, {}, false}}, {}, trial_of(2));
+  EXPECT_EQ(naming.judgement().confidence(10), 9);
+  Judge half(compare());
+  half.answer({kStandard, at(900)});
+  half.answer({kStandard});  // nothing to compare with
+  EXPECT_EQ(half.judgement().confidence(10), 0);
+}
+
+TEST(TaskJudgement, WhatHasItsNoiseAlreadyGetsNoMore) {
+  JudgementSettings settings;
+  settings.lapse = 0;
+  Judge judge(compare(), settings);
+  for (std::uint64_t k = 0; k < 50; ++k) {
+    judge.judgement().begin(trial_of(), stimuli::Random(2, {k}));
+    judge.judgement().feel(kStandard, {400.0, true, true});
+    judge.judgement().feel(at(300), {400.001, true, true});
+    EXPECT_EQ(judge.named(judge.judgement().answer()), "2");
+  }
+}
+
+TEST(TaskJudgement, AnyLevelIsAsLikelyAsAnother) {
+  Judge judge(R"("task": "rate", "scale": [{"label": "a"}, {"label": "b"}, {"label": "c"}], )" +
+                  constant("100, 500"),
+              exact());
+  const TaskJudgement::Felt untouched{{}, false, false};
+  expect_share(share(judge, "1", {at(500)}, untouched), 0.25, "lowest");
+  expect_share(share(judge, "2", {at(500)}, untouched), 0.5, "middle");
+}
+
 TEST(TaskJudgement, TurnsAreFeltWithTheSameNoiseEverywhere) {
   JudgementSettings settings;
   settings.lapse = 0;
@@ -331,7 +248,7 @@ TEST(TaskJudgement, TurnsAreFeltWithTheSameNoiseEverywhere) {
                  "procedure": {"kind": "constant", "levels": [-6, 6], "repetitions": 1})",
               settings);
   for (const double level : {-3.0, 2.0, 6.0})
-    expect_share(judge.share("2", {kStandard, at(level)}), normal_cdf(level / 3),
+    expect_share(share(judge, "2", {kStandard, at(level)}), normal_cdf(level / 3),
                  std::to_string(level));
 }
 
@@ -356,6 +273,5 @@ TEST(TaskJudgement, WhereTheStandardIsZeroTheLargestLevelSetsTheNoise) {
   expect_share(static_cast<double>(second) / kDraws, normal_cdf(0.2 / (0.15 * 0.8)), "friction");
 }
 
-}  // namespace judged
 }  // namespace
-}  // namespace palpate::runner
+}  // namespace palpate::runner::judged
