@@ -16,52 +16,10 @@ namespace {
 
 using Index = HalfEdges::Index;
 
-/// The name of a face that may not be part of a linked surface.
-std::string name_of_face(const PolygonSoup& soup, std::size_t f) {
-  const MeshNaming naming(soup.names);
-  std::vector<std::string> labels;
-  for (const Index v : soup.faces[f])
-    labels.push_back(naming.label(v, v < soup.vertices.size() ? soup.vertices[v] : Vec3(0)));
-  return naming.face(static_cast<Index>(f), labels);
-}
-
 bool finite(const Vec3& v) {
   // Far larger numbers overflow when they are multiplied, and no object is that far away.
   constexpr double kLargest = 1e30;
   return std::abs(v.x) <= kLargest && std::abs(v.y) <= kLargest && std::abs(v.z) <= kLargest;
-}
-
-void check_numbers(const PolygonSoup& soup) {
-  MeshFaults faults;
-  if (soup.faces.empty()) faults.add("empty", [] { return "expected faces, found none"; });
-  for (Index v = 0; v < soup.vertices.size(); ++v) {
-    if (finite(soup.vertices[v])) continue;
-    faults.add("not finite", [&] {
-      return MeshNaming(soup.names).vertex(v, soup.vertices[v]) +
-             ": expected three finite coordinates (up to 1e30 m)";
-    });
-  }
-  std::size_t corners = 0;
-  for (std::size_t f = 0; f < soup.faces.size(); ++f) {
-    const std::vector<Index>& face = soup.faces[f];
-    corners += face.size();
-    const auto name = [&] { return name_of_face(soup, f); };
-    if (face.size() < 3) {
-      faults.add("too few corners", [&] { return name() + ": expected at least 3"; });
-    }
-    for (const Index v : face) {
-      if (v < soup.vertices.size()) continue;
-      faults.add("no such vertex", [&] {
-        return name() + ": expected vertex numbers below " + std::to_string(soup.vertices.size()) +
-               ", found " + std::to_string(v);
-      });
-      break;
-    }
-  }
-  if (corners >= HalfEdges::kNone / 2 || soup.vertices.size() >= HalfEdges::kNone / 2) {
-    faults.add("too large", [] { return "expected fewer than 2^31 corners"; });
-  }
-  faults.throw_if_any();
 }
 
 // Corners that no face uses are left out: they must not make the object seem larger than it is.
@@ -211,6 +169,47 @@ void check_fans(const HalfEdges& mesh, MeshFaults& faults) {
 }
 
 }  // namespace
+
+std::string name_of_face(const PolygonSoup& soup, std::size_t f) {
+  const MeshNaming naming(soup.names);
+  std::vector<std::string> labels;
+  for (const Index v : soup.faces[f])
+    labels.push_back(naming.label(v, v < soup.vertices.size() ? soup.vertices[v] : Vec3(0)));
+  return naming.face(static_cast<Index>(f), labels);
+}
+
+void check_numbers(const PolygonSoup& soup) {
+  MeshFaults faults;
+  if (soup.faces.empty()) faults.add("empty", [] { return "expected faces, found none"; });
+  for (Index v = 0; v < soup.vertices.size(); ++v) {
+    if (finite(soup.vertices[v])) continue;
+    faults.add("not finite", [&] {
+      return MeshNaming(soup.names).vertex(v, soup.vertices[v]) +
+             ": expected three finite coordinates (up to 1e30 m)";
+    });
+  }
+  std::size_t corners = 0;
+  for (std::size_t f = 0; f < soup.faces.size(); ++f) {
+    const std::vector<Index>& face = soup.faces[f];
+    corners += face.size();
+    const auto name = [&] { return name_of_face(soup, f); };
+    if (face.size() < 3) {
+      faults.add("too few corners", [&] { return name() + ": expected at least 3"; });
+    }
+    for (const Index v : face) {
+      if (v < soup.vertices.size()) continue;
+      faults.add("no such vertex", [&] {
+        return name() + ": expected vertex numbers below " + std::to_string(soup.vertices.size()) +
+               ", found " + std::to_string(v);
+      });
+      break;
+    }
+  }
+  if (corners >= HalfEdges::kNone / 2 || soup.vertices.size() >= HalfEdges::kNone / 2) {
+    faults.add("too large", [] { return "expected fewer than 2^31 corners"; });
+  }
+  faults.throw_if_any();
+}
 
 std::string HalfEdges::name_face(Index f) const {
   std::vector<std::string> labels;

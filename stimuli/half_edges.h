@@ -38,6 +38,12 @@ struct HalfEdges {
   std::string name_edge(Index h) const;    ///< "edge 4-5 of face 3 ..."
 };
 
+/// What messages call a face of a soup, linked or not.
+std::string name_of_face(const PolygonSoup& soup, std::size_t face);
+
+/// \throws MeshError where indices or coordinates are unusable: no faces, not finite, too large.
+void check_numbers(const PolygonSoup& soup);
+
 enum class Pieces { one, any };
 
 /// Welds, drops faces that welding has collapsed (their two sides cancel, so the surface stays

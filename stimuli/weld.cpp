@@ -22,7 +22,13 @@ std::uint64_t hash_of(const Vec3& point) {
   return hash;
 }
 
-// Equal coordinates first: in a triangle soup each corner occurs about six times.
+Index kept_for(std::vector<Index>& kept, Index i) {
+  while (kept[i] != i) i = kept[i] = kept[kept[i]];
+  return i;
+}
+
+}  // namespace
+
 std::vector<Index> weld_equal(const std::vector<Vec3>& points) {
   std::vector<Index> slots(std::bit_ceil(2 * points.size() + 16), kNone);
   std::vector<Index> kept(points.size());
@@ -37,14 +43,8 @@ std::vector<Index> weld_equal(const std::vector<Vec3>& points) {
   return kept;
 }
 
-Index kept_for(std::vector<Index>& kept, Index i) {
-  while (kept[i] != i) i = kept[i] = kept[kept[i]];
-  return i;
-}
-
-}  // namespace
-
 std::vector<Index> weld(const std::vector<Vec3>& points, double tolerance) {
+  // Equal coordinates first: in a triangle soup each corner occurs about six times.
   std::vector<Index> kept = weld_equal(points);
   // Close points are close in any projection. The direction is no axis and no diagonal, so that few
   // corners of a man-made object project onto one value.

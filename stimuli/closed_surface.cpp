@@ -1,0 +1,287 @@
+#include "stimuli/closed_surface.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <limits>
+#include <numeric>
+#include <utility>
+
+#include "stimuli/face_triangles.h"
+#include "stimuli/flat_triangles.h"
+#include "stimuli/half_edges.h"
+#include "stimuli/mesh_faults.h"
+#include "stimuli/side_groups.h"
+#include "stimuli/weld.h"
+#include "stimuli/winding_check.h"
+
+namespace palpate::stimuli {
+namespace {
+
+using Index = std::uint32_t;
+using Triangle = std::array<Index, 3>;
+constexpr Index kNoPoint = 0xffffffff;
+
+constexpr const char* kClose = "; fill holes and orient faces in a modelling program";
+
+// m, in units of a coordinate's error: nearer than this, a corner lies on a line or on another one.
+constexpr double kFlatErrors = 4;
+
+std::string counted(std::size_t count, const char* one, const char* many) {
+  return std::to_string(count) + ' ' + (count == 1 ? one : many);
+}
+
+/// Makes the surface, step by step.
+class Cleaner {
+ public:
+  explicit Cleaner(const PolygonSoup& soup) : soup_(soup), naming_(soup.names) {}
+
+  CleanedSurface run() {
+    check_numbers(soup_);
+    take_corners();
+    take_faces();
+    drop_fins();
+    balance();
+    link_triangles(points_, triangles_, across_);
+    const std::size_t flat =
+        collapse_flat_triangles(points_, triangles_, across_, kFlatErrors * error_);
+    if (flat > 0) {
+      drop_gone();
+      drop_fins();
+      link_triangles(points_, triangles_, across_);
+    }
+    note(dropped_ + flat, "triangle without area left out, its neighbours joined",
+         "triangles without area left out, their neighbours joined");
+    ClosedSurface surface = take_surface();
+    check_winding(surface, kFlatErrors * error_,
+                  [&](Index t) { return name_of_face(soup_, face_[t]); });
+    return {std::move(surface), std::move(notes_)};
+  }
+
+ private:
+  void note(std::size_t count, const char* one, const char* many) {
+    if (count > 0) notes_.push_back(counted(count, one, many));
+  }
+
+  // Corners that no face uses are left out: they must not make the object seem larger than it is.
+  void take_corners() {
+    const std::vector<Index> kept = weld_equal(soup_.vertices);
+    point_of_.assign(soup_.vertices.size(), kNoPoint);
+    std::vector<char> used(soup_.vertices.size(), 0);
+    for (const auto& face : soup_.faces) {
+      for (const Index v : face) used[v] = 1;
+    }
+    std::size_t unused = 0, twice = 0;
+    for (Index v = 0; v < kept.size(); ++v) {
+      if (used[v] == 0) {
+        ++unused;
+        continue;
+      }
+      Index& point = point_of_[kept[v]];
+      if (point == kNoPoint) {
+        point = static_cast<Index>(points_.size());
+        points_.push_back(soup_.vertices[v] + 0.0);  // -0 is 0
+        vertex_.push_back(v);
+      } else {
+        ++twice;
+      }
+      point_of_[v] = point;
+    }
+    // A file of separate triangles gives each corner several times: that says nothing.
+    const bool numbered = !soup_.names || !soup_.names->vertices.empty();
+    if (numbered)
+      note(twice, "corner at the place of another made one with it",
+           "corners at the places of others made one with them");
+    if (numbered) note(unused, "corner in no face left out", "corners in no face left out");
+    Vec3 low(std::numeric_limits<double>::max()), high = -low;
+    for (const Vec3& point : points_) {
+      low = glm::min(low, point);
+      high = glm::max(high, point);
+    }
+    const Vec3 far = glm::max(glm::abs(low), glm::abs(high));
+    error_ =
+        std::max({soup_.coordinate_error, 1e-11 * glm::length(high - low),
+                  8 * std::numeric_limits<double>::epsilon() * std::max({far.x, far.y, far.z})});
+  }
+
+  void add_triangle(const Triangle& t, Index face) {
+    if (t[0] == t[1] || t[1] == t[2] || t[2] == t[0]) {
+      ++dropped_;
+      return;
+    }
+    triangles_.push_back(t);
+    face_.push_back(face);
+  }
+
+  void take_faces() {
+    std::size_t cut = 0;
+    triangles_.reserve(soup_.faces.size());
+    face_.reserve(soup_.faces.size());
+    std::vector<Index> loop;
+    std::vector<Vec3> corners;
+    for (Index f = 0; f < soup_.faces.size(); ++f) {
+      const std::vector<Index>& face = soup_.faces[f];
+      if (face.size() == 3) {
+        add_triangle({point_of_[face[0]], point_of_[face[1]], point_of_[face[2]]}, f);
+        continue;
+      }
+      loop.clear();
+      for (const Index v : face) {
+        if (loop.empty() || loop.back() != point_of_[v]) loop.push_back(point_of_[v]);
+      }
+      while (loop.size() > 1 && loop.back() == loop.front()) loop.pop_back();
+      if (loop.size() < 3) {
+        ++dropped_;
+        continue;
+      }
+      corners.clear();
+      for (const Index v : loop) corners.push_back(points_[v]);
+      ++cut;
+      for (const Triangle& t : face_triangles(corners))
+        add_triangle({loop[t[0]], loop[t[1]], loop[t[2]]}, f);
+    }
+    note(cut, "face of four or more corners cut into triangles",
+         "faces of four or more corners cut into triangles");
+  }
+
+  // Two triangles back to back enclose nothing.
+  void drop_fins() {
+    std::vector<char> gone(triangles_.size(), 0);
+    std::vector<std::pair<Triangle, Index>> sorted;  // of those that share all corners with another
+    {
+      const SideGroups sides(points_.size(), triangles_);
+      sides.for_each_edge([&](const SideGroups::Edge& edge) {
+        if (edge.sides.size() < 3) return;
+        for (const SideGroups::Side& side : edge.sides) {
+          Triangle key = triangles_[side.triangle()];
+          std::sort(key.begin(), key.end());
+          sorted.emplace_back(key, side.triangle());
+        }
+      });
+      // Back to back over a whole edge that only the two of them have.
+      sides.for_each_edge([&](const SideGroups::Edge& edge) {
+        if (edge.sides.size() != 2) return;
+        Triangle a = triangles_[edge.sides[0].triangle()], b = triangles_[edge.sides[1].triangle()];
+        std::sort(a.begin(), a.end());
+        std::sort(b.begin(), b.end());
+        if (a != b) return;
+        sorted.emplace_back(a, edge.sides[0].triangle());
+        sorted.emplace_back(a, edge.sides[1].triangle());
+      });
+    }
+    std::sort(sorted.begin(), sorted.end());
+    sorted.erase(std::unique(sorted.begin(), sorted.end()), sorted.end());
+    std::size_t fins = 0;
+    for (std::size_t i = 0; i < sorted.size();) {
+      std::size_t end = i;
+      std::vector<Index> even, odd;
+      for (; end < sorted.size() && sorted[end].first == sorted[i].first; ++end) {
+        const Triangle& t = triangles_[sorted[end].second];
+        const auto least = std::min_element(t.begin(), t.end()) - t.begin();
+        const bool up = t[static_cast<std::size_t>(least + 1) % 3] == sorted[i].first[1];
+        (up ? even : odd).push_back(sorted[end].second);
+      }
+      for (std::size_t k = 0; k < std::min(even.size(), odd.size()); ++k) {
+        gone[even[k]] = gone[odd[k]] = 1;
+        ++fins;
+      }
+      i = end;
+    }
+    if (fins == 0) return;
+    note(fins, "pair of faces back to back left out", "pairs of faces back to back left out");
+    drop(gone);
+  }
+
+  void drop(const std::vector<char>& gone) {
+    std::size_t kept = 0;
+    for (std::size_t t = 0; t < triangles_.size(); ++t) {
+      if (gone[t] != 0) continue;
+      triangles_[kept] = triangles_[t];
+      face_[kept++] = face_[t];
+    }
+    triangles_.resize(kept);
+    face_.resize(kept);
+  }
+
+  void drop_gone() {
+    std::vector<char> gone(triangles_.size(), 0);
+    for (std::size_t t = 0; t < triangles_.size(); ++t) gone[t] = triangles_[t][0] == kNoPoint;
+    drop(gone);
+  }
+
+  std::string label(Index point) const { return naming_.label(vertex_[point], points_[point]); }
+
+  // Along every edge as many triangles run one way as the other.
+  void balance() {
+    MeshFaults faults;
+    const SideGroups sides(points_.size(), triangles_);
+    sides.for_each_edge([&](const SideGroups::Edge& edge) {
+      const auto up = static_cast<std::size_t>(
+          std::count_if(edge.sides.begin(), edge.sides.end(),
+                        [&](const SideGroups::Side& side) { return side.up(); }));
+      if (2 * up == edge.sides.size()) return;
+      const Index face = face_[edge.sides[0].triangle()];
+      const std::string name =
+          "edge " + label(edge.low) + "-" + label(edge.high) + " of " + name_of_face(soup_, face);
+      if (edge.sides.size() == 1) {
+        faults.add("open", [&] {
+          return name + " has no face on its other side; expected a closed surface" + kClose;
+        });
+      } else if (edge.sides.size() == 2) {
+        faults.add("turned face", [&] {
+          return name + " runs the same way in " +
+                 name_of_face(soup_, face_[edge.sides[1].triangle()]) +
+                 "; expected opposite ways (all faces counter-clockwise seen from outside)" +
+                 kClose;
+        });
+      } else {
+        faults.add("shared edge", [&] {
+          return name + " belongs to " + std::to_string(edge.sides.size()) + " faces, of which " +
+                 std::to_string(up) + " run one way; expected as many both ways" + kClose;
+        });
+      }
+    });
+    faults.throw_if_any();
+  }
+
+  ClosedSurface take_surface() {
+    ClosedSurface surface;
+    if (triangles_.empty()) {
+      MeshFaults faults;
+      faults.add("flat", [] { return "expected a solid, found no volume"; });
+      faults.throw_if_any();
+    }
+    std::vector<Index> number(points_.size(), kNoPoint);
+    for (Triangle& t : triangles_) {
+      for (Index& v : t) {
+        if (number[v] == kNoPoint) {
+          number[v] = static_cast<Index>(surface.vertices.size());
+          surface.vertices.push_back(points_[v]);
+        }
+        v = number[v];
+      }
+    }
+    surface.triangles = std::move(triangles_);
+    surface.across = std::move(across_);
+    return surface;
+  }
+
+  const PolygonSoup& soup_;
+  const MeshNaming naming_;
+  std::vector<std::string> notes_;
+  std::vector<Index> point_of_;  // of each vertex of the soup
+  std::vector<Vec3> points_;
+  std::vector<Index> vertex_;  // the soup's number of each point
+  std::vector<Triangle> triangles_, across_;
+  std::vector<Index> face_;  // the soup's number of each triangle's face
+  std::size_t dropped_ = 0;
+  double error_ = 0;  // m, of a coordinate
+};
+
+}  // namespace
+
+CleanedSurface closed_surface(const PolygonSoup& soup) { return Cleaner(soup).run(); }
+
+}  // namespace palpate::stimuli

@@ -1,0 +1,39 @@
+#pragma once
+// A closed, oriented surface of triangles, as any mesh file gives one: what "inside" means to the
+// renderers. The mesh's own frame, SI units.
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "stimuli/convex_mesh.h"
+#include "stimuli/vec.h"
+
+namespace palpate::stimuli {
+
+/// Every side of a triangle has one neighbour, which runs along it the opposite way. The solid is
+/// where the surface winds round a point a positive number of times; it nowhere winds round one a
+/// negative number of times.
+struct ClosedSurface {
+  std::vector<Vec3> vertices;  ///< m; no two at the same place, each in some triangle
+  /// Counter-clockwise seen from outside; three different corners, never in one line.
+  std::vector<std::array<std::uint32_t, 3>> triangles;
+  /// The triangle beyond the side from corner k to corner k + 1. Where more than two triangles meet
+  /// in an edge, each two neighbours have solid between them.
+  std::vector<std::array<std::uint32_t, 3>> across;
+};
+
+/// The surface that polygons bound, and what was done to them to get it.
+struct CleanedSurface {
+  ClosedSurface surface;
+  std::vector<std::string> notes;  ///< "3 faces without area left out"; empty: taken as they stand
+};
+
+/// Welds corners at equal coordinates, triangulates, leaves out triangles without area within the
+/// coordinates' error (their neighbours close the gap). Shells may overlap.
+/// \throws MeshError with the faults of the polygons as their file names them, and advice: open,
+/// turned, inside out, winds round some place a negative number of times, not finite, too large.
+CleanedSurface closed_surface(const PolygonSoup& soup);
+
+}  // namespace palpate::stimuli

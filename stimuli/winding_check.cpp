@@ -1,0 +1,423 @@
+#include "stimuli/winding_check.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstdio>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <limits>
+#include <numeric>
+#include <optional>
+#include <utility>
+
+#include "stimuli/mesh_faults.h"
+
+namespace palpate::stimuli {
+namespace {
+
+using Index = std::uint32_t;
+using Triangle = std::array<Index, 3>;
+
+struct Box {
+  Vec3 low{std::numeric_limits<double>::max()}, high{-low};
+  void add(const Vec3& p) {
+    low = glm::min(low, p);
+    high = glm::max(high, p);
+  }
+  void add(const Box& box) {
+    low = glm::min(low, box.low);
+    high = glm::max(high, box.high);
+  }
+  bool meets(const Box& box) const {
+    return low.x <= box.high.x && box.low.x <= high.x && low.y <= box.high.y &&
+           box.low.y <= high.y && low.z <= box.high.z && box.low.z <= high.z;
+  }
+};
+
+/// A tree over the triangles, halved along a space-filling curve.
+class Tree {
+ public:
+  struct Node {
+    Box box;
+    Index begin = 0, end = 0;  ///< of `order`
+    Index right = 0;           ///< the left child is the next node; 0: a leaf
+  };
+
+  explicit Tree(const ClosedSurface& surface) : surface_(surface) {
+    Box all;
+    for (const Vec3& v : surface.vertices) all.add(v);
+    const double size = std::max({all.high.x - all.low.x, all.high.y - all.low.y,
+                                  all.high.z - all.low.z, std::numeric_limits<double>::min()});
+    std::vector<std::pair<std::uint64_t, Index>> keys(surface.triangles.size());
+    for (Index t = 0; t < keys.size(); ++t) {
+      const Triangle& c = surface.triangles[t];
+      const Vec3 middle =
+          (surface.vertices[c[0]] + surface.vertices[c[1]] + surface.vertices[c[2]]) / 3.0;
+      keys[t] = {morton((middle - all.low) / size), t};
+    }
+    std::sort(keys.begin(), keys.end());
+    order_.reserve(keys.size());
+    for (const auto& [key, t] : keys) order_.push_back(t);
+    nodes_.reserve(keys.size());
+    build(keys, 0, static_cast<Index>(keys.size()));
+  }
+
+  const std::vector<Node>& nodes() const { return nodes_; }
+  Index triangle(Index i) const { return order_[i]; }
+  Box box(Index t) const {
+    Box box;
+    for (const Index v : surface_.triangles[t]) box.add(surface_.vertices[v]);
+    return box;
+  }
+
+ private:
+  static constexpr Index kLeaf = 4;
+
+  // Every third bit.
+  static std::uint64_t spread(double x) {
+    auto bits = static_cast<std::uint64_t>(std::clamp(x, 0.0, 1.0) * 2097151);
+    bits = (bits | bits << 32U) & 0x1f00000000ffffU;
+    bits = (bits | bits << 16U) & 0x1f0000ff0000ffU;
+    bits = (bits | bits << 8U) & 0x100f00f00f00f00fU;
+    bits = (bits | bits << 4U) & 0x10c30c30c30c30c3U;
+    return (bits | bits << 2U) & 0x1249249249249249U;
+  }
+  static std::uint64_t morton(const Vec3& at) {
+    return spread(at.x) << 2U | spread(at.y) << 1U | spread(at.z);
+  }
+
+  void build(const std::vector<std::pair<std::uint64_t, Index>>& keys, Index begin, Index end) {
+    const std::size_t self = nodes_.size();
+    nodes_.push_back({{}, begin, end, 0});
+    if (end - begin <= kLeaf) {
+      for (Index i = begin; i < end; ++i) nodes_[self].box.add(box(order_[i]));
+      return;
+    }
+    // Where the highest bit changes; equal keys are halved.
+    Index middle = begin + (end - begin) / 2;
+    const std::uint64_t different = keys[begin].first ^ keys[end - 1].first;
+    if (different != 0) {
+      const std::uint64_t bit = std::bit_floor(different);
+      const auto split =
+          std::partition_point(keys.begin() + begin, keys.begin() + end,
+                               [&](const auto& key) { return (key.first & bit) == 0; });
+      middle = static_cast<Index>(split - keys.begin());
+    }
+    build(keys, begin, middle);
+    const auto right = static_cast<Index>(nodes_.size());
+    nodes_[self].right = right;
+    build(keys, middle, end);
+    nodes_[self].box = nodes_[self + 1].box;
+    nodes_[self].box.add(nodes_[right].box);
+  }
+
+  const ClosedSurface& surface_;
+  std::vector<Index> order_;
+  std::vector<Node> nodes_;
+};
+
+// Sign of (b - a) x (q - a) in x and y with q moved by an infinitesimal (e, e^2): never 0 unless a
+// and b are at one place. Exact, so neighbours agree on the side that they share.
+int side_of(const Vec3& a, const Vec3& b, const Vec3& q) {
+  const double left = (b.x - a.x) * (q.y - a.y), right = (b.y - a.y) * (q.x - a.x);
+  const double det = left - right;
+  // Shewchuk 1997, orient2d: the error of the plain formula.
+  if (std::abs(det) > 3.4e-16 * (std::abs(left) + std::abs(right))) return det > 0 ? 1 : -1;
+  // The six products as exact sums of two numbers, added without error.
+  std::array<double, 12> sum{};
+  std::size_t count = 0;
+  const auto add = [&](double value) {
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+      const double total = value + sum[i], back = total - value;
+      const double error = (value - (total - back)) + (sum[i] - back);
+      if (error != 0) sum[kept++] = error;
+      value = total;
+    }
+    sum[kept++] = value;
+    count = kept;
+  };
+  const auto add_product = [&](double x, double y) {
+    const double product = x * y;
+    add(std::fma(x, y, -product));
+    add(product);
+  };
+  add_product(a.x, b.y);
+  add_product(-a.y, b.x);
+  add_product(b.x, q.y);
+  add_product(-b.y, q.x);
+  add_product(q.x, a.y);
+  add_product(-q.y, a.x);
+  if (sum[count - 1] != 0) return sum[count - 1] > 0 ? 1 : -1;
+  if (b.y != a.y) return b.y < a.y ? 1 : -1;
+  return b.x > a.x ? 1 : b.x < a.x ? -1 : 0;
+}
+
+class WindingCheck {
+ public:
+  WindingCheck(const ClosedSurface& surface, double tolerance,
+               const std::function<std::string(Index)>& name)
+      : surface_(surface), tolerance_(tolerance), name_(name), tree_(surface) {}
+
+  void run() {
+    check_shells();
+    faults_.throw_if_any();
+    // Over triangles that cross no others, the number does not change from one to its neighbour.
+    // Where two cross, a region of a lower number begins outside both.
+    find_crossings();
+    faults_.throw_if_any();
+    check_regions();
+    faults_.throw_if_any();
+  }
+
+ private:
+  const Vec3& corner(Index t, Index k) const {
+    return surface_.vertices[surface_.triangles[t][k % 3]];
+  }
+  Vec3 area(Index t) const {
+    return glm::cross(corner(t, 1) - corner(t, 0), corner(t, 2) - corner(t, 0));
+  }
+  Vec3 middle(Index t) const { return (corner(t, 0) + corner(t, 1) + corner(t, 2)) / 3.0; }
+
+  template <class Visit>
+  void flood(Index from, std::vector<char>& seen, Visit visit) {
+    std::vector<Index> todo{from};
+    seen[from] = 1;
+    while (!todo.empty()) {
+      const Index t = todo.back();
+      todo.pop_back();
+      visit(t);
+      for (const Index n : surface_.across[t]) {
+        if (seen[n] != 0) continue;
+        seen[n] = 1;
+        todo.push_back(n);
+      }
+    }
+  }
+
+  // Volumes of all shells, by the divergence theorem.
+  void check_shells() {
+    std::vector<char> seen(surface_.triangles.size(), 0);
+    double total = 0, total_area = 0;
+    for (Index t = 0; t < seen.size(); ++t) {
+      if (seen[t] != 0) continue;
+      const Vec3 origin = corner(t, 0);
+      double volume = 0, whole_area = 0;
+      flood(t, seen, [&](Index s) {
+        const Vec3 twice = area(s);
+        volume += glm::dot(corner(s, 0) - origin, twice) / 6;
+        whole_area += glm::length(twice) / 2;
+      });
+      total += volume;
+      total_area += whole_area;
+    }
+    if (std::abs(total) <= tolerance_ / 2 * total_area) {
+      faults_.add("flat", [] { return "expected a solid, found no volume"; });
+    } else if (total < 0) {
+      faults_.add("inside out", [] {
+        return "all faces are clockwise seen from outside; expected counter-clockwise: turn the "
+               "faces over in a modelling program";
+      });
+    }
+  }
+
+  // How often the surface winds round a place: signed crossings of a ray along +z.
+  int winding(const Vec3& q) const {
+    int number = 0;
+    std::array<Index, 128> stack{};
+    std::size_t left = 0;
+    stack[left++] = 0;
+    while (left > 0) {
+      const Index at = stack[--left];
+      const Tree::Node& node = tree_.nodes()[at];
+      if (q.x < node.box.low.x || q.x > node.box.high.x || q.y < node.box.low.y ||
+          q.y > node.box.high.y || q.z > node.box.high.z)
+        continue;
+      if (node.right != 0) {
+        stack[left++] = node.right;
+        stack[left++] = at + 1;
+        continue;
+      }
+      for (Index i = node.begin; i < node.end; ++i) number += crossing(tree_.triangle(i), q);
+    }
+    return number;
+  }
+
+  int crossing(Index t, const Vec3& q) const {
+    const Vec3 &a = corner(t, 0), &b = corner(t, 1), &c = corner(t, 2);
+    const int side = side_of(a, b, q);
+    if (side == 0 || side_of(b, c, q) != side || side_of(c, a, q) != side) return 0;
+    const double height = glm::dot(area(t), q - a);
+    return (height < 0) == (side > 0) ? side : 0;
+  }
+
+  // van Oosterom & Strackee 1983, and the distance of every triangle: for a place that is accused.
+  bool truly_negative(const Vec3& q) const {
+    double angle = 0;
+    for (Index t = 0; t < surface_.triangles.size(); ++t) {
+      const Vec3 a = corner(t, 0) - q, b = corner(t, 1) - q, c = corner(t, 2) - q;
+      const double la = glm::length(a), lb = glm::length(b), lc = glm::length(c);
+      angle +=
+          std::atan2(glm::dot(a, glm::cross(b, c)), la * lb * lc + glm::dot(a, b) * lc +
+                                                        glm::dot(b, c) * la + glm::dot(c, a) * lb);
+    }
+    return angle / (2 * 3.14159265358979323846) < -0.5;
+  }
+
+  void examine(const Vec3& q, Index t, const char* why) {
+    if (winding(q) >= 0 || accused_ > 32) return;
+    ++accused_;
+    if (!truly_negative(q)) return;
+    faults_.add("negative", [&] {
+      char text[200];
+      std::snprintf(text, sizeof text,
+                    ": the surface winds a negative number of times round a place near it, "
+                    "(%.6g, %.6g, %.6g) m: ",
+                    q.x, q.y, q.z);
+      return name_(t) + text + why + "; repair and orient the faces in a modelling program";
+    });
+  }
+
+  // Places just outside some triangles of each region that nothing crosses, and of all others.
+  void check_regions() {
+    std::vector<char> seen = crossed_;
+    for (Index t = 0; t < seen.size(); ++t) {
+      if (crossed_[t] != 0) {
+        examine_over(t, "it passes through itself");
+        continue;
+      }
+      if (seen[t] != 0) continue;
+      std::array<std::pair<double, Index>, 3> largest{};
+      flood(t, seen, [&](Index s) {
+        const double size = glm::length(area(s));
+        if (size > largest[2].first) largest[2] = {size, s};
+        if (largest[2].first > largest[1].first) std::swap(largest[2], largest[1]);
+        if (largest[1].first > largest[0].first) std::swap(largest[1], largest[0]);
+      });
+      for (const auto& [size, s] : largest) {
+        if (size > 0) examine_over(s, "a shell there is turned inside out");
+      }
+    }
+  }
+
+  void examine_over(Index t, const char* why) {
+    const Vec3 twice = area(t);
+    const double size = glm::length(twice);
+    if (size > 0) examine(middle(t) + twice * (2 * tolerance_ / size), t, why);
+  }
+
+  void find_crossings() {
+    crossed_.assign(surface_.triangles.size(), 0);
+    budget_ = 64 * surface_.triangles.size() + 100'000'000;
+    cross(0, 0);
+    if (budget_ == 0) {
+      faults_.add("tangled", [] {
+        return "too many faces pass through each other; remove those inside of the solid in a "
+               "modelling program";
+      });
+    }
+  }
+
+  void cross(Index a, Index b) {
+    if (budget_ == 0) return;
+    const Tree::Node &x = tree_.nodes()[a], &y = tree_.nodes()[b];
+    if (a != b && !x.box.meets(y.box)) return;
+    if (x.right == 0 && y.right == 0) {
+      for (Index i = x.begin; i < x.end; ++i) {
+        for (Index k = a == b ? i + 1 : y.begin; k < y.end; ++k)
+          cross_pair(tree_.triangle(i), tree_.triangle(k));
+      }
+    } else if (a == b) {
+      cross(a + 1, a + 1);
+      cross(x.right, x.right);
+      cross(a + 1, x.right);
+    } else if (y.right == 0 || (x.right != 0 && x.end - x.begin >= y.end - y.begin)) {
+      cross(a + 1, b);
+      cross(x.right, b);
+    } else {
+      cross(a, b + 1);
+      cross(a, y.right);
+    }
+  }
+
+  void cross_pair(Index s, Index t) {
+    if (budget_ > 0) --budget_;
+    int shared = 0;
+    for (const Index v : surface_.triangles[s]) {
+      for (const Index w : surface_.triangles[t]) shared += v == w ? 1 : 0;
+    }
+    if (shared >= 2) return;
+    if (shared == 0 && !tree_.box(s).meets(tree_.box(t))) return;
+    const Vec3 n = area(s), m = area(t);
+    std::array<double, 3> of_t{}, of_s{};  // heights over the planes, times the areas
+    for (Index k = 0; k < 3; ++k) {
+      of_t[k] = glm::dot(n, corner(t, k) - corner(s, 0));
+      of_s[k] = glm::dot(m, corner(s, k) - corner(t, 0));
+    }
+    const double near_s = tolerance_ * glm::length(n), near_t = tolerance_ * glm::length(m);
+    const auto apart = [](const std::array<double, 3>& h, double near) {
+      return (h[0] > near && h[1] > near && h[2] > near) ||
+             (h[0] < -near && h[1] < -near && h[2] < -near);
+    };
+    if (apart(of_t, near_s) || apart(of_s, near_t)) return;
+    // Where the line that both planes share runs through both (Moeller 1997).
+    const Vec3 along = glm::cross(n, m);
+    const double steep = glm::length(along);
+    if (steep <= 1e-9 * glm::length(n) * glm::length(m)) {  // in one plane
+      if (shared == 0) crossed_[s] = crossed_[t] = 1;
+      return;
+    }
+    Vec3 s_low, s_high, t_low, t_high;
+    if (!cut(s, of_s, s_low, s_high, along) || !cut(t, of_t, t_low, t_high, along)) return;
+    const double low_s = glm::dot(along, s_low - s_low), high_s = glm::dot(along, s_high - s_low);
+    const double low_t = glm::dot(along, t_low - s_low), high_t = glm::dot(along, t_high - s_low);
+    const double low = std::max(low_s, low_t), high = std::min(high_s, high_t);
+    if (low > high) return;
+    if (shared == 1 && high - low <= tolerance_ * steep) return;  // only in the shared corner
+    crossed_[s] = crossed_[t] = 1;
+    const Vec3 unit_n = glm::normalize(n), unit_m = glm::normalize(m), sum = unit_n + unit_m;
+    const double outside = glm::dot(sum, unit_n);  // of both
+    if (outside < 1e-3) return;
+    const Vec3 at = s_low + along * ((low + high) / 2 / (steep * steep));
+    examine(at + sum * (2 * tolerance_ / outside), s, "it passes through itself");
+  }
+
+  // The ends of what a plane cuts out of a triangle whose corners have these heights over it.
+  bool cut(Index t, const std::array<double, 3>& height, Vec3& low, Vec3& high,
+           const Vec3& along) const {
+    std::array<Vec3, 6> ends;
+    std::size_t count = 0;
+    for (Index k = 0; k < 3; ++k) {
+      const double a = height[k], b = height[(k + 1) % 3];
+      if (a == 0) ends[count++] = corner(t, k);
+      if ((a < 0 && b > 0) || (a > 0 && b < 0))
+        ends[count++] = corner(t, k) + (corner(t, k + 1) - corner(t, k)) * (a / (a - b));
+    }
+    if (count == 0) return false;
+    low = high = ends[0];
+    for (std::size_t i = 1; i < count; ++i) {
+      if (glm::dot(along, ends[i] - low) < 0) low = ends[i];
+      if (glm::dot(along, ends[i] - high) > 0) high = ends[i];
+    }
+    return true;
+  }
+
+  const ClosedSurface& surface_;
+  const double tolerance_;
+  const std::function<std::string(Index)>& name_;
+  const Tree tree_;
+  MeshFaults faults_;
+  std::vector<char> crossed_;
+  std::size_t budget_ = 0;
+  int accused_ = 0;
+};
+
+}  // namespace
+
+void check_winding(const ClosedSurface& surface, double tolerance,
+                   const std::function<std::string(Index)>& name) {
+  WindingCheck(surface, tolerance, name).run();
+}
+
+}  // namespace palpate::stimuli
