@@ -42,13 +42,15 @@ std::string contents(const std::string& path, FileFaults& faults) {
   return bytes;
 }
 
-enum class MeshFormat { obj, stl, gltf, none };
+enum class MeshFormat { obj, stl, gltf, ply, off, none };
 
 MeshFormat format_of(const std::string& path, FileFaults& faults) {
   const std::string extension = lower_extension(path);
   if (extension == ".obj") return MeshFormat::obj;
   if (extension == ".stl") return MeshFormat::stl;
   if (extension == ".gltf" || extension == ".glb") return MeshFormat::gltf;
+  if (extension == ".ply") return MeshFormat::ply;
+  if (extension == ".off") return MeshFormat::off;
   faults.add("", std::string("a name that ends in ") + kMeshExtensions, in_quotes(extension));
   return MeshFormat::none;
 }
@@ -160,6 +162,8 @@ PolygonSoup read_mesh(const std::string& path, const std::string& bytes) {
     text.remove_prefix(3);
   PolygonSoup soup = format == MeshFormat::obj   ? read_obj(text, faults)
                      : format == MeshFormat::stl ? read_stl(text, faults)
+                     : format == MeshFormat::ply ? read_ply(text, faults)
+                     : format == MeshFormat::off ? read_off(text, faults)
                                                  : read_gltf(text, faults);
   faults.throw_if_any();
   return soup;

@@ -76,9 +76,12 @@ class AsciiReader {
         inside_ = is("solid");
         skip_line();
         advance();
-      } else {
+      } else if (inside_ || soup_.faces.empty()) {
         fault("facet or endsolid");
         skip_facet();
+      } else {  // what follows a solid and is none
+        skip_line();
+        advance();
       }
     }
     if (inside_) fault("facet or endsolid");
@@ -181,6 +184,8 @@ PolygonSoup read_stl(std::string_view bytes, FileFaults& faults) {
     soup = read_binary(bytes, faults);
   } else if (is_text(bytes)) {
     soup = AsciiReader(bytes, faults).read();
+  } else if (has_header && bytes.size() > kHeader + kTriangle * count) {
+    soup = read_binary(bytes, faults);  // what follows is no triangle, and some programs write it
   } else if (has_header) {
     faults.add("byte 80",
                std::to_string(kHeader + kTriangle * count) + " bytes for " + std::to_string(count) +

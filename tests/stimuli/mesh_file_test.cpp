@@ -272,17 +272,18 @@ TEST_F(MeshFile, AsciiStlFaultsNameTheLine) {
   expect_fault("a.stl", with("outer", "inner"), ": line 3: expected outer");
   expect_fault("a.stl", with("endfacet", ""), ": line 9: expected endfacet, found \"facet\"");
   expect_fault("a.stl", good.substr(0, 200), "found the end of the file");
-  expect_fault("a.stl", good + "more", "expected facet or endsolid");
+  EXPECT_EQ(read("a.stl", good + "more\nand more").faces.size(), 12U);
+  expect_fault("a.stl", "solid a\nmore\n", "expected facet or endsolid");
   expect_fault("a.stl", "solid a\nendsolid a\n", "at least one triangle");
   EXPECT_EQ(read("a.stl", with("facet", "FACET")).faces.size(), 12U);
 }
 
-TEST_F(MeshFile, ABinaryStlMustHaveTheSizeThatItClaims) {
+TEST_F(MeshFile, ABinaryStlMustHaveTheTrianglesThatItClaims) {
   const std::string good = as_binary_stl(triangulated(cube(1)), "x");
   for (const std::string header : {"x", "solid x"}) {
     std::string bytes = as_binary_stl(triangulated(cube(1)), header);
     EXPECT_EQ(read("a.stl", bytes).faces.size(), 12U);
-    expect_fault("a.stl", bytes + "x", "byte 80: expected 684 bytes for 12 triangles, found 685");
+    EXPECT_EQ(read("a.stl", bytes + "x").faces.size(), 12U);
     expect_fault("a.stl", bytes.substr(0, 600), "found 600 bytes");
     bytes.replace(80, 4, word_bytes(0xffffffff));
     expect_fault("a.stl", bytes, "for 4294967295 triangles");
@@ -350,7 +351,7 @@ TEST_F(MeshFileSurface, FaultsOfAnStlHaveItsPlacesAndCoordinates) {
 }
 
 TEST_F(MeshFile, OtherThingsThanMeshFilesAreRefused) {
-  expect_fault("a.ply", "ply", ".obj, .stl, .gltf or .glb");
+  expect_fault("a.3ds", "ply", ".obj, .stl, .gltf, .glb, .ply or .off");
   EXPECT_THROW(read_mesh_file(folder_ / "none.obj"), MeshError);
   std::filesystem::create_directory(folder_ / "folder.stl");
   EXPECT_THROW(read_mesh_file(folder_ / "folder.stl"), MeshError);
