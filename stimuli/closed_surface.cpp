@@ -28,6 +28,10 @@ constexpr const char* kClose = "; fill holes and orient faces in a modelling pro
 
 // m, in units of a coordinate's error: nearer than this, a corner lies on a line or on another one.
 constexpr double kFlatErrors = 4;
+// m, in the same units: corners on open edges nearer than this are meant to be one.
+constexpr double kRimErrors = 8;
+// A surface with more open edges than this is no closed one with flaws.
+constexpr std::size_t kMostRims = 20000;
 
 std::string counted(std::size_t count, const char* one, const char* many) {
   return std::to_string(count) + ' ' + (count == 1 ? one : many);
@@ -101,8 +105,9 @@ class Cleaner {
       high = glm::max(high, point);
     }
     const Vec3 far = glm::max(glm::abs(low), glm::abs(high));
+    size_ = glm::length(high - low);
     error_ =
-        std::max({soup_.coordinate_error, 1e-11 * glm::length(high - low),
+        std::max({soup_.coordinate_error, 1e-11 * size_,
                   8 * std::numeric_limits<double>::epsilon() * std::max({far.x, far.y, far.z})});
   }
 
@@ -213,36 +218,234 @@ class Cleaner {
 
   std::string label(Index point) const { return naming_.label(vertex_[point], points_[point]); }
 
-  // Along every edge as many triangles run one way as the other.
+  /// Of the edges along which more triangles run one way than the other.
+  struct Unbalanced {
+    std::size_t open = 0, other = 0;           ///< edges of one triangle; of more
+    std::vector<SideGroups::Side> sides = {};  ///< of the open ones
+  };
+
+  Unbalanced unbalanced() const {
+    Unbalanced found;
+    SideGroups(points_.size(), triangles_).for_each_edge([&](const SideGroups::Edge& edge) {
+      if (2 * ups(edge) == edge.sides.size()) return;
+      ++(edge.sides.size() == 1 ? found.open : found.other);
+      if (edge.sides.size() == 1) found.sides.push_back(edge.sides[0]);
+    });
+    return found;
+  }
+
+  static std::size_t ups(const SideGroups::Edge& edge) {
+    return static_cast<std::size_t>(
+        std::count_if(edge.sides.begin(), edge.sides.end(),
+                      [](const SideGroups::Side& side) { return side.up(); }));
+  }
+
+  bool balanced() const {
+    const Unbalanced found = unbalanced();
+    return found.open + found.other == 0;
+  }
+
+  // Along every edge as many triangles run one way as the other. What prevents it is mended only
+  // where there is one way to do it.
   void balance() {
+    Unbalanced found = unbalanced();
+    if (found.open + found.other == 0) return;
+    const std::vector<Triangle> triangles = triangles_;
+    const std::vector<Index> faces = face_;
+    const std::vector<std::string> notes = notes_;
+    if (found.other > 0 && drop_twins()) found = unbalanced();
+    if (found.other == 0 && found.open > 0 && weld_rims(found)) found = unbalanced();
+    if (found.other == 0 && found.open > 0) split_rims(found);
+    if (balanced()) return;
+    triangles_ = triangles;
+    face_ = faces;
+    notes_ = notes;
+    report_unbalanced();
+  }
+
+  // Faces that are given twice, turned the same way.
+  bool drop_twins() {
+    std::vector<std::pair<Triangle, Index>> sorted;
+    for (Index t = 0; t < triangles_.size(); ++t) {
+      Triangle key = triangles_[t];
+      std::rotate(key.begin(), std::min_element(key.begin(), key.end()), key.end());
+      sorted.emplace_back(key, t);
+    }
+    std::sort(sorted.begin(), sorted.end());
+    std::vector<char> gone(triangles_.size(), 0);
+    std::size_t twins = 0;
+    for (std::size_t i = 1; i < sorted.size(); ++i) {
+      if (sorted[i].first != sorted[i - 1].first) continue;
+      gone[sorted[i].second] = 1;
+      ++twins;
+    }
+    note(twins, "face that is given twice left out once",
+         "faces that are given twice left out once");
+    drop(gone);
+    return twins > 0;
+  }
+
+  std::vector<Index> rim_points(const Unbalanced& found) const {
+    std::vector<Index> rim;
+    for (const SideGroups::Side& side : found.sides) {
+      const Triangle& t = triangles_[side.triangle()];
+      rim.push_back(t[side.k()]);
+      rim.push_back(t[(side.k() + 1) % 3]);
+    }
+    std::sort(rim.begin(), rim.end());
+    rim.erase(std::unique(rim.begin(), rim.end()), rim.end());
+    return rim;
+  }
+
+  // For each of them the first that it is welded to.
+  std::vector<Index> welded(const std::vector<Index>& rim, double within) const {
+    std::vector<Vec3> at;
+    for (const Index v : rim) at.push_back(points_[v]);
+    return weld(at, within);
+  }
+
+  // Corners on open edges that differ in the last digits only. \return whether there are some
+  bool weld_rims(const Unbalanced& found) {
+    const std::vector<Index> rim = rim_points(found);
+    const double within = kRimErrors * error_;
+    const std::vector<Index> kept = welded(rim, within);
+    // Others that are nearly as near: it could have been meant otherwise.
+    if (kept != welded(rim, 4 * within)) return false;
+    std::vector<Index> to(points_.size());
+    std::iota(to.begin(), to.end(), Index{0});
+    std::size_t moved = 0;
+    double farthest = 0;
+    for (std::size_t i = 0; i < rim.size(); ++i) {
+      if (kept[i] == i) continue;
+      to[rim[i]] = rim[kept[i]];
+      ++moved;
+      farthest = std::max(farthest, glm::distance(points_[rim[i]], points_[rim[kept[i]]]));
+    }
+    if (moved == 0) return false;
+    std::vector<Triangle> triangles = std::move(triangles_);
+    const std::vector<Index> faces = std::move(face_);
+    triangles_.clear();
+    face_.clear();
+    for (std::size_t i = 0; i < triangles.size(); ++i)
+      add_triangle({to[triangles[i][0]], to[triangles[i][1]], to[triangles[i][2]]}, faces[i]);
+    char text[120];
+    std::snprintf(text, sizeof text,
+                  " on an open edge made one with another that is at most %.2g m from it",
+                  farthest);
+    note(moved, (std::string("corner") + text).c_str(),
+         (std::string("corners, each") + text).c_str());
+    return true;
+  }
+
+  // Open edges on which corners of others lie: they are cut there.
+  void split_rims(const Unbalanced& found) {
+    if (found.sides.size() > kMostRims) return;
+    std::vector<std::pair<double, Index>> along_x;
+    for (const Index v : rim_points(found)) along_x.emplace_back(points_[v].x, v);
+    std::sort(along_x.begin(), along_x.end());
+    const double within = kRimErrors * error_;
+    std::vector<std::pair<Index, std::vector<Index>>> cut;  // triangle, its corners with new ones
+    std::vector<SideGroups::Side> sides = found.sides;
+    std::sort(sides.begin(), sides.end(),
+              [](const auto& a, const auto& b) { return a.code < b.code; });
+    std::size_t added = 0;
+    for (std::size_t i = 0; i < sides.size();) {
+      const Index t = sides[i].triangle();
+      std::vector<Index> loop;
+      const std::size_t before = added;
+      for (Index k = 0; k < 3; ++k) {
+        loop.push_back(triangles_[t][k]);
+        if (i == sides.size() || sides[i].triangle() != t || sides[i].k() != k) continue;
+        ++i;
+        for (const Index v :
+             between(triangles_[t][k], triangles_[t][(k + 1) % 3], along_x, within)) {
+          loop.push_back(v);
+          ++added;
+        }
+      }
+      if (added > before) cut.emplace_back(t, std::move(loop));
+    }
+    if (added == 0) return;
+    for (const auto& [t, loop] : cut) {
+      std::vector<Vec3> corners;
+      for (const Index v : loop) corners.push_back(points_[v]);
+      const std::vector<Triangle> pieces = face_triangles(corners);
+      for (std::size_t i = 0; i < pieces.size(); ++i) {
+        const Triangle piece{loop[pieces[i][0]], loop[pieces[i][1]], loop[pieces[i][2]]};
+        if (i == 0) {
+          triangles_[t] = piece;
+        } else {
+          add_triangle(piece, face_[t]);
+        }
+      }
+    }
+    note(added, "edge cut at a corner of another face that lies on it",
+         "edges cut at corners of other faces that lie on them");
+  }
+
+  // Corners on the way from a to b, in order.
+  std::vector<Index> between(Index a, Index b, const std::vector<std::pair<double, Index>>& along_x,
+                             double within) const {
+    const Vec3 from = points_[a], way = points_[b] - from;
+    const double length = glm::length(way);
+    std::vector<std::pair<double, Index>> on;
+    const double low = std::min(from.x, points_[b].x) - within;
+    const double high = std::max(from.x, points_[b].x) + within;
+    for (auto i = std::lower_bound(along_x.begin(), along_x.end(), std::pair(low, Index{0}));
+         i != along_x.end() && i->first <= high; ++i) {
+      const Vec3 apart = points_[i->second] - from;
+      const double at = glm::dot(apart, way) / length;
+      if (at <= within || at >= length - within) continue;
+      if (glm::length(apart - way * (at / length)) <= within) on.emplace_back(at, i->second);
+    }
+    std::sort(on.begin(), on.end());
+    std::vector<Index> corners;
+    for (const auto& [at, v] : on) corners.push_back(v);
+    return corners;
+  }
+
+  void report_unbalanced() const {
     MeshFaults faults;
-    const SideGroups sides(points_.size(), triangles_);
-    sides.for_each_edge([&](const SideGroups::Edge& edge) {
-      const auto up = static_cast<std::size_t>(
-          std::count_if(edge.sides.begin(), edge.sides.end(),
-                        [&](const SideGroups::Side& side) { return side.up(); }));
+    std::size_t near = 0;
+    SideGroups(points_.size(), triangles_).for_each_edge([&](const SideGroups::Edge& edge) {
+      const std::size_t up = ups(edge);
       if (2 * up == edge.sides.size()) return;
-      const Index face = face_[edge.sides[0].triangle()];
-      const std::string name =
-          "edge " + label(edge.low) + "-" + label(edge.high) + " of " + name_of_face(soup_, face);
+      const auto name = [&] {
+        return "edge " + label(edge.low) + "-" + label(edge.high) + " of " +
+               name_of_face(soup_, face_[edge.sides[0].triangle()]);
+      };
       if (edge.sides.size() == 1) {
         faults.add("open", [&] {
-          return name + " has no face on its other side; expected a closed surface" + kClose;
+          return name() + " has no face on its other side; expected a closed surface" + kClose;
         });
       } else if (edge.sides.size() == 2) {
         faults.add("turned face", [&] {
-          return name + " runs the same way in " +
+          return name() + " runs the same way in " +
                  name_of_face(soup_, face_[edge.sides[1].triangle()]) +
                  "; expected opposite ways (all faces counter-clockwise seen from outside)" +
                  kClose;
         });
       } else {
         faults.add("shared edge", [&] {
-          return name + " belongs to " + std::to_string(edge.sides.size()) + " faces, of which " +
-                 std::to_string(up) + " run one way; expected as many both ways" + kClose;
+          return name() + " belongs to " + std::to_string(edge.sides.size()) + " faces, and " +
+                 std::to_string(up) + " of them run one way; expected as many both ways" + kClose;
         });
       }
     });
+    const std::vector<Index> rim = rim_points(unbalanced());
+    const double within = 1e-5 * size_;
+    const std::vector<Index> kept = welded(rim, within);
+    for (std::size_t i = 0; i < kept.size(); ++i) near += kept[i] != i ? 1 : 0;
+    if (near > 0) {
+      faults.add("crowded", [&] {
+        char text[200];
+        std::snprintf(text, sizeof text,
+                      "%zu corners on open edges are nearer than %.1g m to another one: the edges "
+                      "may be open only there; merge corners by distance in a modelling program",
+                      near, within);
+        return std::string(text);
+      });
+    }
     faults.throw_if_any();
   }
 
@@ -277,6 +480,7 @@ class Cleaner {
   std::vector<Triangle> triangles_, across_;
   std::vector<Index> face_;  // the soup's number of each triangle's face
   std::size_t dropped_ = 0;
+  double size_ = 0;   // m, diagonal of the bounding box
   double error_ = 0;  // m, of a coordinate
 };
 

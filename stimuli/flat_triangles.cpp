@@ -26,6 +26,7 @@ class Flattening {
     // Some only can be taken out after others.
     std::vector<Index> left = first;
     for (int round = 0; round < 16 && !left.empty(); ++round) {
+      last_resort_ = round > 1;
       todo_ = left;
       // A flip can make another flat triangle, so the number of steps is bounded.
       for (std::size_t steps = 16 * left.size() + 16; !todo_.empty() && steps > 0; --steps) {
@@ -39,7 +40,7 @@ class Flattening {
       std::sort(left.begin(), left.end());
       left.erase(std::unique(left.begin(), left.end()), left.end());
       std::erase_if(left, [&](Index t) { return gone(t) || !flat(triangles_[t]); });
-      if (left.size() == before) break;
+      if (left.size() >= before && round > 2) break;
     }
     return first.size() > left.size() ? first.size() - left.size() : 0;
   }
@@ -130,9 +131,10 @@ class Flattening {
     std::vector<Index> common;
     std::set_intersection(ring_from.begin(), ring_from.end(), ring_to.begin(), ring_to.end(),
                           std::back_inserter(common));
-    // Else two other sides would become one.
+    // Else two other edges would become one, of four triangles.
+    if (common.size() != 2 && !last_resort_) return false;
     const Index end = triangles_[t][(k + 1) % 3], begin = triangles_[t][k];
-    if (common.size() != 2 || std::count(ring_from.begin(), ring_from.end(), end) != 1 ||
+    if (std::count(ring_from.begin(), ring_from.end(), end) != 1 ||
         std::count(ring_to.begin(), ring_to.end(), begin) != 1)
       return false;
     return move(from, t, k, n, j) || move(to, n, j, t, k);
@@ -171,7 +173,10 @@ class Flattening {
       if (glm::distance(points_[b], points_[d]) >= glm::distance(points_[a], points_[c])) return;
     } else {
       const Vec3 normal = area(triangles_[n]);
-      if (glm::dot(area(one), normal) <= 0 || glm::dot(area(other), normal) <= 0) return;
+      const auto fits = [&](const Triangle& piece) {
+        return glm::dot(area(piece), normal) > 0 || (last_resort_ && flat(piece));
+      };
+      if (!fits(one) || !fits(other)) return;
     }
     const Index over_ab = across_[t][(k + 1) % 3], over_bc = across_[t][(k + 2) % 3],
                 over_cd = across_[n][(j + 1) % 3], over_da = across_[n][(j + 2) % 3];
@@ -194,6 +199,7 @@ class Flattening {
   std::vector<Triangle>& across_;
   const double tolerance_;
   std::vector<Index> todo_, touched_;
+  bool last_resort_ = false;
 };
 
 }  // namespace

@@ -1,0 +1,397 @@
+#include "stimuli/closed_surface.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <limits>
+#include <numbers>
+#include <set>
+#include <tuple>
+#include <utility>
+
+#include "stimuli/mesh_file.h"
+#include "stimuli/orientation.h"
+#include "stimuli/parts/solid.h"
+#include "stimuli/primitives.h"
+#include "stimuli/random.h"
+#include "tests/shared/random_polyhedron.h"
+#include "tests/stimuli/concave_solids.h"
+
+namespace palpate::stimuli {
+namespace {
+
+using testing::placed;
+using testing::triangulated;
+
+TriangleSurface coordinates_of(const ClosedSurface& surface) {
+  TriangleSurface triangles;
+  for (const auto& t : surface.triangles)
+    triangles.push_back({surface.vertices[t[0]], surface.vertices[t[1]], surface.vertices[t[2]]});
+  return triangles;
+}
+
+// What the header promises of every surface.
+void expect_closed(const ClosedSurface& surface) {
+  std::vector<char> used(surface.vertices.size(), 0);
+  ASSERT_EQ(surface.across.size(), surface.triangles.size());
+  for (std::uint32_t t = 0; t < surface.triangles.size(); ++t) {
+    const auto& corners = surface.triangles[t];
+    const Vec3 area = glm::cross(surface.vertices[corners[1]] - surface.vertices[corners[0]],
+                                 surface.vertices[corners[2]] - surface.vertices[corners[0]]);
+    EXPECT_GT(glm::length(area), 0) << t;
+    for (std::size_t k = 0; k < 3; ++k) {
+      used.at(corners[k]) = 1;
+      const std::uint32_t n = surface.across[t][k];
+      const auto& other = surface.triangles.at(n);
+      const std::uint32_t from = corners[(k + 1) % 3], to = corners[k];
+      bool back = false;
+      for (std::size_t j = 0; j < 3; ++j)
+        back |= other[j] == from && other[(j + 1) % 3] == to && surface.across[n][j] == t;
+      EXPECT_TRUE(back) << t << " over " << k;
+    }
+  }
+  EXPECT_EQ(std::count(used.begin(), used.end(), 0), 0);
+  const auto before = [](const Vec3& a, const Vec3& b) {
+    return std::tie(a.x, a.y, a.z) < std::tie(b.x, b.y, b.z);
+  };
+  std::set<Vec3, decltype(before)> places(surface.vertices.begin(), surface.vertices.end(), before);
+  EXPECT_EQ(places.size(), surface.vertices.size());
+}
+
+double volume_of(const ClosedSurface& surface) { return bulk_of(coordinates_of(surface)).volume; }
+
+std::string notes_of(const CleanedSurface& cleaned) {
+  std::string text;
+  for (const std::string& note : cleaned.notes) text += note + "\n";
+  return text;
+}
+
+std::string fault_of(const PolygonSoup& soup) {
+  try {
+    closed_surface(soup);
+  } catch (const MeshError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+void append(PolygonSoup& soup, const PolygonSoup& other) {
+  const auto first = static_cast<std::uint32_t>(soup.vertices.size());
+  soup.vertices.insert(soup.vertices.end(), other.vertices.begin(), other.vertices.end());
+  for (std::vector<std::uint32_t> face : other.faces) {
+    for (std::uint32_t& v : face) v += first;
+    soup.faces.push_back(std::move(face));
+  }
+}
+
+PolygonSoup moved(PolygonSoup soup, const Vec3& by) {
+  for (Vec3& v : soup.vertices) v += by;
+  return soup;
+}
+
+PolygonSoup turned_over(PolygonSoup soup) {
+  for (auto& face : soup.faces) std::reverse(face.begin(), face.end());
+  return soup;
+}
+
+TEST(ClosedSurfaceTest, ASurfaceOfTrianglesIsTakenAsItStands) {
+  const PolygonSoup sphere = icosphere(0.03, 2);
+  const CleanedSurface cleaned = closed_surface(sphere);
+  EXPECT_EQ(notes_of(cleaned), "");
+  expect_closed(cleaned.surface);
+  ASSERT_EQ(cleaned.surface.triangles.size(), sphere.faces.size());
+  for (std::size_t f = 0; f < sphere.faces.size(); ++f) {
+    for (std::size_t k = 0; k < 3; ++k)
+      EXPECT_EQ(cleaned.surface.vertices[cleaned.surface.triangles[f][k]],
+                sphere.vertices[sphere.faces[f][k]]);
+  }
+}
+
+// Any outline, so concave, and with hundreds of corners.
+TEST(ClosedSurfaceTest, FacesOfAnyOutlineAreCutIntoTrianglesOfTheSameVolume) {
+  Random random(5);
+  for (int i = 0; i < 200; ++i) {
+    solids::Outline outline;
+    const auto corners = 3 + random.below(i % 10 == 0 ? 400 : 30);
+    for (std::uint64_t k = 0; k < corners; ++k) {
+      const double angle =
+          2 * std::numbers::pi * static_cast<double>(k) / static_cast<double>(corners);
+      const double radius = 0.01 + 0.03 * random.unit();
+      outline.push_back({radius * std::cos(angle), radius * std::sin(angle)});
+    }
+    const solids::Solid solid = solids::prism(outline, 0.02);
+    const PolygonSoup soup = placed(solid.soup, uniform_rotation(random), 1, Vec3(0.1, 0, 0));
+    const CleanedSurface cleaned = closed_surface(soup);
+    expect_closed(cleaned.surface);
+    EXPECT_EQ(cleaned.surface.triangles.size(), 4 * corners - 4);
+    EXPECT_NEAR(volume_of(cleaned.surface), solid.volume, 1e-12 * 0.04);
+    // Each triangle is turned as its face is: no part of a cap is counted twice.
+    double sides = 0;
+    for (std::size_t k = 0; k < outline.size(); ++k) {
+      const auto &from = outline[k], &to = outline[(k + 1) % outline.size()];
+      sides += 0.02 * std::hypot(to[0] - from[0], to[1] - from[1]);
+    }
+    EXPECT_NEAR(bulk_of(coordinates_of(cleaned.surface)).area, 2 * solids::area_of(outline) + sides,
+                1e-9);
+  }
+}
+
+TEST(ClosedSurfaceTest, BentFacesAreCutNotRefused) {
+  PolygonSoup soup = cube(0.04);
+  soup.vertices[0] *= 1.3;
+  const CleanedSurface cleaned = closed_surface(soup);
+  expect_closed(cleaned.surface);
+  EXPECT_EQ(notes_of(cleaned), "6 faces of four or more corners cut into triangles\n");
+}
+
+// A face with a bridge to its hole visits two corners twice.
+TEST(ClosedSurfaceTest, AFaceWithABridgeToAHoleIsTaken) {
+  PolygonSoup soup;
+  for (const double z : {0.0, 0.01}) {
+    for (const double r : {0.03, 0.01}) {
+      for (const auto& [x, y] : {std::pair(-r, -r), {r, -r}, {r, r}, {-r, r}})
+        soup.vertices.emplace_back(x, y, z);
+    }
+  }
+  // Outer ring 0 to 3, inner 4 to 7; the same 8 higher.
+  soup.faces = {{3, 2, 1, 0, 4, 5, 6, 7, 4, 0}, {8, 9, 10, 11, 8, 12, 15, 14, 13, 12}};
+  for (std::uint32_t k = 0; k < 4; ++k) {
+    const std::uint32_t n = (k + 1) % 4;
+    soup.faces.push_back({k, n, n + 8, k + 8});
+    soup.faces.push_back({n + 4, k + 4, k + 12, n + 12});
+  }
+  const CleanedSurface cleaned = closed_surface(soup);
+  expect_closed(cleaned.surface);
+  EXPECT_NEAR(volume_of(cleaned.surface), 0.01 * (0.06 * 0.06 - 0.02 * 0.02), 1e-15);
+}
+
+TEST(ClosedSurfaceTest, TrianglesWithoutAreaAreTakenOutAndTheSurfaceStaysClosed) {
+  Random random(9);
+  for (int i = 0; i < 100; ++i) {
+    // A corner on the middle of an edge belongs to a triangle without area on one side of it.
+    PolygonSoup soup = triangulated(cube(0.04));
+    const double volume = 0.04 * 0.04 * 0.04;
+    for (int n = 0; n < 20; ++n) {
+      const std::size_t f = random.below(soup.faces.size());
+      const std::vector<std::uint32_t> face = soup.faces[f];
+      const auto middle = static_cast<std::uint32_t>(soup.vertices.size());
+      // Now and then close to an end.
+      const double at = random.below(4) == 0 ? 1e-13 : 0.5;
+      soup.vertices.push_back(soup.vertices[face[0]] * (1 - at) + soup.vertices[face[1]] * at);
+      soup.faces[f] = {face[0], middle, face[2]};
+      soup.faces.push_back({middle, face[1], face[2]});
+      soup.faces.push_back({face[0], face[1], middle});
+    }
+    soup = placed(soup, uniform_rotation(random), 1, Vec3(0));
+    const CleanedSurface cleaned = closed_surface(soup);
+    expect_closed(cleaned.surface);
+    EXPECT_NE(notes_of(cleaned).find("without area left out"), std::string::npos);
+    EXPECT_NEAR(volume_of(cleaned.surface), volume, 1e-9 * volume);
+    EXPECT_NEAR(bulk_of(coordinates_of(cleaned.surface)).area, 6 * 0.04 * 0.04, 1e-8);
+    for (const auto& t : coordinates_of(cleaned.surface)) {
+      const double longest = std::max(
+          {glm::distance(t[0], t[1]), glm::distance(t[1], t[2]), glm::distance(t[2], t[0])});
+      EXPECT_GT(glm::length(glm::cross(t[1] - t[0], t[2] - t[0])), 1e-12 * longest);
+    }
+  }
+}
+
+TEST(ClosedSurfaceTest, FacesBackToBackAndCornersOfNoFaceAreLeftOut) {
+  PolygonSoup soup = cube(0.04);
+  soup.vertices.emplace_back(1, 1, 1);
+  soup.faces.push_back({0, 1, 6});
+  soup.faces.push_back({1, 0, 6});
+  const CleanedSurface cleaned = closed_surface(soup);
+  expect_closed(cleaned.surface);
+  EXPECT_EQ(cleaned.surface.vertices.size(), 8U);
+  EXPECT_EQ(notes_of(cleaned),
+            "1 corner in no face left out\n6 faces of four or more corners cut into triangles\n"
+            "1 pair of faces back to back left out\n");
+}
+
+TEST(ClosedSurfaceTest, CornersAreWeldedByPlaceNotByDistance) {
+  PolygonSoup soup = triangulated(cube(0.04));
+  PolygonSoup apart;
+  for (const auto& face : soup.faces) {
+    for (const std::uint32_t v : face) apart.vertices.push_back(soup.vertices[v]);
+    const auto n = static_cast<std::uint32_t>(apart.vertices.size());
+    apart.faces.push_back({n - 3, n - 2, n - 1});
+  }
+  EXPECT_EQ(closed_surface(apart).surface.vertices.size(), 8U);
+  // A tetrahedron that is less than the digits' error across is a thing of its own size.
+  const PolygonSoup tiny = placed(soup, Quat(1, 0, 0, 0), 1e-6, Vec3(0));
+  EXPECT_EQ(closed_surface(tiny).surface.vertices.size(), 8U);
+}
+
+TEST(ClosedSurfaceTest, CornersThatDifferInTheLastDigitAreWeldedOnlyOnOpenEdges) {
+  Random random(11);
+  PolygonSoup apart;
+  apart.coordinate_error = 0x1p-24 * 0.1;
+  const PolygonSoup sphere = placed(icosphere(0.03, 2), uniform_rotation(random), 1, Vec3(0.05));
+  for (const auto& face : sphere.faces) {
+    for (const std::uint32_t v : face) {
+      Vec3 at = sphere.vertices[v];
+      for (int axis = 0; axis < 3; ++axis) {
+        auto single = static_cast<float>(at[axis]);
+        if (random.below(10) == 0) single = std::nextafter(single, 9.0F);
+        at[axis] = single;
+      }
+      apart.vertices.push_back(at);
+    }
+    const auto n = static_cast<std::uint32_t>(apart.vertices.size());
+    apart.faces.push_back({n - 3, n - 2, n - 1});
+  }
+  const CleanedSurface cleaned = closed_surface(apart);
+  expect_closed(cleaned.surface);
+  EXPECT_EQ(cleaned.surface.triangles.size(), sphere.faces.size());
+  EXPECT_NE(notes_of(cleaned).find("on an open edge made one with another"), std::string::npos);
+}
+
+TEST(ClosedSurfaceTest, AnEdgeIsCutAtACornerOfANeighbourThatLiesOnIt) {
+  Random random(13);
+  for (int i = 0; i < 50; ++i) {
+    // One face of a cube in two halves; its neighbours do not know of the corners between.
+    PolygonSoup soup = cube(0.04);
+    const std::vector<std::uint32_t> face = soup.faces[2];
+    const auto n = static_cast<std::uint32_t>(soup.vertices.size());
+    const double at = 0.1 + 0.8 * random.unit();
+    const auto between = [&](std::uint32_t a, std::uint32_t b) {
+      return soup.vertices[a] * (1 - at) + soup.vertices[b] * at;
+    };
+    const Vec3 one = between(face[0], face[1]), other = between(face[3], face[2]);
+    soup.vertices.push_back(one);
+    soup.vertices.push_back(other);
+    soup.faces[2] = {face[0], n, n + 1, face[3]};
+    soup.faces.push_back({n, face[1], face[2], n + 1});
+    soup = placed(soup, uniform_rotation(random), 1, Vec3(0.01));
+    const CleanedSurface cleaned = closed_surface(soup);
+    expect_closed(cleaned.surface);
+    EXPECT_NEAR(volume_of(cleaned.surface), 0.04 * 0.04 * 0.04, 1e-15);
+    EXPECT_NE(notes_of(cleaned).find("2 edges cut at corners of other faces"), std::string::npos);
+  }
+}
+
+TEST(ClosedSurfaceTest, ShellsMayOverlapAbutAndTouch) {
+  for (const Vec3& by :
+       {Vec3(0.01, 0.007, 0.003), Vec3(0.04, 0, 0), Vec3(0.04, 0.04, 0), Vec3(0.04, 0.04, 0.04),
+        Vec3(0.02, 0, 0), Vec3(0, 0, 0), Vec3(0.1, 0, 0)}) {
+    PolygonSoup soup = cube(0.04);
+    append(soup, moved(cube(0.04), by));
+    const CleanedSurface cleaned = closed_surface(soup);
+    expect_closed(cleaned.surface);
+    EXPECT_NEAR(volume_of(cleaned.surface), 2 * 0.04 * 0.04 * 0.04, 1e-15);
+  }
+}
+
+// Solid must lie between neighbours, or a segment passes through an edge that two shells share.
+TEST(ClosedSurfaceTest, AtAnEdgeOfTwoShellsNeighboursHaveSolidBetweenThem) {
+  PolygonSoup soup = cube(0.04);
+  append(soup, moved(cube(0.04), Vec3(0.04, 0.04, 0)));
+  const ClosedSurface surface = closed_surface(soup).surface;
+  for (std::uint32_t t = 0; t < surface.triangles.size(); ++t) {
+    const auto side_of = [&](std::uint32_t n) {
+      double sum = 0;
+      for (const std::uint32_t v : surface.triangles[n])
+        sum += surface.vertices[v].x + surface.vertices[v].y;
+      return sum > 0.12;
+    };
+    for (const std::uint32_t n : surface.across[t]) EXPECT_EQ(side_of(n), side_of(t));
+  }
+}
+
+TEST(ClosedSurfaceTest, ACavityIsTakenAndAShellTurnedOverElsewhereIsRefused) {
+  PolygonSoup cavity = cube(0.04);
+  append(cavity, turned_over(cube(0.02)));
+  EXPECT_NEAR(volume_of(closed_surface(cavity).surface), 0.000064 - 0.000008, 1e-15);
+
+  PolygonSoup beside = cube(0.04);
+  append(beside, moved(turned_over(cube(0.02)), Vec3(0.05, 0, 0)));
+  const std::string text = fault_of(beside);
+  EXPECT_NE(text.find("negative: face "), std::string::npos) << text;
+  EXPECT_NE(text.find("a shell there is turned inside out"), std::string::npos) << text;
+
+  PolygonSoup partly = cube(0.04);
+  append(partly, moved(turned_over(cube(0.02)), Vec3(0.0199, 0.001, 0.002)));
+  EXPECT_NE(fault_of(partly).find("it passes through itself"), std::string::npos);
+
+  EXPECT_NE(fault_of(turned_over(cube(0.04))).find("inside out: all faces are clockwise"),
+            std::string::npos);
+}
+
+// A dent that is pushed out through the far side leaves a region that is wound round backwards.
+TEST(ClosedSurfaceTest, ASmallRegionOfNegativeWindingIsFoundInALargeMesh) {
+  PolygonSoup sphere = icosphere(0.03, 4);
+  EXPECT_EQ(fault_of(sphere), "");
+  const Vec3 dent = sphere.vertices[0];
+  for (Vec3& v : sphere.vertices) {
+    if (v == dent) v = -1.05 * dent;
+  }
+  EXPECT_NE(fault_of(sphere).find("negative: face "), std::string::npos);
+}
+
+TEST(ClosedSurfaceTest, WhatIsNoClosedSurfaceIsRefusedWithThePlaceAndAdvice) {
+  PolygonSoup soup = cube(0.04);
+  soup.faces.pop_back();
+  const std::string open = fault_of(soup);
+  EXPECT_NE(open.find("open: edge "), std::string::npos) << open;
+  EXPECT_NE(open.find("fill holes and orient faces in a modelling program"), std::string::npos);
+
+  soup = cube(0.04);
+  std::reverse(soup.faces[0].begin(), soup.faces[0].end());
+  EXPECT_NE(fault_of(soup).find("turned face: edge "), std::string::npos);
+
+  soup = cube(0.04);
+  soup.vertices.emplace_back(1, 1, 1);
+  soup.faces.push_back({soup.faces[0][0], soup.faces[0][1], 8});
+  EXPECT_NE(fault_of(soup).find(" belongs to 3 faces, and "), std::string::npos) << fault_of(soup);
+
+  soup = cube(0.04);
+  soup.vertices[3].y = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_NE(fault_of(soup).find("not finite: vertex 3"), std::string::npos);
+  soup.vertices[3].y = 1e31;
+  EXPECT_NE(fault_of(soup).find("not finite: vertex 3"), std::string::npos);
+  EXPECT_NE(fault_of({}).find("empty"), std::string::npos);
+
+  soup = cube(0.04);
+  for (Vec3& v : soup.vertices) v.z = 0;
+  EXPECT_NE(fault_of(soup).find("flat: expected a solid"), std::string::npos) << fault_of(soup);
+}
+
+TEST(ClosedSurfaceTest, AGapIsToldFromAHole) {
+  PolygonSoup soup = cube(0.04);
+  soup.vertices.push_back(soup.vertices[soup.faces[0][0]] + Vec3(1e-7, 0, 0));
+  soup.faces[0][0] = 8;
+  const std::string text = fault_of(soup);
+  EXPECT_NE(text.find("crowded: 1 corners on open edges are nearer than "), std::string::npos)
+      << text;
+}
+
+// The winding number of the surface, seen from random places, is that of the polygons.
+TEST(ClosedSurfaceTest, RandomShellsGiveTheirUnion) {
+  Random random(17);
+  for (int i = 0; i < 60; ++i) {
+    PolygonSoup soup;
+    std::vector<TriangleSurface> shells;
+    for (std::uint64_t n = 1 + random.below(4); n > 0; --n) {
+      const PolygonSoup shell =
+          placed(testing::random_polyhedron(random, 12, Vec3(0.5)), uniform_rotation(random), 0.04,
+                 0.03 * Vec3(random.unit(), random.unit(), random.unit()));
+      shells.push_back(coordinates_of(closed_surface(shell).surface));
+      append(soup, shell);
+    }
+    const CleanedSurface cleaned = closed_surface(soup);
+    expect_closed(cleaned.surface);
+    const TriangleSurface whole = coordinates_of(cleaned.surface);
+    for (int k = 0; k < 50; ++k) {
+      const Vec3 at = 0.05 * Vec3(random.unit(), random.unit(), random.unit()) - Vec3(0.01);
+      double sum = 0;
+      for (const TriangleSurface& shell : shells) sum += winding_number(shell, at);
+      EXPECT_NEAR(winding_number(whole, at), sum, 1e-9);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace palpate::stimuli
