@@ -91,7 +91,7 @@ PUBLIC = {
     "data/files": "atomic_file atomic_folder checksum file_identity file_permissions formula_guard output_check "
                   "temporary_names text_sink trusted_links utc",
     "data/store": "export_log protocol_rows schema sqlite_errors statement_values station_database store sweep_file tombstones",
-    "data/export": "bids csv psychds sweep_csv trial_table",
+    "data/export": "bids csv psychds study_about sweep_csv trial_table",
     "data/merge": "merge sweep_merge",
     "analysis": "text",
     "analysis/input": "csv_reader renderers study_record sweep_table task_trials trials",

@@ -63,9 +63,9 @@ Json describe_run(const RunInfo& run, const Participant& person, const ExportClo
 }
 
 std::string readme_text(const std::map<std::string, StudyLabel>& labels, bool simulated,
-                        bool relative) {
+                        bool relative, const StudyAbout& about) {
   return dataset_name(labels, simulated) + "\n\n" + dataset_description(labels, simulated) +
-         "\n\n"
+         "\n\n" + about_text(about) +
          "sub-CODE/ses-S/beh/ holds the trials of session S of a participant, one row a trial, "
          "sorted by\nonset. Every column is described in the JSON file beside the table. The "
          "protocol that was run\nis in sourcedata/, byte for byte; protocol_sha256 is its "
@@ -257,16 +257,16 @@ void BidsWriter::describe_dataset(bool simulated) {
     write("sourcedata/" + study.label + "_protocol.json", study.protocol.text);
     write_protocol_files(store_, study, "stimuli", folder_);
   }
-  const Json json{
-      {"Name", dataset_name(labels_, simulated)},
-      {"BIDSVersion", kBidsVersion},
-      {"DatasetType", "raw"},
-      {"GeneratedBy",
-       {{{"Name", "palpate"},
-         {"Version", settings_.program_version},
-         {"Description", "palpate export --format bids; trials recorded by palpate"}}}}};
+  Json json{{"Name", dataset_name(labels_, simulated)},
+            {"BIDSVersion", kBidsVersion},
+            {"DatasetType", "raw"},
+            {"GeneratedBy",
+             {{{"Name", "palpate"},
+               {"Version", settings_.program_version},
+               {"Description", "palpate export --format bids; trials recorded by palpate"}}}}};
+  json.update(bids_fields(settings_.about));
   write("dataset_description.json", json_text(json));
-  write("README", readme_text(labels_, simulated, clock_.relative()));
+  write("README", readme_text(labels_, simulated, clock_.relative(), settings_.about));
 }
 
 bool BidsWriter::has_file(const std::string& name) {

@@ -39,9 +39,9 @@ Json describe_variable(const Column& column, const ProtocolFacts& facts,
   return variable;
 }
 
-std::string dataset_readme(const std::string& name, const std::string& about, bool relative) {
-  return "# " + name + "\n\n" + about +
-         "\n\n"
+std::string dataset_readme(const std::string& name, const std::string& description, bool relative,
+                           const StudyAbout& about) {
+  return "# " + name + "\n\n" + description + "\n\n" + about_text(about) +
          "`data/subject-CODE/study-T_subject-CODE_data.csv` holds all trials of a participant, "
          "one row a trial.\n"
          "`..._session-S_description-haptic_data.csv`, where it is there, holds the servo-rate "
@@ -184,15 +184,16 @@ void PsychDsWriter::describe_dataset(bool simulated) {
     write_protocol_files(store_, study, "materials", folder_);
   }
   const std::string name = dataset_name(labels_, simulated),
-                    about = dataset_description(labels_, simulated);
-  write("dataset_description.json",
-        json_text({{"@context", "https://schema.org/"},
-                   {"@type", "Dataset"},
-                   {"name", name},
-                   {"description", about},
-                   {"measurementTechnique", "palpate " + settings_.program_version},
-                   {"variableMeasured", variables()}}));
-  write("README.md", dataset_readme(name, about, clock_.relative()));
+                    description = dataset_description(labels_, simulated);
+  Json json{{"@context", "https://schema.org/"},
+            {"@type", "Dataset"},
+            {"name", name},
+            {"description", description}};
+  json.update(schema_org_terms(settings_.about));
+  json["measurementTechnique"] = "palpate " + settings_.program_version;
+  json["variableMeasured"] = variables();
+  write("dataset_description.json", json_text(json));
+  write("README.md", dataset_readme(name, description, clock_.relative(), settings_.about));
 }
 
 bool PsychDsWriter::has_file(const std::string& name) {

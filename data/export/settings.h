@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "data/export/study_about.h"
 #include "data/record.h"
 
 namespace palpate::data {
@@ -51,6 +52,7 @@ struct ExportSettings {
   Times times = Times::absolute;
   std::string codebook = {};  ///< csv: a file that describes the columns; "" for none
   std::vector<FaultMeaning> fault_bits = {};  ///< lowest first
+  StudyAbout about = {};                      ///< BIDS and Psych-DS: goes into their descriptions
   bool pages = false;  ///< with the answers to pages, which are personal data
   /// Parses the text of a protocol; called by exports with descriptions only. May throw.
   std::function<ProtocolFacts(const ProtocolInfo&)> facts = {};

@@ -13,6 +13,7 @@
 #include "data/store/sweep_file.h"
 #include "protocols/protocol.h"
 #include "protocols/tasks/levels.h"
+#include "runner/commands/shared/about_file.h"
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/progress_line.h"
 #include "runner/commands/shared/stop_signal.h"
@@ -135,7 +136,7 @@ data::ExportResult export_as(const std::string& format, data::Store& store, cons
 }
 
 struct Request {
-  std::string database, format, out, codebook;
+  std::string database, format, out, codebook, about;
   data::Times times = data::Times::absolute;
   bool force = false, pages = false;
 };
@@ -143,7 +144,8 @@ struct Request {
 void add_options(CommandLine& line) {
   line.usage =
       "palpate export --db FILE --format csv|bids|psych-ds --out PATH\n"
-      "       [--times relative|absolute] [--codebook FILE] [--pages] [--force]";
+      "       [--times relative|absolute] [--codebook FILE] [--about FILE.json]\n"
+      "       [--pages] [--force]";
   line.summary =
       "Writes the trials of a database for others, completely or not at all. Can be used while a\n"
       "session runs. csv: every completed trial as a row of PATH, and the attempts that were cut\n"
@@ -157,6 +159,9 @@ void add_options(CommandLine& line) {
   line.example = R"(  palpate export --db study.db --format csv --out trials.csv
   palpate export --db study.db --format csv --out trials.csv --codebook codebook.csv
   palpate export --db study.db --format bids --out study-bids
+  palpate export --db study.db --format bids --about study.json --out study-bids
+      (study.json: {"version": 1, "authors": ["Ada Example", "Bo Example"], "license": "CC-BY-4.0"};
+      all its keys: protocols/study.schema.json)
   palpate export --db people.sweep --format csv --out people.csv         a sweep: a row a point
   palpate export --db study.db --format psych-ds --out study-psychds --force
       (replaces an earlier export; a folder that palpate did not make is never replaced))";
@@ -170,6 +175,9 @@ void add_options(CommandLine& line) {
       "relative (default of bids and psych-ds) or absolute (default of csv)");
   add("codebook", po::value<std::string>()->default_value("", "")->value_name("FILE"),
       "csv only: what every column, value and fault bit means, as a table");
+  add("about", po::value<std::string>()->default_value("", "")->value_name("FILE"),
+      "bids and psych-ds: JSON with authors, license, funding, ethics_approvals, references, doi, "
+      "which go into the dataset's description");
   add("pages", po::bool_switch(),
       "the answers to pages as well, which are personal data: pages.csv in the same folder, or in "
       "the dataset");
@@ -178,7 +186,8 @@ void add_options(CommandLine& line) {
 
 Request request_of(const po::variables_map& values, const std::string& usage) {
   Request request{values["db"].as<std::string>(), values["format"].as<std::string>(),
-                  values["out"].as<std::string>(), values["codebook"].as<std::string>()};
+                  values["out"].as<std::string>(), values["codebook"].as<std::string>(),
+                  values["about"].as<std::string>()};
   request.force = values["force"].as<bool>();
   request.pages = values["pages"].as<bool>();
   if (request.format != "csv" && request.format != "bids" && request.format != "psych-ds") {
@@ -190,13 +199,16 @@ Request request_of(const po::variables_map& values, const std::string& usage) {
     throw UsageError("--codebook is for csv; " + request.format +
                      " describes its columns in JSON files");
   }
+  if (!request.about.empty() && request.format == "csv")
+    throw UsageError("--about is for bids and psych-ds; a CSV file has no description");
   return request;
 }
 
 data::ExportResult write_export(const Request& request) {
+  data::ExportSettings settings;
+  if (!request.about.empty()) settings.about = read_about_file(request.about);
   data::Store store = data::Store::open(request.database, data::Store::Mode::read_only);
   warn_of_exposure(request.database);
-  data::ExportSettings settings;
   settings.force = request.force;
   settings.pages = request.pages;
   settings.program_version = PALPATE_VERSION;

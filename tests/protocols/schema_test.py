@@ -22,8 +22,9 @@ PROGRAM_ONLY = {
     "v2-renderer-not-of-the-protocol", "v2-same-different-of-three", "v2-scale-falls", "v2-sessions-in-order",
     "v2-first-session", "v2-no-time-to-answer", "v2-picture-damaged", "v2-picture-files", "v2-practice-counts", "v2-standard-without-the-number", "v2-too-many-trials", "v2-two-keys", "v2-unknown-stimuli",
 }
-# The same, of sweep spaces.
+# The same, of sweep spaces and of studies.
 SPACES_PROGRAM_ONLY = {"limits-in-order", "names-twice", "normal-far-away", "values-set-twice"}
+STUDIES_PROGRAM_ONLY = {"keys-given-twice", "orcid-digit"}
 
 
 def refuse_constant(word):
@@ -88,6 +89,24 @@ def keys(value):
     return set().union(*map(keys, value)) if isinstance(value, list) else set()
 
 
+def failures_of(schema, files, program_only, more_good=()):
+    """Of a schema that stands alone, against the folders good and bad in `files`."""
+    validator = jsonschema.Draft202012Validator(read(schema))
+    validator.check_schema(validator.schema)
+    good, bad = [*sorted((files / "good").glob("*.json")), *more_good], sorted((files / "bad").glob("*.json"))
+    failures = [f"{path.name}, which is good: {fault.message}" for path in good for fault in validator.iter_errors(read(path))]
+    for path in bad:
+        try:
+            accepted = validator.is_valid(read(path))
+        except ValueError:
+            accepted = False
+        if accepted != (path.stem in program_only):
+            failures.append(f"{path.name}: {schema.name} {'accepts' if accepted else 'refuses'} it")
+    if len(good) < 2 or len(bad) < 15:
+        failures.append(f"only {len(good)} good and {len(bad)} bad files of {schema.name} were found")
+    return failures
+
+
 def main(source):
     tests = source / "tests" / "protocols"
     scene, protocol = load_schemas(source / "protocols")
@@ -117,21 +136,13 @@ def main(source):
             failures.append(f"{path.name}: the schema accepts it")
         if not accepted and path.stem in PROGRAM_ONLY:
             failures.append(f"{path.name}: the schema refuses it, so it is not for the program only")
-    space = jsonschema.Draft202012Validator(read(source / "protocols" / "sweep_space.schema.json"))
-    space.check_schema(space.schema)
-    good_spaces = sorted((tests / "spaces" / "good").glob("*.json")) + sorted((source / "protocols" / "spaces").glob("*.json"))
-    bad_spaces = sorted((tests / "spaces" / "bad").glob("*.json"))
-    for path in good_spaces:
-        failures += [f"{path.name}, which is good: {fault.message}" for fault in space.iter_errors(read(path))]
-    for path in bad_spaces:
-        try:
-            accepted = space.is_valid(read(path))
-        except ValueError:
-            accepted = False
-        if accepted != (path.stem in SPACES_PROGRAM_ONLY):
-            failures.append(f"{path.name}: the schema {'accepts' if accepted else 'refuses'} it")
-    if len(good_spaces) < 2 or len(bad_spaces) < 15:
-        failures.append(f"only {len(good_spaces)} good and {len(bad_spaces)} bad spaces were found")
+    published = sorted((source / "protocols" / "spaces").glob("*.json"))
+    failures += failures_of(source / "protocols" / "sweep_space.schema.json", tests / "spaces", SPACES_PROGRAM_ONLY, published)
+    study = source / "protocols" / "study.schema.json"
+    failures += failures_of(study, tests / "studies", STUDIES_PROGRAM_ONLY)
+    unused = properties(read(study)) - keys(read(tests / "studies" / "good" / "everything.json"))
+    if unused:
+        failures.append(f"everything.json of the studies lacks {sorted(unused)}")
     # The parser accepts everything.json: so it knows every key that the schema names.
     unused = properties(protocol.schema) - keys(read(tests / "good" / "everything.json"))
     unused -= {"objects"}  # of scenes

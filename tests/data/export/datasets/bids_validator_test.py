@@ -48,13 +48,14 @@ def validator():
     return command
 
 
-def simulate(folder, name, participants, /, start="quick", **changes):
+def simulate(folder, name, participants, /, start="quick", about=None, **changes):
     protocol = json.loads((PROTOCOLS / f"{start}.json").read_text())
     protocol.pop("$schema")
     protocol.update(changes)
     (folder / f"{name}.json").write_text(json.dumps(protocol))
+    who = ["--about", about] if about else []
     for words in (["simulate", folder / f"{name}.json", "--db", folder / f"{name}.db", "--participants", participants],
-                  ["export", "--db", folder / f"{name}.db", "--format", "bids", "--out", folder / name]):
+                  ["export", "--db", folder / f"{name}.db", "--format", "bids", *who, "--out", folder / name]):
         subprocess.run([PALPATE, *map(str, words)], check=True, capture_output=True, timeout=600)
     return folder / name
 
@@ -90,6 +91,9 @@ def main():
             errors, warnings = issues(command, dataset)
             good &= expect(errors == [], f"{dataset.name}: no errors {errors}")
             good &= expect(set(warnings) <= {"NO_AUTHORS"}, f"{dataset.name}: no warning but that authors are to be added {warnings}")
+        about = PROTOCOLS.parent / "tests" / "protocols" / "studies" / "good" / "everything.json"
+        errors, warnings = issues(command, simulate(folder, "authors", 2, about=about))
+        good &= expect(errors == [] and warnings == [], f"with --about: no errors {errors}, no warnings {warnings}")
         table = next(plain.glob("sub-S001/ses-1/beh/*_beh.tsv"))
         table.rename(table.with_name("sub-S001_trials.tsv"))
         good &= expect("NOT_INCLUDED" in issues(command, plain)[0], "a name that is none is found")

@@ -26,6 +26,55 @@ class Rules(Study):
         self.assertIn("--codebook is for csv",
                       self.export("bids", self.dir / "no", "--codebook", self.dir / "no.csv", status=2).stderr)
 
+    def test_who_made_the_study_stands_in_the_description(self):
+        about = self.dir / "study.json"
+        about.write_text(json.dumps({
+            "version": 1, "authors": [{"name": "Example, Ada", "orcid": "0000-0002-1825-0097", "affiliation": "Ü"}, "Bo"],
+            "license": "CC-BY-4.0", "funding": ["Own means", {"funder": "Council", "grant": "C-1"}, {"funder": "Council", "grant": "C-2"}],
+            "ethics_approvals": ["Committee, 2026-17"], "references": ["https://osf.io/abcde", "Bo (2026)"],
+            "doi": "https://doi.org/10.5281/zenodo.1234", "acknowledgements": "Thanks.", "how_to_acknowledge": "Cite."}))
+        said = {}
+        for form in ("bids", "psych-ds"):
+            self.export(form, self.dir / f"about-{form}", "--about", about)
+            self.export(form, self.dir / f"about-{form}", "--force")  # and away again
+            without = json.loads((self.dir / f"about-{form}" / "dataset_description.json").read_text())
+            self.export(form, self.dir / f"about-{form}", "--about", about, "--force")
+            whole = json.loads((self.dir / f"about-{form}" / "dataset_description.json").read_text())
+            self.assertEqual({key: whole[key] for key in without}, without)
+            said[form] = {key: value for key, value in whole.items() if key not in without}
+            readme = (self.dir / f"about-{form}" / ("README" if form == "bids" else "README.md")).read_text()
+            for words in ("Authors: Example, Ada (Ü); Bo\n\n", "License: CC-BY-4.0\n\n",
+                          "Funding: Own means; Council, C-1; Council, C-2\n\n", "Ethics approvals: Committee, 2026-17\n\n",
+                          "References: https://osf.io/abcde; Bo (2026)\n\n", "DOI: https://doi.org/10.5281/zenodo.1234\n\n",
+                          "Acknowledgements: Thanks.\n\n", "How to acknowledge: Cite.\n\n"):
+                self.assertIn(words, readme)
+        self.assertEqual(said["bids"], {
+            "License": "CC-BY-4.0", "Authors": ["Example, Ada", "Bo"], "Acknowledgements": "Thanks.",
+            "HowToAcknowledge": "Cite.", "Funding": ["Own means", "Council, C-1", "Council, C-2"],
+            "EthicsApprovals": ["Committee, 2026-17"], "ReferencesAndLinks": ["https://osf.io/abcde", "Bo (2026)"],
+            "DatasetDOI": "doi:10.5281/zenodo.1234"})
+        council = {"@type": "Organization", "name": "Council"}
+        self.assertEqual(said["psych-ds"], {
+            "author": [{"@type": "Person", "@id": "https://orcid.org/0000-0002-1825-0097", "name": "Example, Ada",
+                        "affiliation": {"@type": "Organization", "name": "Ü"}}, {"@type": "Person", "name": "Bo"}],
+            "license": "https://spdx.org/licenses/CC-BY-4.0.html",
+            "funder": [{"@type": "Organization", "name": "Own means"}, council],
+            "funding": [{"@type": "Grant", "identifier": grant, "funder": council} for grant in ("C-1", "C-2")],
+            "citation": ["https://osf.io/abcde", "Bo (2026)"], "identifier": "https://doi.org/10.5281/zenodo.1234",
+            "creditText": "Cite."})
+        self.assertEqual(bids_checks.bids_faults(self.dir / "about-bids"), [])
+        self.assertEqual(psychds_checks.psychds_faults(self.dir / "about-psych-ds"), [])
+
+    def test_a_wrong_file_of_a_study_is_refused_before_anything_is_written(self):
+        about = self.dir / "wrong.json"
+        about.write_text('{"version": 1,\n "authors": ["A"],\n "licence": "CC0-1.0"}')
+        said = self.export("bids", self.dir / "wrong", "--about", about, status=2).stderr
+        self.assertIn("wrong.json:3: /licence: unknown key; did you mean 'license'?", said)
+        self.assertIn("none.json: (file)", self.export("psych-ds", self.dir / "wrong", "--about", self.dir / "none.json", status=2).stderr)
+        self.assertFalse((self.dir / "wrong").exists())
+        about.write_text('{"version": 1, "authors": ["A"]}')
+        self.assertIn("--about is for bids", self.export("csv", self.dir / "no.csv", "--about", about, status=2).stderr)
+
     def test_protocols_come_with_the_data(self):
         text = (self.dir / "sampled.json").read_bytes()
         self.assertEqual((self.dir / "sampled-bids" / "sourcedata" / "withsamples_protocol.json").read_bytes(), text)
