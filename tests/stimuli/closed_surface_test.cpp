@@ -25,7 +25,7 @@ namespace {
 using testing::placed;
 using testing::triangulated;
 
-TriangleSurface coordinates_of(const ClosedSurface& surface) {
+TriangleSurface places_of(const ClosedSurface& surface) {
   TriangleSurface triangles;
   for (const auto& t : surface.triangles)
     triangles.push_back({surface.vertices[t[0]], surface.vertices[t[1]], surface.vertices[t[2]]});
@@ -60,7 +60,7 @@ void expect_closed(const ClosedSurface& surface) {
   EXPECT_EQ(places.size(), surface.vertices.size());
 }
 
-double volume_of(const ClosedSurface& surface) { return bulk_of(coordinates_of(surface)).volume; }
+double volume_in(const ClosedSurface& surface) { return bulk_of(places_of(surface)).volume; }
 
 std::string notes_of(const CleanedSurface& cleaned) {
   std::string text;
@@ -68,7 +68,7 @@ std::string notes_of(const CleanedSurface& cleaned) {
   return text;
 }
 
-std::string fault_of(const PolygonSoup& soup) {
+std::string refusal_of(const PolygonSoup& soup) {
   try {
     closed_surface(soup);
   } catch (const MeshError& error) {
@@ -77,7 +77,7 @@ std::string fault_of(const PolygonSoup& soup) {
   return "";
 }
 
-void append(PolygonSoup& soup, const PolygonSoup& other) {
+void add_shell(PolygonSoup& soup, const PolygonSoup& other) {
   const auto first = static_cast<std::uint32_t>(soup.vertices.size());
   soup.vertices.insert(soup.vertices.end(), other.vertices.begin(), other.vertices.end());
   for (std::vector<std::uint32_t> face : other.faces) {
@@ -86,7 +86,7 @@ void append(PolygonSoup& soup, const PolygonSoup& other) {
   }
 }
 
-PolygonSoup moved(PolygonSoup soup, const Vec3& by) {
+PolygonSoup shifted(PolygonSoup soup, const Vec3& by) {
   for (Vec3& v : soup.vertices) v += by;
   return soup;
 }
@@ -126,14 +126,14 @@ TEST(ClosedSurfaceTest, FacesOfAnyOutlineAreCutIntoTrianglesOfTheSameVolume) {
     const CleanedSurface cleaned = closed_surface(soup);
     expect_closed(cleaned.surface);
     EXPECT_EQ(cleaned.surface.triangles.size(), 4 * corners - 4);
-    EXPECT_NEAR(volume_of(cleaned.surface), solid.volume, 1e-12 * 0.04);
+    EXPECT_NEAR(volume_in(cleaned.surface), solid.volume, 1e-12 * 0.04);
     // Each triangle is turned as its face is: no part of a cap is counted twice.
     double sides = 0;
     for (std::size_t k = 0; k < outline.size(); ++k) {
       const auto &from = outline[k], &to = outline[(k + 1) % outline.size()];
       sides += 0.02 * std::hypot(to[0] - from[0], to[1] - from[1]);
     }
-    EXPECT_NEAR(bulk_of(coordinates_of(cleaned.surface)).area, 2 * solids::area_of(outline) + sides,
+    EXPECT_NEAR(bulk_of(places_of(cleaned.surface)).area, 2 * solids::area_of(outline) + sides,
                 1e-9);
   }
 }
@@ -164,7 +164,7 @@ TEST(ClosedSurfaceTest, AFaceWithABridgeToAHoleIsTaken) {
   }
   const CleanedSurface cleaned = closed_surface(soup);
   expect_closed(cleaned.surface);
-  EXPECT_NEAR(volume_of(cleaned.surface), 0.01 * (0.06 * 0.06 - 0.02 * 0.02), 1e-15);
+  EXPECT_NEAR(volume_in(cleaned.surface), 0.01 * (0.06 * 0.06 - 0.02 * 0.02), 1e-15);
 }
 
 TEST(ClosedSurfaceTest, TrianglesWithoutAreaAreTakenOutAndTheSurfaceStaysClosed) {
@@ -188,9 +188,9 @@ TEST(ClosedSurfaceTest, TrianglesWithoutAreaAreTakenOutAndTheSurfaceStaysClosed)
     const CleanedSurface cleaned = closed_surface(soup);
     expect_closed(cleaned.surface);
     EXPECT_NE(notes_of(cleaned).find("without area left out"), std::string::npos);
-    EXPECT_NEAR(volume_of(cleaned.surface), volume, 1e-9 * volume);
-    EXPECT_NEAR(bulk_of(coordinates_of(cleaned.surface)).area, 6 * 0.04 * 0.04, 1e-8);
-    for (const auto& t : coordinates_of(cleaned.surface)) {
+    EXPECT_NEAR(volume_in(cleaned.surface), volume, 1e-9 * volume);
+    EXPECT_NEAR(bulk_of(places_of(cleaned.surface)).area, 6 * 0.04 * 0.04, 1e-8);
+    for (const auto& t : places_of(cleaned.surface)) {
       const double longest = std::max(
           {glm::distance(t[0], t[1]), glm::distance(t[1], t[2]), glm::distance(t[2], t[0])});
       EXPECT_GT(glm::length(glm::cross(t[1] - t[0], t[2] - t[0])), 1e-12 * longest);
@@ -268,7 +268,7 @@ TEST(ClosedSurfaceTest, AnEdgeIsCutAtACornerOfANeighbourThatLiesOnIt) {
     soup = placed(soup, uniform_rotation(random), 1, Vec3(0.01));
     const CleanedSurface cleaned = closed_surface(soup);
     expect_closed(cleaned.surface);
-    EXPECT_NEAR(volume_of(cleaned.surface), 0.04 * 0.04 * 0.04, 1e-15);
+    EXPECT_NEAR(volume_in(cleaned.surface), 0.04 * 0.04 * 0.04, 1e-15);
     EXPECT_NE(notes_of(cleaned).find("2 edges cut at corners of other faces"), std::string::npos);
   }
 }
@@ -278,17 +278,17 @@ TEST(ClosedSurfaceTest, ShellsMayOverlapAbutAndTouch) {
        {Vec3(0.01, 0.007, 0.003), Vec3(0.04, 0, 0), Vec3(0.04, 0.04, 0), Vec3(0.04, 0.04, 0.04),
         Vec3(0.02, 0, 0), Vec3(0, 0, 0), Vec3(0.1, 0, 0)}) {
     PolygonSoup soup = cube(0.04);
-    append(soup, moved(cube(0.04), by));
+    add_shell(soup, shifted(cube(0.04), by));
     const CleanedSurface cleaned = closed_surface(soup);
     expect_closed(cleaned.surface);
-    EXPECT_NEAR(volume_of(cleaned.surface), 2 * 0.04 * 0.04 * 0.04, 1e-15);
+    EXPECT_NEAR(volume_in(cleaned.surface), 2 * 0.04 * 0.04 * 0.04, 1e-15);
   }
 }
 
 // Solid must lie between neighbours, or a segment passes through an edge that two shells share.
 TEST(ClosedSurfaceTest, AtAnEdgeOfTwoShellsNeighboursHaveSolidBetweenThem) {
   PolygonSoup soup = cube(0.04);
-  append(soup, moved(cube(0.04), Vec3(0.04, 0.04, 0)));
+  add_shell(soup, shifted(cube(0.04), Vec3(0.04, 0.04, 0)));
   const ClosedSurface surface = closed_surface(soup).surface;
   for (std::uint32_t t = 0; t < surface.triangles.size(); ++t) {
     const auto side_of = [&](std::uint32_t n) {
@@ -303,67 +303,68 @@ TEST(ClosedSurfaceTest, AtAnEdgeOfTwoShellsNeighboursHaveSolidBetweenThem) {
 
 TEST(ClosedSurfaceTest, ACavityIsTakenAndAShellTurnedOverElsewhereIsRefused) {
   PolygonSoup cavity = cube(0.04);
-  append(cavity, turned_over(cube(0.02)));
-  EXPECT_NEAR(volume_of(closed_surface(cavity).surface), 0.000064 - 0.000008, 1e-15);
+  add_shell(cavity, turned_over(cube(0.02)));
+  EXPECT_NEAR(volume_in(closed_surface(cavity).surface), 0.000064 - 0.000008, 1e-15);
 
   PolygonSoup beside = cube(0.04);
-  append(beside, moved(turned_over(cube(0.02)), Vec3(0.05, 0, 0)));
-  const std::string text = fault_of(beside);
+  add_shell(beside, shifted(turned_over(cube(0.02)), Vec3(0.05, 0, 0)));
+  const std::string text = refusal_of(beside);
   EXPECT_NE(text.find("negative: face "), std::string::npos) << text;
   EXPECT_NE(text.find("a shell there is turned inside out"), std::string::npos) << text;
 
   PolygonSoup partly = cube(0.04);
-  append(partly, moved(turned_over(cube(0.02)), Vec3(0.0199, 0.001, 0.002)));
-  EXPECT_NE(fault_of(partly).find("it passes through itself"), std::string::npos);
+  add_shell(partly, shifted(turned_over(cube(0.02)), Vec3(0.0199, 0.001, 0.002)));
+  EXPECT_NE(refusal_of(partly).find("it passes through itself"), std::string::npos);
 
-  EXPECT_NE(fault_of(turned_over(cube(0.04))).find("inside out: all faces are clockwise"),
+  EXPECT_NE(refusal_of(turned_over(cube(0.04))).find("inside out: all faces are clockwise"),
             std::string::npos);
 }
 
 // A dent that is pushed out through the far side leaves a region that is wound round backwards.
 TEST(ClosedSurfaceTest, ASmallRegionOfNegativeWindingIsFoundInALargeMesh) {
   PolygonSoup sphere = icosphere(0.03, 4);
-  EXPECT_EQ(fault_of(sphere), "");
+  EXPECT_EQ(refusal_of(sphere), "");
   const Vec3 dent = sphere.vertices[0];
   for (Vec3& v : sphere.vertices) {
     if (v == dent) v = -1.05 * dent;
   }
-  EXPECT_NE(fault_of(sphere).find("negative: face "), std::string::npos);
+  EXPECT_NE(refusal_of(sphere).find("negative: face "), std::string::npos);
 }
 
 TEST(ClosedSurfaceTest, WhatIsNoClosedSurfaceIsRefusedWithThePlaceAndAdvice) {
   PolygonSoup soup = cube(0.04);
   soup.faces.pop_back();
-  const std::string open = fault_of(soup);
+  const std::string open = refusal_of(soup);
   EXPECT_NE(open.find("open: edge "), std::string::npos) << open;
   EXPECT_NE(open.find("fill holes and orient faces in a modelling program"), std::string::npos);
 
   soup = cube(0.04);
   std::reverse(soup.faces[0].begin(), soup.faces[0].end());
-  EXPECT_NE(fault_of(soup).find("turned face: edge "), std::string::npos);
+  EXPECT_NE(refusal_of(soup).find("turned face: edge "), std::string::npos);
 
   soup = cube(0.04);
   soup.vertices.emplace_back(1, 1, 1);
   soup.faces.push_back({soup.faces[0][0], soup.faces[0][1], 8});
-  EXPECT_NE(fault_of(soup).find(" belongs to 3 faces, and "), std::string::npos) << fault_of(soup);
+  EXPECT_NE(refusal_of(soup).find(" belongs to 3 faces, and "), std::string::npos)
+      << refusal_of(soup);
 
   soup = cube(0.04);
   soup.vertices[3].y = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_NE(fault_of(soup).find("not finite: vertex 3"), std::string::npos);
+  EXPECT_NE(refusal_of(soup).find("not finite: vertex 3"), std::string::npos);
   soup.vertices[3].y = 1e31;
-  EXPECT_NE(fault_of(soup).find("not finite: vertex 3"), std::string::npos);
-  EXPECT_NE(fault_of({}).find("empty"), std::string::npos);
+  EXPECT_NE(refusal_of(soup).find("not finite: vertex 3"), std::string::npos);
+  EXPECT_NE(refusal_of({}).find("empty"), std::string::npos);
 
   soup = cube(0.04);
   for (Vec3& v : soup.vertices) v.z = 0;
-  EXPECT_NE(fault_of(soup).find("flat: expected a solid"), std::string::npos) << fault_of(soup);
+  EXPECT_NE(refusal_of(soup).find("flat: expected a solid"), std::string::npos) << refusal_of(soup);
 }
 
 TEST(ClosedSurfaceTest, AGapIsToldFromAHole) {
   PolygonSoup soup = cube(0.04);
   soup.vertices.push_back(soup.vertices[soup.faces[0][0]] + Vec3(1e-7, 0, 0));
   soup.faces[0][0] = 8;
-  const std::string text = fault_of(soup);
+  const std::string text = refusal_of(soup);
   EXPECT_NE(text.find("crowded: 1 corners on open edges are nearer than "), std::string::npos)
       << text;
 }
@@ -378,12 +379,12 @@ TEST(ClosedSurfaceTest, RandomShellsGiveTheirUnion) {
       const PolygonSoup shell =
           placed(testing::random_polyhedron(random, 12, Vec3(0.5)), uniform_rotation(random), 0.04,
                  0.03 * Vec3(random.unit(), random.unit(), random.unit()));
-      shells.push_back(coordinates_of(closed_surface(shell).surface));
-      append(soup, shell);
+      shells.push_back(places_of(closed_surface(shell).surface));
+      add_shell(soup, shell);
     }
     const CleanedSurface cleaned = closed_surface(soup);
     expect_closed(cleaned.surface);
-    const TriangleSurface whole = coordinates_of(cleaned.surface);
+    const TriangleSurface whole = places_of(cleaned.surface);
     for (int k = 0; k < 50; ++k) {
       const Vec3 at = 0.05 * Vec3(random.unit(), random.unit(), random.unit()) - Vec3(0.01);
       double sum = 0;

@@ -76,7 +76,7 @@ void expect_same(const PolygonSoup& read, const PolygonSoup& soup, double within
   }
 }
 
-std::string fault_of(const std::string& name, const std::string& bytes) {
+std::string fault_in(const std::string& name, const std::string& bytes) {
   try {
     read_mesh(name, bytes);
   } catch (const MeshError& error) {
@@ -86,7 +86,7 @@ std::string fault_of(const std::string& name, const std::string& bytes) {
   return "";
 }
 
-std::string replaced(std::string text, const std::string& from, const std::string& to) {
+std::string exchanged(std::string text, const std::string& from, const std::string& to) {
   const std::size_t at = text.find(from);
   EXPECT_NE(at, std::string::npos) << from;
   return text.replace(at, from.size(), to);
@@ -122,42 +122,43 @@ TEST_F(PlyFile, AFileCutShortAnywhereIsRefused) {
   for (const bool big : {false, true}) {
     const std::string bytes = binary_ply(soup_, big, true);
     for (std::size_t size = 0; size < bytes.size(); ++size)
-      EXPECT_NE(fault_of("a.ply", bytes.substr(0, size)), "") << size;
+      EXPECT_NE(fault_in("a.ply", bytes.substr(0, size)), "") << size;
   }
-  EXPECT_NE(fault_of("a.ply", text_.substr(0, text_.size() / 2)), "");
+  EXPECT_NE(fault_in("a.ply", text_.substr(0, text_.size() / 2)), "");
 }
 
 TEST_F(PlyFile, FaultsNameTheLine) {
   // The header has 16 lines, then come 8 corners.
-  EXPECT_EQ(fault_of("a.ply", replaced(text_, "9 4 ", "9 2 ")),
+  EXPECT_EQ(fault_in("a.ply", exchanged(text_, "9 4 ", "9 2 ")),
             "a.ply: line 25: expected three or more corners of a face, found 2");
-  EXPECT_EQ(fault_of("a.ply", replaced(text_, "0.5 " + number(soup_.vertices[0].x), "0.5 nan")),
+  EXPECT_EQ(fault_in("a.ply", exchanged(text_, "0.5 " + number(soup_.vertices[0].x), "0.5 nan")),
             "a.ply: line 17: expected three finite coordinates, found \"nan\"");
-  EXPECT_EQ(fault_of("a.ply", replaced(text_, "9 4 " + std::to_string(soup_.faces[0][0]), "9 4 8")),
-            "a.ply: line 25: expected vertex numbers from 0 to 7, found \"8\"");
-  EXPECT_EQ(fault_of("a.ply", replaced(text_, "9 4 ", "9 40 ")),
+  EXPECT_EQ(
+      fault_in("a.ply", exchanged(text_, "9 4 " + std::to_string(soup_.faces[0][0]), "9 4 8")),
+      "a.ply: line 25: expected vertex numbers from 0 to 7, found \"8\"");
+  EXPECT_EQ(fault_in("a.ply", exchanged(text_, "9 4 ", "9 40 ")),
             "a.ply: line 25: expected the length of the list vertex_indices and as many numbers, "
             "found \"40\"");
 }
 
 TEST_F(PlyFile, HeadersThatSayNothingOfASurfaceAreRefused) {
-  EXPECT_NE(fault_of("a.ply", "").find("line 1: expected \"ply\""), std::string::npos);
-  EXPECT_NE(fault_of("a.ply", replaced(text_, "ascii", "utf")).find("line 2: expected ascii"),
+  EXPECT_NE(fault_in("a.ply", "").find("line 1: expected \"ply\""), std::string::npos);
+  EXPECT_NE(fault_in("a.ply", exchanged(text_, "ascii", "utf")).find("line 2: expected ascii"),
             std::string::npos);
   EXPECT_NE(
-      fault_of("a.ply", replaced(text_, "float y", "float yy")).find("a property y of vertex"),
+      fault_in("a.ply", exchanged(text_, "float y", "float yy")).find("a property y of vertex"),
       std::string::npos);
-  EXPECT_NE(fault_of("a.ply", replaced(text_, "vertex_indices", "corners"))
+  EXPECT_NE(fault_in("a.ply", exchanged(text_, "vertex_indices", "corners"))
                 .find("a property list vertex_indices"),
             std::string::npos);
-  EXPECT_NE(fault_of("a.ply", replaced(text_, "element face", "element facet"))
+  EXPECT_NE(fault_in("a.ply", exchanged(text_, "element face", "element facet"))
                 .find("a cloud of points is no surface"),
             std::string::npos);
-  EXPECT_NE(fault_of("a.ply", replaced(text_, "float y", "real y")).find("types of PLY"),
+  EXPECT_NE(fault_in("a.ply", exchanged(text_, "float y", "real y")).find("types of PLY"),
             std::string::npos);
-  EXPECT_NE(fault_of("a.ply", replaced(text_, "vertex 8", "vertex 4000000000")).find("2^31"),
+  EXPECT_NE(fault_in("a.ply", exchanged(text_, "vertex 8", "vertex 4000000000")).find("2^31"),
             std::string::npos);
-  EXPECT_NE(fault_of("a.ply", replaced(text_, "end_header", "end")), "");
+  EXPECT_NE(fault_in("a.ply", exchanged(text_, "end_header", "end")), "");
 }
 
 std::string off(const PolygonSoup& soup, const std::string& head, const std::string& vertex_rest,
@@ -190,22 +191,22 @@ TEST(OffFile, EveryKindOfTextGivesTheSameMesh) {
 TEST(OffFile, FaultsNameTheLine) {
   const PolygonSoup soup = cube(0.06);
   const std::string text = off(soup, "OFF\n", "", "");
-  EXPECT_NE(fault_of("a.off", ""), "");
-  EXPECT_NE(fault_of("a.off", "OFF BINARY\n").find("OFF as text"), std::string::npos);
-  EXPECT_NE(fault_of("a.off", "4" + text).find("in three dimensions, found \"4OFF\""),
+  EXPECT_NE(fault_in("a.off", ""), "");
+  EXPECT_NE(fault_in("a.off", "OFF BINARY\n").find("OFF as text"), std::string::npos);
+  EXPECT_NE(fault_in("a.off", "4" + text).find("in three dimensions, found \"4OFF\""),
             std::string::npos);
-  EXPECT_NE(fault_of("a.off", "solid a").find("line 1: expected OFF"), std::string::npos);
-  EXPECT_NE(fault_of("a.off", "OFF\n0 0 0\n").find("at least one vertex"), std::string::npos);
+  EXPECT_NE(fault_in("a.off", "solid a").find("line 1: expected OFF"), std::string::npos);
+  EXPECT_NE(fault_in("a.off", "OFF\n0 0 0\n").find("at least one vertex"), std::string::npos);
   const std::string first = "\n4 " + std::to_string(soup.faces[0][0]);
-  EXPECT_NE(fault_of("a.off", replaced(text, first, "\n4 8"))
+  EXPECT_NE(fault_in("a.off", exchanged(text, first, "\n4 8"))
                 .find("line 13: expected vertex numbers from 0 to 7, found \"8\""),
             std::string::npos);
-  EXPECT_NE(fault_of("a.off", replaced(text, first, "\n5" + first.substr(2))).find("line 13"),
+  EXPECT_NE(fault_in("a.off", exchanged(text, first, "\n5" + first.substr(2))).find("line 13"),
             std::string::npos);
-  EXPECT_NE(fault_of("a.off", text.substr(0, text.find("\n4 ") + 1))
+  EXPECT_NE(fault_in("a.off", text.substr(0, text.find("\n4 ") + 1))
                 .find("expected 6 lines of faces, found the end of the file after 0"),
             std::string::npos);
-  EXPECT_NE(fault_of("a.off", replaced(text, number(soup.vertices[0].x), "x"))
+  EXPECT_NE(fault_in("a.off", exchanged(text, number(soup.vertices[0].x), "x"))
                 .find("line 3: expected three finite coordinates, found \"x\""),
             std::string::npos);
 }
