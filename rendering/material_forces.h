@@ -73,8 +73,7 @@ void apply_material_forces(const Scene& scene, RenderState& state,
   }
   for (PlacedContact& c : contacts) {
     FrictionState& friction = friction_of(c);
-    apply_material<kFeatures>(c.loaded, scene.parts()[c.loaded.part].material, c.motion, rate,
-                              friction);
+    apply_material<kFeatures>(c.loaded, scene.material_of(c.loaded.part), c.motion, rate, friction);
     if (kFeatures.friction && c.by_law && friction.in_contact)
       all.rubbed.push_back({c.group, c.pair});
   }

@@ -5,6 +5,7 @@
 #include <glm/geometric.hpp>
 
 #include "rendering/render_fault.h"
+#include "rendering/surface_contact.h"
 
 namespace palpate::rendering {
 namespace {
@@ -25,6 +26,8 @@ void forget_contacts(UnionTick& tick, std::uint32_t index) {
   const PartGroup& group = tick.scene.groups()[index];
   tick.state.unions.groups[index].touching = false;
   tick.state.unions.groups[index].lag = 0;
+  if (group.surface != PartGroup::kParts)
+    tick.state.unions.surfaces[group.surface].carrying_count = 0;
   for (std::size_t k = 0; k < group.part_count; ++k) forget_part(tick, group, k);
 }
 
@@ -32,7 +35,10 @@ void forget_contacts(UnionTick& tick, std::uint32_t index) {
 bool left(UnionTick& tick, std::uint32_t object) {
   for (std::uint32_t i = 0; i < tick.scene.groups().size(); ++i) {
     const PartGroup& group = tick.scene.groups()[i];
-    if (group.by_law && group.object_state == object && inside_group(tick, i)) return false;
+    if (!group.by_law || group.object_state != object) continue;
+    if (group.surface != PartGroup::kParts ? inside_surface(tick, group.surface)
+                                           : inside_group(tick, i))
+      return false;
   }
   return true;
 }
@@ -79,6 +85,7 @@ void release_hooked(UnionTick& tick) {
 
 /// Null: the contact's part never gives way.
 BreakState* breaking_of(UnionTick& tick, const PlacedContact& contact) {
+  if (contact.loaded.part >= tick.scene.parts().size()) return nullptr;  // a surface
   const std::uint32_t index = tick.scene.parts()[contact.loaded.part].breaking;
   return index == ScenePart::kHolds ? nullptr : &tick.state.unions.breaking[index];
 }

@@ -52,7 +52,7 @@ void add_margin(ScenePart& part) {
 }  // namespace
 
 Scene::Scene(std::vector<SceneObject> objects, bool side_contact, Tool tool,
-             std::shared_ptr<const SceneMotion> motion)
+             std::shared_ptr<const SceneMotion> motion, std::vector<SceneSurface> surfaces)
     : tool_(std::move(tool)), motion_(std::move(motion)) {
   if (tool_.segments.size() > Tool::kMostSegments)
     throw std::invalid_argument("a tool has 1 to 16 segments");
@@ -84,6 +84,7 @@ Scene::Scene(std::vector<SceneObject> objects, bool side_contact, Tool tool,
   }
   group_parts();
   index_parts();
+  add_surfaces(std::move(surfaces), features);
   features.unions = std::any_of(groups_.begin(), groups_.end(),
                                 [](const PartGroup& group) { return group.by_law; });
   features.several_parts = parts_.size() != 1 || features.unions;
@@ -92,7 +93,6 @@ Scene::Scene(std::vector<SceneObject> objects, bool side_contact, Tool tool,
 }
 
 void Scene::group_parts() {
-  constexpr double kSkin = 1e-9;  // of the size of the largest part
   std::vector<int> objects;
   for (std::uint32_t i = 0; i < parts_.size(); ++i) {
     const ScenePart& part = parts_[i];
@@ -118,12 +118,66 @@ void Scene::group_parts() {
   for (PartGroup& group : groups_) {
     // The walk knows one part that never gives way.
     group.by_law = tool() != nullptr || !group.felt || parts_of_object[group.object_state] > 1;
-    if (!group.by_law) continue;
-    for (std::uint32_t k = 0; k < group.part_count; ++k) {
-      ScenePart& part = parts_[group.first_part + k];
-      add_margin(part);
-      group.skin = std::max({group.skin, 3 * part.margin, kSkin * part.mesh->size()});
+    if (group.by_law) prepare_for_law(group);
+  }
+}
+
+void Scene::prepare_for_law(PartGroup& group) {
+  constexpr double kSkin = 1e-9;  // of the size of the largest part
+  for (std::uint32_t k = 0; k < group.part_count; ++k) {
+    ScenePart& part = parts_[group.first_part + k];
+    add_margin(part);
+    group.skin = std::max({group.skin, 3 * part.margin, kSkin * part.mesh->size()});
+  }
+}
+
+void Scene::add_surfaces(std::vector<SceneSurface> surfaces, TickFeatures& features) {
+  constexpr double kRounding = 1e-12, kSkin = 1e-9;  // of the size
+  constexpr double kRoundings = 8 * std::numeric_limits<double>::epsilon();
+  auto pairs = static_cast<std::uint32_t>(parts_.size() * segments());
+  for (SceneSurface& placed : surfaces) {
+    PlacedSurface surface;
+    surface.surface = std::move(placed.surface);
+    surface.to_world = glm::mat3_cast(placed.pose.orientation);
+    surface.position = placed.pose.position;
+    surface.sphere_centre = surface.world_vector(surface.surface->centre()) + surface.position;
+    surface.sphere_radius = surface.surface->radius();
+    surface.tolerance = kRounding * surface.surface->size() +
+                        kRoundings * (glm::length(surface.sphere_centre) +
+                                      glm::length(surface.surface->centre()) + tool_reach_);
+    surface.skin = std::max(kSkin * surface.surface->size(), 64 * surface.tolerance);
+    surface.object = placed.object;
+    surface.group = static_cast<std::uint32_t>(groups_.size());
+    surface.first_material = static_cast<std::uint32_t>(parts_.size() + materials_.size());
+    for (const stimuli::Material& material : surface.surface->materials()) {
+      features.damping |= material.damping != 0;
+      features.friction |= material.has_friction();
+      materials_.push_back(material);
     }
+    PartGroup group;
+    group.first_part = static_cast<std::uint32_t>(parts_.size());
+    group.first_pair = pairs;
+    group.object = placed.object;
+    group.by_law = true;
+    group.skin = surface.skin;
+    group.surface = static_cast<std::uint32_t>(surfaces_.size());
+    const auto same = std::find_if(groups_.begin(), groups_.end(), [&](const PartGroup& other) {
+      return other.object == placed.object;
+    });
+    group.object_state =
+        same != groups_.end() ? same->object_state : static_cast<std::uint32_t>(object_states_++);
+    pairs += kMostPlanes;
+    groups_.push_back(group);
+    surfaces_.push_back(std::move(surface));
+  }
+  // What was a single part, for the walk alone, shares its object with a surface.
+  for (PartGroup& group : groups_) {
+    const auto shares = [&](const PlacedSurface& s) {
+      return groups_[s.group].object_state == group.object_state;
+    };
+    if (group.by_law || std::none_of(surfaces_.begin(), surfaces_.end(), shares)) continue;
+    group.by_law = true;
+    prepare_for_law(group);
   }
 }
 
@@ -188,7 +242,12 @@ RenderState Scene::initial_state() const {
       most_pairs = std::max(most_pairs, group.part_count * segments());
       contacts += group.by_law ? kMostPlanes : 1;
     }
-    state.unions.pairs.resize(parts_.size() * segments());
+    state.unions.pairs.resize(parts_.size() * segments() + kMostPlanes * surfaces_.size());
+    state.unions.surfaces.resize(surfaces_.size());
+    for (SurfaceState& surface : state.unions.surfaces) {
+      surface.near.reserve(kMostNear);
+      surface.patches.reserve(kMostPatches);
+    }
     state.unions.groups.resize(groups_.size());
     state.unions.objects.resize(object_states_);
     state.unions.breaking.resize(breaking_.size());

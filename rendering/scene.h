@@ -42,6 +42,13 @@ struct SceneObject {
   double break_force = std::numeric_limits<double>::infinity();
 };
 
+/// A closed surface to be put into a scene: all shells of an object.
+struct SceneSurface {
+  std::shared_ptr<const Surface> surface;
+  Pose pose;
+  int object = 0;  ///< index of the object in the scene
+};
+
 /// One convex part as the tick uses it.
 struct ScenePart {
   std::shared_ptr<const stimuli::ConvexMesh> mesh;
@@ -87,7 +94,8 @@ struct TickFeatures {
   bool several_parts = false;  ///< broad phase, a list of contacts, sums over it
   bool damping = false;        ///< some material has it; so the others
   bool friction = false;
-  bool unions = false;  ///< objects of several parts, layers, or a tool: the law of union_contact.h
+  /// Objects of several parts, layers, or a tool: the law of union_contact.h; or closed surfaces.
+  bool unions = false;
 
   static constexpr std::size_t kCount = 16;  ///< combinations
   static constexpr TickFeatures of(std::size_t index) {
@@ -142,10 +150,16 @@ class Scene {
   /// \param motion        what moves, of objects that stand at first where they are here; null:
   /// nothing
   explicit Scene(std::vector<SceneObject> objects, bool side_contact = true, Tool tool = {},
-                 std::shared_ptr<const SceneMotion> motion = nullptr);
+                 std::shared_ptr<const SceneMotion> motion = nullptr,
+                 std::vector<SceneSurface> surfaces = {});
 
   /// Where they stand, at first where they move.
   const std::vector<ScenePart>& parts() const { return parts_; }
+  const std::vector<PlacedSurface>& surfaces() const { return surfaces_; }
+  /// Of a contact's part; those of surfaces follow after the convex parts.
+  const stimuli::Material& material_of(std::uint32_t part) const {
+    return part < parts_.size() ? parts_[part].material : materials_[part - parts_.size()];
+  }
   const SceneMotion* motion() const { return motion_.get(); }
   /// Selects the tick that a renderer runs; beyond TickFeatures::kCount it is that of motion().
   TickFeatures features() const { return TickFeatures::of(features_index_); }
@@ -172,10 +186,14 @@ class Scene {
 
  private:
   void group_parts();
+  void prepare_for_law(PartGroup& group);
+  void add_surfaces(std::vector<SceneSurface> surfaces, TickFeatures& features);
   void index_parts();
   void find_breaking_parts();
 
   std::vector<ScenePart> parts_;
+  std::vector<PlacedSurface> surfaces_;
+  std::vector<stimuli::Material> materials_;  ///< of the surfaces' shells
   std::vector<PartGroup> groups_;
   std::vector<BreakingParts> breaking_;
   std::size_t object_states_ = 0;

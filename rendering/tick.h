@@ -16,6 +16,7 @@
 #include "rendering/material_forces.h"
 #include "rendering/release.h"
 #include "rendering/renderer.h"
+#include "rendering/surface_contact.h"
 #include "rendering/union_contact.h"
 
 namespace palpate::rendering::tick {
@@ -229,6 +230,9 @@ void add_placed_contacts(UnionTick& tick, Tick<Probe>& plain) {
     found.motion = (1 - found.loaded.probe_fraction) * (plain.probe.tip - last.tip) +
                    found.loaded.probe_fraction * (plain.probe.tail - last.tail);
     all.contacts.push_back(found);
+  }
+  for (std::uint32_t i = 0; i < scene.surfaces().size(); ++i) {
+    if (!is_off(tick, scene.groups()[scene.surfaces()[i].group])) follow_on_surface(tick, i);
   }
 }
 

@@ -32,14 +32,16 @@ struct Plane {
 };
 
 /// Those in use, at most kMostPlanes.
-class Planes {
+/// \tparam Held  has the normal, depth and multiplier of Plane
+template <class Held>
+class PlanesOf {
  public:
-  std::span<Plane> all() { return {planes_.data(), count_}; }
-  std::span<const Plane> all() const { return {planes_.data(), count_}; }
+  std::span<Held> all() { return {planes_.data(), count_}; }
+  std::span<const Held> all() const { return {planes_.data(), count_}; }
   /// Null where there is none.
-  const Plane* most_loaded() const {
-    const Plane* most = nullptr;
-    for (const Plane& plane : all()) {
+  const Held* most_loaded() const {
+    const Held* most = nullptr;
+    for (const Held& plane : all()) {
       if (most == nullptr || plane.multiplier > most->multiplier) most = &plane;
     }
     return most;
@@ -47,7 +49,7 @@ class Planes {
   bool full() const { return count_ == planes_.size(); }
   bool empty() const { return count_ == 0; }
   void clear() { count_ = 0; }
-  void add(const Plane& plane) { planes_[count_++] = plane; }
+  void add(const Held& plane) { planes_[count_++] = plane; }
   /// In order; `drop` may change what it keeps.
   template <class Drop>
   void remove_if(const Drop& drop) {
@@ -119,8 +121,10 @@ class Planes {
     return true;
   }
 
-  std::array<Plane, kMostPlanes> planes_;
+  std::array<Held, kMostPlanes> planes_;
   std::size_t count_ = 0;
 };
+
+using Planes = PlanesOf<Plane>;
 
 }  // namespace palpate::rendering

@@ -11,12 +11,13 @@
 #include "rendering/facet_walk.h"
 #include "rendering/force.h"
 #include "rendering/separation.h"
+#include "rendering/surface_state.h"
 #include "rendering/tool_pose.h"
 
 namespace palpate::rendering {
 
-/// The convex parts that have one ideal tool together: the surface of an object, or one of its
-/// layers.
+/// What has one ideal tool: the convex parts of an object's surface or of one of its layers, side
+/// by side, or a closed surface.
 struct PartGroup {
   std::uint32_t first_part = 0, part_count = 0;  ///< in the scene, side by side
   std::uint32_t first_pair = 0;  ///< of part k and segment j: first_pair + k * segments + j
@@ -25,6 +26,8 @@ struct PartGroup {
   bool by_law = false;  ///< else a single part without a tool, which the walk alone renders
   bool felt = true;     ///< false: it has no force and only says what is inside of the object
   double skin = 0;      ///< m; the ideal tool keeps this distance from what it rests on
+  static constexpr std::uint32_t kParts = 0xffffffff;
+  std::uint32_t surface = kParts;  ///< index in Scene::surfaces(); kParts: it is of convex parts
 };
 
 /// Parts of one group that give way together: a layer, or in a compound what has equal bounds of
@@ -118,6 +121,7 @@ struct UnionMemory {
   std::vector<GroupState> groups;
   std::vector<ObjectState> objects;
   std::vector<BreakState> breaking;
+  std::vector<SurfaceState> surfaces;
   std::vector<NearPair> near;           ///< of the group in hand
   std::vector<PlacedContact> contacts;  ///< of the last tick
   std::vector<RubbedPair> rubbed;       ///< at the last tick

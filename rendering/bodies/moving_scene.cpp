@@ -166,8 +166,10 @@ std::optional<MovingSummary> moving_summary(const Scene& scene) {
 }
 
 Scene moving_scene(std::vector<SceneObject> parts, const std::vector<MovingObject>& moving,
-                   const Vec3& gravity, bool side_contact, const Tool& tool, bool sleeps) {
-  if (moving.empty()) return Scene(std::move(parts), side_contact, tool);
+                   const Vec3& gravity, bool side_contact, const Tool& tool, bool sleeps,
+                   std::vector<SceneSurface> surfaces) {
+  if (moving.empty())
+    return Scene(std::move(parts), side_contact, tool, nullptr, std::move(surfaces));
   if (moving.size() > kMostBodies)
     refuse(moving[kMostBodies].object,
            "expected at most " + std::to_string(kMostBodies) + " moving objects in a scene");

@@ -1,0 +1,212 @@
+#include "rendering/surface.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <limits>
+#include <numeric>
+
+#include "rendering/surface_query.h"
+
+namespace palpate::rendering {
+namespace {
+
+constexpr std::uint32_t kLeaf = 4;
+
+/// Six times the volume under d's plane, as exact as doubles make it: its rounding is below the
+/// bound that is returned beside it (Shewchuk 1997, orient3d's filter).
+struct Volume {
+  double value, bound;
+};
+
+Volume volume_of(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) {
+  const Vec3 p = a - d, q = b - d, r = c - d;
+  const double x = p.y * q.z - p.z * q.y, y = p.z * q.x - p.x * q.z, z = p.x * q.y - p.y * q.x;
+  const double value = r.x * x + r.y * y + r.z * z;
+  const double most = std::abs(r.x) * (std::abs(p.y * q.z) + std::abs(p.z * q.y)) +
+                      std::abs(r.y) * (std::abs(p.z * q.x) + std::abs(p.x * q.z)) +
+                      std::abs(r.z) * (std::abs(p.x * q.y) + std::abs(p.y * q.x));
+  return {value, 8 * std::numeric_limits<double>::epsilon() * most};
+}
+
+float rounded_up(double value) {
+  const auto near = static_cast<float>(value);
+  return static_cast<double>(near) < value
+             ? std::nextafter(near, std::numeric_limits<float>::infinity())
+             : near;
+}
+
+}  // namespace
+
+Surface::Surface(std::span<const SurfaceShell> shells) {
+  std::size_t vertices = 0, triangles = 0;
+  for (const SurfaceShell& shell : shells) {
+    vertices += shell.surface->vertices.size();
+    triangles += shell.surface->triangles.size();
+  }
+  vertices_.reserve(vertices);
+  triangles_.reserve(triangles);
+  for (const SurfaceShell& shell : shells) add(shell);
+  Vec3 low(HUGE_VAL), high(-HUGE_VAL);
+  for (const Vec3& v : vertices_) {
+    low = glm::min(low, v);
+    high = glm::max(high, v);
+  }
+  if (vertices_.empty()) return;
+  centre_ = 0.5 * (low + high);
+  for (const Vec3& v : vertices_) radius_ = std::max(radius_, glm::length(v - centre_));
+  radius_ *= 1 + 1e-15;
+  find_edges();
+  build_tree();
+}
+
+void Surface::add(const SurfaceShell& shell) {
+  const auto first = static_cast<std::uint32_t>(vertices_.size());
+  const auto base = static_cast<std::uint32_t>(triangles_.size());
+  const bool placed = shell.pose.orientation != Quat(1, 0, 0, 0) || shell.pose.position != Vec3(0);
+  for (const Vec3& v : shell.surface->vertices)
+    vertices_.push_back(placed ? shell.pose.orientation * v + shell.pose.position : v);
+  const auto& corners = shell.surface->triangles;
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    SurfaceTriangle& t = triangles_.emplace_back();
+    for (std::size_t k = 0; k < 3; ++k) t.corners[k] = first + corners[i][k];
+    t.shell = static_cast<std::uint32_t>(materials_.size());
+    const Vec3 &a = vertices_[t.corners[0]], &b = vertices_[t.corners[1]],
+               &c = vertices_[t.corners[2]];
+    // Of the two longest sides: the rounding of needles is least.
+    const Vec3 ab = b - a, bc = c - b, ca = a - c;
+    const double ab2 = glm::dot(ab, ab), bc2 = glm::dot(bc, bc), ca2 = glm::dot(ca, ca);
+    Vec3 normal = ab2 >= bc2 && ab2 >= ca2 ? (bc2 > ca2 ? glm::cross(ab, bc) : glm::cross(ca, ab))
+                  : bc2 >= ca2             ? (ab2 > ca2 ? glm::cross(ab, bc) : glm::cross(bc, ca))
+                                           : (ab2 > bc2 ? glm::cross(ca, ab) : glm::cross(bc, ca));
+    const double length = glm::length(normal);
+    t.normal = length > 0 ? normal / length : Vec3(0, 0, 1);
+    t.offset = glm::dot(t.normal, a);
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::uint32_t beyond = shell.surface->across[i][k];
+      const std::uint32_t end = corners[i][(k + 1) % 3];
+      std::uint32_t side = 0;
+      while (side < 2 &&
+             !(corners[beyond][side] == end && corners[beyond][(side + 1) % 3] == corners[i][k]))
+        ++side;
+      t.across[k] = (base + beyond) << 2 | side;
+    }
+  }
+  materials_.push_back(shell.material);
+}
+
+void Surface::find_edges() {
+  for (SurfaceTriangle& t : triangles_) {
+    const Vec3 &a = vertices_[t.corners[0]], &b = vertices_[t.corners[1]],
+               &c = vertices_[t.corners[2]];
+    for (std::uint32_t k = 0; k < 3; ++k) {
+      const SurfaceTriangle& other = triangles_[SurfaceTriangle::triangle_of(t.across[k])];
+      const std::uint32_t apex = other.corners[(SurfaceTriangle::side_of(t.across[k]) + 2) % 3];
+      // Positive where the other's corner is under this triangle's plane.
+      const Volume under = volume_of(a, b, c, vertices_[apex]);
+      if (!(under.value < -under.bound)) t.touched |= 1U << k;
+    }
+  }
+  // Both sides say the same.
+  for (std::uint32_t i = 0; i < triangles_.size(); ++i) {
+    for (std::uint32_t k = 0; k < 3; ++k) {
+      const std::uint32_t across = triangles_[i].across[k];
+      SurfaceTriangle& other = triangles_[SurfaceTriangle::triangle_of(across)];
+      const std::uint32_t side = SurfaceTriangle::side_of(across);
+      if (triangles_[i].touches(k) || other.touches(side)) {
+        triangles_[i].touched |= 1U << k;
+        other.touched |= 1U << side;
+      }
+    }
+  }
+}
+
+void Surface::build_tree() {
+  std::vector<Vec3> middles(triangles_.size());
+  for (std::size_t i = 0; i < triangles_.size(); ++i) {
+    const auto& c = triangles_[i].corners;
+    middles[i] = (vertices_[c[0]] + vertices_[c[1]] + vertices_[c[2]]) / 3.0;
+  }
+  order_.resize(triangles_.size());
+  std::iota(order_.begin(), order_.end(), 0U);
+  nodes_.reserve(triangles_.size());
+  build_node(middles, 0, static_cast<std::uint32_t>(order_.size()));
+  nodes_.shrink_to_fit();
+}
+
+std::uint32_t Surface::build_node(std::span<const Vec3> middles, std::uint32_t begin,
+                                  std::uint32_t end) {
+  const auto index = static_cast<std::uint32_t>(nodes_.size());
+  Vec3 low(HUGE_VAL), high(-HUGE_VAL), first_middle(HUGE_VAL), last_middle(-HUGE_VAL);
+  for (std::uint32_t i = begin; i < end; ++i) {
+    for (const std::uint32_t corner : triangles_[order_[i]].corners) {
+      low = glm::min(low, vertices_[corner]);
+      high = glm::max(high, vertices_[corner]);
+    }
+    first_middle = glm::min(first_middle, middles[order_[i]]);
+    last_middle = glm::max(last_middle, middles[order_[i]]);
+  }
+  Node node;
+  for (int k = 0; k < 3; ++k) {
+    const auto at = static_cast<std::size_t>(k);
+    node.middle[at] = static_cast<float>(0.5 * (low[k] + high[k]));
+    const double middle = node.middle[at];
+    node.half[at] = rounded_up(std::max(high[k] - middle, middle - low[k]));
+  }
+  node.first = begin;
+  node.count = end - begin;
+  nodes_.push_back(node);
+  if (end - begin <= kLeaf) return index;
+  const Vec3 extent = last_middle - first_middle;
+  int axis = 0;
+  if (extent[1] > extent[axis]) axis = 1;
+  if (extent[2] > extent[axis]) axis = 2;
+  const std::uint32_t half = (begin + end) / 2;
+  std::nth_element(
+      order_.begin() + begin, order_.begin() + half, order_.begin() + end,
+      [&](std::uint32_t p, std::uint32_t q) {
+        return middles[p][axis] != middles[q][axis] ? middles[p][axis] < middles[q][axis] : p < q;
+      });
+  build_node(middles, begin, half);
+  const std::uint32_t right = build_node(middles, half, end);
+  nodes_[index].first = right;
+  nodes_[index].count = 0;
+  return index;
+}
+
+int Surface::winding(const Vec3& point) const {
+  // Crossings of a ray, in directions that no file has, until none is within rounding of a side.
+  constexpr int kDirections = 8;
+  int count = 0;
+  for (int n = 0; n < kDirections; ++n) {
+    const double turn = 0.7 + 2.399963229728653 * n, rise = 0.33 - 0.0817 * n;
+    const double flat = std::sqrt(1 - rise * rise);
+    const Vec3 way = (4 * radius_ + glm::length(point - centre_)) *
+                     Vec3(flat * std::cos(turn), flat * std::sin(turn), rise);
+    count = 0;
+    bool clear = true;
+    near_segment(point, way, 0, [&](std::uint32_t index) {
+      const SurfaceTriangle& t = triangles_[index];
+      const Vec3 a = vertices_[t.corners[0]] - point, b = vertices_[t.corners[1]] - point,
+                 c = vertices_[t.corners[2]] - point;
+      const double sides[3] = {glm::dot(way, glm::cross(a, b)), glm::dot(way, glm::cross(b, c)),
+                               glm::dot(way, glm::cross(c, a))};
+      const bool in = sides[0] <= 0 && sides[1] <= 0 && sides[2] <= 0;
+      const bool out = sides[0] >= 0 && sides[1] >= 0 && sides[2] >= 0;
+      if (!in && !out) return true;
+      if (sides[0] == 0 || sides[1] == 0 || sides[2] == 0) {
+        clear = false;
+        return false;
+      }
+      const double height = glm::dot(t.normal, a);  // of the plane over the point
+      if (out && height > 0) ++count;
+      if (in && height < 0) --count;
+      return true;
+    });
+    if (clear) break;
+  }
+  return count;
+}
+
+}  // namespace palpate::rendering

@@ -1,0 +1,217 @@
+#include "rendering/surface_patch.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+
+namespace palpate::rendering {
+namespace {
+
+using Kind = SurfacePatch::Kind;
+
+/// A side as its triangle has it, from v0 to v1, the triangle to its left.
+struct EdgeOf {
+  const SurfaceTriangle &left, &right;
+  Vec3 v0, v1;
+};
+
+EdgeOf edge_of(const Surface& surface, std::uint32_t side) {
+  const SurfaceTriangle& left = surface.triangles()[SurfaceTriangle::triangle_of(side)];
+  const std::uint32_t k = SurfaceTriangle::side_of(side);
+  const SurfaceTriangle& right = surface.triangles()[SurfaceTriangle::triangle_of(left.across[k])];
+  return {left, right, surface.vertices()[left.corners[k]],
+          surface.vertices()[left.corners[(k + 1) % 3]]};
+}
+
+/// Out of an edge that a segment touches: at right angles to both, between the triangles' normals.
+Vec3 edge_normal(const EdgeOf& edge, const Vec3& along, double left, double right) {
+  constexpr double kAlongEdge = 1e-6;
+  // Exact also where the segment lies along the edge, but for sharp ones.
+  const Vec3 between = std::abs(right) * edge.left.normal + std::abs(left) * edge.right.normal;
+  const Vec3 e = edge.v1 - edge.v0;
+  Vec3 across = left >= 0 ? glm::cross(e, along) : glm::cross(along, e);
+  const double size2 = glm::dot(across, across);
+  if (size2 > kAlongEdge * kAlongEdge * glm::dot(e, e) * glm::dot(along, along) &&
+      glm::dot(across, between) > 0)
+    return across / std::sqrt(size2);
+  const double length = glm::length(between);
+  if (length > 0) return between / length;
+  return glm::normalize(edge.left.normal + edge.right.normal);
+}
+
+double to_side(const Vec3& p, const Vec3& a, const Vec3& b) {
+  const Vec3 side = b - a, to = p - a;
+  const double length2 = glm::dot(side, side);
+  const double t = length2 > 0 ? std::clamp(glm::dot(to, side) / length2, 0.0, 1.0) : 0.0;
+  const Vec3 apart = to - t * side;
+  return glm::dot(apart, apart);
+}
+
+/// An end that moves from `from` to `to` against a triangle.
+void sweep_end(const Surface& surface, std::uint32_t index, std::uint8_t segment, bool tail,
+               const Vec3& from, const Vec3& to, double tolerance, PatchHit& first) {
+  const SurfaceTriangle& t = surface.triangles()[index];
+  const Vec3 a = surface.vertices()[t.corners[0]] - from;
+  const double start = -glm::dot(t.normal, a);
+  if (start < -tolerance) return;
+  const Vec3 way = to - from;
+  const double fall = -glm::dot(t.normal, way);
+  if (!(fall > 0) || start > fall) return;
+  const double time = std::max(0.0, start / fall);
+  if (time >= first.time) return;
+  PatchPolygon polygon;
+  polygon.count = 3;
+  for (std::size_t k = 0; k < 3; ++k) polygon.corners[k] = surface.vertices()[t.corners[k]];
+  if (!meets(polygon, from, way)) return;
+  first = {{index << 2, segment, tail, Kind::face}, time};
+}
+
+/// A segment whose ends move linearly against an edge: where the two are in one plane is a
+/// quadratic equation in time.
+void sweep_edge(const Surface& surface, std::uint32_t side, std::uint8_t segment,
+                const PosedTool::Segment& from, const PosedTool::Segment& to, double tolerance,
+                double slack, PatchHit& first) {
+  const EdgeOf edge = edge_of(surface, side);
+  const Vec3 e = edge.v1 - edge.v0, r = from.start - edge.v0, way = to.start - from.start,
+             turn = to.along - from.along;
+  const Vec3 across = glm::cross(e, from.along), change = glm::cross(e, turn);
+  const double c0 = glm::dot(across, r), c1 = glm::dot(change, r) + glm::dot(across, way),
+               c2 = glm::dot(change, way), end = c0 + c1 + c2;
+  const double edge_length = glm::length(e), length = glm::length(from.along);
+  const double rounding = tolerance * edge_length * length;
+  const double bend = std::abs(c2) + rounding;
+  if (std::min(c0, end) > bend || std::max(c0, end) < -bend) return;
+  const auto try_at = [&](double time) {
+    if (!(time <= 1) || !(time < first.time)) return;
+    const Vec3 along = from.along + time * turn;
+    const double left = glm::dot(edge.left.normal, along),
+                 right = glm::dot(edge.right.normal, along), level = 1e-12 * length;
+    const double rate = c1 + 2 * c2 * time;
+    const bool up = left >= -level && right <= level, down = left <= level && right >= -level;
+    if (!((up && rate < 0) || (down && rate > 0))) return;
+    // Crossing of the two lines.
+    const Vec3 apart = r + time * way;  // from v0 to the start
+    const Vec3 normal = glm::cross(e, along);
+    const double size2 = glm::dot(normal, normal);
+    if (!(size2 > 0)) return;
+    const double u = glm::dot(glm::cross(apart, along), normal) / size2 * edge_length;
+    const double s = glm::dot(glm::cross(apart, e), normal) / size2 * length;
+    if (u < -slack || u > edge_length + slack || s < -slack || s > length + slack) return;
+    first = {{side, segment, false, Kind::edge}, std::max(0.0, time)};
+  };
+  if (std::abs(c0) <= rounding) try_at(0);
+  if (std::abs(c2) <= 1e-14 * (std::abs(c0) + std::abs(c1))) {
+    if (c1 != 0 && -c0 / c1 >= 0) try_at(-c0 / c1);
+    return;
+  }
+  const double root2 = c1 * c1 - 4 * c2 * c0;
+  if (root2 < 0) return;
+  const double q = -0.5 * (c1 + std::copysign(std::sqrt(root2), c1));
+  const double one = q / c2;
+  if (one >= 0) try_at(one);
+  if (q != 0 && c0 / q >= 0) try_at(c0 / q);
+}
+
+}  // namespace
+
+PatchPlane plane_of(const Surface& surface, const SurfacePatch& patch, const PosedTool& tool) {
+  const PosedTool::Segment& segment = tool.segments[patch.segment];
+  if (patch.kind == Kind::face) {
+    const SurfaceTriangle& t = surface.triangles()[patch.triangle()];
+    const Vec3 end = segment.end(patch.tail);
+    return {t.normal, glm::dot(t.normal, surface.vertices()[t.corners[0]] - end)};
+  }
+  const EdgeOf edge = edge_of(surface, patch.side);
+  const double left = glm::dot(edge.left.normal, segment.along),
+               right = glm::dot(edge.right.normal, segment.along);
+  PatchPlane plane;
+  plane.normal = edge_normal(edge, segment.along, left, right);
+  plane.depth = glm::dot(plane.normal, edge.v0 - segment.start);
+  return plane;
+}
+
+PatchPolygon polygon_of(const Surface& surface, const SurfacePatch& patch, const PosedTool& tool) {
+  const PosedTool::Segment& segment = tool.segments[patch.segment];
+  PatchPolygon out;
+  if (patch.kind == Kind::face) {
+    const SurfaceTriangle& t = surface.triangles()[patch.triangle()];
+    const Vec3 end = segment.end(patch.tail);
+    out.count = 3;
+    for (std::size_t k = 0; k < 3; ++k) out.corners[k] = surface.vertices()[t.corners[k]] - end;
+    return out;
+  }
+  const EdgeOf edge = edge_of(surface, patch.side);
+  const Vec3 tail = segment.end(true);
+  out.count = 4;
+  out.corners = {edge.v1 - segment.start, edge.v0 - segment.start, edge.v0 - tail, edge.v1 - tail};
+  if (!by_tip(edge.left, segment.along)) std::reverse(out.corners.begin(), out.corners.end());
+  return out;
+}
+
+SurfacePatch patch_after_turn(const Surface& surface, const SurfacePatch& patch,
+                              const PosedTool& tool) {
+  if (patch.kind != Kind::edge) return patch;
+  const Vec3& along = tool.segments[patch.segment].along;
+  const EdgeOf edge = edge_of(surface, patch.side);
+  if (by_tip(edge.left, along) != by_tip(edge.right, along)) return patch;
+  // It goes on over the triangle that has turned away.
+  const bool left =
+      std::abs(glm::dot(edge.left.normal, along)) <= std::abs(glm::dot(edge.right.normal, along));
+  const std::uint32_t triangle =
+      left
+          ? patch.triangle()
+          : SurfaceTriangle::triangle_of(
+                surface.triangles()[patch.triangle()].across[SurfaceTriangle::side_of(patch.side)]);
+  return {triangle << 2, patch.segment, !by_tip(edge.left, along), Kind::face};
+}
+
+bool meets(const PatchPolygon& polygon, const Vec3& from, const Vec3& way) {
+  std::array<Vec3, 4> to;
+  for (std::size_t k = 0; k < polygon.count; ++k) to[k] = polygon.corners[k] - from;
+  for (std::size_t k = 0; k < polygon.count; ++k) {
+    const Vec3& next = to[k + 1 == polygon.count ? 0 : k + 1];
+    if (!(glm::dot(way, glm::cross(to[k], next)) <= 0)) return false;
+  }
+  return true;
+}
+
+double distance_off(const PatchPolygon& polygon, const Vec3& normal, const Vec3& at) {
+  const Vec3 p = at - glm::dot(normal, at - polygon.corners[0]) * normal;
+  bool over = true;
+  double nearest = HUGE_VAL;
+  for (std::size_t k = 0; k < polygon.count; ++k) {
+    const Vec3 &a = polygon.corners[k], &b = polygon.corners[k + 1 == polygon.count ? 0 : k + 1];
+    over = over && glm::dot(normal, glm::cross(b - a, p - a)) >= 0;
+    nearest = std::min(nearest, to_side(p, a, b));
+  }
+  return over ? 0 : std::sqrt(nearest);
+}
+
+void cast_on_patch(const Surface& surface, const SurfacePatch& patch, const PatchPlane& plane,
+                   const PosedTool& tool, const Vec3& from, const Vec3& to, double tolerance,
+                   PatchHit& first) {
+  const double start = glm::dot(plane.normal, from) - plane.depth,
+               end = glm::dot(plane.normal, to) - plane.depth;
+  if (end > 0 || start < -tolerance || !(end < start)) return;
+  const double time = std::max(0.0, start / (start - end));
+  if (time >= first.time) return;
+  if (meets(polygon_of(surface, patch, tool), from, to - from)) first = {patch, time};
+}
+
+void sweep_triangle(const Surface& surface, std::uint32_t index, std::uint8_t segment,
+                    std::uint8_t what, const PosedTool::Segment& from, const PosedTool::Segment& to,
+                    double tolerance, double slack, PatchHit& first) {
+  if ((what & surface_pair::kTip) != 0)
+    sweep_end(surface, index, segment, false, from.start, to.start, tolerance, first);
+  if (from.along == Vec3(0)) return;
+  if ((what & surface_pair::kTail) != 0)
+    sweep_end(surface, index, segment, true, from.end(true), to.end(true), tolerance, first);
+  if ((what & surface_pair::kSides) == 0) return;
+  const SurfaceTriangle& t = surface.triangles()[index];
+  for (std::uint32_t k = 0; k < 3; ++k) {
+    if ((what >> k & 1) == 0 || !owns(t, index, k) || !t.touches(k)) continue;
+    sweep_edge(surface, index << 2 | k, segment, from, to, tolerance, slack, first);
+  }
+}
+
+}  // namespace palpate::rendering

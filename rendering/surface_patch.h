@@ -1,0 +1,122 @@
+#pragma once
+// Where a tool can touch a closed surface (surface_contact.h): for a fixed orientation of the tool,
+// patches in the space of its translations. Local frame of the surface, m.
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include "rendering/surface.h"
+#include "rendering/tool.h"
+
+namespace palpate::rendering {
+
+/// A triangle with an end of a segment, or an edge that is no concave one with a segment.
+struct SurfacePatch {
+  enum class Kind : std::uint8_t { none, face, edge };
+  std::uint32_t side = 0;  ///< the triangle times four; of an edge its side as well
+  std::uint8_t segment = 0;
+  bool tail = false;  ///< face only: the end that touches
+  Kind kind = Kind::none;
+
+  std::uint32_t triangle() const { return side >> 2; }
+  friend bool operator==(const SurfacePatch&, const SurfacePatch&) = default;
+};
+
+/// The segments of a tool where they are.
+struct PosedTool {
+  struct Segment {
+    Vec3 start, along;
+    Vec3 end(bool tail) const { return tail ? start + along : start; }
+  };
+  std::array<Segment, Tool::kMostSegments> segments;
+  std::size_t count = 0;
+};
+
+/// A patch's plane: translations y of the tool with dot(normal, y) >= depth are outside.
+struct PatchPlane {
+  Vec3 normal;  ///< unit
+  double depth = 0;
+};
+
+/// Its polygon, counter-clockwise seen from outside. Patches that share a side have the same
+/// corners there, to the bit.
+struct PatchPolygon {
+  std::array<Vec3, 4> corners;
+  std::size_t count = 0;
+};
+
+/// Whether the triangle is touched by the tip of a segment of this direction, not by its tail.
+inline bool by_tip(const SurfaceTriangle& triangle, const Vec3& along) {
+  return triangle.normal.x * along.x + triangle.normal.y * along.y + triangle.normal.z * along.z >=
+         0;
+}
+
+/// \param tool  with the translation 0
+PatchPlane plane_of(const Surface& surface, const SurfacePatch& patch, const PosedTool& tool);
+PatchPolygon polygon_of(const Surface& surface, const SurfacePatch& patch, const PosedTool& tool);
+
+/// The patch that took over from one that the tool, turned, has no more; or the same.
+SurfacePatch patch_after_turn(const Surface& surface, const SurfacePatch& patch,
+                              const PosedTool& tool);
+
+/// Whether a line in the direction of `way` from `from`, against the normal, goes through the
+/// polygon. One expression decides for both patches at a side (Woop, Benthin & Wald 2013), and one
+/// that goes through the side itself goes through both.
+bool meets(const PatchPolygon& polygon, const Vec3& from, const Vec3& way);
+
+/// m, along the plane, by which a translation is off the polygon; 0 over it.
+double distance_off(const PatchPolygon& polygon, const Vec3& normal, const Vec3& at);
+
+/// Where a motion of the tool first meets a patch.
+struct PatchHit {
+  SurfacePatch patch;
+  double time = 2;  ///< of the motion; above 1: it does not
+  bool hit() const { return time <= 1; }
+};
+
+/// Whether a translation from `from` to `to` enters the patch, and does so before `first`, which it
+/// is then.
+/// \param tolerance  m; who is no farther than this behind a plane is still before it
+void cast_on_patch(const Surface& surface, const SurfacePatch& patch, const PatchPlane& plane,
+                   const PosedTool& tool, const Vec3& from, const Vec3& to, double tolerance,
+                   PatchHit& first);
+
+/// What of a triangle and a segment can come together: bits.
+namespace surface_pair {
+inline constexpr std::uint8_t kSides = 7;  ///< bit k: side k, which is the triangle's own
+inline constexpr std::uint8_t kTip = 8, kTail = 16;
+inline constexpr std::uint8_t kAll = 31;
+}  // namespace surface_pair
+
+/// The same of a segment whose ends move linearly, for all patches of a triangle and of the sides
+/// that are its own.
+/// \param what   of them; bits of surface_pair
+/// \param slack  m, by which edges and segment are longer
+void sweep_triangle(const Surface& surface, std::uint32_t triangle, std::uint8_t segment,
+                    std::uint8_t what, const PosedTool::Segment& from, const PosedTool::Segment& to,
+                    double tolerance, double slack, PatchHit& first);
+
+/// Whether a side that two triangles share is this one's own.
+inline bool owns(const SurfaceTriangle& triangle, std::uint32_t index, std::uint32_t k) {
+  return triangle.across[k] > (index << 2 | k);
+}
+
+/// Calls visit(patch) for those of a triangle and of the sides that are its own.
+template <class Visit>
+void for_each_patch(const Surface& surface, std::uint32_t index, std::uint8_t segment,
+                    std::uint8_t what, const Vec3& along, const Visit& visit) {
+  const SurfaceTriangle& triangle = surface.triangles()[index];
+  const bool tip = by_tip(triangle, along);
+  if ((what & (tip ? surface_pair::kTip : surface_pair::kTail)) != 0)
+    visit(SurfacePatch{index << 2, segment, !tip, SurfacePatch::Kind::face});
+  if ((what & surface_pair::kSides) == 0 || along == Vec3(0)) return;
+  for (std::uint32_t k = 0; k < 3; ++k) {
+    if ((what >> k & 1) == 0 || !owns(triangle, index, k) || !triangle.touches(k)) continue;
+    if (by_tip(surface.triangles()[SurfaceTriangle::triangle_of(triangle.across[k])], along) == tip)
+      continue;
+    visit(SurfacePatch{index << 2 | k, segment, false, SurfacePatch::Kind::edge});
+  }
+}
+
+}  // namespace palpate::rendering

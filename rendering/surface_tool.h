@@ -1,0 +1,111 @@
+#pragma once
+// One ideal tool on one closed surface in one tick: it turns (surface_turn.cpp), translates
+// (surface_translate.cpp) and says where it touches (surface_contacts.cpp). Internal to the law of
+// surfaces (surface_contact.h). Local frame of the surface, SI units; poses are in the world.
+
+#include <cstddef>
+#include <cstdint>
+
+#include "rendering/surface_contact.h"
+#include "rendering/surface_state.h"
+#include "rendering/union_planes.h"
+
+namespace palpate::rendering {
+
+/// A plane that holds the tool. Translations are relative to the virtual tool.
+struct SurfacePlane {
+  SurfacePatch patch;
+  Vec3 normal;            ///< out of the solid
+  double depth = 0;       ///< m, of the virtual tool below it: dot(normal, y) >= depth outside
+  double multiplier = 0;  ///< m, of the normal in the way from the virtual to the ideal tool
+  bool stays = false;     ///< came back where it had let go: rounding, it is not let go there again
+};
+
+class SurfaceTool {
+ public:
+  SurfaceTool(UnionTick& tick, std::uint32_t index)
+      : tick_(tick),
+        all_(tick.state.unions),
+        placed_(tick.scene.surfaces()[index]),
+        surface_(*placed_.surface),
+        own_(all_.surfaces[index]),
+        memory_(all_.groups[placed_.group]),
+        group_(placed_.group),
+        carried_(tick.sides ? tick.scene.tool() : nullptr),
+        skin_(placed_.skin),
+        tolerance_(placed_.tolerance),
+        target_(tick.tool) {}
+
+  void follow();
+  bool virtual_inside();
+
+ private:
+  // surface_contact.cpp
+  PosedTool pose(const ToolPose& at) const;
+  Vec3 turned(const Vec3& grasp, const ToolPose& at) const {
+    return carried_ != nullptr ? at.frame * grasp : grasp.z * at.d;
+  }
+  bool far_away();
+  void step(const ToolPose& target, const ToolPose& from);
+  void keep_list(const PosedTool& from, const PosedTool& to);
+  void list(const PosedTool& at, double room);
+  std::uint8_t within(std::uint32_t index, const PosedTool::Segment& segment, double far) const;
+  double moved_from_list(const PosedTool& at, const Vec3& by) const;
+  SurfacePlane plane_at(const SurfacePatch& patch) const;
+
+  // surface_turn.cpp
+  double turn(const ToolPose& from, double most);
+  bool settle(const PosedTool& from, double most_push);
+  PatchHit sweep(const PosedTool& from, const PosedTool& to, const Vec3& shift) const;
+
+  // surface_translate.cpp
+  void collect_patches();
+  PatchHit cast(const Vec3& from, const Vec3& to) const;
+  void resume_planes();
+  void translate();
+  bool find_goal(Vec3& goal);
+  void move_to_hit(const Vec3& goal, const PatchHit& hit);
+  bool find_exact_place();
+  bool rests();
+  bool in_the_way_at_rest(SurfacePlane& plane) const;
+  void take_plane(const SurfacePlane& plane);
+  void let_go_of_idle_planes();
+  bool let_go_of_slid_planes(const Vec3& at, double slack);
+  double off_patch(const SurfacePlane& plane, const Vec3& at) const;
+  bool past_a_patch_at_rest() const;
+  bool parted_here(const SurfacePatch& patch) const;
+  bool holds(const SurfacePatch& patch) const;
+
+  // surface_contacts.cpp
+  void add_contacts();
+  void add_contact(const SurfacePlane& plane, const Vec3& shift);
+  void remember(std::size_t first_contact);
+
+  UnionTick& tick_;
+  UnionMemory& all_;
+  const PlacedSurface& placed_;
+  const Surface& surface_;
+  SurfaceState& own_;
+  GroupState& memory_;
+  std::uint32_t group_;
+  const Tool* carried_;
+  double skin_, tolerance_;
+
+  ToolPose target_;   ///< the virtual tool, or in a first contact a pose before it
+  ToolPose pose_;     ///< the ideal tool's orientation; its tip is the virtual one plus at_
+  PosedTool turned_;  ///< of that orientation, with the virtual tip
+  Vec3 at_;           ///< from the virtual to the ideal tool, a skin off what it rests on
+  Vec3 exact_;        ///< the same without the skin, once it rests
+  PlanesOf<SurfacePlane> planes_;
+  struct Parted {
+    SurfacePatch patch;
+    Vec3 at;
+    int times = 0;
+  };
+  std::array<Parted, 8> parted_;  ///< the last that let go of the tool in this tick
+  std::size_t parted_count_ = 0;
+  bool stuck_ = false;
+  bool in_crack_ = false;  ///< opposite planes leave it less than a skin
+};
+
+}  // namespace palpate::rendering

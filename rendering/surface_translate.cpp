@@ -1,0 +1,267 @@
+#include <algorithm>
+#include <glm/geometric.hpp>
+
+#include "rendering/surface_query.h"
+#include "rendering/surface_tool.h"
+
+namespace palpate::rendering {
+namespace {
+
+constexpr int kRounds = 96;          // of casts in one tick; then the ideal tool stays where it is
+constexpr double kSlidOff = 4;       // skins; a contact farther off its patch has left it
+constexpr double kAtRest = 2e-12;    // of the size: the same without the skin
+constexpr double kOnPatch = 1e-11;   // of the size
+constexpr double kExact = 1e-5;      // of the skin; what is nearer than this is rounding
+constexpr double kRounding = 0.125;  // of the skin; so much less of it is a skin
+constexpr double kLessSkin = 0.25;   // of the skin, in a gap where two do not fit, and so on
+constexpr double kInTheWay = 0.25;   // of rounding; what a tool at rest is deeper in holds it
+constexpr double kSamePlace = 8;     // skins; within it a contact that comes back never left
+// The bottom of a valley of 1e-7 rad is hidden by the skin: its sides would take turns for ever.
+constexpr int kTimes = 2;             // that a patch let go of the tool in this tick
+constexpr double kSameValley = 1e-6;  // of the size
+constexpr int kMostInTheWay = 4;
+constexpr int kPieces = 64;  // of a long way, each looked at by itself
+
+}  // namespace
+
+/// The patches of the tool as it is turned, of what is listed.
+void SurfaceTool::collect_patches() {
+  own_.patches.clear();
+  if (!own_.has_list) return;
+  for (const NearTriangle& near : own_.near) {
+    for_each_patch(surface_, near.triangle, near.segment, near.what,
+                   turned_.segments[near.segment].along, [&](const SurfacePatch& patch) {
+                     if (own_.patches.size() < own_.patches.capacity())
+                       own_.patches.push_back({plane_of(surface_, patch, turned_), patch});
+                   });
+  }
+}
+
+/// The first patch on the straight way.
+PatchHit SurfaceTool::cast(const Vec3& from, const Vec3& to) const {
+  PatchHit first;
+  const Vec3 way = to - from;
+  const double length = glm::length(way);
+  if (!(length > 0)) return first;
+  double done = 0;
+  const double room = own_.has_list ? own_.room - moved_from_list(turned_, from) : 0;
+  if (room > 0) {
+    for (const NearPatch& near : own_.patches)
+      cast_on_patch(surface_, near.patch, near.plane, turned_, from, to, tolerance_, first);
+    done = std::min(1.0, room / length);
+    if (first.time <= done || done == 1) return first;
+    first = {};
+  }
+  const double piece = std::max({own_.wanted_room, skin_, length / kPieces}) / length;
+  while (done < 1) {
+    const double end = std::min(1.0, done + 2 * piece);
+    const Vec3 middle = from + 0.5 * (done + end) * way;
+    const double reach = 0.5 * (end - done) * length + 2 * skin_;
+    for (std::size_t j = 0; j < turned_.count; ++j) {
+      const PosedTool::Segment& segment = turned_.segments[j];
+      surface_.near_segment(
+          segment.start + middle, segment.along, reach, [&](std::uint32_t triangle) {
+            for_each_patch(surface_, triangle, static_cast<std::uint8_t>(j), surface_pair::kAll,
+                           segment.along, [&](const SurfacePatch& patch) {
+                             cast_on_patch(surface_, patch,
+                                           rendering::plane_of(surface_, patch, turned_), turned_,
+                                           from, to, tolerance_, first);
+                           });
+            return true;
+          });
+    }
+    if (first.time <= end) return first;
+    first = {};
+    done = end;
+  }
+  return first;
+}
+
+bool SurfaceTool::holds(const SurfacePatch& patch) const {
+  const auto all = planes_.all();
+  return std::any_of(all.begin(), all.end(),
+                     [&](const SurfacePlane& plane) { return plane.patch == patch; });
+}
+
+/// Takes up the planes that held the tool at the last tick, where it is still beyond them.
+void SurfaceTool::resume_planes() {
+  // What the turn put in use may be no patch of the tool as it is turned now.
+  planes_.remove_if([&](const SurfacePlane& plane) {
+    return plane.multiplier <= 0 || !(glm::dot(plane.normal, at_) - plane.depth > 0);
+  });
+  for (std::size_t i = 0; i < own_.carrying_count && !planes_.full(); ++i) {
+    const SurfacePlane plane = plane_at(own_.carrying[i]);
+    if (holds(plane.patch) || !(glm::dot(plane.normal, at_) - plane.depth > 0)) continue;
+    planes_.add(plane);
+  }
+}
+
+/// m, by which the tool is past the patch of a plane.
+double SurfaceTool::off_patch(const SurfacePlane& plane, const Vec3& at) const {
+  return distance_off(polygon_of(surface_, plane.patch, turned_), plane.normal, at);
+}
+
+bool SurfaceTool::parted_here(const SurfacePatch& patch) const {
+  const double same = kSamePlace * skin_;
+  for (std::size_t i = 0; i < parted_count_; ++i) {
+    const Parted& parted = parted_[i];
+    if (!(parted.patch == patch)) continue;
+    const double far = parted.times < kTimes ? same : kSameValley * surface_.size();
+    const Vec3 apart = at_ - parted.at;
+    return glm::dot(apart, apart) <= far * far;
+  }
+  return false;
+}
+
+/// Lets go of planes that hold nothing.
+void SurfaceTool::let_go_of_idle_planes() {
+  planes_.remove_if([](const SurfacePlane& plane) { return !(plane.multiplier > 0); });
+}
+
+/// Lets go of planes whose patch the tool has slid off. True when there are some.
+bool SurfaceTool::let_go_of_slid_planes(const Vec3& at, double slack) {
+  bool slid = false;
+  planes_.remove_if([&](SurfacePlane& plane) {
+    if (plane.stays && parted_here(plane.patch)) return false;
+    if (!(off_patch(plane, at) > slack)) return false;
+    std::size_t known = 0;
+    while (known < parted_count_ && !(parted_[known].patch == plane.patch)) ++known;
+    if (known == parted_.size()) {  // the oldest is forgotten
+      std::move(parted_.begin() + 1, parted_.end(), parted_.begin());
+      parted_[--known].times = 0;
+    }
+    if (known == parted_count_) parted_[parted_count_++].times = 0;
+    parted_[known] = {plane.patch, at_, parted_[known].times + 1};
+    slid = true;
+    return true;
+  });
+  return slid;
+}
+
+/// Where the tool rests without the skin; sets the multipliers. False where rounding hides it.
+bool SurfaceTool::find_exact_place() {
+  return planes_.nearest(Vec3(0), 0, kExact * skin_, exact_) ||
+         planes_.nearest(Vec3(0), 0, kRounding * skin_, exact_);
+}
+
+/// Whether planes hold the tool, a skin away, on patches that it is past without the skin: those of
+/// a groove may end between the two, and leave a gap that is too narrow for the skin.
+bool SurfaceTool::past_a_patch_at_rest() const {
+  const double size = surface_.size(), slack = kSlidOff * skin_ + kOnPatch * size;
+  bool past = false, off = false;
+  for (const SurfacePlane& plane : planes_.all()) {
+    if (!(plane.multiplier > 0)) continue;
+    past = past || (plane.stays && off_patch(plane, exact_) > kOnPatch * size);
+    off = off || off_patch(plane, at_) > slack;
+  }
+  return past && !off;
+}
+
+/// Whether the tool, without the skin that keeps it off what holds it, is behind another patch that
+/// it was less than the skin away from; then the plane that keeps it out.
+bool SurfaceTool::in_the_way_at_rest(SurfacePlane& out) const {
+  double deepest = kInTheWay * tolerance_;
+  bool found = false;
+  const auto look = [&](const SurfacePatch& patch, const PatchPlane& plane) {
+    const double under = plane.depth - glm::dot(plane.normal, exact_);
+    if (!(under > deepest) || plane.depth - glm::dot(plane.normal, at_) > tolerance_) return;
+    if (holds(patch)) return;
+    PatchHit hit;
+    cast_on_patch(surface_, patch, plane, turned_, at_, exact_, tolerance_, hit);
+    if (!hit.hit()) return;
+    deepest = under;
+    found = true;
+    out = {patch, plane.normal, plane.depth};
+  };
+  if (own_.has_list && moved_from_list(turned_, exact_) < own_.room) {
+    for (const NearPatch& near : own_.patches) look(near.patch, near.plane);
+    return found;
+  }
+  for (std::size_t j = 0; j < turned_.count; ++j) {
+    const PosedTool::Segment& segment = turned_.segments[j];
+    surface_.near_segment(
+        segment.start + exact_, segment.along, 4 * skin_, [&](std::uint32_t triangle) {
+          for_each_patch(
+              surface_, triangle, static_cast<std::uint8_t>(j), surface_pair::kAll, segment.along,
+              [&](const SurfacePatch& patch) { look(patch, plane_of(surface_, patch, turned_)); });
+          return true;
+        });
+  }
+  return found;
+}
+
+/// Puts a plane in use.
+void SurfaceTool::take_plane(const SurfacePlane& plane) {
+  if (planes_.full()) let_go_of_idle_planes();
+  stuck_ = planes_.full();
+  if (!stuck_) planes_.add(plane);
+}
+
+void SurfaceTool::move_to_hit(const Vec3& goal, const PatchHit& hit) {
+  SurfacePlane plane = plane_at(hit.patch);
+  // It stops a skin before the plane.
+  const Vec3 way = goal - at_;
+  const double rate = glm::dot(plane.normal, way);
+  const double height = glm::dot(plane.normal, at_) - plane.depth;
+  const double time = rate < 0 ? std::clamp((height - skin_) / -rate, 0.0, hit.time) : 0.0;
+  at_ += time * way;
+  if (time * glm::length(way) > kSamePlace * skin_) {
+    let_go_of_idle_planes();
+    let_go_of_slid_planes(at_, kSlidOff * skin_ + kOnPatch * surface_.size());
+  }
+  if (holds(plane.patch)) return;
+  plane.stays = parted_here(plane.patch);
+  take_plane(plane);
+}
+
+/// The point nearest to the virtual tool a skin off the planes. In a gap narrower than two skins
+/// the tool keeps a share of the skin, or else what it has. False where rounding hides it.
+bool SurfaceTool::find_goal(Vec3& goal) {
+  in_crack_ = false;
+  if (planes_.nearest(Vec3(0), skin_, kRounding * skin_, goal)) return true;
+  in_crack_ = planes_.are_a_crack();
+  for (double less = kLessSkin * skin_; less >= kExact * skin_; less *= kLessSkin) {
+    if (planes_.nearest(Vec3(0), less, kRounding * less, goal)) return true;
+  }
+  return planes_.nearest_from(at_, skin_, kRounding * skin_, kExact * skin_, goal);
+}
+
+/// Whether the tool is at rest where its planes hold it without the skin. Planes that it is behind
+/// there are taken up: a skin away they may hold nothing, so it is not asked again whether they do.
+bool SurfaceTool::rests() {
+  SurfacePlane in_the_way;
+  for (int i = 0; i < kMostInTheWay; ++i) {
+    if (!in_the_way_at_rest(in_the_way)) return true;
+    take_plane(in_the_way);
+    if (stuck_) return false;
+    const Vec3 last = exact_;
+    if (!find_exact_place()) return false;
+    const Vec3 moved = exact_ - last;
+    if (glm::dot(moved, moved) > kSamePlace * kSamePlace * skin_ * skin_) return false;
+  }
+  return false;
+}
+
+/// Moves the ideal tool as near to the virtual one as the surface lets it.
+void SurfaceTool::translate() {
+  parted_count_ = 0;
+  const double slack = kAtRest * surface_.size();
+  for (int round = 0; round < kRounds && !stuck_; ++round) {
+    Vec3 goal;
+    if (!find_goal(goal)) break;
+    const PatchHit hit = cast(at_, goal);
+    if (hit.hit()) {
+      move_to_hit(goal, hit);
+      continue;
+    }
+    at_ = goal;
+    let_go_of_idle_planes();
+    if (!find_exact_place()) break;
+    if (let_go_of_slid_planes(exact_, slack)) continue;
+    if (past_a_patch_at_rest() && !find_goal(exact_)) break;  // the gap is closed to it
+    if (rests()) return;
+  }
+  stuck_ = true;
+}
+
+}  // namespace palpate::rendering

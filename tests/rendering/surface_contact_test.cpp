@@ -1,0 +1,436 @@
+// The contact law of closed surfaces (rendering/surface_contact.h), by what must hold of it.
+
+#include "rendering/surface_contact.h"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <span>
+
+#include "runner/bench/allocation_count.h"
+#include "stimuli/closed_surface.h"
+#include "stimuli/random.h"
+#include "tests/shared/union_scenes.h"
+
+namespace palpate::rendering {
+namespace {
+
+using testing::box_soup;
+using testing::kTick;
+using testing::object_of;
+
+constexpr double kStiffness = 1000;  // N/m
+
+stimuli::Material spring() {
+  stimuli::Material material;
+  material.stiffness = kStiffness;
+  return material;
+}
+
+SceneSurface surface_of(const std::vector<stimuli::PolygonSoup>& soups) {
+  std::vector<SurfaceShell> shells;
+  for (const stimuli::PolygonSoup& soup : soups)
+    shells.push_back(
+        {std::make_shared<const stimuli::ClosedSurface>(stimuli::closed_surface(soup).surface),
+         Pose{}, spring()});
+  return {std::make_shared<const Surface>(shells), Pose{}, 0};
+}
+
+Scene scene_of(const std::vector<stimuli::PolygonSoup>& soups, const Tool& tool = {}) {
+  return Scene({}, true, tool, nullptr, {surface_of(soups)});
+}
+
+/// A prism along y over a polygon in x and z, counter-clockwise seen along +y from behind.
+stimuli::PolygonSoup prism(const std::vector<std::array<double, 2>>& outline, double half_depth) {
+  stimuli::PolygonSoup soup;
+  const auto n = static_cast<std::uint32_t>(outline.size());
+  for (const double y : {-half_depth, half_depth}) {
+    for (const auto& [x, z] : outline) soup.vertices.emplace_back(x, y, z);
+  }
+  auto& front = soup.faces.emplace_back();
+  for (std::uint32_t i = 0; i < n; ++i) front.push_back(i);
+  auto& back = soup.faces.emplace_back();
+  for (std::uint32_t i = n; i-- > 0;) back.push_back(n + i);
+  for (std::uint32_t i = 0; i < n; ++i) {
+    const std::uint32_t k = (i + 1) % n;
+    soup.faces.push_back({k, i, n + i, n + k});
+  }
+  return soup;
+}
+
+/// A block whose upper side bends up (a valley) or down (a ridge) by an angle along x = 0.
+stimuli::PolygonSoup bent_block(double angle) {
+  return prism({{-0.05, -0.06}, {0.05, -0.06}, {0.05, 0.05 * std::tan(angle)}, {0, 0}, {-0.05, 0}},
+               0.05);
+}
+
+/// A height field of cells: flat faces in many triangles, edges of 90 degrees of both kinds.
+stimuli::PolygonSoup stairs(stimuli::Random& random, int cells, double edge) {
+  stimuli::PolygonSoup soup;
+  std::vector<int> heights;
+  for (int i = 0; i < cells * cells; ++i)
+    heights.push_back(1 + static_cast<int>(random.unit() * cells));
+  const auto solid = [&](const std::array<int, 3>& c) {
+    if (*std::min_element(c.begin(), c.end()) < 0 || c[0] >= cells || c[1] >= cells) return false;
+    return c[2] < heights[static_cast<std::size_t>(c[0] * cells + c[1])];
+  };
+  for (int x = 0; x < cells; ++x) {
+    for (int y = 0; y < cells; ++y) {
+      for (int z = 0; z < cells; ++z) {
+        if (!solid({x, y, z})) continue;
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+          for (const int side : {0, 1}) {
+            std::array<int, 3> beyond{x, y, z};
+            beyond[axis] += side == 1 ? 1 : -1;
+            if (solid(beyond)) continue;
+            std::vector<std::uint32_t> face;
+            for (const auto& [u, w] : {std::array{0, 0}, {1, 0}, {1, 1}, {0, 1}}) {
+              std::array<int, 3> corner{x, y, z};
+              corner[axis] += side;
+              corner[(axis + 1) % 3] += u;
+              corner[(axis + 2) % 3] += w;
+              face.push_back(static_cast<std::uint32_t>(soup.vertices.size()));
+              soup.vertices.push_back(edge / cells * Vec3(corner[0], corner[1], corner[2]));
+            }
+            if (side == 0) std::reverse(face.begin(), face.end());
+            soup.faces.push_back(face);
+          }
+        }
+      }
+    }
+  }
+  return soup;
+}
+
+stimuli::PolygonSoup torus(int around, int across, double large, double small) {
+  stimuli::PolygonSoup soup;
+  const auto at = [&](int i, int k) {
+    return static_cast<std::uint32_t>(i % around * across + k % across);
+  };
+  for (int i = 0; i < around; ++i) {
+    for (int k = 0; k < across; ++k) {
+      const double a = 2 * std::numbers::pi * i / around, b = 2 * std::numbers::pi * k / across;
+      const double r = large + small * std::cos(b);
+      soup.vertices.emplace_back(r * std::cos(a), r * std::sin(a), small * std::sin(b));
+      soup.faces.push_back({at(i, k), at(i + 1, k), at(i + 1, k + 1)});
+      soup.faces.push_back({at(i, k), at(i + 1, k + 1), at(i, k + 1)});
+    }
+  }
+  return soup;
+}
+
+Vec3 direction(stimuli::Random& random) {
+  for (;;) {
+    const Vec3 v(random.unit() * 2 - 1, random.unit() * 2 - 1, random.unit() * 2 - 1);
+    const double length = glm::length(v);
+    if (length > 0.1 && length < 1) return v / length;
+  }
+}
+
+/// Turned, then rounded as a binary STL file has it.
+stimuli::PolygonSoup as_in_a_file(stimuli::PolygonSoup soup, stimuli::Random& random) {
+  const Quat turn = glm::angleAxis(3 * random.unit(), direction(random));
+  for (Vec3& v : soup.vertices) {
+    v = turn * v;
+    for (int k = 0; k < 3; ++k) v[k] = static_cast<double>(static_cast<float>(v[k]));
+  }
+  return soup;
+}
+
+/// m, by which a segment goes through the surface; 0: it does not.
+double through(const Surface& surface, const Vec3& start, const Vec3& along) {
+  double worst = 0;
+  for (const SurfaceTriangle& t : surface.triangles()) {
+    const double a = glm::dot(t.normal, start) - t.offset, b = a + glm::dot(t.normal, along);
+    if (a * b >= 0) continue;
+    const Vec3 crossing = start + a / (a - b) * along;
+    double inside = std::min(std::abs(a), std::abs(b));
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Vec3 &v = surface.vertices()[t.corners[k]],
+                 &w = surface.vertices()[t.corners[(k + 1) % 3]];
+      inside =
+          std::min(inside, glm::dot(glm::cross(t.normal, glm::normalize(w - v)), crossing - v));
+    }
+    worst = std::max(worst, inside);
+  }
+  return worst;
+}
+
+double distance(const Surface& surface, const Vec3& p) {
+  double least = HUGE_VAL;
+  for (const SurfaceTriangle& t : surface.triangles()) {
+    PatchPolygon polygon;
+    polygon.count = 3;
+    for (std::size_t k = 0; k < 3; ++k) polygon.corners[k] = surface.vertices()[t.corners[k]];
+    least = std::min(
+        least, std::hypot(distance_off(polygon, t.normal, p), glm::dot(t.normal, p) - t.offset));
+  }
+  return least;
+}
+
+/// A hand that presses at random places, slides on and turns.
+class Hand {
+ public:
+  Hand(const Surface& surface, stimuli::Random& random) : surface_(surface), random_(random) {}
+  LineProbe next() {
+    if (ticks_++ % 50 == 0) {
+      const auto pick = static_cast<std::size_t>(random_.unit() *
+                                                 static_cast<double>(surface_.triangles().size()));
+      const SurfaceTriangle& t = surface_.triangles()[pick];
+      Vec3 middle(0);
+      for (const std::uint32_t corner : t.corners) middle += surface_.vertices()[corner] / 3.0;
+      goal_ = middle + (ticks_ % 1000 == 1 ? 0.05 : 0.005 * random_.unit() - 0.004) * t.normal;
+      turn_ = glm::normalize(t.normal + 1.2 * random_.unit() * direction(random_));
+      step_ = random_.unit() < 0.1 ? 2e-3 : 3e-4 * random_.unit();
+    }
+    const Vec3 way = goal_ - tip_;
+    const double length = glm::length(way);
+    tip_ += length > step_ ? step_ / length * way : way;
+    along_ = glm::normalize(along_ + 0.02 * random_.unit() * (turn_ - along_));
+    return {tip_, tip_ + 0.12 * along_};
+  }
+
+ private:
+  const Surface& surface_;
+  stimuli::Random& random_;
+  Vec3 tip_{0, 0, 0.15}, along_{0, 0, 1}, goal_, turn_{0, 0, 1};
+  double step_ = 0;
+  int ticks_ = 0;
+};
+
+class SurfaceContact : public ::testing::TestWithParam<const Renderer*> {
+ protected:
+  static Rendering tick(const Scene& scene, RenderState& state, const LineProbe& probe) {
+    return GetParam()->tick(scene, state, probe, kTick);
+  }
+  /// From above onto `tip`, upright, in steps of 0.1 mm.
+  static Rendering press(const Scene& scene, RenderState& state, const Vec3& tip) {
+    Rendering r;
+    for (double above = 0.03; above > 0; above -= 1e-4)
+      r = tick(scene, state, standing(tip + Vec3(0, 0, above)));
+    return tick(scene, state, standing(tip));
+  }
+  static LineProbe standing(const Vec3& tip) { return {tip, tip + Vec3(0, 0, 0.1)}; }
+};
+
+TEST_P(SurfaceContact, TheIdealToolIsNeverInside) {
+  stimuli::Random random(11);
+  for (int round = 0; round < 6; ++round) {
+    const stimuli::PolygonSoup soup = as_in_a_file(
+        round % 2 == 0 ? torus(12 + round, 8, 0.03, 0.01) : stairs(random, 2 + round % 3, 0.05),
+        random);
+    const SceneSurface placed = surface_of({soup});
+    const Surface& surface = *placed.surface;
+    const Scene scene({}, true, {}, nullptr, {placed});
+    RenderState state = scene.initial_state();
+    Hand hand(surface, random);
+    const double rounding = 1e-11 * surface.size();
+    int contacts = 0;
+    for (int i = 0; i < 8000; ++i) {
+      const LineProbe probe = hand.next();
+      const std::uint64_t before = runner::allocations();
+      const Rendering r = tick(scene, state, probe);
+      ASSERT_EQ(runner::allocations(), before);
+      ASSERT_EQ(r.faults & ~render_fault::kReleased, 0U) << round << ' ' << i;
+      if (r.contacts == 0 || (r.faults & render_fault::kReleased) != 0) continue;
+      ++contacts;
+      ASSERT_NEAR(glm::length(r.force - kStiffness * (r.ideal.tip - probe.tip)), 0,
+                  GetParam()->side_contact() ? HUGE_VAL : 1e-9);
+      if (GetParam()->side_contact()) {
+        ASSERT_LE(through(surface, r.ideal.tip, r.ideal.tail - r.ideal.tip), rounding)
+            << round << ' ' << i;
+      } else if (surface.winding(r.ideal.tip) > 0) {
+        ASSERT_LE(distance(surface, r.ideal.tip), rounding) << round << ' ' << i;
+      }
+    }
+    EXPECT_GT(contacts, 1000);
+  }
+}
+
+TEST_P(SurfaceContact, AConvexMeshGivesTheForcesOfTheWalk) {
+  stimuli::Random random(5);
+  const stimuli::PolygonSoup soup = stimuli::icosphere(0.03, 2);
+  const SceneSurface placed = surface_of({soup});
+  const Scene surface({}, true, {}, nullptr, {placed});
+  const Scene walk(object_of({soup}, Pose{}, kStiffness));
+  RenderState a = surface.initial_state(), b = walk.initial_state();
+  for (int i = 0; i < 300; ++i) {
+    // Down on the flank, then along it and turning slowly.
+    const Vec3 tip = Vec3(0.004, 0.003, 0.05 - 1e-4 * std::min(i, 215)) +
+                     2e-5 * std::max(0, i - 215) * Vec3(1, 0.5, 0);
+    const LineProbe probe{tip, tip + 0.1 * glm::normalize(Vec3(0.5 + 0.0005 * i, 0.1, 1))};
+    const Rendering one = tick(surface, a, probe), other = tick(walk, b, probe);
+    ASSERT_NEAR(glm::length(one.force - other.force), 0, 1e-9) << i;
+    ASSERT_NEAR(glm::length(one.torque - other.torque), 0, 1e-9) << i;
+    ASSERT_EQ(one.deepest.type, other.deepest.type) << i;
+  }
+}
+
+TEST_P(SurfaceContact, BendsOfAnyAngleAreCrossedWithoutAStepOrAStop) {
+  for (const double bend : {1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.1, 0.5}) {
+    for (const double angle : {bend, -bend}) {
+      const Scene scene = scene_of({bent_block(angle)});
+      RenderState state = scene.initial_state();
+      const double deep = 0.002;
+      press(scene, state, {-0.01, 0, -deep});
+      Vec3 last(0);
+      for (int i = 0; i <= 2000; ++i) {
+        const double x = -0.01 + 1e-5 * i;
+        const Rendering r = tick(scene, state, standing({x, 0.001, -deep}));
+        ASSERT_EQ(r.faults, 0U);
+        // Nearest allowed point: on the flat, on the slope, or in the valley's bottom.
+        const double c = std::cos(angle), s = std::sin(angle);
+        const double flat = deep, slope = std::max(0.0, deep * c + x * s);  // depths
+        Vec3 expected = x < 0 ? Vec3(0, 0, flat) : slope * Vec3(-s, 0, c);
+        if (angle > 0) {
+          const bool on_flat = x <= 0, on_slope = x * c - deep * s >= 0;
+          expected = on_flat    ? Vec3(0, 0, flat)
+                     : on_slope ? slope * Vec3(-s, 0, c)
+                                : Vec3(-x, 0, deep);
+        } else if (std::abs(x) < deep * std::abs(s) + 1e-9) {
+          continue;  // over a ridge either face may hold it
+        }
+        ASSERT_NEAR(glm::length(r.force / kStiffness - expected), 0, 1e-9) << angle << " at " << x;
+        if (i > 0 && angle > 0) {
+          ASSERT_LT(glm::length(r.force - last), kStiffness * 3e-5) << angle << ' ' << x;
+        }
+        last = r.force;
+      }
+    }
+  }
+}
+
+TEST_P(SurfaceContact, SidesThatRoundingBentBackDoNotTakeTurnsForEver) {
+  // Two halves of a face that bend up by 8e-8 rad, pressed 50 mm deep: within its skin the tool
+  // does not see the bottom of that valley.
+  const Scene scene = scene_of({bent_block(8e-8)});
+  RenderState state = scene.initial_state();
+  for (double z = 0.02; z > -0.05; z -= 1e-4) {
+    const Rendering r = tick(scene, state, standing({1e-9, 0, z}));
+    ASSERT_EQ(r.faults, 0U);
+    if (z >= 0) continue;
+    ASSERT_NEAR(glm::length(r.force - Vec3(0, 0, -kStiffness * z)), 0, 1e-4);
+  }
+}
+
+TEST_P(SurfaceContact, AFlatFaceInManyTrianglesHoldsNothingAlongIt) {
+  stimuli::Random random(3);
+  for (int round = 0; round < 4; ++round) {
+    // A plate of 20 x 20 cells, turned, in single precision.
+    stimuli::PolygonSoup soup;
+    const int n = 20;
+    const Quat turn = glm::angleAxis(3 * random.unit(), direction(random));
+    for (const double z : {-0.01, 0.0}) {
+      for (int i = 0; i <= n; ++i) {
+        for (int k = 0; k <= n; ++k) {
+          const double inner = i > 0 && i < n && k > 0 && k < n ? 0.4 : 0;
+          soup.vertices.emplace_back(0.004 * (i - 10 + inner * (random.unit() - 0.5)),
+                                     0.004 * (k - 10 + inner * (random.unit() - 0.5)), z);
+        }
+      }
+    }
+    const auto at = [&](int layer, int i, int k) {
+      return static_cast<std::uint32_t>(layer * (n + 1) * (n + 1) + i * (n + 1) + k);
+    };
+    for (int i = 0; i < n; ++i) {
+      for (int k = 0; k < n; ++k) {
+        soup.faces.push_back({at(1, i, k), at(1, i + 1, k), at(1, i + 1, k + 1)});
+        soup.faces.push_back({at(1, i, k), at(1, i + 1, k + 1), at(1, i, k + 1)});
+        soup.faces.push_back({at(0, i, k), at(0, i, k + 1), at(0, i + 1, k + 1), at(0, i + 1, k)});
+      }
+      soup.faces.push_back({at(0, i, 0), at(0, i + 1, 0), at(1, i + 1, 0), at(1, i, 0)});
+      soup.faces.push_back({at(0, i + 1, n), at(0, i, n), at(1, i, n), at(1, i + 1, n)});
+      soup.faces.push_back({at(0, 0, i + 1), at(0, 0, i), at(1, 0, i), at(1, 0, i + 1)});
+      soup.faces.push_back({at(0, n, i), at(0, n, i + 1), at(1, n, i + 1), at(1, n, i)});
+    }
+    for (Vec3& v : soup.vertices) {
+      v = turn * v;
+      for (int c = 0; c < 3; ++c) v[c] = static_cast<double>(static_cast<float>(v[c]));
+    }
+    const Scene scene = scene_of({soup});
+    RenderState state = scene.initial_state();
+    const Vec3 up = turn * Vec3(0, 0, 1);
+    const auto at_place = [&](double x, double y, double z, double tilt) {
+      const Vec3 tip = turn * Vec3(x, y, z);
+      return LineProbe{tip, tip + 0.1 * (turn * glm::normalize(Vec3(1, 0.3, tilt)))};
+    };
+    for (double z = 0.01; z > -0.001; z -= 1e-4) tick(scene, state, at_place(-0.03, 0, z, 0.2));
+    for (int i = 0; i < 3000; ++i) {
+      const Rendering r =
+          tick(scene, state, at_place(-0.03 + 2e-5 * i, 0.01 * std::sin(0.002 * i), -0.001, 0.2));
+      ASSERT_NEAR(glm::dot(r.force, up), 1, 2e-5);
+      // Rounding tilts a triangle by its error over its width.
+      ASSERT_LT(glm::length(r.force - glm::dot(r.force, up) * up), 5e-6) << round << ' ' << i;
+    }
+  }
+}
+
+TEST_P(SurfaceContact, OverlappingShellsAreTheirUnion) {
+  // A step of 10 mm where two boxes overlap; inner walls are never felt.
+  const Scene scene = scene_of({box_soup({-0.05, -0.05, -0.02}, {0.01, 0.05, 0.0}),
+                                box_soup({-0.01, -0.05, -0.02}, {0.05, 0.05, 0.01})});
+  RenderState state = scene.initial_state();
+  Rendering r = press(scene, state, {-0.03, 0, -0.001});
+  EXPECT_NEAR(r.force.z, 1, 1e-9);
+  for (int i = 0; i < 180; ++i) {
+    r = tick(scene, state, standing({-0.03 + 1e-4 * i, 0, -0.001}));
+    ASSERT_NEAR(glm::length(r.force - Vec3(0, 0, 1)), 0, 1e-9) << i;
+  }
+  r = tick(scene, state, standing({-0.008, 0, -0.001}));  // 2 mm behind the riser
+  EXPECT_NEAR(glm::length(r.force - Vec3(-2, 0, 1)), 0, 1e-9);
+}
+
+TEST_P(SurfaceContact, WhoStartsInsideFeelsNothingUntilItHasLeft) {
+  const Scene scene = scene_of({bent_block(0.3)});
+  RenderState state = scene.initial_state();
+  Rendering r = tick(scene, state, standing({-0.02, 0, -0.01}));
+  EXPECT_EQ(r.force, Vec3(0));
+  EXPECT_NE(r.faults & render_fault::kStartedInside, 0U);
+  for (int i = 0; i < 300; ++i) r = tick(scene, state, standing({-0.02, 0, -0.01 + 1e-4 * i}));
+  EXPECT_EQ(r.faults, 0U);
+  r = press(scene, state, {-0.02, 0, -0.002});
+  EXPECT_NEAR(glm::length(r.force - Vec3(0, 0, 2)), 0, 1e-9);
+}
+
+TEST_P(SurfaceContact, AThinPlateStopsAFastHand) {
+  const Scene scene = scene_of({box_soup({-0.05, -0.05, -1e-4}, {0.05, 0.05, 0})});
+  RenderState state = scene.initial_state();
+  Rendering r;
+  for (int i = 0; i < 12; ++i) r = tick(scene, state, standing({0.003, 0.002, 0.022 - 0.004 * i}));
+  EXPECT_NEAR(glm::length(r.force - Vec3(0, 0, kStiffness * 0.022)), 0, 1e-6);
+}
+
+TEST(SurfaceTool, ASingleMeshGivesTheForcesOfItsParts) {
+  // A step of two boxes, under a bent tool of two segments.
+  const stimuli::PolygonSoup whole =
+      prism({{-0.05, -0.02}, {0.05, -0.02}, {0.05, 0.01}, {0, 0.01}, {0, 0}, {-0.05, 0}}, 0.05);
+  const Tool tool{{{{0, 0, 0}, {0, 0, 0.12}}, {{0, 0, 0}, {0.02, 0.003, 0.004}}}};
+  const Scene surface = scene_of({whole}, tool);
+  const Scene parts(object_of({box_soup({-0.05, -0.05, -0.02}, {0, 0.05, 0}),
+                               box_soup({0, -0.05, -0.02}, {0.05, 0.05, 0.01})},
+                              Pose{}, kStiffness),
+                    true, tool);
+  RenderState a = surface.initial_state(), b = parts.initial_state();
+  int held = 0;
+  for (int i = 0; i < 3000; ++i) {
+    const double t = 1e-3 * i;
+    const Vec3 tip(-0.02 + 0.012 * std::sin(1.1 * t), 0.01 * std::sin(2.3 * t),
+                   0.003 + 0.006 * std::cos(1.7 * t));
+    const LineProbe probe{tip, tip + 0.12 * glm::normalize(Vec3(0.3 * std::sin(0.7 * t), 0.2, 1))};
+    const Rendering one = ray_renderer().tick(surface, a, probe, kTick);
+    const Rendering other = ray_renderer().tick(parts, b, probe, kTick);
+    ASSERT_NEAR(glm::length(one.force - other.force), 0, 1e-6) << i;
+    ASSERT_NEAR(glm::length(one.torque - other.torque), 0, 1e-7) << i;
+    held += one.contacts > 0;
+  }
+  EXPECT_GT(held, 500);
+}
+
+INSTANTIATE_TEST_SUITE_P(Renderers, SurfaceContact,
+                         ::testing::Values(&point_renderer(), &ray_renderer()),
+                         [](const auto& one) { return std::string(one.param->name()); });
+
+}  // namespace
+}  // namespace palpate::rendering
