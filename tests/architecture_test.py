@@ -91,13 +91,13 @@ PUBLIC = {
     "data/files": "atomic_file atomic_folder checksum file_identity file_permissions formula_guard output_check "
                   "temporary_names text_sink trusted_links utc",
     "data/store": "export_log protocol_rows schema sqlite_errors statement_values station_database store sweep_file tombstones",
-    "data/export": "bids csv psychds study_about sweep_csv trial_table",
+    "data/export": "bids csv psychds settings study_about sweep_csv trial_table",
     "data/merge": "merge sweep_merge",
     "analysis": "text",
     "analysis/input": "csv_reader renderers study_record sweep_table task_trials trials",
-    "analysis/statistics": "analysis conclusions describe paired paper_effects pattern pilot plan quantiles sweep_analysis task_analysis threshold_plan",
+    "analysis/statistics": "analysis conclusions describe model_study paired paper_effects pattern pilot plan power quantiles sensitivity sweep_analysis task_analysis threshold_plan",
     "analysis/figures": "axes figure_svg figures marks palette sweep_figures task_figures",
-    "analysis/report": "html_elements html_page plan_report report_html report_json report_text sweep_report tables task_report",
+    "analysis/report": "html_elements html_page hypotheses plan_report report_html report_json report_text sweep_report tables task_report",
     "runner": "",
     "runner/servo": "device device_config force_limiter passivity realtime sample servo servo_fault servo_thread shared_value "
                     "tick_clock tick_source touched_places triple_buffer",

@@ -119,6 +119,85 @@ std::vector<PlanPoint> read_plan_points(const std::string& json, const StudyMode
   }
 }
 
+namespace {
+
+double number_within(const Json& object, const char* key, double least, double most) {
+  const auto value = object.at(key).get<double>();
+  if (value >= least && value <= most) return value;
+  throw std::invalid_argument(std::string("has an impossible ") + key + ": " +
+                              object.at(key).dump());
+}
+
+StudyModel read_model(const Json& in) {
+  constexpr double kMostSd = 100;
+  StudyModel model;
+  for (const auto& [shape, ratio] : in.at("log_ratio").items()) {
+    model.shapes.push_back(shape);
+    model.log_ratios.push_back(ratio.get<double>());
+    if (!(std::fabs(model.log_ratios.back()) <= kMostSd))
+      throw std::invalid_argument("has an impossible log_ratio: " + ratio.dump());
+  }
+  if (model.shapes.empty()) throw std::invalid_argument("has no shapes");
+  model.gain_sd = number_within(in, "gain_sd", 0, kMostSd);
+  model.shape_gain_sd = number_within(in, "shape_gain_sd", 0, kMostSd);
+  model.intercept_sd = number_within(in, "intercept_sd", 0, kMostSd);
+  model.correlation = number_within(in, "correlation", -1, 1);
+  model.residual_sd = number_within(in, "residual_sd", 0, kMostSd);
+  model.proportion_used = number_within(in, "share_used", 0, 1);
+  return model;
+}
+
+/// One of two words.
+bool is_first(const Json& value, const char* first, const char* second) {
+  const auto word = value.get<std::string>();
+  if (word != first && word != second)
+    throw std::invalid_argument("expected " + std::string(first) + " or " + second + ", found " +
+                                value.dump());
+  return word == first;
+}
+
+}  // namespace
+
+PlanRecord read_plan(const std::string& json) {
+  try {
+    const Json in = Json::parse(json);
+    if (in.is_object() && !in.contains("model"))
+      throw std::invalid_argument(
+          "expected a plan of times (palpate plan --effect); this is another one");
+    require_same("version of plans", in, {{"version", 1}});
+    PlanRecord plan;
+    plan.model = read_model(in.at("model"));
+    const Json& settings = in.at("settings");
+    plan.power = number_within(settings, "power", 0, 1);
+    plan.alpha = number_within(settings, "alpha", 0, 1);
+    plan.goal = is_first(settings.at("goal"), "all", "any") ? Goal::all : Goal::any;
+    plan.test =
+        is_first(settings.at("test"), "paired", "model") ? StudyTest::paired : StudyTest::model;
+    plan.studies = settings.at("studies").get<std::size_t>();
+    if (in.at("pilot_label").is_string()) plan.pilot_label = in.at("pilot_label");
+    for (const Json& note : in.at("notes")) plan.notes.push_back(note.get<std::string>());
+    for (const Json& needed : in.at("needed")) {
+      PlanRecord::Curve& curve = plan.curves.emplace_back();
+      curve.trials = needed.at("trials_per_cell").get<std::size_t>();
+      const Json& participants = needed.at("participants");
+      if (!participants.is_null()) curve.participants = participants.get<std::size_t>();
+    }
+    for (const Json& points : in.at("curves")) {
+      for (const Json& point : points.at("points")) {
+        for (PlanRecord::Curve& curve : plan.curves) {
+          if (curve.trials == point.at("trials_per_cell").get<std::size_t>())
+            curve.power[point.at("participants").get<std::size_t>()] =
+                number_within(point, "power", 0, 1);
+        }
+      }
+    }
+    return plan;
+  } catch (const Json::exception& error) {
+    throw std::invalid_argument(std::string("is not what 'palpate plan --json' writes: ") +
+                                error.what());
+  }
+}
+
 std::string plan_json(const Plan& plan) {
   Json out;
   out["version"] = 1;

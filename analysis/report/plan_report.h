@@ -1,6 +1,8 @@
 #pragma once
 // A sample size plan as text, JSON and a figure.
 
+#include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -15,6 +17,24 @@ std::string plan_json(const Plan& plan);
 /// writes, or of another model or simulation than these, with what differs
 std::vector<PlanPoint> read_plan_points(const std::string& json, const StudyModel& model,
                                         const PlanSettings& settings);
+/// What a plan's JSON says of the study to be run.
+struct PlanRecord {
+  StudyModel model;
+  double power = 0.8, alpha = 0.05;
+  Goal goal = Goal::all;
+  StudyTest test = StudyTest::paired;
+  std::size_t studies = 0;  ///< simulated for each power
+  std::string pilot_label;  ///< "SIMULATED PARTICIPANTS"; empty: people, or no pilot
+  std::vector<std::string> notes;
+  struct Curve {
+    std::size_t trials = 0;                   ///< of each shape with each renderer
+    std::optional<std::size_t> participants;  ///< that reach the power; none: not in the range
+    std::map<std::size_t, double> power;      ///< by number of participants
+  };
+  std::vector<Curve> curves;
+};
+/// \throws std::invalid_argument: it is not what plan_json writes, with what is wrong
+PlanRecord read_plan(const std::string& json);
 /// Power (%) over the number of participants, a line for each number of trials.
 Figure plan_figure(const Plan& plan);
 

@@ -91,9 +91,9 @@ PatternError::PatternError(const std::string& expression, std::size_t place,
     : std::runtime_error(pattern_message(expression, place, expected)), place_(place) {}
 
 Pattern::Pattern(std::string expression, const Resolve& resolve,
-                 const std::vector<std::string>& known)
+                 const std::vector<std::string>& known, const std::string& source)
     : expression_(std::move(expression)),
-      root_(std::make_unique<Node>(parse_pattern(expression_, resolve, known))) {}
+      root_(std::make_unique<Node>(parse_pattern(expression_, resolve, known, source))) {}
 Pattern::Pattern(Pattern&&) noexcept = default;
 Pattern& Pattern::operator=(Pattern&&) noexcept = default;
 Pattern::~Pattern() = default;

@@ -1,5 +1,6 @@
 #pragma once
-// A pattern that is looked for at each point of a sweep: "cone>5 && cube>5 && min(cone,cube)>3".
+// A condition on named numbers: a pattern that is looked for at each point of a sweep, "cone>5 &&
+// cube>5 && min(cone,cube)>3", or a hypothesis on an analysis, "paired.cone.p_holm < 0.05".
 // What is a number and what holds or not is told apart when the expression is read.
 //
 // clang-format off
@@ -11,7 +12,8 @@
 //   product := sign { ("*" | "/") sign }
 //   sign    := "-" sign | atom
 //   atom    := number | name | ("min" | "max") "(" or { "," or } ")" | "abs" "(" or ")" | "(" or ")"
-//   name    := letters, digits and _, not a digit first; or any text in ' or "
+//   name    := word { "." word }; or any text in ' or "
+//   word    := letters, digits and _; the first one does not begin with a digit
 // clang-format on
 
 #include <cstddef>
@@ -39,8 +41,11 @@ class Pattern {
   /// The column that a name stands for; none: it is unknown.
   using Resolve = std::function<std::optional<std::size_t>(const std::string& name)>;
 
-  /// \param known  names to suggest for an unknown one. \throws PatternError
-  Pattern(std::string expression, const Resolve& resolve, const std::vector<std::string>& known);
+  /// \param known  names to suggest for an unknown one
+  /// \param source  of the names, for messages
+  /// \throws PatternError
+  Pattern(std::string expression, const Resolve& resolve, const std::vector<std::string>& known,
+          const std::string& source = "the sweep");
   Pattern(Pattern&&) noexcept;
   Pattern& operator=(Pattern&&) noexcept;
   ~Pattern();

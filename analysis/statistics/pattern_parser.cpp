@@ -25,8 +25,8 @@ constexpr Operator kComparisons[] = {{"<=", Kind::at_most}, {">=", Kind::at_leas
 class Parser {
  public:
   Parser(const std::string& text, const Pattern::Resolve& resolve,
-         const std::vector<std::string>& known)
-      : text_(text), resolve_(resolve), known_(known) {}
+         const std::vector<std::string>& known, const std::string& source)
+      : text_(text), resolve_(resolve), known_(known), source_(source) {}
 
   Node parse() {
     Node root = either();
@@ -182,7 +182,8 @@ class Parser {
   }
 
   Node name_or_function(std::size_t place) {
-    while (at_ < text_.size() && (is_letter(text_[at_]) || is_digit(text_[at_]))) ++at_;
+    while (at_ < text_.size() && (is_in_word(at_) || (text_[at_] == '.' && is_in_word(at_ + 1))))
+      ++at_;
     const std::string name = text_.substr(place, at_ - place);
     skip_space();
     if (at_ < text_.size() && text_[at_] == '(') return function(name, place);
@@ -215,7 +216,7 @@ class Parser {
 
   Node column(const std::string& name, std::size_t place) {
     const auto found = resolve_(name);
-    if (!found) fail(place, "a name that the sweep has" + suggestion(name));
+    if (!found) fail(place, "a name that " + source_ + " has" + suggestion(name));
     Node node;
     node.kind = Kind::column;
     node.place = place;
@@ -243,9 +244,9 @@ class Parser {
 
   /// In quotes where the name needs them.
   static std::string as_written(const std::string& name) {
-    const bool plain =
-        !name.empty() && is_letter(name[0]) &&
-        std::all_of(name.begin(), name.end(), [](char c) { return is_letter(c) || is_digit(c); });
+    bool plain = !name.empty() && is_letter(name[0]) && name.back() != '.';
+    for (std::size_t i = 0; plain && i < name.size(); ++i)
+      plain = is_letter(name[i]) || is_digit(name[i]) || (name[i] == '.' && name[i + 1] != '.');
     if (plain) return name;
     const char mark = name.find('\'') == std::string::npos ? '\'' : '"';
     return mark + name + mark;
@@ -258,6 +259,9 @@ class Parser {
     node.place = place;
     (node.parts.push_back(std::move(parts)), ...);
     return node;
+  }
+  bool is_in_word(std::size_t place) const {
+    return place < text_.size() && (is_letter(text_[place]) || is_digit(text_[place]));
   }
   static bool is_digit(char c) { return c >= '0' && c <= '9'; }
   static bool is_letter(char c) {
@@ -278,14 +282,15 @@ class Parser {
   const std::string& text_;
   const Pattern::Resolve& resolve_;
   const std::vector<std::string>& known_;
+  const std::string& source_;
   std::size_t at_ = 0, depth_ = 0;
 };
 
 }  // namespace
 
 Pattern::Node parse_pattern(const std::string& text, const Pattern::Resolve& resolve,
-                            const std::vector<std::string>& known) {
-  return Parser(text, resolve, known).parse();
+                            const std::vector<std::string>& known, const std::string& source) {
+  return Parser(text, resolve, known, source).parse();
 }
 
 }  // namespace palpate::analysis

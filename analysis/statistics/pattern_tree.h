@@ -45,6 +45,6 @@ inline bool is_truth(Pattern::Node::Kind kind) { return kind >= Pattern::Node::K
 
 /// \throws PatternError
 Pattern::Node parse_pattern(const std::string& text, const Pattern::Resolve& resolve,
-                            const std::vector<std::string>& known);
+                            const std::vector<std::string>& known, const std::string& source);
 
 }  // namespace palpate::analysis

@@ -222,6 +222,23 @@ class Reference(unittest.TestCase):
         self.assertEqual(told, listed)
 
 
+class Hypotheses(unittest.TestCase):
+    """Short names of numbers and points of a check are those of the program."""
+
+    def test_short_names(self):
+        defined = re.findall(r'\{"([^"]+)",\s*"([^"]+)"\}', (ROOT / "analysis/report/hypotheses.h").read_text())
+        told = [tuple(codes(cell)[0] for cell in row)
+                for row in cells(PAGES["analysis/README.md"].section("Reference: names in hypotheses"))]
+        self.assertEqual(told, defined)
+
+    def test_points_of_a_check(self):
+        source = (ROOT / "runner/commands/check/deviations.cpp").read_text()
+        made = set(re.findall(r'CheckPoint out\{\s*"([a-z]+)"', source)) | set(re.findall(r'left_out\(\s*"([a-z]+)"', source))
+        told = {code for row in cells(PAGES["analysis/README.md"].section("Reference: points of a check"))
+                for code in codes(row[0])}
+        self.assertEqual(told, made)
+
+
 class Path(unittest.TestCase):
     """From main() to a force: each file exists and calls what the table says of the next."""
 

@@ -1,0 +1,85 @@
+#pragma once
+// Hypotheses as conditions on the numbers of an analysis (Lakens & DeBruine 2021,
+// 10.1177/2515245920970949): each says what would corroborate it and what would refute it.
+
+#include <cstddef>
+#include <functional>
+#include <map>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "analysis/statistics/pattern.h"
+
+namespace palpate::analysis {
+
+/// Not a number: undefined in this analysis.
+using NamedResults = std::map<std::string, double, std::less<>>;
+
+/// The numbers of analysis.json by name: the keys that lead to a number, joined by dots
+/// ("paired_by_shape.cone.t_test.p_holm"; true and false are 1 and 0, members of lists have no
+/// name), the short names of kShortNames, and "alpha".
+/// \param analysis  text of report_json() \param alpha  of the tests, as registered
+NamedResults named_results(const std::string& analysis, double alpha);
+
+/// A short name and what it stands for; * is the name of a shape, renderer or effect.
+struct ShortName {
+  const char* name;
+  const char* key;
+};
+/// The one place in which they are defined; analysis/README.md explains them.
+inline constexpr ShortName kShortNames[] = {
+    {"paired.*.n_pairs", "paired_by_shape.*.n_pairs"},
+    {"paired.*.reduction", "paired_by_shape.*.percent_reduction_geometric"},
+    {"paired.*.ci95_low", "paired_by_shape.*.t_test.percent_reduction_ci95_low"},
+    {"paired.*.ci95_high", "paired_by_shape.*.t_test.percent_reduction_ci95_high"},
+    {"paired.*.log_ratio", "paired_by_shape.*.mean_log_ratio"},
+    {"paired.*.t", "paired_by_shape.*.t_test.t"},
+    {"paired.*.df", "paired_by_shape.*.t_test.df"},
+    {"paired.*.p", "paired_by_shape.*.t_test.p"},
+    {"paired.*.p_holm", "paired_by_shape.*.t_test.p_holm"},
+    {"paired.*.dz", "paired_by_shape.*.effect_size.dz"},
+    {"paired.*.hedges_gz", "paired_by_shape.*.effect_size.hedges_gz"},
+    {"paired.*.wilcoxon_p", "paired_by_shape.*.wilcoxon.p"},
+    {"model.*.reduction", "mixed_model.contrasts_ray_minus_point.*.percent_reduction"},
+    {"model.*.ci95_low", "mixed_model.contrasts_ray_minus_point.*.percent_reduction_ci95_low"},
+    {"model.*.ci95_high", "mixed_model.contrasts_ray_minus_point.*.percent_reduction_ci95_high"},
+    {"model.*.p", "mixed_model.contrasts_ray_minus_point.*.p"},
+    {"model.*.p_holm", "mixed_model.contrasts_ray_minus_point.*.p_holm"},
+    {"anova.*.F", "rm_anova.effects.*.F"},
+    {"anova.*.p", "rm_anova.effects.*.p"},
+    {"accuracy_change.*", "speed_accuracy.*.accuracy_change"},
+};
+
+enum class Verdict {
+  corroborated,
+  refuted,
+  undecided  ///< neither holds, both do, or that depends on an undefined number
+};
+const char* to_string(Verdict verdict);
+
+struct Hypothesis {
+  std::string id;            ///< letters, digits and '-'
+  std::string text;          ///< in words
+  std::string corroborated;  ///< expressions as of Pattern
+  std::string refuted;
+};
+
+/// Reads hypotheses.json: [{"id": "H1", "text": "...", "corroborated": "...", "refuted": "..."}].
+/// \param known  names that an analysis has; empty: any are accepted
+/// \throws protocols::InputError with every fault
+std::vector<Hypothesis> read_hypotheses(const std::string& text, const std::string& file,
+                                        const NamedResults& known);
+
+struct Judgement {
+  Verdict verdict = Verdict::undecided;
+  std::optional<bool> corroborated, refuted;  ///< none: depends on an undefined number
+  /// That the expressions name, each once, in their order.
+  std::vector<std::pair<std::string, double>> numbers;
+};
+
+/// Names that the results do not have count as undefined. \throws PatternError
+Judgement judge(const Hypothesis& hypothesis, const NamedResults& results);
+
+}  // namespace palpate::analysis

@@ -1,0 +1,102 @@
+// `palpate check`: whether a study was run as it was registered.
+
+#include <filesystem>
+#include <iostream>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "protocols/json_document.h"
+#include "runner/commands/check/deviations.h"
+#include "runner/commands/shared/command.h"
+#include "runner/commands/shared/outputs.h"
+#include "stimuli/printable.h"
+
+namespace palpate::runner {
+namespace {
+
+namespace po = boost::program_options;
+namespace fs = std::filesystem;
+
+/// A check must not change what it checks. \throws UsageError
+void require_outside(const po::variables_map& values, const char* option,
+                     const std::string& folder) {
+  if (values.count(option) == 0) return;
+  const fs::path file = fs::weakly_canonical(values[option].as<std::string>());
+  const fs::path within = file.lexically_relative(fs::weakly_canonical(folder));
+  if (!within.empty() && *within.begin() != "..")
+    throw UsageError(std::string("--") + option + ": name a file outside of the registration");
+}
+
+/// \throws UsageError
+ReportedAnalysis read_reported(const std::string& path) {
+  ReportedAnalysis reported;
+  if (path.empty()) return reported;
+  reported.json = protocols::read_text_file(path);
+  try {
+    const auto json = nlohmann::json::parse(reported.json);
+    reported.too_fast = json.at("settings").at("too_fast_s").get<double>();
+    if (!(*reported.too_fast > 0) || !json.contains("paired_by_shape"))
+      throw UsageError(path + ": expected what 'palpate analyze --json' wrote for this study");
+  } catch (const nlohmann::json::exception&) {
+    throw UsageError(path + ": expected what 'palpate analyze --json' wrote for this study");
+  }
+  return reported;
+}
+
+}  // namespace
+
+int check_command(const std::vector<std::string>& args) {
+  CommandLine line;
+  line.usage =
+      "palpate check REGISTRATION --db FILE [--analysis FILE] [--json FILE] [--report FILE.html]";
+  line.summary =
+      "Holds a study against its registration (a folder that 'palpate register' made): protocol,\n"
+      "order of trials, numbers, dates, settings of the analysis, versions, what was left out;\n"
+      "each deviation with its evidence. Then the verdict on each hypothesis. Exit status 1 if\n"
+      "there is a deviation.";
+  line.example =
+      "  palpate check registration --db study.db\n"
+      "  palpate check registration --db study.db --analysis analysis.json --report check.html";
+  line.positional_names = {"REGISTRATION"};
+  std::string database, analysis_file, json, report;
+  double too_fast = 0, alpha = 0;
+  auto add = line.options.add_options();
+  add("db", po::value(&database)->required()->value_name("FILE"), "the study's database");
+  add("analysis", po::value(&analysis_file)->value_name("FILE"),
+      "what 'palpate analyze --json' wrote for the report of the study: its settings and numbers "
+      "are checked, too");
+  add("too-fast-s", po::value(&too_fast)->value_name("SECONDS"),
+      "limit of too fast answers that the report of the study uses; default: the registered one");
+  add("alpha", po::value(&alpha)->value_name("P"),
+      "alpha that the report of the study uses; default: the registered one");
+  add("json", po::value(&json)->value_name("FILE"), "write every point as JSON");
+  add("report", po::value(&report)->value_name("FILE.html"), "write a page");
+  add("force", "replace existing files");
+  const auto values = line.parse(args);
+  if (!values) return 0;
+  const std::string folder = (*values)["REGISTRATION"].as<std::string>();
+  Outputs outputs(*values, {"json", "report"}, {"db", "analysis"});
+  for (const char* option : {"json", "report"}) require_outside(*values, option, folder);
+  ReportedAnalysis reported = read_reported(analysis_file);
+  if (values->count("too-fast-s")) {
+    if (!(too_fast > 0)) throw UsageError("--too-fast-s: expected a time in s above 0");
+    if (reported.too_fast)
+      throw UsageError("--too-fast-s: --analysis says it already; give one of them");
+    reported.too_fast = too_fast;
+  }
+  if (values->count("alpha")) {
+    if (!(alpha > 0 && alpha < 1)) throw UsageError("--alpha: expected a number from 0 to 1");
+    reported.alpha = alpha;
+  }
+  const Registration registered = read_registration(folder);
+  warn_of_exposure(database);
+  const StudyCheck check = check_study(registered, folder, database, reported);
+  if (outputs.wanted("json")) outputs.put("json", check_json(check, registered));
+  if (outputs.wanted("report")) outputs.put("report", check_html(check, registered));
+  outputs.write();
+  std::cout << check_text(check, registered);
+  return check.deviations() > 0 ? 1 : 0;
+}
+
+}  // namespace palpate::runner

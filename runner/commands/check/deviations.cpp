@@ -1,0 +1,485 @@
+#include "runner/commands/check/deviations.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "analysis/input/trials.h"
+#include "analysis/report/report_json.h"
+#include "analysis/statistics/analysis.h"
+#include "analysis/text.h"
+#include "data/files/utc.h"
+#include "protocols/difference.h"
+#include "runner/commands/shared/command.h"
+#include "runner/commands/shared/sealed_folder.h"
+#include "runner/participants/simulated_settings.h"
+#include "stimuli/printable.h"
+
+namespace palpate::runner {
+namespace {
+
+using analysis::counted;
+
+struct StudyParticipant {
+  data::Participant person;
+  std::string protocol_sha256;
+  std::vector<OrderRow> rows;  ///< trials that count, in their order
+};
+
+/// What a database says of the study.
+struct StudyData {
+  std::vector<data::ProtocolInfo> protocols;
+  std::vector<StudyParticipant> participants;  ///< who have trials, practice or not
+  std::vector<data::StoredRun> runs;
+  std::vector<data::StoredNote> notes;
+  std::map<std::string, std::vector<data::ProtocolFile>> files;  ///< by SHA-256 of the protocol
+};
+
+/// "" or "; and 12 more": evidence is cut, not endless.
+constexpr std::size_t kMostEvidence = 50;
+
+void cut(std::vector<std::string>& evidence) {
+  if (evidence.size() <= kMostEvidence) return;
+  const std::size_t more = evidence.size() - kMostEvidence;
+  evidence.resize(kMostEvidence);
+  evidence.push_back("and " + std::to_string(more) + " more");
+}
+
+StudyData read_study(data::Store& store) {
+  StudyData out;
+  out.protocols = store.protocols();
+  out.runs = store.runs();
+  out.notes = store.notes();
+  for (const data::ProtocolInfo& info : out.protocols)
+    out.files[info.sha256] = store.files(info.sha256);
+  store.for_each_trial([&](const data::StoredTrial& trial) {
+    if (out.participants.empty() || out.participants.back().person.id != trial.participant.id)
+      out.participants.push_back({trial.participant, trial.protocol_sha256, {}});
+    if (trial.record.practice) return;
+    out.participants.back().rows.push_back({trial.record.session, trial.record.renderer,
+                                            trial.record.shape, trial.record.orientation_wxyz});
+  });
+  return out;
+}
+
+/// Who ended a session by withdrawing and did not begin again.
+std::vector<std::string> withdrawn(const std::vector<data::StoredRun>& runs) {
+  std::map<std::pair<std::int64_t, int>, const data::StoredRun*> latest;
+  for (const data::StoredRun& run : runs) latest[{run.participant.id, run.info.session}] = &run;
+  std::vector<std::string> codes;
+  for (const auto& [session, run] : latest) {
+    if (run->end == data::RunEnd::withdrawn &&
+        std::ranges::find(codes, run->participant.code) == codes.end())
+      codes.push_back(run->participant.code);
+  }
+  return codes;
+}
+
+std::string short_sum(const std::string& sha256) { return sha256.substr(0, 12) + "..."; }
+
+/// "S001, S002 and S003".
+std::string names(const std::set<std::string>& codes) {
+  return analysis::joined(std::vector<std::string>(codes.begin(), codes.end()));
+}
+
+CheckPoint of_registration(const std::string& folder) {
+  CheckPoint out{"registration", "The registration", Finding::as_registered,
+                 "No file of the registration has changed since it was made."};
+  out.evidence = checksum_faults(folder, files_to_fill_in());
+  if (!out.evidence.empty()) {
+    out.finding = Finding::deviation;
+    out.sentence = "The registration has changed since it was made.";
+  }
+  if (const auto filled = filled_in(folder); !filled.empty())
+    out.sentence += " Filled in, as it asks: " + analysis::joined(filled) + ".";
+  return out;
+}
+
+std::size_t first_difference(const std::string& a, const std::string& b) {
+  std::size_t at = 0;
+  while (at < std::min(a.size(), b.size()) && a[at] == b[at]) ++at;
+  return at;
+}
+
+CheckPoint of_protocol(const Registration& registered, const StudyData& study) {
+  CheckPoint out{"protocol", "Protocol", Finding::as_registered,
+                 "Protocol " + registered.protocol.name +
+                     " is the registered one, byte for byte (SHA-256 " +
+                     short_sum(registered.protocol.sha256) + ")."};
+  for (const data::ProtocolInfo& info : study.protocols) {
+    if (info.sha256 == registered.protocol.sha256) continue;
+    std::set<std::string> began, shown;
+    for (const StudyParticipant& one : study.participants) {
+      if (one.protocol_sha256 == info.sha256) began.insert(one.person.code);
+    }
+    for (const data::StoredRun& run : study.runs) {
+      if (run.info.protocol_sha256 == info.sha256 && !began.contains(run.participant.code))
+        shown.insert(run.participant.code);
+    }
+    if (began.empty() && shown.empty()) continue;
+    began.merge(shown);
+    std::string line = names(began) + ": shown with protocol " + stimuli::printable(info.name) +
+                       ", SHA-256 " + short_sum(info.sha256);
+    if (info.name == registered.protocol.name) {
+      line += "; the texts differ from byte " +
+              std::to_string(first_difference(registered.protocol.source_text, info.text) + 1);
+      const protocols::ProtocolDifference differs =
+          protocols::difference(registered.protocol.source_text, info.text);
+      line += differs.nothing() ? ", in layout only"
+                                : ", " + stimuli::printable(protocols::in_words(differs));
+    }
+    out.evidence.push_back(std::move(line));
+  }
+  if (const auto stored = study.files.find(registered.protocol.sha256);
+      stored != study.files.end()) {
+    for (const data::ProtocolFile& file : registered.files) {
+      const auto found = std::ranges::find(stored->second, file.name, &data::ProtocolFile::name);
+      if (found == stored->second.end() || found->bytes != file.bytes)
+        out.evidence.push_back(stimuli::printable(file.name) + (found == stored->second.end()
+                                                                    ? ": is not in the database"
+                                                                    : ": other bytes were shown"));
+    }
+  }
+  if (out.evidence.empty()) return out;
+  out.finding = Finding::deviation;
+  out.sentence = "Trials were shown with another protocol than the registered one (SHA-256 " +
+                 short_sum(registered.protocol.sha256) + ").";
+  return out;
+}
+
+std::map<int, std::vector<OrderRow>> by_session(const std::vector<OrderRow>& rows) {
+  std::map<int, std::vector<OrderRow>> out;
+  for (const OrderRow& row : rows) out[row.session].push_back(row);
+  return out;
+}
+
+/// Where the trials that were shown first differ from the order; "": nowhere.
+std::string order_difference(const std::vector<OrderRow>& expected,
+                             const std::vector<OrderRow>& shown) {
+  const auto planned = by_session(expected);
+  for (const auto& [session, rows] : by_session(shown)) {
+    const auto found = planned.find(session);
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+      const std::string where = "session " + std::to_string(session) + ", trial " +
+                                std::to_string(i + 1) + " of those that count: ";
+      if (found == planned.end() || i >= found->second.size())
+        return where + "shown " + stimuli::printable(to_line(rows[i])) + ", none registered";
+      if (!(rows[i] == found->second[i]))
+        return where + "shown " + stimuli::printable(to_line(rows[i])) + ", registered " +
+               to_line(found->second[i]);
+    }
+  }
+  return "";
+}
+
+CheckPoint of_order(const Registration& registered, const StudyData& study) {
+  CheckPoint out{"order", "Order of trials", Finding::as_registered, ""};
+  std::size_t beyond = 0;
+  for (const StudyParticipant& one : study.participants) {
+    const int number = one.person.enrolled_number;
+    const std::string who = one.person.code + " (number " + std::to_string(number) + ")";
+    if (number < 1) {
+      out.evidence.push_back(who + ": there is no such number");
+      continue;
+    }
+    const std::vector<OrderRow> expected = order_of(registered.protocol, number);
+    const auto at = static_cast<std::size_t>(number) - 1;
+    if (at >= registered.order_sha256.size()) {
+      ++beyond;
+    } else if (order_checksum(expected) != registered.order_sha256[at]) {
+      out.evidence.push_back(who + ": the registered order has SHA-256 " +
+                             short_sum(registered.order_sha256[at]) +
+                             "; this program makes another one of the registered protocol, " +
+                             short_sum(order_checksum(expected)));
+      continue;
+    }
+    const std::string differs = order_difference(expected, one.rows);
+    if (!differs.empty()) out.evidence.push_back(who + ": " + differs);
+  }
+  out.sentence = "Every participant's trials came in the order that was registered for the number.";
+  if (beyond > 0)
+    out.sentence += " " + counted(beyond, "number is", "numbers are") +
+                    " beyond those registered; the order follows from the protocol all the same.";
+  if (out.evidence.empty()) return out;
+  out.finding = Finding::deviation;
+  out.sentence = counted(out.evidence.size(), "participant", "participants") +
+                 " had trials in another order than the registered one.";
+  cut(out.evidence);
+  return out;
+}
+
+CheckPoint of_participants(const Registration& registered, const StudyData& study) {
+  const std::size_t n = study.participants.size();
+  CheckPoint out{"participants", "Number of participants", Finding::as_registered,
+                 counted(n, "participant", "participants") + ", as registered."};
+  if (n == registered.participants) return out;
+  out.finding = Finding::deviation;
+  out.sentence = counted(n, "participant", "participants") + ", " +
+                 std::to_string(registered.participants) + " registered.";
+  std::set<int> used;
+  for (const StudyParticipant& one : study.participants) used.insert(one.person.enrolled_number);
+  for (const StudyParticipant& one : study.participants) {
+    if (static_cast<std::size_t>(one.person.enrolled_number) > registered.participants)
+      out.evidence.push_back(one.person.code + " has number " +
+                             std::to_string(one.person.enrolled_number));
+  }
+  for (int number = 1; static_cast<std::size_t>(number) <= registered.participants; ++number) {
+    if (!used.contains(number))
+      out.evidence.push_back("nobody has number " + std::to_string(number));
+  }
+  cut(out.evidence);
+  return out;
+}
+
+CheckPoint of_trials(const Registration& registered, const StudyData& study) {
+  const auto planned = static_cast<std::size_t>(protocols::main_trials(registered.protocol));
+  CheckPoint out{
+      "trials", "Number of trials", Finding::as_registered,
+      "Every participant has the registered " + counted(planned, "trial", "trials") + "."};
+  for (const StudyParticipant& one : study.participants) {
+    if (one.rows.size() != planned)
+      out.evidence.push_back(one.person.code + ": " + std::to_string(one.rows.size()) + " of " +
+                             std::to_string(planned) + " trials");
+  }
+  if (out.evidence.empty()) return out;
+  out.finding = Finding::deviation;
+  out.sentence = counted(out.evidence.size(), "participant has", "participants have") +
+                 " another number of trials than the registered " + std::to_string(planned) + ".";
+  cut(out.evidence);
+  return out;
+}
+
+/// The version of a simulated participant; "" for changed settings.
+std::string version_of(const std::string& observer_sha256) {
+  for (const int version : participant_versions()) {
+    if (load_simulated_settings("", version).sha256 == observer_sha256)
+      return "version " + std::to_string(version);
+  }
+  return "changed settings";
+}
+
+CheckPoint of_people(const StudyData& study) {
+  CheckPoint out{"people", "Who took part", Finding::as_registered, "All participants are people."};
+  std::set<std::string> simulated, people, observers;
+  for (const StudyParticipant& one : study.participants)
+    (one.person.simulated ? simulated : people).insert(one.person.code);
+  if (simulated.empty()) return out;
+  for (const data::StoredRun& run : study.runs) {
+    if (run.participant.simulated && !run.info.observer_sha256.empty())
+      observers.insert(run.info.observer_sha256);
+  }
+  std::string which;
+  for (const std::string& sha256 : observers)
+    which +=
+        (which.empty() ? "" : ", ") + version_of(sha256) + " (settings " + short_sum(sha256) + ")";
+  out.finding = people.empty() ? Finding::note : Finding::deviation;
+  out.sentence = people.empty() ? "SIMULATED PARTICIPANTS: no person took part"
+                                : "People and SIMULATED participants are mixed";
+  out.sentence += which.empty() ? "." : "; simulated participants: " + which + ".";
+  if (!people.empty())
+    out.evidence = {"simulated: " + names(simulated), "people: " + names(people)};
+  return out;
+}
+
+CheckPoint of_dates(const Registration& registered, const StudyData& study) {
+  CheckPoint out{"dates", "Dates", Finding::as_registered,
+                 "Every session began after the registration was made."};
+  bool real = false;
+  for (const data::StoredRun& run : study.runs) {
+    if (run.participant.simulated) continue;
+    real = true;
+    const std::int64_t began = run.info.clock.utc_ns;
+    if (began < registered.made_utc_ns)
+      out.evidence.push_back(
+          run.participant.code + ", session " + std::to_string(run.info.session) + ": began on " +
+          data::format_utc(began).substr(0, 19) + "Z, the registration was made on " +
+          data::format_utc(registered.made_utc_ns).substr(0, 19) + "Z");
+  }
+  if (!real) {
+    out.finding = Finding::note;
+    out.sentence = "Simulated sessions have no true dates.";
+  } else if (!out.evidence.empty()) {
+    out.finding = Finding::deviation;
+    out.sentence = counted(out.evidence.size(), "session", "sessions") +
+                   " began before the registration was made.";
+    cut(out.evidence);
+  }
+  return out;
+}
+
+std::string seconds(double value) { return nlohmann::json(value).dump() + " s"; }
+
+CheckPoint of_exclusion(const Registration& registered, const ReportedAnalysis& reported) {
+  CheckPoint out{"exclusion", "Exclusion of times", Finding::as_registered,
+                 "Correct answers faster than " + seconds(registered.too_fast) +
+                     " are left out of the times, as registered."};
+  const double used = reported.too_fast.value_or(registered.too_fast);
+  if (used == registered.too_fast) return out;
+  out.finding = Finding::deviation;
+  out.sentence = "Another limit for times that are too fast was used than the registered one.";
+  out.evidence = {"used " + seconds(used) + ", registered " + seconds(registered.too_fast)};
+  return out;
+}
+
+CheckPoint of_alpha(const Registration& registered, const ReportedAnalysis& reported) {
+  const auto text = [](double value) { return nlohmann::json(value).dump(); };
+  CheckPoint out{"alpha", "Alpha", Finding::as_registered,
+                 "Alpha is " + text(registered.alpha) + ", as registered."};
+  const double used = reported.alpha.value_or(registered.alpha);
+  if (used == registered.alpha) return out;
+  out.finding = Finding::deviation;
+  out.sentence = "Another alpha was used than the registered one.";
+  out.evidence = {"used " + text(used) + ", registered " + text(registered.alpha)};
+  return out;
+}
+
+CheckPoint of_versions(const Registration& registered, const StudyData& study) {
+  CheckPoint out{
+      "versions", "Versions of the program", Finding::as_registered,
+      "Recorded and analysed with palpate " + registered.program_version + ", as registered."};
+  std::map<std::string, std::set<std::string>> codes;
+  std::set<std::string> builds;
+  for (const data::StoredRun& run : study.runs) {
+    if (run.info.program_version != registered.program_version)
+      codes[run.info.program_version].insert(run.participant.code);
+    if (run.info.build != registered.build) builds.insert(run.info.build);
+  }
+  for (const auto& [version, who] : codes)
+    out.evidence.push_back(names(who) + ": recorded with palpate " + stimuli::printable(version) +
+                           ", registered " + stimuli::printable(registered.program_version));
+  if (registered.program_version != PALPATE_VERSION)
+    out.evidence.push_back("this check analyses with palpate " PALPATE_VERSION ", registered " +
+                           stimuli::printable(registered.program_version));
+  if (!out.evidence.empty()) {
+    out.finding = Finding::deviation;
+    out.sentence = "Other versions of palpate were used than the registered one.";
+  }
+  if (!builds.empty())
+    out.sentence += " Other builds of it: " + stimuli::printable(names(builds)) + ".";
+  return out;
+}
+
+/// Sessions with a note that `says` recognises.
+std::vector<std::string> noted(const StudyData& study, bool (*says)(const std::string&)) {
+  std::vector<std::string> out;
+  for (const data::StoredNote& note : study.notes) {
+    if (says(note.text))
+      out.push_back(note.participant.code + ", session " + std::to_string(note.session) + ": " +
+                    stimuli::printable(note.text, 300));
+  }
+  return out;
+}
+
+CheckPoint left_out(const char* id, const char* title, const std::string& good,
+                    const std::string& bad, std::vector<std::string> evidence) {
+  CheckPoint out{id, title, Finding::as_registered, good, std::move(evidence)};
+  if (!out.evidence.empty()) {
+    out.finding = Finding::deviation;
+    out.sentence = bad;
+    cut(out.evidence);
+  }
+  return out;
+}
+
+/// The numbers of an analysis as it was reported, beside those that the registered one gives.
+CheckPoint of_reported(const analysis::TrialTable& table, const ReportedAnalysis& reported,
+                       double too_fast) {
+  CheckPoint out{"analysis", "Reported numbers", Finding::as_registered,
+                 "Every number of the reported analysis is that of these data."};
+  analysis::AnalysisSettings settings;
+  settings.too_fast = too_fast;
+  const analysis::NamedResults ours = analysis::named_results(
+      analysis::report_json(analysis::analyze(table, settings, PALPATE_VERSION)), 0);
+  const analysis::NamedResults theirs = analysis::named_results(reported.json, 0);
+  const auto text = [](const analysis::NamedResults& of, const std::string& name) {
+    const auto found = of.find(name);
+    return found == of.end()           ? std::string("nothing")
+           : std::isnan(found->second) ? "undefined"
+                                       : nlohmann::json(found->second).dump();
+  };
+  analysis::NamedResults both = ours;
+  both.insert(theirs.begin(), theirs.end());
+  for (const auto& [name, value] : both) {
+    if (text(ours, name) != text(theirs, name))
+      out.evidence.push_back(stimuli::printable(name, 120) + ": reported " + text(theirs, name) +
+                             ", of these data " + text(ours, name));
+  }
+  if (out.evidence.empty()) return out;
+  out.finding = Finding::deviation;
+  out.sentence = counted(out.evidence.size(), "number", "numbers") +
+                 " of the reported analysis are not those of these data.";
+  cut(out.evidence);
+  return out;
+}
+
+}  // namespace
+
+std::size_t StudyCheck::deviations() const {
+  return static_cast<std::size_t>(
+      std::ranges::count(points, Finding::deviation, &CheckPoint::finding));
+}
+
+std::string conclusion_of(const StudyCheck& check) {
+  return check.deviations() == 0
+             ? "Run as registered"
+             : counted(check.deviations(), "deviation", "deviations") + " from the registration";
+}
+
+StudyCheck check_study(const Registration& registered, const std::string& folder,
+                       const std::string& database, const ReportedAnalysis& reported) {
+  data::Store store = data::Store::open(database, data::Store::Mode::read_only);
+  const StudyData study = read_study(store);
+  if (const auto codes = withdrawn(study.runs); !codes.empty())
+    throw UsageError(stimuli::printable(database) + ": " + analysis::joined(codes) +
+                     (codes.size() == 1 ? " has" : " have") +
+                     " withdrawn and must not be used; remove with 'palpate forget' first");
+  const analysis::TrialTable table = analysis::read_trials_store(database);
+  analysis::AnalysisSettings settings;
+  settings.too_fast = registered.too_fast;
+  const analysis::NamedResults results = analysis::named_results(
+      analysis::report_json(analysis::analyze(table, settings, PALPATE_VERSION)), registered.alpha);
+
+  StudyCheck out;
+  out.label = analysis::simulated_label(table.simulated);
+  out.participants = study.participants.size();
+  out.points = {of_registration(folder),       of_protocol(registered, study),
+                of_order(registered, study),   of_participants(registered, study),
+                of_trials(registered, study),  of_people(study),
+                of_dates(registered, study),   of_exclusion(registered, reported),
+                of_alpha(registered, reported)};
+  if (!reported.json.empty())
+    out.points.push_back(
+        of_reported(table, reported, reported.too_fast.value_or(registered.too_fast)));
+  out.points.push_back(of_versions(registered, study));
+  out.points.push_back(left_out(
+      "calibration", "Calibration of the device", "No session says that calibration was left out.",
+      "Sessions were run without a stored calibration of the device.",
+      noted(study, [](const std::string& note) {
+        return note.starts_with("pre-flight: ") && note.ends_with("WITHOUT calibration");
+      })));
+  out.points.push_back(left_out(
+      "noise", "Masking noise",
+      registered.protocol.masking_noise ? "No session says that the noise was left out."
+                                        : "The protocol has no masking noise.",
+      "Sessions were run without the protocol's masking noise.",
+      noted(study,
+            [](const std::string& note) { return note == R"({"masking_noise":"left out"})"; })));
+  out.points.push_back(left_out(
+      "sounds", "Sounds",
+      registered.protocol.sounds ? "No session says that they were left out."
+                                 : "The protocol has no sounds.",
+      "Sessions were run without the protocol's sounds.",
+      noted(study, [](const std::string& note) { return note == R"({"sounds":"left out"})"; })));
+  out.points.push_back(
+      left_out("levels", "Levels from another program", "No other program chose what was shown.",
+               "Another program was asked for levels.", noted(study, [](const std::string& note) {
+                 return note.starts_with(R"({"level_from_own_procedure")");
+               })));
+  for (const analysis::Hypothesis& one : registered.hypotheses)
+    out.hypotheses.emplace_back(one, analysis::judge(one, results));
+  return out;
+}
+
+}  // namespace palpate::runner

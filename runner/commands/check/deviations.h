@@ -1,0 +1,59 @@
+#pragma once
+// A study held against its registration: each point with what was found, and its evidence.
+
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "analysis/report/hypotheses.h"
+#include "data/store/store.h"
+#include "runner/commands/register/registration.h"
+
+namespace palpate::runner {
+
+enum class Finding {
+  as_registered,
+  deviation,
+  note  ///< nothing to hold against the registration
+};
+
+struct CheckPoint {
+  std::string id;  ///< "protocol", "order", ...
+  std::string title;
+  Finding finding = Finding::as_registered;
+  std::string sentence;
+  std::vector<std::string> evidence =
+      {};  ///< a line each: who, what was registered, what was found
+};
+
+/// How the data were analysed for the report of the study, where that is known.
+struct ReportedAnalysis {
+  std::optional<double> too_fast = {}, alpha = {};  ///< s; none: as registered
+  std::string json = {};                            ///< text of its analysis.json; "": not given
+};
+
+struct StudyCheck {
+  std::string label;  ///< "SIMULATED PARTICIPANTS"; empty: people
+  std::size_t participants = 0;
+  std::vector<CheckPoint> points;
+  std::vector<std::pair<analysis::Hypothesis, analysis::Judgement>> hypotheses;
+
+  std::size_t deviations() const;
+};
+
+/// \param folder  of the registration \throws UsageError: a participant has withdrawn and is still
+/// in the database; what analysis and store throw
+StudyCheck check_study(const Registration& registered, const std::string& folder,
+                       const std::string& database, const ReportedAnalysis& reported);
+
+/// "Run as registered", "2 deviations from the registration".
+std::string conclusion_of(const StudyCheck& check);
+
+std::string check_text(const StudyCheck& check, const Registration& registered);
+std::string check_json(const StudyCheck& check, const Registration& registered);
+/// A page as analyze's report.
+std::string check_html(const StudyCheck& check, const Registration& registered);
+
+}  // namespace palpate::runner

@@ -1,0 +1,345 @@
+// `palpate register`: a registration of a study, before its first session.
+
+#include <algorithm>
+#include <chrono>
+#include <filesystem>
+#include <iostream>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "analysis/report/plan_report.h"
+#include "analysis/report/report_json.h"
+#include "analysis/statistics/analysis.h"
+#include "analysis/statistics/sensitivity.h"
+#include "analysis/text.h"
+#include "data/files/atomic_folder.h"
+#include "data/store/store.h"
+#include "protocols/json_document.h"
+#include "protocols/parse.h"
+#include "runner/build_info.h"
+#include "runner/commands/register/registration.h"
+#include "runner/commands/register/registration_text.h"
+#include "runner/commands/register/rehearsal.h"
+#include "runner/commands/shared/command.h"
+#include "runner/commands/shared/progress_line.h"
+#include "runner/commands/shared/sealed_folder.h"
+#include "runner/participants/simulated_settings.h"
+#include "runner/session/protocol_info.h"
+#include "stimuli/printable.h"
+
+namespace palpate::runner {
+namespace {
+
+namespace po = boost::program_options;
+namespace fs = std::filesystem;
+
+constexpr std::size_t kMostParticipants = 10'000;
+constexpr const char* kMark = "registration.json";
+
+struct RegisterOptions {
+  std::string protocol, plan, hypotheses, out, database;
+  std::size_t participants = 0, studies = 200, jobs = 1;
+  double too_fast = 0.2;
+  std::uint64_t seed = 1;
+  bool force = false;
+};
+
+std::optional<RegisterOptions> parse_options(const std::vector<std::string>& args) {
+  RegisterOptions options;
+  options.jobs = std::max(1U, std::thread::hardware_concurrency());
+  CommandLine line;
+  line.usage =
+      "palpate register PROTOCOL.json --plan plan.json --hypotheses hypotheses.json --out FOLDER\n"
+      "       [--participants N] [--too-fast-s SECONDS] [--db FILE] [--force]";
+  line.summary =
+      "Makes a registration of a study before its first session: a folder with the answers to the\n"
+      "questions of the OSF Preregistration form that protocol and plan give, the hypotheses as\n"
+      "conditions on the numbers of the analysis, the checksum of every participant's order of\n"
+      "trials, SIMULATED data with the planned effect and with none, and their analysis. What\n"
+      "only the lab can say is marked FILL IN. Nothing is sent anywhere: deposit the folder.";
+  line.example =
+      R"(  palpate plan --db pilot.db --effect cone=22,cube=11 --trials 76 --json plan.json
+  palpate register protocols/ho2000.json --plan plan.json --hypotheses hypotheses.json \
+      --out registration
+hypotheses.json:
+  [{"id": "H1", "text": "Cones are found faster with the ray.",
+    "corroborated": "paired.cone.p_holm < alpha && paired.cone.reduction > 0",
+    "refuted": "paired.cone.ci95_high < 5"}])";
+  line.positional_names = {"PROTOCOL.json"};
+  auto add = line.options.add_options();
+  add("plan", po::value(&options.plan)->required()->value_name("FILE"),
+      "what 'palpate plan --json' wrote for the protocol's repetitions");
+  add("hypotheses", po::value(&options.hypotheses)->required()->value_name("FILE"),
+      "the hypotheses, as below");
+  add("out", po::value(&options.out)->required()->value_name("FOLDER"), "to be made");
+  add("participants", po::value(&options.participants)->value_name("N"),
+      "how many there will be; default: as the plan says");
+  add("too-fast-s", po::value(&options.too_fast)->default_value(0.2, "0.2")->value_name("SECONDS"),
+      "correct answers faster than this will be excluded from the times");
+  add("db", po::value(&options.database)->value_name("FILE"),
+      "the study's database, if there is one already: how many sessions it holds is said");
+  add("studies", po::value(&options.studies)->default_value(200)->value_name("N"),
+      "simulated with the planned effect, and as many with none");
+  add("seed", po::value(&options.seed)->default_value(1)->value_name("S"),
+      "of the simulated studies");
+  add("jobs", po::value(&options.jobs)->default_value(options.jobs)->value_name("J"),
+      "studies simulated at a time");
+  add("force", po::bool_switch(&options.force), "replace an earlier registration");
+  const auto values = line.parse(args);
+  if (!values) return std::nullopt;
+  options.protocol = (*values)["PROTOCOL.json"].as<std::string>();
+  if (values->count("participants") &&
+      (options.participants < 2 || options.participants > kMostParticipants))
+    throw UsageError("--participants: must be 2 to " + std::to_string(kMostParticipants));
+  if (!(options.too_fast > 0 && options.too_fast <= 60))
+    throw UsageError("--too-fast-s: must be above 0, at most 60 s");
+  if (options.studies < 20 || options.studies > 100'000)
+    throw UsageError("--studies: must be 20 to 100000");
+  if (options.jobs < 1 || options.jobs > 256) throw UsageError("--jobs: must be 1 to 256");
+  return options;
+}
+
+/// Of a registration that is not replaced: one that the lab has filled in.
+void require_replaceable(const RegisterOptions& options) {
+  require_replaceable_folder(options.out, options.force, kMark, files_to_fill_in());
+  if (!options.force || !fs::exists(fs::path(options.out) / kMark)) return;
+  for (const std::string& file : filled_in(options.out))
+    throw UsageError(stimuli::printable(options.out) + ": " + file +
+                     " has been filled in and would be lost; name another folder");
+}
+
+protocols::Protocol read_protocol(const std::string& path) {
+  protocols::Protocol protocol = protocols::parse_protocol(path);
+  if (protocol.version != 1)
+    throw UsageError(path +
+                     ": expected a protocol of version 1: hypotheses on the results of "
+                     "tasks cannot be registered yet");
+  if (protocol.renderers.size() != 2)
+    throw UsageError(path + ": expected two renderers to compare, point and ray");
+  return protocol;
+}
+
+/// The plan, with a curve for the protocol's trials and the same shapes. \throws UsageError
+analysis::PlanRecord read_fitting_plan(const std::string& path, const std::string& text,
+                                       const protocols::Protocol& protocol) {
+  analysis::PlanRecord plan;
+  try {
+    plan = analysis::read_plan(text);
+  } catch (const std::invalid_argument& error) {
+    throw UsageError(path + ": " + error.what());
+  }
+  std::vector<std::string> planned = plan.model.shapes, shown;
+  for (const protocols::StimulusSpec& stimulus : protocol.stimuli) shown.push_back(stimulus.name);
+  std::ranges::sort(planned);
+  std::ranges::sort(shown);
+  if (planned != shown)
+    throw UsageError(path + ": expected a plan for the protocol's shapes (" +
+                     stimuli::printable(analysis::joined(shown)) + "); this one is for " +
+                     stimuli::printable(analysis::joined(planned)));
+  const auto trials = static_cast<std::size_t>(protocol.repetitions);
+  std::string others;
+  for (const auto& curve : plan.curves) {
+    if (curve.trials == trials) return plan;
+    others += (others.empty() ? "" : ", ") + std::to_string(curve.trials);
+  }
+  throw UsageError(path + ": expected a plan for the protocol's " + std::to_string(trials) +
+                   " trials of each shape with each renderer; this one is for " + others +
+                   ": plan again with --trials " + std::to_string(trials));
+}
+
+const analysis::PlanRecord::Curve& curve_of(const Registration& made) {
+  return *std::ranges::find(made.plan.curves, static_cast<std::size_t>(made.protocol.repetitions),
+                            &analysis::PlanRecord::Curve::trials);
+}
+
+std::size_t sample_size(const RegisterOptions& options, const Registration& made) {
+  if (options.participants > 0) return options.participants;
+  if (const auto& needed = curve_of(made).participants) {
+    if (*needed >= 2 && *needed <= kMostParticipants) return *needed;
+  }
+  throw UsageError(options.plan +
+                   ": no number of participants reaches the wanted power; say with --participants "
+                   "N how many there will be, or plan again");
+}
+
+/// Sessions of protocols of this name.
+std::size_t sessions_in(const std::string& database, const std::string& protocol) {
+  data::Store store = data::Store::open(database, data::Store::Mode::read_only);
+  std::size_t sessions = 0;
+  for (const data::ProtocolInfo& info : store.protocols()) {
+    if (info.name != protocol) continue;
+    for (const data::StoredRun& run : store.runs())
+      sessions += run.protocol_sha256 == info.sha256 ? 1 : 0;
+  }
+  return sessions;
+}
+
+std::string share_text(std::size_t n, std::size_t of) {
+  const analysis::Interval ends = analysis::wilson_interval(n, of);
+  return std::to_string(n) + " of " + std::to_string(of) + " (95 % interval " +
+         analysis::fixed(100 * ends.low, 0) + " to " + analysis::fixed(100 * ends.high, 0) + " %)";
+}
+
+void warn_of_hypothesis(const analysis::Hypothesis& one, const Rehearsal& rehearsal,
+                        double wanted_power, std::vector<std::string>& out) {
+  const VerdictCounts &with = rehearsal.with_effect, &without = rehearsal.without_effect;
+  const std::size_t all = with.studies() + without.studies();
+  for (const auto& [n, words] :
+       {std::pair{with.corroborated + without.corroborated, "corroborated"},
+        std::pair{with.refuted + without.refuted, "refuted"},
+        std::pair{with.undecided + without.undecided, "undecided"}}) {
+    if (n == all)
+      out.push_back(one.id + " comes out " + words + " in all of " + std::to_string(all) +
+                    " simulated studies, with the planned effect and with none: the data cannot "
+                    "tell.");
+  }
+  if (with.refuted + without.refuted == 0)
+    out.push_back(one.id + " cannot be refuted: it is refuted in none of " +
+                  std::to_string(with.studies()) + " studies with the planned effect and " +
+                  std::to_string(without.studies()) + " with no effect.");
+  if (analysis::wilson_interval(with.corroborated, with.studies()).high < wanted_power)
+    out.push_back(one.id + " lacks power: with the planned effect it is corroborated in " +
+                  share_text(with.corroborated, with.studies()) +
+                  " simulated studies; the plan "
+                  "wants " +
+                  analysis::fixed(100 * wanted_power, 0) + " %.");
+}
+
+std::vector<std::string> warnings_of(const Registration& made) {
+  std::vector<std::string> out;
+  const auto& curve = curve_of(made);
+  const auto power = curve.power.find(made.participants);
+  if (!curve.participants) {
+    out.push_back("The plan reaches its power with no number of participants in its range.");
+  } else if (made.participants < *curve.participants) {
+    out.push_back("The plan wants " + std::to_string(*curve.participants) + " participants; " +
+                  std::to_string(made.participants) + " are registered" +
+                  (power == curve.power.end()
+                       ? "."
+                       : ", with a power of " + analysis::fixed(100 * power->second, 0) + " %."));
+  }
+  const auto orders = static_cast<std::size_t>(protocols::renderer_orders(made.protocol));
+  if (made.participants % orders != 0)
+    out.push_back("The orders of the renderers repeat after " + std::to_string(orders) +
+                  " participants: with " + std::to_string(made.participants) +
+                  " they are not balanced.");
+  if (!made.plan.pilot_label.empty())
+    out.push_back("The plan rests on " + made.plan.pilot_label +
+                  ": their standard deviations are a model's.");
+  for (std::size_t h = 0; h < made.hypotheses.size(); ++h)
+    warn_of_hypothesis(made.hypotheses[h], made.rehearsals[h], made.plan.power, out);
+  return out;
+}
+
+std::string analyzed(const analysis::TrialTable& table, double too_fast) {
+  analysis::AnalysisSettings settings;
+  settings.too_fast = too_fast;
+  return analysis::report_json(analysis::analyze(table, settings, PALPATE_VERSION));
+}
+
+/// The trials of a file in the draft, under its name there.
+analysis::TrialTable read_table(const data::AtomicFolder& draft, const std::string& name) {
+  analysis::TrialTable table = analysis::read_trials_csv(draft / name);
+  table.provenance.source = name;
+  return table;
+}
+
+/// Simulated studies, their analyses and what they say of the hypotheses.
+void put_simulated(const RegisterOptions& options, const data::AtomicFolder& draft,
+                   Registration& made) {
+  constexpr const char* kEffect = "simulated/planned-effect.csv";
+  constexpr const char* kNone = "simulated/no-effect.csv";
+  const PlannedStudies studies(made.protocol, made.plan.model, made.participants, made.seed);
+  const std::string scratch = draft / "scratch";
+  studies.write(scratch, draft.prepare(kEffect), draft / "codebook.csv", true, made.typical_time);
+  fs::remove_all(scratch);
+  studies.write(scratch, draft.prepare(kNone), "", false, made.typical_time);
+  fs::remove_all(scratch);
+  write_member(draft, "simulated/README.md",
+               "# SIMULATED data\n\nDrawn from the model of plan.json, in the registered orders of "
+               "trials: no person took part. `planned-effect.csv` has the effects that the study "
+               "is to find, `no-effect.csv` none. `../codebook.csv` explains the columns.\n");
+  const analysis::TrialTable first = read_table(draft, kEffect);
+  const std::string with = analyzed(first, made.too_fast);
+  const std::string none = analyzed(read_table(draft, kNone), made.too_fast);
+  write_member(draft, "analysis-simulated.json",
+               nlohmann::ordered_json{{"planned_effect", nlohmann::ordered_json::parse(with)},
+                                      {"no_effect", nlohmann::ordered_json::parse(none)}}
+                       .dump(2) +
+                   "\n");
+  made.hypotheses = analysis::read_hypotheses(made.hypotheses_text, options.hypotheses,
+                                              analysis::named_results(with, made.alpha));
+  ProgressLine line("simulated studies");
+  made.rehearsals =
+      studies.rehearse(first, made, options.studies, options.jobs, [&](std::size_t n) {
+        line.show(static_cast<double>(n) / static_cast<double>(2 * options.studies));
+      });
+  line.clear();
+}
+
+void write_registration(const data::AtomicFolder& draft, const Registration& made) {
+  write_member(draft, "protocol.json", made.protocol.source_text);
+  for (const data::ProtocolFile& file : made.files) write_member(draft, file.name, file.bytes);
+  write_member(draft, "plan.json", made.plan_text);
+  write_member(draft, "hypotheses.json", made.hypotheses_text);
+  const std::vector<Question> questions = registration_questions(made);
+  const std::vector<std::string> texts = {registration_markdown(made, questions),
+                                          registration_osf(questions)};
+  for (std::size_t i = 0; i < texts.size(); ++i)
+    write_member(draft, files_to_fill_in()[i], texts[i]);
+  write_member(draft, "registration.json", registration_json(made, texts));
+  write_checksums(draft, files_to_fill_in());
+}
+
+}  // namespace
+
+int register_command(const std::vector<std::string>& args) {
+  const std::optional<RegisterOptions> given = parse_options(args);
+  if (!given) return 0;
+  const RegisterOptions& options = *given;
+  Registration made;
+  made.protocol = read_protocol(options.protocol);
+  made.files = info_of(made.protocol).files;
+  require_files_below(made.files);
+  made.plan_text = protocols::read_text_file(options.plan);
+  made.plan = read_fitting_plan(options.plan, made.plan_text, made.protocol);
+  made.hypotheses_text = protocols::read_text_file(options.hypotheses);
+  made.participants = sample_size(options, made);
+  if (!options.database.empty())
+    made.sessions_so_far = sessions_in(options.database, made.protocol.name);
+  require_replaceable(options);
+
+  made.made_utc_ns = std::chrono::duration_cast<std::chrono::nanoseconds>(
+                         std::chrono::system_clock::now().time_since_epoch())
+                         .count();
+  made.program_version = PALPATE_VERSION;
+  made.build = build_description();
+  made.too_fast = options.too_fast;
+  made.alpha = made.plan.alpha;
+  made.seed = options.seed;
+  made.typical_time = PlannedStudies::typical_time(made.protocol, made.too_fast);
+  made.participant_version = kDefaultParticipantVersion;
+  made.participant_sha256 = load_simulated_settings("").sha256;
+  for (std::size_t p = 1; p <= made.participants; ++p)
+    made.order_sha256.push_back(order_checksum(order_of(made.protocol, static_cast<int>(p))));
+
+  data::AtomicFolder draft(options.out);
+  put_simulated(options, draft, made);
+  made.warnings = warnings_of(made);
+  write_registration(draft, made);
+  draft.commit(options.force);
+  for (const std::string& warning : made.warnings)
+    std::cerr << "warning: " << stimuli::printable(warning) << "\n";
+  std::cout << stimuli::printable(options.out) << ": " << made.protocol.name << ", "
+            << made.participants << " participants, "
+            << analysis::counted(made.hypotheses.size(), "hypothesis", "hypotheses") << "\n"
+            << "Answer what is marked FILL IN in registration.md and osf.json, then deposit the "
+               "folder.\n";
+  return 0;
+}
+
+}  // namespace palpate::runner

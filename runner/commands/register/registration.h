@@ -1,0 +1,84 @@
+#pragma once
+// A registration: what a lab says, before the first session, of the study that it will run. A
+// folder of files that 'palpate register' makes and 'palpate check' reads.
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "analysis/report/hypotheses.h"
+#include "analysis/report/plan_report.h"
+#include "data/record.h"
+#include "protocols/protocol.h"
+#include "protocols/schedule.h"
+
+namespace palpate::runner {
+
+/// The trials for analysis of a participant, a line each: "session,renderer,shape,w,x,y,z" with 17
+/// significant digits. Practice is left out, as its rounds depend on answers.
+struct OrderRow {
+  int session = 1;
+  std::string renderer, shape;
+  std::array<double, 4> orientation_wxyz{};
+  bool operator==(const OrderRow&) const = default;
+};
+std::string to_line(const OrderRow& row);
+std::vector<OrderRow> order_of(const protocols::Protocol& protocol, int participant_number);
+/// SHA-256 of the lines, each with a line feed.
+std::string order_checksum(const std::vector<OrderRow>& rows);
+
+/// In how many simulated studies a hypothesis came out how.
+struct VerdictCounts {
+  std::size_t corroborated = 0, refuted = 0, undecided = 0;
+  void add(analysis::Verdict verdict);
+  std::size_t studies() const { return corroborated + refuted + undecided; }
+};
+
+/// What simulated studies say of a hypothesis.
+struct Rehearsal {
+  VerdictCounts with_effect, without_effect;
+};
+
+struct Registration {
+  std::int64_t made_utc_ns = 0;
+  std::string program_version, build;
+  protocols::Protocol protocol;           ///< with its text and SHA-256
+  std::vector<data::ProtocolFile> files;  ///< that it names
+  std::string plan_text;                  ///< plan.json, byte for byte
+  analysis::PlanRecord plan;
+  std::string hypotheses_text;  ///< hypotheses.json, byte for byte
+  std::vector<analysis::Hypothesis> hypotheses;
+  std::size_t participants = 0;
+  double too_fast = 0.2, alpha = 0.05;         ///< s; of the tests
+  std::vector<std::string> order_sha256;       ///< of participant number 1, 2, ...
+  int participant_version = 0;                 ///< default of the simulated participant
+  std::string participant_sha256;              ///< its settings
+  std::vector<Rehearsal> rehearsals;           ///< one for each hypothesis
+  std::uint64_t seed = 1;                      ///< of the simulated studies
+  double typical_time = 0;                     ///< s, of the simulated studies
+  std::optional<std::size_t> sessions_so_far;  ///< in the database that was named; none: none was
+  std::vector<std::string> warnings;
+};
+
+/// The files that the lab fills in: no checksum is listed, registration.json has those of the
+/// begin.
+const std::vector<std::string>& files_to_fill_in();
+
+/// registration.json, which read_registration reads.
+/// \param texts  of files_to_fill_in(), as they were made
+std::string registration_json(const Registration& registration,
+                              const std::vector<std::string>& texts);
+/// Those of them that have changed since they were made. \throws UsageError
+std::vector<std::string> filled_in(const std::string& folder);
+
+/// The registration in the folder, as its files say, changed or not. \throws UsageError,
+/// InputError: it is none
+Registration read_registration(const std::string& folder);
+
+/// Of a protocol's files: names that lead to a place below its folder. \throws UsageError
+void require_files_below(const std::vector<data::ProtocolFile>& files);
+
+}  // namespace palpate::runner

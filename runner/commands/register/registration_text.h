@@ -1,0 +1,44 @@
+#pragma once
+// A registration in words: the questions of OSF Preregistration, version 3, that the protocol, the
+// plan and the hypotheses answer. What only the lab can say remains a question.
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "runner/commands/register/registration.h"
+
+namespace palpate::runner {
+
+/// Marks what only the lab can say.
+inline constexpr const char* kFillIn = "FILL IN: ";
+
+/// A paragraph, a point of a list, or lines as they are.
+struct Paragraph {
+  enum class Kind { text, item, lines } kind = Kind::text;
+  std::string text;
+};
+
+/// A question of the form with its answer.
+struct Question {
+  std::string id;     ///< "q2"
+  std::string title;  ///< "Hypotheses"
+  std::vector<Paragraph> answer;
+  std::vector<std::string> chosen = {};  ///< of the form's options, in its words
+  bool several = false;                  ///< options can be chosen together
+};
+
+std::vector<Question> registration_questions(const Registration& registration);
+
+/// registration.md
+std::string registration_markdown(const Registration& registration,
+                                  const std::vector<Question>& questions);
+/// osf.json: the answers by question id.
+std::string registration_osf(const std::vector<Question>& questions);
+
+/// Text from files as Markdown that shows it as it is, within a line: no markup, HTML or links.
+std::string as_markdown(std::string_view text);
+/// The same at the beginning of a paragraph, where more characters are markup.
+std::string as_paragraph(std::string_view text);
+
+}  // namespace palpate::runner
