@@ -37,6 +37,8 @@ constexpr Command kCommands[] = {
     {"analyze", "per-shape speed-ups with inference, from a database or a CSV file",
      palpate::runner::analyze_command},
     {"bench", "run time of the renderers' ticks on this machine", palpate::runner::bench_command},
+    {"bundle", "data, registration, check and analysis as one folder to deposit",
+     palpate::runner::bundle_command},
     {"check", "whether a study was run as it was registered", palpate::runner::check_command},
     {"cluster", "a sweep, a study or a plan as one array job on Slurm",
      palpate::runner::cluster_command},

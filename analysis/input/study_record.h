@@ -40,6 +40,9 @@ struct StudyRecord {
   std::vector<std::string> devices, builds, response_devices;
   std::vector<std::string> seeds;  ///< of simulated participants, "CODE: SEED"
   std::size_t n_cut_off = 0;       ///< attempts that were interrupted and repeated
+  /// How the study was held against its registration; empty: it was not.
+  std::string checked;     ///< a sentence
+  std::string check_page;  ///< file name of the page beside the report
 };
 
 /// \param database path \throws what data::Store::open throws

@@ -170,6 +170,13 @@ class Report {
       put_table(page_.body(), table);
     }
     page_.end_section();
+    if (!record_.checked.empty()) {
+      begin({"registration", "Held against its registration", "Registration"});
+      page_.body() += "<p>" + escaped_sentence(stimuli::printable(record_.checked, 4000)) +
+                      "</p>\n<p><a href=\"" + escaped(record_.check_page) +
+                      "\">The check, point by point</a></p>\n";
+      page_.end_section();
+    }
     begin({"source", "Protocol, seeds, versions and checksums", "Source"});
     put_source();
     page_.end_section();

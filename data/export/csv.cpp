@@ -125,7 +125,8 @@ ExportResult export_csv(Store& store, const std::string& path, const ExportSetti
     });
   }
   result.simulated = participants.any_simulated();
-  result.not_recorded = participants.record(store.path(), path, "csv");
+  result.not_recorded = participants.record(
+      store.path(), settings.recorded_as.empty() ? path : settings.recorded_as, "csv");
   commit_all(files, settings.force);
   return result;
 }

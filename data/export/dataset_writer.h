@@ -91,7 +91,8 @@ ExportResult export_dataset(Store& store, const std::string& path, const ExportS
   }
   result.simulated = participants.any_simulated();
   writer.describe_dataset(result.simulated);
-  result.not_recorded = participants.record(store.path(), path, format);
+  result.not_recorded = participants.record(
+      store.path(), settings.recorded_as.empty() ? path : settings.recorded_as, format);
   writer.folder().commit(settings.force);
   return result;
 }

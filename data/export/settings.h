@@ -59,6 +59,8 @@ struct ExportSettings {
   /// Called every so many trials with their number; may throw to stop the export, which then leaves
   /// no file.
   std::function<void(std::int64_t)> progress = {};
+  /// Path that the database records, where the export will be moved to; "": that of the export.
+  std::string recorded_as = {};
 };
 
 struct ExportResult {

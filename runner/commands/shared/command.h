@@ -37,6 +37,7 @@ void warn_of_exposure(const std::string& database);
 int accuracy_command(const std::vector<std::string>& args);
 int analyze_command(const std::vector<std::string>& args);
 int bench_command(const std::vector<std::string>& args);
+int bundle_command(const std::vector<std::string>& args);
 int check_command(const std::vector<std::string>& args);
 int cluster_command(const std::vector<std::string>& args);
 int devices_command(const std::vector<std::string>& args);

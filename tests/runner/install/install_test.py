@@ -55,7 +55,7 @@ class Completion(unittest.TestCase):
         self.assertGreaterEqual(len(commands()), 15)
         self.assertEqual(set(self.offered("")), set(commands()) | {"--help", "--version"})
         self.assertEqual(self.offered("an"), ["analyze"])
-        self.assertEqual(sorted(self.offered("re")), ["render", "replay"])
+        self.assertEqual(sorted(self.offered("re")), ["register", "render", "replay"])
         self.assertEqual(self.offered("xyz"), [])
 
     def test_every_option_of_every_command(self):

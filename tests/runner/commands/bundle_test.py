@@ -1,0 +1,292 @@
+"""Bundles a study: what the folder holds, that it reproduces elsewhere, and its description by the rules of RO-Crate.
+
+Usage: bundle_test.py PALPATE SOURCE_DIR
+"""
+
+import csv
+import json
+import os
+import pathlib
+import re
+import shutil
+import stat
+import subprocess
+import sys
+import tempfile
+import unittest
+import urllib.parse
+
+PALPATE, SOURCE = str(pathlib.Path(sys.argv[1]).resolve()), pathlib.Path(sys.argv[2])
+ABOUT = {"version": 1, "authors": [{"name": "Ada Example", "orcid": "0000-0002-1825-0097", "affiliation": "A University"},
+                                   "Bo Example"],
+         "license": "CC-BY-4.0", "funding": [{"funder": "A Fund", "grant": "7"}], "references": ["A paper"],
+         "doi": "10.5281/zenodo.1234"}
+
+
+def run(*arguments, status=0, folder=None):
+    done = subprocess.run([PALPATE, *map(str, arguments)], capture_output=True, text=True, cwd=folder, timeout=600)
+    assert done.returncode == status, f"{arguments}: {done.returncode}\n{done.stdout}{done.stderr}"
+    return done
+
+
+def files(folder):
+    return {p.relative_to(folder).as_posix() for p in folder.rglob("*") if p.is_file()}
+
+
+def crate_faults(folder):
+    """What RO-Crate 1.2 says that a crate must be, and is not (https://w3id.org/ro/crate/1.2, root-data-entity,
+    data-entities, appendix on JSON-LD)."""
+    document = json.loads((folder / "ro-crate-metadata.json").read_text(encoding="utf-8"))
+    faults = []
+
+    def expect(holds, what):
+        if not holds:
+            faults.append(what)
+
+    expect(set(document) == {"@context", "@graph"}, "only @context and @graph")
+    expect(document["@context"] == "https://w3id.org/ro/crate/1.2/context", "the context by reference")
+    entities = {}
+    for entity in document["@graph"]:
+        expect(isinstance(entity.get("@id"), str) and entity.get("@type"), f"@id and @type: {entity}")
+        expect(entity["@id"] not in entities, f"each @id once: {entity['@id']}")
+        entities[entity["@id"]] = entity
+    descriptor = entities["ro-crate-metadata.json"]
+    expect(descriptor["@type"] == "CreativeWork", "type of the descriptor")
+    expect(descriptor["about"] == {"@id": "./"}, "about the root")
+    expect(descriptor["conformsTo"] == {"@id": "https://w3id.org/ro/crate/1.2"}, "conformsTo")
+    root = entities["./"]
+    expect(root["@type"] == "Dataset", "type of the root")
+    for key in ("name", "description", "datePublished", "license"):
+        expect(root.get(key), f"root has {key}")
+    expect(re.fullmatch(r"\d{4}-\d\d-\d\d", root["datePublished"]), "date to the day")
+    license = entities.get(root["license"]["@id"], {})
+    expect(license.get("name") and license.get("description"), "license with name and description")
+
+    linked = set()
+
+    def follow(entity):
+        for part in entity.get("hasPart", []):
+            if part["@id"] not in linked:
+                linked.add(part["@id"])
+                follow(entities.get(part["@id"], {}))
+
+    follow(root)
+    for identity, entity in entities.items():
+        flat = {key: value if isinstance(value, list) else [value] for key, value in entity.items()}
+        for key, values in flat.items():
+            for value in values:
+                if isinstance(value, dict):
+                    expect(set(value) == {"@id"}, f"{identity}: {key} is nested")
+                    absolute = re.match(r"[a-z]+:", value["@id"])
+                    expect(value["@id"] in entities or absolute, f"{identity}: {key} leads nowhere")
+        if "File" in flat["@type"]:
+            expect(identity in linked, f"{identity} is linked from the root")
+            path = folder / urllib.parse.unquote(identity)
+            expect(path.is_file(), f"{identity} is there")
+            expect(entity.get("encodingFormat"), f"{identity}: encodingFormat")
+            if "contentSize" in entity:
+                expect(entity["contentSize"] == str(path.stat().st_size), f"{identity}: contentSize")
+        if "Dataset" in flat["@type"] and identity != "./":
+            expect(identity in linked and identity.endswith("/"), f"{identity}: a folder, linked")
+            expect((folder / urllib.parse.unquote(identity)).is_dir(), f"{identity} is there")
+        if "Person" in flat["@type"]:
+            expect(entity.get("name"), f"{identity}: name")
+    described = {urllib.parse.unquote(i) for i, e in entities.items() if e["@type"] == "File"}
+    expect(described | {"ro-crate-metadata.json"} == files(folder), "every file is described")
+    return faults
+
+
+class Bundle(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        scratch = tempfile.TemporaryDirectory()
+        cls.addClassCleanup(scratch.cleanup)
+        cls.base = base = pathlib.Path(scratch.name)
+        shutil.copy(SOURCE / "protocols/quick.json", base / "quick.json")
+        run("plan", "--gain-sd", "0.1", "--residual-sd", "0.3", "--effect", "cone=50", "--participants", "2-6",
+            "--trials", "3", "--studies", "100", "--json", base / "plan.json")
+        (base / "h.json").write_text(json.dumps([
+            {"id": "H1", "text": "Cones <b>faster</b> | [x](y).", "refuted": "paired.cone.ci95_high < 5",
+             "corroborated": "paired.cone.p_holm < 0.05 && paired.cone.reduction > 0"}]))
+        run("register", base / "quick.json", "--plan", base / "plan.json", "--hypotheses", base / "h.json",
+            "--out", base / "registration", "--studies", "20", "--participants", "3")
+        run("simulate", base / "quick.json", "--db", base / "study.db", "--participants", "3")
+        (base / "study.json").write_text(json.dumps(ABOUT))
+        cls.make(base)
+
+    @staticmethod
+    def make(folder, *more, out="bundle", about="study.json", status=0):
+        return run("bundle", "--db", "study.db", "--registration", "registration", "--about", about, "--out", out, *more,
+                   status=status, folder=folder)
+
+    def setUp(self):
+        scratch = tempfile.TemporaryDirectory()
+        self.addCleanup(scratch.cleanup)
+        self.dir = pathlib.Path(scratch.name)
+        for name in ("study.db", "study.json"):
+            shutil.copy(self.base / name, self.dir / name)
+        for name in ("registration", "bundle"):
+            shutil.copytree(self.base / name, self.dir / name)
+        self.bundle = self.dir / "bundle"
+
+    def test_what_it_holds(self):
+        there = files(self.bundle)
+        for name in ("data/trials.csv", "data/codebook.csv", "data/psych-ds/dataset_description.json",
+                     "registration/registration.md", "check.json", "check.html", "report.html", "figures/figure15.svg",
+                     "analysis.json", "about.json", "ro-crate-metadata.json", "reproduce.sh", "README.md", "SHA256SUMS"):
+            self.assertIn(name, there)
+        checked = subprocess.run(["sha256sum", "-c", "--quiet", "SHA256SUMS"], cwd=self.bundle, capture_output=True)
+        self.assertEqual(checked.returncode, 0, checked.stdout)
+        self.assertEqual(len((self.bundle / "SHA256SUMS").read_text().splitlines()), len(there) - 1)
+        for name in there:
+            mode = stat.S_IMODE((self.base / "bundle" / name).stat().st_mode)
+            self.assertEqual(mode, 0o700 if name == "reproduce.sh" else 0o600, name)
+        self.assertIn('href="check.html"', (self.bundle / "report.html").read_text())
+        for name in ("README.md", "report.html", "check.html", "ro-crate-metadata.json"):
+            self.assertIn("SIMULATED PARTICIPANTS", (self.bundle / name).read_text(), name)
+        with open(self.bundle / "data/trials.csv", newline="") as file:
+            self.assertEqual({row["onset_utc"][:4] for row in csv.DictReader(file)}, {"1900"})
+
+    def test_the_same_numbers_as_of_the_database(self):
+        run("analyze", "--db", "study.db", "--json", "db.json", folder=self.dir)
+        ours = json.loads((self.bundle / "analysis.json").read_text())
+        theirs = json.loads((self.dir / "db.json").read_text())
+        # A table does not name the protocol and the settings of simulated participants.
+        for key in ("source", "protocol", "observer_sha256"):
+            ours.pop(key), theirs.pop(key)
+        self.assertEqual(ours, theirs)
+
+    def test_the_rules_of_ro_crate(self):
+        self.assertEqual(crate_faults(self.bundle), [])
+        graph = json.loads((self.bundle / "ro-crate-metadata.json").read_text())["@graph"]
+        root = next(entity for entity in graph if entity["@id"] == "./")
+        self.assertEqual(root["author"], [{"@id": "https://orcid.org/0000-0002-1825-0097"}, {"@id": "#author-2"}])
+        self.assertEqual(root["identifier"], {"@id": "https://doi.org/10.5281/zenodo.1234"})
+
+    def test_a_fault_of_a_crate_is_noticed(self):
+        path = self.bundle / "ro-crate-metadata.json"
+        good = json.loads(path.read_text())
+        for change in ({"license": None}, {"datePublished": "soon"}, {"hasPart": []}):
+            bad = json.loads(path.read_text())
+            next(e for e in bad["@graph"] if e["@id"] == "./").update(change)
+            path.write_text(json.dumps(bad))
+            try:
+                self.assertNotEqual(crate_faults(self.bundle), [], change)
+            except TypeError:
+                pass  # a license that is none
+            path.write_text(json.dumps(good))
+
+    def test_it_reproduces_in_another_folder(self):
+        elsewhere = self.dir / "a folder's \"name\" $x"
+        shutil.copytree(self.bundle, elsewhere)
+        shutil.rmtree(self.bundle)
+        (self.dir / "study.db").unlink()
+        done = run("bundle", "--verify", elsewhere)
+        self.assertEqual(done.stdout.count("same "), 2, done.stdout)
+        before = files(elsewhere)
+        script = subprocess.run(["sh", elsewhere / "reproduce.sh"], capture_output=True, text=True,
+                                env=os.environ | {"PALPATE": PALPATE})
+        self.assertEqual((script.returncode, script.stdout), (0, "analysis.json is reproduced\n"), script.stderr)
+        self.assertEqual(files(elsewhere), before)
+
+    @unittest.skipUnless(os.geteuid() == 0, "only root can become another user")
+    def test_it_reproduces_as_another_user(self):
+        with tempfile.TemporaryDirectory(dir="/tmp") as scratch:
+            os.chmod(scratch, 0o755)
+            program = pathlib.Path(scratch) / "palpate"
+            shutil.copy(PALPATE, program)
+            os.chmod(program, 0o755)
+            shutil.copytree(self.bundle, pathlib.Path(scratch) / "b")
+            for path in (pathlib.Path(scratch) / "b").rglob("*"):
+                os.chmod(path, 0o755 if path.is_dir() else 0o444)
+            os.chmod(pathlib.Path(scratch) / "b", 0o755)
+
+            def nobody():
+                os.setgroups([])
+                os.setgid(65534)
+                os.setuid(65534)
+
+            done = subprocess.run([program, "bundle", "--verify", "b"], cwd=scratch, capture_output=True, text=True,
+                                  preexec_fn=nobody, env={"PATH": "/usr/bin:/bin", "LC_ALL": "C"})
+            self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+
+    def test_what_was_changed_is_named(self):
+        trials = self.bundle / "data/trials.csv"
+        text = trials.read_bytes()
+        time = list(csv.reader(text.decode().splitlines()))[1][8]
+        trials.write_bytes(text.replace(f",{time},".encode(), f",{float(time) + 0.5},".encode(), 1))
+        done = run("bundle", "--verify", self.bundle, status=1)
+        self.assertIn("data/trials.csv has changed", done.stdout)
+        self.assertIn("DIFFERS  analysis.json", done.stdout)
+        trials.write_bytes(text)
+        run("bundle", "--verify", self.bundle)
+        (self.bundle / "more.txt").write_text("x")
+        (self.bundle / "about.json").unlink()
+        done = run("bundle", "--verify", self.bundle, status=1)
+        self.assertIn("more.txt is not listed", done.stdout)
+        self.assertIn("about.json is missing", done.stdout)
+        self.assertIn("same     analysis.json", done.stdout)
+
+    def test_links_are_not_followed(self):
+        (self.bundle / "about.json").unlink()
+        (self.bundle / "about.json").symlink_to(self.dir / "study.json")
+        run("bundle", "--verify", self.bundle, status=2)
+        (self.dir / "registration/plan.json").rename(self.dir / "plan.json")
+        (self.dir / "registration/plan.json").symlink_to(self.dir / "plan.json")
+        self.make(self.dir, out="new", status=2)
+        self.assertFalse((self.dir / "new").exists())
+
+    def test_as_bids(self):
+        self.make(self.dir, "--format", "bids", out="new")
+        self.assertIn("data/bids/participants.tsv", files(self.dir / "new"))
+        self.assertEqual(crate_faults(self.dir / "new"), [])
+        run("bundle", "--verify", self.dir / "new")
+
+    def test_who_withdraws_is_in_none_of_it(self):
+        self.make(self.dir, out="first")
+        done = run("forget", "--db", "study.db", "--participant", "S002", "--yes", folder=self.dir)
+        self.assertIn("first/data/trials.csv", done.stdout)
+        self.assertIn("first/data/psych-ds", done.stdout)
+        self.make(self.dir, out="second")
+        for name in files(self.dir / "second"):
+            if not name.startswith("registration/simulated/"):  # whose codes are of nobody
+                self.assertNotIn(b"S002", (self.dir / "second" / name).read_bytes(), name)
+        check = json.loads((self.dir / "second/check.json").read_text())
+        self.assertEqual(check["deviations"], 1)
+        run("bundle", "--verify", self.dir / "second")
+
+    def test_nothing_is_overwritten(self):
+        self.assertIn("--force", self.make(self.dir, status=2).stderr)
+        self.make(self.dir, "--force")
+        (self.bundle / "mine.txt").write_text("mine")
+        self.assertIn("mine.txt", self.make(self.dir, "--force", status=2).stderr)
+        self.assertEqual((self.bundle / "mine.txt").read_text(), "mine")
+        self.make(self.dir, "--force", out="registration", status=2)
+        self.make(self.dir, "--force", out="study.db", status=2)
+
+    def test_hostile_texts(self):
+        (self.dir / "evil.json").write_text(json.dumps(ABOUT | {"authors": [
+            {"name": "<script>alert(1)</script> [x](javascript:y)", "affiliation": "=1+1"}]}))
+        self.make(self.dir, out="new", about="evil.json")
+        text = (self.dir / "new/README.md").read_text()
+        self.assertNotRegex(text, r"(?<!\\)<(script|b)>|(?<!\\)\[x")
+        for name in ("report.html", "check.html"):
+            self.assertNotRegex((self.dir / "new" / name).read_text(), r"<script>alert|<b>faster")
+        self.assertEqual(crate_faults(self.dir / "new"), [])
+
+    def test_what_is_refused(self):
+        no_license = {key: value for key, value in ABOUT.items() if key != "license"}
+        (self.dir / "a.json").write_text(json.dumps(no_license))
+        self.assertIn("license", self.make(self.dir, out="new", about="a.json", status=2).stderr)
+        (self.dir / "b.json").write_text("{}")
+        self.make(self.dir, out="new", about="b.json", status=2)
+        self.make(self.dir, "--format", "csv", out="new", status=2)
+        run("bundle", "--db", "study.db", status=2, folder=self.dir)
+        run("bundle", "--verify", "bundle", "--db", "study.db", status=2, folder=self.dir)
+        run("bundle", "--verify", "nowhere", status=2, folder=self.dir)
+        self.assertFalse((self.dir / "new").exists())
+        self.assertEqual([p.name for p in self.dir.iterdir() if p.name.startswith(".")], [])
+
+
+if __name__ == "__main__":
+    unittest.main(argv=[sys.argv[0]])
