@@ -7,11 +7,17 @@ out="${1:-$here/results/ho2000-simulated}"
 mkdir -p "$out"
 out="$(cd "$out" && pwd)"
 
+# The Python module too, where the build found Python's headers.
+targets() {
+  echo palpate
+  grep -q '^PALPATE_PYTHON:BOOL=ON' .build/release/CMakeCache.txt && echo palpate_python
+}
+
 "$here/runner/install_packages.sh" build
 cd "$here"
 echo "Building (a few minutes the first time) ..." >&2
 cmake --preset release -DPALPATE_TESTS=OFF > "$out/build.log" 2>&1 &&
-  cmake --build --preset release --target palpate >> "$out/build.log" 2>&1 ||
+  cmake --build --preset release --target $(targets) >> "$out/build.log" 2>&1 ||
   { tail -n 30 "$out/build.log" >&2; echo "The build failed; all of its output: $out/build.log" >&2; exit 1; }
 palpate=.build/release/runner/palpate
 
@@ -29,3 +35,6 @@ Trials        $out/trials.csv (what its columns mean: codebook.csv)
 Report        $out/report.html (the same as text: report.txt; as numbers: analysis.json)
 Figure 15     $out/figure15.svg (and the other figures beside it)
 END
+if [ "$(targets)" != palpate ]; then
+  echo "Python        PYTHONPATH=$here/.build/release/runner/python python3 -c 'import palpate; help(palpate)'"
+fi

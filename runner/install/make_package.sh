@@ -8,8 +8,8 @@ cd "$here"
 echo "Building (a few minutes the first time) ..." >&2
 scratch="$(mktemp -d)"
 trap 'rm -r "$scratch"' EXIT
-cmake --preset portable -DPALPATE_TESTS=OFF > /dev/null
-cmake --build --preset portable --target palpate > .build/portable/build.log 2>&1 ||
+cmake --preset portable -DPALPATE_TESTS=OFF -DPALPATE_PYTHON=ON > /dev/null
+cmake --build --preset portable --target palpate palpate_python > .build/portable/build.log 2>&1 ||
   { tail -n 30 .build/portable/build.log >&2; echo "The build failed; all of its output: $here/.build/portable/build.log" >&2; exit 1; }
 cpack --preset portable -B "$scratch" > .build/portable/cpack.log 2>&1 ||
   { cat .build/portable/cpack.log >&2; exit 1; }

@@ -16,14 +16,23 @@ the interpreter's lock, so that a concurrent.futures.ThreadPoolExecutor uses all
 
 import json
 import os
+import sys
 import warnings
 from typing import Any, Dict, Mapping, Optional, Union
 
 import numpy
 from numpy.typing import NDArray
 
-from ._palpate import DEFAULT_VERSION, Document, InputError, __version__
-from . import _palpate
+try:
+    from ._palpate import DEFAULT_VERSION, Document, InputError, __version__
+    from . import _palpate
+except ModuleNotFoundError as error:
+    raise ImportError(
+        f"palpate is here ({os.path.dirname(__file__)}), but its compiled part was not built for Python "
+        f"{sys.version_info.major}.{sys.version_info.minor}. Build it from palpate's sources, where python3-dev, "
+        "pybind11-dev and python3-numpy are installed:\n"
+        "  cmake --preset release -DPALPATE_PYTHON=ON && cmake --build --preset release --target palpate_python\n"
+        "and import it with PYTHONPATH=.build/release/runner/python") from error
 
 __all__ = ["InputError", "render", "schedule", "settings", "simulate", "__version__"]
 

@@ -26,6 +26,10 @@ for file in /etc/security/limits.d/palpate.conf /usr/lib/udev/rules.d/60-palpate
   /usr/share/palpate/protocols/ho2000.json /usr/share/doc/palpate/{copyright,README.md,runner/README.md,images/figure15.svg}; do
   [ -e "$root$file" ] || fail "it has no $file"
 done
+python="$root/usr/lib/python3/dist-packages"
+[ "$(env -i PYTHONPATH="$python" PYTHONDONTWRITEBYTECODE=1 /usr/bin/python3 -c 'import palpate; print(palpate.__version__)')" = \
+  "${version#palpate }" ] || fail "import palpate does not work"
+grep -qaF -- "$PWD" "$python"/palpate/_palpate.*.so && fail "the Python module names the folder of its sources"
 python3 tests/readme/links.py "$root/usr/share/doc/palpate"
 [ -z "$(find "$root" \( -perm /022 -o -type d ! -perm -755 -o ! -perm -444 \) -print)" ] || fail "wrong permissions"
 grep -qaF -- "$PWD" "$root/usr/bin/palpate" && fail "the program names the folder of its sources"

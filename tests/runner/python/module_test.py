@@ -8,6 +8,7 @@ import io
 import json
 import os
 import pathlib
+import shutil
 import signal
 import subprocess
 import sys
@@ -257,3 +258,16 @@ def test_stubs_and_docstrings_fit_the_module():
         for parameter in signature.parameters.values():
             assert parameter.annotation is not inspect.Parameter.empty
             assert parameter.name in function.__doc__ or function is palpate.schedule
+
+
+def test_without_its_compiled_part_it_says_how_to_build_it(tmp_path):
+    package = tmp_path / "palpate"
+    package.mkdir()
+    for name in ("__init__.py", "_palpate.pyi", "py.typed"):
+        shutil.copy(pathlib.Path(palpate.__file__).parent / name, package)
+    done = subprocess.run([sys.executable, "-c", "import palpate"], env={**os.environ, "PYTHONPATH": str(tmp_path)},
+                          capture_output=True, text=True, timeout=60)
+    assert done.returncode == 1
+    said = done.stderr[done.stderr.index("ImportError: palpate is here"):]
+    assert f"was not built for Python {sys.version_info.major}.{sys.version_info.minor}" in said
+    assert "cmake --build --preset release --target palpate_python" in said
