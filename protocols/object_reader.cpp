@@ -256,15 +256,9 @@ void ObjectReader::refuse_unknown_keys() {
       faults_.add({}, {});
       continue;
     }
-    std::string nearest, all;
-    std::size_t distance = key.size() / 2 + 1;  // with more edits it is another word
-    for (const std::string& known : known_) {
-      all += (all.empty() ? "" : ", ") + known;
-      if (const std::size_t d = stimuli::edit_distance(key, known); d < distance) {
-        distance = d;
-        nearest = known;
-      }
-    }
+    std::string all;
+    for (const std::string& known : known_) all += (all.empty() ? "" : ", ") + known;
+    const std::string nearest = stimuli::nearest_word(key, {known_.begin(), known_.end()});
     faults_.add(pointer(key), nearest.empty() ? "unknown key; known here: " + all
                                               : "unknown key; did you mean '" + nearest + "'?");
   }

@@ -21,6 +21,7 @@
 #include "protocols/parse.h"
 #include "runner/commands/shared/command.h"
 #include "stimuli/convex_mesh.h"
+#include "stimuli/edit_distance.h"
 #include "stimuli/printable.h"
 
 namespace {
@@ -73,9 +74,9 @@ void print_help(std::ostream& out) {
     name.resize(12, ' ');
     out << "  " << name << command.summary << "\n";
   }
-  out << "\n'palpate COMMAND --help' shows a command's options with examples; 'palpate --version' "
-         "the "
-         "version.\nExit status: 0 done, 1 failed while running, 2 wrong usage or bad input.\n";
+  out << "\n'palpate COMMAND --help' or 'palpate help COMMAND' shows a command's options with "
+         "examples;\n'palpate --version' the version.\nExit status: 0 done, 1 failed while "
+         "running, 2 wrong usage or bad input.\n";
 }
 
 /// If standard input, output or error is closed, the next file to be opened would get its
@@ -84,6 +85,21 @@ void occupy_standard_descriptors() {
   int descriptor = 0;
   while (descriptor >= 0 && descriptor <= STDERR_FILENO) descriptor = ::open("/dev/null", O_RDONLY);
   if (descriptor > STDERR_FILENO) ::close(descriptor);
+}
+
+/// \throws UsageError: there is none.
+const Command& command_named(const std::string& name) {
+  std::vector<std::string> names;
+  for (const Command& command : kCommands) {
+    if (name == command.name) return command;
+    names.emplace_back(command.name);
+  }
+  constexpr std::size_t kLongest = 40;  // of what may be a misspelt command
+  const std::string meant =
+      name.size() > kLongest ? "" : palpate::stimuli::nearest_word(name, names);
+  throw palpate::runner::UsageError("no command '" + name + "'; " +
+                                    (meant.empty() ? "" : "did you mean '" + meant + "'? ") +
+                                    "'palpate --help' lists them");
 }
 
 int run(int argc, char** argv) {
@@ -96,14 +112,13 @@ int run(int argc, char** argv) {
     std::cout << "palpate " PALPATE_VERSION "\n";
     return 0;
   }
-  if (words[0] == "--help" || words[0] == "-h" || words[0] == "help") {
+  if (words.size() == 1 && (words[0] == "--help" || words[0] == "-h" || words[0] == "help")) {
     print_help(std::cout);
     return 0;
   }
-  for (const auto& command : kCommands) {
-    if (words[0] == command.name) return command.run({words.begin() + 1, words.end()});
-  }
-  throw palpate::runner::UsageError("no command '" + words[0] + "'; 'palpate --help' lists them");
+  const bool asks_for_help = words[0] == "help" || words[0] == "--help" || words[0] == "-h";
+  if (asks_for_help) return command_named(words[1]).run({"--help"});
+  return command_named(words[0]).run({words.begin() + 1, words.end()});
 }
 
 }  // namespace

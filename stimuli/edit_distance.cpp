@@ -20,4 +20,16 @@ std::size_t edit_distance(std::string_view a, std::string_view b) {
   return row.back();
 }
 
+std::string nearest_word(std::string_view word, const std::vector<std::string>& known) {
+  std::string nearest;
+  std::size_t distance = word.size() / 2 + 1;
+  for (const std::string& one : known) {
+    const std::size_t edits = edit_distance(word, one);
+    if (edits >= distance) continue;
+    distance = edits;
+    nearest = one;
+  }
+  return nearest;
+}
+
 }  // namespace palpate::stimuli

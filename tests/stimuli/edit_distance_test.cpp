@@ -39,5 +39,15 @@ TEST(EditDistance, IsAMetric) {
   }
 }
 
+TEST(EditDistance, TheNearestWordIsWhatWasMeant) {
+  const std::vector<std::string> known = {"analyze", "export", "plan", "run"};
+  EXPECT_EQ(nearest_word("analyse", known), "analyze");
+  EXPECT_EQ(nearest_word("exprot", known), "export");
+  EXPECT_EQ(nearest_word("plan", known), "plan");
+  EXPECT_EQ(nearest_word("simulation", known), "");
+  EXPECT_EQ(nearest_word("", known), "");
+  EXPECT_EQ(nearest_word("x", {}), "");
+}
+
 }  // namespace
 }  // namespace palpate::stimuli

@@ -1,11 +1,13 @@
 #include "runner/commands/shared/command.h"
 
+#include <algorithm>
 #include <cmath>
 #include <iostream>
 #include <optional>
 #include <typeinfo>
 
 #include "data/files/file_permissions.h"
+#include "stimuli/edit_distance.h"
 #include "stimuli/printable.h"
 
 namespace palpate::runner {
@@ -24,6 +26,18 @@ void check_number(const std::string& option, const std::string& text, const boos
   const bool no_sign = is(0U) || is(0UL) || is(0ULL);
   if (no_sign && text.find('-') != std::string::npos) refuse("a whole number from 0");
   if (is(0.0) && !std::isfinite(boost::any_cast<double>(value))) refuse("a finite number");
+}
+
+/// "; did you mean '--jobs'?", or "".
+std::string option_meant(const std::string& given, const po::options_description& options) {
+  constexpr std::size_t kLongest = 40;  // of what may be a misspelt option
+  const std::size_t begin = std::min(given.find_first_not_of('-'), given.size());
+  const std::string word = given.substr(begin, given.find('=') - begin);
+  if (word.size() > kLongest) return "";
+  std::vector<std::string> names;
+  for (const auto& option : options.options()) names.push_back(option->long_name());
+  const std::string meant = stimuli::nearest_word(word, names);
+  return meant.empty() ? "" : "; did you mean '--" + meant + "'?";
 }
 
 void check_numbers(const po::parsed_options& parsed, const po::variables_map& values) {
@@ -61,6 +75,9 @@ std::optional<po::variables_map> CommandLine::parse(const std::vector<std::strin
     }
     check_numbers(parsed, values);
     po::notify(values);
+  } catch (const po::unknown_option& error) {
+    throw UsageError(error.what() + option_meant(error.get_option_name(), options) +
+                     "\nUsage: " + usage + "\nMore: add --help");
   } catch (const po::error& error) {
     throw UsageError(std::string(error.what()) + "\nUsage: " + usage + "\nMore: add --help");
   }

@@ -21,6 +21,30 @@ PROTOCOLS = pathlib.Path(sys.argv[1])
 COMMANDS = ["accuracy", "analyze", "bench", "bundle", "check", "cluster", "devices", "export", "forget", "merge", "plan", "register", "render", "replay", "run", "schedule", "simulate", "stability", "sweep", "validate"]
 
 
+class Words(CommandCase):
+    """What was misspelt, and help on a command in either order."""
+
+    def said(self, *words, status=2):
+        done = subprocess.run([PALPATE, *words], capture_output=True, text=True, timeout=60, cwd=self.dir)
+        self.assertEqual(done.returncode, status, done.stdout + done.stderr)
+        return done.stdout + done.stderr
+
+    def test_a_command_that_is_not_one_names_the_nearest(self):
+        self.assertEqual(self.said("analyse"), "palpate: no command 'analyse'; did you mean 'analyze'? 'palpate --help' lists them\n")
+        self.assertIn("did you mean 'export'?", self.said("exprot", "--db", "x"))
+        self.assertEqual(self.said("xyzzy"), "palpate: no command 'xyzzy'; 'palpate --help' lists them\n")
+
+    def test_an_option_that_is_not_one_names_the_nearest(self):
+        self.assertIn("did you mean '--participants'?", self.said("simulate", "p.json", "--participents=3"))
+        self.assertNotIn("did you mean", self.said("simulate", "p.json", "--xyzzy"))
+
+    def test_help_on_a_command(self):
+        for command in COMMANDS:
+            self.assertEqual(self.said("help", command, status=0), self.said(command, "--help", status=0))
+        self.assertEqual(self.said("help", status=0), self.said("--help", status=0))
+        self.assertIn("did you mean 'analyze'?", self.said("help", "analyse"))
+
+
 class Devices(CommandCase):
     def test_what_needs_no_hardware_is_always_there_and_passes_its_test(self):
         out = self.dir / "devices.json"
