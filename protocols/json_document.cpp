@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "stimuli/input_file.h"
+#include "stimuli/likely_mistakes.h"
 
 namespace palpate::protocols {
 namespace {
@@ -105,12 +106,23 @@ class Builder : public nlohmann::json_sax<json> {
     } else {
       what = "number out of range: '" + last_token + "'";
     }
+    if (stimuli::is_utf16(text_)) what = "it is in UTF-16; save it as UTF-8";
     faults_.add_syntax_error(static_cast<int>(newlines) + 1, static_cast<int>(end - line_start) + 1,
-                             "expected JSON in UTF-8: " + what);
+                             "expected JSON in UTF-8: " + what + comma_at(end));
     return false;
   }
 
  private:
+  /// Of "0,5" between keys: what is meant. In a list these are two numbers.
+  std::string comma_at(std::size_t end) const {
+    const std::string_view text = text_;
+    const auto in_number = [](char c) { return (c >= '0' && c <= '9') || c == ',' || c == '-'; };
+    std::size_t first = std::min(end, text.size()), last = first;
+    while (first > 0 && end - first < 40 && in_number(text[first - 1])) --first;
+    while (last < text.size() && last - end < 40 && in_number(text[last])) ++last;
+    return stimuli::point_meant(text.substr(first, last - first));
+  }
+
   struct Open {
     json* value;
     PointerHash pointer;

@@ -10,6 +10,7 @@
 #include <system_error>
 #include <utility>
 
+#include "stimuli/likely_mistakes.h"
 #include "stimuli/mesh_text.h"
 
 namespace palpate::stimuli {
@@ -160,6 +161,14 @@ PolygonSoup read_mesh(const std::string& path, const std::string& bytes) {
   if (text.starts_with("\xEF\xBB\xBF") &&
       (format != MeshFormat::stl || text.substr(3, 5) == "solid"))
     text.remove_prefix(3);
+  // The header of a binary .stl may be anything.
+  const bool may_be_text =
+      format != MeshFormat::stl ||
+      text.substr(0, 12).find(std::string_view("s\0o\0l", 5)) != std::string_view::npos;
+  if (may_be_text && is_utf16(text)) {
+    faults.add("", "text in UTF-8 or ASCII", "UTF-16; save it as UTF-8");
+    faults.throw_if_any();
+  }
   PolygonSoup soup = format == MeshFormat::obj   ? read_obj(text, faults)
                      : format == MeshFormat::stl ? read_stl(text, faults)
                      : format == MeshFormat::ply ? read_ply(text, faults)

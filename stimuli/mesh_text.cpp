@@ -4,6 +4,8 @@
 #include <charconv>
 #include <cmath>
 
+#include "stimuli/likely_mistakes.h"
+
 namespace palpate::stimuli {
 namespace {
 
@@ -23,7 +25,7 @@ void FileFaults::add(const std::string& location, const std::string& expected,
 
 void FileFaults::add_line(std::size_t line, const std::string& expected, std::string_view found) {
   add("line " + std::to_string(line), expected,
-      found.empty() ? std::string("the end of the line") : in_quotes(found));
+      found.empty() ? std::string("the end of the line") : in_quotes(found) + point_meant(found));
 }
 
 void FileFaults::throw_if_any() const {

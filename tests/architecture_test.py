@@ -78,7 +78,7 @@ def room_of(name):
 
 # The headers of a room that other rooms use; all others are the room's own business (and that of the rooms within).
 PUBLIC = {
-    "stimuli": "closed_surface compose convex_mesh edit_distance grid_hull input_file inset large_array mesh_file object_spec orientation parts/convex_parts parts/inset_parts parts/overlaps parts/triangulate signed_distance "
+    "stimuli": "closed_surface compose convex_mesh edit_distance grid_hull input_file inset large_array likely_mistakes mesh_file object_spec orientation parts/convex_parts parts/inset_parts parts/overlaps parts/triangulate signed_distance "
                "primitives printable random shapes solids/gmsh_file solids/solid_mesh vec",
     "rendering": "first_contact motion probe reach render_fault renderer scene tool tool_pose",
     "rendering/bodies": "moving_scene",

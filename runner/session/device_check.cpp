@@ -147,6 +147,16 @@ std::string workspace_fault(const protocols::Protocol& protocol, double radius,
                   " m with '", device.name, "': move /workspace/centre_m or change /reach/factor");
 }
 
+/// Whether a stimulus is, or has, a mesh that no hand could get round: its lengths were meant in
+/// millimetres, probably. \param radius  m, of the device
+bool in_millimetres(const stimuli::ObjectSpec& object, double radius) {
+  constexpr double kBeyondHands = 1;  // m
+  if (object.shape == stimuli::ShapeKind::mesh) return radius > kBeyondHands;
+  return std::any_of(
+      object.parts.begin(), object.parts.end(),
+      [radius](const stimuli::ObjectSpec& part) { return in_millimetres(part, radius); });
+}
+
 /// One sentence for all levels of a stimulus that fail the same check, of which there may be
 /// hundreds: about the last one, and how many there are besides.
 class StimulusFaults {
@@ -362,7 +372,11 @@ std::vector<std::string> incompatibilities(const protocols::Protocol& protocol,
     const double radius =
         (library.reach(static_cast<int>(i)) + protocol.home.margin) / protocol.workspace.scale;
     const std::string fault = workspace_fault(protocol, radius, device);
-    if (!fault.empty()) faults.add(stimulus.name, StimulusFaults::Check::workspace, fault);
+    if (!fault.empty())
+      faults.add(stimulus.name, StimulusFaults::Check::workspace,
+                 fault + (in_millimetres(stimulus.object, radius)
+                              ? "; or its mesh file is in millimetres and must be in metres"
+                              : ""));
   }
   faults.append_to(out);
   return out;

@@ -13,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include "stimuli/likely_mistakes.h"
 #include "stimuli/mesh_text.h"
 
 namespace palpate::stimuli {
@@ -282,6 +283,11 @@ bool is_gmsh_file_name(const std::string& path) {
 }
 
 SolidMesh read_gmsh(const std::string& name, const std::string& text) {
+  if (is_utf16(text)) {
+    FileFaults faults(name);
+    faults.add("", "text in UTF-8 or ASCII", "UTF-16; save it as UTF-8");
+    faults.throw_if_any();
+  }
   return GmshReader(name, text).read();
 }
 
