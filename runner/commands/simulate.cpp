@@ -6,8 +6,12 @@
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
+#include <filesystem>
+#include <map>
 #include <optional>
+#include <set>
 #include <string>
+#include <system_error>
 #include <thread>
 #include <vector>
 
@@ -92,6 +96,25 @@ StudyPlan plan_of(const SimulateSettings& settings) {
   return plan;
 }
 
+/// The version that participants of this protocol in the database have; of any protocol if there
+/// are none. \throws UsageError: it has several
+int version_begun_with(data::Store& store, const std::string& protocol_sha256,
+                       const std::string& patch) {
+  std::map<std::string, std::optional<int>> version_of;  // by checksum
+  std::set<int> own, all;
+  for (const data::StoredRun& run : store.runs()) {
+    const std::string& sha256 = run.info.observer_sha256;
+    if (sha256.empty()) continue;  // a person
+    auto known = version_of.find(sha256);
+    if (known == version_of.end())
+      known = version_of.emplace(sha256, participant_version_of(sha256, patch)).first;
+    if (!known->second) continue;
+    all.insert(*known->second);
+    if (run.protocol_sha256 == protocol_sha256) own.insert(*known->second);
+  }
+  return version_to_go_on_with(own.empty() ? all : own, store.path());
+}
+
 /// \param seconds  that it took
 void print_summary(const protocols::Protocol& protocol, const std::string& database,
                    const SimulatedSettings& simulated, std::uint64_t seed,
@@ -142,24 +165,35 @@ int simulate_command(const std::vector<std::string>& args) {
   const StudyOptions& options = given->study;
   StudyPlan plan = plan_of(*given);
   protocols::Protocol protocol = protocols::parse_protocol(options.protocol);
-  const SimulatedSettings simulated = load_simulated_settings(options.patch, options.version);
-  // First: what is refused leaves no database behind.
+  std::optional<data::Store> store;
+  const auto open = [&] {
+    return data::Store::open(given->database, data::Store::Mode::write_or_create);
+  };
+  int version = options.version;
+  std::error_code none;  // what cannot be seen is refused where it is opened
+  if (version == 0 && std::filesystem::exists(given->database, none)) {
+    store.emplace(open());
+    version = version_begun_with(*store, protocol.sha256, options.patch);
+  }
+  if (version == 0) version = kDefaultParticipantVersion;
+  const SimulatedSettings simulated = load_simulated_settings(options.patch, version);
+  // Before a database is created: what is refused leaves none behind.
   const LimitedForSimulation limited = fit_to_simulation(protocol, simulated);
   for (const std::string& text : limited.texts)
     std::fprintf(stderr, "%s\n", stimuli::printable(text).c_str());
   plan.event = limited.event;
-  data::Store store = data::Store::open(given->database, data::Store::Mode::write_or_create);
-  warn_of_exposure(store.path());
+  if (!store) store.emplace(open());
+  warn_of_exposure(store->path());
 
   const auto start = std::chrono::steady_clock::now();
   ProgressLine line("trials");
   const StudyProgress progress = simulate_study(
-      protocol, store, simulated, plan, catch_stop_signals(), [&line](const StudyProgress& p) {
+      protocol, *store, simulated, plan, catch_stop_signals(), [&line](const StudyProgress& p) {
         line.show(static_cast<double>(p.recorded) / static_cast<double>(p.expected));
       });
   line.clear();
   const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
-  print_summary(protocol, store.path(), simulated, plan.seed, progress, took.count());
+  print_summary(protocol, store->path(), simulated, plan.seed, progress, took.count());
   print_unanswered(protocol, progress);
   if (progress.recorded < progress.expected) {
     std::fprintf(stderr, "stopped; the same command resumes from here\n");

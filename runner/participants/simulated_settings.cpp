@@ -109,6 +109,14 @@ std::string simulated_settings_text(const std::string& patch_path, int version) 
   return patched_settings(patch_path, version).dump();
 }
 
+std::optional<int> participant_version_of(const std::string& sha256,
+                                          const std::string& patch_path) {
+  for (const int version : participant_versions()) {
+    if (settings_checksum(patched_settings(patch_path, version)) == sha256) return version;
+  }
+  return std::nullopt;
+}
+
 SimulatedSettings read_simulated_settings(const std::string& text) {
   const json settings = json::parse(text);
   check_settings(settings);

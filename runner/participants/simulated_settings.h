@@ -3,6 +3,7 @@
 // differ by switches, which a patch can set in any of them.
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -64,7 +65,7 @@ struct SimulatedSettings {
 };
 
 /// The version that is used where none is asked for.
-inline constexpr int kDefaultParticipantVersion = 2;
+inline constexpr int kDefaultParticipantVersion = 3;
 /// Of the frozen settings, ascending.
 std::vector<int> participant_versions();
 
@@ -77,6 +78,9 @@ SimulatedSettings load_simulated_settings(const std::string& patch_path,
 /// included, for whoever changes some of them. \throws as load_simulated_settings
 std::string simulated_settings_text(const std::string& patch_path,
                                     int version = kDefaultParticipantVersion);
+/// The version that has this checksum with the patch; none where no version has.
+/// \throws InputError as load_simulated_settings
+std::optional<int> participant_version_of(const std::string& sha256, const std::string& patch_path);
 /// From such a text. \throws InputError where a key is missing or has a value that it cannot have
 SimulatedSettings read_simulated_settings(const std::string& text);
 

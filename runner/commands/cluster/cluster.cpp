@@ -309,6 +309,7 @@ int cluster_command(const std::vector<std::string>& args) {
     const auto values = line.parse(words);
     if (!values) return 0;
     check_study_options(*values, study);
+    if (study.version == 0) study.version = kDefaultParticipantVersion;
     return begin_study(settings, study);
   }
   add_sweep_options(line, sweep);
@@ -316,6 +317,7 @@ int cluster_command(const std::vector<std::string>& args) {
   const auto values = line.parse(words);
   if (!values) return 0;
   check_sweep_options(*values, sweep);
+  if (sweep.version == 0) sweep.version = kDefaultParticipantVersion;
   return begin_sweep(settings, sweep);
 }
 

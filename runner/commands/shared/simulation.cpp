@@ -1,10 +1,11 @@
 #include "runner/commands/shared/simulation.h"
 
 #include <algorithm>
+#include <cstdio>
 #include <string>
 #include <vector>
 
-#include "runner/commands/shared/command.h"
+#include "stimuli/printable.h"
 
 namespace palpate::runner {
 
@@ -13,10 +14,36 @@ void check_simulated_participants(int participants) {
     throw UsageError("--participants: must be 1 to 100000");
 }
 
-void check_participant_version(int version) {
+void add_participant_version(CommandLine& line, int& version) {
+  line.options.add_options()(
+      "participant-version", boost::program_options::value(&version)->value_name("1|2|3"),
+      ("of the simulated participant; each is frozen. Default: the one that FILE was begun with, "
+       "else " +
+       std::to_string(kDefaultParticipantVersion))
+          .c_str());
+}
+
+void check_participant_version(const boost::program_options::variables_map& values, int version) {
+  if (values.count("participant-version") == 0) return;
   const std::vector<int> versions = participant_versions();
   if (std::find(versions.begin(), versions.end(), version) == versions.end())
     throw UsageError("--participant-version: must be 1 to " + std::to_string(versions.back()));
+}
+
+int version_to_go_on_with(const std::set<int>& begun, const std::string& file) {
+  if (begun.empty()) return kDefaultParticipantVersion;
+  if (begun.size() > 1) {
+    std::string versions;
+    for (const int version : begun)
+      versions += (versions.empty() ? "" : ", ") + std::to_string(version);
+    throw UsageError(stimuli::printable(file) + ": holds versions " + versions +
+                     " of the simulated participant; choose one with --participant-version");
+  }
+  if (*begun.begin() != kDefaultParticipantVersion) {
+    std::fprintf(stderr, "%s: goes on with version %d of the simulated participant\n",
+                 stimuli::printable(file).c_str(), *begun.begin());
+  }
+  return *begun.begin();
 }
 
 LimitedForSimulation fit_to_simulation(protocols::Protocol& protocol,

@@ -14,10 +14,9 @@ void add_study_options(CommandLine& line, StudyOptions& options) {
        po::value(&options.participants)->default_value(options.participants)->value_name("N"),
        "simulated participants, numbered from 1")  //
       ("seed", po::value(&options.seed)->default_value(options.seed)->value_name("S"),
-       "of the participants; the order of trials follows the protocol's own seed")  //
-      ("participant-version",
-       po::value(&options.version)->default_value(options.version)->value_name("1|2|3"),
-       "of the simulated participant; each is frozen")  //
+       "of the participants; the order of trials follows the protocol's own seed");
+  add_participant_version(line, options.version);
+  line.options.add_options()  //
       ("settings", po::value(&options.patch)->value_name("FILE"),
        "JSON merge patch on the settings of that version, for ablations");
   line.positional_names = {"PROTOCOL.json"};
@@ -25,7 +24,7 @@ void add_study_options(CommandLine& line, StudyOptions& options) {
 
 void check_study_options(const po::variables_map& values, StudyOptions& options) {
   check_simulated_participants(options.participants);
-  check_participant_version(options.version);
+  check_participant_version(values, options.version);
   options.protocol = values["PROTOCOL.json"].as<std::string>();
 }
 

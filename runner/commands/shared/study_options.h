@@ -15,7 +15,7 @@ struct StudyOptions {
   std::string patch;  ///< file of a JSON merge patch on the simulated participant; empty: none
   int participants = 7;
   std::uint64_t seed = 1;
-  int version = kDefaultParticipantVersion;
+  int version = 0;  ///< of the simulated participant; 0: none was asked for
 };
 
 void add_study_options(CommandLine& line, StudyOptions& options);

@@ -102,10 +102,9 @@ void add_sweep_options(CommandLine& line, SweepSettings& settings) {
        po::value(&settings.participants)->default_value(settings.participants)->value_name("N"),
        "simulated participants at each point")  //
       ("repetitions", po::value(&settings.repetitions)->value_name("R"),
-       "of each shape with each renderer, in place of the protocol's")  //
-      ("participant-version",
-       po::value(&settings.version)->default_value(settings.version)->value_name("1|2|3"),
-       "which of the frozen settings of the simulated participant")  //
+       "of each shape with each renderer, in place of the protocol's");
+  add_participant_version(line, settings.version);
+  line.options.add_options()  //
       ("settings", po::value(&settings.patch)->value_name("FILE"),
        "JSON merge patch on those settings, before anything varies");
 }
@@ -117,7 +116,7 @@ void check_sweep_options(const po::variables_map& values, SweepSettings& setting
   check_simulated_participants(settings.participants);
   if (values.count("repetitions") && (settings.repetitions < 1 || settings.repetitions > 1000000))
     throw UsageError("--repetitions: must be 1 to 1000000");
-  check_participant_version(settings.version);
+  check_participant_version(values, settings.version);
   settings.protocol = values["PROTOCOL.json"].as<std::string>();
 }
 

@@ -17,8 +17,8 @@ struct SweepSettings {
   std::string patch;  ///< file of a JSON merge patch on the participant's settings; "": none
   std::int64_t points = 0;
   std::uint64_t seed = 1;
-  int version = kDefaultParticipantVersion;  ///< of the simulated participant
-  int participants = 7, repetitions = 0;     ///< repetitions 0: the protocol's
+  int version = 0;                        ///< of the simulated participant; 0: none was asked for
+  int participants = 7, repetitions = 0;  ///< repetitions 0: the protocol's
 };
 
 void add_sweep_options(CommandLine& line, SweepSettings& settings);
@@ -27,7 +27,8 @@ void check_sweep_options(const boost::program_options::variables_map& values,
                          SweepSettings& settings);
 
 struct PlannedSweep {
-  /// \throws UsageError; protocols::InputError with every fault of protocol or space
+  /// \param settings  with a version. \throws UsageError; protocols::InputError with every fault of
+  /// protocol or space
   explicit PlannedSweep(const SweepSettings& settings);
 
   protocols::Protocol protocol;  ///< as its file has it

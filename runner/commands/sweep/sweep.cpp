@@ -6,8 +6,11 @@
 #include <condition_variable>
 #include <cstdlib>
 #include <exception>
+#include <filesystem>
 #include <iostream>
 #include <mutex>
+#include <set>
+#include <system_error>
 #include <thread>
 #include <vector>
 
@@ -15,6 +18,7 @@
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/progress_line.h"
 #include "runner/commands/shared/shard.h"
+#include "runner/commands/shared/simulation.h"
 #include "runner/commands/shared/stop_signal.h"
 #include "runner/commands/sweep/planned.h"
 #include "runner/commands/sweep/point.h"
@@ -174,6 +178,21 @@ std::int64_t run_points(const Sweep& sweep, data::SweepFile& file, PointQueue& q
   return done;
 }
 
+/// \throws data::StoreRefused: the file is no sweep's
+int version_begun_with(const std::string& database) {
+  std::set<int> begun;
+  std::error_code none;  // what cannot be seen is refused where it is opened
+  if (std::filesystem::exists(database, none)) {
+    const json settings =
+        json::parse(data::SweepFile::open(database).plan().settings, nullptr, false);
+    for (const int version : participant_versions()) {
+      if (settings.is_object() && settings.value("version", json()) == version)
+        begun.insert(version);
+    }
+  }
+  return version_to_go_on_with(begun, database);
+}
+
 void print_summary(data::SweepFile& file, const data::SweepPlan& plan, const std::string& name) {
   const std::int64_t count = file.count(), failed = file.failed();
   std::cout << name << ", SIMULATED participants: " << count << " of " << plan.points << " points ("
@@ -225,10 +244,12 @@ void print_point(const Sweep& sweep, std::int64_t point) {
 }  // namespace
 
 int sweep_command(const std::vector<std::string>& args) {
-  const std::optional<RunSettings> settings = parse_run_settings(args);
+  std::optional<RunSettings> settings = parse_run_settings(args);
   if (!settings) return 0;
   const Shard shard =
       parse_shard(settings->shard, [](const char* name) { return std::getenv(name); });
+  if (settings->sweep.version == 0)
+    settings->sweep.version = version_begun_with(settings->database);
   const PlannedSweep planned(settings->sweep);
   const Sweep sweep{planned.study, planned.design, planned.plan};
   if (settings->print_point > 0) {

@@ -8,7 +8,7 @@ What the program would refuse raises InputError, a ValueError, with the program'
 the interpreter's lock, so that a concurrent.futures.ThreadPoolExecutor uses all processors, and end at Ctrl-C.
 
     >>> import palpate
-    >>> person = palpate.settings(3)
+    >>> person = palpate.settings()
     >>> person["motor"]["slide_speed_m_per_s"] = 0.04
     >>> trials = palpate.simulate("protocols/quick.json", person, participants=2, seed=5)
     >>> trials["response_time"][trials["correct"]].mean()

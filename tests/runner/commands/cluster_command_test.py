@@ -156,6 +156,23 @@ class Cluster(unittest.TestCase):
         self.assertEqual((self.folder / "v/all.sweep").read_bytes(), (self.folder / "few.sweep").read_bytes())
         self.assertIn("points: 3 of 3", self.palpate("cluster", "status", "v"))
 
+    def test_a_folder_goes_on_with_the_version_that_it_was_begun_with(self):
+        old = ["--participant-version", 1]
+        (self.slurm / "kill").write_text("1")
+        self.palpate("cluster", "simulate", *self.STUDY, *old, "--shards", 2, "--dir", "d")
+        self.palpate("cluster", "sweep", *self.PLAN, *old, "--shards", 2, "--dir", "e")
+        (self.slurm / "kill").unlink()
+        for folder in ("d", "e"):
+            self.palpate("cluster", "submit", folder)
+        self.palpate("simulate", *self.STUDY, *old, "--db", "old.db")
+        self.palpate("sweep", *self.PLAN, *old, "--db", "old.sweep")
+        self.assertEqual(self.trials("d/all.db"), self.trials("old.db"))
+        self.assertEqual((self.folder / "e/all.sweep").read_bytes(), (self.folder / "old.sweep").read_bytes())
+        self.palpate("cluster", "simulate", *self.STUDY, "--shards", 2, "--dir", "f", "--no-submit")
+        self.palpate("cluster", "sweep", *self.PLAN, "--shards", 2, "--dir", "g", "--no-submit")
+        for folder in ("f", "g"):  # whatever the default of the program that goes on
+            self.assertIn("--participant-version 3", (self.folder / folder / "shard.sh").read_text())
+
     PLAN_OPTIONS = ["--gain-sd", 0.15, "--residual-sd", 0.5, "--effect", "cone=22,cube=11", "--participants", "4-30",
                     "--studies", 400, "--trials", "5,9,20"]
 

@@ -225,6 +225,47 @@ class Simulate(CommandCase):
             self.assertIn("participant-version", done.stderr)
         self.assertFalse((self.dir / "none.db").exists())
 
+    def test_the_default_is_version_3(self):
+        self.assertIn("settings version 3, ", self.simulate(self.dir / "default.db", "--participants", 1).stdout)
+        self.simulate(self.dir / "3.db", "--participants", 1, "--participant-version", 3)
+        self.assertEqual(self.csv_of(self.dir / "default.db"), self.csv_of(self.dir / "3.db"))
+
+    def test_a_database_goes_on_with_the_version_that_it_was_begun_with(self):
+        patch = ["--settings", self.file("patch.json", '{"motor": {"reaction_delay_s": 0.02}}')]
+        for version, more in ((1, []), (2, []), (2, patch), (3, patch)):
+            whole, begun = (self.dir / f"{version}{len(more)}{name}.db" for name in ("whole", "begun"))
+            self.simulate(whole, "--participants", 3, "--participant-version", version, *more)
+            self.simulate(begun, "--participants", 1, "--participant-version", version, *more)
+            child = subprocess.Popen([PALPATE, "simulate", PROTOCOLS / "quick.json", "--db", begun, "--participants", "3",
+                                      *map(str, more)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+            time.sleep(0.3)
+            child.kill()  # wherever it is
+            child.wait()
+            done = self.simulate(begun, "--participants", 3, *more)
+            self.assertIn(f"settings version {version}, ", done.stdout)
+            self.assertEqual("goes on with version" in done.stderr, version != 3, done.stderr)
+            self.assertEqual(self.csv_of(begun), self.csv_of(whole))
+        # Other settings than it has are refused as ever.
+        refused = self.simulate(self.dir / "10begun.db", "--participants", 3, *patch, status=2)
+        self.assertIn("was simulated with other settings", refused.stderr)
+
+    def test_another_protocol_in_a_database_of_an_earlier_version_has_that_version(self):
+        db = self.dir / "one.db"
+        self.simulate(db, "--participants", 1, "--participant-version", 2)
+        mine = json.loads((PROTOCOLS / "quick.json").read_text())
+        other = self.file("other.json", json.dumps({**mine, "name": "other", "$schema": str(PROTOCOLS / "protocol.schema.json")}))
+        self.assertIn("settings version 2, ", self.palpate("simulate", other, "--db", db, "--participants", 1).stdout)
+
+    def test_of_several_versions_in_a_database_one_is_asked_for(self):
+        db = self.dir / "both.db"
+        for shard, version in (("1/2", 1), ("2/2", 2)):
+            self.simulate(db, "--participants", 2, "--shard", shard, "--participant-version", version)
+        before = self.csv_of(db)
+        refused = self.simulate(db, "--participants", 2, status=2)
+        self.assertIn("holds versions 1, 2 of the simulated participant", refused.stderr)
+        self.assertIn("--participant-version", refused.stderr)
+        self.assertEqual(self.csv_of(db), before)
+
     def test_a_second_writer_is_refused(self):
         db = self.dir / "busy.db"
         child = subprocess.Popen([PALPATE, "simulate", PROTOCOLS / "ho2000.json", "--db", db],

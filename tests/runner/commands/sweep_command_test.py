@@ -86,6 +86,24 @@ class Sweeps(SweepCase):
         self.assertEqual(self.bytes("one.sweep"), file.read_bytes())
         self.assertEqual([path.name for path in self.folder.iterdir() if "journal" in path.name], [])
 
+    def test_a_file_goes_on_with_the_version_that_it_was_begun_with(self):
+        for version in (1, 2):
+            old = ["--participant-version", version]
+            whole, begun = f"whole{version}.sweep", f"begun{version}.sweep"
+            self.sweep(whole, *old)
+            self.sweep(begun, *old, "--shard", "2/3")
+            point = json.loads(self.palpate(*self.command(begun, "--print-point", 1)))
+            self.assertEqual(point["settings"]["version"], version)
+            done = subprocess.run([PALPATE, *map(str, self.command(begun))], cwd=self.folder, capture_output=True, text=True, timeout=600)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            self.assertIn(f"{begun}: goes on with version {version}", done.stderr)
+            self.assertEqual(self.bytes(begun), self.bytes(whole))
+            self.assertIn("holds another sweep", self.sweep(begun, "--participant-version", 3, status=2))
+        self.sweep("new.sweep", points=1)
+        self.sweep("3.sweep", "--participant-version", 3, points=1)
+        self.assertEqual(self.bytes("new.sweep"), self.bytes("3.sweep"))
+        self.assertEqual(json.loads(self.palpate(*self.command("none.sweep", "--print-point", 1)))["settings"]["version"], 3)
+
     def test_a_signal_stops_it_and_the_same_command_goes_on(self):
         running = subprocess.Popen([PALPATE, *map(str, self.command("a.sweep", points=500))], cwd=self.folder, text=True,
                                    stdout=subprocess.PIPE, stderr=subprocess.PIPE)

@@ -295,7 +295,7 @@ TEST_F(SimulatedStudy, RefusesWhatTheDeviceOrTheParticipantCannotDo) {
 }
 
 TEST_F(SimulatedStudy, PatchesAreCheckedAndChangeTheChecksum) {
-  const SimulatedSettings defaults = load_simulated_settings("");
+  const SimulatedSettings defaults = load_simulated_settings("", 2);
   const SimulatedSettings quick = patched(R"({"motor": {"reaction_delay_s": 0.02}})", 2);
   EXPECT_EQ(quick.motor.reaction_delay, 0.02);
   EXPECT_NE(quick.sha256, defaults.sha256);
@@ -321,6 +321,19 @@ TEST_F(SimulatedStudy, ChecksumsAreThoseOfTheFrozenFiles) {
               protocols::sha256_hex(nlohmann::json::parse(file).dump()))
         << "version " << version;
   }
+}
+
+TEST_F(SimulatedStudy, VersionsAreKnownByTheirChecksums) {
+  std::ofstream(folder_ / "patch.json") << R"({"motor": {"reaction_delay_s": 0.02}})";
+  for (const int version : participant_versions()) {
+    const std::string plain = load_simulated_settings("", version).sha256;
+    const std::string patched = load_simulated_settings(folder_ / "patch.json", version).sha256;
+    EXPECT_EQ(participant_version_of(plain, ""), version);
+    EXPECT_EQ(participant_version_of(patched, folder_ / "patch.json"), version);
+    EXPECT_EQ(participant_version_of(patched, ""), std::nullopt);
+    EXPECT_EQ(participant_version_of(plain, folder_ / "patch.json"), std::nullopt);
+  }
+  EXPECT_EQ(load_simulated_settings("").version, 3);
 }
 
 // A switch of a later version counts in an earlier one's checksum where it is moved.
