@@ -71,6 +71,47 @@ TEST(SimulatedStylus, SettlesInTheEquilibriumOfHandAndForce) {
   EXPECT_NEAR(glm::length(reading.stylus.tail - reading.stylus.tip), 0.12, 1e-9);
 }
 
+/// The stylus after one tick, turned at rest from one direction while the hand points it to
+/// another, in long double.
+struct Turned {
+  using Vec = glm::vec<3, long double, glm::highp>;
+  Vec axis;
+
+  Turned(const Vec& from, const Vec& target, long double share) {
+    const Vec c = glm::cross(target, from);
+    const long double sine = glm::length(c);
+    const long double angle = share * std::atan2(sine, glm::dot(target, from));
+    const Vec k = c / sine;
+    axis = glm::normalize(std::cos(angle) * target + std::sin(angle) * glm::cross(k, target));
+  }
+};
+
+// Whatever is used for small angles in place of sines, it is that to the last digits, and small and
+// large angles meet.
+TEST(SimulatedStylus, TurnsByRodriguesFormulaToTheLastDigits) {
+  SimulatedDeviceSettings device = ideal_device();
+  device.resolution = 1e-17;
+  const HandImpedance hand;
+  const double inertia = device.end_mass * 2 * 0.06 * 0.06;
+  Vec3 away(1, 0, 0), spin(0);
+  SpringDamper(inertia, hand.turn_damping, hand.turn_stiffness, kStep).advance(away, spin);
+  const auto share = static_cast<long double>(away.x);  // of the angle, that is left after a tick
+  const Vec3 target = glm::normalize(Vec3(0.3, -0.2, 0.9));
+  const Vec3 side = glm::normalize(glm::cross(target, Vec3(0.5, 0.8, -0.1)));
+  for (double angle = 1e-9; angle < 3; angle *= 1.09) {
+    const Vec3 from = std::cos(angle) * target + std::sin(angle) * side;
+    SimulatedStylus stylus(device, hand, 0.12, 0.06, kStep);
+    stylus.reset({{0, 0, 0}, {0, 0, 0}, from});
+    stylus.set_target({{0, 0, 0}, {0, 0, 0}, target});
+    const rendering::LineProbe probe = stylus.read().stylus;
+    const Turned expected(from, target, share);
+    for (int k = 0; k < 3; ++k) {
+      EXPECT_NEAR(probe.tail[k], static_cast<double>(0.06L * expected.axis[k]), 3e-17) << angle;
+      EXPECT_NEAR(probe.tip[k], static_cast<double>(-0.06L * expected.axis[k]), 3e-17) << angle;
+    }
+  }
+}
+
 TEST(SimulatedStylus, FollowsAMovingTargetWithoutLagOfTheHandsDamper) {
   SimulatedDeviceSettings device = ideal_device();
   device.damping = 0;
