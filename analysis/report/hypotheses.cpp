@@ -95,7 +95,9 @@ std::string read_condition(const char* key, const NamedResults& known,
                           "expected a condition on a number of the analysis; this one is always "
                           "the same");
   } catch (const PatternError& error) {
-    reader.faults().add(reader.pointer(key), error.what());
+    // A fault is a line: the expression below it, with its mark, stands in the file.
+    const std::string said = error.what();
+    reader.faults().add(reader.pointer(key), said.substr(0, said.find('\n')));
   }
   return text;
 }

@@ -80,7 +80,10 @@ analysis::Table points_of(const StudyCheck& check) {
   table.header = {"point", "", "what was found"};
   table.n_names = 3;
   for (const CheckPoint& point : check.points)
-    table.rows.push_back({point.title, word_of(point.finding), point.sentence});
+    table.rows.push_back(
+        {point.title,
+         point.finding == Finding::as_registered ? "as\u00a0registered" : word_of(point.finding),
+         point.sentence});
   return table;
 }
 

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 
@@ -84,6 +85,7 @@ TEST(Hypotheses, ANameThatTheAnalysisDoesNotHaveIsRefused) {
   EXPECT_NE(said.find("/0/corroborated"), std::string::npos) << said;
   EXPECT_NE(said.find("did you mean paired.cone.p_holm?"), std::string::npos) << said;
   EXPECT_NE(said.find("/0/refuted"), std::string::npos) << said;
+  EXPECT_EQ(std::count(said.begin(), said.end(), '\n'), 1) << "a line for each fault\n" << said;
 }
 
 TEST(Hypotheses, EveryFaultOfAFileIsSaid) {
