@@ -6,12 +6,13 @@
 #include <optional>
 #include <string>
 
+#include "protocols/answer_keys.h"
+
 namespace palpate::protocols {
 namespace {
 
 using nlohmann::json;
 
-constexpr std::size_t kMaxKey = 32;    // bytes of a response key's name
 constexpr std::size_t kMaxLabel = 80;  // bytes of a label
 
 /// The stimulus that a key stands for: its name, or an object of name and label. Not a string, and
@@ -63,13 +64,10 @@ void read_response_keys(ObjectReader& response, Protocol& protocol) {
   }
   std::map<std::string, std::optional<std::string>> key_of;  // by stimulus
   for (const StimulusSpec& stimulus : protocol.stimuli) key_of[stimulus.name];
+  KeysTaken taken;
   for (const auto& [key, value] : keys->items()) {
     const std::string here = child_pointer(pointer, key);
-    const auto printable = [](unsigned char c) { return c >= 0x20 && c != 0x7f; };
-    if (key.empty() || key.size() > kMaxKey || !std::all_of(key.begin(), key.end(), printable)) {
-      faults.add(here, "expected a key's name of 1 to " + std::to_string(kMaxKey) +
-                           " bytes without control characters");
-    }
+    if (const std::string fault = taken.add(key); !fault.empty()) faults.add(here, fault);
     std::string label;
     const json name = read_answer(value, here, label, faults);
     const auto stimulus = name.is_string() ? key_of.find(name.get<std::string>()) : key_of.end();

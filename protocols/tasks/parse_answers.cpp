@@ -5,16 +5,18 @@
 #include <set>
 #include <utility>
 
+#include "protocols/answer_keys.h"
+
 namespace palpate::protocols {
 namespace {
 
 using nlohmann::json;
 
 constexpr std::size_t kMostSteps = 11;  // of a scale
-constexpr std::size_t kMostLabel = 80, kMostKeyName = 32;
+constexpr std::size_t kMostLabel = 80;
 constexpr NumberRange kScaleNumber{-1e9, 1e9};
 // Keys that mean the same in every task.
-constexpr const char* kTaken[] = {"space", "enter", "escape"};
+constexpr const char* kGoOn[] = {"space", "enter"};
 
 bool is_label(const std::string& text, std::size_t most) {
   return !text.empty() && text.size() <= most &&
@@ -119,13 +121,12 @@ std::string read_answer_name(const json& value, const std::string& pointer, std:
 }
 
 void read_key(const std::string& key, const json& value, const std::string& pointer,
-              std::vector<TaskAnswer>& answers, std::set<std::string>& given, FaultList& faults) {
-  const bool taken = std::find(std::begin(kTaken), std::end(kTaken), key) != std::end(kTaken);
-  if (taken || !is_label(key, kMostKeyName)) {
-    faults.add(pointer, taken
-                            ? "expected another key: '" + key + "' goes on in every task"
-                            : "expected a key's name of 1 to 32 bytes without control characters");
-  }
+              std::vector<TaskAnswer>& answers, std::set<std::string>& given, KeysTaken& taken,
+              FaultList& faults) {
+  const bool goes_on = std::find(std::begin(kGoOn), std::end(kGoOn), key) != std::end(kGoOn);
+  const std::string fault =
+      goes_on ? "expected another key: '" + key + "' goes on in every task" : taken.add(key);
+  if (!fault.empty()) faults.add(pointer, fault);
   std::string label;
   const std::size_t before = faults.count();
   const std::string name = read_answer_name(value, pointer, label, faults);
@@ -156,8 +157,9 @@ void read_answer_keys(ObjectReader& reader, const Protocol& protocol, TaskBlock&
     return;
   }
   std::set<std::string> given;
+  KeysTaken taken;
   for (const auto& [key, value] : keys->items())
-    read_key(key, value, child_pointer(pointer, key), block.answers, given, reader.faults());
+    read_key(key, value, child_pointer(pointer, key), block.answers, given, taken, reader.faults());
   for (const TaskAnswer& answer : block.answers) {
     if (!given.contains(answer.name))
       reader.faults().add(pointer, "no key for the answer '" + answer.name + "'");

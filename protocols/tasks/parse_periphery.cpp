@@ -4,14 +4,13 @@
 #include <array>
 #include <string_view>
 
+#include "protocols/answer_keys.h"
 #include "protocols/tasks/parse_blocks.h"
 
 namespace palpate::protocols {
 namespace {
 
 using nlohmann::json;
-
-constexpr std::size_t kMostMappedKey = 32;
 
 /// A whole number from 1 to `most` at the begin of `text`, which goes on behind it; 0: none.
 int number_at(std::string_view& text, int most) {
@@ -71,12 +70,17 @@ void read_mapping(ObjectReader& reader, const char* key, std::map<std::string, s
   for (const auto& [input, meaning] : value->items()) {
     const std::string here = child_pointer(pointer, input);
     if (!is_input(input)) reader.faults().add(here, expected);
-    const std::string name = meaning.is_string() ? meaning.get<std::string>() : "";
-    if (name.empty() || name.size() > kMostMappedKey) {
+    if (!meaning.is_string()) {
       reader.faults().add(here,
                           "expected the name of the key that it stands for, such as '1', "
                           "'space' or 'escape' (emergency)" +
                               found_text(meaning));
+      continue;
+    }
+    const auto name = meaning.get<std::string>();
+    const std::string fault = name == "escape" ? "" : key_fault(name);
+    if (!fault.empty()) {
+      reader.faults().add(here, fault + found_text(meaning));
       continue;
     }
     out[input] = name;

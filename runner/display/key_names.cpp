@@ -4,6 +4,8 @@
 
 #include <algorithm>
 
+#include "protocols/answer_keys.h"
+
 namespace palpate::runner {
 namespace {
 
@@ -84,15 +86,12 @@ std::vector<std::string> key_names(int key, int scancode) {
 
 std::string match_key(const std::vector<std::string>& names,
                       const std::vector<std::pair<std::string, std::string>>& keys) {
-  const auto same = [](const std::string& a, const std::string& b) {
-    if (a == b) return true;
-    // A protocol may say "A" where the keyboard gives "a".
-    return a.size() == 1 && b.size() == 1 && (a[0] | 0x20) == (b[0] | 0x20) &&
-           (b[0] | 0x20) >= 'a' && (b[0] | 0x20) <= 'z';
-  };
   for (const std::string& name : names) {
-    const auto found = std::find_if(keys.begin(), keys.end(),
-                                    [&](const auto& entry) { return same(entry.first, name); });
+    // A protocol may say "A" where the keyboard gives "a".
+    const auto found =
+        std::find_if(keys.begin(), keys.end(), [key = protocols::one_key(name)](const auto& entry) {
+          return protocols::one_key(entry.first) == key;
+        });
     if (found != keys.end()) return found->first;
   }
   return names.empty() ? std::string() : names.front();

@@ -122,8 +122,8 @@ void TextInput::letter(const std::string& text, std::int64_t time_ns, std::vecto
     out.emplace_back(KeyPress{"backspace", time_ns});
   } else if (enter) {
     out.emplace_back(KeyPress{"enter", time_ns});
-  } else if (text == " ") {
-    out.emplace_back(KeyPress{"space", time_ns});
+  } else if (text == " " || text == "\t") {
+    out.emplace_back(KeyPress{text == " " ? "space" : "tab", time_ns});
   } else if (static_cast<unsigned char>(text[0]) > ' ' && text[0] != kDelete) {
     out.emplace_back(KeyPress{text, time_ns});
   }

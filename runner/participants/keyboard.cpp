@@ -4,6 +4,8 @@
 #include <iterator>
 #include <utility>
 
+#include "protocols/answer_keys.h"
+
 namespace palpate::runner {
 namespace {
 
@@ -190,7 +192,7 @@ void KeyboardRespondent::show_cue(const Sample& sample) {
 std::optional<int> KeyboardRespondent::meaning(const std::string& key) const {
   if (by_ == AnswerBy::buttons) return std::nullopt;
   for (std::size_t i = 0; i < keys_.size(); ++i) {
-    if (keys_[i].first == key) return stimuli_[i];
+    if (protocols::one_key(keys_[i].first) == protocols::one_key(key)) return stimuli_[i];
   }
   return std::nullopt;
 }

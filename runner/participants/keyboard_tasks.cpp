@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <utility>
 
+#include "protocols/answer_keys.h"
 #include "protocols/tasks/levels.h"
 #include "runner/participants/keyboard.h"
 
@@ -198,7 +199,7 @@ std::optional<Answer> KeyboardRespondent::meaning_in_interval(const std::string&
   const char* const wheel = key == "wheel up" ? "up" : key == "wheel down" ? "down" : "";
   for (std::size_t i = 0; i < asked.answers.size() && by_ != AnswerBy::buttons; ++i) {
     const bool turned = adjusts && asked.answers[i].name == wheel;
-    if (asked.answers[i].key != key && !turned) continue;
+    if (protocols::one_key(asked.answers[i].key) != protocols::one_key(key) && !turned) continue;
     answer.stimulus = static_cast<int>(i);
     if (view_.interval == 2 && is_turn(asked, answer)) break;  // the standard is not turned
     return answer;
@@ -303,7 +304,7 @@ int KeyboardRespondent::page_through(const std::vector<ReadScreen>& screens, con
       const KeyPress press = wait_for_key(since_ns);
       time_ns = press.time_ns;
       const auto key = std::find_if(keys.begin(), keys.end(), [&press](const auto& entry) {
-        return entry.first == press.key;
+        return protocols::one_key(entry.first) == protocols::one_key(press.key);
       });
       const bool forward = press.key == "space" || press.key == "enter" || press.key == "right";
       const bool back = press.key == "left" || press.key == "backspace";

@@ -13,6 +13,7 @@ import jsonschema
 # files, and the JSON reader drops keys that are given twice. The program refuses these.
 PROGRAM_ONLY = {
     "compounds-too-deep", "friction-static-below-dynamic", "grip-off-the-stylus", "key-for-unknown",
+    "keys-that-are-one", "keys-that-are-one-elsewhere",
     "keys-given-twice", "labels-alike", "layers-out-of-order", "material-twice", "max-run-alone", "min-distance-too-far", "more-blocks-than-repetitions",
     "more-sessions-than-trials", "quaternions", "same-names", "stimulus-without-key", "surface-without-layers",
     "too-many-trials", "tool-radius", "tool-segment-without-length", "two-keys",
