@@ -129,6 +129,75 @@ std::string texts_json(const Protocol& protocol) {
   return all.dump(1, ' ', false, json::error_handler_t::replace) + "\n";
 }
 
+namespace {
+
+/// Which of the program's own texts a participant gets to read at all.
+struct TextsRead {
+  explicit TextsRead(const Protocol& protocol) : tasks(protocol.version == 2) {
+    for (const TaskBlock& block : protocol.blocks) {
+      intervals |=
+          block.task == TaskKind::compare || (block.task == TaskKind::rate && block.standard);
+      no_question |= block.question.empty();
+      numbers |= block.task == TaskKind::rate && block.answers.empty();
+    }
+    for (const PageSpec& page : protocol.pages) {
+      consent |= page.kind == PageSpec::Kind::consent;
+      for (const PageItem& item : page.items) {
+        numbers_of_pages |= item.kind == PageItem::Kind::number;
+        typed |= item.kind == PageItem::Kind::number || item.kind == PageItem::Kind::text;
+      }
+    }
+    typed |= numbers;
+  }
+  bool of(const std::string& key) const {
+    if (key == "texts.go") return !tasks;  // a question stands there
+    if (key == "texts.next_interval") return intervals;
+    if (key == "texts.answer_now") return no_question;
+    if (key == "texts.type_number") return numbers;
+    if (key == "texts.other_number") return numbers || numbers_of_pages;
+    if (key == "texts.answer_first") return typed;
+    return key == "texts.agree" || key == "texts.disagree" ? consent : true;
+  }
+
+  bool tasks = false, intervals = false, no_question = false, numbers = false,
+       numbers_of_pages = false, typed = false, consent = false;
+};
+
+/// Names of answers that are words of the program, not of the protocol.
+bool is_built_in_answer(const TaskBlock& block, const TaskAnswer& answer) {
+  if (block.task == TaskKind::identify || block.task == TaskKind::rate) return false;
+  return answer.label == answer.name && answer.name.size() > 1;  // 1, 2 and 3 are of any language
+}
+
+}  // namespace
+
+std::vector<std::string> built_in_texts(const Protocol& protocol) {
+  std::vector<std::string> found;
+  if (!protocol.language.empty()) return found;
+  Protocol plain;
+  plain.version = protocol.version;
+  const auto own_words = texts_of(plain);
+  const std::map<std::string, std::string> built_in(own_words.begin(), own_words.end());
+  std::set<std::string> answers;
+  for (const TaskBlock& block : protocol.blocks) {
+    for (const TaskAnswer& answer : block.answers) {
+      if (is_built_in_answer(block, answer))
+        answers.insert("blocks." + block.name + ".keys." + answer.name);
+    }
+  }
+  const TextsRead read(protocol);
+  bool has_words = false;
+  for (const auto& [key, text] : texts_of(protocol)) {
+    const auto same = built_in.find(key);
+    const bool is_built_in =
+        answers.contains(key) || (same != built_in.end() && same->second == text);
+    if (is_built_in && read.of(key)) found.push_back(key);
+    // An answer without a label is the name of a stimulus, of whatever language.
+    has_words |= !is_built_in && text.size() > 1 && text != key.substr(key.rfind('.') + 1);
+  }
+  return has_words ? found : std::vector<std::string>();
+}
+
 void translate(Protocol& protocol, const std::string& language, const std::string& text,
                const std::string& file_name) {
   FaultList faults(file_name);

@@ -17,6 +17,10 @@ std::vector<std::pair<std::string, std::string>> texts_of(const Protocol& protoc
 /// The same as a JSON object, a key a line: what a translator fills in.
 std::string texts_json(const Protocol& protocol);
 
+/// Keys of the program's own texts, in English, that participants read in a protocol that has words
+/// of its own; empty where it has none, or all are of a translation.
+std::vector<std::string> built_in_texts(const Protocol& protocol);
+
 /// Replaces the texts by those of a JSON object of the same keys. What is stored of an answer stays
 /// what it is in the protocol's own language.
 /// \param language  "de", "pt-BR"; \param file_name  that faults name

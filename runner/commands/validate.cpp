@@ -204,6 +204,11 @@ int validate_command(const std::vector<std::string>& args) {
   }
   if (!faults.empty()) throw protocols::InputError(faults);
   print_summary(protocol, std::cout);
+  const std::vector<std::string> built_in = protocols::built_in_texts(protocol);
+  if (!built_in.empty())
+    std::cout
+        << "  texts       built in, in English; a protocol in another language gives its own: "
+        << list(built_in) << "\n";
   for (const protocols::StimulusSpec& stimulus : protocol.stimuli)
     print_overlaps(stimulus.object, stimulus.name, std::cout);
   const StimulusLibrary library(protocol);

@@ -107,6 +107,42 @@ TEST(Texts, OfThePublishedProtocolAreFoundBesideIt) {
   EXPECT_THROW(translate(protocol, kPublished, "tlh"), InputError);
 }
 
+TEST(Texts, BuiltInOnesAreListedBesideWordsOfTheProtocol) {
+  Protocol protocol = parse_protocol(PALPATE_SOURCE_DIR "/protocols/quick.json");
+  EXPECT_EQ(built_in_texts(protocol),
+            (std::vector<std::string>{"texts.move_away", "texts.ready", "texts.go", "texts.wait",
+                                      "texts.other_key"}));
+  protocol.texts.go = "Los";
+  protocol.texts.wait = "Bitte warten.";
+  EXPECT_EQ(built_in_texts(protocol),
+            (std::vector<std::string>{"texts.move_away", "texts.ready", "texts.other_key"}));
+  protocol.texts = {};
+  EXPECT_EQ(built_in_texts(protocol), std::vector<std::string>()) << "it is in English throughout";
+  protocol.response.labels["cube"] = "W\u00fcrfel";
+  EXPECT_EQ(built_in_texts(protocol).size(), 5U);
+}
+
+TEST(Texts, BuiltInOnesOfTasksAreThoseThatAreRead) {
+  const Protocol all = everything();
+  const std::vector<std::string> found = built_in_texts(all);
+  const auto lists = [&](const std::string& key) {
+    return std::find(found.begin(), found.end(), key) != found.end();
+  };
+  EXPECT_FALSE(lists("texts.go")) << "a question stands there";
+  Protocol published = parse_protocol(kPublished);
+  translate(published, kPublished, "de");
+  EXPECT_EQ(built_in_texts(published), std::vector<std::string>());
+  Protocol asks = parse_protocol_text(R"({"version": 2, "name": "x", "renderers": ["ray"],
+    "stimuli": [{"name": "ball", "shape": "sphere", "radius_m": 0.03}],
+    "blocks": [{"name": "is-it", "task": "detect", "stimuli": ["ball"], "repetitions": 2,
+                "question": "Da?"}]})",
+                                      "x.json");
+  EXPECT_EQ(
+      built_in_texts(asks),
+      (std::vector<std::string>{"texts.move_away", "texts.ready", "texts.wait", "texts.other_key",
+                                "blocks.is-it.keys.yes", "blocks.is-it.keys.no"}));
+}
+
 TEST(Texts, OfVersion1AreItsTextsAndLabels) {
   Protocol protocol = parse_protocol(PALPATE_SOURCE_DIR "/protocols/quick.json");
   json texts = json::parse(texts_json(protocol));
