@@ -53,7 +53,8 @@ Session::State Session::before_trial() const {
   if (station_.plan.block_begins())
     return station_.plan.next().practice ? State::practice : State::block;
   const auto& every = station_.protocol.breaks.every_trials;
-  if (every && station_.plan.done() % static_cast<std::size_t>(*every) == 0) return State::rest;
+  if (every && station_.plan.done_in_block() % static_cast<std::size_t>(*every) == 0)
+    return State::rest;
   return State::trial;
 }
 
@@ -74,17 +75,18 @@ void Session::step() {
       state_ = before_trial();
       break;
     case State::practice:
+      rest_between_blocks();
       participant_.read(texts.practice);
       begin_task_block();
       state_ = State::trial;
       break;
     case State::block:
-      if (station_.plan.done() > 0) end_rest();
+      rest_between_blocks();
       begin_task_block();
       state_ = State::trial;
       break;
     case State::rest:
-      if (station_.plan.done() > 0) end_rest();
+      rest();
       state_ = State::trial;
       break;
     case State::trial:
@@ -131,7 +133,12 @@ data::TrialRecord Session::planned_record(const protocols::Trial& trial) const {
   return record;
 }
 
-void Session::end_rest() {
+/// Practice belongs to the block that follows: they are not taken apart.
+void Session::rest_between_blocks() {
+  if (station_.plan.done() > 0 && !station_.plan.after_practice()) rest();
+}
+
+void Session::rest() {
   const std::int64_t until =
       station_.clock.now_ns() + std::llround(station_.protocol.breaks.min_seconds * kPerSecond_ns);
   participant_.rest(station_.protocol.texts.break_text, until);

@@ -32,6 +32,12 @@ class SessionFault : public std::runtime_error {
 /// Why forces went off, in words. \param faults, trouble  of a sample with kTripped
 std::string trip_reason(std::uint32_t faults, DeviceTrouble trouble);
 
+/// What is shown of a page.
+struct PageView {
+  std::string page, question;  ///< names; of a consent the question is "consent"
+  int number = 0, questions = 0;
+};
+
 /// What happens in a trial, as it happens: for markers and the experimenter's console.
 class SessionEvents {
  public:
@@ -47,6 +53,9 @@ class SessionEvents {
   virtual void recorded(const data::TrialRecord& record) = 0;
   /// Version 2: an interval of the trial is about to begin.
   virtual void interval(const protocols::Trial& /*trial*/, const IntervalView& /*view*/) {}
+  /// Version 2: a page is shown, or a question of it: its number, from 1, of so many; 0: the text.
+  /// Empty names: the page is over.
+  virtual void page(const PageView& /*view*/) {}
   /// Version 2: how sure the participant is, is asked, with forces off, or no longer.
   virtual void asking(bool /*now*/) {}
 };
@@ -112,9 +121,12 @@ class Session {
   void read_instructions(const protocols::TaskBlock& block);
   void resume_task_block();
   void show_pages(protocols::PageSpec::When when, const std::string& block = "");
+  void show_page(const protocols::PageSpec& page);
+  void tell_page(const PageView& view);
   const protocols::TaskBlock& task_of(const protocols::Trial& trial) const;
   void cut_off(const std::string& reason);
-  void end_rest();
+  void rest_between_blocks();
+  void rest();
   void tell_feedback();
   void add_quality(const ServoQuality& quality);
   void take_answer(const protocols::Trial& trial, const std::optional<Answer>& answer);

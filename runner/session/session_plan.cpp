@@ -29,6 +29,12 @@ protocols::TrialOutcome outcome_of(const data::TrialRecord& record) {
 }
 
 void SessionPlan::answered(const protocols::TrialOutcome& outcome) {
+  after_practice_ = next().practice;
+  go_on(outcome);
+  done_in_block_ = finished() || block_begins() ? 0 : done_in_block_ + 1;
+}
+
+void SessionPlan::go_on(const protocols::TrialOutcome& outcome) {
   if (tasks_) return tasks_->answered(outcome);
   const protocols::Trial& trial = trials_[next_++];
   if (!trial.practice || trial.block < first_practice_block_) return;

@@ -29,6 +29,9 @@ class SessionPlan {
   }
   /// True at the first trial of a block (of a session, for the first).
   bool block_begins() const;
+  std::size_t done_in_block() const { return done_in_block_; }  ///< of the next trial
+  /// Whether the trial before the next one was practice, of this session.
+  bool after_practice() const { return after_practice_; }
   /// Version 2: the next trial, of an adaptive block, is shown at another level.
   void propose(double level) {
     if (tasks_) tasks_->propose(level);
@@ -38,12 +41,15 @@ class SessionPlan {
   void answered(bool correct) { answered(protocols::TrialOutcome{correct, correct}); }
 
  private:
+  void go_on(const protocols::TrialOutcome& outcome);
   void judge_practice();
 
   const protocols::Protocol* protocol_;
   int participant_number_;
   std::vector<protocols::Trial> trials_;
   std::size_t next_ = 0;
+  std::size_t done_in_block_ = 0;
+  bool after_practice_ = false;
   int first_practice_block_ = 0;              ///< blocks before it are warm-up
   int round_ = 1;                             ///< of the practice under way
   int correct_ = 0, shown_ = 0;               ///< in that round

@@ -20,8 +20,9 @@ TEST(Session, GoesThroughPracticeBlocksBreaksAndEnd) {
   ScriptedRespondent respondent({});
   Session session = bench.session(respondent, SessionPlan(bench.protocol, 1, 1));
   run(session);
-  // Practice of 2, then blocks of 2: pages at the beginning of each, rest after every third trial.
-  EXPECT_EQ(respondent.pages, "hello;try;right;right;rest;rest;rest;bye;");
+  // Practice of 2, then blocks of 2. Rest between blocks, not after practice, which is not counted
+  // in the three trials until a break either.
+  EXPECT_EQ(respondent.pages, "hello;try;right;right;rest;bye;");
   ASSERT_EQ(bench.log.finished.size(), 6u);
   for (std::size_t i = 0; i < 6; ++i) {
     const data::TrialRecord& record = bench.log.finished[i];
@@ -32,7 +33,26 @@ TEST(Session, GoesThroughPracticeBlocksBreaksAndEnd) {
     EXPECT_DOUBLE_EQ(record.response_time, 0.3);
     EXPECT_EQ(record.onset_utc.substr(0, 11), "1970-01-01T");
   }
-  EXPECT_GE(bench.log.finished[3].onset_ns - bench.log.finished[2].response_ns, 20'000'000'000);
+  EXPECT_LT(bench.log.finished[2].onset_ns - bench.log.finished[1].response_ns, 20'000'000'000);
+  EXPECT_GE(bench.log.finished[4].onset_ns - bench.log.finished[3].response_ns, 20'000'000'000);
+}
+
+TEST(Session, ABreakIsDueAfterSoManyTrialsOfTheBlock) {
+  SessionBench bench;
+  bench.protocol.blocks_per_renderer = 1;
+  bench.protocol.repetitions = 4;  // 2 of practice, then 8 for each renderer
+  ScriptedRespondent respondent({});
+  Session session = bench.session(respondent, SessionPlan(bench.protocol, 1, 1));
+  run(session);
+  std::vector<std::size_t> after;  // so many trials a break came
+  const auto& finished = bench.log.finished;
+  for (std::size_t i = 1; i < finished.size(); ++i) {
+    if (finished[i].onset_ns - finished[i - 1].response_ns >= 20'000'000'000) after.push_back(i);
+  }
+  const std::size_t practice = static_cast<std::size_t>(
+      std::count_if(finished.begin(), finished.end(), [](const auto& r) { return r.practice; }));
+  ASSERT_FALSE(after.empty());
+  EXPECT_EQ(after.front(), practice + 3);
 }
 
 TEST(Session, TimeOutIsWrongWithTheLimitAsItsTime) {
