@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <ctime>
 #include <optional>
+#include <string_view>
 
 #include "data/files/utc.h"
 #include "runner/commands/shared/command.h"
@@ -12,9 +13,17 @@ namespace palpate::runner {
 namespace {
 
 constexpr std::int64_t kSecond_ns = 1'000'000'000;
+constexpr std::string_view kEndNote = "ended: ";  // of the run, with the reason, at that moment
 
 std::int64_t utc_now() {
   return std::chrono::system_clock::now().time_since_epoch() / std::chrono::nanoseconds(1);
+}
+
+/// s of an ISO 8601 time in UTC, in ns.
+std::int64_t utc_of(const std::string& iso) {
+  std::tm time{};
+  strptime(iso.c_str(), "%Y-%m-%dT%H:%M:%S", &time);
+  return timegm(&time) * kSecond_ns;
 }
 
 std::tm local(std::int64_t utc_ns) {
@@ -115,7 +124,13 @@ std::string withdrawn_when(data::Store& store, const std::string& code) {
   const std::optional<data::StoredRun> last = newest_run(
       store, [&code](const data::StoredRun& run) { return run.participant.code == code; });
   if (!last || last->end != data::RunEnd::withdrawn) return "";
-  return spoken_time(last->info.clock.utc_ns, utc_now());
+  std::int64_t when_ns = last->info.clock.utc_ns;
+  for (const data::StoredNote& note : store.notes()) {
+    const bool of_that_run =
+        note.participant.code == code && note.run_clock.utc_ns == last->info.clock.utc_ns;
+    if (of_that_run && note.text.starts_with(kEndNote)) when_ns = utc_of(note.utc);
+  }
+  return spoken_time(when_ns, utc_now());
 }
 
 void throw_withdrawn(const std::string& code, const std::string& when) {

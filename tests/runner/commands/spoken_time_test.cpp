@@ -9,6 +9,7 @@
 #include <string>
 
 #include "runner/commands/run/resumption.h"
+#include "tests/data/store/store_fixture.h"
 
 namespace palpate::runner {
 namespace {
@@ -84,5 +85,19 @@ TEST_F(SpokenTime, GoesByTheCalendarWhereClocksAreChanged) {
 }
 
 }  // namespace spoken_times
+TEST(WithdrawalTime, IsItsOwnNotThatOfTheSessionsBegin) {
+  const palpate::testing::TemporaryFolder folder;
+  data::Store store = data::Store::open(folder / "s.db", data::Store::Mode::write_or_create);
+  constexpr std::int64_t kHour_ns = 3'600'000'000'000, kBegan_ns = 946'717'200'000'000'000;
+  data::RunInfo info = data::testing::a_run();
+  info.clock = {kBegan_ns, 5};
+  const data::Run run = store.begin_run(store.enrol(data::testing::a_protocol(), "W1"), info);
+  store.add_note(run, 5 + kHour_ns, "tired");
+  store.add_note(run, 5 + 3 * kHour_ns, "ended: the participant withdrew");
+  store.end_run(run, data::RunEnd::withdrawn, 5 + 3 * kHour_ns);
+  EXPECT_EQ(withdrawn_when(store, "W1"),
+            spoken_time(kBegan_ns + 3 * kHour_ns, kBegan_ns + 1000 * kHour_ns));
+}
+
 }  // namespace
 }  // namespace palpate::runner
