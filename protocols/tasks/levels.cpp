@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <cstdio>
+#include <cstdlib>
 #include <glm/gtc/quaternion.hpp>
 #include <numbers>
 #include <utility>
@@ -51,6 +53,13 @@ stimuli::ObjectSpec read_again(const json& value, const Protocol& protocol,
 std::string level_text(double level) {
   char text[32];
   return {text, std::to_chars(text, text + sizeof text, level).ptr};
+}
+
+std::string level_in_words(const TaskBlock& block, double level) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.4g", level);
+  const std::string unit = block.level ? unit_of_level(block.level->pointer) : "1";
+  return level_text(std::strtod(text, nullptr)) + (unit == "1" ? "" : " " + unit);
 }
 
 StimulusSpec at_level(const Protocol& protocol, const TaskBlock& block, int stimulus,

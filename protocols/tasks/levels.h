@@ -33,4 +33,7 @@ std::string unit_of_level(const std::string& path);
 /// A level as it is printed: the shortest text that reads back as it.
 std::string level_text(double level);
 
+/// A level for people: rounded to four digits, with the unit of the block's varied number.
+std::string level_in_words(const TaskBlock& block, double level);
+
 }  // namespace palpate::protocols

@@ -3,6 +3,7 @@
 
 #include "runner/display/console_panels.h"
 #include "runner/display/console_widgets.h"
+#include "runner/display/console_words.h"
 
 namespace palpate::runner {
 namespace {
@@ -31,7 +32,7 @@ Plot plot_frame(const char* name, float width, float height, double top = 0,
   for (int i = 0; i <= 2 && top > 0; ++i) {
     const float y = plot.to.y + (plot.from.y - plot.to.y) * static_cast<float>(i) / 2;
     list->AddLine({plot.from.x, y}, {plot.to.x, y}, IM_COL32(255, 255, 255, 26));
-    const std::string label = fixed_point(top * i / 2, top < 4 ? 1 : 0) + (i == 2 ? unit : "");
+    const std::string label = axis_label(top * i / 2) + (i == 2 ? unit : "");
     const float wide = ImGui::CalcTextSize(label.c_str()).x;
     list->AddText({plot.from.x - wide - 6, y - size / 2}, kAxisColour, label.c_str());
   }

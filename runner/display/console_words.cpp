@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 
 #include "runner/safety/fault_table.h"
 
@@ -42,13 +43,17 @@ std::string forces_off_reason(const ConsoleState& state) {
 
 std::string state_title(const ConsoleState& state) {
   if (state.state.empty()) return "waiting";
-  return state.seconds_left > 0 || state.state == "rest" ? "break" : state.state;
+  if (state.seconds_left > 0 || state.state == "rest") return "break";
+  return state.state.substr(0, state.state.find(": "));
 }
 
 std::string state_detail(const ConsoleState& state) {
   if (!state.stop_plan.empty()) return "stops " + state.stop_plan;
   if (!state.held_by.empty()) return {};
   if (state.seconds_left > 0) return duration_text(state.seconds_left) + " left";
+  // "question 2 of 5: PAGE, QUESTION", "page: PAGE"
+  const std::size_t colon = state.state.find(": ");
+  if (colon != std::string::npos) return state.state.substr(colon + 2);
   for (const char* const page : {"instructions", "practice begins", "block begins", "rest"}) {
     if (state.state == page) return "space bar goes on";
   }
@@ -62,7 +67,8 @@ std::string state_detail(const ConsoleState& state) {
 double fraction_done(const ConsoleState& state) {
   if (state.trials <= 0) return 0;
   const bool over = state.seconds_left > 0 || state.state == "rest" ||
-                    state.state == "block begins" || state.state == "end";
+                    state.state == "block begins" || state.state == "end" ||
+                    state.state.find(": ") != std::string::npos;
   return std::clamp((state.trial - (over ? 0.0 : 1.0)) / state.trials, 0.0, 1.0);
 }
 
@@ -79,6 +85,12 @@ std::string forces_text(const ConsoleState& state) {
   if (!state.held_by.empty()) return "Forces are off: " + state.held_by;
   return "Forces are off: " + forces_off_reason(state) + "; next: '" +
          button_label(ConsoleCommand::Kind::clear_fault) + "'";
+}
+
+std::string axis_label(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.6g", value);
+  return text;
 }
 
 std::string duration_text(double seconds) {

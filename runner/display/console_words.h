@@ -20,6 +20,8 @@ double fraction_done(const ConsoleState& state);
 bool forces_not_yet_on(const ConsoleState& state);
 /// Whether forces are off, why, and what to press next.
 std::string forces_text(const ConsoleState& state);
+/// A number of an axis as it is, of half the number at its end too: "2.5", "500".
+std::string axis_label(double value);
 /// "1 h 05 min", "3 min 20 s"
 std::string duration_text(double seconds);
 

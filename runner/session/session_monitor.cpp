@@ -1,5 +1,6 @@
 #include "runner/session/session_monitor.h"
 
+#include <algorithm>
 #include <memory>
 #include <utility>
 #include <vector>
@@ -79,6 +80,8 @@ void SessionMonitor::show() {
   state_.fault = sources_.hold.fault();
   if (in_trial_) {
     state_.state = feeling_ ? "trial" : "homing";
+  } else if (state_.held_by.empty() && !page_.empty()) {
+    state_.state = page_;
   } else if (state_.held_by.empty() && in_words(session.state()) != nullptr) {
     state_.state = in_words(session.state());
   }
@@ -123,9 +126,18 @@ void SessionMonitor::interval(const protocols::Trial& trial, const IntervalView&
     std::optional<double> level = shown->level;
     if (!level && block.level && shown->stimulus >= 0)
       level = protocols::own_level(station_.protocol, block, shown->stimulus);
-    if (level) state_.level = protocols::level_text(*level);
+    if (level) state_.level = protocols::level_in_words(block, *level);
   }
   state_.objects = std::make_shared<const std::vector<stimuli::ObjectSpec>>(std::move(objects));
+  show();
+}
+
+void SessionMonitor::page(const PageView& view) {
+  page_ = view.page.empty() ? ""
+          : view.number == 0
+              ? "page: " + view.page
+              : "question " + std::to_string(view.number) + " of " +
+                    std::to_string(view.questions) + ": " + view.page + ", " + view.question;
   show();
 }
 
@@ -185,8 +197,21 @@ void SessionMonitor::cut_off(const std::string& reason) {
   say("trial " + std::to_string(marker_.trial) + " was cut off: " + reason);
 }
 
+/// The record has every digit of a level that was set.
+std::string SessionMonitor::answer_in_words(const data::TrialRecord& record) const {
+  if (!record.task || !record.task->number ||
+      record.task->task != to_string(protocols::TaskKind::adjust))
+    return record.response;
+  const auto& blocks = station_.protocol.blocks;
+  const auto block = std::find_if(
+      blocks.begin(), blocks.end(),
+      [&](const protocols::TaskBlock& one) { return one.name == record.task->block_name; });
+  return block == blocks.end() ? record.response
+                               : protocols::level_in_words(*block, *record.task->number);
+}
+
 void SessionMonitor::recorded(const data::TrialRecord& record) {
-  state_.answer = record.timed_out ? "none in time" : record.response;
+  state_.answer = record.timed_out ? "none in time" : answer_in_words(record);
   if (!record.timed_out && data::has_right_answer(record))
     state_.answer += record.correct ? ", right" : ", wrong";
   if (record.task && record.task->confidence)

@@ -53,11 +53,14 @@ class SessionMonitor final : public SessionEvents {
   void cut_off(const std::string& reason) override;
   void recorded(const data::TrialRecord& record) override;
   void interval(const protocols::Trial& trial, const IntervalView& view) override;
+  void page(const PageView& view) override;
   void asking(bool now) override { asking_ = now; }
   /// The trial's intervals are over, a question of it is not.
   bool asking() const { return asking_; }
 
  private:
+  std::string answer_in_words(const data::TrialRecord& record) const;
+
   const LiveStation& station_;
   const Sources sources_;
   ConsoleState state_;
@@ -70,6 +73,7 @@ class SessionMonitor final : public SessionEvents {
   bool turned_ = false;         ///< the interval follows a turn: nothing new begins for others
   bool touched_ = false;        ///< in any interval of the trial
   bool asking_ = false;
+  std::string page_;  ///< that is shown, as the state in words; empty: none
 };
 
 }  // namespace palpate::runner

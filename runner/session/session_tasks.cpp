@@ -303,22 +303,36 @@ bool Session::has_open_pages() const {
 void Session::show_pages(PageSpec::When when, const std::string& block) {
   for (const PageSpec& page : station_.protocol.pages) {
     if (page.when != when || page.before_block != block) continue;
-    if (station_.log.has_answers(page.name)) continue;
-    const bool consent = page.kind == PageSpec::Kind::consent;
-    if (!consent) participant_.read_screens(screens_of(page.text, page.pictures));
-    std::vector<data::PageAnswer> answers;
-    PageItem agree;
-    agree.name = "consent";
-    for (const PageItem& item : consent ? std::vector<PageItem>{agree} : page.items) {
-      const std::string shown = consent ? page.text : item.question;
-      std::string answer = participant_.ask(page, item);
-      if (consent && answer != "agree")
-        throw EndOfSession(data::RunEnd::aborted, "consent was not given");
-      answers.push_back({page.name, item.name, page.version, protocols::sha256_hex(shown),
-                         std::move(answer), station_.clock.now_ns()});
-    }
-    if (!answers.empty()) station_.log.answered(answers);
+    if (!station_.log.has_answers(page.name)) show_page(page);
   }
+  tell_page({});
+}
+
+void Session::show_page(const PageSpec& page) {
+  const bool consent = page.kind == PageSpec::Kind::consent;
+  PageItem agree;
+  agree.name = "consent";
+  const std::vector<PageItem> items = consent ? std::vector<PageItem>{agree} : page.items;
+  PageView view{page.name, "", 0, static_cast<int>(items.size())};
+  tell_page(view);
+  if (!consent) participant_.read_screens(screens_of(page.text, page.pictures));
+  std::vector<data::PageAnswer> answers;
+  for (const PageItem& item : items) {
+    view.question = item.name;
+    ++view.number;
+    tell_page(view);
+    const std::string shown = consent ? page.text : item.question;
+    std::string answer = participant_.ask(page, item);
+    if (consent && answer != "agree")
+      throw EndOfSession(data::RunEnd::aborted, "consent was not given");
+    answers.push_back({page.name, item.name, page.version, protocols::sha256_hex(shown),
+                       std::move(answer), station_.clock.now_ns()});
+  }
+  if (!answers.empty()) station_.log.answered(answers);
+}
+
+void Session::tell_page(const PageView& view) {
+  if (events_ != nullptr) events_->page(view);
 }
 
 }  // namespace palpate::runner

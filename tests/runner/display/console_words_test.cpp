@@ -33,6 +33,22 @@ TEST(ConsoleWords, APageToReadNamesTheKeyToPress) {
   EXPECT_EQ(state_detail(held), "") << "the space bar does not";
 }
 
+TEST(ConsoleWords, AQuestionOfAPageSaysWhich) {
+  const ConsoleState state = in("question 2 of 5: about-you, age");
+  EXPECT_EQ(state_title(state), "question 2 of 5");
+  EXPECT_EQ(state_detail(state), "about-you, age");
+  EXPECT_EQ(state_title(in("page: welcome")), "page");
+  EXPECT_EQ(state_detail(in("page: welcome")), "welcome");
+}
+
+TEST(ConsoleWords, NumbersOfAnAxisAreNotRounded) {
+  EXPECT_EQ(axis_label(0), "0");
+  EXPECT_EQ(axis_label(2.5), "2.5");  // half of 5
+  EXPECT_EQ(axis_label(0.5), "0.5");
+  EXPECT_EQ(axis_label(25), "25");
+  EXPECT_EQ(axis_label(500), "500");
+}
+
 TEST(ConsoleWords, TheBarCountsATrialOnceItIsOver) {
   ConsoleState state = in("trial");
   EXPECT_EQ(fraction_done(state), 0);

@@ -107,6 +107,21 @@ TEST_F(LiveTaskButtons, OfTheDeviceAnswerPagesTrialsAndConfidence) {
   expect_all_answered();
 }
 
+TEST_F(LiveTaskButtons, TheConsoleSaysWhichQuestionIsShown) {
+  for (const char* const state :
+       {"question 1 of 1: consent, consent", "question 2 of 2: you, tired", "page: how",
+        "question 1 of 1: after, again"}) {
+    console_.next.clear();
+    console_.last = {};
+    console_.in_state = {state, {ConsoleCommand::Kind::quit, "seen", 0}};
+    FakeDevice device([this](int) {
+      const int button = held();
+      return at(0.1, false, static_cast<std::uint8_t>(button == 0 ? 0 : 1U << (button - 1)));
+    });
+    EXPECT_EQ(run(device, AnswerBy::buttons).reason, "ended by the experimenter: seen") << state;
+  }
+}
+
 TEST_F(LiveTaskButtons, OfAGamepadAnswerPagesTrialsAndConfidence) {
   JoystickKeys keys(
       {{"button 1", "1"}, {"button 2", "2"}, {"button 3", "3"}, {"axis 1 +", "space"}});
