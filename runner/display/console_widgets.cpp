@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdio>
 
 namespace palpate::runner {
@@ -36,6 +37,17 @@ bool wide_button(const char* words, float width, Look look) {
   const bool pressed = ImGui::Button(words, ImVec2(width, 2.0F * ImGui::GetFontSize()));
   if (look != Look::plain) ImGui::PopStyleColor();
   return pressed;
+}
+
+bool slider(const char* name, float& value, const SliderRange& range) {
+  // Behind ### stands what identifies it, as the words change.
+  const std::string words =
+      std::string(name) + " " + fixed_point(value, range.digits) + range.unit + "###" + name;
+  const bool moved = ImGui::SliderFloat(words.c_str(), &value, range.least, range.most, "",
+                                        range.least > 0 ? ImGuiSliderFlags_Logarithmic : 0);
+  const double power = std::pow(10, range.digits);
+  if (moved) value = static_cast<float>(std::round(value * power) / power);
+  return moved;
 }
 
 void wrapped_text(const ImVec4& colour, const std::string& words) {

@@ -28,6 +28,15 @@ void table_row(const char* name, const std::string& value,
 enum class Look { plain, lit, due };  ///< due: the button to press next
 bool wide_button(const char* words, float width, Look look = Look::plain);
 
+struct SliderRange {
+  float least, most;  ///< logarithmic where least > 0
+  int digits;         ///< behind the point, to which it rounds
+  const char* unit;   ///< with a space before it
+};
+/// Name and value stand beside it: in it, the handle would hide the value. \return  whether it was
+/// moved
+bool slider(const char* name, float& value, const SliderRange& range);
+
 std::string fixed_point(double value, int digits);
 
 }  // namespace palpate::runner

@@ -13,6 +13,8 @@
 namespace palpate::runner {
 namespace {
 
+constexpr float kSliderWords = 10;  // widths of a letter, for name and value beside a slider
+
 double force_of(const SceneMoment& moment) {
   const double force = glm::length(moment.sample.device1 + moment.sample.device2);
   return std::isfinite(force) ? force : 0;
@@ -55,9 +57,8 @@ void ExploreView::draw_time(float width) {
     source_.hold(false);
   }
   auto speed = static_cast<float>(timeline_.speed());
-  ImGui::SetNextItemWidth(std::clamp(width - 32 * font - 6 * gap, 5 * font, 12 * font));
-  if (ImGui::SliderFloat("speed", &speed, 0.01F, 2, "%.2f x", ImGuiSliderFlags_Logarithmic))
-    timeline_.set_speed(speed);
+  ImGui::SetNextItemWidth(std::clamp(width - 35 * font - 6 * gap, 5 * font, 12 * font));
+  if (slider("speed", speed, {0.01F, 2, 2, " x"})) timeline_.set_speed(speed);
 }
 
 void ExploreView::draw_plot(float width, float height) {
@@ -167,7 +168,8 @@ void ExploreView::draw_looks() {
   ImGui::NewLine();
   ImGui::SetNextItemWidth(0.4F * ImGui::GetContentRegionAvail().x);
   ImGui::Combo("cut across", &cut_axis_, "nothing\0x\0y\0z\0");
-  if (cut_axis_ > 0) ImGui::SliderFloat("at", &cut_at_, -1, 1, "%.2f of the size");
+  ImGui::SetNextItemWidth(-kSliderWords * ImGui::GetFontSize());
+  if (cut_axis_ > 0) slider("at", cut_at_, {-1, 1, 2, " of the size"});
   if (!settings_.keep_picture) return;
   if (wide_button("Keep this picture", ImGui::GetContentRegionAvail().x)) keep_picture();
   if (clip_ != nullptr) {
@@ -196,18 +198,17 @@ void ExploreView::draw_material() {
   auto damping = static_cast<float>(example.material.damping);
   auto friction = static_cast<float>(example.material.friction_static);
   bool done = false;
-  const auto slider = [&](const char* label, float& value, float least, float most,
-                          const char* form, const std::function<void(stimuli::Material&)>& change) {
-    if (ImGui::SliderFloat(label, &value, least, most, form,
-                           least > 0 ? ImGuiSliderFlags_Logarithmic : 0))
-      for_each_chosen(settings_.objects, touched_object_, change);
+  const auto setting = [&](const char* word, float& value, const SliderRange& range,
+                           const std::function<void(stimuli::Material&)>& change) {
+    ImGui::SetNextItemWidth(-kSliderWords * ImGui::GetFontSize());
+    if (slider(word, value, range)) for_each_chosen(settings_.objects, touched_object_, change);
     done |= ImGui::IsItemDeactivatedAfterEdit();
   };
-  slider("stiffness", stiffness, 10, 5000, "%.0f N/m",
-         [&](stimuli::Material& m) { m.stiffness = std::clamp(stiffness, 0.0F, 1e5F); });
-  slider("damping", damping, 0, 10, "%.2f N s/m",
-         [&](stimuli::Material& m) { m.damping = std::clamp(damping, 0.0F, 1e3F); });
-  slider("friction", friction, 0, 1.5F, "%.2f", [&](stimuli::Material& m) {
+  setting("stiffness", stiffness, {10, 5000, 0, " N/m"},
+          [&](stimuli::Material& m) { m.stiffness = std::clamp(stiffness, 0.0F, 1e5F); });
+  setting("damping", damping, {0, 10, 2, " N s/m"},
+          [&](stimuli::Material& m) { m.damping = std::clamp(damping, 0.0F, 1e3F); });
+  setting("friction", friction, {0, 1.5F, 2, ""}, [&](stimuli::Material& m) {
     m.friction_static = m.friction_dynamic = std::clamp(friction, 0.0F, 10.0F);
   });
   // A scene is compiled anew for each: not while the slider moves.

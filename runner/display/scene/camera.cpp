@@ -87,11 +87,18 @@ bool Camera::in_front(const glm::vec3& point) const {
   return -(view() * glm::vec4(point, 1)).z > near();
 }
 
+float Camera::depth(const glm::vec3& point) const {
+  return std::max(near(), -(view() * glm::vec4(point, 1)).z);
+}
+
+float Camera::height_at(const glm::vec3& depth_of) const {
+  return 2 * depth(depth_of) * std::tan(kFieldOfView / 2);
+}
+
 glm::vec3 Camera::unproject(const glm::vec2& pixel, const glm::vec3& depth_of) const {
-  const float depth = std::min(-near(), (view() * glm::vec4(depth_of, 1)).z);
-  const float per_pixel = -2 * depth * std::tan(kFieldOfView / 2) / height_;
+  const float per_pixel = height_at(depth_of) / height_;
   const glm::vec4 seen((pixel.x - width_ / 2) * per_pixel, (height_ / 2 - pixel.y) * per_pixel,
-                       depth, 1);
+                       -depth(depth_of), 1);
   return {glm::inverse(view()) * seen};
 }
 

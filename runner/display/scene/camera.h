@@ -33,11 +33,14 @@ class Camera {
   bool in_front(const glm::vec3& point) const;  ///< not behind the viewer
   /// The point seen at a pixel, at the same depth as `depth_of`.
   glm::vec3 unproject(const glm::vec2& pixel, const glm::vec3& depth_of) const;
+  /// m, from the lower to the upper edge of the picture at the depth of a point.
+  float height_at(const glm::vec3& depth_of) const;
   glm::vec3 towards_viewer() const;  ///< unit, from the centre to the camera
 
  private:
   glm::mat4 view() const;
   float near() const;
+  float depth(const glm::vec3& point) const;  ///< m, at least near()
 
   float width_ = 1, height_ = 1;     ///< px
   float yaw_ = 0.5F, pitch_ = 0.4F;  ///< rad

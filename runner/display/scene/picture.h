@@ -30,6 +30,9 @@ struct DrawnRod {
   glm::vec3 colour{0.2F};
   /// How much is seen of it inside of or behind objects: 0 nothing, 1 as much as before them.
   float through = 0;
+  /// Of the picture's height: so thick it looks at most at its nearer end, however near that is to
+  /// the viewer; 0: no limit.
+  float thickest = 0;
 };
 
 struct DrawnBall {

@@ -28,6 +28,12 @@ glm::mat4 rod_place(const glm::vec3& from, const glm::vec3& to, float radius) {
           glm::vec4(std::max(length, 1e-3F * radius) * z, 0), glm::vec4(from, 1)};
 }
 
+float radius_seen(const DrawnRod& rod, const Camera& camera) {
+  if (rod.thickest == 0) return rod.radius;
+  const float height = std::min(camera.height_at(rod.from), camera.height_at(rod.to));
+  return std::min(rod.radius, 0.5F * rod.thickest * height);
+}
+
 glm::mat4 ball_place(const glm::vec3& centre, float radius) {
   return glm::scale(glm::translate(glm::mat4(1), centre), glm::vec3(radius));
 }

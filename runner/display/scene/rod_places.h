@@ -5,12 +5,15 @@
 #include <glm/vec3.hpp>
 #include <vector>
 
+#include "runner/display/scene/camera.h"
 #include "runner/display/scene/picture.h"
 
 namespace palpate::runner {
 
 /// Takes the unit z axis from `from` to `to`, x and y to `radius`.
 glm::mat4 rod_place(const glm::vec3& from, const glm::vec3& to, float radius);
+/// The radius with which the rod is drawn.
+float radius_seen(const DrawnRod& rod, const Camera& camera);
 glm::mat4 ball_place(const glm::vec3& centre, float radius);
 
 struct ArrowPlaces {

@@ -30,6 +30,8 @@ constexpr std::array<glm::vec3, 4> kLayerColours{
 constexpr double kIdealRadius = 0.020, kVirtualRadius = 0.012, kHeldRadius = 0.05,
                  kContactRadius = 0.035, kArrowRadius = 0.024, kTurnThickness = 0.013,
                  kTurnRadius = 0.28, kLongestArrow = 1.6;
+// Of the picture's height: the end of a stretched stylus that is held is near to the viewer.
+constexpr double kThickestStretched = 0.035, kThickestHeld = 0.06;
 constexpr double kLengthOfOneNewton = 1.0 / 6;  // of the size: what a device gives at most is 1
 constexpr double kTurnOfOneNewtonMetre = 8;     // rad
 constexpr double kLeastTurn = 0.05, kLongestTurn = 5.5;  // rad
@@ -322,21 +324,25 @@ void SceneDrawing::add_tool(const SceneMoment& moment, const Theme& theme,
     return static_cast<float>(of_size * size_ * settings.thickness);
   };
   const auto add_rod = [&](const rendering::LineProbe& line, double thick, const glm::vec3& colour,
-                           float through) {
-    out.rods.push_back({line.tip, line.tail, radius(thick), colour, through});
+                           float through, double thickest) {
+    out.rods.push_back({line.tip, line.tail, radius(thick), colour, through,
+                        moment.held ? static_cast<float>(thickest * settings.thickness) : 0});
   };
   const bool tip_alone = !settings.sides && tool_.segments.empty();
   for (const rendering::LineProbe& segment : seen.segments)
-    add_rod(segment, tip_alone ? 0.4 * kIdealRadius : kIdealRadius, theme.ideal_tool, 0.30F);
+    add_rod(segment, tip_alone ? 0.4 * kIdealRadius : kIdealRadius, theme.ideal_tool, 0.30F,
+            kThickestStretched);
   if (tip_alone)
     out.balls.push_back({seen.stylus.tip, radius(1.8 * kIdealRadius), theme.ideal_tool, 0.30F});
   // What is held but does not touch.
-  if (!tool_.segments.empty()) add_rod(seen.stylus, 0.4 * kIdealRadius, theme.ideal_tool, 0.2F);
+  if (!tool_.segments.empty())
+    add_rod(seen.stylus, 0.4 * kIdealRadius, theme.ideal_tool, 0.2F, kThickestStretched);
   if (moment.held && finite(moment.held->tip) && finite(moment.held->tail))
-    add_rod(*moment.held, kHeldRadius, theme.grip, 0);
+    add_rod(*moment.held, kHeldRadius, theme.grip, 0, kThickestHeld);
   if (!touching) return;
   for (const rendering::LineProbe& segment : in_hand.segments)
-    add_rod(segment, tip_alone ? 0.5 * kVirtualRadius : kVirtualRadius, theme.virtual_tool, 0.75F);
+    add_rod(segment, tip_alone ? 0.5 * kVirtualRadius : kVirtualRadius, theme.virtual_tool, 0.75F,
+            kThickestStretched);
   if (tip_alone)
     out.balls.push_back(
         {in_hand.stylus.tip, radius(1.8 * kIdealRadius), theme.virtual_tool, 0.75F});

@@ -89,14 +89,16 @@ void SceneRenderer::forget_unused() {
   for (auto& [mesh, known] : meshes_) known.used = false;
 }
 
-std::vector<SceneRenderer::Item> SceneRenderer::tool_items(const ScenePicture& picture) const {
+std::vector<SceneRenderer::Item> SceneRenderer::tool_items(const ScenePicture& picture,
+                                                           const Camera& camera) const {
   std::vector<Item> items;
   const auto ball = [&](const glm::vec3& at, float radius, const glm::vec3& colour, float through) {
     items.push_back({&sphere_, ball_place(at, radius), colour, through});
   };
   for (const DrawnRod& rod : picture.rods) {
-    items.push_back({&cylinder_, rod_place(rod.from, rod.to, rod.radius), rod.colour, rod.through});
-    for (const glm::vec3& end : {rod.from, rod.to}) ball(end, rod.radius, rod.colour, rod.through);
+    const float radius = radius_seen(rod, camera);
+    items.push_back({&cylinder_, rod_place(rod.from, rod.to, radius), rod.colour, rod.through});
+    for (const glm::vec3& end : {rod.from, rod.to}) ball(end, radius, rod.colour, rod.through);
   }
   for (const DrawnBall& drawn : picture.balls)
     ball(drawn.centre, drawn.radius, drawn.colour, drawn.through);
@@ -331,7 +333,7 @@ unsigned SceneRenderer::draw(const ScenePicture& picture, const Camera& camera, 
   lamp_view_ = light_view(picture, lamp_);
   sky_view_ = light_view(picture, {0, 0, 1});
   for (const DrawnObject& object : picture.objects) uploaded(object.mesh);
-  const std::vector<Item> items = tool_items(picture);
+  const std::vector<Item> items = tool_items(picture, camera);
   glDisable(GL_SCISSOR_TEST);
   glDisable(GL_BLEND);
   draw_shadows(picture, items);

@@ -48,7 +48,7 @@ class SceneRenderer {
   };
   const GlMesh& uploaded(const std::shared_ptr<const DrawnMesh>& mesh);
   void forget_unused();
-  std::vector<Item> tool_items(const ScenePicture& picture) const;
+  std::vector<Item> tool_items(const ScenePicture& picture, const Camera& camera) const;
   void draw_shadows(const ScenePicture& picture, const std::vector<Item>& items);
   void prepare_light(const ScenePicture& picture, const Camera& camera, const Theme& theme) const;
   void draw_background(const Theme& theme) const;
