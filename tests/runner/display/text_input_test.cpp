@@ -36,7 +36,8 @@ std::string command(Kind kind, const std::string& text = "") {
 
 TEST(TextInput, SingleKeysAnswer) {
   EXPECT_EQ(heard("1a \r\n\xC3\xA4"), "key:1 key:a key:space key:enter key:enter key:\xC3\xA4 ");
-  EXPECT_EQ(heard(std::string_view("\x01\t\0", 3)), "");
+  EXPECT_EQ(heard(std::string_view("\x01\0", 2)), "");
+  EXPECT_EQ(heard("\t"), "key:tab ");
   EXPECT_EQ(heard("1\x7f\b"), "key:1 key:backspace key:backspace ");
 }
 
