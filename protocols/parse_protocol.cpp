@@ -229,6 +229,8 @@ void read_apparatus(ObjectReader& reader, Protocol& protocol) {
                            "not be the one on record");
     }
   });
+  reader.choice("torque", protocol.torque,
+                {{"required", TorqueRule::required}, {"left_out", TorqueRule::left_out}});
   reader.section("masking_noise", [&](ObjectReader& section) {
     MaskingNoise& noise = protocol.masking_noise.emplace();
     section.choice("kind", noise.kind,

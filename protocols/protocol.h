@@ -23,6 +23,8 @@ enum class OrientationKind { uniform, fixed, listed };
 /// What is done about a material that the device cannot render passively: refuse the session, or
 /// limit the stiffness.
 enum class MaterialLimit { refuse, limit };
+/// What becomes of torque on a device that drives force alone.
+enum class TorqueRule { required, left_out };
 
 enum class NoiseKind { white, pink };
 const char* to_string(NoiseKind kind);  ///< "white", "pink"
@@ -96,6 +98,7 @@ struct Protocol {
   double servo_rate = 1000;           ///< Hz
   bool passivity_controller = false;  ///< dissipates the energy that sampling would generate
   MaterialLimit material_limit = MaterialLimit::refuse;
+  TorqueRule torque = TorqueRule::required;
   struct Home {
     double rest = 0.5;     ///< s
     double margin = 0.01;  ///< m outside the bounding spheres

@@ -38,7 +38,7 @@ DeviceReading GuardedReading::reading() const {
 DeviceCapabilities FixedCapabilities::numbers() const {
   return {name.data(),        sensed_freedom,   actuated_freedom, max_force, max_stiffness,
           max_rate,           workspace_radius, resolution,       simulated, serial.data(),
-          calibration.data(), damping,          friction,         any_rate};
+          calibration.data(), damping,          friction,         any_rate,  max_torque};
 }
 
 void FixedCapabilities::set(const DeviceCapabilities& from) {
@@ -56,6 +56,7 @@ void FixedCapabilities::set(const DeviceCapabilities& from) {
   friction = from.friction;
   simulated = from.simulated;
   any_rate = from.any_rate;
+  max_torque = from.max_torque;
 }
 
 void futex_wait(const std::atomic<std::uint32_t>& word, std::uint32_t value,

@@ -38,7 +38,7 @@ struct FixedCapabilities {
   std::array<char, 256> serial{}, calibration{};
   int sensed_freedom = 0, actuated_freedom = 0;
   double max_force = 0, max_stiffness = 0, max_rate = 0, workspace_radius = 0, resolution = 0;
-  double damping = 0, friction = 0;
+  double damping = 0, friction = 0, max_torque = 0;
   bool simulated = false, any_rate = false;
 };
 

@@ -27,8 +27,24 @@ const char* advice(DeviceTrouble trouble) noexcept {
       return "the guard process has ended or hangs: start the program again";
     case DeviceTrouble::reopening:
       return "the device is being opened again";
+    case DeviceTrouble::not_calibrated:
+      return "the device asks for its maker's calibration: put the grip into its calibration pit, "
+             "or calibrate it as its manual says";
+    case DeviceTrouble::stopped_by_device:
+      return "the device has taken its forces off by itself: it was moved too fast, is too warm, "
+             "or had no command for too long";
+    case DeviceTrouble::service_gone:
+      return "the maker's service through which the device is reached has ended: start it again";
+    case DeviceTrouble::in_use:
+      return "another program commands the device: end that program";
   }
   return "";
+}
+
+bool needs_reopening(DeviceTrouble trouble) noexcept {
+  return trouble == DeviceTrouble::unplugged || trouble == DeviceTrouble::silent ||
+         trouble == DeviceTrouble::stopped_by_device || trouble == DeviceTrouble::service_gone ||
+         trouble == DeviceTrouble::in_use;
 }
 
 }  // namespace palpate::runner

@@ -13,7 +13,7 @@ struct DeviceCapabilities {
   std::string name;
   int sensed_freedom = 3;       ///< degrees of freedom sensed: 3 position, 5 position and axis
   int actuated_freedom = 3;     ///< degrees of freedom driven: 3 force, 5 force and torque
-  double max_force = 0;         ///< N, of each device at an end of the stylus
+  double max_force = 0;         ///< N, of each device: at each end of the stylus where two hold it
   double max_stiffness = 0;     ///< N/m that it can show at max_rate
   double max_rate = 1000;       ///< Hz
   double workspace_radius = 0;  ///< m about the device's centre, reached in every direction
@@ -25,6 +25,9 @@ struct DeviceCapabilities {
   double damping = 0;     ///< N s/m, viscous, physical, of the whole device; 0: not known
   double friction = 0;    ///< N, Coulomb, of the whole device; 0: not known
   bool any_rate = false;  ///< has no rate of its own: max_rate is what was asked for
+  /// N m about the tip, of one device that drives torque at its grip; its force is max_force in
+  /// all. 0: it drives none, or two devices hold the ends.
+  double max_torque = 0;
 };
 
 /// What is wrong with a reading.
@@ -40,9 +43,15 @@ enum class DeviceTrouble : std::uint8_t {
   guard_late,  ///< the guard process has given no readings for a while; it may again
   guard_lost,  ///< the guard process has ended, or has been silent for so long that it counts so
   reopening,   ///< the guard process is opening the device again
+  not_calibrated,     ///< its maker's calibration is due: positions mean nothing
+  stopped_by_device,  ///< it has taken its own forces off: too fast, too warm, its watchdog
+  service_gone,       ///< the program through which it is reached has ended
+  in_use,             ///< another program commands it
 };
 /// In words, with what the experimenter can do; empty for none.
 const char* advice(DeviceTrouble trouble) noexcept;
+/// Whether the device must be opened again before it can work.
+bool needs_reopening(DeviceTrouble trouble) noexcept;
 
 struct DeviceReading {
   rendering::LineProbe stylus;  ///< m, tip and tail
@@ -56,7 +65,8 @@ class Device {
   virtual ~Device() = default;
   virtual const DeviceCapabilities& capabilities() const = 0;
   virtual DeviceReading read() noexcept = 0;
-  /// Forces on the hand, N: device 1 at the tip, device 2 at the tail (eq. 1).
+  /// Forces on the hand, N: device 1 at the tip, device 2 at the tail (eq. 1). The servo gives a
+  /// device that drives 3 degrees of freedom all force as device 1's.
   virtual void write(const Vec3& device1, const Vec3& device2) noexcept = 0;
   /// Opens a device again that was unplugged or fell silent; does nothing where it works.
   /// May take seconds, without forces: never in the servo thread.

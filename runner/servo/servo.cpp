@@ -53,7 +53,10 @@ Servo::Servo(Device& device, Clock& clock, double rate, const ForceLimits& limit
       limiter_({std::min(limits.max_force, device.capabilities().max_force), limits.max_change,
                 limits.ramp},
                1 / rate),
-      workspace_(workspace) {}
+      workspace_(workspace),
+      drives_force_alone_(device.capabilities().actuated_freedom == 3),
+      grip_force_(std::min(limits.max_force, device.capabilities().max_force)),
+      grip_torque_(device.capabilities().max_torque) {}
 
 void Servo::prepare(const rendering::Scene& scene, const rendering::Renderer& renderer,
                     const HomeZone& home) {
@@ -155,10 +158,26 @@ void Servo::check(const DeviceReading& reading) noexcept {
   }
 }
 
-void Servo::command(const Vec3& device1, const Vec3& device2) noexcept {
+void Servo::command(Vec3 device1, Vec3 device2) noexcept {
   if (emergency_.load()) {
     sample_.faults |= servo_fault::kEmergency;
     limiter_.trip();
+  }
+  // A device with one grip adds both forces up: the limits and the energy account see their sum.
+  // Its torque is left out.
+  if (drives_force_alone_) {
+    device1 += device2;
+    device2 = Vec3(0);
+  }
+  if (grip_torque_ > 0 && sample_.phase == Phase::feeling) {
+    const rendering::LineProbe ends = workspace_.to_device(sample_.probe);
+    const double force = glm::length(device1 + device2) / grip_force_;
+    const double torque = glm::length(glm::cross(ends.tail - ends.tip, device2)) / grip_torque_;
+    if (const double most = std::max(force, torque); most > 1) {
+      device1 /= most;
+      device2 /= most;
+      sample_.faults |= servo_fault::kForceLimited;
+    }
   }
   const DeviceForces forces =
       passivity_ ? kept_passive(device1, device2) : limiter_.apply(device1, device2);

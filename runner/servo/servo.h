@@ -110,7 +110,7 @@ class Servo final : public TickSource {
   void keep_time() noexcept;
   void warm_up() noexcept;
   void check(const DeviceReading& reading) noexcept;
-  void command(const Vec3& device1, const Vec3& device2) noexcept;
+  void command(Vec3 device1, Vec3 device2) noexcept;
   DeviceForces kept_passive(const Vec3& device1, const Vec3& device2) noexcept;
 
   static constexpr int kMissedInARow = 5;  ///< missed ticks at which forces go off
@@ -123,6 +123,10 @@ class Servo final : public TickSource {
   std::int64_t read_ns_ = 0;  ///< when the device had been read
   ForceLimiter limiter_;
   WorkspaceMap workspace_;
+  bool drives_force_alone_;  ///< one grip, no torque
+  /// N, N m, of one grip that drives torque; 0: of none. Force and
+  /// torque are scaled together, before the limiter, which knows ends of a stylus only.
+  double grip_force_ = 0, grip_torque_ = 0;
   std::optional<PassivityController> passivity_;
   std::unique_ptr<TrialScene> own_;  ///< of prepare()
   TrialScene* shown_ = nullptr;

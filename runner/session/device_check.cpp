@@ -249,6 +249,10 @@ ShowableMaterial showable(const stimuli::Material& material, const DeviceCapabil
   return out;
 }
 
+bool torque_is_left_out(const DeviceCapabilities& device) {
+  return device.sensed_freedom >= 5 && device.actuated_freedom == 3;
+}
+
 std::vector<LimitedMaterial> limit_materials(protocols::Protocol& protocol,
                                              const DeviceCapabilities& device) {
   std::vector<LimitedMaterial> out;
@@ -337,6 +341,11 @@ std::vector<std::string> incompatibilities(const protocols::Protocol& protocol,
     if (device.sensed_freedom < needed) {
       add("renderer '", protocols::to_string(kind), "' needs a device that senses ", needed,
           " degrees of freedom; '", device.name, "' senses ", device.sensed_freedom);
+    } else if (needed == 5 && torque_is_left_out(device) &&
+               protocol.torque != protocols::TorqueRule::left_out) {
+      add("renderer '", protocols::to_string(kind), "' gives torque, and '", device.name,
+          "' drives force alone: set /torque to \"left_out\" to show the force without it, which "
+          "is on record");
     }
   }
   if (protocol.reach && protocol.reach->pivot != protocols::ReachSpec::Pivot::point &&

@@ -15,6 +15,10 @@ std::vector<std::string> incompatibilities(const protocols::Protocol& protocol,
                                            const StimulusLibrary& library,
                                            const DeviceCapabilities& device);
 
+/// Whether the device senses the axis of the stylus and drives force alone: what a side contact
+/// gives is felt without its torque.
+bool torque_is_left_out(const DeviceCapabilities& device);
+
 /// What of a material a device can show at a rate without feeding energy to the hand.
 struct ShowableMaterial {
   double fraction = 1;  ///< of its stiffness and damping together; 1: all, 0: nothing

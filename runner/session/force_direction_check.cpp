@@ -61,8 +61,8 @@ class CommandCheck {
 
 }  // namespace
 
-ForceDirectionCheck::ForceDirectionCheck(const ForceLimits& limits, bool both_ends)
-    : limits_(limits), force_(std::min(1.0, 0.5 * limits.max_force)), both_ends_(both_ends) {}
+ForceDirectionCheck::ForceDirectionCheck(const ForceLimits& limits, int driven)
+    : limits_(limits), force_(std::min(1.0, 0.5 * limits.max_force)), both_ends_(driven >= 5) {}
 
 rendering::Rendering ForceDirectionCheck::tick(const rendering::Scene&, rendering::RenderState&,
                                                const rendering::LineProbe& probe,

@@ -15,11 +15,13 @@ class ForceDirectionCheck final : public rendering::Renderer {
  public:
   static constexpr double kSeconds = 1;  ///< of the push
 
-  /// \param limits     that are in force: the smaller of the program's and the device's
-  /// \param both_ends  of a stylus that two devices hold; else all of it at the tip
-  ForceDirectionCheck(const ForceLimits& limits, bool both_ends);
+  /// \param limits  that are in force: the smaller of the program's and the device's
+  /// \param driven  degrees of freedom that the device drives. 5: push both ends of the stylus;
+  ///                fewer: all of it at the grip, even where the device senses an axis
+  ForceDirectionCheck(const ForceLimits& limits, int driven);
 
   double force() const { return force_; }  ///< N, at each end
+  bool both_ends() const { return both_ends_; }
   const ForceLimits& limits() const { return limits_; }
 
   /// Pushes for kSeconds through the servo and its limits as in a trial, then takes the force off.

@@ -74,9 +74,7 @@ std::string LiveForces::allow(const std::function<bool()>& stop) {
   // Zero force that is asked for from now on is kept, however long this takes.
   servo_.clear_fault();
   await(is_settled, kReadingPatience, stop);
-  const bool away =
-      sample_.trouble == DeviceTrouble::unplugged || sample_.trouble == DeviceTrouble::silent;
-  if (guard_ != nullptr && away) {
+  if (guard_ != nullptr && needs_reopening(sample_.trouble)) {
     std::string trouble = open_again(stop);
     if (!trouble.empty()) return trouble;
     await(is_well, kReadingPatience, stop);

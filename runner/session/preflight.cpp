@@ -106,7 +106,8 @@ int Preflight::missing_button() const {
 std::string Preflight::limits_in_words() const {
   const ForceLimits& limits = needs_.push->limits();
   return "forces of up to " + newtons(limits.max_force) +
-         " at each end (the device's own limit: " + newtons(needs_.device_limit) + "), " +
+         (needs_.push->both_ends() ? " at each end" : " at the grip") +
+         " (the device's own limit: " + newtons(needs_.device_limit) + "), " +
          newtons(limits.max_change) + " of change a tick";
 }
 

@@ -140,7 +140,7 @@ class PreflightDialogue {
     Checklist list = preflight_.checklist();
     const DeviceTrouble trouble = state_.sample.trouble;
     // What takes more than the hand that is at the grip.
-    if (trouble == DeviceTrouble::unplugged || trouble == DeviceTrouble::silent)
+    if (needs_reopening(trouble))
       list.instruction += "; after that " + station_.console.name_of(Kind::clear_fault);
     if (!state_.fault.empty()) {  // nothing else is obeyed before
       list.instruction = "forces are off: " + state_.fault +

@@ -149,6 +149,7 @@ json values(const Protocol& p) {
               p.servo_rate,
               p.passivity_controller,
               p.material_limit,
+              p.torque,
               p.home.rest,
               p.home.margin,
               p.texts.move_away,

@@ -9,8 +9,10 @@ namespace palpate::runner::testing {
 /// Reads what a function of the tick says, keeps what was written last.
 class FakeDevice final : public Device {
  public:
-  explicit FakeDevice(std::function<DeviceReading(int tick)> script) : script_(std::move(script)) {
-    capabilities_ = {"fake", 5, 5, 8, 3000, 1000, 0.2, 0, true};
+  /// \param drives  degrees of freedom
+  explicit FakeDevice(std::function<DeviceReading(int tick)> script, int drives = 5)
+      : script_(std::move(script)) {
+    capabilities_ = {"fake", 5, drives, 8, 3000, 1000, 0.2, 0, true};
   }
   const DeviceCapabilities& capabilities() const override { return capabilities_; }
   DeviceReading read() noexcept override { return script_(tick_++); }
@@ -20,6 +22,7 @@ class FakeDevice final : public Device {
     last2 = device2;
   }
 
+  void drive_at_grip(double max_torque) { capabilities_.max_torque = max_torque; }
   void limit(double max_force) { capabilities_.max_force = max_force; }
 
   Vec3 force, last1, last2;

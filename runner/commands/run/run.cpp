@@ -109,6 +109,14 @@ void tell(LiveSession& session, const LiveStation& station, const Beforehand& kn
   }
   if (!known.limited.empty())
     record.note(began_ns, to_json_text(known.limited, station.device, station.protocol.servo_rate));
+  const auto& renderers = station.protocol.renderers;
+  const bool side_contact = std::any_of(renderers.begin(), renderers.end(), [](auto kind) {
+    return renderer_for(kind).side_contact();
+  });
+  if (side_contact && torque_is_left_out(station.device)) {
+    session.say("torque is left out: this device drives force alone");
+    record.note(began_ns, R"({"torque":"left out"})");
+  }
   if (station.protocol.sounds && station.noise == nullptr) {
     session.say("WITHOUT the protocol's sounds");
     record.note(began_ns, R"({"sounds":"left out"})");
@@ -247,7 +255,7 @@ int run_command(const std::vector<std::string>& args) {
   // The servo loop, without forces until the first trial; the displays, of which each can end them.
   const ServoSettings servo_settings = servo_settings_of(protocol);
   const ForceDirectionCheck direction_check(limits_of(servo_settings, device),
-                                            device.sensed_freedom >= 5);
+                                            device.actuated_freedom);
   const std::int64_t servo_began_ns = clock.now_ns();
   ServoThread servo(*open.device, clock, servo_settings);
   const ZeroOnSignal servo_on_signal(signals, &servo);

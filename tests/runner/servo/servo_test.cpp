@@ -266,6 +266,66 @@ TEST(Servo, MissedTicksAreCountedAndFiveInARowEndTheForce) {
   }
 }
 
+TEST(Servo, ADeviceThatDrivesThreeGetsTheWholeForceAtItsGripWithinItsLimit) {
+  // The stylus lies on the cube's upper face, its middle above the face's: each end gets a half.
+  const auto lie_down = [](double floor) {
+    return [floor](int tick) {
+      const double z = tick < 600 ? 0.1 : std::max(floor, 0.1 - 1e-4 * (tick - 600));
+      return DeviceReading{{{-0.06, 0, z}, {0.06, 0, z}}, 0, false};
+    };
+  };
+  for (const bool controlled : {false, true}) {
+    for (const int driven : {3, 5}) {
+      for (const double floor : {0.026, 0.01}) {  // 4 mm deep, 3.2 N; 20 mm deep, 16 N
+        FakeDevice device(lie_down(floor), driven);
+        VirtualClock clock;
+        Servo servo(device, clock, 1000, ForceLimits{});
+        if (controlled) servo.control_passivity();
+        servo.prepare(cube_scene(), rendering::ray_renderer(), HomeZone{});
+        Vec3 last(0);
+        for (int tick = 0; tick < 3000; ++tick) {
+          const Sample& sample = servo.tick();
+          if (driven == 5) continue;
+          ASSERT_EQ(device.last2, Vec3(0));
+          ASSERT_LE(glm::length(device.force), 6 + 1e-12);
+          ASSERT_LE(glm::length(device.force - last), 0.5 + 1e-12);
+          ASSERT_EQ(sample.device1, device.force) << "what was commanded";
+          last = device.force;
+        }
+        const bool deep = floor < 0.02;
+        const double whole = deep ? (driven == 3 ? 6 : 12) : 3.2;
+        EXPECT_NEAR(device.force.z, whole, 1e-6) << driven << " " << floor;
+        EXPECT_NEAR(device.last1.z, driven == 3 ? whole : whole / 2, 1e-6);
+      }
+    }
+  }
+}
+
+TEST(Servo, AGripThatDrivesTorqueGetsForceAndTorqueWithinItsLimitsInTheSameRatio) {
+  for (const double middle : {-0.05, 0.0, 0.05}) {  // of the stylus beside that of the face, m
+    const auto lie_down = [middle](int tick) {
+      const double z = tick < 600 ? 0.1 : std::max(0.01, 0.1 - 1e-4 * (tick - 600));
+      return DeviceReading{{{middle - 0.06, 0, z}, {middle + 0.06, 0, z}}, 0, false};
+    };
+    FakeDevice device(lie_down);
+    device.drive_at_grip(0.2);
+    VirtualClock clock;
+    Servo servo(device, clock, 1000, ForceLimits{});
+    servo.prepare(cube_scene(), rendering::ray_renderer(), HomeZone{});
+    for (int tick = 0; tick < 3000; ++tick) {
+      const Sample& sample = servo.tick();
+      ASSERT_LE(glm::length(device.force), 6 + 1e-12);
+      ASSERT_LE(0.12 * glm::length(device.last2), 0.2 + 1e-12) << "N m about the tip";
+      ASSERT_EQ(sample.device2, device.last2) << "what was commanded";
+    }
+    const Sample sample = servo.tick();
+    EXPECT_NEAR(0.12 * device.last2.z, 0.2, 1e-9) << "torque is what limits it";
+    EXPECT_NEAR(device.last1.z / device.last2.z,
+                sample.rendering.device1.z / sample.rendering.device2.z, 1e-9);
+    EXPECT_TRUE(sample.faults & servo_fault::kForceLimited);
+  }
+}
+
 TEST(Servo, TheWorkspaceMapMovesAndScales) {
   // Twice as large in the virtual world, seen from (0, 0, 0.05).
   FakeDevice device([](int tick) {

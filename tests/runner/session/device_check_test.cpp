@@ -50,6 +50,27 @@ double share(const stimuli::Material& material, const DeviceCapabilities& device
   return showable(material, device, rate, scale, controlled).fraction;
 }
 
+TEST(DeviceCheck, ARendererWithTorqueNeedsADeviceThatDrivesItOrAProtocolThatLeavesItOut) {
+  for (const int driven : {0, 3, 5}) {
+    for (const bool ray : {false, true}) {
+      for (const bool left_out : {false, true}) {
+        protocols::Protocol protocol = some_protocol(of(100));
+        if (ray) protocol.renderers = {protocols::RendererKind::ray};
+        if (left_out) protocol.torque = protocols::TorqueRule::left_out;
+        DeviceCapabilities device = some_device();
+        device.actuated_freedom = driven;
+        const StimulusLibrary library(protocol);
+        const std::vector<std::string> faults = incompatibilities(protocol, library, device);
+        const bool refused = driven == 3 && ray && !left_out;
+        ASSERT_EQ(faults.size(), refused ? 1U : 0U) << driven << ray << left_out;
+        if (refused) {
+          EXPECT_NE(faults[0].find("/torque"), std::string::npos) << faults[0];
+        }
+      }
+    }
+  }
+}
+
 TEST(DeviceCheck, LevelsThatFailAlikeAreOneSentence) {
   const protocols::Protocol protocol = protocols::parse_protocol_text(
       R"({"version": 2, "name": "levels", "renderers": ["point"],

@@ -91,7 +91,7 @@ TEST(Preflight, WhatIsLeftOutIsOnRecord) {
 }
 
 TEST(Preflight, ThePushIsAskedForGivenAndFelt) {
-  const ForceDirectionCheck push({2.5, 0.5, 0.2}, false);
+  const ForceDirectionCheck push({2.5, 0.5, 0.2}, 3);
   PreflightNeeds needs{0.03, 0};
   needs.push = &push;
   needs.device_limit = 2.5;
@@ -103,7 +103,7 @@ TEST(Preflight, ThePushIsAskedForGivenAndFelt) {
   EXPECT_FALSE(preflight.push_due()) << "not before somebody holds the grip";
   EXPECT_NE(
       preflight.checklist().instruction.find(
-          "forces of up to 2.5 N at each end (the device's own limit: 2.5 N), 0.5 N of change "
+          "forces of up to 2.5 N at the grip (the device's own limit: 2.5 N), 0.5 N of change "
           "a tick; hold the grip: a push of 1.0 N to the right"),
       std::string::npos)
       << preflight.checklist().instruction;
@@ -128,7 +128,7 @@ TEST(Preflight, ThePushIsAskedForGivenAndFelt) {
 }
 
 TEST(Preflight, ADeviceThatIsLostWhileItPushesIsHomedAndPushesAgain) {
-  const ForceDirectionCheck push({6, 0.5, 0.2}, false);
+  const ForceDirectionCheck push({6, 0.5, 0.2}, 3);
   PreflightNeeds needs{0, 0};
   needs.push = &push;
   Preflight preflight(needs);
@@ -163,19 +163,19 @@ class Grip final : public Device {
 };
 
 TEST(ForceDirectionCheck, PushesToTheRightWithinTheLimitsAndLetsGo) {
-  for (const bool both : {false, true}) {
+  for (const int driven : {3, 5}) {
     for (const double limit : {6.0, 0.8}) {
       Grip grip(limit);
       VirtualClock clock;
       const ForceLimits limits{limit, 0.5, 0.2};
       Servo servo(grip, clock, 1000, limits);
-      const ForceDirectionCheck push(limits, both);
+      const ForceDirectionCheck push(limits, driven);
       EXPECT_EQ(push.force(), std::min(1.0, limit / 2));
       EXPECT_EQ(push.push(servo, [] { return false; }), "");
       double most = 0, before = 0;
       for (const auto& [tip, tail] : grip.commands) {
         EXPECT_EQ(Vec3(tip.x, 0, 0), tip);
-        EXPECT_EQ(tail, both ? tip : Vec3(0));
+        EXPECT_EQ(tail, driven == 5 ? tip : Vec3(0));
         EXPECT_LE(tip.x - before, 0.01) << "a ramp";
         before = tip.x;
         most = std::max(most, tip.x);
@@ -215,7 +215,7 @@ class WrongServo final : public TickSource {
 };
 
 TEST(ForceDirectionCheck, TellsWhatIsWrongWithTheCommands) {
-  const ForceDirectionCheck push({2, 0.5, 0.2}, true);
+  const ForceDirectionCheck push({2, 0.5, 0.2}, 5);
   const std::pair<std::string, std::function<void(Sample&)>> cases[] = {
       {"", [](Sample&) {}},
       {"above the limit of 2.00 N", [](Sample& s) { s.device2.z = s.tick < 400 ? 0 : 2.1; }},

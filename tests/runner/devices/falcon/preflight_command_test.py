@@ -22,9 +22,9 @@ class Preflight(FalconSession):
         self.assertFalse(self.state()["torque_before_homing"])
         self.control.tell("shake 1 0.035")
         terminal.wait_for("limits: forces of up to ")
-        limits = re.search(r"up to ([\d.]+) N at each end \(the device's own limit: ([\d.]+) N\)", terminal.text)
+        limits = re.search(r"up to ([\d.]+) N at the grip \(the device's own limit: ([\d.]+) N\)", terminal.text)
         terminal.wait_for("(':go': push)")
-        limits = limits or re.search(r"up to ([\d.]+) N at each end \(the device's own limit: ([\d.]+) N\)",
+        limits = limits or re.search(r"up to ([\d.]+) N at the grip \(the device's own limit: ([\d.]+) N\)",
                                      terminal.text)
         self.assertEqual(float(limits[1]), min(6.0, float(limits[2])))
         farthest = self.pushed_and_felt(terminal)
