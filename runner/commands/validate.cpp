@@ -137,7 +137,7 @@ void print_summary(const protocols::Protocol& protocol, std::ostream& out) {
 
 void print_verdict(const std::string& what, const std::vector<std::string>& reasons,
                    const std::vector<LimitedMaterial>& limited, std::ostream& out) {
-  out << "    " << std::left << std::setw(12) << what
+  out << "    " << std::left << std::setw(15) << what
       << (reasons.empty() ? limited.empty() ? "yes" : "yes, with limits:" : "no:") << "\n";
   for (const std::string& reason : reasons) out << "      " << stimuli::printable(reason) << "\n";
   if (!reasons.empty()) return;
@@ -154,7 +154,7 @@ void print_fitness(const protocols::Protocol& protocol, const StimulusLibrary& l
   config.stylus_grip = protocol.stylus.grip;
   out << "  can be shown by (run --device NAME)\n";
   for (const DeviceKind& kind : device_kinds()) {
-    const DeviceCapabilities can = nominal_capabilities(kind, config);
+    const DeviceCapabilities can = kind.nominal(config);
     protocols::Protocol shown = protocol;
     const std::vector<LimitedMaterial> limited = limit_materials(shown, can);
     print_verdict(kind.name, incompatibilities(shown, library, can), limited, out);

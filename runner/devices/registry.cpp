@@ -1,17 +1,32 @@
 #include "runner/devices/registry.h"
 
+#include <fcntl.h>
+#include <poll.h>
+#include <sys/prctl.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <chrono>
+#include <csignal>
+#include <cstring>
+#include <nlohmann/json.hpp>
+#include <optional>
 #include <stdexcept>
-#include <string_view>
 
 #include "runner/devices/falcon/open.h"
-#include "runner/devices/falcon/parameters.h"
+#include "runner/devices/forcedimension/forcedimension.h"
+#include "runner/devices/haply/inverse3.h"
 #include "runner/devices/mouse.h"
 #include "runner/devices/stroking.h"
 
 namespace palpate::runner {
 namespace {
 
-std::vector<ConnectedDevice> always_there() { return {{}}; }
+using Json = nlohmann::json;
+constexpr auto kListingPatience = std::chrono::seconds(3);
+
+std::vector<ConnectedDevice> always_there(const DeviceConfig& /*config*/) { return {{}}; }
 void nothing_to_check(const DeviceConfig& /*config*/) {}
 
 std::unique_ptr<Device> open_simulated(const DeviceConfig& config) {
@@ -22,34 +37,113 @@ std::unique_ptr<Device> open_mouse(const DeviceConfig& config) {
   return std::make_unique<MouseStylus>(config.stylus_length, config.rate);
 }
 
+template <std::unique_ptr<Device> (*open)(const DeviceConfig&)>
+DeviceCapabilities as_opened(const DeviceConfig& config) {
+  return open(config)->capabilities();
+}
+
 constexpr DeviceKind kKinds[] = {
     {"falcon", "a Novint Falcon: position and force of one point, no orientation", true,
-     falcon::check_falcon, falcon::connected_falcons, falcon::open_falcon},
+     falcon::check_falcon, falcon::nominal_falcon, falcon::connected_falcons, falcon::open_falcon},
     {"falcon2", "two Novint Falcons that hold the ends of a stylus", true, falcon::check_falcon2,
-     falcon::connected_falcons, falcon::open_falcon2},
+     falcon::nominal_falcon2, falcon::connected_falcons, falcon::open_falcon2},
+#ifdef PALPATE_FORCEDIMENSION
+    {"forcedimension",
+     "a Force Dimension omega, delta, sigma or lambda, through the maker's library", true,
+     forcedimension::check, forcedimension::nominal, forcedimension::connected,
+     forcedimension::open},
+#endif
+#ifdef PALPATE_HAPLY
+    {"inverse3", "a Haply Inverse3, with or without a Verse Grip, through the maker's service",
+     true, haply::check, haply::nominal, haply::connected, haply::open},
+#endif
     {"mouse", "the pointer moves a stylus in the window; contact is seen, not felt", false,
-     nothing_to_check, always_there, open_mouse},
+     nothing_to_check, as_opened<open_mouse>, always_there, open_mouse},
     {"simulated",
      "a stylus held by two simulated devices and a simulated hand that moves to and fro", false,
-     nothing_to_check, always_there, open_simulated},
+     nothing_to_check, as_opened<open_simulated>, always_there, open_simulated},
 };
+
+/// What a listing process sends: {"found": [...]} or {"error": "..."}.
+std::string listing_of(const DeviceKind& kind, const DeviceConfig& config) noexcept {
+  Json out;
+  try {
+    out["found"] = Json::array();
+    for (const ConnectedDevice& one : kind.connected(config))
+      out["found"].push_back({{"serial", one.serial}, {"trouble", one.trouble}});
+  } catch (const std::exception& error) {
+    out = {{"error", error.what()}};
+  } catch (...) {
+    out = {{"error", "the devices could not be listed"}};
+  }
+  return out.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+void write_all(int to, const std::string& text) {
+  for (std::size_t sent = 0; sent < text.size();) {
+    const ssize_t n = write(to, text.data() + sent, text.size() - sent);
+    if (n < 0 && errno == EINTR) continue;
+    if (n <= 0) return;
+    sent += static_cast<std::size_t>(n);
+  }
+}
+
+/// All that comes until the other end closes; none after the patience.
+std::optional<std::string> read_all(int from) {
+  const auto give_up = std::chrono::steady_clock::now() + kListingPatience;
+  std::string text;
+  while (true) {
+    const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(
+        give_up - std::chrono::steady_clock::now());
+    pollfd waiting{from, POLLIN, 0};
+    const int ready = left.count() > 0 ? poll(&waiting, 1, static_cast<int>(left.count())) : 0;
+    if (ready < 0 && errno == EINTR) continue;
+    if (ready <= 0) return std::nullopt;
+    char some[4096];
+    const ssize_t n = read(from, some, sizeof some);
+    if (n < 0 && errno == EINTR) continue;
+    if (n <= 0) return text;
+    text.append(some, static_cast<std::size_t>(n));
+  }
+}
 
 }  // namespace
 
-std::span<const DeviceKind> device_kinds() { return kKinds; }
-
-DeviceCapabilities nominal_capabilities(const DeviceKind& kind, const DeviceConfig& config) {
-  if (!kind.has_force_feedback) return kind.open(config)->capabilities();
-  const int freedom = std::string_view(kind.name) == "falcon" ? 3 : 5;
-  DeviceCapabilities can;
-  can.name = kind.name;
-  can.sensed_freedom = can.actuated_freedom = freedom;
-  can.max_stiffness = falcon::kMaxStiffness;
-  can.max_rate = falcon::kMaxRate;
-  can.workspace_radius = falcon::kWorkspaceRadius;
-  can.resolution = falcon::kResolution;
-  return can;
+std::vector<ConnectedDevice> list_connected(const DeviceKind& kind, const DeviceConfig& config) {
+  if (!kind.has_force_feedback) return kind.connected(config);
+  int ends[2];
+  if (pipe2(ends, O_CLOEXEC) != 0)
+    throw std::runtime_error(std::string("the devices cannot be listed: ") + std::strerror(errno));
+  const int runner = getpid();
+  const pid_t lister = fork();
+  if (lister == 0) {
+    prctl(PR_SET_PDEATHSIG, SIGKILL);
+    if (getppid() != runner) _exit(1);
+    const int nothing = open("/dev/null", O_WRONLY | O_CLOEXEC);
+    if (nothing >= 0) dup2(nothing, STDOUT_FILENO);  // what a library says is no result of ours
+    write_all(ends[1], listing_of(kind, config));
+    _exit(0);
+  }
+  close(ends[1]);
+  const std::string why = lister < 0 ? std::strerror(errno) : "";
+  const std::optional<std::string> said = lister < 0 ? std::nullopt : read_all(ends[0]);
+  close(ends[0]);
+  if (lister < 0) throw std::runtime_error("the devices cannot be listed: " + why);
+  if (!said) kill(lister, SIGKILL);
+  waitpid(lister, nullptr, 0);
+  if (!said)
+    throw std::runtime_error("listing these devices took longer than 3 s: is one of them stuck?");
+  const Json listing = Json::parse(*said, nullptr, false);
+  if (!listing.is_object())
+    throw std::runtime_error("the program that lists these devices crashed");
+  if (listing.contains("error")) throw std::runtime_error(listing["error"].get<std::string>());
+  std::vector<ConnectedDevice> found;
+  for (const Json& one : listing["found"])
+    found.push_back({one["serial"].get<std::string>(), one["trouble"].get<std::string>()});
+  return found;
 }
+
+std::span<const DeviceKind> device_kinds() { return kKinds; }
 
 const DeviceKind& device_kind(const std::string& name) {
   std::string known;

@@ -13,6 +13,8 @@ struct DeviceConfig {
   std::vector<std::string> serials;  ///< which ones, where several are plugged in; empty: any
   std::string firmware;              ///< file to upload where the device needs one; empty: none
   std::string calibration;           ///< file of calibrations; empty: none
+  std::string library;               ///< the maker's, where one is loaded; empty: looked for
+  std::string service;               ///< HOST:PORT of the maker's program; empty: where it says
 };
 
 /// A device that is plugged in (or, for the mouse and the simulated one, always there).

@@ -33,6 +33,7 @@ Json to_json(const DeviceCapabilities& c) {
   return {{"sensed_freedom", c.sensed_freedom},
           {"actuated_freedom", c.actuated_freedom},
           {"max_force_n", limit_of_force(c.max_force)},
+          {"max_torque_nm", c.max_torque > 0 ? Json(c.max_torque) : Json()},
           {"max_stiffness_n_per_m", limit_of_force(c.max_stiffness)},
           {"max_rate_hz", c.any_rate ? Json() : Json(c.max_rate)},
           {"workspace_radius_m", c.workspace_radius},
@@ -90,7 +91,7 @@ bool list_kind(const DeviceKind& kind, const DeviceConfig& config, bool named, J
   bool good = true, usable = false;
   row["connected"] = Json::array();
   try {
-    const std::vector<ConnectedDevice> connected = kind.connected();
+    const std::vector<ConnectedDevice> connected = list_connected(kind, config);
     for (const ConnectedDevice& found : connected) {
       row["connected"].push_back({{"serial", found.serial}, {"trouble", found.trouble}});
       usable = usable || found.trouble.empty();
@@ -195,6 +196,8 @@ DeviceConfig config_of(const po::variables_map& values) {
     throw UsageError("--rate: must be 10 to 10000 Hz");
   if (values.count("serial") > 0) config.serials = values["serial"].as<std::vector<std::string>>();
   if (values.count("firmware") > 0) config.firmware = values["firmware"].as<std::string>();
+  if (values.count("library") > 0) config.library = values["library"].as<std::string>();
+  if (values.count("service") > 0) config.service = values["service"].as<std::string>();
   if (values.count("calibration") > 0) config.calibration = values["calibration"].as<std::string>();
   return config;
 }
@@ -214,7 +217,11 @@ void add_options(CommandLine& line) {
       ("serial", po::value<std::vector<std::string>>()->value_name("S"),
        "which one of several; falcon2: twice, the tip's first")  //
       ("firmware", po::value<std::string>()->value_name("FILE"),
-       "to upload where the device needs it")                                                     //
+       "to upload where the device needs it")  //
+      ("library", po::value<std::string>()->value_name("FILE"),
+       "the maker's, where a device is reached through one; default: looked for")  //
+      ("service", po::value<std::string>()->value_name("HOST:PORT"),
+       "the maker's program, where a device is reached through one; default: its own port here")  //
       ("calibration", po::value<std::string>()->value_name("FILE"), "file of calibrations")       //
       ("rate", po::value<double>()->default_value(1000)->value_name("HZ"), "of the servo")        //
       ("timing", "measure this machine; exit status 1 when it is not fit")                        //

@@ -22,7 +22,8 @@ const DeviceKind& find_device_kind(const std::string& name) {
 OpenDevice open_device(const DeviceKind& kind, const RunSettings& settings,
                        const protocols::Protocol& protocol) {
   const DeviceConfig config{protocol.servo_rate, protocol.stylus.length, protocol.stylus.grip,
-                            settings.serials,    settings.firmware,      settings.calibration};
+                            settings.serials,    settings.firmware,      settings.calibration,
+                            settings.library,    settings.service};
   try {
     kind.check(config);
   } catch (const std::invalid_argument& error) {

@@ -123,6 +123,10 @@ std::optional<RunSettings> parse_run_settings(const std::vector<std::string>& ar
        "which device; falcon2: twice, tip first")  //
       ("firmware", po::value(&settings.firmware)->value_name("FILE"),
        "uploaded where the device needs it")  //
+      ("library", po::value(&settings.library)->value_name("FILE"),
+       "the maker's library, where --device is reached through one; default: looked for")  //
+      ("service", po::value(&settings.service)->value_name("HOST:PORT"),
+       "the maker's program, where --device is reached through one; default: its own port here")  //
       ("calibration", po::value(&settings.calibration)->value_name("FILE"),
        "what 'palpate devices --calibrate' stored")  //
       ("without-calibration", po::bool_switch(&settings.without_calibration),

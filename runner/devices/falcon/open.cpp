@@ -13,6 +13,7 @@
 #include "runner/devices/falcon/falcon.h"
 #include "runner/devices/falcon/falcon2.h"
 #include "runner/devices/falcon/image.h"
+#include "runner/devices/falcon/parameters.h"
 #include "runner/devices/falcon/usb.h"
 #include "stimuli/printable.h"
 
@@ -67,6 +68,17 @@ std::string summary_of(const CalibrationVerdict& verdict) {
   return "";
 }
 
+DeviceCapabilities nominal(const char* name, int freedom) {
+  DeviceCapabilities can;
+  can.name = name;
+  can.sensed_freedom = can.actuated_freedom = freedom;
+  can.max_stiffness = kMaxStiffness;
+  can.max_rate = kMaxRate;
+  can.workspace_radius = kWorkspaceRadius;
+  can.resolution = kResolution;
+  return can;
+}
+
 void show_progress(const std::string& serial, const BootProgress& progress) {
   if (isatty(STDERR_FILENO) == 0) return;
   using Step = BootProgress::Step;
@@ -82,7 +94,10 @@ void show_progress(const std::string& serial, const BootProgress& progress) {
 
 }  // namespace
 
-std::vector<ConnectedDevice> connected_falcons() {
+DeviceCapabilities nominal_falcon(const DeviceConfig& /*config*/) { return nominal("falcon", 3); }
+DeviceCapabilities nominal_falcon2(const DeviceConfig& /*config*/) { return nominal("falcon2", 5); }
+
+std::vector<ConnectedDevice> connected_falcons(const DeviceConfig& /*config*/) {
   std::vector<ConnectedDevice> connected;
   for (UsbListing& listing : list_usb()) {
     connected.push_back({std::move(listing.serial), std::move(listing.trouble)});

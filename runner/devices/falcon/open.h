@@ -15,7 +15,11 @@
 namespace palpate::runner::falcon {
 
 /// Falcons that are plugged in. \throws TransportError where USB cannot be used.
-std::vector<ConnectedDevice> connected_falcons();
+std::vector<ConnectedDevice> connected_falcons(const DeviceConfig& config);
+
+/// See DeviceKind::nominal.
+DeviceCapabilities nominal_falcon(const DeviceConfig& config);
+DeviceCapabilities nominal_falcon2(const DeviceConfig& config);
 
 /// See DeviceKind::check.
 void check_falcon(const DeviceConfig& config);

@@ -3,7 +3,9 @@
 #include "runner/devices/registry.h"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
+#include <csignal>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -21,7 +23,8 @@ TEST(DeviceKinds, AreThoseOfTheHandbookEachWithADescription) {
     EXPECT_EQ(&device_kind(kind.name), &kind);
     EXPECT_EQ(testing::flaw_of(kind.description), "") << kind.name;
   }
-  EXPECT_EQ(names, (std::vector<std::string>{"falcon", "falcon2", "mouse", "simulated"}));
+  EXPECT_EQ(names, (std::vector<std::string>{"falcon", "falcon2", "forcedimension", "inverse3",
+                                             "mouse", "simulated"}));
 }
 
 TEST(DeviceKinds, AnUnknownNameIsRefusedWithTheKnownOnes) {
@@ -31,7 +34,8 @@ TEST(DeviceKinds, AnUnknownNameIsRefusedWithTheKnownOnes) {
       ADD_FAILURE() << name;
     } catch (const std::invalid_argument& error) {
       EXPECT_EQ(error.what(),
-                "no device '" + name + "'; there are: falcon, falcon2, mouse, simulated");
+                "no device '" + name +
+                    "'; there are: falcon, falcon2, forcedimension, inverse3, mouse, simulated");
     }
   }
 }
@@ -39,14 +43,14 @@ TEST(DeviceKinds, AnUnknownNameIsRefusedWithTheKnownOnes) {
 // A real hand that motors move must have a guard.
 TEST(DeviceKinds, WhatHasMotorsIsGuarded) {
   for (const DeviceKind& kind : device_kinds()) {
-    const bool falcon = std::string(kind.name).starts_with("falcon");
-    EXPECT_EQ(kind.has_force_feedback, falcon) << kind.name;
+    const std::string name = kind.name;
+    EXPECT_EQ(kind.has_force_feedback, name != "mouse" && name != "simulated") << name;
   }
 }
 
 TEST(DeviceKinds, AFalconSensesAndMovesAPointTwoOfThemALine) {
   for (const auto& [name, freedom] : {std::pair("falcon", 3), std::pair("falcon2", 5)}) {
-    const DeviceCapabilities can = nominal_capabilities(device_kind(name), {});
+    const DeviceCapabilities can = device_kind(name).nominal({});
     EXPECT_EQ(can.name, name);
     EXPECT_EQ(can.sensed_freedom, freedom);
     EXPECT_EQ(can.actuated_freedom, freedom);
@@ -68,14 +72,14 @@ TEST(DeviceKinds, WithoutMotorsThereIsAlwaysOneAndItHasTheStylusOfTheConfig) {
   for (const char* name : {"mouse", "simulated"}) {
     const DeviceKind& kind = device_kind(name);
     EXPECT_NO_THROW(kind.check(config));
-    const std::vector<ConnectedDevice> there = kind.connected();
+    const std::vector<ConnectedDevice> there = list_connected(kind, config);
     ASSERT_EQ(there.size(), 1U);
     EXPECT_EQ(there[0].serial, "");
     EXPECT_EQ(there[0].trouble, "");
     const std::unique_ptr<Device> device = kind.open(config);
     const DeviceReading reading = device->read();
     EXPECT_NEAR(glm::length(reading.stylus.tail - reading.stylus.tip), 0.2, 1e-4) << name;
-    const DeviceCapabilities can = nominal_capabilities(kind, config);
+    const DeviceCapabilities can = kind.nominal(config);
     EXPECT_EQ(can.name, device->capabilities().name);
     EXPECT_EQ(can.sensed_freedom, 5) << name;
     EXPECT_EQ(can.actuated_freedom, std::string(name) == "mouse" ? 0 : 5);
@@ -90,6 +94,44 @@ TEST(DeviceKinds, WithoutMotorsThereIsAlwaysOneAndItHasTheStylusOfTheConfig) {
   EXPECT_NEAR(simulated->read().stylus.tip.y, -0.1, 1e-3);
   for (int tick = 0; tick < 375; ++tick) simulated->read();
   EXPECT_NEAR(simulated->read().stylus.tip.y, 0, 2e-3) << "0.75 s later in the middle";
+}
+
+// A maker's library may do all of these; the program goes on.
+TEST(DeviceKinds, AreListedInAProcessOfTheirOwn) {
+  DeviceKind kind = device_kind("falcon");
+  const auto said = [&kind] {
+    try {
+      list_connected(kind, {});
+      return std::string();
+    } catch (const std::runtime_error& error) {
+      return std::string(error.what());
+    }
+  };
+  kind.connected = [](const DeviceConfig& config) {
+    return std::vector<ConnectedDevice>{
+        {config.library + "\xff", "in use by process " + std::to_string(getpid())}};
+  };
+  DeviceConfig config;
+  config.library = "a";
+  const std::vector<ConnectedDevice> found = list_connected(kind, config);
+  ASSERT_EQ(found.size(), 1U);
+  EXPECT_EQ(found[0].serial, "a\xef\xbf\xbd") << "bytes that are no text are replaced";
+  EXPECT_NE(found[0].trouble, "in use by process " + std::to_string(getpid()));
+
+  kind.connected = [](const DeviceConfig&) -> std::vector<ConnectedDevice> {
+    throw std::runtime_error("no rights");
+  };
+  EXPECT_EQ(said(), "no rights");
+  kind.connected = [](const DeviceConfig&) -> std::vector<ConnectedDevice> {
+    std::raise(SIGKILL);
+    return {};
+  };
+  EXPECT_NE(said().find("crashed"), std::string::npos) << said();
+  kind.connected = [](const DeviceConfig&) -> std::vector<ConnectedDevice> {
+    pause();
+    return {};
+  };
+  EXPECT_NE(said().find("longer than 3 s"), std::string::npos);
 }
 
 }  // namespace kinds

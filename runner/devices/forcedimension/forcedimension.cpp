@@ -1,0 +1,298 @@
+#include "runner/devices/forcedimension/forcedimension.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <glm/geometric.hpp>
+#include <stdexcept>
+
+#include "runner/servo/realtime.h"
+#include "stimuli/printable.h"
+
+namespace palpate::runner::forcedimension {
+namespace {
+
+constexpr unsigned char kWatchdog = 40;        // 125 us: 5 ms
+constexpr double kStatusPeriod = 0.008;        // s; the status costs a transfer of its own
+constexpr double kFarthest = 0.5;              // m; no model reaches so far
+constexpr double kMaxSpeed = 5, kJump = 1e-3;  // m/s and m; hands move the grip more slowly
+constexpr int kCommunication = 2, kNoDevice = 5, kTimeOut = 7, kDeviceInUse = 20;
+
+/// Limits as CHAI3D lists them; 0: not known.
+struct Model {
+  const char* family;
+  double max_force, max_torque, max_stiffness, reach;  // N, N m, N/m, m
+};
+constexpr Model kModels[] = {{"omega", 12, 0, 5000, 0.075},
+                             {"delta", 20, 0, 4000, 0.15},
+                             {"sigma", 12, 0.2, 4000, 0.075},
+                             {"lambda", 8, 0, 4000, 0.1125}};
+constexpr Model kUnknown = {"", 8, 0, 1000, 0.05};
+
+const Model& model_of(std::string name) {
+  std::transform(name.begin(), name.end(), name.begin(),
+                 [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c | 0x20) : c; });
+  for (const Model& model : kModels)
+    if (name.find(model.family) != std::string::npos) return model;
+  return kUnknown;
+}
+
+DeviceCapabilities capabilities_of(const Model& model, bool wrist, bool active_wrist) {
+  DeviceCapabilities can;
+  can.name = "forcedimension";
+  can.sensed_freedom = wrist ? 5 : 3;
+  // Torque whose limit is not known is not driven.
+  can.actuated_freedom = active_wrist && model.max_torque > 0 ? 5 : 3;
+  can.max_torque = can.actuated_freedom == 5 ? model.max_torque : 0;
+  can.max_force = model.max_force;
+  can.max_stiffness = model.max_stiffness;
+  can.max_rate = 4000;
+  can.workspace_radius = model.reach;
+  can.resolution = 1e-5;
+  return can;
+}
+
+bool finite(const Vec3& v) {
+  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+}
+
+std::string error_text(const Library& library) {
+  const char* const text = library.error_get_last_str();
+  return text != nullptr ? stimuli::printable(text) : "no reason is given";
+}
+
+/// What opening one found.
+struct Found {
+  char id;
+  std::string serial, name;
+};
+
+Found open_one(const Library& library, int index) {
+  const int id = library.open_id(static_cast<char>(index));
+  if (id < 0) {
+    throw std::runtime_error(library.error_get_last() == kDeviceInUse
+                                 ? "another program uses it: end that program"
+                                 : "it cannot be opened: " + error_text(library));
+  }
+  unsigned short serial = 0;
+  const bool numbered = library.get_serial_number(&serial, static_cast<char>(id)) >= 0;
+  const char* const name = library.get_system_name(static_cast<char>(id));
+  return {static_cast<char>(id), numbered ? std::to_string(serial) : "",
+          name != nullptr ? stimuli::printable(name) : "a device without a name"};
+}
+
+/// Negative where the library cannot count them.
+int count_of(const Library& library) {
+  constexpr int kMost = 16;
+  return std::min(library.get_device_count(), kMost);
+}
+
+}  // namespace
+
+ForceDimensionDevice::ForceDimensionDevice(const DeviceConfig& config)
+    : config_(config), library_(config.library) {
+  open();
+}
+
+ForceDimensionDevice::~ForceDimensionDevice() { close(); }
+
+void ForceDimensionDevice::open() {
+  const int count = count_of(library_);
+  if (count < 0)
+    throw std::runtime_error("Force Dimension devices cannot be counted: " + error_text(library_));
+  const std::string wanted = config_.serials.empty() ? "" : config_.serials[0];
+  // Indices move when devices come and go: it is known by its serial number.
+  std::string others, trouble;
+  Found device{};
+  for (int index = 0; index < count && !id_; ++index) {
+    try {
+      device = open_one(library_, index);
+    } catch (const std::runtime_error& error) {
+      trouble = error.what();
+      continue;
+    }
+    if (wanted.empty() || device.serial == wanted) {
+      id_ = device.id;
+    } else {
+      others += (others.empty() ? "" : ", ") + device.serial;
+      library_.close(device.id);
+    }
+  }
+  if (!id_) {
+    std::string text = wanted.empty() ? "no Force Dimension device is ready"
+                                      : "no Force Dimension device has the serial number " + wanted;
+    if (!others.empty()) text += "; connected: " + others;
+    if (!trouble.empty()) text += "; of one: " + trouble;
+    if (count == 0) text += ": check its cable, its power supply and the rights to use USB";
+    throw std::runtime_error(text);
+  }
+  const char id = *id_;
+  const auto need = [&](int result, const char* what) {
+    if (result >= 0) return;
+    const std::string why = error_text(library_);
+    close();
+    throw std::runtime_error(std::string("the Force Dimension device does not take '") + what +
+                             "': " + why);
+  };
+  need(library_.enable_expert_mode(), "expert mode");  // for the two below
+  need(library_.set_time_guard(0, id), "no time guard");
+  const bool watched =
+      library_.set_watchdog != nullptr && library_.set_watchdog(kWatchdog, id) >= 0;
+  need(library_.set_brakes(1, id), "brakes on");
+  need(library_.set_gravity_compensation(1, id), "gravity compensation");
+  if (library_.has_gripper(id) && library_.emulate_button != nullptr)
+    library_.emulate_button(1, id);  // a gripper that closes is a button
+  // Of a device that waits for its calibration forces stay off.
+  std::array<int, kStatusRoom> status{};
+  const bool calibrated = library_.get_status(status.data(), id) >= 0 && status[kReset] == 0;
+  if (calibrated) need(library_.enable_force(1, id), "forces on");
+  library_.set_force_and_torque(0, 0, 0, 0, 0, 0, id);
+
+  capabilities_ =
+      capabilities_of(model_of(device.name), library_.has_wrist(id), library_.has_active_wrist(id));
+  capabilities_.serial = device.serial;
+  capabilities_.calibration = "maker's: " + device.name + ", SDK " + library_.version();
+  if (!watched) {
+    capabilities_.calibration += ", WITHOUT the firmware's watchdog";
+    std::fprintf(stderr,
+                 "This device has no watchdog of its own firmware: zero force after a crash "
+                 "depends on palpate's guard process alone.\n");
+  }
+  read_ns_ = 0;
+  until_status_ = 0;
+  status_ = write_trouble_ = DeviceTrouble::none;
+}
+
+void ForceDimensionDevice::close() noexcept {
+  if (!id_) return;
+  library_.set_force_and_torque(0, 0, 0, 0, 0, 0, *id_);
+  library_.enable_force(0, *id_);
+  library_.close(*id_);
+  id_.reset();
+}
+
+void ForceDimensionDevice::reopen() {
+  close();
+  config_.serials = {capabilities_.serial};
+  if (capabilities_.serial.empty()) config_.serials.clear();
+  open();
+}
+
+DeviceTrouble ForceDimensionDevice::last_error() const noexcept {
+  switch (library_.error_get_last()) {
+    case kCommunication:
+    case kNoDevice:
+      return DeviceTrouble::unplugged;
+    case kDeviceInUse:
+      return DeviceTrouble::in_use;
+    case kTimeOut:
+    default:
+      return DeviceTrouble::silent;
+  }
+}
+
+DeviceTrouble ForceDimensionDevice::trouble_of_status() noexcept {
+  std::array<int, kStatusRoom> status{};
+  if (library_.get_status(status.data(), *id_) < 0) return last_error();
+  if (status[kConnected] == 0) return DeviceTrouble::unplugged;
+  if (status[kPower] == 0) return DeviceTrouble::silent;
+  if (status[kReset] != 0) return DeviceTrouble::not_calibrated;
+  // It was calibrated just now: forces may go on. Zero until the servo says otherwise.
+  if (status_ == DeviceTrouble::not_calibrated) {
+    library_.set_force_and_torque(0, 0, 0, 0, 0, 0, *id_);
+    return library_.enable_force(1, *id_) < 0 ? last_error() : DeviceTrouble::none;
+  }
+  if (status[kForce] == 0 || status[kError] != 0) return DeviceTrouble::stopped_by_device;
+  return DeviceTrouble::none;
+}
+
+bool ForceDimensionDevice::plausible(const Vec3& position, const Vec3& axis) noexcept {
+  const std::int64_t now = RealClock().now_ns();
+  const double elapsed = read_ns_ > 0 ? static_cast<double>(now - read_ns_) * 1e-9 : 1;
+  const double moved = glm::length(position - tip_);
+  tip_ = position;
+  tail_ = position;
+  read_ns_ = now;
+  if (!finite(position) || !finite(axis) || glm::length(position) > kFarthest) {
+    tip_ = tail_ = Vec3(0);
+    read_ns_ = 0;  // the next one is not measured against it
+    return false;
+  }
+  if (capabilities_.sensed_freedom == 5) {
+    if (std::abs(glm::length(axis) - 1) > 0.01) return false;
+    tail_ = position + config_.stylus_length * axis;
+  }
+  return moved <= kMaxSpeed * elapsed + kJump || elapsed >= 1;
+}
+
+DeviceReading ForceDimensionDevice::read() noexcept {
+  DeviceTrouble trouble = DeviceTrouble::unplugged;
+  std::uint8_t buttons = 0;
+  if (id_) {
+    double x = 0, y = 0, z = 0, frame[3][3] = {};
+    if (library_.get_position_and_frame(&x, &y, &z, frame, *id_) < 0) {
+      trouble = last_error();
+    } else {
+      trouble = write_trouble_;
+      if (--until_status_ < 0 || status_ != DeviceTrouble::none) {
+        until_status_ = static_cast<int>(kStatusPeriod * config_.rate);
+        status_ = trouble_of_status();
+      }
+      if (trouble == DeviceTrouble::none) trouble = status_;
+      const Vec3 along(frame[0][0], frame[1][0], frame[2][0]);
+      const bool possible = plausible(to_world({x, y, z}), to_world(along));
+      if (trouble == DeviceTrouble::none && !possible) trouble = DeviceTrouble::implausible;
+      buttons = static_cast<std::uint8_t>(library_.get_button_mask(*id_));
+    }
+  }
+  lost_ = trouble != DeviceTrouble::none;
+  return {{tip_, tail_}, buttons, lost_, trouble};
+}
+
+void ForceDimensionDevice::write(const Vec3& device1, const Vec3& device2) noexcept {
+  if (!id_) return;
+  Vec3 force = device1 + device2, torque(0);
+  if (capabilities_.actuated_freedom == 5) torque = glm::cross(tail_ - tip_, device2);
+  if (lost_ || !finite(force) || !finite(torque)) force = torque = Vec3(0);
+  const Vec3 f = from_world(force), t = from_world(torque);
+  const bool taken = library_.set_force_and_torque(f.x, f.y, f.z, t.x, t.y, t.z, *id_) >= 0;
+  write_trouble_ = taken ? DeviceTrouble::none : last_error();
+}
+
+void check(const DeviceConfig& config) {
+  if (config.serials.size() > 1)
+    throw std::invalid_argument("forcedimension is one device; " +
+                                std::to_string(config.serials.size()) +
+                                " serial numbers are given");
+}
+
+DeviceCapabilities nominal(const DeviceConfig& /*config*/) {
+  DeviceCapabilities can = capabilities_of(kModels[0], true, false);
+  can.max_force = 0;
+  return can;
+}
+
+std::vector<ConnectedDevice> connected(const DeviceConfig& config) {
+  const Library library(config.library);
+  const int count = count_of(library);
+  if (count < 0)
+    throw std::runtime_error("Force Dimension devices cannot be counted: " + error_text(library));
+  std::vector<ConnectedDevice> out;
+  for (int index = 0; index < count; ++index) {
+    try {
+      const Found device = open_one(library, index);
+      out.push_back({device.serial, ""});
+      library.close(device.id);
+    } catch (const std::runtime_error& error) {
+      out.push_back({"", error.what()});
+    }
+  }
+  return out;
+}
+
+std::unique_ptr<Device> open(const DeviceConfig& config) {
+  return std::make_unique<ForceDimensionDevice>(config);
+}
+
+}  // namespace palpate::runner::forcedimension

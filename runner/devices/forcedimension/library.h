@@ -1,0 +1,65 @@
+#pragma once
+// The functions of Force Dimension's library, loaded at run time: it is proprietary, and a lab
+// installs it. Prototypes are written anew from its public documentation (SDK 3.7 to 3.17).
+
+#include <memory>
+#include <string>
+
+namespace palpate::runner::forcedimension {
+
+/// `id` is the number that opening a device gave. Negative results are errors unless said
+/// otherwise. SI units; frame: x to the user, y right, z up.
+struct Library {
+  /// \param path  of libdrd or libdhd; empty: below $FDSDK and $FORCEDIM_SDK, then where the loader
+  ///              looks. \throws std::runtime_error saying what was tried and what is missing
+  explicit Library(const std::string& path);
+  Library(const Library&) = delete;
+  Library& operator=(const Library&) = delete;
+
+  std::string version() const;  ///< "3.17.5.0"
+
+  void (*get_sdk_version)(int* major, int* minor, int* release, int* revision) = nullptr;
+  int (*get_device_count)() = nullptr;
+  int (*open_id)(char index) = nullptr;  ///< returns the id
+  int (*close)(char id) = nullptr;
+  int (*get_serial_number)(unsigned short* serial, char id) = nullptr;
+  const char* (*get_system_name)(char id) = nullptr;
+  int (*get_status)(int* status, char id) = nullptr;  ///< room for kStatusRoom numbers
+  bool (*has_wrist)(char id) = nullptr;
+  bool (*has_active_wrist)(char id) = nullptr;
+  bool (*has_gripper)(char id) = nullptr;
+  /// 0 and 1 (nothing new since the last call) are success.
+  int (*get_position_and_frame)(double* x, double* y, double* z, double frame[3][3],
+                                char id) = nullptr;
+  /// 0 and 2 (a motor is saturated) are success.
+  int (*set_force_and_torque)(double fx, double fy, double fz, double tx, double ty, double tz,
+                              char id) = nullptr;
+  int (*enable_force)(unsigned char on, char id) = nullptr;
+  int (*set_brakes)(int on, char id) = nullptr;
+  int (*set_gravity_compensation)(int on, char id) = nullptr;
+  unsigned (*get_button_mask)(char id) = nullptr;
+  int (*enable_expert_mode)() = nullptr;
+  int (*set_time_guard)(int microseconds, char id) = nullptr;
+  int (*error_get_last)() = nullptr;
+  const char* (*error_get_last_str)() = nullptr;
+
+  // What older versions do not have is null.
+  int (*set_watchdog)(unsigned char periods_of_125us, char id) = nullptr;
+  int (*emulate_button)(unsigned char on, char id) = nullptr;
+  int (*drd_open_id)(char index) = nullptr;
+  int (*drd_auto_init)(char id) = nullptr;
+  bool (*drd_is_initialized)(char id) = nullptr;
+  int (*drd_stop)(bool forces_stay_on, char id) = nullptr;
+
+ private:
+  struct Unload {
+    void operator()(void* handle) const;
+  };
+  std::unique_ptr<void, Unload> handle_;
+};
+
+inline constexpr int kStatusRoom = 64;  ///< 16 or 17 are written, by version
+/// Places in the status.
+inline constexpr int kPower = 0, kConnected = 1, kReset = 3, kForce = 5, kError = 9;
+
+}  // namespace palpate::runner::forcedimension

@@ -1,0 +1,285 @@
+#include "runner/devices/haply/inverse3.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <stdexcept>
+
+#include "runner/servo/realtime.h"
+#include "stimuli/printable.h"
+
+namespace palpate::runner::haply {
+namespace {
+
+constexpr std::int64_t kExchange_ns = 250'000;
+constexpr std::int64_t kSilent_ns = 25'000'000;      // without a state: the device counts as silent
+constexpr std::int64_t kStale_ns = 500'000'000;      // the same state, whatever is sent
+constexpr std::int64_t kUnheeded_ns = 200'000'000;   // a force that is not reported
+constexpr double kHeeded = 0.1, kFelt = 0.3;         // part of the force; N, that is looked at
+constexpr double kFarthest = 0.5;                    // m; no model reaches so far
+constexpr double kMaxSpeed = 5, kJump = 1e-3;        // m/s and m
+constexpr auto kPatience = std::chrono::seconds(2);  // for the list of devices
+
+// A reseller's numbers; the arm's reach as the maker's tutorials clamp it.
+constexpr double kMaxForce = 4, kMaxStiffness = 1000, kReach = 0.1, kResolution = 1e-5;
+
+bool finite(const Vec3& v) {
+  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+}
+
+std::string service_of(const DeviceConfig& config) {
+  return config.service.empty() ? kService : config.service;
+}
+
+std::string advice_for(const std::string& service, const std::string& why) {
+  return "Haply's Inverse Service at " + service + " cannot be used: " + why +
+         "; is it running? (--service HOST:PORT names another)";
+}
+
+/// The first message of a new connection.
+Inventory inventory_of(Link& link) {
+  std::string_view message;
+  if (!link.receive(message, kPatience)) throw LinkError("it sends no list of devices");
+  return parse_inventory(message);
+}
+
+DeviceCapabilities capabilities_of(bool grip) {
+  DeviceCapabilities can;
+  can.name = "inverse3";
+  can.sensed_freedom = grip ? 5 : 3;
+  can.actuated_freedom = 3;
+  can.max_force = kMaxForce;
+  can.max_stiffness = kMaxStiffness;
+  can.max_rate = 1000;
+  can.workspace_radius = kReach;
+  can.resolution = kResolution;
+  return can;
+}
+
+}  // namespace
+
+Pump::Pump(std::unique_ptr<Link> link, const Settings& settings)
+    : link_(std::move(link)), settings_(settings), thread_([this] { run(); }) {}
+
+Pump::~Pump() {
+  quit_.store(true);
+  thread_.join();
+}
+
+void Pump::push(const Vec3& force) noexcept {
+  wanted_.write({force.x, force.y, force.z, RealClock().now_ns()});
+}
+
+const Pump::Newest& Pump::newest() noexcept {
+  newest_.read(seen_);
+  return seen_;
+}
+
+void Pump::run() noexcept {
+  request_realtime({84, false, -1, false});  // below the guard that reads it
+  RealClock clock;
+  std::int64_t due = clock.now_ns();
+  try {
+    exchange(true);
+    while (!quit_.load()) {
+      exchange(false);
+      due = std::max(due + kExchange_ns, clock.now_ns() - kExchange_ns);
+      clock.wait_until(due);
+    }
+    wanted_.write({});
+    exchange(false);
+  } catch (const std::exception&) {  // the connection, or what came over it
+    last_.trouble = DeviceTrouble::service_gone;
+    last_.time_ns = clock.now_ns();
+    newest_.write(last_);
+  }
+}
+
+void Pump::exchange(bool first) {
+  RealClock clock;
+  Wanted wanted;
+  while (!wanted_.read(wanted)) {
+  }
+  const std::int64_t age = clock.now_ns() - wanted.time_ns;
+  Vec3 force(wanted.x, wanted.y, wanted.z);
+  if (static_cast<double>(age) * 1e-9 > settings_.silence || !finite(force)) force = Vec3(0);
+  link_->send(command(settings_.arm, force, settings_.dialect, first));
+  std::string_view message;
+  while (!link_->receive(message, std::chrono::milliseconds(5)))
+    if (quit_.load()) return;
+  const State state = parse_state(message, settings_.arm, settings_.grip);
+  const DeviceTrouble before = last_.trouble;
+  last_ = {state, clock.now_ns(), before};
+  if (!state.has_arm) {
+    last_.trouble = DeviceTrouble::unplugged;
+  } else if (before == DeviceTrouble::unplugged) {
+    last_.trouble = DeviceTrouble::none;
+  }
+  watch(force, message);
+  newest_.write(last_);
+}
+
+void Pump::watch(const Vec3& sent, std::string_view message) noexcept {
+  const std::size_t hash = std::hash<std::string_view>()(message);
+  sent_changed_ = sent_changed_ || sent != sent_;
+  sent_ = sent;
+  if (hash != last_message_ || changed_ns_ == 0) {
+    changed_ns_ = last_.time_ns;
+    sent_changed_ = false;
+  }
+  last_message_ = hash;
+  // Where the hand holds still and the force stays, nothing need change.
+  if (sent_changed_ && last_.time_ns - changed_ns_ > kStale_ns)
+    last_.trouble = DeviceTrouble::silent;
+  const double size = glm::length(sent);
+  const bool heeded = !finite(last_.state.force) || size < kFelt ||
+                      glm::length(last_.state.force) >= kHeeded * size;
+  if (heeded) {
+    unanswered_ns_ = 0;
+  } else if (unanswered_ns_ == 0) {
+    unanswered_ns_ = last_.time_ns;
+  } else if (last_.time_ns - unanswered_ns_ > kUnheeded_ns) {
+    misunderstood_.store(true);
+    last_.trouble = DeviceTrouble::stopped_by_device;
+  }
+}
+
+Inverse3Device::Inverse3Device(const DeviceConfig& config)
+    : config_(config), period_ns_(1e9 / config.rate) {
+  open();
+}
+
+void Inverse3Device::open() {
+  const std::string service = service_of(config_);
+  try {
+    const ServiceVersion version = parse_version(get(service, "/version"));
+    const std::optional<double> scale =
+        parse_force_scale(get(service, "/settings/devices/force_scale"));
+    if (scale && *scale != 1)
+      throw std::runtime_error("it scales forces by " + std::to_string(*scale) +
+                               ": set its force_scale to 1, or newtons are none");
+    std::unique_ptr<Link> link = connect(service);
+    const Inventory found = inventory_of(*link);
+    const std::string wanted = config_.serials.empty() ? "" : config_.serials[0];
+    std::string ids;
+    const Listed* arm = nullptr;
+    for (const Listed& one : found.arms) {
+      ids += (ids.empty() ? "" : ", ") + stimuli::printable(one.id);
+      if (arm == nullptr && (wanted.empty() || one.id == wanted)) arm = &one;
+    }
+    if (arm == nullptr)
+      throw std::runtime_error(wanted.empty()
+                                   ? "it lists no Inverse3: check cable and power supply"
+                                   : "it lists no Inverse3 '" + wanted +
+                                         "'; there are: " + (ids.empty() ? "none" : ids));
+    if (arm->in_use)
+      throw std::runtime_error("another program commands the Inverse3 '" + arm->id +
+                               "', and the forces of both would add up: end that program");
+    if (arm->basis != "XYZ" || arm->mounted)
+      throw std::runtime_error(
+          "the axes of the Inverse3 '" + arm->id +
+          "' are permuted or moved there: set its basis to XYZ, without mount");
+    Pump::Settings settings;
+    settings.arm = arm->id;
+    has_grip_ = !found.grips.empty();
+    if (has_grip_) settings.grip = found.grips[0].id;
+    const bool vector = (dialect_of(version) == Dialect::vector) != other_dialect_;
+    settings.dialect = vector ? Dialect::vector : Dialect::values;
+    settings.silence = std::max(0.005, 5 / config_.rate);
+    capabilities_ = capabilities_of(has_grip_);
+    capabilities_.serial = arm->id;
+    capabilities_.calibration = "maker's: Inverse3 " + arm->id + ", Inverse Service " +
+                                version.text + ", filters " +
+                                (arm->filters.empty() ? "not told" : arm->filters);
+    pump_ = std::make_unique<Pump>(std::move(link), settings);
+  } catch (const std::runtime_error& error) {
+    throw std::runtime_error(advice_for(service, error.what()));
+  }
+  moved_ns_ = 0;
+  // From here on there is a state.
+  RealClock clock;
+  const std::int64_t give_up = clock.now_ns() + 2'000'000'000;
+  while (pump_->newest().time_ns == 0 && clock.now_ns() < give_up)
+    clock.wait_until(clock.now_ns() + 1'000'000);
+}
+
+void Inverse3Device::reopen() {
+  if (pump_ && pump_->misunderstood()) other_dialect_ = !other_dialect_;
+  pump_.reset();
+  if (!capabilities_.serial.empty()) config_.serials = {capabilities_.serial};
+  open();
+}
+
+bool Inverse3Device::plausible(const Pump::Newest& newest) noexcept {
+  const Vec3& at = newest.state.position;
+  const double elapsed = moved_ns_ > 0 ? static_cast<double>(newest.time_ns - moved_ns_) * 1e-9 : 1;
+  const double moved = glm::length(at - tip_);
+  if (!finite(at) || glm::length(at) > kFarthest || !finite(newest.state.axis)) {
+    moved_ns_ = 0;  // the next one is not measured against it
+    return false;
+  }
+  tip_ = at;
+  tail_ = has_grip_ ? at + config_.stylus_length * newest.state.axis : at;
+  moved_ns_ = newest.time_ns;
+  return elapsed >= 1 || moved <= kMaxSpeed * elapsed + kJump;
+}
+
+DeviceReading Inverse3Device::read() noexcept {
+  if (!pump_) {
+    lost_ = true;
+    return {{tip_, tail_}, 0, true, DeviceTrouble::service_gone};
+  }
+  const Pump::Newest newest = pump_->newest();
+  const std::int64_t age = RealClock().now_ns() - newest.time_ns;
+  DeviceTrouble trouble = newest.trouble;
+  if (trouble == DeviceTrouble::none && (newest.time_ns == 0 || age > kSilent_ns))
+    trouble = DeviceTrouble::silent;
+  if (trouble == DeviceTrouble::none && !newest.state.powered) trouble = DeviceTrouble::silent;
+  if (trouble == DeviceTrouble::none && !newest.state.calibrated)
+    trouble = DeviceTrouble::not_calibrated;
+  if (trouble == DeviceTrouble::none && has_grip_ && !newest.state.has_grip)
+    trouble = DeviceTrouble::silent;
+  if (trouble == DeviceTrouble::none && !plausible(newest)) trouble = DeviceTrouble::implausible;
+  lost_ = trouble != DeviceTrouble::none;
+  if (!lost_ && static_cast<double>(age) > 2 * period_ns_) trouble = DeviceTrouble::late;
+  return {{tip_, tail_}, newest.state.buttons, lost_, trouble};
+}
+
+void Inverse3Device::write(const Vec3& device1, const Vec3& device2) noexcept {
+  if (!pump_) return;
+  const Vec3 force = device1 + device2;
+  pump_->push(lost_ || !finite(force) ? Vec3(0) : force);
+}
+
+void check(const DeviceConfig& config) {
+  if (config.serials.size() > 1)
+    throw std::invalid_argument("inverse3 is one device; " + std::to_string(config.serials.size()) +
+                                " serial numbers are given");
+}
+
+DeviceCapabilities nominal(const DeviceConfig& /*config*/) {
+  DeviceCapabilities can = capabilities_of(true);
+  can.max_force = 0;
+  return can;
+}
+
+std::vector<ConnectedDevice> connected(const DeviceConfig& config) {
+  const std::string service = service_of(config);
+  try {
+    parse_version(get(service, "/version"));
+    const std::unique_ptr<Link> link = connect(service);
+    std::vector<ConnectedDevice> out;
+    for (const Listed& arm : inventory_of(*link).arms)
+      out.push_back({arm.id, arm.in_use ? "another program commands it: end that program" : ""});
+    return out;
+  } catch (const std::runtime_error& error) {
+    throw std::runtime_error(advice_for(service, error.what()));
+  }
+}
+
+std::unique_ptr<Device> open(const DeviceConfig& config) {
+  return std::make_unique<Inverse3Device>(config);
+}
+
+}  // namespace palpate::runner::haply

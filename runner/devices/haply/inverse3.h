@@ -1,0 +1,107 @@
+#pragma once
+// A Haply Inverse3, Inverse3x or Minverse, with or without a Verse Grip, through the maker's
+// Inverse Service. Not tried on hardware: what is uncertain is listed in runner/README.md.
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "runner/devices/haply/link.h"
+#include "runner/devices/haply/messages.h"
+#include "runner/servo/device.h"
+#include "runner/servo/device_config.h"
+#include "runner/servo/shared_value.h"
+#include "runner/servo/triple_buffer.h"
+
+namespace palpate::runner::haply {
+
+inline constexpr const char* kService = "127.0.0.1:10001";
+
+/// Exchanges one message with the service every 250 us, in a thread of its own: the newest force
+/// out, the newest state in. One exchange a tick would make every force a tick late.
+class Pump {
+ public:
+  struct Settings {
+    std::string arm, grip;  ///< ids; no grip: empty
+    Dialect dialect = Dialect::vector;
+    double silence = 0.005;  ///< s; a force that is older becomes zero
+  };
+  struct Newest {
+    State state;
+    std::int64_t time_ns = 0;  ///< CLOCK_MONOTONIC, of its arrival; 0: none yet
+    DeviceTrouble trouble = DeviceTrouble::none;
+  };
+
+  Pump(std::unique_ptr<Link> link, const Settings& settings);
+  /// Zero force, then the end.
+  ~Pump();
+  Pump(const Pump&) = delete;
+  Pump& operator=(const Pump&) = delete;
+
+  void push(const Vec3& force) noexcept;  ///< N, on the hand
+  const Newest& newest() noexcept;        ///< for one thread
+  /// Whether the service seemed not to understand forces in this dialect.
+  bool misunderstood() const noexcept { return misunderstood_.load(); }
+
+ private:
+  struct Wanted {
+    double x = 0, y = 0, z = 0;
+    std::int64_t time_ns = 0;
+  };
+  void run() noexcept;
+  void exchange(bool first);
+  void watch(const Vec3& sent, std::string_view message) noexcept;
+
+  std::unique_ptr<Link> link_;
+  const Settings settings_;
+  SharedValue<Wanted> wanted_;
+  TripleBuffer<Newest> newest_;
+  Newest seen_;  ///< the reader's
+  std::atomic<bool> quit_{false}, misunderstood_{false};
+  // The thread's own.
+  Newest last_;
+  Vec3 sent_;
+  std::size_t last_message_ = 0;    ///< hash
+  std::int64_t changed_ns_ = 0;     ///< when a message differed from the one before
+  bool sent_changed_ = false;       ///< since then
+  std::int64_t unanswered_ns_ = 0;  ///< since a force is sent that the service does not report
+  std::thread thread_;
+};
+
+class Inverse3Device final : public Device {
+ public:
+  /// \throws std::runtime_error saying what is in the way
+  explicit Inverse3Device(const DeviceConfig& config);
+
+  const DeviceCapabilities& capabilities() const override { return capabilities_; }
+  /// Never waits. The stylus has its tip at the arm's cursor; without a grip tip and tail are one.
+  DeviceReading read() noexcept override;
+  void write(const Vec3& device1, const Vec3& device2) noexcept override;
+  void reopen() override;
+
+ private:
+  void open();
+  bool plausible(const Pump::Newest& newest) noexcept;
+
+  DeviceConfig config_;
+  DeviceCapabilities capabilities_;
+  bool other_dialect_ = false;  ///< than the version suggests
+  bool has_grip_ = false;
+  double period_ns_;
+  Vec3 tip_, tail_;  ///< m, of the last good reading
+  std::int64_t moved_ns_ = 0;
+  bool lost_ = true;
+  std::unique_ptr<Pump> pump_;
+};
+
+/// See DeviceKind.
+void check(const DeviceConfig& config);
+DeviceCapabilities nominal(const DeviceConfig& config);
+std::vector<ConnectedDevice> connected(const DeviceConfig& config);
+std::unique_ptr<Device> open(const DeviceConfig& config);
+
+}  // namespace palpate::runner::haply

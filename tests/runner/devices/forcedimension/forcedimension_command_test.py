@@ -1,0 +1,169 @@
+"""palpate with a Force Dimension device that is not there: listed, tested, and a whole session with its faults.
+
+Usage: forcedimension_command_test.py PALPATE STUB_LIBRARY
+"""
+
+import contextlib
+import json
+import mmap
+import os
+import pathlib
+import sqlite3
+import struct
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+import unittest.mock
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "session"))
+from terminal import Terminal  # noqa: E402
+
+PALPATE, STUB = sys.argv[1:3]
+PATIENCE = 120  # s; only a hang reaches it
+# As in stub_state.h: the number of devices, then the numbers of each.
+FIELDS = ("serial model hand_x hand_y hand_z hand_stiffness connected power reset in_use wrong buttons too_fast error "
+          "delay force_x force_y force_z torque_x torque_y torque_z forces_on brakes watchdog open commands "
+          "last_command").split()
+PROTOCOL = {
+    "version": 1, "name": "touch", "renderers": ["ray"], "torque": "left_out", "seed": 3, "samples": True,
+    "servo": {"rate_hz": 100}, "material": {"stiffness_n_per_m": 100},
+    "stimuli": [{"name": "ball", "shape": "sphere", "radius_m": 0.02, "subdivisions": 1},
+                {"name": "box", "shape": "cube", "edge_m": 0.03}],
+    "repetitions": 1, "home": {"rest_s": 0.1, "margin_m": 0.005},
+    "response": {"keys": {"1": "ball", "2": "box"}, "time_out_s": 600},
+}
+
+
+class Stub:
+    """The first device's numbers by name."""
+
+    def __init__(self, path):
+        path.write_bytes(bytes(8 * (1 + 2 * len(FIELDS))))
+        self._file = open(path, "r+b")
+        self._map = mmap.mmap(self._file.fileno(), 0)
+        struct.pack_into("d", self._map, 0, 1)
+        self.set(serial=4711, hand_stiffness=400, connected=1, power=1)
+
+    def set(self, **numbers):
+        for name, number in numbers.items():
+            struct.pack_into("d", self._map, 8 * (1 + FIELDS.index(name)), number)
+
+    def get(self, name):
+        return struct.unpack_from("d", self._map, 8 * (1 + FIELDS.index(name)))[0]
+
+    def force(self):
+        return max(abs(self.get(f"force_{axis}")) for axis in "xyz")
+
+    def close(self):
+        self._map.close()
+        self._file.close()
+
+
+class ForceDimension(unittest.TestCase):
+    def setUp(self):
+        scratch = tempfile.TemporaryDirectory()
+        self.addCleanup(scratch.cleanup)
+        self.folder = pathlib.Path(scratch.name)
+        self.database = self.folder / "study.db"
+        (self.folder / "protocol.json").write_text(json.dumps(PROTOCOL))
+        self.stub = Stub(self.folder / "stub")
+        self.addCleanup(self.stub.close)
+        self.environment = {**os.environ, "PALPATE_STUB_STATE": str(self.folder / "stub")}
+
+    def palpate(self, *arguments):
+        return subprocess.run([PALPATE, *map(str, arguments)], capture_output=True, text=True, timeout=PATIENCE,
+                              env=self.environment)
+
+    def run_session(self, *options):
+        with unittest.mock.patch.dict(os.environ, self.environment):
+            terminal = Terminal([PALPATE, "run", self.folder / "protocol.json", "--db", self.database,
+                                 "--participant", "P01", "--device", "forcedimension", "--library", STUB,
+                                 "--no-window", *options], patience=PATIENCE)
+        self.addCleanup(terminal.__exit__)
+        return terminal
+
+    def wait(self, holds):
+        end = time.monotonic() + PATIENCE
+        while not holds():
+            self.assertLess(time.monotonic(), end)
+            time.sleep(0.005)
+
+    def rows(self, query):
+        with contextlib.closing(sqlite3.connect(self.database)) as db:
+            return db.execute(query).fetchall()
+
+    def test_it_is_listed_and_tested_with_zero_force(self):
+        found = self.palpate("devices", "--device", "forcedimension", "--library", STUB, "--json",
+                             self.folder / "found.json")
+        self.assertEqual(found.returncode, 0, found.stdout + found.stderr)
+        self.assertIn("connected: 4711", found.stdout)
+        self.assertIn("senses 5 degrees of freedom, drives 3; up to 12 N, 5000 N/m", found.stdout)
+        self.assertIn("maker's: omega.6", found.stdout)
+        limits = json.loads((self.folder / "found.json").read_text())["devices"][0]["limits"]
+        self.assertEqual((limits["sensed_freedom"], limits["actuated_freedom"]), (5, 3))
+        self.assertEqual(self.stub.get("open"), 0, "it is let go")
+        missing = self.palpate("devices", "--device", "forcedimension", "--library", self.folder / "none.so")
+        self.assertEqual(missing.returncode, 1)
+        self.assertIn("--library", missing.stdout + missing.stderr)
+
+    def test_a_protocol_that_needs_torque_is_refused(self):
+        required = {key: value for key, value in PROTOCOL.items() if key != "torque"}
+        (self.folder / "protocol.json").write_text(json.dumps(required))
+        terminal = self.run_session("--new-participant")
+        self.assertEqual(terminal.finish(), 2, terminal.text)
+        self.assertIn("/torque", terminal.text)
+        self.assertFalse(self.database.exists())
+
+    def test_a_session_with_faults_is_whole_in_the_end(self):
+        self.stub.set(reset=1)
+        terminal = self.run_session("--new-participant")
+        terminal.wait_for("calibration pit")
+        self.assertEqual(self.stub.get("forces_on"), 0)
+        self.stub.set(reset=0)
+        terminal.wait_for("(':go': push)")
+        while True:  # a starved machine's guard takes the push off
+            terminal.type(":go\n")
+            self.wait(lambda: self.stub.get("force_y") > 0.5)  # right
+            self.assertAlmostEqual(self.stub.get("force_x"), 0)
+            self.assertLessEqual(self.stub.force(), 1 + 1e-9, "one push, not two")
+            if terminal.wait_for("was a weak push to the right felt?", "the force direction check failed").startswith(
+                    "was"):
+                break
+        terminal.type(":go\n")
+        terminal.wait_for("move the stylus")
+        terminal.type(":go\n")
+        cut_off = False
+        while True:
+            # The home zone is to the right; the stylus points away from the user.
+            self.stub.set(hand_x=0, hand_y=0.04)
+            came = terminal.wait_for("[trial, ", "[fault, ", "[paused, ", "on record; ")
+            if came == "on record; ":
+                break
+            if came != "[trial, ":
+                terminal.type(":clear\n:go\n")
+                continue
+            self.stub.set(hand_y=0.012)
+            self.wait(lambda: self.stub.force() > 0.01 or terminal.text.count("[fault, "))
+            if not cut_off and self.stub.force() > 0.01:
+                self.stub.set(connected=0)
+                terminal.wait_for("[fault, ")
+                self.wait(lambda: "unplugged" in terminal.text)
+                self.stub.set(connected=1)
+                cut_off = True
+                terminal.type(":clear\n:go\n")
+                continue
+            terminal.type("1")
+        self.assertEqual(terminal.finish(), 0, terminal.text)
+        self.assertEqual(self.rows("SELECT count(*) FROM attempts WHERE state = 'completed'"), [(2,)])
+        self.assertGreaterEqual(self.rows("SELECT count(*) FROM attempts WHERE state <> 'completed'")[0][0], 1)
+        notes = [text for (text,) in self.rows("SELECT text FROM notes")]
+        self.assertIn('{"torque":"left out"}', notes)
+        self.assertIn("maker's: omega.6", self.rows("SELECT device_calibration FROM runs")[0][0])
+        self.assertEqual(self.stub.get("open"), 0)
+        self.assertEqual(self.stub.force(), 0)
+
+
+if __name__ == "__main__":
+    unittest.main(argv=sys.argv[:1] + sys.argv[3:])

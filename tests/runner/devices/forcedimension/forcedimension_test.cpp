@@ -1,0 +1,240 @@
+// Force Dimension's devices through a library that stands in for the maker's.
+
+#include "runner/devices/forcedimension/forcedimension.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <glm/geometric.hpp>
+#include <stdexcept>
+#include <string>
+#include <thread>
+
+#include "runner/devices/self_test.h"
+#include "tests/runner/devices/forcedimension/stub_state.h"
+#include "tests/shared/temporary_folder.h"
+
+namespace palpate::runner::forcedimension {
+namespace {
+
+using testing::StubDevice;
+using testing::StubState;
+
+class ForceDimension : public ::testing::Test {
+ protected:
+  ForceDimension() {
+    // The stub keeps the first file that it maps: each test writes the same one anew.
+    static const palpate::testing::TemporaryFolder folder;
+    static const std::string path = folder / "stub";
+    setenv("PALPATE_STUB_STATE", path.c_str(), 1);
+    static StubState* const mapped = testing::map_stub_state(path);
+    state_ = mapped;
+    *state_ = StubState{};
+    one().serial = 4711;
+    config_.library = STUB_LIBRARY;
+  }
+
+  StubDevice& one() { return state_->device[0]; }
+  StubDevice& other() { return state_->device[1]; }
+  static DeviceTrouble read(Device& device) { return device.read().trouble; }
+  /// Until the status has been asked for again.
+  static DeviceTrouble settle(Device& device) {
+    DeviceTrouble trouble = DeviceTrouble::none;
+    for (int tick = 0; tick < 10; ++tick) {
+      trouble = device.read().trouble;
+      device.write(Vec3(0), Vec3(0));
+    }
+    return trouble;
+  }
+  std::string refusal() {
+    try {
+      open(config_);
+      return "";
+    } catch (const std::runtime_error& error) {
+      return error.what();
+    }
+  }
+
+  StubState* state_;
+  DeviceConfig config_;
+};
+
+void expect_near(const Vec3& a, const Vec3& b) {
+  EXPECT_LT(glm::length(a - b), 1e-12)
+      << a.x << " " << a.y << " " << a.z << ", not " << b.x << " " << b.y << " " << b.z;
+}
+
+TEST_F(ForceDimension, AStylusIsReadInTheWorldFrameAndItsForcesAddUpAtTheGrip) {
+  one().hand[0] = 0.01;  // towards the user
+  one().hand[1] = 0.02;  // right
+  one().hand[2] = 0.03;  // up
+  one().hand_stiffness = 0;
+  const auto device = open(config_);
+  const DeviceReading reading = device->read();
+  EXPECT_FALSE(reading.lost);
+  expect_near(reading.stylus.tip, {0.02, -0.01, 0.03});
+  expect_near(reading.stylus.tail, {0.02, -0.01 - config_.stylus_length, 0.03});
+  const DeviceCapabilities& can = device->capabilities();
+  EXPECT_EQ(can.sensed_freedom, 5);
+  EXPECT_EQ(can.actuated_freedom, 3);
+  EXPECT_EQ(can.max_force, 12);
+  EXPECT_EQ(can.serial, "4711");
+  EXPECT_EQ(can.calibration, "maker's: omega.6, SDK 3.17.5.0");
+  EXPECT_EQ(one().watchdog, 40) << "125 us each";
+  EXPECT_EQ(one().brakes, 1);
+  device->write({1, 2, 3}, {0.1, 0.2, 0.3});
+  EXPECT_DOUBLE_EQ(one().force[0], -2.2);  // -y of the world is towards the user
+  EXPECT_DOUBLE_EQ(one().force[1], 1.1);
+  EXPECT_DOUBLE_EQ(one().force[2], 3.3);
+  EXPECT_EQ(one().torque[2], 0);
+}
+
+TEST_F(ForceDimension, WithoutAWristTheStylusIsAPoint) {
+  one().model = 1;
+  const auto device = open(config_);
+  EXPECT_EQ(device->capabilities().sensed_freedom, 3);
+  const DeviceReading reading = device->read();
+  EXPECT_EQ(reading.stylus.tip, reading.stylus.tail);
+}
+
+TEST_F(ForceDimension, ADrivenWristGetsTheTorqueOfTheTailsForceAboutTheTip) {
+  one().model = 2;
+  const auto device = open(config_);
+  EXPECT_EQ(device->capabilities().actuated_freedom, 5);
+  EXPECT_EQ(device->capabilities().max_torque, 0.2);
+  device->read();
+  device->write({0, 0, 1}, {0, 0, 1});
+  EXPECT_DOUBLE_EQ(one().force[2], 2);
+  // World: (0, -L, 0) x (0, 0, 1) = (-L, 0, 0), which is -y of the library.
+  EXPECT_NEAR(one().torque[0], 0, 1e-15);
+  EXPECT_NEAR(one().torque[1], -config_.stylus_length, 1e-15);
+  EXPECT_NEAR(one().torque[2], 0, 1e-15);
+}
+
+TEST_F(ForceDimension, AModelThatNobodyKnowsGetsCautiousLimits) {
+  one().model = 3;
+  const DeviceCapabilities can = open(config_)->capabilities();
+  EXPECT_EQ(can.max_force, 8);
+  EXPECT_EQ(can.max_stiffness, 1000);
+  EXPECT_EQ(can.workspace_radius, 0.05);
+}
+
+TEST_F(ForceDimension, EveryFaultIsTroubleAndZeroForceUntilItIsOver) {
+  const struct {
+    const char* name;
+    double StubDevice::*what;
+    double value, well;
+    DeviceTrouble trouble;
+  } cases[] = {{"unplugged", &StubDevice::connected, 0, 1, DeviceTrouble::unplugged},
+               {"no power", &StubDevice::power, 0, 1, DeviceTrouble::silent},
+               {"calibration lost", &StubDevice::reset, 1, 0, DeviceTrouble::not_calibrated},
+               {"too fast", &StubDevice::too_fast, 1, 0, DeviceTrouble::stopped_by_device},
+               {"NaN", &StubDevice::wrong, 1, 0, DeviceTrouble::implausible},
+               {"infinite", &StubDevice::wrong, 2, 0, DeviceTrouble::implausible},
+               {"1e9 m", &StubDevice::wrong, 3, 0, DeviceTrouble::implausible},
+               {"communication", &StubDevice::error, 2, 0, DeviceTrouble::unplugged},
+               {"no answer", &StubDevice::error, 7, 0, DeviceTrouble::silent},
+               {"in use", &StubDevice::error, 20, 0, DeviceTrouble::in_use}};
+  for (const auto& [name, what, value, well, trouble] : cases) {
+    SCOPED_TRACE(name);
+    *state_ = StubState{};
+    one().serial = 4711;
+    const auto device = open(config_);
+    ASSERT_EQ(settle(*device), DeviceTrouble::none);
+    device->write({0, 0, 1}, Vec3(0));
+    ASSERT_EQ(one().force[2], 1);
+    one().*what = value;
+    EXPECT_EQ(settle(*device), trouble);
+    const DeviceReading reading = device->read();
+    EXPECT_TRUE(reading.lost);
+    EXPECT_TRUE(std::isfinite(reading.stylus.tip.x + reading.stylus.tip.y + reading.stylus.tip.z));
+    device->write({0, 0, 1}, Vec3(0));
+    one().*what = well;
+    const bool reached = what != &StubDevice::connected && what != &StubDevice::error;
+    if (reached) {
+      EXPECT_EQ(one().force[2], 0) << "a force that is asked for anyway";
+    }
+    if (needs_reopening(trouble)) device->reopen();
+    EXPECT_EQ(settle(*device), DeviceTrouble::none);
+    device->write({0, 0, 1}, Vec3(0));
+    EXPECT_EQ(one().force[2], 1) << "it works again";
+  }
+}
+
+TEST_F(ForceDimension, AJumpIsNoMotionOfAHand) {
+  const auto device = open(config_);
+  ASSERT_EQ(settle(*device), DeviceTrouble::none);
+  one().wrong = 4;
+  EXPECT_EQ(read(*device), DeviceTrouble::implausible);
+  EXPECT_EQ(read(*device), DeviceTrouble::none) << "the servo keeps the forces off by itself";
+}
+
+TEST_F(ForceDimension, AfterADeadGuardTheFirmwareTakesTheForceOff) {
+  const auto device = open(config_);
+  device->read();
+  device->write({0, 0, 1}, Vec3(0));
+  std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  EXPECT_EQ(settle(*device), DeviceTrouble::stopped_by_device);
+  EXPECT_EQ(one().force[2], 0);
+  EXPECT_EQ(one().forces_on, 0) << "not by itself on again";
+  device->reopen();
+  EXPECT_EQ(settle(*device), DeviceTrouble::none);
+}
+
+TEST_F(ForceDimension, ADeviceIsKnownByItsSerialNumberWhateverItsPlace) {
+  state_->count = 2;
+  other().serial = 99;
+  other().hand[2] = 0.05;
+  config_.serials = {"99"};
+  const auto device = open(config_);
+  EXPECT_NEAR(device->read().stylus.tip.z, 0.05, 1e-12);
+  EXPECT_EQ(one().open, 0) << "the other one was let go";
+  one().connected = 0;  // its place is the first now
+  device->reopen();
+  EXPECT_NEAR(device->read().stylus.tip.z, 0.05, 1e-12);
+  config_.serials = {"5"};
+  EXPECT_NE(refusal().find("has the serial number 5; connected: 99"), std::string::npos)
+      << refusal();
+}
+
+TEST_F(ForceDimension, WhatCannotBeOpenedSaysWhy) {
+  one().in_use = 1;
+  EXPECT_NE(refusal().find("another program uses it"), std::string::npos) << refusal();
+  one().in_use = 0;
+  one().connected = 0;
+  EXPECT_NE(refusal().find("check its cable"), std::string::npos) << refusal();
+  state_->count = -1;
+  EXPECT_NE(refusal().find("cannot be counted"), std::string::npos) << refusal();
+  EXPECT_EQ(refusal().find('\x1b'), std::string::npos) << "no control characters of a library's";
+  config_.library = "/nonexistent/libdrd.so";
+  EXPECT_NE(refusal().find("--library"), std::string::npos) << refusal();
+  EXPECT_NE(refusal().find("/nonexistent/libdrd.so"), std::string::npos) << refusal();
+  config_.library = FOREIGN_LIBRARY;
+  EXPECT_NE(refusal().find("it has no dhdGetSDKVersion"), std::string::npos) << refusal();
+  config_.serials = {"1", "2"};
+  EXPECT_THROW(check(config_), std::invalid_argument);
+}
+
+TEST_F(ForceDimension, AnOldLibraryWorksAndWhatItDoesNotHaveIsOnRecord) {
+  config_.library = OLD_LIBRARY;
+  const auto device = open(config_);
+  EXPECT_EQ(settle(*device), DeviceTrouble::none);
+  EXPECT_EQ(device->capabilities().calibration,
+            "maker's: omega.6, SDK 3.3.0.1, WITHOUT the firmware's watchdog");
+  EXPECT_EQ(one().watchdog, 0);
+}
+
+TEST_F(ForceDimension, AreListedWithTheirSerialNumbersAndTroubles) {
+  state_->count = 2;
+  other().in_use = 1;
+  const std::vector<ConnectedDevice> found = connected(config_);
+  ASSERT_EQ(found.size(), 2U);
+  EXPECT_EQ(found[0].serial, "4711");
+  EXPECT_EQ(found[0].trouble, "");
+  EXPECT_NE(found[1].trouble.find("another program"), std::string::npos);
+  EXPECT_EQ(one().open, 0);
+}
+
+}  // namespace
+}  // namespace palpate::runner::forcedimension

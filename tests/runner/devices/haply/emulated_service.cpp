@@ -1,0 +1,180 @@
+#include "tests/runner/devices/haply/emulated_service.h"
+
+#include <sys/socket.h>
+
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/beast/core.hpp>
+#include <boost/beast/http.hpp>
+#include <boost/beast/websocket.hpp>
+#include <chrono>
+#include <list>
+#include <nlohmann/json.hpp>
+
+namespace palpate::runner::testing {
+
+namespace asio = boost::asio;
+namespace beast = boost::beast;
+namespace http = beast::http;
+using Json = nlohmann::ordered_json;
+using tcp = asio::ip::tcp;
+
+struct EmulatedService::Sockets {
+  asio::io_context io;
+  tcp::acceptor acceptor{io};
+  std::mutex mutex;
+  std::list<std::shared_ptr<tcp::socket>> open;
+  std::list<std::thread> threads;
+};
+
+namespace {
+
+Json vector(const std::array<double, 3>& v) { return {{"x", v[0]}, {"y", v[1]}, {"z", v[2]}}; }
+
+}  // namespace
+
+EmulatedService::EmulatedService(int port) : sockets_(std::make_unique<Sockets>()) {
+  const tcp::endpoint place(asio::ip::make_address("127.0.0.1"), static_cast<unsigned short>(port));
+  sockets_->acceptor.open(place.protocol());
+  sockets_->acceptor.set_option(tcp::acceptor::reuse_address(true));
+  sockets_->acceptor.bind(place);
+  sockets_->acceptor.listen();
+  acceptor_ = std::thread([this] { accept(); });
+}
+
+EmulatedService::~EmulatedService() {
+  quit_.store(true);
+  turn(false);
+  shutdown(sockets_->acceptor.native_handle(), SHUT_RDWR);
+  acceptor_.join();
+  for (std::thread& one : sockets_->threads) one.join();
+}
+
+std::string EmulatedService::address() const {
+  return "127.0.0.1:" + std::to_string(sockets_->acceptor.local_endpoint().port());
+}
+
+void EmulatedService::turn(bool on) {
+  on_.store(on);
+  if (on) return;
+  const std::scoped_lock lock(sockets_->mutex);
+  for (const auto& socket : sockets_->open) shutdown(socket->native_handle(), SHUT_RDWR);
+  with([](EmulatedArm& arm) { arm.force = {0, 0, 0}; });  // the arm is idle without its service
+}
+
+void EmulatedService::accept() {
+  while (!quit_.load()) {
+    boost::system::error_code error;
+    auto socket = std::make_shared<tcp::socket>(sockets_->io);
+    sockets_->acceptor.accept(*socket, error);
+    if (error || quit_.load()) return;
+    if (!on_.load()) continue;  // closed at once
+    const std::scoped_lock lock(sockets_->mutex);
+    sockets_->open.push_back(socket);
+    sockets_->threads.emplace_back([this, socket] {
+      try {
+        beast::flat_buffer buffer;
+        http::request<http::string_body> request;
+        http::read(*socket, buffer, request);
+        if (!beast::websocket::is_upgrade(request)) {
+          http::response<http::string_body> reply{http::status::ok, 11};
+          const std::string target(request.target());
+          const EmulatedArm arm = this->arm();
+          if (target == "/version") {
+            reply.body() = Json{{"ok", true}, {"data", {{"project_version", arm.version}}}}.dump();
+          } else if (target == "/settings/devices/force_scale") {
+            reply.body() = Json{{"force_scale", arm.force_scale}}.dump();
+          } else {
+            reply.result(http::status::not_found);
+            reply.body() = R"({"ok":false,"error":"no such page"})";
+          }
+          reply.prepare_payload();
+          http::write(*socket, reply);
+          socket->shutdown(tcp::socket::shutdown_both);
+          return;
+        }
+        beast::websocket::stream<tcp::socket&> stream(*socket);
+        stream.accept(request);
+        stream.text(true);
+        stream.write(asio::buffer(inventory()));
+        for (bool first = true;; first = false) {
+          beast::flat_buffer message;
+          stream.read(message);
+          const std::string text = beast::buffers_to_string(message.data());
+          if (first) with([&text](EmulatedArm& changed) { changed.first = text; });
+          const double delay = arm().delay;
+          if (delay > 0) std::this_thread::sleep_for(std::chrono::duration<double>(delay));
+          bool mute = false;
+          const std::string reply = answer(text, mute);
+          if (!mute) stream.write(asio::buffer(reply));
+        }
+      } catch (const std::exception&) {  // the client has gone: the arm is idle
+        with([](EmulatedArm& arm) { arm.force = {0, 0, 0}; });
+      }
+    });
+  }
+}
+
+std::string EmulatedService::inventory() {
+  const EmulatedArm arm = this->arm();
+  Json all = {{"session_id", 7}, {"inverse3", Json::array()}, {"verse_grip", Json::array()}};
+  if (arm.present) {
+    all["inverse3"].push_back(
+        {{"device_id", arm.id},
+         {"config",
+          {{"type", "inverse3"},
+           {"basis", {{"permutation", arm.basis}}},
+           {"mount", Json::object()},
+           {"filters", {{"force_gate", {{"gain", 0.3}}}}}}},
+         {"state", Json::object()},
+         {"status", {{"calibrated", arm.calibrated}, {"in_use", arm.in_use}}}});
+  }
+  if (arm.has_grip) all["verse_grip"].push_back({{"device_id", "G1"}, {"state", Json::object()}});
+  return all.dump();
+}
+
+std::string EmulatedService::answer(const std::string& message, bool& mute) {
+  const std::scoped_lock lock(mutex_);
+  const Json in = Json::parse(message);
+  ++arm_.commands;
+  // Unknown keys are ignored; a command counts once.
+  std::array<double, 3> force{0, 0, 0};
+  for (const Json& one : in.value("inverse3", Json::array())) {
+    if (one.value("device_id", "") != arm_.id || !one.contains("commands")) continue;
+    const Json& commanded = one["commands"].value("set_cursor_force", Json::object());
+    const char* const key = arm_.vector ? "vector" : "values";
+    if (!commanded.contains(key)) continue;
+    const Json& v = commanded[key];
+    force = {v["x"].get<double>(), v["y"].get<double>(), v["z"].get<double>()};
+  }
+  if (!arm_.calibrated || !arm_.powered || !arm_.present) force = {0, 0, 0};
+  if (!arm_.frozen) arm_.force = force;
+  mute = arm_.mute;
+  if (!arm_.instead.empty()) return arm_.instead;
+  std::array<double, 3> at = arm_.hand;
+  for (std::size_t i = 0; i < 3; ++i)
+    if (arm_.hand_stiffness > 0) at[i] += arm_.force[i] / arm_.hand_stiffness;
+  Json out = {{"inverse3", Json::array()}, {"verse_grip", Json::array()}};
+  if (arm_.present) {
+    out["inverse3"].push_back(
+        {{"device_id", arm_.id},
+         {"state",
+          {{"cursor_position", vector(at)},
+           {"cursor_velocity", vector({0, 0, 0})},
+           {"current_cursor_force", vector(arm_.force)}}},
+         {"status", {{"calibrated", arm_.calibrated}, {"power_supply", arm_.powered}}}});
+  }
+  if (arm_.has_grip) {
+    const auto& q = arm_.grip;
+    out["verse_grip"].push_back(
+        {{"device_id", "G1"},
+         {"state",
+          {{"button", arm_.button},
+           {"hall", 1},
+           {"orientation", {{"w", q[0]}, {"x", q[1]}, {"y", q[2]}, {"z", q[3]}}}}},
+         {"status", {{"awake", arm_.awake}}}});
+  }
+  return out.dump();
+}
+
+}  // namespace palpate::runner::testing

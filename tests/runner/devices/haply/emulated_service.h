@@ -1,0 +1,67 @@
+#pragma once
+// An Inverse Service that is not there: the messages of Haply's over WebSocket and HTTP, one arm
+// with a grip, held by a hand that gives way. Written from the public documentation.
+
+#include <array>
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+namespace palpate::runner::testing {
+
+/// What a test sets and sees.
+struct EmulatedArm {
+  std::string id = "049D", version = "3.5.0.0", basis = "XYZ";
+  bool vector = true;  ///< the key under which it takes forces; else "values"
+  double force_scale = 1;
+  std::array<double, 3> hand{0, 0, 0};     ///< m
+  double hand_stiffness = 400;             ///< N/m; 0: rigid
+  std::array<double, 4> grip{1, 0, 0, 0};  ///< w, x, y, z
+  bool has_grip = true, awake = true, present = true, in_use = false, calibrated = true,
+       powered = true, button = false, mute = false, frozen = false;
+  double delay = 0;                      ///< s, of each reply
+  std::string instead;                   ///< sent in place of a state; "": nothing is
+  std::array<double, 3> force{0, 0, 0};  ///< N, that it would push with
+  std::uint64_t commands = 0;
+  std::string first;  ///< message of the last connection
+};
+
+class EmulatedService {
+ public:
+  explicit EmulatedService(int port = 0);  ///< 0: any free one. \throws std::exception
+  ~EmulatedService();
+  EmulatedService(const EmulatedService&) = delete;
+  EmulatedService& operator=(const EmulatedService&) = delete;
+
+  std::string address() const;  ///< HOST:PORT
+  /// Ends all connections; new ones are refused until it is on again.
+  void turn(bool on);
+  template <class Change>
+  void with(Change change) {
+    const std::scoped_lock lock(mutex_);
+    change(arm_);
+  }
+  EmulatedArm arm() {
+    const std::scoped_lock lock(mutex_);
+    return arm_;
+  }
+
+ private:
+  struct Sockets;
+  void accept();
+  void talk(int connection);
+  std::string inventory();
+  std::string answer(const std::string& message, bool& mute);
+
+  std::mutex mutex_;
+  EmulatedArm arm_;
+  std::unique_ptr<Sockets> sockets_;
+  std::atomic<bool> quit_{false}, on_{true};
+  std::thread acceptor_;
+};
+
+}  // namespace palpate::runner::testing
