@@ -209,8 +209,11 @@ int validate_command(const std::vector<std::string>& args) {
     std::cout
         << "  texts       built in, in English; a protocol in another language gives its own: "
         << list(built_in) << "\n";
-  for (const protocols::StimulusSpec& stimulus : protocol.stimuli)
+  for (const protocols::StimulusSpec& stimulus : protocol.stimuli) {
+    for (const std::string& note : mesh_notes(stimulus.object))
+      std::cout << "  mesh        stimulus " << stimulus.name << ": " << note << "\n";
     print_overlaps(stimulus.object, stimulus.name, std::cout);
+  }
   const StimulusLibrary library(protocol);
   for (std::size_t i = 0; i < protocol.stimuli.size(); ++i) {
     const rendering::SoftObject* const soft = library.soft(i);

@@ -59,6 +59,7 @@ class Validate(unittest.TestCase):
             path.write_text(json.dumps(protocol), "utf-8")
             said = run("validate", str(path))
             self.assertEqual(said.returncode, 0, said.stderr)
+            self.assertRegex(said.stdout.decode(), r"\n  mesh +stimulus piece: .*tetrahedron.obj: 20 x 20 x 20 mm, 4 faces\n")
             simulated = said.stdout.decode().split("simulated participants")[1]
             refused = run("simulate", str(path), "--db", str(database))
             self.assertEqual(refused.returncode, 2)

@@ -3,7 +3,14 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdio>
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <limits>
+#include <utility>
+
+#include "stimuli/closed_surface.h"
+#include "stimuli/primitives.h"
+#include "stimuli/printable.h"
 
 namespace palpate::runner {
 
@@ -38,9 +45,41 @@ std::optional<std::string> elements_felt(const rendering::SoftObject& object) {
   return text;
 }
 
+std::vector<std::string> mesh_notes(const stimuli::ObjectSpec& object) {
+  std::vector<std::string> notes;
+  for (const stimuli::ObjectSpec& part : object.parts) {
+    for (std::string& note : mesh_notes(part)) notes.push_back(std::move(note));
+  }
+  if (object.shape != stimuli::ShapeKind::mesh || object.soft) return notes;
+  const stimuli::PolygonSoup soup = stimuli::polygons_of(object);
+  Vec3 low(std::numeric_limits<double>::max()), high = -low;
+  for (const auto& face : soup.faces) {
+    for (const std::uint32_t v : face) {
+      low = glm::min(low, soup.vertices[v]);
+      high = glm::max(high, soup.vertices[v]);
+    }
+  }
+  const Vec3 size = 1000.0 * (high - low);
+  char text[160];
+  std::snprintf(text, sizeof text, "%.4g x %.4g x %.4g mm, %zu faces", size.x, size.y, size.z,
+                soup.faces.size());
+  std::string note = stimuli::printable(object.file_name) + ": " + text;
+  try {
+    for (const std::string& done : stimuli::closed_surface(soup).notes) note += "; " + done;
+  } catch (const stimuli::MeshError&) {
+    // Convex all the same, within its coordinates' error.
+  }
+  notes.push_back(std::move(note));
+  return notes;
+}
+
 std::vector<std::string> scene_notes(const protocols::SceneSpec& spec,
                                      const rendering::Scene& scene) {
   std::vector<std::string> notes = objects_passed_through(spec);
+  for (std::size_t i = 0; i < spec.objects.size(); ++i) {
+    for (const std::string& note : mesh_notes(spec.objects[i]))
+      notes.push_back("/objects/" + std::to_string(i) + ": " + note);
+  }
   for (const auto& object : rendering::soft_objects(scene)) {
     if (const auto felt = elements_felt(*object))
       notes.push_back("/objects/" + std::to_string(object->object) + ": " + *felt);

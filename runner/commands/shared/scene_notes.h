@@ -17,6 +17,10 @@ std::vector<std::string> objects_passed_through(const protocols::SceneSpec& scen
 /// A sentence if the tool is smaller than the object's elements, which it feels then; else nothing.
 std::optional<std::string> elements_felt(const rendering::SoftObject& object);
 
+/// Of each mesh file in an object: its size in mm, so that one in other units is seen, and what was
+/// done to its polygons. Without line ends.
+std::vector<std::string> mesh_notes(const stimuli::ObjectSpec& object);
+
 /// All of that of a scene, with places.
 std::vector<std::string> scene_notes(const protocols::SceneSpec& spec,
                                      const rendering::Scene& scene);
