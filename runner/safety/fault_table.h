@@ -20,7 +20,7 @@ inline constexpr std::array<rendering::FaultBit, 8> kServoFaults = {{
     {servo_fault::kDeviceLost, "device-lost", "device lost",
      "the device did not answer: zero force until cleared", "the device was lost"},
     {servo_fault::kMissedTicks, "missed-ticks", "ticks missed",
-     "too many ticks in a row came too late: zero force until cleared",
+     "too many ticks in a row came too late: zero force until cleared, where the device has motors",
      "too many ticks were missed in a row"},
     {servo_fault::kTripped, "forces-off", "forces off",
      "forces were off, by another fault of this list or of an earlier tick, until the experimenter "

@@ -30,6 +30,9 @@ struct DeviceCapabilities {
   double max_torque = 0;
 };
 
+/// Whether it can push the hand. Without motors nothing can hurt.
+inline bool has_motors(const DeviceCapabilities& device) { return device.actuated_freedom > 0; }
+
 /// What is wrong with a reading.
 enum class DeviceTrouble : std::uint8_t {
   none,

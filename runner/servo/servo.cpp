@@ -46,6 +46,7 @@ double distance_of(const TrialScene& shown, const rendering::LineProbe& probe) {
 Servo::Servo(Device& device, Clock& clock, double rate, const ForceLimits& limits,
              const WorkspaceMap& workspace)
     : device_(device),
+      has_motors_(has_motors(device.capabilities())),
       clock_(clock),
       period_(1 / rate),
       period_ns_(std::llround(1e9 / rate)),
@@ -154,7 +155,7 @@ void Servo::check(const DeviceReading& reading) noexcept {
   sample_.buttons = reading.buttons;
   if (sample_.phase == Phase::feeling && late_in_a_row_ >= kMissedInARow) {
     sample_.faults |= servo_fault::kMissedTicks;
-    limiter_.trip();
+    if (has_motors_) limiter_.trip();
   }
 }
 
@@ -228,9 +229,9 @@ const Sample& Servo::tick() noexcept {
   if (workspace_.reach) sample_.rendering = rendering::felt(*workspace_.reach, sample_.rendering);
   sample_.bodies = static_cast<std::uint8_t>(bodies().size());
   sample_.faults |= sample_.rendering.faults;
-  constexpr std::uint32_t kEnds =
-      rendering::render_fault::kNonFinite | rendering::render_fault::kSoftStalled;
-  if (sample_.rendering.faults & kEnds) limiter_.trip();
+  const std::uint32_t ends = rendering::render_fault::kNonFinite |
+                             (has_motors_ ? rendering::render_fault::kSoftStalled : 0);
+  if (sample_.rendering.faults & ends) limiter_.trip();
   command(sample_.rendering.device1, sample_.rendering.device2);
   ++quality_.ticks;
   quality_.faults |= sample_.faults;

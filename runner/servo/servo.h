@@ -113,9 +113,10 @@ class Servo final : public TickSource {
   void command(Vec3 device1, Vec3 device2) noexcept;
   DeviceForces kept_passive(const Vec3& device1, const Vec3& device2) noexcept;
 
-  static constexpr int kMissedInARow = 5;  ///< missed ticks at which forces go off
+  static constexpr int kMissedInARow = 5;  ///< missed ticks at which the forces of motors go off
 
   Device& device_;
+  const bool has_motors_;
   Clock& clock_;
   const double period_;
   const std::int64_t period_ns_;

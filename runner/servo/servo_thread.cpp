@@ -17,12 +17,29 @@ using std::chrono::steady_clock;
 
 constexpr auto kNap = std::chrono::milliseconds(4);  // of the session, where nothing is new
 constexpr std::size_t kPlaces = 4096;                // ticks
-constexpr auto kPatience = std::chrono::seconds(1);  // then the servo counts as stalled
+constexpr auto kPatience = std::chrono::seconds(1);
+constexpr auto kPatienceWithoutMotors = std::chrono::seconds(10);
+constexpr auto kLongestWait =
+    std::chrono::milliseconds(50);  // from asking to asking; else all stood
 
 }  // namespace
 
+void Patience::begin() noexcept {
+  heard_ = asked_ = steady_clock::now();
+  waited_ = {};
+}
+
+bool Patience::is_over() noexcept {
+  const Time now = steady_clock::now();
+  if (has_motors_) return now - heard_ >= kPatience;
+  waited_ += std::min<std::chrono::nanoseconds>(now - asked_, kLongestWait);
+  asked_ = now;
+  return waited_ >= kPatienceWithoutMotors;
+}
+
 ServoThread::ServoThread(Device& device, Clock& clock, const ServoSettings& settings)
     : realtime_(settings.realtime),
+      has_motors_(has_motors(device.capabilities())),
       servo_(device, clock, settings.rate, settings.limits, settings.workspace),
       awake_(settings.realtime.awake),
       ring_(settings.ring),
@@ -162,9 +179,9 @@ void ServoThread::prepare(const rendering::Scene& scene, const rendering::Render
 }
 
 const Sample& ServoThread::next() noexcept {
-  const auto give_up = steady_clock::now() + kPatience;
+  Patience patience(has_motors_);
   while (next_now() == nullptr) {
-    if (steady_clock::now() >= give_up) {
+    if (patience.is_over()) {
       popped_.faults |= servo_fault::kStalled | servo_fault::kTripped;
       return popped_;
     }
@@ -188,9 +205,9 @@ void ServoThread::resume(std::uint32_t ticks) noexcept {
 ServoQuality ServoThread::stop() noexcept {
   const std::uint32_t asked = stops_asked_.load(std::memory_order_relaxed) + 1;
   stops_asked_.store(asked, std::memory_order_release);
-  const auto give_up = steady_clock::now() + kPatience;
+  Patience patience(has_motors_);
   while (stops_done_.load(std::memory_order_acquire) != asked) {
-    if (steady_clock::now() >= give_up) {
+    if (patience.is_over()) {
       emergency_zero();  // should it ever come back
       ServoQuality stalled;
       stalled.faults = servo_fault::kStalled | servo_fault::kTripped;

@@ -4,6 +4,7 @@
 // ring of fixed size, the newest through a triple buffer. No locks.
 
 #include <atomic>
+#include <chrono>
 #include <memory>
 #include <optional>
 #include <thread>
@@ -29,6 +30,24 @@ struct ServoSettings {
   bool touched_places = false;  ///< where every tick touches is told, too
 };
 
+/// Until a servo that gives nothing counts as stalled: one second where it drives motors. Without
+/// motors nobody waits for zero force, so it is ten, and a time in which the whole program stood
+/// still does not count.
+class Patience {
+ public:
+  explicit Patience(bool has_motors) noexcept : has_motors_(has_motors) { begin(); }
+  /// Something has come.
+  void begin() noexcept;
+  /// Ask every few milliseconds.
+  bool is_over() noexcept;
+
+ private:
+  using Time = std::chrono::steady_clock::time_point;
+  bool has_motors_;
+  Time heard_, asked_;
+  std::chrono::nanoseconds waited_{0};  ///< while the program ran
+};
+
 /// prepare, next and stop belong to one thread, the session's; latest to one, which may be another.
 class ServoThread final : public TickSource {
  public:
@@ -43,8 +62,8 @@ class ServoThread final : public TickSource {
   void prepare(const rendering::Scene& scene, const rendering::Renderer& renderer,
                const HomeZone& home) override;
   /// Every sample since prepare, in order. Where the ring overflowed, the first one after the gap
-  /// says so (kSamplesLost); where the thread gives nothing for a second, what comes back is its
-  /// last sample with kStalled and kTripped.
+  /// says so (kSamplesLost); where the thread gives nothing for too long (Patience), what comes
+  /// back is its last sample with kStalled and kTripped.
   const Sample& next() noexcept override;
   ServoQuality stop() noexcept override;
   /// After stop(): the scene goes on from where it was stopped, what moves in it as well, as soon
@@ -97,6 +116,7 @@ class ServoThread final : public TickSource {
   bool hand_over(const Sample& sample) noexcept;
 
   const RealtimeSettings realtime_;
+  const bool has_motors_;
   Servo servo_;
   const AwakeProcessors awake_;
   RealtimeRights rights_;

@@ -27,7 +27,8 @@ bool SessionFault::is_transient() const {
 std::string trip_reason(std::uint32_t faults, DeviceTrouble trouble) {
   using namespace servo_fault;
   for (const std::uint32_t bit :
-       {kEmergency, kStalled, kDeviceLost, kMissedTicks, rendering::render_fault::kNonFinite}) {
+       {kEmergency, kStalled, kDeviceLost, kMissedTicks, rendering::render_fault::kNonFinite,
+        rendering::render_fault::kSoftStalled}) {
     if ((faults & bit) == 0) continue;
     std::string why = bit == kDeviceLost ? advice(trouble) : "";
     if (trouble == DeviceTrouble::guard_late || trouble == DeviceTrouble::guarded) {

@@ -36,6 +36,10 @@ const char* in_words(Session::State state) {
   return "";
 }
 
+std::string milliseconds(std::int64_t ns) {
+  return std::to_string((ns + 500'000) / 1'000'000) + " ms";
+}
+
 }  // namespace
 
 SessionMonitor::SessionMonitor(const LiveStation& station, const Sources& sources)
@@ -221,6 +225,11 @@ void SessionMonitor::recorded(const data::TrialRecord& record) {
   const double took = static_cast<double>(station_.clock.now_ns() - trial_began_ns_) / kSecond_ns;
   ++timed_trials_;
   seconds_per_trial_ += (took - seconds_per_trial_) / timed_trials_;
+  // A device with motors would have cut it off.
+  if ((record.faults & servo_fault::kMissedTicks) != 0)
+    say("trial " + std::to_string(record.trial) + " missed " + std::to_string(record.missed_ticks) +
+        " ticks, up to " + milliseconds(record.longest_period_ns) +
+        " apart, which is on record: the computer was busy");
   const bool nothing_there = record.task && record.task->catch_trial;
   if (!record.response.empty() && !touched_ && !nothing_there) {
     say("trial " + std::to_string(record.trial) + " was answered before the first contact");

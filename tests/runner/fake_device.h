@@ -24,6 +24,7 @@ class FakeDevice final : public Device {
 
   void drive_at_grip(double max_torque) { capabilities_.max_torque = max_torque; }
   void limit(double max_force) { capabilities_.max_force = max_force; }
+  void take_motors_away() { capabilities_.actuated_freedom = 0; }
 
   Vec3 force, last1, last2;
 

@@ -30,6 +30,7 @@ constexpr HomeZone kAnywhere{.radius = 0, .rest = 0};
 LiveTouch::LiveTouch(Device& device, Clock& clock, Settings settings)
     : settings_(std::move(settings)),
       shown_(settings_.spec.objects),
+      patience_(has_motors(device.capabilities())),
       servo_(device, clock, with_places(settings_.servo)) {
   prepare(shown_);  // faults of the scene are told before there is a window
   recorder_ = std::jthread([this](const std::stop_token& stop) { record(stop); });
@@ -60,7 +61,7 @@ std::int64_t LiveTouch::period_ns() const {
 void LiveTouch::keep(const Sample& sample, std::span<const rendering::BodyPose> bodies) {
   if (sample.time_ns == last_ns_) return;  // the servo has stopped: its last one again
   last_ns_ = sample.time_ns;
-  heard_ = std::chrono::steady_clock::now();
+  patience_.begin();
   SceneMoment moment{.sample = sample, .contacts = {}};
   if (stepping_) {  // the hand got next to nothing: shown is what it would have got
     moment.sample.device1 = sample.rendering.device1;
@@ -162,7 +163,7 @@ void LiveTouch::stop_or_go_on(std::optional<std::vector<stimuli::ObjectSpec>> wa
   stepping_ = held;
   gap_ = true;
   running_ = !held;
-  heard_ = std::chrono::steady_clock::now();
+  patience_.begin();
   if (anew_) {
     prepare(shown_);  // as was tried before
     anew_ = false;
@@ -173,8 +174,7 @@ void LiveTouch::stop_or_go_on(std::optional<std::vector<stimuli::ObjectSpec>> wa
 }
 
 void LiveTouch::record(const std::stop_token& stop) {
-  constexpr auto kPatience = std::chrono::seconds(1);
-  heard_ = std::chrono::steady_clock::now();
+  patience_.begin();
   while (!stop.stop_requested()) {
     std::optional<std::vector<stimuli::ObjectSpec>> wanted;
     {
@@ -183,8 +183,8 @@ void LiveTouch::record(const std::stop_token& stop) {
     }
     stop_or_go_on(std::move(wanted));
     keep_what_is_there();
-    if (servo_.away() > 0) heard_ = std::chrono::steady_clock::now();
-    if (running_ && std::chrono::steady_clock::now() > heard_ + kPatience) {
+    if (servo_.away() > 0) patience_.begin();
+    if (running_ && patience_.is_over()) {
       servo_.emergency_zero();  // should it ever come back
       tell_trouble("the servo gives no more samples: forces are off");
     }

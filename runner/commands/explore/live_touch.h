@@ -2,7 +2,6 @@
 // A scene that a hand touches through a device.
 
 #include <atomic>
-#include <chrono>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -83,8 +82,8 @@ class LiveTouch final : public TouchSource {
   bool gap_ = false;                         ///< the next sample comes after a pause
   std::int64_t last_ns_ = 0, shown_ns_ = 0;  ///< of the last sample: the servo's, without pauses
   std::int64_t paused_ns_ = 0;               ///< of all pauses
-  std::chrono::steady_clock::time_point heard_{};  ///< when the servo gave a sample last
-  TouchedPlaces touched_;                          ///< the next that no sample has had yet
+  Patience patience_;                        ///< with the servo
+  TouchedPlaces touched_;                    ///< the next that no sample has had yet
   std::vector<std::shared_ptr<const SoftSurfaceNow>> soft_;  ///< the newest, by soft object
   std::int64_t soft_ns_ = 0;                                 ///< when they were asked for
   ServoThread servo_;

@@ -269,6 +269,27 @@ class SessionTest(WindowCase):
             self.assertGreaterEqual(ticks + missed, 180)
             self.assertLess(longest, 1_000_000_000)
 
+    def test_a_computer_that_stands_still_ends_no_trial_of_the_mouse(self):
+        self.start()
+        self.wait_for_trial()
+        self.assertEqual(self.done(), 0)
+        for stands_still in (0.1, 2.5):  # s; forces of motors would be off after 25 ms
+            self.program.send_signal(signal.SIGSTOP)
+            time.sleep(stands_still)
+            self.program.send_signal(signal.SIGCONT)
+            time.sleep(0.5)
+        self.assertEqual([state for *_, state in self.attempts()], ["running"])
+        self.answer()
+        missed, longest, faults = self.rows("SELECT missed_ticks, longest_period_ns, faults FROM attempts "
+                                            "WHERE state = 'completed'")[0]
+        self.assertGreaterEqual(missed, 500, "2.5 s at 200 Hz")
+        self.assertGreaterEqual(longest, 2_500_000_000)
+        self.assertTrue(faults & 64, "missed-ticks")
+        self.assertFalse(faults & 128, "forces-off")
+        self.screen.keep(self.console, "session_stood_still")
+        self.finish()
+        self.check_whole(cut_off=0)
+
     def test_emergency_zero_until_the_fault_is_cleared(self):
         self.start()
         self.answer(1)

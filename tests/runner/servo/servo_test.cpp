@@ -326,6 +326,39 @@ TEST(Servo, AGripThatDrivesTorqueGetsForceAndTorqueWithinItsLimitsInTheSameRatio
   }
 }
 
+TEST(Servo, MissedTicksAreToldAndEndNothingWhereThereAreNoMotors) {
+  for (const int missed : {4, 5, 50, 2000}) {
+    FakeDevice device([](int tick) { return come_down(tick, 0.029); });
+    device.take_motors_away();
+    StallingClock clock(2'000'000'000, missed * std::int64_t{1'000'000});
+    Servo servo(device, clock, 1000, ForceLimits{});
+    servo.prepare(cube_scene(), rendering::point_renderer(), HomeZone{});
+    std::uint32_t faults = 0;
+    for (int tick = 0; tick < 2500; ++tick) faults |= servo.tick().faults;
+    EXPECT_EQ(faults & servo_fault::kTripped, 0u) << missed;
+    EXPECT_NEAR(device.force.z, 0.8, 1e-9) << "what is shown goes on: " << missed;
+    const ServoQuality quality = servo.stop();
+    EXPECT_EQ((quality.faults & servo_fault::kMissedTicks) != 0, missed >= 5) << missed;
+    EXPECT_EQ(quality.missed_ticks, static_cast<std::uint64_t>(missed));
+    EXPECT_EQ(quality.longest_period_ns, (missed + 1) * std::int64_t{1'000'000});
+  }
+}
+
+TEST(Servo, APoseThatIsNoNumberEndsTheTrialWithoutMotorsToo) {
+  FakeDevice device([](int tick) {
+    const double nan = std::numeric_limits<double>::quiet_NaN();
+    return tick == 2000 ? DeviceReading{{{0, nan, 0.029}, {0, 0, 0.15}}, 0, false}
+                        : come_down(tick, 0.029);
+  });
+  device.take_motors_away();
+  VirtualClock clock;
+  Servo servo(device, clock, 1000, ForceLimits{});
+  servo.prepare(cube_scene(), rendering::point_renderer(), HomeZone{});
+  Sample sample;
+  for (int tick = 0; tick <= 2000; ++tick) sample = servo.tick();
+  EXPECT_TRUE(sample.faults & servo_fault::kTripped);
+}
+
 TEST(Servo, TheWorkspaceMapMovesAndScales) {
   // Twice as large in the virtual world, seen from (0, 0, 0.05).
   FakeDevice device([](int tick) {

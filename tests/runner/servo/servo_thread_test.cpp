@@ -249,6 +249,7 @@ TEST(ServoThread, KnowsWhetherItIsTheOneWhoAsks) {
 /// Holds the servo in its transfer until told to go on.
 class HangingDevice final : public Device {
  public:
+  explicit HangingDevice(int motors = 5) { capabilities_.actuated_freedom = motors; }
   const DeviceCapabilities& capabilities() const override { return capabilities_; }
   DeviceReading read() noexcept override {
     hangs.wait(true);
@@ -275,6 +276,26 @@ TEST(ServoThread, ADeviceThatHangsStopsTheTrialNotTheSession) {
   EXPECT_TRUE(servo.stop().faults & servo_fault::kStalled);
   device.hangs = false;
   device.hangs.notify_all();
+}
+
+TEST(ServoThread, WithoutMotorsASilenceOfASecondAndAHalfIsWaitedOut) {
+  HangingDevice device(0);
+  UnhurriedClock clock;
+  ServoThread servo(device, clock, fast());
+  servo.prepare(cube_scene(), rendering::point_renderer(), quick_home());
+  while (servo.next().phase != Phase::feeling) {
+  }
+  device.hangs = true;
+  std::jthread later([&device] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(1500));
+    device.hangs = false;
+    device.hangs.notify_all();
+  });
+  std::uint32_t faults = 0;
+  while (device.hangs) faults |= servo.next().faults;
+  for (int i = 0; i < 100; ++i) faults |= servo.next().faults;
+  EXPECT_EQ(faults & (servo_fault::kStalled | servo_fault::kTripped), 0u);
+  EXPECT_EQ(servo.stop().faults & servo_fault::kStalled, 0u);
 }
 
 TEST(TimeHistogram, QuantilesAreWithinAnEighth) {

@@ -238,5 +238,30 @@ TEST(SoftThreads, AServoTripsWhereTheyStallAndSnapshotsShowTheSurface) {
   EXPECT_NE(servo.stop().faults & render_fault::kSoftStalled, 0U);
 }
 
+TEST(SoftThreads, WithoutMotorsAStallIsToldAndNothingIsTripped) {
+  testing::FakeDevice device([](int tick) {
+    const double z = std::max(0.024, 0.1 - 1e-4 * tick);
+    return DeviceReading{{{0, 0, z}, {0, 0, z + 0.12}}, 0, false};
+  });
+  device.take_motors_away();
+  SlowClock clock;
+  ServoSettings settings;
+  settings.realtime = kPlainThread;
+  ServoThread servo(device, clock, settings);
+  servo.prepare(soft_cubes(1), rendering::ray_renderer(), {.radius = 0, .rest = 0});
+  Sample sample;
+  for (int i = 0; i < 1500; ++i) sample = servo.next();
+  (*servo.soft_threads())[0].stall(true);
+  for (int i = 0; i < 1000 && (sample.faults & render_fault::kSoftStalled) == 0; ++i)
+    sample = servo.next();
+  EXPECT_NE(sample.faults & render_fault::kSoftStalled, 0U);
+  EXPECT_EQ(sample.faults & servo_fault::kTripped, 0U);
+  (*servo.soft_threads())[0].stall(false);
+  for (int i = 0; i < 3000 && !(sample.device1.z + sample.device2.z > 0.1); ++i)
+    sample = servo.next();
+  EXPECT_GT(sample.device1.z + sample.device2.z, 0.1) << "it comes back by itself";
+  EXPECT_EQ(sample.faults & servo_fault::kTripped, 0U);
+}
+
 }  // namespace
 }  // namespace palpate::runner

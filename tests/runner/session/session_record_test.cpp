@@ -177,9 +177,10 @@ TEST(SessionFault, TheReasonIsTheWorstAndSaysWhatToDo) {
   EXPECT_EQ(reason(kDeviceLost | kMissedTicks | non_finite, DeviceTrouble::silent),
             reason(kDeviceLost, DeviceTrouble::silent));
   std::set<std::string> all;
-  for (const std::uint32_t bit : {kEmergency, kStalled, kDeviceLost, kMissedTicks, non_finite, 0u})
+  for (const std::uint32_t bit : {kEmergency, kStalled, kDeviceLost, kMissedTicks, non_finite,
+                                  rendering::render_fault::kSoftStalled, 0u})
     all.insert(reason(bit));
-  EXPECT_EQ(all.size(), 6u) << "each has its own words";
+  EXPECT_EQ(all.size(), 7u) << "each has its own words";
   for (const DeviceTrouble trouble : {DeviceTrouble::unplugged, DeviceTrouble::guard_late,
                                       DeviceTrouble::guarded, DeviceTrouble::apart}) {
     EXPECT_NE(reason(kDeviceLost, trouble).find(advice(trouble)), std::string::npos);
