@@ -56,6 +56,10 @@ bool draws_in_software() {
       [&name](const char* known) { return name.find(known) != std::string::npos; });
 }
 
+void finish_target() {
+  if (draws_in_software()) glFinish();
+}
+
 void check_opengl(const char* doing) {
   const GLenum error = glGetError();
   if (error == GL_NO_ERROR) return;
@@ -184,9 +188,11 @@ void GlCanvas::begin(int width, int height, int samples) {
 }
 
 void GlCanvas::end() const {
+  finish_target();
   glBindFramebuffer(GL_READ_FRAMEBUFFER, samples_frame_);
   glBindFramebuffer(GL_DRAW_FRAMEBUFFER, frame_);
   glBlitFramebuffer(0, 0, width_, height_, 0, 0, width_, height_, GL_COLOR_BUFFER_BIT, GL_NEAREST);
+  finish_target();
   glBindFramebuffer(GL_FRAMEBUFFER, 0);
 }
 

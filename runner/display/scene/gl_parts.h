@@ -18,6 +18,13 @@ void require_opengl();
 /// Whether the processor draws, not a graphics card.
 bool draws_in_software();
 
+/// After the last thing that is drawn into a target, before anything is drawn into another: where
+/// the processor draws, waits until it has. Mesa's software driver (llvmpipe, seen in 22.3.6) takes
+/// a target's work for done, and frees the fence that says so, while the thread that signals it may
+/// still be in it, if drawing into another target begins without having waited. That thread then
+/// writes into memory of somebody else.
+void finish_target();
+
 /// \throws DisplayError naming `doing` where OpenGL reports an error
 void check_opengl(const char* doing);
 

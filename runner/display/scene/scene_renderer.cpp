@@ -154,6 +154,7 @@ void SceneRenderer::draw_shadows(const ScenePicture& picture, const std::vector<
       item.mesh->draw();
     }
     glEnable(GL_CLIP_DISTANCE0);
+    finish_target();
   };
   draw_from(lamp_map_, lamp_view_);
   draw_from(sky_map_, sky_view_);
