@@ -8,8 +8,8 @@ build=(g++ cmake ninja-build libboost-dev libboost-program-options-dev libeigen3
   fonts-noto-core libasound2-dev libegl-dev libepoxy-dev libfontconfig-dev libglfw3-dev libimgui-dev libpango1.0-dev
   libpng-dev libstb-dev libwebp-dev libx11-dev)
 package=(dpkg-dev file help2man)  # `cmake --install` and cpack
-tests=(imagemagick libbenchmark-dev libbullet-dev libegl1 libfcl-dev libode-dev libgl1-mesa-dri libgtest-dev librsvg2-bin
-  libumockdev-dev libxml2-utils man-db python3 python3-jsonschema python3-pytest umockdev xdotool xvfb)
+tests=(dbus-daemon imagemagick libbenchmark-dev libbullet-dev libegl1 libfcl-dev libode-dev libgl1-mesa-dri libgtest-dev librsvg2-bin
+  libumockdev-dev libxml2-utils man-db openbox python3 python3-jsonschema python3-pytest umockdev xdotool xfwm4 xvfb)
 quality=(chromium clang clang-format clang-tidy devscripts lintian munge rt-tests slurm-wlm valgrind)
 
 case "${1:-}" in

@@ -44,6 +44,7 @@ class ConsoleView {
   std::vector<ConsoleCommand> draw(double now, const Modifiers& modifiers);
   /// Whether a pointer position (px) lies in the emergency button, which spans the window's width.
   bool in_emergency_button(float y) const { return y >= 0 && y < emergency_bottom_; }
+  float emergency_height() const { return emergency_bottom_; }  ///< px, with its margin
   void highlight_emergency(bool on) { emergency_highlit_ = on; }
 
  private:

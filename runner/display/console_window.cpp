@@ -8,6 +8,7 @@
 #include <imgui.h>
 
 #include <algorithm>
+#include <utility>
 
 #include "runner/display/console_words.h"
 #include "runner/display/imgui_context.h"
@@ -21,8 +22,6 @@ ConsoleWindow::ConsoleWindow(const WindowSettings& settings, const WindowLayout&
     : settings_(settings),
       participant_(participant),
       window_(make_window(settings.title + " - console", layout.console)) {
-  glfwSetWindowSizeLimits(window_, std::min(700, layout.console.width),
-                          std::min(480, layout.console.height), GLFW_DONT_CARE, GLFW_DONT_CARE);
   context_ = begin_imgui(window_, settings.texts, static_cast<float>(layout.console_scale));
   glfwSetWindowUserPointer(window_, this);
   glfwSetKeyCallback(window_, &ConsoleWindow::on_key);
@@ -51,6 +50,16 @@ void ConsoleWindow::destroy() {
 
 std::string ConsoleWindow::name_of(ConsoleCommand::Kind kind) const {
   return "'" + std::string(button_label(kind)) + "'";
+}
+
+std::string ConsoleWindow::places() const {
+  const std::lock_guard lock(places_mutex_);
+  return places_;
+}
+
+void ConsoleWindow::put_places(std::string note) {
+  const std::lock_guard lock(places_mutex_);
+  places_ = std::move(note);
 }
 
 void ConsoleWindow::send_command(ConsoleCommand::Kind kind, std::string text) {

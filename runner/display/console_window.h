@@ -1,6 +1,8 @@
 #pragma once
 
 #include <memory>
+#include <mutex>
+#include <string>
 
 #include "runner/display/console_view.h"
 #include "runner/display/mailbox.h"
@@ -26,6 +28,11 @@ class ConsoleWindow final : public ExperimenterConsole {
   std::vector<ConsoleCommand> commands() override { return commands_.take(); }
 
   std::string name_of(ConsoleCommand::Kind kind) const override;
+  std::string places() const override;
+  /// Of places(). By the display's thread.
+  void put_places(std::string note);
+  /// px, of the emergency button, with its margin.
+  float emergency_height() const { return view_->emergency_height(); }
 
   GLFWwindow* handle() const { return window_; }
   void draw();
@@ -55,6 +62,8 @@ class ConsoleWindow final : public ExperimenterConsole {
   std::vector<Release> late_releases_;  ///< of fresh_keys_, passed on after the frame
   Mailbox<ConsoleState> states_;
   EventQueue<ConsoleCommand> commands_;
+  mutable std::mutex places_mutex_;
+  std::string places_;
 };
 
 }  // namespace palpate::runner

@@ -135,6 +135,9 @@ class ExperimenterConsole {
   virtual std::vector<ConsoleCommand> commands() = 0;
   /// What to press or type for a command, in quotes: "':go'", "'Go on'".
   virtual std::string name_of(ConsoleCommand::Kind kind) const = 0;
+  /// Where the experimenter has put the windows in this session, as a note that the next one's are
+  /// placed by; empty: they stand where they were shown, or there are none.
+  virtual std::string places() const { return {}; }
 };
 
 }  // namespace palpate::runner

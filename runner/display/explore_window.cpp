@@ -20,8 +20,9 @@
 namespace palpate::runner {
 namespace {
 
-constexpr double kExploreFrame = 1.0 / 60;  // s
-constexpr int kStepsOfPage = 100;           // ticks
+constexpr double kExploreFrame = 1.0 / 60;                 // s
+constexpr int kStepsOfPage = 100;                          // ticks
+constexpr int kExploreWidth = 1480, kExploreHeight = 900;  // px, at scale 1
 
 double steady_seconds() {
   const auto since = std::chrono::steady_clock::now().time_since_epoch();
@@ -77,21 +78,10 @@ class ExploreWindow {
   bool ended() const { return end_requested_ && end_requested_(); }
 
   void open(ExploreSettings settings) {
-    WindowSettings one;
-    one.ui_scale = settings.ui_scale;
-    const WindowLayout layout = lay_out_windows(one);
-    WindowGeometry geometry = layout.console;
-    const GLFWvidmode* const mode = glfwGetVideoMode(glfwGetPrimaryMonitor());
-    if (mode != nullptr) {
-      geometry.width = std::min(static_cast<int>(1480 * layout.console_scale), mode->width);
-      geometry.height = std::min(static_cast<int>(900 * layout.console_scale), mode->height);
-      geometry.left = std::max(0, (mode->width - geometry.width) / 2);
-      geometry.top = std::max(0, (mode->height - geometry.height) / 2);
-    }
-    window_ = make_window(settings.title + " - palpate explore", geometry);
-    glfwSetWindowSizeLimits(window_, std::min(700, geometry.width), std::min(480, geometry.height),
-                            GLFW_DONT_CARE, GLFW_DONT_CARE);
-    context_ = begin_imgui(window_, {settings.title}, static_cast<float>(layout.console_scale));
+    const double scale = single_scale(settings.ui_scale);
+    window_ = make_window(settings.title + " - palpate explore",
+                          lay_out_single(kExploreWidth, kExploreHeight, scale));
+    context_ = begin_imgui(window_, {settings.title}, static_cast<float>(scale));
     glfwSetWindowUserPointer(window_, this);
     glfwSetKeyCallback(window_, &ExploreWindow::on_key);
     glfwSetCharCallback(window_, &ImGui_ImplGlfw_CharCallback);

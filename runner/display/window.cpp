@@ -7,12 +7,14 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <optional>
 
 #include "runner/display/console_window.h"
 #include "runner/display/joystick.h"
 #include "runner/display/key_names.h"
 #include "runner/display/participant_window.h"
 #include "runner/display/window_layout.h"
+#include "runner/display/window_placing.h"
 #include "runner/display/x11_errors.h"
 
 namespace palpate::runner {
@@ -53,6 +55,7 @@ class Windows final : public DisplayLoop {
         layout_(lay_out_windows(settings_)),
         participant_(settings_, layout_.participant, layout_.participant_scale),
         console_(settings_, layout_, participant_),
+        placing_(participant_.handle(), console_.handle(), layout_),
         joystick_(settings_.joystick.empty() ? nullptr : make_joystick()),
         joystick_keys_(settings_.joystick) {
     GLFWwindow* const window = participant_.handle();
@@ -123,6 +126,9 @@ class Windows final : public DisplayLoop {
     const double drawn = seconds();
     const double next = std::max(started + kFrame, 2 * drawn - started);
     glfwPollEvents();
+    placing_.step(drawn, console_.emergency_height());
+    const std::optional<WindowPlaces> moved = placing_.moved_to();
+    console_.put_places(moved ? to_note(*moved) : "");
     for (double now = seconds(); now < next && !ended_.load(); now = seconds()) {
       glfwWaitEventsTimeout(joystick_ ? std::min(next - now, kJoystickPoll) : next - now);
       poll_joystick();
@@ -164,6 +170,7 @@ class Windows final : public DisplayLoop {
   const WindowLayout layout_;
   ParticipantWindow participant_;
   ConsoleWindow console_;
+  WindowPlacing placing_;
   std::unique_ptr<Joystick> joystick_;  ///< none: the protocol maps none
   JoystickKeys joystick_keys_;
   std::atomic<bool> ended_{false};

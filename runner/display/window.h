@@ -4,12 +4,14 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "runner/devices/mouse.h"
 #include "runner/display/display.h"
 #include "runner/display/scene/display_error.h"
+#include "runner/display/window_places.h"
 
 namespace palpate::runner {
 
@@ -26,6 +28,7 @@ struct WindowSettings {
   MouseStylus* mouse = nullptr;  ///< moved by the pointer over the console's view; nullptr: none
   WorkspaceMap workspace;        ///< of the servo, for the mouse
   std::map<std::string, std::string> joystick;  ///< its inputs -> keys; empty: it is not looked at
+  std::optional<WindowPlaces> places;           ///< where they were put in an earlier session
   Clock* clock = nullptr;  ///< time-stamps keys and commands; required; must outlive the windows
 };
 

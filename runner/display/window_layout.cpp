@@ -5,12 +5,20 @@
 #include <GLFW/glfw3.h>
 
 #include <algorithm>
+#include <cstdint>
+#include <vector>
 
 namespace palpate::runner {
 namespace {
 
 constexpr double kParticipantFraction = 0.4;  // of a monitor's width that both windows are on
-constexpr int kFrame = 40;                    // px, for the decorations of the window manager
+constexpr int kGap = 10;                      // px, around each window
+constexpr int kLeast = 200;                   // px, of a side; a smaller window is of no use
+// px, at scale 1:
+constexpr int kConsoleWidth = 1480, kConsoleHeight = 920;
+constexpr int kParticipantWidth = 1280, kParticipantHeight = 800;
+constexpr int kLeastWidth = 700, kLeastHeight = 480;  // of the console and of `explore`
+constexpr int kBarHeight = 64;                        // of the emergency button, with its margin
 
 /// \param number  from 1; 0: `otherwise`, or the first if there are fewer
 GLFWmonitor* monitor(int number, int otherwise) {
@@ -49,16 +57,95 @@ bool overlap(GLFWmonitor* a, GLFWmonitor* b) {
          top[0] < top[1] + height[1] && top[1] < top[0] + height[0];
 }
 
-/// Centred in a part of the monitor. \param from, to  fractions of its width
-WindowGeometry centred_in(GLFWmonitor* on, double from, double to, int width, int height) {
-  int left = 0, top = 0, room_width = 1280, room_height = 800;
-  if (on != nullptr) glfwGetMonitorWorkarea(on, &left, &top, &room_width, &room_height);
-  left += static_cast<int>(from * room_width);
-  room_width = static_cast<int>((to - from) * room_width);
-  width = std::min(width, std::max(room_width - kFrame / 2, 200));
-  height = std::min(height, std::max(room_height - kFrame, 200));
-  return {nullptr, left + (room_width - width) / 2, top + (room_height - height) / 2, width,
-          height};
+/// Without panels. \param on  nullptr: of a usual size
+ScreenBox work_area(GLFWmonitor* on) {
+  ScreenBox area{0, 0, 1280, 800};
+  if (on != nullptr) glfwGetMonitorWorkarea(on, &area.left, &area.top, &area.width, &area.height);
+  return area;
+}
+
+ScreenBox whole_area(GLFWmonitor* on) {
+  ScreenBox area{0, 0, 1280, 800};
+  const GLFWvidmode* const mode = on != nullptr ? glfwGetVideoMode(on) : nullptr;
+  if (mode == nullptr) return area;
+  glfwGetMonitorPos(on, &area.left, &area.top);
+  area.width = mode->width;
+  area.height = mode->height;
+  return area;
+}
+
+std::vector<GLFWmonitor*> monitors() {
+  int count = 0;
+  GLFWmonitor** const all = glfwGetMonitors(&count);
+  return {all, all + count};
+}
+
+/// The one that most of the box is on.
+GLFWmonitor* monitor_of(const ScreenBox& box) {
+  GLFWmonitor* best = nullptr;
+  std::int64_t most = 0;
+  for (GLFWmonitor* const one : monitors()) {
+    const ScreenBox area = whole_area(one);
+    const int wide = std::min(box.right(), area.right()) - std::max(box.left, area.left);
+    const int high = std::min(box.bottom(), area.bottom()) - std::max(box.top, area.top);
+    if (wide <= 0 || high <= 0 || std::int64_t{wide} * high <= most) continue;
+    most = std::int64_t{wide} * high;
+    best = one;
+  }
+  return best;
+}
+
+/// Of the window manager, if it tells before there is a window on the screen.
+FrameSize usual_frame() {
+  glfwDefaultWindowHints();
+  glfwWindowHint(GLFW_CLIENT_API, GLFW_NO_API);
+  glfwWindowHint(GLFW_VISIBLE, GLFW_FALSE);
+  GLFWwindow* const probe = glfwCreateWindow(100, 100, "", nullptr, nullptr);
+  if (probe == nullptr) return {};
+  const FrameSize frame = frame_of(probe);
+  glfwDestroyWindow(probe);
+  return frame;
+}
+
+int scaled(int size, double scale) { return static_cast<int>(size * scale); }
+
+/// As large as it is wanted and fits, in the middle of the room.
+ScreenBox centred_in(const ScreenBox& room, int width, int height, const FrameSize& frame) {
+  const ScreenBox most = without_frame(room, frame, kGap);
+  width = std::min(width, std::max(most.width, kLeast));
+  height = std::min(height, std::max(most.height, kLeast));
+  return {most.left + (most.width - width) / 2,
+          std::max(most.top, most.top + (most.height - height) / 2), width, height};
+}
+
+/// At the right edge of the room, as wide as the participant's window leaves it.
+ScreenBox console_beside_participant(const ScreenBox& room, double scale, const FrameSize& frame) {
+  const int part = static_cast<int>((1 - kParticipantFraction) * room.width);
+  const int around = 2 * kGap + frame.left + frame.right;
+  const int width = std::min(scaled(kConsoleWidth, scale), std::max(part - around, kLeast));
+  const int height = std::min(
+      scaled(kConsoleHeight, scale),
+      std::max(room.height - std::max(4 * kGap, 2 * kGap + frame.top + frame.bottom), kLeast));
+  return {room.right() - kGap - frame.right - width, room.top + kGap + frame.top, width, height};
+}
+
+/// Where the windows were put last; none: they do not fit there any more, or something else was
+/// asked for.
+const WindowPlaces* usable(const WindowSettings& settings, const FrameSize& frame, int bar) {
+  if (!settings.places || settings.full_screen || settings.participant_monitor > 0 ||
+      settings.console_monitor > 0)
+    return nullptr;
+  const WindowPlaces& places = *settings.places;
+  const ScreenBox all = desktop();
+  if (places.desktop_width != all.width || places.desktop_height != all.height) return nullptr;
+  for (const ScreenBox* const box : {&places.participant, &places.console}) {
+    GLFWmonitor* const on = monitor_of(*box);
+    if (on == nullptr || box->width < kLeast || box->height < kLeast ||
+        !contains(whole_area(on), *box))
+      return nullptr;
+  }
+  const ScreenBox &console = places.console, button{console.left, console.top, console.width, bar};
+  return overlap(with_frame(places.participant, frame), button) ? nullptr : &places;
 }
 
 }  // namespace
@@ -69,25 +156,73 @@ std::string glfw_reason() {
   return reason != nullptr ? reason : "no reason given";
 }
 
+FrameSize frame_of(GLFWwindow* window) {
+  FrameSize frame;
+  glfwGetWindowFrameSize(window, &frame.left, &frame.top, &frame.right, &frame.bottom);
+  return frame;
+}
+
+ScreenBox desktop() {
+  ScreenBox all{0, 0, 0, 0};
+  for (GLFWmonitor* const one : monitors()) {
+    const ScreenBox area = whole_area(one);
+    all.width = std::max(all.width, area.right());
+    all.height = std::max(all.height, area.bottom());
+  }
+  return all;
+}
+
+ScreenBox room_beside(const ScreenBox& console, int bar, const FrameSize& frame) {
+  const ScreenBox area = work_area(monitor_of(console));
+  const ScreenBox beside = rest_of(area, with_frame(console, frame));
+  if (beside.width >= 2 * kLeast && beside.height >= kLeast)
+    return without_frame(beside, frame, kGap);
+  // A console over the whole monitor: on it, but below the button.
+  const int below = std::clamp(console.top + bar, area.top, area.bottom());
+  return without_frame({area.left, below, area.width, area.bottom() - below}, frame, kGap);
+}
+
+double single_scale(double wanted) { return scale_for(monitor(0, 1), wanted); }
+
+WindowGeometry lay_out_single(int width, int height, double scale) {
+  const ScreenBox box = centred_in(work_area(monitor(0, 1)), scaled(width, scale),
+                                   scaled(height, scale), usual_frame());
+  return {nullptr, box, std::min(kLeastWidth, box.width), std::min(kLeastHeight, box.height)};
+}
+
 WindowLayout lay_out_windows(const WindowSettings& settings) {
-  GLFWmonitor* const participant = monitor(settings.participant_monitor, 2);
-  GLFWmonitor* const console = monitor(settings.console_monitor, 1);
+  GLFWmonitor* participant = monitor(settings.participant_monitor, 2);
+  GLFWmonitor* console = monitor(settings.console_monitor, 1);
+  const FrameSize frame = usual_frame();
+  const auto bar_at = [](double scale) { return scaled(kBarHeight, scale); };
+  const WindowPlaces* const places =
+      usable(settings, frame, bar_at(scale_for(console, settings.ui_scale)));
+  if (places != nullptr) {
+    participant = monitor_of(places->participant);
+    console = monitor_of(places->console);
+  }
   WindowLayout layout;
   layout.shared = participant == nullptr || overlap(participant, console);
   layout.participant_scale = scale_for(participant, settings.ui_scale);
   layout.console_scale = scale_for(console, settings.ui_scale);
-  const double fraction = layout.shared ? kParticipantFraction : 0;
-  const auto scaled = [](int size, double scale) { return static_cast<int>(size * scale); };
-  layout.participant =
-      centred_in(participant, 0, layout.shared ? fraction : 1,
-                 scaled(1280, layout.participant_scale), scaled(800, layout.participant_scale));
-  layout.console =
-      centred_in(layout.shared ? participant : console, fraction, 1,
-                 scaled(1480, layout.console_scale), scaled(920, layout.console_scale));
-  if (settings.full_screen && !layout.shared) {
-    const GLFWvidmode* const mode = glfwGetVideoMode(participant);
-    layout.participant = {participant, 0, 0, mode->width, mode->height};
+  if (places != nullptr) {
+    layout.participant.box = places->participant;
+    layout.console.box = places->console;
+  } else if (layout.shared) {
+    layout.console.box =
+        console_beside_participant(work_area(participant), layout.console_scale, frame);
+    layout.participant.box = room_beside(layout.console.box, bar_at(layout.console_scale), frame);
+  } else {
+    layout.participant.box =
+        centred_in(work_area(participant), scaled(kParticipantWidth, layout.participant_scale),
+                   scaled(kParticipantHeight, layout.participant_scale), frame);
+    layout.console.box = centred_in(work_area(console), scaled(kConsoleWidth, layout.console_scale),
+                                    scaled(kConsoleHeight, layout.console_scale), frame);
   }
+  layout.console.least_width = std::min(kLeastWidth, layout.console.box.width);
+  layout.console.least_height = std::min(kLeastHeight, layout.console.box.height);
+  if (settings.full_screen && !layout.shared)
+    layout.participant = {participant, whole_area(participant), 0, 0};
   return layout;
 }
 
@@ -99,10 +234,18 @@ GLFWwindow* make_window(const std::string& title, const WindowGeometry& geometry
   glfwWindowHint(GLFW_VISIBLE, GLFW_FALSE);
   // A click into the console must not minimise the participant's full-screen window.
   glfwWindowHint(GLFW_AUTO_ICONIFY, GLFW_FALSE);
-  GLFWwindow* const window = glfwCreateWindow(geometry.width, geometry.height, title.c_str(),
-                                              geometry.full_screen_on, nullptr);
+  const ScreenBox& box = geometry.box;
+  GLFWwindow* const window =
+      glfwCreateWindow(box.width, box.height, title.c_str(), geometry.full_screen_on, nullptr);
   if (window == nullptr) throw DisplayError("no window with OpenGL 3.3: " + glfw_reason());
-  if (geometry.full_screen_on == nullptr) glfwSetWindowPos(window, geometry.left, geometry.top);
+  if (geometry.full_screen_on == nullptr) {
+    if (geometry.least_width > 0)
+      glfwSetWindowSizeLimits(window, geometry.least_width, geometry.least_height, GLFW_DONT_CARE,
+                              GLFW_DONT_CARE);
+    // After the limits, which write the window's hints anew: without a position among them the
+    // window manager would choose one.
+    glfwSetWindowPos(window, box.left, box.top);
+  }
   glfwMakeContextCurrent(window);
   glfwSwapInterval(0);  // waiting for a vertical retrace would delay the keys of both windows
   return window;

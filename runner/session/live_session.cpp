@@ -42,6 +42,8 @@ LiveSession::Outcome LiveSession::run() {
   }
   if (!outcome.reason.empty()) record.note(now, "ended: " + outcome.reason);
   record.note(now, to_json_text(station_.servo_thread.health(), station_.protocol.servo_rate));
+  if (const std::string places = station_.console.places(); !places.empty())
+    record.note(now, places);
   record.end(outcome.end, now);
   monitor_.show();
   if (outcome.end != data::RunEnd::done)

@@ -1,7 +1,9 @@
 #include "runner/commands/run/opening.h"
 
 #include <algorithm>
+#include <cstdint>
 #include <cstdio>
+#include <optional>
 #include <stdexcept>
 
 #include "protocols/tasks/texts.h"
@@ -100,9 +102,28 @@ std::unique_ptr<ResponseBox> open_response_box(const RunSettings& settings,
   }
 }
 
+namespace {
+
+/// Of the newest run that has any, whoever took part in it.
+std::optional<WindowPlaces> last_places(data::Store& store) {
+  std::optional<WindowPlaces> newest;
+  std::int64_t utc_ns = 0;
+  for (const data::StoredNote& note : store.notes()) {
+    if (newest && note.run_clock.utc_ns < utc_ns) continue;
+    const std::optional<WindowPlaces> places = window_places(note.text);
+    if (!places) continue;
+    newest = places;
+    utc_ns = note.run_clock.utc_ns;
+  }
+  return newest;
+}
+
+}  // namespace
+
 std::unique_ptr<DisplayLoop> open_display(const RunSettings& settings,
-                                          const protocols::Protocol& protocol, Clock& clock,
-                                          Device& device, const std::function<void()>& emergency) {
+                                          const protocols::Protocol& protocol, data::Store& store,
+                                          Clock& clock, Device& device,
+                                          const std::function<void()>& emergency) {
   if (!settings.no_window) {
     WindowSettings window;
     window.title = protocol.name + ", " + settings.participant;
@@ -116,6 +137,7 @@ std::unique_ptr<DisplayLoop> open_display(const RunSettings& settings,
     window.mouse = dynamic_cast<MouseStylus*>(&device);
     window.workspace = workspace_of(protocol);
     window.clock = &clock;
+    window.places = last_places(store);
     try {
       auto windows = make_windows(window);
       const std::string missing = windows->unreadable();

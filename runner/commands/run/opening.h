@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "data/store/store.h"
 #include "protocols/protocol.h"
 #include "runner/commands/run/settings.h"
 #include "runner/devices/registry.h"
@@ -46,9 +47,11 @@ std::unique_ptr<NoisePlayer> open_noise(const RunSettings& settings,
 std::unique_ptr<ResponseBox> open_response_box(const RunSettings& settings,
                                                const protocols::Protocol& protocol, Clock& clock,
                                                const std::function<void()>& emergency);
+/// \param store  says where windows were put last
 /// \param emergency  commands zero force at once; called in the display's thread
 std::unique_ptr<DisplayLoop> open_display(const RunSettings& settings,
-                                          const protocols::Protocol& protocol, Clock& clock,
-                                          Device& device, const std::function<void()>& emergency);
+                                          const protocols::Protocol& protocol, data::Store& store,
+                                          Clock& clock, Device& device,
+                                          const std::function<void()>& emergency);
 
 }  // namespace palpate::runner

@@ -263,7 +263,7 @@ int run_command(const std::vector<std::string>& args) {
     if (guard != nullptr) guard->emergency_zero();
     servo.emergency_zero();
   };
-  const auto display = open_display(settings, protocol, clock, *open.device, emergency);
+  const auto display = open_display(settings, protocol, store, clock, *open.device, emergency);
   const auto box = open_response_box(settings, protocol, clock, emergency);
   std::optional<ScreenWithBox> box_screen;
   if (box) box_screen.emplace(display->participant(), *box);

@@ -5,6 +5,7 @@ import os
 import shutil
 import signal
 import subprocess
+import tempfile
 import time
 import unittest
 
@@ -45,6 +46,7 @@ class VirtualScreen:
             raise AssertionError("Xvfb did not start")
         VirtualScreen.next_number = number + 1
         self.name = f":{number}"
+        self.manager = None
         # One thread of software drawing: the tests share their machine with a servo.
         self.environment = dict(os.environ, DISPLAY=self.name, LP_NUM_THREADS="1")
         # Graphics drivers keep memory until the end, all the more after their display died.
@@ -65,10 +67,29 @@ class VirtualScreen:
         return ready
 
     def close(self):
+        if self.manager:
+            self.stop_manager()
         if self.server.poll() is None:
             self.server.send_signal(signal.SIGCONT)
             self.server.terminate()
         self.server.wait()
+
+    def manage(self, manager):
+        """Starts a window manager."""
+        command = {"openbox": ["openbox"], "xfwm4": ["dbus-run-session", "--", "xfwm4", "--compositor=off"]}[manager]
+        home = tempfile.TemporaryDirectory(ignore_cleanup_errors=True)  # what it writes
+        self.manager = home, subprocess.Popen(
+            command, env=dict(self.environment, HOME=home.name, XDG_RUNTIME_DIR=home.name), start_new_session=True,
+            stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        wait_for("the window manager", lambda: not subprocess.run(
+            ["xdotool", "get_desktop"], env=self.environment, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE).stderr)
+
+    def stop_manager(self):
+        home, process = self.manager
+        os.killpg(process.pid, signal.SIGTERM)
+        process.wait()
+        home.cleanup()
+        self.manager = None
 
     def kill(self):
         self.server.kill()
@@ -120,11 +141,17 @@ class VirtualScreen:
         return int(words["WIDTH"]), int(words["HEIGHT"])
 
     def box(self, window):
-        """Left, top, right and lower edge on the screen."""
-        words = dict(line.split("=") for line in self.do(
-            "getwindowgeometry", "--shell", window).split())
-        left, top = int(words["X"]), int(words["Y"])
-        return left, top, left + int(words["WIDTH"]), top + int(words["HEIGHT"])
+        """Left, top, right and lower edge on the screen, without its frame. xdotool of Debian 12 counts the frame of
+        a window manager twice."""
+        x11 = ctypes.CDLL("libX11.so.6")
+        x11.XOpenDisplay.restype = x11.XDefaultRootWindow.restype = ctypes.c_void_p
+        display = ctypes.c_void_p(x11.XOpenDisplay(self.environment["DISPLAY"].encode()))
+        root, child, own = ctypes.c_ulong(), ctypes.c_ulong(), ctypes.c_ulong(int(window))
+        x, y, width, height, border, depth = (ctypes.c_int() for _ in range(6))
+        x11.XGetGeometry(display, own, *map(ctypes.byref, (root, x, y, width, height, border, depth)))
+        x11.XTranslateCoordinates(display, own, root, 0, 0, *map(ctypes.byref, (x, y, child)))
+        x11.XCloseDisplay(display)
+        return x.value, y.value, x.value + width.value, y.value + height.value
 
     def point(self, window, x, y):
         self.do("mousemove", "--window", window, x, y)

@@ -6,6 +6,7 @@
 //                       trial with a tool of three segments on the cube
 //   where               answers "tip x y z axis x y z" of the mouse's stylus
 //   ping                answers "pong"
+//   places              answers "places" and where the windows have been put
 //   end
 //   end slowly          answers "over", and takes everything down after another line
 
@@ -155,6 +156,7 @@ class Talk {
       state_ = state_of(words, stylus_);
     }
     if (verb == "ping") say("pong");
+    if (verb == "places") say("places " + windows_.console().places());
     if (verb == "where") {
       const Vec3 axis = glm::normalize(stylus_.tail - stylus_.tip);
       std::ostringstream out;
@@ -186,6 +188,8 @@ int show(const std::vector<std::string>& args) {
   if (!asked("--no-mouse")) settings.mouse = &mouse;
   settings.full_screen = asked("--full-screen");
   if (asked("--ui-scale")) settings.ui_scale = 1.5;
+  const auto places = std::find(args.begin(), args.end(), "--places");
+  if (places != args.end() && places + 1 != args.end()) settings.places = window_places(places[1]);
   settings.texts = {"Kugel", "球"};
   settings.emergency = [] { std::cout << "emergency" << std::endl; };  // at once
   const std::unique_ptr<DisplayLoop> windows = make_windows(settings);
