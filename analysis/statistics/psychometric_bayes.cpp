@@ -65,6 +65,11 @@ double log_prior(const RateModel& rate, double value) {
   return rate.free ? 9 * std::log1p(-value) : 0;
 }
 
+/// One rate at both ends stands on the axis of lapses alone: that of guesses has one value, unused.
+PosteriorAxis guess_axis(const PsychometricModel& model) {
+  return rate_axis(model.guess_is_lapse ? RateModel{} : model.guess);
+}
+
 struct PosteriorGrid {
   PosteriorAxis threshold, log_slope, guess, lapse;
 };
@@ -76,8 +81,12 @@ void add_marginals(PosteriorGrid& grid, const PlacedData& data, const Psychometr
     for (const double s : grid.log_slope.values) {
       for (const double g : grid.guess.values) {
         for (const double l : grid.lapse.values) {
-          logs.push_back(psychometric_log_likelihood(data, model.function, t, std::exp(s), g, l) +
-                         log_prior(model.guess, g) + log_prior(model.lapse, l));
+          const double low = model.guess_is_lapse ? l : g;
+          double log_posterior =
+              psychometric_log_likelihood(data, model.function, t, std::exp(s), low, l) +
+              log_prior(model.lapse, l);
+          if (!model.guess_is_lapse) log_posterior += log_prior(model.guess, g);
+          logs.push_back(log_posterior);
           largest = std::max(largest, logs.back());
         }
       }
@@ -116,24 +125,25 @@ PsychometricPosterior psychometric_posterior(const std::vector<LevelCount>& coun
   const double half = 0.5 * (data.high - data.low);
   PosteriorGrid coarse{
       PosteriorAxis(std::max(data.low - half, data.least), data.high + half, kCoarse),
-      PosteriorAxis(data.least_log_slope(), data.most_log_slope(), kCoarse), rate_axis(model.guess),
+      PosteriorAxis(data.least_log_slope(), data.most_log_slope(), kCoarse), guess_axis(model),
       rate_axis(model.lapse)};
   add_marginals(coarse, data, model);
   const auto [t_low, t_high] = coarse.threshold.core();
   const auto [s_low, s_high] = coarse.log_slope.core();
   PosteriorGrid fine{PosteriorAxis(t_low, t_high, kFine), PosteriorAxis(s_low, s_high, kFine),
-                     rate_axis(model.guess), rate_axis(model.lapse)};
+                     guess_axis(model), rate_axis(model.lapse)};
   add_marginals(fine, data, model);
 
   const auto level = [&](double place) { return protocols::level_at(model.function.scale, place); };
-  result.mean = {level(fine.threshold.mean()), std::exp(fine.log_slope.mean()), fine.guess.mean(),
-                 fine.lapse.mean()};
+  const double lapse = fine.lapse.mean();
+  result.mean = {level(fine.threshold.mean()), std::exp(fine.log_slope.mean()),
+                 model.guess_is_lapse ? lapse : fine.guess.mean(), lapse};
   result.threshold_scale_sd = fine.threshold.sd();
   const Interval threshold = central(fine.threshold), slope = central(fine.log_slope);
   result.threshold_ci95 = {level(threshold.low), level(threshold.high)};
   result.slope_ci95 = {std::exp(slope.low), std::exp(slope.high)};
-  result.guess_ci95 = central(fine.guess);
   result.lapse_ci95 = central(fine.lapse);
+  result.guess_ci95 = model.guess_is_lapse ? result.lapse_ci95 : central(fine.guess);
   return result;
 }
 

@@ -11,7 +11,7 @@ namespace palpate::analysis {
 /// levels and half their range beyond on both sides, but not below 0 where all levels are above;
 /// log slope uniform over all that the levels can
 /// tell apart; free rates with density 10 (1 - rate)^9 up to their largest value (Schuett et al.
-/// 2016).
+/// 2016); one rate at both ends has that density once.
 struct PsychometricPosterior {
   std::string undefined;
   protocols::PsychometricParameters mean;  ///< threshold and slope: means on the scale, of the log

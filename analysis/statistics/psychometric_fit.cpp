@@ -25,6 +25,11 @@ std::string reason_not_to_fit(const std::vector<LevelCount>& counts, const Place
   return "";
 }
 
+/// Differences of log likelihood below are none. The steepest slope leaves some 2e-9 of every
+/// answer beside a step, which depends on where a search ends: two fits of perfectly separated
+/// answers differ by 1e-7 to 1e-5.
+constexpr double kSameLogLikelihood = 1e-4;
+
 /// Where answers change between two levels at once, every threshold between them is as good: then
 /// it is the middle, with the steepest slope.
 void take_middle_of_step(const PsychometricObjective& objective, const PlacedData& data,
@@ -36,8 +41,7 @@ void take_middle_of_step(const PsychometricObjective& objective, const PlacedDat
   step[0] = 0.5 * (*std::prev(above) + *above);
   step[1] = data.most_log_slope();
   const double value = objective(step);
-  constexpr double kSame = 1e-6;
-  if (value <= best.value + kSame) best = {std::move(step), value};
+  if (value <= best.value + kSameLogLikelihood) best = {std::move(step), value};
 }
 
 /// Point estimates alone, as the simulations need them.
@@ -94,8 +98,9 @@ PsychometricFit fit_psychometric(const std::vector<LevelCount>& counts,
   if (!fit.undefined.empty()) return fit;
   fit.threshold_ci95 = threshold_interval(data, model, best);
   fit.slope_ci95 = slope_interval(data, model, best, std::log(fit.parameters.slope));
-  fit.guess_ci95 = rate_interval(data, model, best, PsychometricRate::guess);
   fit.lapse_ci95 = rate_interval(data, model, best, PsychometricRate::lapse);
+  fit.guess_ci95 = model.guess_is_lapse ? fit.lapse_ci95
+                                        : rate_interval(data, model, best, PsychometricRate::guess);
   return fit;
 }
 
@@ -126,7 +131,7 @@ GoodnessOfFit goodness_of_fit(const std::vector<LevelCount>& counts, const Psych
     const PsychometricFit refit = fit_point(simulated, data, model, kQuickSearch, best);
     // All answers alike: any function that goes there fits without deviance.
     const double deviance = refit.undefined.empty() ? deviance_of(simulated, refit) : 0;
-    if (deviance >= result.deviance * (1 - 1e-9)) ++as_large;
+    if (deviance >= result.deviance - 2 * kSameLogLikelihood) ++as_large;
   }
   result.simulations = simulations;
   result.p = static_cast<double>(as_large) / (simulations + 1);

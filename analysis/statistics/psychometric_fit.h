@@ -28,9 +28,18 @@ struct RateModel {
   double most = 0.1;
 };
 
+/// The largest lapse rate that `analyze` looks for.
+inline constexpr double kMostLapse = 0.06;
+
 struct PsychometricModel {
   protocols::PsychometricFunction function;
   RateModel guess, lapse;
+  /// Both ends are lapses, as where levels lie on both sides of a standard: a key pressed by chance
+  /// lifts the lower end by as much as it lowers the upper one. The guess rate is the lapse rate,
+  /// and `guess` is not used.
+  bool guess_is_lapse = false;
+
+  bool guess_is_free() const { return guess.free && !guess_is_lapse; }
 };
 
 struct PsychometricFit {
@@ -43,7 +52,7 @@ struct PsychometricFit {
   /// above 0) where the data exclude no value on that side.
   Interval threshold_ci95, slope_ci95;
   /// Likewise; an end of a free rate is 0 or its most where no value on that side is excluded. Of a
-  /// constant: both ends are it.
+  /// constant: both ends are it. One rate at both ends has one interval.
   Interval guess_ci95, lapse_ci95;
   bool slope_at_bound =
       false;  ///< answers change between two levels at once: no slope is too steep
@@ -59,7 +68,8 @@ PsychometricFit quick_fit(const std::vector<LevelCount>& counts, const Psychomet
 struct GoodnessOfFit {
   double deviance = 0;
   int levels = 0;
-  std::optional<double> p;  ///< (1 + number at least as large) / (1 + simulations)
+  /// (1 + number at least as large) / (1 + simulations); deviances within 2e-4 are equally large.
+  std::optional<double> p;
   int simulations = 0;
 };
 

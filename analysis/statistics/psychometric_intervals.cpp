@@ -126,7 +126,7 @@ Interval rate_interval(const PlacedData& data, const PsychometricModel& model,
   const auto point = objective.point(best.place);
   const double at = rate == PsychometricRate::guess ? point.guess : point.lapse;
   std::vector<double> others = best.place;
-  const bool after_guess = rate == PsychometricRate::lapse && model.guess.free;
+  const bool after_guess = rate == PsychometricRate::lapse && model.guess_is_free();
   others.erase(others.begin() + (after_guess ? 3 : 2));
   const double allowed = best.value + kHalfChiSquared95, step = 0.1 * of.most;
   Profile falling(

@@ -13,7 +13,8 @@ Interval threshold_interval(const PlacedData& data, const PsychometricModel& mod
 /// Of the slope. \param log_slope  of the fit
 Interval slope_interval(const PlacedData& data, const PsychometricModel& model,
                         const SimplexMinimum& best, double log_slope);
-/// Of the guess or lapse rate, within 0 and its most; of a constant, the constant twice.
+/// Of the guess or lapse rate, within 0 and its most; of a constant, the constant twice. One rate
+/// at both ends is the lapse rate.
 Interval rate_interval(const PlacedData& data, const PsychometricModel& model,
                        const SimplexMinimum& best, PsychometricRate rate);
 

@@ -31,8 +31,9 @@ PsychometricObjective::Point PsychometricObjective::point(const std::vector<doub
   const auto rate = [&](const RateModel& model, const std::optional<double>& held) {
     return searched(model, held) ? rate_of(model, x[i++]) : held.value_or(model.value);
   };
-  p.guess = rate(model_.guess, guess_);
+  if (!model_.guess_is_lapse) p.guess = rate(model_.guess, guess_);
   p.lapse = rate(model_.lapse, lapse_);
+  if (model_.guess_is_lapse) p.guess = p.lapse;
   return p;
 }
 
@@ -82,7 +83,7 @@ std::optional<std::vector<double>> PsychometricObjective::other_start(
 std::vector<std::vector<double>> PsychometricObjective::rates_of_grid() const {
   std::vector<std::vector<double>> all{{}};
   const std::size_t rates =
-      (searched(model_.guess, guess_) ? 1U : 0U) + (searched(model_.lapse, lapse_) ? 1U : 0U);
+      (model_.guess_is_free() && !guess_ ? 1U : 0U) + (searched(model_.lapse, lapse_) ? 1U : 0U);
   for (std::size_t i = 0; i < rates; ++i) {
     std::vector<std::vector<double>> longer;
     for (const std::vector<double>& one : all) {

@@ -24,7 +24,7 @@ enum class PsychometricRate { guess, lapse };
 /// none. A free rate is most sin^2(x): never outside 0 .. most.
 class PsychometricObjective {
  public:
-  /// Both must outlive it.
+  /// Both must outlive it. One rate at both ends is the lapse rate: hold that.
   PsychometricObjective(const PlacedData& data, const PsychometricModel& model)
       : data_(data), model_(model) {}
 

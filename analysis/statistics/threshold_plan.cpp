@@ -20,7 +20,8 @@ constexpr double kStandard = 1;  // levels are shares of it
 std::optional<double> measured_jnd(const ThresholdStudy& study, double jnd, double assumed,
                                    double pse, std::size_t trials, stimuli::Random& random) {
   PsychometricModel model;
-  model.lapse = {0, true, 0.06};
+  model.lapse = {0, true, kMostLapse};
+  model.guess_is_lapse = true;
   const double slope = std::log(3.0) / jnd;  // F = 0.75 at a JND
   std::vector<LevelCount> counts;
   for (int i = 0; i < kPlanLevels; ++i) {

@@ -11,7 +11,7 @@ namespace {
 
 double guesses_of(const TaskBlock& block, const TypicalSettings& settings, bool both_sides) {
   if (block.task != TaskKind::compare || block.same_different) return settings.false_alarm;
-  return both_sides ? 0 : 1.0 / block.intervals;
+  return both_sides ? settings.lapse : 1.0 / block.intervals;
 }
 
 }  // namespace

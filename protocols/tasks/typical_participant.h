@@ -14,8 +14,9 @@ struct TypicalSettings {
 };
 
 /// Cumulative normal on the scale of the block's first adaptive procedure, with its easier levels.
-/// compare: guesses 1 / intervals; with levels on both sides of the standard none, and the
-/// threshold at the standard. \param block  with levels
+/// compare: guesses 1 / intervals; with levels on both sides of the standard they are lapses as
+/// well, as many as at the other end, and the threshold is at the standard. \param block  with
+/// levels
 PsychometricParticipant typical_participant(const Protocol& protocol, const TaskBlock& block,
                                             const TypicalSettings& settings = {});
 

@@ -50,6 +50,7 @@ TEST(PsychometricFit, IntervalsCoverTheTruthIn200SimulatedStudies) {
       {"2AFC, lapses free",
        {{PsychometricShape::normal}, {0.5, false, 0.1}, {0, true, 0.06}},
        {4, 0.7, 0.5, 0.03}},
+      {"both sides, lapses free", {{}, {}, {0, true, 0.06}, true}, {4, 1.2, 0.05, 0.05}},
   };
   for (const Case& one : cases) {
     int thresholds = 0, slopes = 0, lapses = 0;
@@ -90,6 +91,29 @@ TEST(PsychometricFit, IntervalsCoverTheTruthIn200SimulatedStudies) {
     for (const int covered : {thresholds, slopes})
       EXPECT_LE(covered, expected + three_sd) << one.name;
   }
+}
+
+// Where the lower end is held at 0, the fit is bad and the JND too large.
+TEST(PsychometricFit, LapsesAtBothEndsAreNoBadFit) {
+  PsychometricModel both{{}, {}, {0, true, 0.06}, true}, upper_only{{}, {}, {0, true, 0.06}};
+  stimuli::Random random(11, {0xc2});
+  constexpr int kStudies = 40;
+  int bad = 0, bad_upper = 0;
+  double ratio = 0, ratio_upper = 0;
+  for (int i = 0; i < kStudies; ++i) {
+    const auto counts = simulate_counts({}, {4, 1.2, 0.05, 0.05}, random);
+    for (const bool shared : {true, false}) {
+      const PsychometricModel& model = shared ? both : upper_only;
+      const PsychometricFit fit = fit_psychometric(counts, model);
+      (shared ? bad : bad_upper) +=
+          *goodness_of_fit(counts, model, fit, 99, random.next()).p <= 0.05 ? 1 : 0;
+      (shared ? ratio : ratio_upper) += 1.2 / fit.parameters.slope / kStudies;
+    }
+  }
+  EXPECT_LE(bad, 2 + 3 * std::sqrt(2));
+  EXPECT_GT(bad_upper, bad);
+  EXPECT_NEAR(ratio, 1, 0.06);
+  EXPECT_GT(ratio_upper, 1.15) << "JND, of the true one";
 }
 
 /// Minus log likelihood of the best fit that a search finds.

@@ -186,6 +186,78 @@ TEST(PsychometricFit, AStepHasASlopeAtItsBoundAndAThresholdBetween) {
   }
 }
 
+// What a step leaves of the deviance grows with the answers and differs from search to search.
+TEST(PsychometricFit, SeparatedAnswersFitWellHoweverMany) {
+  for (const auto shape : {PsychometricShape::logistic, PsychometricShape::normal}) {
+    for (const bool both_ends : {false, true}) {
+      PsychometricModel model;
+      model.function.shape = shape;
+      model.lapse = {0, true, kMostLapse};
+      model.guess_is_lapse = both_ends;
+      for (const int below : {1, 10, 30, 5000}) {
+        for (const int above : {1, 3, 30, 3000}) {
+          const std::vector<LevelCount> counts{
+              {1, above, 0}, {2, below, 0}, {3, above, above}, {4, below, below}};
+          const PsychometricFit fit = fit_psychometric(counts, model);
+          EXPECT_NEAR(fit.parameters.threshold, 2.5, 1e-9) << below << ", " << above;
+          const GoodnessOfFit good = goodness_of_fit(counts, model, fit, 199, 7);
+          EXPECT_LT(good.deviance, 1e-4);
+          EXPECT_EQ(good.p, 1) << below << ", " << above;
+        }
+      }
+    }
+  }
+}
+
+/// Log likelihood with the lapse rate at both ends, by the definition.
+double log_likelihood_of(const std::vector<LevelCount>& counts, double threshold, double slope,
+                         double lapse) {
+  double sum = 0;
+  for (const auto& [level, n, k] : counts) {
+    const double p = lapse + (1 - 2 * lapse) / (1 + std::exp(-slope * (level - threshold)));
+    sum += k * std::log(p) + (n - k) * std::log(1 - p);
+  }
+  return sum;
+}
+
+TEST(PsychometricFit, OneRateAtBothEndsIsTheBestOfAGrid) {
+  const std::vector<LevelCount> counts{{-3, 80, 7}, {-2, 80, 8}, {-1, 80, 18}, {0, 80, 42},
+                                       {1, 80, 66}, {2, 80, 72}, {3, 80, 74}};
+  PsychometricModel model;
+  model.lapse = {0, true, kMostLapse};
+  model.guess_is_lapse = true;
+  const PsychometricFit fit = fit_psychometric(counts, model);
+  const auto& [threshold, slope, guess, lapse] = fit.parameters;
+  EXPECT_EQ(guess, lapse);
+  EXPECT_NEAR(lapse, kMostLapse, 1e-6) << "some 8 % at both ends";
+  EXPECT_GT(fit.lapse_ci95.low, 0);
+  EXPECT_EQ(fit.guess_ci95.low, fit.lapse_ci95.low);
+  EXPECT_EQ(fit.guess_ci95.high, fit.lapse_ci95.high);
+  EXPECT_NEAR(fit.log_likelihood, log_likelihood_of(counts, threshold, slope, lapse), 1e-9);
+  // Maxima of the definition over a grid: of all parameters, and with one held.
+  constexpr int kSteps = 240, kRateSteps = 60;
+  double best = -1e300, at_low = best, at_high = best, rate_low = best;
+  const double half_chi_squared = 0.5 * 3.841458820694124;
+  for (int s = 0; s < kSteps; ++s) {
+    const double x = std::exp(-1.5 + 3.0 * s / kSteps);
+    for (int l = 0; l <= kRateSteps; ++l) {
+      const double rate = kMostLapse * l / kRateSteps;
+      at_low = std::max(at_low, log_likelihood_of(counts, fit.threshold_ci95.low, x, rate));
+      at_high = std::max(at_high, log_likelihood_of(counts, fit.threshold_ci95.high, x, rate));
+    }
+    for (int t = 0; t < kSteps; ++t) {
+      const double place = -0.6 + 1.2 * t / kSteps;
+      best = std::max(best, log_likelihood_of(counts, place, x, kMostLapse));
+      rate_low = std::max(rate_low, log_likelihood_of(counts, place, x, fit.lapse_ci95.low));
+    }
+  }
+  EXPECT_LE(best, fit.log_likelihood + 1e-9);
+  EXPECT_NEAR(best, fit.log_likelihood, 2e-3);
+  EXPECT_NEAR(at_low, fit.log_likelihood - half_chi_squared, 2e-3);
+  EXPECT_NEAR(at_high, fit.log_likelihood - half_chi_squared, 2e-3);
+  EXPECT_NEAR(rate_low, fit.log_likelihood - half_chi_squared, 5e-3);
+}
+
 TEST(PsychometricFit, NoThresholdOfLevelsAboveZeroIsBelowIt) {
   // Nearly always right: where guessing turns into certainty, nobody knows.
   PsychometricModel model;
@@ -307,6 +379,38 @@ TEST(PsychometricPosterior, EqualsADenseGrid) {
   EXPECT_NEAR(posterior.threshold_scale_sd,
               std::sqrt(square / sum - mean_threshold * mean_threshold), 2e-3);
   EXPECT_NEAR(std::log(posterior.mean.slope), mean_log_slope / sum, 5e-3);
+}
+
+TEST(PsychometricPosterior, OfOneRateAtBothEndsEqualsADenseGrid) {
+  const std::vector<LevelCount> counts{
+      {1, 20, 2}, {2, 20, 3}, {3, 20, 9}, {4, 20, 17}, {5, 20, 18}};
+  PsychometricModel model;
+  model.lapse = {0, true, kMostLapse};
+  model.guess_is_lapse = true;
+  const PsychometricPosterior posterior = psychometric_posterior(counts, model);
+  // The priors as above, and 10 (1 - rate)^9 once.
+  double sum = 0, mean_threshold = 0, mean_log_slope = 0, mean_rate = 0;
+  for (int l = 0; l < 40; ++l) {
+    const double rate = kMostLapse * (l + 0.5) / 40;
+    for (int i = 0; i < 200; ++i) {
+      const double t = 7 * (i + 0.5) / 200;
+      for (int j = 0; j < 200; ++j) {
+        const double s = std::log(0.025) + std::log(1600) * (j + 0.5) / 200;
+        const double weight =
+            std::pow(1 - rate, 9) * std::exp(log_likelihood_of(counts, t, std::exp(s), rate));
+        sum += weight;
+        mean_threshold += weight * t;
+        mean_log_slope += weight * s;
+        mean_rate += weight * rate;
+      }
+    }
+  }
+  EXPECT_NEAR(posterior.mean.threshold, mean_threshold / sum, 3e-3);
+  EXPECT_NEAR(std::log(posterior.mean.slope), mean_log_slope / sum, 8e-3);
+  EXPECT_NEAR(posterior.mean.lapse, mean_rate / sum, 3e-4);
+  EXPECT_EQ(posterior.mean.guess, posterior.mean.lapse);
+  EXPECT_EQ(posterior.guess_ci95.low, posterior.lapse_ci95.low);
+  EXPECT_EQ(posterior.guess_ci95.high, posterior.lapse_ci95.high);
 }
 
 }  // namespace
