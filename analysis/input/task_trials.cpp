@@ -9,6 +9,7 @@
 #include <tuple>
 #include <utility>
 
+#include "analysis/input/column_names.h"
 #include "analysis/input/csv_reader.h"
 #include "analysis/input/trial_table_builder.h"
 #include "analysis/text.h"
@@ -20,6 +21,14 @@ namespace {
 
 using Columns = std::map<std::string, std::size_t, std::less<>>;
 constexpr std::size_t kMostTaskFaults = 50;
+const std::vector<std::string_view> kTaskColumns{
+    "participant_id", "task",          "renderer",        "shape",
+    "response",       "level",         "success",         "standard_level",
+    "correct",        "catch_trial",   "number",          "confidence",
+    "block_name",     "track",         "practice",        "timed_out",
+    "simulated",      "session",       "block",           "trial",
+    "response_time",  "protocol_name", "protocol_sha256", "comparison_interval",
+    "interval_onsets"};
 const char* const kTasks[] = {"identify", "compare", "detect", "rate", "adjust"};
 
 Columns read_header(CsvReader& reader) {
@@ -47,6 +56,12 @@ class TaskRow {
     const std::string_view field = text(column);
     return field == "NA" || field == "n/a" || field == "nan" || field == "NaN" ? std::string_view()
                                                                                : field;
+  }
+  /// Of a column that is missing, where another looks like it.
+  std::string hint(std::string_view column) const {
+    std::vector<std::string> found;
+    for (const auto& [name, place] : columns_) found.push_back(name);
+    return hint_for(column, alike_columns(found, kTaskColumns));
   }
   bool has(std::string_view column) const { return columns_.find(column) != columns_.end(); }
 
@@ -150,7 +165,8 @@ TaskTrial read_trial(TaskRow& row) {
   if (!row.has("success") && !success_of(row, trial))
     row.add_fault(
         "success",
-        "expected a column success (1: the comparison was chosen), or comparison_interval");
+        "expected a column success (1: the comparison was chosen), or comparison_interval" +
+            row.hint("success") + row.hint("comparison_interval"));
   if (trial.participant.empty()) row.add_fault("participant_id", "expected a participant");
   if (std::find(std::begin(kTasks), std::end(kTasks), trial.task) == std::end(kTasks))
     row.add_fault("task", "expected identify, compare, detect, rate or adjust");
@@ -176,10 +192,15 @@ TaskTable read_task_trials_csv(const std::string& path, const std::string& proto
   std::vector<protocols::Fault> faults;
   CsvReader reader(path);
   const Columns columns = read_header(reader);
+  std::vector<std::string> found;
+  for (const auto& [name, place] : columns) found.push_back(name);
+  const std::vector<AlikeColumn> alike = alike_columns(found, kTaskColumns);
   for (const char* needed : {"participant_id", "task", "renderer", "shape", "response"}) {
     if (columns.count(needed) == 0)
-      faults.push_back({path, "line 1", std::string("expected a column ") + needed});
+      faults.push_back(
+          {path, "line 1", std::string("expected a column ") + needed + hint_for(needed, alike)});
   }
+  for (const AlikeColumn& one : alike) table.warnings.push_back(sentence(one));
   const bool numbered = columns.count("session") > 0 && columns.count("trial") > 0;
   std::map<std::tuple<std::string, std::pair<std::string, std::string>, int, int, int>, std::size_t>
       seen;  // line of each trial

@@ -34,6 +34,8 @@ struct TaskTable {
   std::size_t n_practice = 0;     ///< left out
   bool simulated = false;         ///< some of them
   Provenance provenance;          ///< of all of them
+  std::string title;              ///< of the study, as its protocol says it; "": unknown
+  std::vector<std::string> warnings;
   /// Whose trials they are: name and SHA-256, each once.
   std::vector<std::pair<std::string, std::string>> protocols;
   /// How levels were chosen, by SHA-256 of the protocol and name of the block: of databases.

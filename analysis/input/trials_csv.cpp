@@ -6,6 +6,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "analysis/input/column_names.h"
 #include "analysis/input/csv_reader.h"
 #include "analysis/input/trial_table_builder.h"
 #include "analysis/input/trials.h"
@@ -120,11 +121,17 @@ class CsvTrials {
         at = i;
       }
     }
+    std::vector<std::string_view> known(kColumns.begin(), kColumns.end());
+    known.emplace_back("task");  // a table with it is one of tasks
+    const std::vector<AlikeColumn> alike =
+        alike_columns(std::vector<std::string>(names.begin(), names.end()), known);
+    for (const AlikeColumn& one : alike) warnings_.push_back(sentence(one));
     std::string hint;
     if (names.size() == 1) hint = " (one column only: are the fields separated by commas?)";
     for (std::size_t i = 0; i < kNeeded; ++i) {
       if (at_[i] == kAbsent) {
-        faults_.add(line(reader), "expected a column '" + std::string(kColumns[i]) + "'" + hint);
+        faults_.add(line(reader), "expected a column '" + std::string(kColumns[i]) + "'" + hint +
+                                      hint_for(kColumns[i], alike));
       }
     }
   }
@@ -265,7 +272,9 @@ class CsvTrials {
     provenance.protocol_sha256 = protocols_;
     provenance.program_versions = versions_;
     try {
-      return builder_.finish(std::move(provenance));
+      TrialTable table = builder_.finish(std::move(provenance));
+      table.warnings.insert(table.warnings.begin(), warnings_.begin(), warnings_.end());
+      return table;
     } catch (const std::runtime_error& error) {
       faults_.add("file", error.what());
     }
@@ -282,7 +291,7 @@ class CsvTrials {
   bool ok_ = true, too_many_ = false;
   /// Names of valid rows, practice included: each is checked once.
   Interner names_, renderers_, stimuli_;
-  std::vector<std::string> protocols_, versions_;
+  std::vector<std::string> protocols_, versions_, warnings_;
   TrialTableBuilder builder_;
 };
 
