@@ -95,7 +95,7 @@ PUBLIC = {
     "data/merge": "merge sweep_merge",
     "analysis": "text",
     "analysis/input": "csv_reader renderers study_record sweep_table task_trials trials",
-    "analysis/statistics": "analysis conclusions describe model_study paired paper_effects pattern pilot plan power quantiles sensitivity sweep_analysis task_analysis threshold_plan",
+    "analysis/statistics": "analysis conclusions describe interval_coverage model_study paired paper_effects pattern pilot plan power quantiles sensitivity sweep_analysis task_analysis threshold_plan",
     "analysis/figures": "axes figure_svg figures marks palette sweep_figures task_figures",
     "analysis/report": "html_elements html_page hypotheses plan_report report_html report_json report_text sweep_report tables task_report",
     "runner": "",

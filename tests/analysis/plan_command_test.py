@@ -37,6 +37,20 @@ class Plan(unittest.TestCase):
         self.assertEqual(done.returncode, 0)
         self.assertIn("palpate plan --db pilot.db", done.stdout)
 
+    def test_coverage_of_intervals(self):
+        out = self.dir / "coverage.json"
+        done = self.run_palpate("--coverage", "--studies", 1, "--seed", 3, "--jobs", 2, "--json", out)
+        self.assertEqual((done.returncode, done.stderr), (0, ""))
+        self.assertTrue(done.stdout.startswith("SIMULATED STUDIES"))
+        found = json.loads(out.read_text())
+        self.assertEqual((found["n_studies"], found["seed"], len(found["designs"])), (1, 3, 36))
+        for design in found["designs"]:
+            self.assertIn(design["task"] + "\n", done.stdout)
+            self.assertIn(f"\n  {design['procedure']} ", done.stdout)
+            self.assertEqual(design["n_fitted"] + design["n_without_fit"], 1)
+        self.refused("--studies", "--coverage", "--studies", "0")
+        self.refused("not with --coverage", "--coverage", "--effect", "cone=25")
+
     def test_from_figures_given(self):
         out, figure = self.dir / "plan.json", self.dir / "power.svg"
         done = self.run_palpate(*GIVEN, *QUICK, "--effect", "cone=25", "--json", out, "--figure",

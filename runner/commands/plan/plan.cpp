@@ -37,7 +37,8 @@ int plan_command(const std::vector<std::string>& args) {
   CommandLine line;
   line.usage =
       R"(palpate plan (--db FILE | --csv FILE | --gain-sd SD --residual-sd SD) [--effect SHAPE=PERCENT,...]
-       palpate plan --jnd-effect PERCENT [--weber W])";
+       palpate plan --jnd-effect PERCENT [--weber W]
+       palpate plan --coverage [--studies N] [--seed S])";
   line.summary =
       "Sample size planning: the number of participants and trials that find an effect with a\n"
       "given power. Studies are simulated from the mixed model fitted to a pilot, or from given\n"
@@ -46,7 +47,8 @@ int plan_command(const std::vector<std::string>& args) {
   line.example = R"(  palpate plan --db pilot.db --effect cone=22,cube=11 --power 0.9
   palpate plan --gain-sd 0.15 --residual-sd 0.5 --effect cone=15 --participants 4-60 \
       --trials 20,40 --json plan.json --figure power.svg
-  palpate plan --jnd-effect 20 --weber 0.1 --trials 70,140 --participants 6-30   (thresholds))";
+  palpate plan --jnd-effect 20 --weber 0.1 --trials 70,140 --participants 6-30   (thresholds)
+  palpate plan --coverage --studies 500 --seed 1)";
   PlanOptions options;
   add_plan_options(line, options);
   ThresholdOptions thresholds;
@@ -66,6 +68,10 @@ int plan_command(const std::vector<std::string>& args) {
                      "\nMore: add --help");
   }
   Outputs outputs(*values, {"json", "figure"}, {"db", "csv"});
+  if (values->count("coverage")) {
+    print_coverage(options, *values, outputs);
+    return 0;
+  }
   if (values->count("jnd-effect")) {
     plan_thresholds_of(thresholds, options, *values, outputs);
     return 0;

@@ -1,10 +1,12 @@
 #include "runner/commands/plan/thresholds.h"
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <iostream>
 #include <utility>
 
+#include "analysis/statistics/interval_coverage.h"
 #include "analysis/statistics/threshold_plan.h"
 #include "runner/commands/shared/progress_line.h"
 
@@ -68,6 +70,38 @@ void add_threshold_options(CommandLine& line, ThresholdOptions& options) {
       "of participants' PSE, in JNDs");
   add("reach", po::value(&options.reach)->default_value(2.5, "2.5")->value_name("JNDS"),
       "how far the levels reach from the standard");
+  add("coverage",
+      "how often the 95 % intervals of thresholds, slopes and lapses hold the truth, after each "
+      "procedure, with lapses and without; takes --studies (200), --seed, --jobs, --json");
+}
+
+void print_coverage(const PlanOptions& options, const po::variables_map& values, Outputs& outputs) {
+  for (const char* other :
+       {"db", "csv", "effect", "gain-sd", "residual-sd", "figure", "reuse", "jnd-effect"}) {
+    if (values.count(other))
+      throw UsageError(std::string("--") + other + ": is of a plan; not with --coverage");
+  }
+  PlanOptions own = options;
+  std::size_t studies = 200;
+  if (values.count("studies")) {
+    const char* const end = own.studies.data() + own.studies.size();
+    const auto [stop, error] = std::from_chars(own.studies.data(), end, studies);
+    require(error == std::errc() && stop == end && studies >= 1 && studies <= 100'000, "studies",
+            "a whole number from 1 to 100000");
+    own.studies = "100";  // of plans, which are not made
+  }
+  const analysis::PowerSettings asked = settings_of(own, values).simulation;
+  analysis::CoverageSettings settings;
+  settings.studies = studies;
+  settings.seed = asked.seed;
+  settings.jobs = asked.jobs;
+  ProgressLine progress("simulated studies");
+  settings.progress = [&progress](double share) { progress.show(share); };
+  const auto results = analysis::interval_coverage(settings);
+  progress.clear();
+  if (outputs.wanted("json")) outputs.put("json", analysis::coverage_json(results, settings));
+  outputs.write();
+  std::cout << analysis::coverage_text(results, settings);
 }
 
 void plan_thresholds_of(const ThresholdOptions& thresholds, const PlanOptions& options,

@@ -14,4 +14,9 @@ void add_threshold_options(CommandLine& line, ThresholdOptions& options);
 void plan_thresholds_of(const ThresholdOptions& thresholds, const PlanOptions& options,
                         const boost::program_options::variables_map& values, Outputs& outputs);
 
+/// Prints how often the intervals of thresholds hold the truth, and writes its JSON.
+/// \throws UsageError
+void print_coverage(const PlanOptions& options, const boost::program_options::variables_map& values,
+                    Outputs& outputs);
+
 }  // namespace palpate::runner

@@ -1,0 +1,90 @@
+#include <nlohmann/json.hpp>
+
+#include "analysis/statistics/interval_coverage.h"
+#include "analysis/text.h"
+
+namespace palpate::analysis {
+namespace {
+
+std::string percent_of(std::size_t count, std::size_t studies) {
+  if (studies == 0) return "-";
+  return fixed(100 * static_cast<double>(count) / static_cast<double>(studies), 1);
+}
+
+std::string counts_text(const CoverageCounts& counts, std::size_t studies) {
+  return pad_left(percent_of(counts.threshold, studies), 7) +
+         pad_left(percent_of(counts.slope, studies), 7) +
+         pad_left(percent_of(counts.lapse, studies), 7);
+}
+
+nlohmann::ordered_json counts_json(const CoverageCounts& counts, std::size_t studies) {
+  nlohmann::ordered_json out;
+  for (const auto& [name, count] : {std::pair{"threshold", counts.threshold},
+                                    {"slope", counts.slope},
+                                    {"lapse", counts.lapse}}) {
+    const Interval ends = coverage_interval(count, studies);
+    out[name] = {{"held", count}, {"ci95", {ends.low, ends.high}}};
+  }
+  return out;
+}
+
+}  // namespace
+
+std::string coverage_text(const std::vector<CoverageResult>& results,
+                          const CoverageSettings& settings) {
+  std::string text = "SIMULATED STUDIES\n\nHow often 95 % intervals hold the truth, in %: " +
+                     std::to_string(settings.studies) + " studies a line, seed " +
+                     std::to_string(settings.seed) + "\n\n" + std::string(55, ' ') +
+                     "likelihood           Bayes\n" + pad_right("", 43) + " lapses" +
+                     "  thresh  slope  lapse thresh  slope  lapse  bad fit  open\n";
+  std::string task;
+  for (const CoverageResult& one : results) {
+    if (one.design.task != task) text += one.design.task + "\n";
+    task = one.design.task;
+    text += "  " + pad_right(one.design.procedure, 41) +
+            pad_left(fixed(one.design.truth.parameters.lapse, 2), 7) + " " +
+            counts_text(one.likelihood, one.studies) + counts_text(one.bayes, one.bayes_studies) +
+            pad_left(percent_of(one.called_bad, one.studies), 9) +
+            pad_left(percent_of(one.open, one.studies), 6) + "\n";
+  }
+  const auto held = static_cast<std::size_t>(0.95 * static_cast<double>(settings.studies) + 0.5);
+  const Interval noise = coverage_interval(held, settings.studies);
+  return text + "\nThe simulation's own 95 % interval about 95 %: " + fixed(100 * noise.low, 1) +
+         " to " + fixed(100 * noise.high, 1) +
+         " %. Bad fit: goodness of fit has p <= 0.05\n(5 % where the model is right). Open: the "
+         "interval of the threshold has no end on a side. Lapses: at each\nend, where levels lie "
+         "on both sides of the standard. The JND is read off the slope there, and off the "
+         "threshold\nof a forced choice. Staircases and QUEST+ have 140 trials. Bayes of yes/no: "
+         "one study in four.\n";
+}
+
+std::string coverage_json(const std::vector<CoverageResult>& results,
+                          const CoverageSettings& settings) {
+  nlohmann::ordered_json out{{"version", 1},
+                             {"simulated", true},
+                             {"seed", settings.seed},
+                             {"n_studies", settings.studies},
+                             {"n_refits", settings.simulations},
+                             {"designs", nlohmann::ordered_json::array()}};
+  for (const CoverageResult& one : results) {
+    const protocols::PsychometricParameters& truth = one.design.truth.parameters;
+    out["designs"].push_back({{"task", one.design.task},
+                              {"procedure", one.design.procedure},
+                              {"threshold", truth.threshold},
+                              {"slope", truth.slope},
+                              {"guess", truth.guess},
+                              {"lapse", truth.lapse},
+                              {"mean_trials", one.mean_trials},
+                              {"n_fitted", one.studies},
+                              {"n_without_fit", one.unfitted},
+                              {"n_open", one.open},
+                              {"n_with_posterior", one.bayes_studies},
+                              {"n_called_bad", one.called_bad},
+                              {"median_slope_bias", one.slope_bias},
+                              {"likelihood", counts_json(one.likelihood, one.studies)},
+                              {"bayes", counts_json(one.bayes, one.bayes_studies)}});
+  }
+  return out.dump(1) + "\n";
+}
+
+}  // namespace palpate::analysis

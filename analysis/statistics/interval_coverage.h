@@ -1,0 +1,69 @@
+#pragma once
+// How often the 95 % intervals of fitted psychometric functions hold the truth, where levels are
+// chosen in advance or by the answers, with and without lapses.
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "analysis/statistics/psychometric_fit.h"
+#include "protocols/procedures/procedure_spec.h"
+
+namespace palpate::analysis {
+
+/// A study of one simulated participant, and how it is fitted.
+struct CoverageDesign {
+  std::string task, procedure;  ///< in words
+  std::vector<protocols::ProcedureSpec> tracks;
+  int catch_trials = 0;  ///< beside those of the tracks: nothing is there
+  protocols::PsychometricParticipant truth;
+  PsychometricModel model;
+};
+
+/// Two intervals with levels on both sides of the standard, forced choice, and yes/no with catch
+/// trials, each with constant stimuli, staircases, QUEST+ and (yes/no) limits, at each lapse rate.
+/// The models are those of `analyze`.
+std::vector<CoverageDesign> coverage_designs(const std::vector<double>& lapses);
+
+/// In how many studies an interval held the truth.
+struct CoverageCounts {
+  std::size_t threshold = 0, slope = 0, lapse = 0;
+};
+
+struct CoverageResult {
+  CoverageDesign design;
+  std::size_t studies = 0;    ///< with a fit: the others have no interval
+  std::size_t unfitted = 0;   ///< all answers alike, or one level
+  std::size_t open = 0;       ///< the interval of the threshold has no end on a side
+  CoverageCounts likelihood;  ///< by the profile likelihood
+  CoverageCounts bayes;
+  std::size_t bayes_studies = 0;  ///< with a posterior: of two free rates, one study in four
+  /// Fits whose goodness of fit has p <= 0.05; five in a hundred where the model is right.
+  std::size_t called_bad = 0;
+  double mean_trials = 0;
+  double slope_bias = 0;  ///< median of the fitted slope over the true one, less 1
+};
+
+/// Wilson's 95 % interval of a share of studies.
+Interval coverage_interval(std::size_t held, std::size_t studies);
+
+struct CoverageSettings {
+  std::vector<double> lapses{0, 0.02, 0.05};
+  std::size_t studies = 500;  ///< of each design
+  std::uint64_t seed = 1;
+  std::size_t jobs = 1;
+  int simulations = 39;                  ///< of each goodness of fit: 2 of 40 places are 5 %
+  std::function<void(double)> progress;  ///< share done; may be empty
+};
+
+/// The same whatever the number of jobs.
+std::vector<CoverageResult> interval_coverage(const CoverageSettings& settings);
+
+std::string coverage_text(const std::vector<CoverageResult>& results,
+                          const CoverageSettings& settings);
+std::string coverage_json(const std::vector<CoverageResult>& results,
+                          const CoverageSettings& settings);
+
+}  // namespace palpate::analysis
