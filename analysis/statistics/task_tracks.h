@@ -25,6 +25,10 @@ const char* kind_of(
 
 /// The scale on which an adaptive procedure has its levels; nullopt: it is none.
 std::optional<protocols::LevelScale> scale_of_adaptive(const protocols::ProcedureSpec& spec);
+/// The levels that an adaptive procedure has as easier; nullopt: it is none.
+std::optional<protocols::Easier> easier_of_adaptive(const protocols::ProcedureSpec& spec);
+/// How a trial's block chose its levels; nullptr: its protocol is not in the source.
+const protocols::BlockProcedures* block_of(const TaskTrial& trial, const TaskTable& table);
 /// The procedures of a trial's block; empty: none, or its protocol is not in the source.
 const std::vector<protocols::ProcedureSpec>& specs_of(const TaskTrial& trial,
                                                       const TaskTable& table);
@@ -34,7 +38,9 @@ struct Track {
   std::string name;
   std::vector<double> levels;
   std::vector<bool> successes;
-  /// Of a staircase: where it turned, as indices. Empty where levels do not follow the answers.
+  /// Of a staircase: the answers at which it turned, as indices; with its protocol all that it
+  /// counted itself. Without one they follow from levels and answers: empty where the levels do not
+  /// follow the answers, and the last answer turned it if as many alike did before.
   std::vector<std::size_t> reversals;
   /// None: levels are constant, or the protocol is not in the source.
   std::optional<TrackProcedure> procedure;

@@ -6,6 +6,7 @@
 #include "protocols/parse_procedure.h"
 #include "protocols/procedures/track_seed.h"
 #include "protocols/tasks/block_tracks.h"
+#include "protocols/tasks/levels.h"
 #include "protocols/tasks/parse_blocks.h"
 
 namespace palpate::protocols {
@@ -54,6 +55,10 @@ std::map<std::string, BlockProcedures> procedures_of_blocks(const std::string& t
     block.name("name", name);
     BlockProcedures procedures{seed, all.size(), {}};
     read_procedures(block, procedures.specs);
+    block.choice("asks", procedures.asks_smaller, {{"larger", false}, {"smaller", true}});
+    const nlohmann::json::json_pointer path("/level/path");
+    if (one.is_object() && one.contains(path) && one[path].is_string())
+      procedures.level_unit = unit_of_level(one[path].get<std::string>());
     all.emplace(name, std::move(procedures));
   }
   faults.throw_if_any();

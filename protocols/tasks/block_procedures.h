@@ -14,6 +14,8 @@ struct BlockProcedures {
   std::uint64_t protocol_seed = 0;
   std::uint64_t index = 0;           ///< of the block in its protocol
   std::vector<ProcedureSpec> specs;  ///< empty: none
+  bool asks_smaller = false;         ///< compare: the interval with the smaller level
+  std::string level_unit{};          ///< "N/m", ...; "1" without one, "": nothing is varied
 
   /// Of a track, from 1. \pre specs is not empty
   const ProcedureSpec& spec_of(int track) const;

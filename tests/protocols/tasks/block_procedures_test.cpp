@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include "protocols/tasks/typical_participant.h"
 #include "tests/protocols/tasks/task_study.h"
 
 namespace palpate::protocols {
@@ -61,6 +62,31 @@ TEST(BlockProcedures, EstimateWhatTheTracksOfTheSessionEstimated) {
     }
   }
   EXPECT_EQ(compared, 3U * (2 + 8));
+}
+
+TEST(BlockProcedures, SayWhatIsAskedAndVaried) {
+  nlohmann::json document = task_study();
+  document["blocks"][0]["asks"] = "smaller";
+  document["blocks"].push_back(nlohmann::json::parse(
+      R"({"name": "plain", "task": "detect", "stimuli": ["lump"], "repetitions": 2})"));
+  const auto blocks = procedures_of_blocks(parsed(document).source_text, "study.json");
+  EXPECT_TRUE(blocks.at("constant").asks_smaller);
+  EXPECT_FALSE(blocks.at("stairs").asks_smaller);
+  EXPECT_EQ(blocks.at("constant").level_unit, "N/m");
+  EXPECT_EQ(blocks.at("lumps").level_unit, "m");
+  EXPECT_EQ(blocks.at("plain").level_unit, "");
+}
+
+TEST(TypicalParticipant, LapsesAtBothEndsWhereLevelsLieOnBothSides) {
+  const Protocol protocol = parsed(task_study());
+  const TypicalSettings settings{0.5, 0.15, 0.07, 0.03};
+  const auto rates = [&](std::size_t block) {
+    const auto& found = typical_participant(protocol, protocol.blocks[block], settings).parameters;
+    return std::pair(found.guess, found.lapse);
+  };
+  EXPECT_EQ(rates(0), std::pair(0.03, 0.03)) << "both sides";
+  EXPECT_EQ(rates(1), std::pair(1.0 / 3, 0.03)) << "three intervals, one side";
+  EXPECT_EQ(rates(2), std::pair(0.07, 0.03)) << "detection";
 }
 
 TEST(BlockProcedures, ConstantStimuliAndVersion1HaveNone) {
