@@ -106,6 +106,14 @@ std::string fixed(double value, int decimals) {
   return (std::signbit(value) && !zero ? "−" : "") + text;
 }
 
+std::string short_number(double value) {
+  if (std::isinf(value)) return value > 0 ? "inf" : "-inf";
+  char digits[32];
+  const auto end =
+      std::to_chars(digits, digits + sizeof digits, value, std::chars_format::general, 4).ptr;
+  return {digits, end};
+}
+
 std::string p_text(double p) {
   if (p < 0.001) return "<0.001";
   return fixed(p, 3);

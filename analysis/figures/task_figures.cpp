@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
+#include <limits>
+#include <map>
 #include <string>
 #include <utility>
 
@@ -40,11 +43,16 @@ void add_curve_of(Panel& panel, const ParticipantFunction& one) {
                       "threshold with its 95 % interval, cut at the axis");
 }
 
-Panel function_panel(const ParticipantFunction& one) {
+/// "level (N/m)"
+std::string level_title(const std::string& unit) {
+  return unit.empty() ? "level" : "level (" + stimuli::printable(unit) + ")";
+}
+
+Panel function_panel(const ParticipantFunction& one, const std::string& unit) {
   Panel panel;
   panel.title = stimuli::printable(one.participant);
   const Interval range = levels_of(one);
-  panel.x = linear_axis(range.low, range.high, "level");
+  panel.x = linear_axis(range.low, range.high, level_title(unit));
   panel.y = linear_axis(0, 100, "success (%)");
   panel.width = kPanelWidth;
   panel.height = kPanelHeight;
@@ -63,14 +71,14 @@ Panel function_panel(const ParticipantFunction& one) {
 
 /// Levels in the order of a track: a circle where the answer was a success, a diamond where it
 /// turned.
-Panel track_panel(const ParticipantFunction& one, const Track& track) {
+Panel track_panel(const ParticipantFunction& one, const Track& track, const std::string& unit) {
   Panel panel;
   panel.title = stimuli::printable(one.participant);
   if (one.tracks.size() > 1) panel.title += ", track " + stimuli::printable(track.name);
   const auto [low, high] = std::minmax_element(track.levels.begin(), track.levels.end());
   const double margin = *low < *high ? 0.06 * (*high - *low) : 0.5;
   panel.x = linear_axis(0, static_cast<double>(track.levels.size() + 1), "trial of the track");
-  panel.y = linear_axis(*low - margin, *high + margin, "level");
+  panel.y = linear_axis(*low - margin, *high + margin, level_title(unit));
   panel.width = kPanelWidth;
   panel.height = kPanelHeight;
   Mark line = line_mark(Role::soft, {}, {}, 1);
@@ -95,6 +103,158 @@ Panel track_panel(const ParticipantFunction& one, const Track& track) {
   return panel;
 }
 
+/// "JND (N/m)"
+std::string measure_title(const TaskGroup& group) {
+  std::string name = measure_plural(group.measure);
+  name.pop_back();
+  return group.unit.empty() ? name : name + " (" + stimuli::printable(group.unit) + ")";
+}
+
+/// Of the n-th renderer of a group.
+std::pair<Role, MarkerShape> group_style(const std::string& renderer, std::size_t n) {
+  if (renderer == "point") return {Role::point, MarkerShape::circle};
+  if (renderer == "ray") return {Role::ray, MarkerShape::square};
+  constexpr Role kOthers[] = {Role::third, Role::fourth,  Role::fifth,
+                              Role::sixth, Role::seventh, Role::eighth};
+  constexpr MarkerShape kShapes[] = {MarkerShape::diamond, MarkerShape::up, MarkerShape::down};
+  return {kOthers[n % std::size(kOthers)], kShapes[n % std::size(kShapes)]};
+}
+
+/// What is drawn, and half of it above an interval that only two participants have.
+FigureAxis group_axis(const TaskGroup& group) {
+  double low = std::numeric_limits<double>::infinity(), high = -low;
+  for (const GroupMean& one : group.renderers) {
+    for (const NamedFigure& figure : one.participants) {
+      low = std::min(low, figure.value);
+      high = std::max(high, figure.value);
+    }
+  }
+  const double range = std::max(high - low, 1e-3 * std::abs(high)), room = 0.5 * range;
+  const double least = low - room, most = high + room;
+  for (const GroupMean& one : group.renderers) {
+    if (!one.ci95) continue;
+    low = std::min(low, std::max(one.ci95->low, least));
+    high = std::max(high, std::min(one.ci95->high, most));
+  }
+  const double margin = 0.08 * range;
+  const bool all_above = low > 0;
+  low -= margin;
+  return linear_axis(all_above ? std::max(0.0, low) : low, high + margin, measure_title(group));
+}
+
+/// Each participant's figures are joined by a line.
+void add_participants_of(Panel& panel, const TaskGroup& group) {
+  std::map<std::string, Mark> lines;
+  for (std::size_t r = 0; r < group.renderers.size(); ++r) {
+    const auto [role, shape] = group_style(group.renderers[r].renderer, r);
+    for (const NamedFigure& figure : group.renderers[r].participants) {
+      Mark& line =
+          lines.try_emplace(figure.participant, line_mark(Role::soft, {}, {}, 1)).first->second;
+      line.x.push_back(static_cast<double>(r) + 0.62);
+      line.y.push_back(figure.value);
+      Mark dot = symbol(role, shape, line.x.back(), figure.value, 2.6,
+                        stimuli::printable(figure.participant) + ", " +
+                            stimuli::printable(group.renderers[r].renderer) + ": " +
+                            short_number(figure.value));
+      dot.opacity = 0.7;
+      panel.marks.push_back(std::move(dot));
+    }
+  }
+  for (auto& [participant, line] : lines) {
+    if (line.x.size() < 2) continue;
+    line.opacity = 0.5;
+    line.text = stimuli::printable(participant);
+    panel.marks.push_back(std::move(line));
+  }
+}
+
+Panel group_panel(const TaskGroup& group) {
+  std::vector<std::string> names;
+  for (const GroupMean& one : group.renderers) names.push_back(one.renderer);
+  Panel panel;
+  panel.title = measure_plural(group.measure);
+  panel.x = names_axis(names, names.size(), "renderer");
+  panel.y = group_axis(group);
+  panel.width = 110 + 70 * static_cast<double>(names.size());
+  panel.height = 240;
+  add_participants_of(panel, group);
+  for (std::size_t r = 0; r < group.renderers.size(); ++r) {
+    const GroupMean& one = group.renderers[r];
+    if (!one.mean) continue;
+    const auto [role, shape] = group_style(one.renderer, r);
+    const double x = static_cast<double>(r) + 0.38;
+    std::string text = stimuli::printable(one.renderer) + ": mean " + short_number(*one.mean);
+    if (one.ci95) {
+      text +=
+          ", 95 % interval " + short_number(one.ci95->low) + " to " + short_number(one.ci95->high);
+      add_interval(panel, role, x, one.ci95->low, one.ci95->high, text);
+    }
+    panel.marks.push_back(symbol(role, shape, x, *one.mean, 6, text));
+  }
+  return panel;
+}
+
+/// "ray / point: 0.8 [0.7, 0.9], p 0.012 (6 pairs)"
+std::string difference_sentence(const TaskComparison& one) {
+  std::string text;
+  for (const ConditionDifference& difference : one.comparison.differences) {
+    if (difference.n_pairs == 0) continue;
+    const auto shown = [&](double value) {
+      return short_number(one.logarithms ? std::exp(value) : value);
+    };
+    text += measure_plural(one.measure) + ", " +
+            stimuli::printable(one.conditions[difference.condition]) +
+            (one.logarithms ? " / " : " - ") + stimuli::printable(one.conditions[0]) + ": " +
+            shown(difference.mean);
+    if (const auto& ends = difference.t_test.log_ratio_ci95)
+      text += " [" + shown(ends->low) + ", " + shown(ends->high) + "]";
+    if (difference.t_test.p) text += ", p " + p_text(*difference.t_test.p);
+    text += " (paired, " + counted(difference.n_pairs, "participant", "participants") + "). ";
+  }
+  return text;
+}
+
+void add_group_figures(const TaskAnalysis& analysis, std::vector<Figure>& figures) {
+  const auto same = [](const auto& a, const auto& b) {
+    return a.task == b.task && a.block_name == b.block_name && a.shape == b.shape;
+  };
+  std::size_t number = 0;
+  for (std::size_t i = 0; i < analysis.groups.size();) {
+    const TaskGroup& first = analysis.groups[i];
+    Figure figure;
+    figure.title = "Over participants: " + first.task;
+    for (const std::string* name : {&first.block_name, &first.shape}) {
+      if (!name->empty()) figure.title += ", " + stimuli::printable(*name);
+    }
+    if (analysis.table.simulated) figure.label = "SIMULATED PARTICIPANTS";
+    figure.notes.push_back(
+        "Large symbols: means over participants with their 95 % intervals (t), geometric where all "
+        "values are ratios. Small ones: participants, joined by a line.");
+    std::size_t most = 0;
+    for (; i < analysis.groups.size() && same(analysis.groups[i], first); ++i) {
+      const TaskGroup& group = analysis.groups[i];
+      std::size_t shown = 0;
+      figure.description += measure_plural(group.measure) + ": ";
+      for (const GroupMean& one : group.renderers) {
+        shown = std::max(shown, one.participants.size());
+        figure.description += stimuli::printable(one.renderer) + " " +
+                              (one.mean ? short_number(*one.mean) : "no mean") + ". ";
+      }
+      if (shown > 0) figure.panels.push_back(group_panel(group));
+      most = std::max(most, shown);
+    }
+    std::string differences;
+    for (const TaskComparison& one : analysis.renderers) {
+      if (same(one, first)) differences += difference_sentence(one);
+    }
+    if (!differences.empty()) figure.notes.push_back(differences);
+    figure.subtitle = counted(most, "participant", "participants");
+    if (figure.panels.empty()) continue;
+    figure.id = "group" + std::to_string(++number);
+    figures.push_back(std::move(figure));
+  }
+}
+
 Figure figure_of(const TaskAnalysis& analysis, const TaskCell& cell, std::string id,
                  const std::string& what) {
   Figure figure;
@@ -116,6 +276,7 @@ Figure figure_of(const TaskAnalysis& analysis, const TaskCell& cell, std::string
 
 std::vector<Figure> task_figures(const TaskAnalysis& analysis) {
   std::vector<Figure> figures;
+  add_group_figures(analysis, figures);
   std::size_t number = 0;
   for (const TaskCell& cell : analysis.cells) {
     if (cell.functions.empty()) continue;
@@ -130,9 +291,9 @@ std::vector<Figure> task_figures(const TaskAnalysis& analysis) {
                         "success. Diamonds: reversals of a staircase.");
     for (std::size_t i = 0; i < std::min(cell.functions.size(), kDrawnParticipants); ++i) {
       const ParticipantFunction& one = cell.functions[i];
-      if (!one.counts.empty()) functions.panels.push_back(function_panel(one));
+      if (!one.counts.empty()) functions.panels.push_back(function_panel(one, cell.level_unit));
       for (std::size_t t = 0; t < std::min(one.tracks.size(), kDrawnTracks); ++t)
-        tracks.panels.push_back(track_panel(one, one.tracks[t]));
+        tracks.panels.push_back(track_panel(one, one.tracks[t], cell.level_unit));
       functions.description +=
           stimuli::printable(one.participant) + ": " +
           (one.fit.undefined.empty() ? "threshold " + fixed(one.fit.parameters.threshold, 4)

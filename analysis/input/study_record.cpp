@@ -16,11 +16,9 @@ void remember(const std::string& value, std::vector<std::string>& known) {
 
 ProtocolText protocol_text(const data::ProtocolInfo& info) {
   ProtocolText protocol{info.name, info.sha256, info.text, {}, {}};
+  protocol.title = title_of_protocol(info.text);
   const auto json = nlohmann::json::parse(info.text, nullptr, false);
   if (!json.is_object()) return protocol;
-  if (json.contains("title") && json["title"].is_string()) {
-    protocol.title = json["title"].get<std::string>();
-  }
   if (json.contains("seed") && json["seed"].is_number_integer()) {
     protocol.seed = json["seed"].dump();
   }
@@ -44,6 +42,12 @@ void add_trial(const data::TrialRecord& record, ServoQuality& servo) {
 }
 
 }  // namespace
+
+std::string title_of_protocol(const std::string& text) {
+  const auto json = nlohmann::json::parse(text, nullptr, false);
+  if (!json.is_object() || !json.contains("title") || !json["title"].is_string()) return "";
+  return json["title"].get<std::string>();
+}
 
 StudyRecord read_study_record(const std::string& database) {
   data::Store store = data::Store::open(database, data::Store::Mode::read_only);

@@ -26,6 +26,9 @@ struct ServoQuality {
   double max_force = 0;                              ///< N, largest of all trials
 };
 
+/// What a protocol's text gives as its title; "": none.
+std::string title_of_protocol(const std::string& text);
+
 /// A protocol as stored in the database.
 struct ProtocolText {
   std::string name, sha256, text;

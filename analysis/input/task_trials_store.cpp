@@ -2,6 +2,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "analysis/input/study_record.h"
 #include "analysis/input/task_trials.h"
 #include "data/store/store.h"
 #include "protocols/parse.h"
@@ -88,6 +89,9 @@ TaskTable read_task_trials_store(const std::string& path, const std::string& pro
   for (const data::ProtocolInfo& one : store.protocols()) {
     if (is_protocol(protocol, one.name, one.sha256))
       table.procedures[one.sha256] = protocols::procedures_of_blocks(one.text, path);
+    const bool used = std::ranges::any_of(
+        table.protocols, [&](const auto& known) { return known.second == one.sha256; });
+    if (used && table.title.empty()) table.title = title_of_protocol(one.text);
   }
   table.provenance.protocol_name = listed(names);
   table.provenance.observer_sha256 = listed(observers);

@@ -48,6 +48,21 @@ std::string escaped_sentence(std::string_view text) {
   return out;
 }
 
+std::string escaped_lines(std::string_view text) {
+  std::string out;
+  while (!text.empty()) {
+    const std::size_t end = std::min(text.find('\n'), text.size());
+    std::string_view line = text.substr(0, end);
+    if (line.ends_with('\r')) line.remove_suffix(1);
+    std::string plain(line);
+    std::ranges::replace(plain, '\t', ' ');
+    out += escaped(plain);
+    out += '\n';
+    text.remove_prefix(std::min(end + 1, text.size()));
+  }
+  return out;
+}
+
 void put_table(std::string& out, const Table& table) {
   out += "<div class=\"wide\" tabindex=\"0\" role=\"region\" aria-label=\"";
   out += escaped(table.caption) + "\">\n<table>\n<caption>" + escaped_sentence(table.caption) +

@@ -12,6 +12,9 @@ namespace palpate::analysis {
 /// Escaped text with no-break spaces before percent signs.
 std::string escaped_sentence(std::string_view text);
 
+/// Escaped line by line, as escaped() makes line ends and tabs visible.
+std::string escaped_lines(std::string_view text);
+
 /// Appends a table in a box that scrolls horizontally, with its notes below. At most 400 rows and
 /// 60 columns, with a note if it was cut.
 void put_table(std::string& out, const Table& table);

@@ -238,21 +238,10 @@ class Report {
     }
   }
 
-  /// Escaped line by line, since escaped() replaces line ends.
   static std::string protocol_lines(std::string_view text) {
-    std::string out;
     const bool cut = text.size() > kMostProtocol;
     if (cut) text = text.substr(0, kMostProtocol);
-    while (!text.empty()) {
-      const std::size_t end = std::min(text.find('\n'), text.size());
-      std::string_view line = text.substr(0, end);
-      if (line.ends_with('\r')) line.remove_suffix(1);
-      std::string plain(line);
-      std::ranges::replace(plain, '\t', ' ');
-      out += escaped(plain);
-      out += '\n';
-      text.remove_prefix(std::min(end + 1, text.size()));
-    }
+    const std::string out = escaped_lines(text);
     return cut ? out + "…" : out;
   }
 

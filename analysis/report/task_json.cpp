@@ -22,6 +22,11 @@ TaskJson ends_json(const std::optional<Interval>& interval) {
   return {finite(interval->low), finite(interval->high)};
 }
 
+/// As protocols say it.
+const char* easier_name(protocols::Easier easier) {
+  return easier == protocols::Easier::higher ? "higher" : "lower";
+}
+
 void put_status(TaskJson& out, const std::string& undefined) {
   out["status"] = undefined.empty() ? "ok" : "undefined";
   if (!undefined.empty()) out["reason"] = undefined;
@@ -33,12 +38,15 @@ TaskJson fit_json(const ParticipantFunction& one) {
   if (!one.fit.undefined.empty()) return fit;
   fit["function"] = to_string(one.model.function.shape);
   fit["scale"] = to_string(one.model.function.scale);
+  fit["easier"] = easier_name(one.model.function.easier);
+  fit["reversed"] = one.reversed;
   fit["threshold"] = one.fit.parameters.threshold;
   fit["threshold_ci95"] = ends_json(one.fit.threshold_ci95);
   fit["slope"] = one.fit.parameters.slope;
   fit["slope_ci95"] = ends_json(one.fit.slope_ci95);
   fit["determined"] = one.determined;
   fit["slope_at_bound"] = one.fit.slope_at_bound;
+  fit["guess_is_lapse"] = one.model.guess_is_lapse;
   fit["guess"] = one.fit.parameters.guess;
   fit["guess_ci95"] = ends_json(one.fit.guess_ci95);
   fit["lapse"] = one.fit.parameters.lapse;
@@ -155,6 +163,9 @@ TaskJson cell_json(const TaskCell& cell) {
                {"n_judged", cell.judged},
                {"n_correct", cell.correct},
                {"standard_level", maybe(cell.standard_level)},
+               {"level_unit", cell.level_unit.empty() ? TaskJson() : TaskJson(cell.level_unit)},
+               {"expected_easier",
+                cell.expected_easier ? TaskJson(easier_name(*cell.expected_easier)) : TaskJson()},
                {"forced_choice", cell.forced_choice},
                {"same_different", cell.same_different},
                {"n_intervals", cell.task == "compare" ? TaskJson(cell.intervals) : TaskJson()}};
@@ -187,6 +198,29 @@ TaskJson cell_json(const TaskCell& cell) {
     confidence["ci95"] = ends_json(cell.confidence.area_ci95);
   }
   out["confidence"] = confidence;
+  return out;
+}
+
+TaskJson group_json(const TaskGroup& group) {
+  TaskJson out{{"task", group.task},
+               {"block_name", group.block_name},
+               {"shape", group.shape},
+               {"measure", group.measure},
+               {"unit", group.unit.empty() ? TaskJson() : TaskJson(group.unit)},
+               {"mean_is", group.geometric ? "geometric" : "arithmetic"}};
+  for (const GroupMean& one : group.renderers) {
+    TaskJson renderer{{"renderer", one.renderer},
+                      {"n_participants", one.participants.size()},
+                      {"n_undetermined", one.n_undetermined},
+                      {"mean", maybe(one.mean)},
+                      {"ci95", ends_json(one.ci95)},
+                      {group.geometric ? "sd_of_natural_logs" : "sd", maybe(one.sd)},
+                      {"participants", TaskJson::array()}};
+    for (const NamedFigure& figure : one.participants)
+      renderer["participants"].push_back(
+          {{"participant_id", figure.participant}, {"value", finite(figure.value)}});
+    out["renderers"].push_back(std::move(renderer));
+  }
   return out;
 }
 
@@ -246,14 +280,18 @@ TaskJson accuracy_json(const MixedLogistic& model) {
 std::string task_report_json(const TaskAnalysis& analysis, const std::string& program_version) {
   TaskJson out{{"version", 1},
                {"simulated", analysis.table.simulated},
+               {"title", analysis.table.title},
                {"source", analysis.table.source},
+               {"warnings", analysis.table.warnings},
                {"program_version", program_version},
                {"n_trials", analysis.table.trials.size()},
                {"n_practice", analysis.table.n_practice},
                {"cells", TaskJson::array()},
+               {"group_results", TaskJson::array()},
                {"renderer_comparisons", TaskJson::array()},
                {"condition_comparisons", TaskJson::array()}};
   for (const TaskCell& cell : analysis.cells) out["cells"].push_back(cell_json(cell));
+  for (const TaskGroup& group : analysis.groups) out["group_results"].push_back(group_json(group));
   for (const TaskComparison& one : analysis.renderers)
     out["renderer_comparisons"].push_back(comparison_json(one, true));
   for (const TaskComparison& one : analysis.conditions)

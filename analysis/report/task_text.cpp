@@ -1,6 +1,4 @@
 #include <algorithm>
-#include <array>
-#include <charconv>
 #include <cmath>
 #include <variant>
 
@@ -11,15 +9,6 @@
 
 namespace palpate::analysis {
 namespace {
-
-/// Four significant digits; levels may be millimetres or kilonewtons.
-std::string short_number(double value) {
-  if (std::isinf(value)) return value > 0 ? "inf" : "-inf";
-  std::array<char, 32> text{};
-  const auto end =
-      std::to_chars(text.data(), text.data() + text.size(), value, std::chars_format::general, 4);
-  return {text.data(), end.ptr};
-}
 
 std::string with_interval(double value, const Interval& interval) {
   return short_number(value) + " [" + short_number(interval.low) + ", " +
@@ -37,8 +26,10 @@ std::string optional_interval(const std::optional<double>& value,
 
 std::string detection_text(const ParticipantFunction& one) {
   if (!one.detectability.d_prime) return "";
+  const auto& ends = one.detectability.d_prime_ci95;
+  const std::string swapped = ends && ends->high < 0 ? " (BELOW 0: are keys swapped?)" : "";
   return ", d' " + optional_interval(one.detectability.d_prime, one.detectability.d_prime_ci95) +
-         ", criterion " +
+         swapped + ", criterion " +
          optional_interval(one.detectability.criterion, one.detectability.criterion_ci95);
 }
 
@@ -70,7 +61,18 @@ std::string procedure_text(const Track& track) {
   return text + "\n";
 }
 
-std::string function_line(const ParticipantFunction& one) {
+/// \param easier  of the answers
+std::string reversal_text(protocols::Easier easier,
+                          const std::optional<protocols::Easier>& expected) {
+  const bool falls = easier == protocols::Easier::lower;
+  std::string text =
+      falls ? "successes FALL as the level rises, where " : "successes RISE with the level, where ";
+  text += expected ? "the task has them " : "those of the others ";
+  return text + (falls ? "rise" : "fall") + " (are keys swapped?)";
+}
+
+std::string function_line(const ParticipantFunction& one,
+                          const std::optional<protocols::Easier>& expected) {
   std::string text = "  " + pad_right(stimuli::printable(one.participant), 12);
   const std::string detected = detection_text(one);
   if (!one.fit.undefined.empty())
@@ -90,15 +92,20 @@ std::string function_line(const ParticipantFunction& one) {
     text += ", lapses " + with_interval(rounded_rate(one.fit.parameters.lapse),
                                         {rounded_rate(one.fit.lapse_ci95.low),
                                          rounded_rate(one.fit.lapse_ci95.high)});
-  if (!one.determined) text += ", threshold NOT DETERMINED by these levels";
+  if (one.reversed) {
+    text += ", NOT COMPARED: " + reversal_text(one.model.function.easier, expected);
+  } else if (!one.determined) {
+    text += ", threshold NOT DETERMINED by these levels";
+  }
   if (one.goodness.p) text += ", fit p " + p_text(*one.goodness.p);
   if (one.posterior.undefined.empty())
     text += "; Bayes " + with_interval(one.posterior.mean.threshold, one.posterior.threshold_ci95);
   return text + detected + "\n";
 }
 
-std::string function_text(const ParticipantFunction& one) {
-  std::string text = function_line(one);
+std::string function_text(const ParticipantFunction& one,
+                          const std::optional<protocols::Easier>& expected) {
+  std::string text = function_line(one, expected);
   for (const Track& track : one.tracks) {
     if (track.procedure) text += procedure_text(track);
   }
@@ -107,14 +114,15 @@ std::string function_text(const ParticipantFunction& one) {
 
 std::string explanation(const FunctionSettings& functions) {
   std::string text = std::string("Intervals are of 95 %. Psychometric functions: ") +
-                     to_string(functions.shape) +
-                     ", lapses free up to 0.06; compare with levels on\none side of the standard: "
-                     "guesses 1 / intervals, the ";
+                     to_string(functions.shape) + ", lapses free up to " +
+                     short_number(kMostLapse) +
+                     "; compare with levels on\nboth sides of the standard: lapses as many at "
+                     "both ends; on one side: guesses 1 / intervals, the\n";
   text += functions.shape == protocols::PsychometricShape::weibull
               ? "JND is measured half-way from there to certainty (threshold: at 63 %)"
               : "threshold is half-way from there to certainty";
   return text +
-         ";\ndetect, same/different: guesses free. d': log-linear correction. Bayes: posterior "
+         "; detect, same/different: guesses free.\nd': log-linear correction. Bayes: posterior "
          "mean of the threshold on a grid.\n";
 }
 
@@ -139,6 +147,7 @@ std::string magnitude_text(const TaskCell& cell) {
     text += "  " + pad_right(stimuli::printable(cell.participants[line.participant]), 12);
     text += line.exponent ? "exponent " + short_number(*line.exponent) : line.undefined;
     if (line.r_squared) text += ", r2 " + short_number(*line.r_squared);
+    if (line.exponent.value_or(0) < 0) text += ", the numbers FALL as the level rises";
     text += "\n";
   }
   if (magnitude.exponent)
@@ -178,7 +187,8 @@ std::string cell_text(const TaskCell& cell) {
     text += cell.scale == protocols::LevelScale::linear
                 ? "  functions over the levels as they are\n"
                 : "  functions over the logarithm (base 10) of the levels\n";
-  for (const ParticipantFunction& one : cell.functions) text += function_text(one);
+  for (const ParticipantFunction& one : cell.functions)
+    text += function_text(one, cell.expected_easier);
   if (cell.magnitude) text += magnitude_text(cell);
   text += adjustment_text(cell);
   if (cell.information && cell.information->plain) {
@@ -193,19 +203,35 @@ std::string cell_text(const TaskCell& cell) {
   }
   if (cell.confidence.area)
     text += "  confidence: area under the type 2 ROC " +
-            optional_interval(cell.confidence.area, cell.confidence.area_ci95) + "\n";
+            optional_interval(cell.confidence.area, cell.confidence.area_ci95) +
+            (cell.confidence.area_ci95 && cell.confidence.area_ci95->high < 0.5
+                 ? " (BELOW 0.5: is the scale turned round?)"
+                 : "") +
+            "\n";
   return text + "\n";
 }
 
-std::string measure_name(const TaskComparison& one) {
-  if (one.measure == "threshold") return "Thresholds";
-  if (one.measure == "jnd") return "JNDs";
-  return one.measure == "pse" ? "PSEs" : "Exponents";
+std::string group_text(const TaskGroup& group) {
+  std::string text = measure_plural(group.measure) + " over participants";
+  for (const std::string* name : {&group.task, &group.block_name, &group.shape}) {
+    if (!name->empty()) text += ", " + stimuli::printable(*name);
+  }
+  text += group.geometric ? " (geometric means" : " (means";
+  text += (group.unit.empty() ? "" : ", " + group.unit) + ")\n";
+  for (const GroupMean& one : group.renderers) {
+    text += "  " + pad_right(stimuli::printable(one.renderer), 12) +
+            (one.mean ? optional_interval(one.mean, one.ci95) : "no mean") + " (" +
+            counted(one.participants.size(), "participant", "participants");
+    if (one.n_undetermined > 0)
+      text += ", " + std::to_string(one.n_undetermined) + " not determined and left out";
+    text += ")\n";
+  }
+  return text + "\n";
 }
 
 std::string comparison_text(const TaskComparison& one, bool of_renderers) {
   std::string text =
-      measure_name(one) + " by " + (of_renderers ? "renderer" : "block and stimulus");
+      measure_plural(one.measure) + " by " + (of_renderers ? "renderer" : "block and stimulus");
   const auto add = [&](const std::string& name) {
     if (!name.empty()) text += ", " + stimuli::printable(name);
   };
@@ -217,7 +243,7 @@ std::string comparison_text(const TaskComparison& one, bool of_renderers) {
   if (!one.comparison.undefined.empty()) text += "  " + one.comparison.undefined + "\n";
   if (one.n_undetermined > 0)
     text += "  " + counted(one.n_undetermined, "function", "functions") +
-            " left out: no threshold among the levels shown\n";
+            " left out: no threshold among the levels shown, or answers the other way round\n";
   for (const ConditionDifference& difference : one.comparison.differences) {
     const auto shown = [&](double value) {
       return short_number(one.logarithms ? std::exp(value) : value);
@@ -263,7 +289,11 @@ std::string accuracy_text(const MixedLogistic& model) {
 std::string task_report_text(const TaskAnalysis& analysis) {
   std::string text;
   if (analysis.table.simulated) text += "SIMULATED PARTICIPANTS\n\n";
+  for (const std::string& warning : analysis.table.warnings)
+    text += stimuli::printable(warning, 400) + "\n";
+  if (!analysis.table.warnings.empty()) text += "\n";
   for (const TaskCell& cell : analysis.cells) text += cell_text(cell);
+  for (const TaskGroup& group : analysis.groups) text += group_text(group);
   for (const TaskComparison& one : analysis.renderers) text += comparison_text(one, true);
   for (const TaskComparison& one : analysis.conditions) text += comparison_text(one, false);
   if (analysis.accuracy) text += accuracy_text(*analysis.accuracy);

@@ -113,8 +113,48 @@ LevelFigures figures_of(const PsychometricFit& fit, const PsychometricModel& mod
           found.pse_ci95, found.jnd_ci95, found.weber_fraction_ci95};
 }
 
+/// Of which levels a cell's functions are expected to be easier; none: nothing tells.
+std::optional<protocols::Easier> expected_easier(const TaskCell& cell, const Trials& trials,
+                                                 bool above, bool below, const Context& context) {
+  using protocols::Easier;
+  if (cell.task == "compare" && above != below) return above ? Easier::higher : Easier::lower;
+  for (const TaskTrial* trial : trials) {
+    for (const protocols::ProcedureSpec& spec : specs_of(*trial, context.table)) {
+      if (const auto easier = easier_of_adaptive(spec)) return easier;
+    }
+    const protocols::BlockProcedures* const block = block_of(*trial, context.table);
+    if (cell.task == "compare" && !cell.same_different && block != nullptr)
+      return block->asks_smaller ? Easier::lower : Easier::higher;
+  }
+  return std::nullopt;
+}
+
+/// The counts that a function is fitted to: with those of catch trials.
+std::vector<LevelCount> counts_to_fit(const ParticipantFunction& one,
+                                      const DetectionCounts& detections, bool catches) {
+  return catches ? with_catch_trials(one.counts, detections, one.model.function) : one.counts;
+}
+
+/// Sets the model's direction to the expected one, or to the other where that is clearly better.
+void set_direction(ParticipantFunction& one, const DetectionCounts& detections, bool catches,
+                   protocols::Easier expected) {
+  constexpr double kHalfChiSquared95 = 0.5 * 3.841458820694124;
+  using protocols::Easier;
+  one.model.function.easier = expected;
+  if (easier_of(one.counts) == expected) return;
+  const auto log_likelihood = [&] {
+    const PsychometricFit fit = quick_fit(counts_to_fit(one, detections, catches), one.model);
+    return fit.undefined.empty() ? fit.log_likelihood : 0;
+  };
+  const double as_expected = log_likelihood();
+  one.model.function.easier = expected == Easier::higher ? Easier::lower : Easier::higher;
+  one.reversed = log_likelihood() > as_expected + kHalfChiSquared95;
+  if (!one.reversed) one.model.function.easier = expected;
+}
+
 ParticipantFunction function_of(const std::string& participant, const Trials& trials,
-                                const TaskCell& cell, const Context& context) {
+                                const TaskCell& cell, protocols::Easier expected,
+                                const Context& context) {
   ParticipantFunction result;
   result.participant = participant;
   result.tracks = tracks_of(trials, context.table);
@@ -128,14 +168,13 @@ ParticipantFunction function_of(const std::string& participant, const Trials& tr
   result.fit.undefined = cell.no_function;
   result.posterior.undefined = cell.no_function;
   if (!cell.no_function.empty()) return result;
-  result.model.function = {context.settings.shape, cell.scale, easier_of(result.counts)};
+  result.model.function = {context.settings.shape, cell.scale, expected};
   if (cell.forced_choice) result.model.guess.value = 1.0 / cell.intervals;
-  std::vector<LevelCount> counts = result.counts;
-  if (catches) {
-    result.model.guess = {0, true, 0.5};
-    counts = with_catch_trials(counts, detections, result.model.function);
-  }
-  result.model.lapse = {0, true, 0.06};
+  if (catches) result.model.guess = {0, true, 0.5};
+  result.model.lapse = {0, true, kMostLapse};
+  result.model.guess_is_lapse = !catches && !cell.forced_choice;
+  set_direction(result, detections, catches, expected);
+  const std::vector<LevelCount> counts = counts_to_fit(result, detections, catches);
   result.fit = fit_psychometric(counts, result.model);
   result.posterior = psychometric_posterior(counts, result.model);
   if (result.fit.undefined.empty()) {
@@ -145,7 +184,7 @@ ParticipantFunction function_of(const std::string& participant, const Trials& tr
     add_fitted_levels(result.tracks, result.model, result.fit);
     const double threshold = result.fit.parameters.threshold;
     const Interval& ends = result.fit.threshold_ci95;
-    result.determined = threshold >= result.counts.front().level &&
+    result.determined = !result.reversed && threshold >= result.counts.front().level &&
                         threshold <= result.counts.back().level && std::isfinite(ends.low) &&
                         std::isfinite(ends.high) &&
                         (ends.low > 0 || result.counts.front().level <= 0);
@@ -200,8 +239,11 @@ void add_functions(TaskCell& cell, const Trials& trials, const Context& context)
       std::any_of(trials.begin(), trials.end(),
                   [](const TaskTrial* trial) { return trial->level && *trial->level < 0; }))
     cell.no_function = "levels below 0 have no place on a logarithmic scale";
+  cell.expected_easier = expected_easier(cell, trials, above, below, context);
+  const protocols::Easier usual =
+      cell.expected_easier.value_or(easier_of(counts_of_levels(trials)));
   for (const auto& [participant, own] : by_participant(trials))
-    cell.functions.push_back(function_of(participant, own, cell, context));
+    cell.functions.push_back(function_of(participant, own, cell, usual, context));
 }
 
 void add_magnitude(TaskCell& cell, const Trials& trials) {
@@ -282,6 +324,9 @@ TaskCell cell_of(const CellKey& key, const Trials& trials, const Context& contex
   }
   for (const auto& [participant, own] : by_participant(trials))
     cell.participants.push_back(participant);
+  if (const auto* block = block_of(*trials.front(), context.table)) {
+    if (block->level_unit != "1") cell.level_unit = block->level_unit;
+  }
   if (cell.task == "compare" || cell.task == "detect") add_functions(cell, trials, context);
   if (cell.task == "rate") add_magnitude(cell, trials);
   if (cell.task == "adjust") add_adjustments(cell, trials);
@@ -307,6 +352,7 @@ TaskAnalysis analyze_tasks(TaskTable table, const FunctionSettings& functions,
   };
   for (const auto& [key, trials] : grouped<CellKey>(all, key_of))
     result.cells.push_back(cell_of(key, trials, context));
+  result.groups = group_results(result.cells);
   result.renderers = compare_renderers(result.cells);
   result.conditions = compare_conditions(result.cells);
   if (auto shapes = identification_of(result.table)) {

@@ -47,8 +47,13 @@ struct ParticipantFunction {
   PsychometricModel model;
   PsychometricFit fit;
   GoodnessOfFit goodness;
-  /// The threshold lies among the levels shown, and its interval is closed. Others are reported,
-  /// but not compared.
+  /// Answers go the other way round than the task, or the other participants', say, by more than
+  /// chance explains: twice the log likelihood of the better direction exceeds that of the expected
+  /// one by the 0.95 quantile of chi squared with one degree of freedom. The fit is of the
+  /// direction that they have.
+  bool reversed = false;
+  /// The threshold lies among the levels shown, its interval is closed, and the function is not
+  /// reversed. Others are reported, but neither compared nor averaged.
   bool determined = false;
   LevelFigures figures;
   PsychometricPosterior posterior;  ///< of the same counts and model
@@ -68,6 +73,10 @@ struct TaskCell {
   bool same_different = false;  ///< compare: that is what is answered
   int intervals = 2;            ///< compare
   protocols::LevelScale scale = protocols::LevelScale::linear;  ///< of its functions
+  /// Which levels have more successes, as the task says; none: nothing tells, and most
+  /// participants' answers are taken as right.
+  std::optional<protocols::Easier> expected_easier;
+  std::string level_unit;                 ///< "N/m", ...; "": unknown, or without unit
   std::string no_function;                ///< why no psychometric function is fitted; empty: one is
   std::vector<std::string> participants;  ///< that `magnitude`, `adjustments` number
   std::vector<ParticipantFunction> functions;      ///< compare, detect
@@ -85,6 +94,7 @@ struct TaskAnalysis {
   TaskTable table;
   FunctionSettings functions;
   std::vector<TaskCell> cells;
+  std::vector<TaskGroup> groups;
   std::vector<TaskComparison> renderers, conditions;
   /// What version 1 reports of identification, over all its blocks; none: no identification.
   std::optional<Analysis> identification;

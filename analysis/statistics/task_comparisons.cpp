@@ -1,5 +1,6 @@
 #include "analysis/statistics/task_comparisons.h"
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <map>
@@ -62,6 +63,15 @@ Figures jnds(const TaskCell& cell) {
   return figures;
 }
 
+Figures weber_fractions(const TaskCell& cell) {
+  Figures figures = of_functions(cell, [&](const ParticipantFunction& one) {
+    const bool none = one.fit.slope_at_bound && !cell.forced_choice;
+    return none ? std::nullopt : one.figures.weber_fraction;
+  });
+  figures.ratios = true;
+  return figures;
+}
+
 Figures exponents(const TaskCell& cell) {
   Figures figures;
   if (!cell.magnitude) return figures;
@@ -78,12 +88,57 @@ Figures settings(const TaskCell& cell) {
   return figures;
 }
 
+Figures setting_jnds(const TaskCell& cell) {
+  Figures figures;
+  for (const Adjustment& one : cell.adjustments) {
+    if (one.jnd) figures.add(cell.participants[one.participant], *one.jnd);
+  }
+  return figures;
+}
+
+/// Those that are compared. Weber fractions are JNDs over the same standard.
 std::vector<Measure> measures() {
-  return {{"threshold", thresholds},
-          {"pse", pses},
-          {"jnd", jnds},
-          {"exponent", exponents},
-          {"pse", settings}};
+  return {{"threshold", thresholds}, {"pse", pses},     {"jnd", jnds},
+          {"exponent", exponents},   {"pse", settings}, {"jnd", setting_jnds}};
+}
+
+void add_mean(GroupMean& group, bool geometric) {
+  std::vector<double> values;
+  for (const NamedFigure& one : group.participants)
+    values.push_back(geometric ? std::log(one.value) : one.value);
+  if (values.empty()) return;
+  const auto back = [&](double value) { return geometric ? std::exp(value) : value; };
+  group.mean = back(mean(values));
+  group.sd = standard_deviation(values);
+  if (const auto ends = t_test(values).log_ratio_ci95)
+    group.ci95 = Interval{back(ends->low), back(ends->high)};
+}
+
+std::optional<TaskGroup> group_of(const std::vector<const TaskCell*>& cells,
+                                  const Measure& measure) {
+  TaskGroup result;
+  result.measure = measure.name;
+  const std::string name = measure.name;
+  result.geometric = name != "exponent";
+  for (const TaskCell* cell : cells) {
+    const Figures figures = measure.of(*cell);
+    if (figures.of.empty() && figures.n_undetermined == 0) continue;
+    GroupMean& group = result.renderers.emplace_back();
+    group.renderer = cell->renderer;
+    group.n_undetermined = figures.n_undetermined;
+    result.geometric &= figures.ratios;
+    for (const auto& [participant, value] : figures.of) {
+      group.participants.push_back({participant, value});
+      result.geometric &= value > 0;
+    }
+    if (name != "exponent" && name != "weber_fraction") result.unit = cell->level_unit;
+  }
+  if (result.renderers.empty()) return std::nullopt;
+  result.task = cells.front()->task;
+  result.block_name = cells.front()->block_name;
+  result.shape = cells.front()->shape;
+  for (GroupMean& group : result.renderers) add_mean(group, result.geometric);
+  return result;
 }
 
 /// Fewer than two cells that have figures: none.
@@ -130,14 +185,43 @@ std::vector<std::vector<const TaskCell*>> groups_of(
   return groups;
 }
 
+/// The cells of a stimulus in a block, by renderer.
+std::vector<std::vector<const TaskCell*>> groups_by_renderer(const std::vector<TaskCell>& cells) {
+  using Key = std::tuple<std::string, std::string, std::string>;
+  auto groups = groups_of<Key>(cells, [](const TaskCell& c) {
+    return Key{c.task, c.block_name, c.shape};
+  });
+  const auto rank = [](const TaskCell* cell) {
+    return cell->renderer == "point" ? 0 : cell->renderer == "ray" ? 1 : 2;
+  };
+  for (auto& group : groups) std::ranges::stable_sort(group, {}, rank);
+  return groups;
+}
+
 }  // namespace
 
+std::string measure_plural(const std::string& measure) {
+  if (measure == "threshold") return "Thresholds";
+  if (measure == "jnd") return "JNDs";
+  if (measure == "weber_fraction") return "Weber fractions";
+  return measure == "pse" ? "PSEs" : "Exponents";
+}
+
+std::vector<TaskGroup> group_results(const std::vector<TaskCell>& cells) {
+  std::vector<Measure> all = measures();
+  all.push_back({"weber_fraction", weber_fractions});
+  std::vector<TaskGroup> results;
+  for (const auto& group : groups_by_renderer(cells)) {
+    for (const Measure& measure : all) {
+      if (auto one = group_of(group, measure)) results.push_back(std::move(*one));
+    }
+  }
+  return results;
+}
+
 std::vector<TaskComparison> compare_renderers(const std::vector<TaskCell>& cells) {
-  using Key = std::tuple<std::string, std::string, std::string>;
   std::vector<TaskComparison> results;
-  for (const auto& group : groups_of<Key>(cells, [](const TaskCell& c) {
-         return Key{c.task, c.block_name, c.shape};
-       })) {
+  for (const auto& group : groups_by_renderer(cells)) {
     for (const Measure& measure : measures()) {
       auto one = compared(group, measure, [](const TaskCell& cell) { return cell.renderer; });
       if (!one) continue;

@@ -1,8 +1,10 @@
 #pragma once
-// What the same participants have under several renderers, or in several blocks and with several
-// stimuli of a task: thresholds, JNDs, exponents, settings. Paired and mixed
-// (threshold_comparison.h).
+// Thresholds, JNDs, exponents and settings over participants: their means, and what the same
+// participants have under several renderers, or in several blocks and with several stimuli of a
+// task. Paired and mixed (threshold_comparison.h).
 
+#include <cstddef>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -11,6 +13,32 @@
 namespace palpate::analysis {
 
 struct TaskCell;
+
+/// A figure of a participant, in its own unit.
+struct NamedFigure {
+  std::string participant;
+  double value = 0;
+};
+
+/// The participants with a renderer.
+struct GroupMean {
+  std::string renderer;
+  std::vector<NamedFigure> participants;
+  std::size_t n_undetermined = 0;  ///< functions whose threshold the data do not tell: left out
+  std::optional<double> mean;      ///< none: nobody has a figure
+  std::optional<double> sd;        ///< n - 1; of natural logarithms where the mean is geometric
+  std::optional<Interval> ci95;    ///< t over participants; none below two, or without variance
+};
+
+/// A measure of a stimulus in a block, with each renderer.
+struct TaskGroup {
+  std::string task, block_name, shape;
+  std::string measure;  ///< "threshold", "pse", "jnd", "weber_fraction", "exponent"
+  std::string unit;     ///< "N/m", ...; "": unknown, or without unit
+  /// Means are geometric where all figures are positive and have a true zero, but of exponents.
+  bool geometric = false;
+  std::vector<GroupMean> renderers;  ///< point, ray, then others in order of their first trial
+};
 
 /// Natural logarithms where all figures are positive.
 struct TaskComparison {
@@ -25,7 +53,13 @@ struct TaskComparison {
   ThresholdComparison comparison;
 };
 
-/// In a block with a stimulus, where there are several renderers.
+/// "Thresholds", "PSEs", "JNDs", "Weber fractions", "Exponents".
+std::string measure_plural(const std::string& measure);
+
+/// Means over participants, of each measure that somebody has.
+std::vector<TaskGroup> group_results(const std::vector<TaskCell>& cells);
+/// In a block with a stimulus, where there are several renderers: the reference is point, or else
+/// that of the first trial.
 std::vector<TaskComparison> compare_renderers(const std::vector<TaskCell>& cells);
 /// With a renderer, where a task has several blocks or stimuli whose levels are of one kind: the
 /// standard is the same.

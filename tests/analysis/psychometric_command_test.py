@@ -13,6 +13,72 @@ from task_study import PALPATE, PEOPLE, TaskStudy, logistic, rows_of_a_study
 FIXTURES = pathlib.Path(__file__).with_name("fixtures")
 
 
+def best_with_lapses_at_both_ends(case, function, scale):
+    """By the definition: maximum and profile likelihood with one lapse rate up to 0.06 at both ends."""
+    place = math.log10 if scale == "log" else float
+    points = [(place(level), n, k) for level, n, k in zip(case["levels"], case["n"], case["k"])]
+    core = {"logistic": logistic, "normal": statistics.NormalDist().cdf,
+            "weibull": lambda z: 1 - math.exp(-10 ** min(z, 30))}[function]
+
+    def loss(threshold, log_slope, lapse):
+        total = 0
+        for x, n, k in points:
+            z = max(-700, min(700, math.exp(log_slope) * (x - threshold)))
+            p = min(1 - 1e-15, max(1e-15, lapse + (1 - 2 * lapse) * core(z)))
+            total -= k * math.log(p) + (n - k) * math.log(1 - p)
+        return total
+
+    def golden(f, low, high, steps=44):
+        share = (math.sqrt(5) - 1) / 2
+        a, b = high - share * (high - low), low + share * (high - low)
+        at_a, at_b = f(a), f(b)
+        for _ in range(steps):
+            if at_a < at_b:
+                high, b, at_b = b, a, at_a
+                a = high - share * (high - low)
+                at_a = f(a)
+            else:
+                low, a, at_a = a, b, at_b
+                b = low + share * (high - low)
+                at_b = f(b)
+        return min(((f(x), x) for x in (low, high, (low + high) / 2)))
+
+    xs = [x for x, _, _ in points]
+    low, high = min(xs), max(xs)
+    steep = math.log(40 / (high - low))  # wide enough: the maximum lies within
+    flat = steep - 4
+
+    def best(threshold=None, lapse=None):
+        """Loss, threshold, log slope and lapse, with what is given held."""
+        def over_slope(t, rate):
+            return golden(lambda s: loss(t, s, rate), flat, steep)
+        def over_rate(t):
+            if lapse is not None:
+                return over_slope(t, lapse)[0], lapse
+            return min(golden(lambda r: over_slope(t, r)[0], 0, 0.06, 30), (over_slope(t, 0)[0], 0), (over_slope(t, 0.06)[0], 0.06))
+        t = threshold if threshold is not None else golden(lambda x: over_rate(x)[0], low, high, 34)[1]
+        value, rate = over_rate(t)
+        return value, t, over_slope(t, rate)[1], rate
+
+    least, threshold, log_slope, lapse = best()
+    allowed = least + 0.5 * 3.841458820694124
+
+    def end(inside, outside, held):
+        if held(outside) <= allowed:
+            return outside
+        for _ in range(16):
+            middle = (inside + outside) / 2
+            inside, outside = (middle, outside) if held(middle) <= allowed else (inside, middle)
+        return (inside + outside) / 2
+
+    back = (lambda x: 10 ** x) if scale == "log" else float
+    reach = (high - low) / 4
+    return {"log_likelihood": -least, "threshold": back(threshold), "slope": math.exp(log_slope), "fitted_lapse": lapse,
+            "threshold_low": back(end(threshold, threshold - reach, lambda t: best(threshold=t)[0])),
+            "threshold_high": back(end(threshold, threshold + reach, lambda t: best(threshold=t)[0])),
+            "lapse_low": end(lapse, 0, lambda r: best(lapse=r)[0]), "lapse_high": end(lapse, 0.06, lambda r: best(lapse=r)[0])}
+
+
 class PsychometricFunctions(TaskStudy):
     def test_levels_on_one_side_of_the_standard_are_a_forced_choice(self):
         draw = random.Random(3)
@@ -36,7 +102,10 @@ class PsychometricFunctions(TaskStudy):
         function by its inverse."""
         for case in json.loads((FIXTURES / "psychophysics.json").read_text())["by_command"]:
             function, scale = case["name"].split()
-            standard = 500 if case["guess"] == 0 else 100
+            both_sides = case["guess"] == 0
+            standard = 500 if both_sides else 100
+            if both_sides:  # R's lower end is 0 there, without lapses
+                case |= best_with_lapses_at_both_ends(case, function, scale)
             rows = [{"participant_id": "T1", "session": 1, "block": 1, "trial": 1000 * place + i + 1, "renderer": "ray", "shape": "ball",
                      "response": "2", "correct": 1, "task": "compare", "block_name": "b", "track": 1, "level": level,
                      "standard_level": standard, "success": int(i < k)}
@@ -49,14 +118,16 @@ class PsychometricFunctions(TaskStudy):
                     self.assertIn(f"Psychometric functions: {function}", done.stdout)
                     cell, = json.loads((self.path / "one.json").read_text())["cells"]
                     fit = cell["psychometric_functions"][0]["fit"]
-                    self.assertEqual((fit["function"], fit["scale"], fit["guess"]), (function, scale, case["guess"]))
+                    self.assertEqual((fit["function"], fit["scale"], fit["guess"]),
+                                     (function, scale, fit["lapse"] if both_sides else case["guess"]))
+                    self.assertEqual(fit["guess_is_lapse"], both_sides)
                     self.assertAlmostEqual(fit["log_likelihood"], case["log_likelihood"], delta=1e-6)
                     self.assertAlmostEqual(fit["threshold"] / case["threshold"], 1, delta=1e-4)
                     self.assertAlmostEqual(fit["slope"] / case["slope"], 1, delta=2e-3)
                     self.assertAlmostEqual(fit["lapse"], case["fitted_lapse"], delta=1e-4)
                     for end, value in zip(("lapse_low", "lapse_high"), fit["lapse_ci95"]):
                         self.assertAlmostEqual(value, case[end], delta=1e-4)
-                    self.assertEqual(fit["guess_ci95"], [case["guess"]] * 2)
+                    self.assertEqual(fit["guess_ci95"], fit["lapse_ci95"] if both_sides else [case["guess"]] * 2)
                     for end, value in zip(("threshold_low", "threshold_high"), fit["threshold_ci95"]):
                         self.assertAlmostEqual(value / case[end], 1, delta=1e-3)
                     if case["guess"] == 0.5:

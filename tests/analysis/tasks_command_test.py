@@ -3,6 +3,8 @@
 import json
 import math
 import random
+import re
+import statistics
 import unittest
 
 from task_study import PEOPLE, TaskStudy, logistic, rows_of_a_study
@@ -124,11 +126,156 @@ class Tasks(TaskStudy):
         page = (self.path / "report.html").read_text()
         self.assertIn("SIMULATED PARTICIPANTS", page)
         self.assertIn("Psychometric functions: compare, stiffness, ball, point", page)
+        self.assertFalse("\\u000a" in page)
+        self.assertTrue("<pre tabindex=\"0\">SIMULATED PARTICIPANTS\n" in page)
+        for link, words in re.findall(r'<li><a href="#([^"]*)">([^<]*)</a></li>', page):
+            self.assertNotRegex(words, r"^[a-z]+[0-9]+$", link)
+        self.assertIn("Results over participants", page)
         names = {file.name for file in (self.path / "figures").iterdir()}
+        self.assertLessEqual({"group1.svg", "group2.svg"}, names)
         self.assertLessEqual({f"{kind}{i}.svg" for kind in ("function", "track") for i in (1, 2, 3)}, names)
         self.assertIn("figure15.svg", names)  # of identification, as in version 1
         drawn = (self.path / "figures" / "function1.svg").read_text()
         self.assertIn("of 30 trials", drawn)
+
+    def test_means_over_participants_are_those_of_their_figures(self):
+        def t_interval(values):  # 95 %, Student's t for 3 to 5 degrees of freedom
+            quantile = {3: 3.182446, 4: 2.776445, 5: 2.570582}[len(values) - 1]
+            half = quantile * statistics.stdev(values) / math.sqrt(len(values))
+            return statistics.mean(values), statistics.mean(values) - half, statistics.mean(values) + half
+
+        for seed in (1, 6):
+            found = self.found(rows_of_a_study(seed))
+            groups = {(one["task"], one["measure"]): one for one in found["group_results"]}
+            self.assertEqual(set(groups), {("compare", "pse"), ("compare", "jnd"), ("compare", "weber_fraction"),
+                                           ("detect", "threshold"), ("rate", "exponent"), ("adjust", "pse"), ("adjust", "jnd")})
+            text = self.analyze().stdout
+            cells = {(cell["task"], cell["renderer"]): cell for cell in found["cells"]}
+            for (task, measure), group in groups.items():
+                geometric = measure != "exponent"
+                self.assertEqual(group["mean_is"], "geometric" if geometric else "arithmetic")
+                self.assertEqual([one["renderer"] for one in group["renderers"]], ["point", "ray"] if task == "compare" else ["ray"])
+                for one in group["renderers"]:
+                    cell = cells[task, one["renderer"]]
+                    if task == "adjust":
+                        values = {each["participant_id"]: each[measure] for each in cell["adjustments"]}
+                    elif task == "rate":
+                        values = {each["participant_id"]: each["exponent"] for each in cell["magnitude_estimation"]["participants"]}
+                    else:
+                        values = {each["participant_id"]: each["fit"][measure] for each in cell["psychometric_functions"]
+                                  if each["fit"]["determined"]}
+                    self.assertEqual({each["participant_id"]: each["value"] for each in one["participants"]}, values)
+                    self.assertEqual(one["n_participants"] + one["n_undetermined"], 6)
+                    numbers = [math.log(value) if geometric else value for value in values.values()]
+                    if statistics.stdev(numbers) < 1e-6:  # the exponents are all 0.6
+                        continue
+                    expected = [math.exp(x) if geometric else x for x in t_interval(numbers)]
+                    for got, wanted in zip((one["mean"], *one["ci95"]), expected):
+                        self.assertAlmostEqual(got / wanted, 1, delta=1e-5)
+                    self.assertAlmostEqual(one["sd_of_natural_logs" if geometric else "sd"], statistics.stdev(numbers), places=9)
+                    self.assertRegex(text, rf"\n  {one['renderer']} +{one['mean']:.4g} \[{one['ci95'][0]:.4g}, {one['ci95'][1]:.4g}\] "
+                                           rf"\({one['n_participants']} participants")
+            # Point against ray: the paired comparison is of the same figures.
+            for one in found["renderer_comparisons"]:
+                point, ray = groups[one["task"], one["measure"]]["renderers"]
+                ratios = [math.log(b["value"] / a["value"]) for a in point["participants"] for b in ray["participants"]
+                          if a["participant_id"] == b["participant_id"]]
+                difference, = one["differences"]
+                self.assertEqual((one["reference"], difference["renderer"]), ("point", "ray"))
+                for got, wanted in zip((difference["mean"], *difference["ci95"]), t_interval(ratios)):
+                    self.assertAlmostEqual(got, wanted, places=5)
+
+    def test_the_reference_is_point_whichever_came_first(self):
+        rows = [row for row in rows_of_a_study(2) if row["task"] == "compare"]
+        rows.sort(key=lambda row: row["renderer"] != "ray")
+        found = self.found(rows)
+        self.assertEqual(found["cells"][0]["renderer"], "ray")
+        self.assertEqual({one["reference"] for one in found["renderer_comparisons"]}, {"point"})
+
+    def test_swapped_keys_are_said_and_left_out(self):
+        for seed in (1, 2):
+            # One standard on one side: farther ones are easier, whoever answers.
+            rows = self.forced(random.Random(seed), 350, 0)
+            for row in rows:
+                if row["participant_id"] == "T2":
+                    row["success"] = 1 - row["success"]
+            cell, = self.found(rows)["cells"]
+            self.assertEqual(cell["expected_easier"], "higher")
+            for one in cell["psychometric_functions"]:
+                swapped = one["participant_id"] == "T2"
+                self.assertEqual((one["fit"]["reversed"], one["fit"]["easier"], one["fit"]["determined"]),
+                                 (swapped, "lower" if swapped else "higher", not swapped))
+            said, = [line for line in self.analyze().stdout.splitlines() if "FALL" in line]
+            self.assertRegex(said, r"^  T2 .*NOT COMPARED: successes FALL as the level rises, where the task has them rise")
+            group = self.found(rows)["group_results"][0]["renderers"][0]
+            self.assertEqual((group["n_participants"], group["n_undetermined"]), (PEOPLE - 1, 1))
+            # On both sides a table does not say what is asked: the others do.
+            rows = [row for row in rows_of_a_study(seed) if row["task"] == "compare"]
+            for row in rows:
+                if row["participant_id"] == "T3" and row["renderer"] == "ray":
+                    row["success"] = 1 - row["success"]
+            for cell in self.found(rows)["cells"]:
+                self.assertIsNone(cell["expected_easier"])
+                for one in cell["psychometric_functions"]:
+                    self.assertEqual(one["fit"]["reversed"], (one["participant_id"], cell["renderer"]) == ("T3", "ray"))
+                    self.assertEqual(one["fit"]["guess"], one["fit"]["lapse"])
+            self.assertIn("where those of the others rise", self.analyze().stdout)
+
+    def test_answers_by_chance_are_not_called_swapped(self):
+        called = 0
+        for seed in range(6):
+            draw = random.Random(seed)
+            rows = [row | {"success": int(draw.random() < 0.5)} for row in self.forced(draw, 350, 0.5)]
+            for one in self.found(rows)["cells"][0]["psychometric_functions"]:
+                called += one["fit"]["reversed"]
+        self.assertLessEqual(called, 4)  # of 30: at most some 2.5 % a side, and the likelihood's noise
+
+    def test_the_last_answer_turns_a_staircase_too(self):
+        # 1 up, 2 down, steps of 2: after each answer the level that follows.
+        answers = [1, 1, 1, 1, 0, 1, 1, 0, 1, 1]
+        for stop, turns in ((10, [5, 7, 8, 10]), (9, [5, 7, 8]), (8, [5, 7, 8]), (7, [5, 7])):
+            level, alike, rows = 20, 0, []
+            for i, success in enumerate(answers[:stop]):
+                rows.append({"participant_id": "A", "task": "detect", "renderer": "ray", "shape": "bump", "response": "yes",
+                             "track": 1, "level": level, "success": success})
+                alike = alike + 1 if success else 0
+                if not success or alike == 2:
+                    level, alike = level + (-2 if success else 2), 0
+            cell, = self.found(rows)["cells"]
+            track, = cell["psychometric_functions"][0]["tracks"]
+            self.assertEqual(track["reversal_trials"], turns, stop)
+
+    def test_columns_that_look_like_others_are_named(self):
+        rows = self.forced(random.Random(4), 350, 0.5)
+        plain = self.found(rows)
+        self.assertEqual(plain["warnings"], [])
+        for found, meant in (("Level", "level"), (" level", "level"), ("Catch Trial", "catch_trial"), ("sucess", "success"),
+                             ("standardLevel", "standard_level"), ("practise", "practice")):
+            renamed = [{found if name == meant else name: value for name, value in row.items()} for row in rows]
+            self.write(renamed)
+            done = self.analyze("--json", self.path / "found.json", "--force")
+            wanted = f"'{meant}'"
+            if meant == "success":  # needed here
+                self.assertEqual(done.returncode, 2)
+                self.assertIn("(is 'sucess' meant?)", done.stderr)
+                continue
+            self.assertEqual((done.returncode, done.stderr), (0, ""))
+            warning, = json.loads((self.path / "found.json").read_text())["warnings"]
+            self.assertEqual(warning, f"Column '{found}' is not known and was not read; is {wanted} meant?")
+            self.assertIn(warning, done.stdout)
+        self.write([row | {"colour": "red", "remark": 1} for row in rows])
+        self.assertNotIn("not known", self.analyze().stdout)
+        self.write([{"Shape" if name == "shape" else name: value for name, value in row.items()} for row in rows])
+        self.assertIn("expected a column shape (is 'Shape' meant?)", self.analyze().stderr)
+        # Of times: the table of trials, also where it is one of tasks.
+        nine = ("participant_id", "session", "block", "trial", "renderer", "shape", "response", "correct", "response_time")
+        times = [{name: row[name] for name in nine} | {"Practice": 1, "Task": "compare"} for row in rows]
+        self.write(times)
+        said = self.analyze().stdout
+        self.assertIn("is 'practice' meant?", said)
+        self.assertIn("is 'task' meant?", said)
+        self.write([{"Response Time" if name == "response_time" else name: value for name, value in row.items()} for row in times])
+        self.assertIn("expected a column 'response_time' (is 'Response Time' meant?)", self.analyze().stderr)
 
     def test_faults_name_line_and_column(self):
         rows = rows_of_a_study(1)[:20]

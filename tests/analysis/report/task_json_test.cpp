@@ -33,7 +33,10 @@ TEST(TaskJson, HeadCountsWhatWasRead) {
   analysis.table.source = "study.csv";
   analysis.table.trials.resize(3);
   analysis.table.n_practice = 2;
+  analysis.table.title = "Which ball?";
+  analysis.table.warnings = {"one", "two"};
   Expected expected = Expected::parse(R"({"version": 1, "simulated": false, "source": "study.csv",
+      "title": "Which ball?", "warnings": ["one", "two"], "group_results": [],
       "program_version": "1.2", "n_trials": 3, "n_practice": 2, "cells": [],
       "renderer_comparisons": [], "condition_comparisons": []})");
   EXPECT_EQ(json_of(analysis), expected);
@@ -54,16 +57,19 @@ TEST(TaskJson, AFunctionWithEverything) {
   cell.standard_level = 300;
   cell.forced_choice = true;
   cell.intervals = 3;
+  cell.level_unit = "N/m";
+  cell.expected_easier = protocols::Easier::lower;
   cell.functions = {full_function("Anna")};
   const Expected expected = Expected::parse(R"({
     "task": "compare", "block_name": "stiff", "shape": "ball", "renderer": "ray", "n_trials": 30,
     "n_answered": 22, "n_judged": 21, "n_correct": 20, "standard_level": 300.0,
-    "forced_choice": true, "same_different": false, "n_intervals": 3,
+    "level_unit": "N/m", "expected_easier": "lower", "forced_choice": true, "same_different": false, "n_intervals": 3,
     "psychometric_functions": [{
       "participant_id": "Anna",
       "levels": [{"level": 200.0, "trials": 10, "successes": 1},
                  {"level": 400.0, "trials": 12, "successes": 9}],
       "fit": {"status": "ok", "function": "normal", "scale": "db",
+              "easier": "higher", "reversed": false, "guess_is_lapse": false,
               "threshold": 301.25, "threshold_ci95": [281.5, 322.75],
               "slope": 2.5, "slope_ci95": [1.25, 4.75], "determined": true, "slope_at_bound": false,
               "guess": 0.125, "guess_ci95": [0.0625, 0.25],
@@ -91,12 +97,17 @@ TEST(TaskJson, WhatIsNotDefinedSaysWhyAndInfiniteEndsAreNull) {
   one.goodness.p.reset();
   one.determined = false;
   one.fit.slope_at_bound = true;
+  one.reversed = true;
+  one.model.guess_is_lapse = true;
+  one.model.function.easier = protocols::Easier::lower;
   one.posterior.undefined = "no grid";
   one.detectability = {};
   one.detectability.undefined = "no noise";
   Expected found = json_of_cell(cell);
   EXPECT_EQ(found["n_intervals"], Expected());
   EXPECT_EQ(found["standard_level"], Expected());
+  EXPECT_EQ(found["level_unit"], Expected());
+  EXPECT_EQ(found["expected_easier"], Expected());
   found = found["psychometric_functions"][0];
   const Expected ends = {nullptr, 322.75};
   EXPECT_EQ(found["fit"]["threshold_ci95"], ends);
@@ -105,6 +116,9 @@ TEST(TaskJson, WhatIsNotDefinedSaysWhyAndInfiniteEndsAreNull) {
   EXPECT_EQ(found["fit"]["deviance_p"], Expected());
   EXPECT_EQ(found["fit"]["determined"], false);
   EXPECT_EQ(found["fit"]["slope_at_bound"], true);
+  EXPECT_EQ(found["fit"]["reversed"], true);
+  EXPECT_EQ(found["fit"]["guess_is_lapse"], true);
+  EXPECT_EQ(found["fit"]["easier"], "lower");
   EXPECT_EQ(found["bayes"], Expected::parse(R"({"status": "undefined", "reason": "no grid"})"));
   EXPECT_EQ(found["detectability"],
             Expected::parse(R"({"status": "undefined", "reason": "no noise"})"));
@@ -183,6 +197,34 @@ TEST(TaskJson, NumbersSettingsAnswersAndConfidence) {
        "stimulus_entropy_bits": 1.875, "categories": 1.0}]})"));
   EXPECT_EQ(found["confidence"], Expected::parse(R"({"status": "ok", "type2_roc_area": 0.6875,
     "ci95": [0.5625, 0.8125]})"));
+}
+
+TEST(TaskJson, GroupResults) {
+  TaskGroup group;
+  group.task = "compare";
+  group.block_name = "stiff";
+  group.shape = "ball";
+  group.measure = "jnd";
+  group.unit = "N/m";
+  group.geometric = true;
+  group.renderers = {{"point", {{"A", 20.5}, {"B", 24}}, 1, 22.25, 0.125, Interval{19, 26}},
+                     {"ray", {}, 3, {}, {}, {}}};
+  TaskAnalysis analysis;
+  analysis.groups = {group};
+  EXPECT_EQ(json_of(analysis)["group_results"], Expected::parse(R"([{"task": "compare",
+    "block_name": "stiff", "shape": "ball", "measure": "jnd", "unit": "N/m", "mean_is": "geometric",
+    "renderers": [{"renderer": "point", "n_participants": 2, "n_undetermined": 1, "mean": 22.25,
+        "ci95": [19.0, 26.0], "sd_of_natural_logs": 0.125,
+        "participants": [{"participant_id": "A", "value": 20.5},
+                         {"participant_id": "B", "value": 24.0}]},
+      {"renderer": "ray", "n_participants": 0, "n_undetermined": 3, "mean": null, "ci95": null,
+       "sd_of_natural_logs": null, "participants": []}]}])"));
+  analysis.groups[0].geometric = false;
+  analysis.groups[0].unit.clear();
+  const Expected found = json_of(analysis)["group_results"][0];
+  EXPECT_EQ(found["mean_is"], "arithmetic");
+  EXPECT_EQ(found["unit"], Expected());
+  EXPECT_EQ(found["renderers"][0]["sd"], 0.125);
 }
 
 TEST(TaskJson, Comparisons) {

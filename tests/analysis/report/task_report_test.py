@@ -161,6 +161,36 @@ class TaskReport(unittest.TestCase):
                 self.assertIn("mixed model " + short(number(difference["mixed_estimate"])), line)
                 self.assertTrue(line.endswith(f"({difference['n_pairs']} pairs)"), line)
 
+    def test_figures_over_participants_draw_everybody_and_every_mean(self):
+        stimuli = []
+        for group in self.json["group_results"]:
+            place = [group[k] for k in ("task", "block_name", "shape")]
+            if place not in stimuli:
+                stimuli.append(place)
+        self.assertEqual(len(stimuli), 4)
+        for number, place in enumerate(stimuli, 1):
+            root = xml.fromstring((self.path / "figures" / f"group{number}.svg").read_text("utf-8"))
+            texts = [text.text for text in root.iter(SVG + "text")]
+            titles = [title.text for title in root.iter(SVG + "title")]
+            self.assertIn("Over participants: " + ", ".join(place), texts)
+            for group in self.json["group_results"]:
+                if [group[k] for k in ("task", "block_name", "shape")] != place:
+                    continue
+                name = {"pse": "PSE", "jnd": "JND", "threshold": "Threshold", "exponent": "Exponent",
+                        "weber_fraction": "Weber fraction"}[group["measure"]]
+                self.assertIn(name, texts, "the axis says what is measured")
+                for one in group["renderers"]:
+                    mean = f"{one['renderer']}: mean {short(one['mean'])}"
+                    if one["ci95"]:
+                        mean += f", 95 % interval {short(one['ci95'][0])} to {short(one['ci95'][1])}"
+                    self.assertIn(mean, titles)
+                    for each in one["participants"]:
+                        self.assertIn(f"{each['participant_id']}, {one['renderer']}: {short(each['value'])}", titles)
+            compared = [one for one in self.json["renderer_comparisons"] if [one[k] for k in ("task", "block_name", "shape")] == place]
+            for one in compared:
+                difference, = one["differences"]
+                self.assertIn(short(math.exp(difference["mean"])) + " [", " ".join(texts))
+
     def test_accuracy_of_identification(self):
         model = self.json["accuracy_model"]
         self.assertIn("(Intercept)", model["fixed_effects"])

@@ -18,9 +18,10 @@ using testing::track_of;
 
 const char* const kLogisticText =
     "Intervals are of 95 %. Psychometric functions: logistic, lapses free up to 0.06; compare with "
-    "levels on\none side of the standard: guesses 1 / intervals, the threshold is half-way from "
-    "there to certainty;\ndetect, same/different: guesses free. d': log-linear correction. Bayes: "
-    "posterior mean of the threshold on a grid.\n";
+    "levels on\nboth sides of the standard: lapses as many at both ends; on one side: guesses 1 / "
+    "intervals, the\nthreshold is half-way from there to certainty; detect, same/different: "
+    "guesses "
+    "free.\nd': log-linear correction. Bayes: posterior mean of the threshold on a grid.\n";
 
 std::string text_of_cell(TaskCell cell) {
   TaskAnalysis analysis;
@@ -52,9 +53,14 @@ TEST(TaskText, AnEmptyAnalysisSaysHowItIsDone) {
       task_report_text(analysis),
       "SIMULATED PARTICIPANTS\n\n"
       "Intervals are of 95 %. Psychometric functions: weibull, lapses free up to 0.06; compare "
-      "with levels on\none side of the standard: guesses 1 / intervals, the JND is measured "
-      "half-way from there to certainty (threshold: at 63 %);\ndetect, same/different: guesses "
-      "free. d': log-linear correction. Bayes: posterior mean of the threshold on a grid.\n");
+      "with levels on\nboth sides of the standard: lapses as many at both ends; on one side: "
+      "guesses 1 / intervals, the\nJND is measured half-way from there to certainty (threshold: at "
+      "63 %); detect, same/different: guesses free.\nd': log-linear correction. Bayes: posterior "
+      "mean of the threshold on a grid.\n");
+  analysis = {};
+  analysis.table.warnings = {"Column 'Level'?", "another"};
+  EXPECT_EQ(task_report_text(analysis),
+            std::string("Column 'Level'?\nanother\n\n") + kLogisticText);
 }
 
 TEST(TaskText, AFunctionWithEverything) {
@@ -87,6 +93,66 @@ TEST(TaskText, WhatAFunctionLacksIsLeftOut) {
   one.detectability.d_prime = 2;
   EXPECT_EQ(line_of_function(one),
             "  Anna        no function: one level only, d' 2, criterion undefined");
+}
+
+TEST(TaskText, AnswersTheOtherWayRoundAreSaid) {
+  TaskCell cell = named_cell("compare", "", "ball", "");
+  cell.functions = {full_function("Anna")};
+  ParticipantFunction& one = cell.functions[0];
+  one.detectability = {};
+  one.reversed = true;
+  one.determined = false;
+  one.model.function.easier = protocols::Easier::lower;
+  const auto has = [&](const std::string& words) {
+    return text_of_cell(cell).find(words) != std::string::npos;
+  };
+  EXPECT_TRUE(has(
+      "[0, 0.06], NOT COMPARED: successes FALL as the level rises, where those of the others rise "
+      "(are keys swapped?), fit p"))
+      << text_of_cell(cell);
+  EXPECT_FALSE(has("NOT DETERMINED"));
+  cell.expected_easier = protocols::Easier::higher;
+  EXPECT_TRUE(has("where the task has them rise (are keys swapped?)"));
+  cell.expected_easier = one.model.function.easier = protocols::Easier::higher;
+  EXPECT_TRUE(has("successes RISE with the level, where the task has them fall"));
+  one.reversed = false;
+  one.detectability.d_prime = -1;
+  one.detectability.d_prime_ci95 = Interval{-2, -0.5};
+  EXPECT_TRUE(has("d' -1 [-2, -0.5] (BELOW 0: are keys swapped?), criterion"));
+  one.detectability.d_prime_ci95 = Interval{-2, 0.5};
+  EXPECT_FALSE(has("BELOW"));
+  cell.confidence.area = 0.25;
+  cell.confidence.area_ci95 = Interval{0.125, 0.375};
+  EXPECT_TRUE(has("0.25 [0.125, 0.375] (BELOW 0.5: is the scale turned round?)\n"));
+  cell.confidence.area_ci95 = Interval{0.125, 0.625};
+  EXPECT_FALSE(has("BELOW"));
+}
+
+TEST(TaskText, GroupResults) {
+  TaskGroup group;
+  group.task = "compare";
+  group.shape = "ball";
+  group.measure = "weber_fraction";
+  group.geometric = true;
+  group.renderers = {{"point", {{"A", 1}, {"B", 2}}, 1, 0.25, 0.5, Interval{0.125, 0.5}},
+                     {"ray", {{"A", 1}}, 0, 0.75, {}, {}},
+                     {"other", {}, 2, {}, {}, {}}};
+  TaskAnalysis analysis;
+  analysis.groups = {group};
+  EXPECT_EQ(
+      task_report_text(analysis),
+      std::string("Weber fractions over participants, compare, ball (geometric means)\n"
+                  "  point       0.25 [0.125, 0.5] (2 participants, 1 not determined and left "
+                  "out)\n"
+                  "  ray         0.75 (1 participant)\n"
+                  "  other       no mean (0 participants, 2 not determined and left out)\n"
+                  "\n") +
+          kLogisticText);
+  analysis.groups[0].measure = "pse";
+  analysis.groups[0].geometric = false;
+  analysis.groups[0].unit = "N/m";
+  EXPECT_EQ(task_report_text(analysis).substr(0, 54),
+            "PSEs over participants, compare, ball (means, N/m)\n  p");
 }
 
 TEST(TaskText, ProceduresOfTracks) {
@@ -258,7 +324,8 @@ TEST(TaskText, Comparisons) {
   one.comparison.differences[0].t_test.log_ratio_ci95 = Interval{std::log(0.25), std::log(4)};
   EXPECT_EQ(text_of_comparison(one, false),
             "JNDs by block and stimulus, detect, ray (ratios)\n"
-            "  2 functions left out: no threshold among the levels shown\n"
+            "  2 functions left out: no threshold among the levels shown, or answers the other way "
+            "round\n"
             "  b, ball / a, ball: 0.5 [0.25, 4], p 0.500; mixed model 2 (1 pair)\n\n");
 
   one.comparison.differences.clear();
@@ -268,7 +335,8 @@ TEST(TaskText, Comparisons) {
   EXPECT_EQ(text_of_comparison(one, false),
             "PSEs by block and stimulus, detect, ray (ratios)\n"
             "  nothing to compare\n"
-            "  1 function left out: no threshold among the levels shown\n\n");
+            "  1 function left out: no threshold among the levels shown, or answers the other way "
+            "round\n\n");
   one.measure = "exponent";
   EXPECT_EQ(text_of_comparison(one, false).substr(0, 10), "Exponents ");
 }

@@ -56,6 +56,9 @@ class TaskStudies(CommandCase):
                 self.assertLessEqual(len(scales), 1)
                 known = ["--scale", *scales] if scales else []
                 exported = self.numbers("--csv", self.dir / f"{name}.csv", *known)["cells"]
+                for cell in (*exported, *found["cells"]):  # which the protocol alone tells
+                    for name_of_protocol in ("level_unit", "expected_easier"):
+                        cell.pop(name_of_protocol)
                 for cell, own in zip(exported, found["cells"]):
                     for one, same in zip(cell.get("psychometric_functions", []), own.get("psychometric_functions", [])):
                         for track, as_stored in zip(one.get("tracks", []), same.get("tracks", [])):
@@ -117,7 +120,18 @@ class TaskStudies(CommandCase):
         db = self.simulated(PROTOCOLS / "stiffness-2afc.json", "stairs", participants=3)
         said = self.palpate("analyze", "--db", db, "--report", self.dir / "stairs.html").stdout
         self.assertIn("its reversals' mean, where it converges at 70.7 % successes", said)
-        self.assertIn("where it converges at 70.7 % successes", (self.dir / "stairs.html").read_text())
+        page = (self.dir / "stairs.html").read_text()
+        self.assertTrue("where it converges at 70.7 % successes" in page)
+        title = json.loads((PROTOCOLS / "stiffness-2afc.json").read_text())["title"]
+        self.assertTrue(f"<h1>{title}</h1>" in page, "the study's title heads its report")
+        for axis in ("level (N/m)", "JND (N/m)", "PSE (N/m)", "Weber fraction"):
+            self.assertTrue(f">{axis}</text>" in page, axis)
+        self.assertFalse(">level</text>" in page)
+        found = self.numbers("--db", db)
+        self.assertEqual(found["title"], title)
+        self.assertEqual({one["unit"] for one in found["group_results"] if one["measure"] == "jnd"}, {"N/m"})
+        for cell in found["cells"]:
+            self.assertEqual((cell["level_unit"], cell["expected_easier"]), ("N/m", "higher"))
         compared = 0
         for cell in self.numbers("--db", db)["cells"]:
             for one in cell["psychometric_functions"]:
@@ -131,8 +145,6 @@ class TaskStudies(CommandCase):
                     self.assertAlmostEqual(found["converges_at"], 0.5 ** (1 / down), places=9)
                     # By the definition: the track's levels where its way turns, two discarded, an even number of them.
                     turns = [track["levels"][trial - 1] for trial in track["reversal_trials"]]
-                    if found["n_reversals"] > len(turns):  # the last one ends the track: nothing follows
-                        turns.append(track["levels"][-1])
                     kept = turns[2 + (len(turns) - 2) % 2:]
                     self.assertEqual(found["n_reversals"], len(turns))
                     self.assertAlmostEqual(found["threshold"], sum(kept) / len(kept), places=6)
@@ -177,10 +189,13 @@ class TaskStudies(CommandCase):
         for one in stairs["psychometric_functions"]:
             self.assertEqual(sorted(track["track"] for track in one["tracks"]), ["1", "2"])
             for track in one["tracks"]:
-                # Eight reversals end a track; the last trial has no next level to turn to.
+                # The trials that the procedure counts as reversals, the one that ends the track as well.
+                self.assertEqual(len(track["reversal_trials"]), track["procedure"]["n_reversals"])
                 self.assertGreaterEqual(len(track["reversal_trials"]), 5)
                 levels = track["levels"]
                 for trial in track["reversal_trials"]:
+                    if trial == len(levels):
+                        continue
                     before = [x for x in levels[:trial] if x != levels[trial - 1]][-1]
                     after = levels[trial]
                     self.assertGreater((levels[trial - 1] - before) * (levels[trial - 1] - after), 0)
