@@ -11,7 +11,8 @@ namespace {
 
 using Kind = SurfacePatch::Kind;
 
-constexpr int kMostFaces = 64;  // to each side of a contact
+constexpr int kMostFaces = 64;      // to each side of a contact
+constexpr double kFlat = 1 - 5e-9;  // cosine of 1e-4 rad, by which rounding may bend a flat face
 
 /// Angle of the segment to a triangle, of the blend angle, -1 to 1; 1: its tip dips.
 double turned_to(const SurfaceTriangle& triangle, const Vec3& d, double length) {
@@ -72,6 +73,11 @@ class Lying {
       moved += (end - from) * 0.5 * (towards_end ? 1 - angle : 1 + angle);
       from = end;
       if (towards_end ? from >= 1 : from <= 0) break;
+      const SurfaceTriangle& beyond = surface_.triangles()[SurfaceTriangle::triangle_of(at.next)];
+      // A segment that bridges a hollow touches one side of it alone.
+      if (!beyond.touches(SurfaceTriangle::side_of(at.next)) &&
+          glm::dot(beyond.normal, surface_.triangles()[triangle].normal) < kFlat)
+        break;
       triangle = SurfaceTriangle::triangle_of(at.next);
     }
     return moved;

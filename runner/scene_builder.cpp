@@ -10,9 +10,11 @@
 
 #include "protocols/tasks/levels.h"
 #include "rendering/bodies/soft/soft_build.h"
+#include "stimuli/closed_surface.h"
 #include "stimuli/compose.h"
 #include "stimuli/parts/convex_parts.h"
 #include "stimuli/parts/inset_parts.h"
+#include "stimuli/primitives.h"
 
 namespace palpate::runner {
 namespace {
@@ -111,6 +113,7 @@ struct SceneBuilder::Placing {
   int object;
   bool side_contact;
   bool has_layers;  ///< anywhere: then its whole surface says where it ends
+  bool by_surface;  ///< what is felt of its own surface is one closed surface
   std::vector<rendering::SceneObject>& out;
   std::vector<PlacedShape> all = {}, layered = {};  ///< its shapes; those that have layers
 
@@ -238,48 +241,124 @@ void SceneBuilder::place(const stimuli::ObjectSpec& spec, const Pose& parent, Pl
   }
   stimuli::Material surface = spec.material;
   surface.layers.clear();
-  for (const Prepared& part : prepare(spec, 0, placing.side_contact)) {
-    rendering::SceneObject placed{part.mesh, pose, surface, placing.object, part.trees};
-    if (!(surface.stiffness > 0)) {
-      placed.layer = rendering::kNotFelt;
-      placed.material = {};
-      placed.material.stiffness = 0;
+  const bool in_parts = surface.stiffness > 0 ? !placing.by_surface : placing.has_layers;
+  if (in_parts) {
+    for (const Prepared& part : prepare(spec, 0, placing.side_contact)) {
+      rendering::SceneObject placed{part.mesh, pose, surface, placing.object, part.trees};
+      if (!(surface.stiffness > 0)) {
+        placed.layer = rendering::kNotFelt;
+        placed.material = {};
+        placed.material.stiffness = 0;
+      }
+      placing.out.push_back(std::move(placed));
     }
-    if (surface.stiffness > 0 || placing.has_layers) placing.out.push_back(std::move(placed));
   }
   placing.all.push_back({&spec, pose});
   if (!spec.material.layers.empty()) placing.layered.push_back({&spec, pose});
 }
 
-std::vector<rendering::SceneObject> SceneBuilder::placed(const stimuli::ObjectSpec& spec,
-                                                         int object, bool side_contact) {
-  std::vector<rendering::SceneObject> parts;
+std::shared_ptr<const stimuli::ClosedSurface> SceneBuilder::concave(
+    const stimuli::ObjectSpec& spec) {
+  if (spec.shape != stimuli::ShapeKind::mesh) return nullptr;
+  const std::string key = shape_key(spec, false);
+  if (const auto known = concave_.find(key); known != concave_.end()) return known->second;
+  std::shared_ptr<const stimuli::ClosedSurface> surface;
+  const stimuli::PolygonSoup soup = stimuli::polygons_of(spec);
+  if (!stimuli::convex_as_it_is(soup))
+    surface = std::make_shared<const stimuli::ClosedSurface>(stimuli::closed_surface(soup).surface);
+  return concave_.emplace(key, surface).first->second;
+}
+
+bool SceneBuilder::has_concave(const stimuli::ObjectSpec& spec) {
+  if (spec.soft) return false;
+  if (spec.shape != stimuli::ShapeKind::compound) return concave(spec) != nullptr;
+  return std::any_of(spec.parts.begin(), spec.parts.end(),
+                     [&](const stimuli::ObjectSpec& part) { return has_concave(part); });
+}
+
+/// The closed surfaces of what is felt of an object.
+/// \param in_object  the pose of the shape's own frame
+void SceneBuilder::add_shells(const stimuli::ObjectSpec& spec, const Pose& in_object,
+                              std::vector<rendering::SurfaceShell>& shells) {
+  if (spec.shape == stimuli::ShapeKind::compound) {
+    for (const stimuli::ObjectSpec& part : spec.parts)
+      add_shells(part, stimuli::compose(in_object, part.pose), shells);
+    return;
+  }
+  if (!(spec.material.stiffness > 0)) return;
+  std::shared_ptr<const stimuli::ClosedSurface> surface = concave(spec);
+  if (surface == nullptr)
+    surface = std::make_shared<const stimuli::ClosedSurface>(
+        stimuli::closed_surface(stimuli::polygons_of(spec)).surface);
+  stimuli::Material material = spec.material;
+  material.layers.clear();
+  shells.push_back({std::move(surface), in_object, std::move(material)});
+}
+
+SceneBuilder::Placed SceneBuilder::placed(const stimuli::ObjectSpec& spec, int object,
+                                          bool side_contact, bool collides) {
+  Placed out;
   // A solid of tetrahedra need not fall into convex parts, and nothing rigid is made of it.
-  if (spec.soft && spec.shape == stimuli::ShapeKind::mesh) return parts;
-  Placing placing{object, side_contact, has_layers(spec), parts};
-  place(spec, Pose{}, placing);
-  place_layers(placing);
+  if (spec.soft && spec.shape == stimuli::ShapeKind::mesh) return out;
+  Placing placing{object, side_contact, has_layers(spec), !collides && has_concave(spec),
+                  out.parts};
+  try {
+    place(spec, Pose{}, placing);
+    place_layers(placing);
+  } catch (const stimuli::MeshError& error) {
+    if (!has_concave(spec)) throw;
+    // What asks for the cutting that failed.
+    const std::string reason =
+        collides ? "objects that move, and what they meet, are cut into convex parts: "
+                 : "layers are made of convex parts: ";
+    std::vector<std::string> faults = error.faults();
+    for (std::string& fault : faults) {
+      if (!fault.starts_with('/')) fault.insert(0, reason);
+    }
+    throw stimuli::MeshError(std::move(faults));
+  }
   // The parts of a layer stand side by side.
-  std::stable_sort(parts.begin(), parts.end(),
+  std::stable_sort(out.parts.begin(), out.parts.end(),
                    [](const auto& a, const auto& b) { return a.layer < b.layer; });
-  return parts;
+  if (!placing.by_surface) return out;
+  std::shared_ptr<const rendering::Surface> surface;
+  std::vector<rendering::SurfaceShell> shells;
+  add_shells(spec, Pose{}, shells);
+  if (shells.empty()) return out;
+  const stimuli::Material& m = spec.material;
+  std::string key;
+  if (spec.shape == stimuli::ShapeKind::mesh) {
+    key = shape_key(spec, false);
+    for (const double value : {m.stiffness, m.damping, m.friction_static, m.friction_dynamic})
+      key += ' ' + key_of(value);
+    if (const auto known = surfaces_.find(key); known != surfaces_.end()) surface = known->second;
+  }
+  if (surface == nullptr) surface = std::make_shared<const rendering::Surface>(shells);
+  if (!key.empty()) surfaces_.emplace(key, surface);
+  out.surfaces.push_back({std::move(surface), spec.pose, object});
+  return out;
 }
 
 rendering::Scene SceneBuilder::build(const std::vector<stimuli::ObjectSpec>& objects,
                                      bool side_contact, const rendering::Tool& tool,
                                      const Vec3& gravity, double soft_radius) {
   std::vector<rendering::SceneObject> parts, shown;
+  std::vector<rendering::SceneSurface> surfaces;
+  const bool collides = std::any_of(objects.begin(), objects.end(),
+                                    [](const auto& object) { return object.body.has_value(); });
   std::vector<std::shared_ptr<const rendering::SoftObject>> soft;
   for (std::size_t i = 0; i < objects.size(); ++i) {
     try {
       const int object = static_cast<int>(i);
-      const std::vector<rendering::SceneObject> own = placed(objects[i], object, side_contact);
+      const Placed placed_here = placed(objects[i], object, side_contact, collides);
+      const std::vector<rendering::SceneObject>& own = placed_here.parts;
       shown.insert(shown.end(), own.begin(), own.end());
       if (objects[i].soft) {
         soft.push_back(rendering::build_soft_object(objects[i], objects[i].pose,
                                                     {soft_radius, gravity, object}));
       } else {
         parts.insert(parts.end(), own.begin(), own.end());
+        surfaces.insert(surfaces.end(), placed_here.surfaces.begin(), placed_here.surfaces.end());
       }
     } catch (const stimuli::MeshError& error) {
       std::string where = "/objects/" + std::to_string(i);
@@ -293,7 +372,8 @@ rendering::Scene SceneBuilder::build(const std::vector<stimuli::ObjectSpec>& obj
   }
   try {
     rendering::Scene others =
-        rendering::moving_scene(std::move(parts), moving_of(objects), gravity, side_contact, tool);
+        rendering::moving_scene(std::move(parts), moving_of(objects), gravity, side_contact, tool,
+                                true, std::move(surfaces));
     if (soft.empty()) return others;
     return rendering::soft_scene(std::move(others), std::move(shown), std::move(soft), side_contact,
                                  tool);
@@ -332,7 +412,14 @@ StimulusLibrary::StimulusLibrary(const protocols::Protocol& protocol)
           if (part.layer <= 0)  // layers are inside of the surface
             reach = std::max(reach, glm::length(part.sphere_centre) + part.sphere_radius);
         }
-        if (!sides) edges_.emplace_back(scene);
+        if (!sides) {
+          edges_.emplace_back(scene);
+          auto& own = surfaces_.emplace_back();
+          for (const rendering::PlacedSurface& placed : scene.surfaces()) {
+            own.push_back({placed.surface, {placed.position, glm::quat_cast(placed.to_world)}, 0});
+            reach = std::max(reach, glm::length(placed.sphere_centre) + placed.sphere_radius);
+          }
+        }
       } catch (const stimuli::MeshError& error) {
         std::vector<std::string> faults;
         for (std::string fault : error.faults()) {
@@ -361,9 +448,13 @@ rendering::Scene StimulusLibrary::scene(const protocols::Trial& trial) const {
   std::vector<rendering::MovingObject> moving = moving_[trial.stimulus];
   for (rendering::MovingObject& object : moving)
     object.pose = stimuli::compose({Vec3(0), trial.orientation}, object.pose);
+  std::vector<rendering::SceneSurface> surfaces = surfaces_[trial.stimulus];
+  for (rendering::SceneSurface& surface : surfaces)
+    surface.pose = stimuli::compose({Vec3(0), trial.orientation}, surface.pose);
   std::shared_ptr<const rendering::SoftObject> soft = soft_[trial.stimulus];
   if (soft == nullptr)
-    return rendering::moving_scene(std::move(objects), moving, gravity_, sides, tool_);
+    return rendering::moving_scene(std::move(objects), moving, gravity_, sides, tool_, true,
+                                   std::move(surfaces));
   if (trial.orientation != Quat(1, 0, 0, 0)) {
     const stimuli::ObjectSpec& spec = specs_[trial.stimulus];
     soft = rendering::build_soft_object(spec,

@@ -28,8 +28,8 @@ WorkspaceMap workspace_of(const protocols::Protocol& protocol);
 /// m, virtual frame: how far along the stylus the hand is from the virtual tip.
 double grip_from_virtual_tip(const protocols::Protocol& protocol);
 
-/// Builds a scene of the convex parts of objects and of their layers; equal shapes share one mesh
-/// and its search trees.
+/// Builds a scene of objects: of the convex parts of their surfaces and layers, or of closed
+/// surfaces where those are not convex; equal shapes share one mesh and its search trees.
 class SceneBuilder {
  public:
   /// \throws MeshError where a shape is no solid that falls into convex parts, where nothing of it
@@ -62,13 +62,25 @@ class SceneBuilder {
                                        bool side_contact);
   struct Placing;
   void place(const stimuli::ObjectSpec& spec, const Pose& parent, Placing& placing);
-  std::vector<rendering::SceneObject> placed(const stimuli::ObjectSpec& spec, int object,
-                                             bool side_contact);
+  struct Placed {
+    std::vector<rendering::SceneObject> parts;
+    std::vector<rendering::SceneSurface> surfaces;
+  };
+  /// \param collides  something in the scene moves: then all of it is made of convex parts
+  Placed placed(const stimuli::ObjectSpec& spec, int object, bool side_contact, bool collides);
+  /// A mesh that is not made of convex groups; null: it is, or is no mesh.
+  std::shared_ptr<const stimuli::ClosedSurface> concave(const stimuli::ObjectSpec& spec);
+  bool has_concave(const stimuli::ObjectSpec& spec);
+  void add_shells(const stimuli::ObjectSpec& spec, const Pose& in_object,
+                  std::vector<rendering::SurfaceShell>& shells);
   void place_layers(Placing& placing);
   std::vector<Prepared> layer_of(const std::vector<PlacedShape>& shapes, double depth,
                                  const Placing& placing, Pose& pose);
 
   std::map<std::string, std::vector<Prepared>> prepared_;  ///< the parts of each shape
+  /// Of each mesh by its shape; null where it is made of convex groups.
+  std::map<std::string, std::shared_ptr<const stimuli::ClosedSurface>> concave_;
+  std::map<std::string, std::shared_ptr<const rendering::Surface>> surfaces_;
 };
 
 /// The stimuli of a protocol, and each at every level that can be told before (levels.h), built
@@ -92,6 +104,7 @@ class StimulusLibrary {
 
  private:
   std::vector<std::vector<rendering::SceneObject>> with_sides_, without_sides_;  ///< by stimulus
+  std::vector<std::vector<rendering::SceneSurface>> surfaces_;                   ///< by stimulus
   /// By stimulus: itself as it stands in the protocol, or nothing.
   std::vector<std::shared_ptr<const rendering::SoftObject>> soft_;
   std::vector<stimuli::ObjectSpec> specs_;  ///< of the soft ones; others are left empty

@@ -23,8 +23,9 @@ SharpEdges::SharpEdges(const rendering::Scene& scene) {
     if (part.layer != rendering::kNotFelt) surface = std::min(surface, part.layer);
   }
   for (const rendering::ScenePart& part : scene.parts()) {
-    if (part.layer == surface) add_part(part);
+    if (part.layer == surface && (surface == 0 || scene.surfaces().empty())) add_part(part);
   }
+  for (const rendering::PlacedSurface& placed : scene.surfaces()) add_surface(placed);
   too_many_ = lines_.size() > kMost;
   if (too_many_) lines_.clear();
 }
@@ -52,6 +53,43 @@ void SharpEdges::add_part(const rendering::ScenePart& part) {
       for (std::uint32_t j = first; j < i && !sharp; ++j) sharp = turns(fan(i), fan(j));
     }
     if (sharp) lines_.push_back({world(mesh.vertices()[v]), Vec3(0), 0});
+  }
+}
+
+void SharpEdges::add_surface(const rendering::PlacedSurface& placed) {
+  const rendering::Surface& surface = *placed.surface;
+  const auto& triangles = surface.triangles();
+  std::vector<bool> on_edge(surface.vertices().size());
+  const auto world = [&](std::uint32_t vertex) {
+    return placed.world_vector(surface.vertices()[vertex]) + placed.position;
+  };
+  for (std::uint32_t i = 0; i < triangles.size(); ++i) {
+    for (std::uint32_t k = 0; k < 3; ++k) {
+      const std::uint32_t beyond = triangles[i].across[k];
+      if (beyond < (i << 2 | k)) continue;
+      const Vec3& other = triangles[rendering::SurfaceTriangle::triangle_of(beyond)].normal;
+      if (!turns(triangles[i].normal, other)) continue;
+      const std::uint32_t v0 = triangles[i].corners[k], v1 = triangles[i].corners[(k + 1) % 3];
+      const Vec3 along = world(v1) - world(v0);
+      lines_.push_back({world(v0), along, 1 / glm::dot(along, along)});
+      on_edge[v0] = on_edge[v1] = true;
+      if (lines_.size() > kMost) return;
+    }
+  }
+  // Vertices that no sharp edge ends in, but whose triangles differ.
+  std::vector<std::vector<std::uint32_t>> fans(surface.vertices().size());
+  for (std::uint32_t i = 0; i < triangles.size(); ++i) {
+    for (const std::uint32_t corner : triangles[i].corners) {
+      if (!on_edge[corner]) fans[corner].push_back(i);
+    }
+  }
+  for (std::uint32_t v = 0; v < fans.size(); ++v) {
+    bool sharp = false;
+    for (std::size_t i = 0; i < fans[v].size() && !sharp; ++i) {
+      for (std::size_t j = 0; j < i && !sharp; ++j)
+        sharp = turns(triangles[fans[v][i]].normal, triangles[fans[v][j]].normal);
+    }
+    if (sharp) lines_.push_back({world(v), Vec3(0), 0});
   }
 }
 

@@ -33,6 +33,7 @@ class SharpEdges {
     double inverse_square;  ///< 1/m^2, of its length; 0 for a vertex
   };
   void add_part(const rendering::ScenePart& part);
+  void add_surface(const rendering::PlacedSurface& placed);
 
   std::vector<Line> lines_;
   bool too_many_ = false;

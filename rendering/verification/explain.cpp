@@ -148,6 +148,9 @@ std::vector<TickStage> explain(const Scene& scene, const Renderer& renderer) {
                     unions ? "one ideal tool for all parts of a surface: turn, push out, cast, "
                              "active planes"
                            : "no object has several parts or layers, and the stylus has no tool"});
+  if (!scene.surfaces().empty())
+    stages.push_back({"closed surfaces", StageTime::contact, true,
+                      "one ideal tool for each, off the patches of its triangles and edges"});
   stages.push_back({"spring", StageTime::contact, true, "stiffness times depth along the normal"});
   add_materials(scene.features(), stages);
   stages.push_back({"torque and second device", StageTime::contact, sides,

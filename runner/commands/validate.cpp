@@ -14,8 +14,10 @@
 #include "runner/devices/simulated.h"
 #include "runner/session/device_check.h"
 #include "runner/session/simulated_study.h"
+#include "stimuli/closed_surface.h"
 #include "stimuli/parts/convex_parts.h"
 #include "stimuli/parts/overlaps.h"
+#include "stimuli/primitives.h"
 #include "stimuli/printable.h"
 
 namespace palpate::runner {
@@ -34,7 +36,8 @@ void check_meshes(const stimuli::ObjectSpec& object, const std::string& pointer,
   }
   const std::string where = object.shape == stimuli::ShapeKind::mesh ? pointer + "/file" : pointer;
   try {
-    stimuli::convex_parts(object);
+    const stimuli::PolygonSoup soup = stimuli::polygons_of(object);
+    if (!stimuli::convex_as_it_is(soup)) stimuli::closed_surface(soup);
   } catch (const stimuli::MeshError& error) {
     for (const std::string& fault : error.faults()) faults.push_back({file, where, fault});
   } catch (const std::runtime_error& error) {

@@ -71,8 +71,61 @@ class Filling {
             std::min(count_[axis] - 1, static_cast<int>(std::floor((high - from) / spacing_)))};
   }
 
+  // Along each line of nodes the surface winds round what lies between two crossings.
+  void mark_inside_surface(const PlacedPart& part) {
+    struct Crossing {
+      double x;
+      int turns;
+    };
+    std::vector<std::vector<Crossing>> lines(static_cast<std::size_t>(count_[1]) *
+                                             static_cast<std::size_t>(count_[2]));
+    // No corner of a file lies on a line.
+    const double y0 = low_.y + 1.2345e-7 * spacing_, z0 = low_.z + 2.3456e-7 * spacing_;
+    for (const auto& corners : part.surface->triangles) {
+      std::array<Vec3, 3> v;
+      for (std::size_t k = 0; k < 3; ++k)
+        v[k] = part.pose.orientation * part.surface->vertices[corners[k]] + part.pose.position;
+      const Vec3 low = glm::min(v[0], glm::min(v[1], v[2])),
+                 high = glm::max(v[0], glm::max(v[1], v[2]));
+      const Range ys = range(low.y - spacing_, high.y, 1), zs = range(low.z - spacing_, high.z, 2);
+      for (int z = zs[0]; z <= zs[1]; ++z) {
+        for (int y = ys[0]; y <= ys[1]; ++y) {
+          const double py = y0 + spacing_ * y, pz = z0 + spacing_ * z;
+          std::array<double, 3> side{};
+          for (std::size_t k = 0; k < 3; ++k) {
+            const Vec3 &a = v[k], &b = v[(k + 1) % 3];
+            side[k] = (a.y - py) * (b.z - pz) - (a.z - pz) * (b.y - py);
+          }
+          const bool out = side[0] > 0 && side[1] > 0 && side[2] > 0;
+          if (!out && !(side[0] < 0 && side[1] < 0 && side[2] < 0)) continue;
+          const double area = side[0] + side[1] + side[2];
+          const double x = (side[1] * v[0].x + side[2] * v[1].x + side[0] * v[2].x) / area;
+          lines[static_cast<std::size_t>(z * count_[1] + y)].push_back({x, out ? -1 : 1});
+        }
+      }
+    }
+    for (int z = 0; z < count_[2]; ++z) {
+      for (int y = 0; y < count_[1]; ++y) {
+        auto& line = lines[static_cast<std::size_t>(z * count_[1] + y)];
+        std::sort(line.begin(), line.end(),
+                  [](const Crossing& a, const Crossing& b) { return a.x < b.x; });
+        int turns = 0;
+        for (std::size_t i = 0; i + 1 < line.size(); ++i) {
+          turns += line[i].turns;
+          if (turns <= 0) continue;
+          const Range x = range(line[i].x, line[i + 1].x, 0);
+          for (int k = x[0]; k <= x[1]; ++k) inside_[index(k, y, z)] = 1;
+        }
+      }
+    }
+  }
+
   // Each line of nodes crosses a convex part in one interval.
   void mark_inside(const PlacedPart& part) {
+    if (part.mesh == nullptr) {
+      mark_inside_surface(part);
+      return;
+    }
     std::vector<std::pair<Vec3, double>> planes;
     for (const stimuli::Facet& facet : part.mesh->facets()) {
       const Vec3 normal = part.pose.orientation * facet.normal;
@@ -103,6 +156,13 @@ class Filling {
   }
 
   void measure(const PlacedPart& part) {
+    if (part.mesh == nullptr) {
+      const auto place = [&](std::uint32_t corner) {
+        return part.pose.orientation * part.surface->vertices[corner] + part.pose.position;
+      };
+      for (const auto& t : part.surface->triangles) measure(place(t[0]), place(t[1]), place(t[2]));
+      return;
+    }
     const stimuli::ConvexMesh& mesh = *part.mesh;
     for (std::uint32_t f = 0; f < mesh.facets().size(); ++f) {
       const stimuli::Facet& facet = mesh.facets()[f];
@@ -240,11 +300,10 @@ class Filling {
 DistanceField::DistanceField(const std::vector<PlacedPart>& parts) {
   Vec3 low(std::numeric_limits<double>::max()), high = -low;
   for (const PlacedPart& part : parts) {
-    for (const Vec3& vertex : part.mesh->vertices()) {
-      const Vec3 place = part.pose.orientation * vertex + part.pose.position;
+    part.for_each_corner([&](const Vec3& place) {
       low = glm::min(low, place);
       high = glm::max(high, place);
-    }
+    });
   }
   const Vec3 size = high - low;
   const double longest = std::max({size.x, size.y, size.z});

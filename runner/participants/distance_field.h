@@ -8,15 +8,29 @@
 #include <vector>
 
 #include "runner/participants/lane_math.h"
+#include "stimuli/closed_surface.h"
 #include "stimuli/convex_mesh.h"
 #include "stimuli/vec.h"
 
 namespace palpate::runner {
 
-/// A convex part in the frame of its stimulus.
+/// A convex part, or a closed surface, in the frame of its stimulus.
 struct PlacedPart {
-  std::shared_ptr<const stimuli::ConvexMesh> mesh;
+  std::shared_ptr<const stimuli::ConvexMesh> mesh;  ///< null: a surface
   Pose pose;
+  std::shared_ptr<const stimuli::ClosedSurface> surface = nullptr;
+
+  /// Calls visit(place) for its corners.
+  template <class Visit>
+  void for_each_corner(const Visit& visit) const {
+    const auto all = [&](const auto& vertices) {
+      for (const Vec3& vertex : vertices) visit(pose.orientation * vertex + pose.position);
+    };
+    if (mesh != nullptr)
+      all(mesh->vertices());
+    else
+      all(surface->vertices);
+  }
 };
 
 /// At the nodes up to six spacings outside it is exact (the least distance of the parts); inside it

@@ -4,9 +4,11 @@
 #include <optional>
 #include <utility>
 
+#include "stimuli/closed_surface.h"
 #include "stimuli/compose.h"
 #include "stimuli/parts/convex_parts.h"
 #include "stimuli/parts/inset_parts.h"
+#include "stimuli/primitives.h"
 
 namespace palpate::runner {
 namespace {
@@ -28,6 +30,15 @@ void add(const stimuli::ObjectSpec& spec, const Pose& parent, std::vector<Placed
   }
   const std::optional<double> depth = felt_depth(spec.material);
   if (!depth) return;
+  if (spec.shape == stimuli::ShapeKind::mesh && *depth == 0) {
+    const stimuli::PolygonSoup soup = stimuli::polygons_of(spec);
+    if (!stimuli::convex_as_it_is(soup)) {
+      out.push_back(
+          {nullptr, pose,
+           std::make_shared<const stimuli::ClosedSurface>(stimuli::closed_surface(soup).surface)});
+      return;
+    }
+  }
   std::vector<std::shared_ptr<const stimuli::ConvexMesh>> meshes;
   for (stimuli::ConvexMesh& part : stimuli::convex_parts(spec))
     meshes.push_back(std::make_shared<const stimuli::ConvexMesh>(std::move(part)));

@@ -33,8 +33,7 @@ void add_axis(const Vec3& through, double least, std::vector<Vec3>& axes) {
 std::vector<Vec3> possible_axes(const std::vector<PlacedPart>& parts, double least) {
   std::vector<Vec3> corners;
   for (const PlacedPart& part : parts) {
-    for (const Vec3& vertex : part.mesh->vertices())
-      corners.push_back(part.pose.orientation * vertex + part.pose.position);
+    part.for_each_corner([&](const Vec3& place) { corners.push_back(place); });
   }
   std::vector<Vec3> axes;
   const stimuli::ConvexMesh hull(stimuli::grid_hull(corners, 1e-6 * least).soup);

@@ -123,6 +123,23 @@ std::vector<ConvexMesh> convex_parts(const PolygonSoup& soup) {
   return parts;
 }
 
+std::optional<std::vector<ConvexMesh>> convex_as_it_is(const PolygonSoup& soup) {
+  std::vector<ConvexMesh> parts;
+  try {
+    parts.emplace_back(soup);
+    return parts;
+  } catch (const MeshError&) {
+    // It is not convex as a whole.
+  }
+  try {
+    for (const SolidGroup& group : solid_groups(soup)) parts.emplace_back(group.soup);
+  } catch (const MeshError&) {
+    return std::nullopt;
+  }
+  if (parts.empty()) return std::nullopt;
+  return parts;
+}
+
 std::vector<ConvexMesh> convex_parts(const ObjectSpec& spec) {
   const PolygonSoup soup = polygons_of(spec);
   if (spec.shape == ShapeKind::mesh) return convex_parts(soup);

@@ -1,6 +1,7 @@
 #pragma once
 // Any closed solid as convex parts: what the renderers need.
 
+#include <optional>
 #include <vector>
 
 #include "stimuli/convex_mesh.h"
@@ -17,6 +18,10 @@ std::vector<ConvexMesh> convex_parts(const ObjectSpec& spec);
 
 /// The same of polygons.
 std::vector<ConvexMesh> convex_parts(const PolygonSoup& soup);
+
+/// The same without cutting: nothing where a group, or a file without groups, is not convex, or no
+/// solid at all.
+std::optional<std::vector<ConvexMesh>> convex_as_it_is(const PolygonSoup& soup);
 
 /// Cuts a closed solid, which may have holes, voids and several pieces, at its concave edges into
 /// convex parts with disjoint interiors. Before it returns, the parts are held against the surface:

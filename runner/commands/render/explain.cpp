@@ -107,6 +107,12 @@ Explanation explain_with_costs(const rendering::Scene& scene, const rendering::R
     explanation.facets += part.mesh->facets().size();
     explanation.edges += part.mesh->edges().size();
   }
+  explanation.surfaces = scene.surfaces().size();
+  for (const rendering::PlacedSurface& placed : scene.surfaces()) {
+    objects.insert(placed.object);
+    explanation.facets += placed.surface->triangles().size();
+    explanation.edges += placed.surface->triangles().size() / 2 * 3;
+  }
   explanation.objects = objects.size();
   std::map<std::string, double> costs;
   const auto soft = rendering::soft_objects(scene);
@@ -140,6 +146,7 @@ Explanation explain_with_costs(const rendering::Scene& scene, const rendering::R
 std::string to_text(const Explanation& e) {
   std::string out = e.renderer + " renderer; objects: " + std::to_string(e.objects) +
                     ", convex parts: " + std::to_string(e.parts) +
+                    (e.surfaces > 0 ? ", closed surfaces: " + std::to_string(e.surfaces) : "") +
                     ", facets: " + std::to_string(e.facets) +
                     ", edges: " + std::to_string(e.edges) + "\n";
   out += "a tick, ns: " + nanoseconds(e.contact_ns) + " in contact, " + nanoseconds(e.free_ns) +

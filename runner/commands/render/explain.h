@@ -20,7 +20,7 @@ struct StageCost {
 
 struct Explanation {
   std::string renderer;
-  std::size_t objects = 0, parts = 0, facets = 0, edges = 0;
+  std::size_t objects = 0, parts = 0, surfaces = 0, facets = 0, edges = 0;
   std::optional<double> contact_ns, free_ns;  ///< of a whole tick
   std::optional<double> rest_ns;              ///< of contact_ns: not accounted for by the stages
   std::vector<StageCost> stages;
