@@ -16,6 +16,7 @@
 
 namespace palpate::rendering {
 namespace {
+namespace surfaces {
 
 using testing::box_soup;
 using testing::kTick;
@@ -432,5 +433,6 @@ INSTANTIATE_TEST_SUITE_P(Renderers, SurfaceContact,
                          ::testing::Values(&point_renderer(), &ray_renderer()),
                          [](const auto& one) { return std::string(one.param->name()); });
 
+}  // namespace surfaces
 }  // namespace
 }  // namespace palpate::rendering
