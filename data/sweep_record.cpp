@@ -5,17 +5,15 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "data/base/json_text.h"
+
 namespace palpate::data {
 namespace {
 
 constexpr std::size_t kMaxNamed = 5;  // places that a difference names
-constexpr std::size_t kMaxValue = 40;
+constexpr std::size_t kMaxValue = 43;
 
-std::string shown(const nlohmann::json& value) {
-  std::string text = value.dump(-1, ' ', true, nlohmann::json::error_handler_t::replace);
-  if (text.size() > kMaxValue) text = text.substr(0, kMaxValue) + "...";
-  return text;
-}
+std::string shown(const nlohmann::json& value) { return json_excerpt(value, kMaxValue); }
 
 std::string in_lower_case(std::string text) {
   std::transform(text.begin(), text.end(), text.begin(),
@@ -52,8 +50,7 @@ class DifferenceTexts {
 
 /// "/seed 1 and 2; /stimuli/0/radius_m 0.03 and 0.02"
 std::string json_differences(const std::string& a, const std::string& b) {
-  const nlohmann::json one = nlohmann::json::parse(a, nullptr, false),
-                       two = nlohmann::json::parse(b, nullptr, false);
+  const nlohmann::json one = json_or_discarded(a), two = json_or_discarded(b);
   if (one.is_discarded() || two.is_discarded()) return "texts that cannot be compared";
   std::string out;
   std::size_t named = 0;
@@ -106,7 +103,7 @@ std::vector<std::string> differences(const SweepPlan& a, const SweepPlan& b) {
 
 std::vector<TaskCellColumns> task_columns(const SweepPlan& plan) {
   std::vector<TaskCellColumns> cells;
-  const auto protocol = nlohmann::json::parse(plan.protocol, nullptr, false);
+  const auto protocol = json_or_discarded(plan.protocol);
   if (!protocol.is_object() || protocol.value("version", 1) != 2) return cells;
   const auto add = [&](TaskCellColumns cell) {
     const std::string place =

@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "data/base/json_text.h"
 #include "stimuli/input_file.h"
 #include "stimuli/likely_mistakes.h"
 
@@ -15,7 +16,6 @@ namespace {
 
 using nlohmann::json;
 
-constexpr std::size_t kMaxDepth = 64;             // objects and arrays within each other
 constexpr std::size_t kMaxKeyBytes = 256;         // the longest that is known has 20
 constexpr std::size_t kMaxValues = 200'000;       // a long list of orientations has 50,000
 constexpr std::uintmax_t kMaxBytes = 16u << 20u;  // a long list of orientations has about 1 MB
@@ -176,8 +176,8 @@ class Builder : public nlohmann::json_sax<json> {
   }
 
   bool open(json value) {
-    if (open_.size() == kMaxDepth) {
-      faults_.add(here(), "objects and arrays at most " + std::to_string(kMaxDepth) +
+    if (open_.size() == data::kDeepestJson) {
+      faults_.add(here(), "objects and arrays at most " + std::to_string(data::kDeepestJson) +
                               " deep within each other");
       return false;
     }

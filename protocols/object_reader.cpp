@@ -7,6 +7,7 @@
 #include <sstream>
 #include <vector>
 
+#include "data/base/json_text.h"
 #include "stimuli/edit_distance.h"
 
 namespace palpate::protocols {
@@ -64,41 +65,9 @@ bool read_numbers(const json& value, const std::string& pointer, std::array<doub
   return good;
 }
 
-constexpr std::size_t kShown = 60;  // characters of a value in a message
-
-/// The first `most` characters of a value as JSON, or somewhat more: a long value is not written
-/// out in full.
-void put_start(const json& value, std::size_t most, std::string& out) {
-  // A truncated character must not make the message ill-formed: other than ASCII is escaped.
-  const auto ascii = [](const json& word) {
-    return word.dump(-1, ' ', true, json::error_handler_t::replace);
-  };
-  if (value.is_string()) {
-    const auto& text = value.get_ref<const std::string&>();
-    out += text.size() > most ? ascii(text.substr(0, most)) : ascii(value);
-  } else if (value.is_structured()) {
-    const bool object = value.is_object();
-    out += object ? '{' : '[';
-    for (const auto& [key, member] : value.items()) {
-      if (out.size() >= most) return;
-      if (out.back() != '{' && out.back() != '[') out += ',';
-      if (object) out += ascii(key) + ':';
-      put_start(member, most, out);
-    }
-    out += object ? '}' : ']';
-  } else {
-    out += ascii(value);
-  }
-}
-
 }  // namespace
 
-std::string found_text(const json& value) {
-  std::string text;
-  put_start(value, kShown + 1, text);
-  if (text.size() > kShown) text = text.substr(0, kShown - 3) + "...";
-  return ", found " + text;
-}
+std::string found_text(const json& value) { return ", found " + data::json_excerpt(value); }
 
 bool read_number(const json& value, const std::string& pointer, double& out,
                  const NumberRange& range, FaultList& faults) {

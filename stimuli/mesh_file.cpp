@@ -105,6 +105,14 @@ class BufferFiles {
   std::string contents_of(const std::string& place, const std::string& uri) {
     const std::string path = beside(path_, place, uri, faults_);
     if (path.empty()) return {};
+    // Each naming would add the file once more.
+    const auto is_it = [&path](const std::filesystem::path& known) {
+      return known.lexically_normal() == std::filesystem::path(path).lexically_normal();
+    };
+    if (std::any_of(file_.files.begin(), file_.files.end(), is_it)) {
+      faults_.add(place, "a file that no other buffer names", in_quotes(uri));
+      return {};
+    }
     FileFaults own(path_ + ": " + place + ": " + path);
     std::string bytes = contents(path, own);
     own.throw_if_any();

@@ -12,6 +12,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "data/base/json_text.h"
 #include "stimuli/base64.h"
 #include "stimuli/mesh_gltf_accessors.h"
 #include "stimuli/mesh_gltf_document.h"
@@ -24,9 +25,10 @@ using Matrix = glm::dmat4;
 using Triangle = std::array<std::uint32_t, 3>;
 
 constexpr int kMostNested = 100;  // nodes within nodes
-constexpr std::size_t kMostVertices =
-    1U << 26U;  // of all nodes: a file may use a mesh again and again
-constexpr std::size_t kMostTriangles = 1U << 25U;
+// Vertices, and triangles, of all nodes: a file may use a mesh again and again, but must not need
+// memory out of proportion to its size. Data that are named once have fewer than one for each byte.
+constexpr std::size_t kAlwaysRead = 1U << 17U;
+constexpr std::size_t kLongestName = 256;  // bytes; every primitive is named after its node
 constexpr double kUnitError = 1e-3;  // of a quaternion's length: what a few digits leave
 
 double number_at(const GltfValue& list, std::size_t i) { return list.element(i).number(); }
@@ -96,7 +98,8 @@ std::vector<Triangle> triangles_of(std::size_t mode, const std::vector<std::uint
 
 class GltfReader {
  public:
-  explicit GltfReader(std::string_view bytes) : document_(bytes), data_(document_) {}
+  explicit GltfReader(std::string_view bytes)
+      : document_(bytes), data_(document_), most_(std::max(bytes.size(), kAlwaysRead)) {}
 
   PolygonSoup read() {
     reached_.assign(document_.list("nodes").size(), 0);
@@ -159,11 +162,28 @@ class GltfReader {
         throw GltfRefused{node.place(), "a mesh that is placed as a solid", "a scale of 0"};
       const GltfValue name = node.member("name");
       read_mesh(document_.named_by(mesh, "meshes", "mesh"), node.member("weights"),
-                name.present() ? name.text("a name") : "node " + std::to_string(index), world);
+                name.present() ? name_in(name) : "node " + std::to_string(index), world);
     }
     const GltfValue children = node.member("children");
     for (std::size_t i = 0; i < children.size(); ++i)
       read_node(children.element(i), world, depth + 1);
+  }
+
+  static std::string name_in(const GltfValue& value) {
+    std::string name = value.text("a name");
+    if (name.size() > kLongestName)
+      value.refuse("a name of at most " + std::to_string(kLongestName) + " bytes");
+    return name;
+  }
+
+  /// \param count  to be added to `so_far`
+  void require_room(std::size_t count, std::size_t so_far, const char* what,
+                    const GltfValue& primitive) const {
+    if (count <= most_ - so_far) return;
+    throw GltfRefused{
+        primitive.place(),
+        "at most " + std::to_string(most_) + " " + what + " in all nodes, for a file of this size",
+        "more"};
   }
 
   void read_mesh(const GltfValue& mesh, const GltfValue& node_weights, const std::string& name,
@@ -186,10 +206,7 @@ class GltfReader {
     if (kind < 4 || kind > 6) mode.refuse("4, 5 or 6 (triangles)");
     const GltfValue source = primitive.member("attributes").member("POSITION");
     const std::size_t count = data_.count(source);
-    if (count > kMostVertices - soup_.vertices.size())
-      throw GltfRefused{primitive.place(),
-                        "at most " + std::to_string(kMostVertices) + " vertices in all nodes",
-                        "more"};
+    require_room(count, soup_.vertices.size(), "vertices", primitive);
     const std::size_t first = soup_.vertices.size();
     add_vertices(data_.positions(source), world, primitive);
     std::vector<std::uint32_t> corners;
@@ -222,10 +239,7 @@ class GltfReader {
 
   void add_triangles(const std::vector<Triangle>& triangles, std::size_t first, const Matrix& world,
                      const GltfValue& primitive) {
-    if (triangles.size() > kMostTriangles - soup_.faces.size())
-      throw GltfRefused{primitive.place(),
-                        "at most " + std::to_string(kMostTriangles) + " triangles in all nodes",
-                        "more"};
+    require_room(triangles.size(), soup_.faces.size(), "triangles", primitive);
     const bool mirrored = glm::determinant(Mat3(world)) < 0;
     const auto start = static_cast<std::uint32_t>(first);
     for (std::uint32_t i = 0; i < triangles.size(); ++i) {
@@ -238,6 +252,7 @@ class GltfReader {
 
   GltfDocument document_;
   GltfAccessors data_;
+  std::size_t most_;           // vertices, and triangles
   std::vector<char> reached_;  // of each node
   PolygonSoup soup_;
   MeshNames names_;
@@ -257,7 +272,7 @@ PolygonSoup read_gltf(std::string_view bytes, FileFaults& faults) {
 
 std::string with_buffers(const std::string& bytes, const ContentsOf& contents_of) {
   using nlohmann::json;
-  json root = json::parse(bytes, nullptr, false);
+  json root = data::json_or_discarded(bytes);
   if (!root.is_object() || !root.contains("buffers") || !root["buffers"].is_array()) return bytes;
   bool changed = false;
   for (std::size_t i = 0; i < root["buffers"].size(); ++i) {

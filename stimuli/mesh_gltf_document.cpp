@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdint>
 
+#include "data/base/json_text.h"
 #include "stimuli/little_endian.h"
 #include "stimuli/printable.h"
 
@@ -29,10 +30,10 @@ std::string found_text(const json* value) {
 
 json parsed(std::string_view text) {
   try {
-    return json::parse(text);
-  } catch (const json::parse_error& error) {
-    // Its byte counts from 1 and is that after what could be read.
-    const std::size_t at = std::min(error.byte > 0 ? error.byte - 1 : 0, text.size());
+    return data::read_json(text);
+  } catch (const data::JsonError& error) {
+    if (!error.byte) throw GltfRefused{"", error.expected, error.found};
+    const std::size_t at = *error.byte;
     const auto line =
         1 + std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(at), '\n');
     std::size_t begin = text.substr(0, at).find_last_of('\n') + 1;  // 0 where there is none
@@ -41,8 +42,6 @@ json parsed(std::string_view text) {
     throw GltfRefused{"line " + std::to_string(line), "JSON (glTF 2.0)",
                       at >= text.size() ? std::string("the end of the text")
                                         : "\"" + printable(rest, kShownBytes) + "\""};
-  } catch (const json::out_of_range&) {
-    throw GltfRefused{"", "JSON with numbers below 1e308", "a greater one"};
   }
 }
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "data/base/json_text.h"
 #include "data/store/store.h"
 
 namespace palpate::analysis {
@@ -17,7 +18,7 @@ void remember(const std::string& value, std::vector<std::string>& known) {
 ProtocolText protocol_text(const data::ProtocolInfo& info) {
   ProtocolText protocol{info.name, info.sha256, info.text, {}, {}};
   protocol.title = title_of_protocol(info.text);
-  const auto json = nlohmann::json::parse(info.text, nullptr, false);
+  const auto json = data::json_or_discarded(info.text);
   if (!json.is_object()) return protocol;
   if (json.contains("seed") && json["seed"].is_number_integer()) {
     protocol.seed = json["seed"].dump();

@@ -4,6 +4,7 @@
 
 #include "analysis/input/study_record.h"
 #include "analysis/input/task_trials.h"
+#include "data/base/json_text.h"
 #include "data/store/store.h"
 #include "protocols/parse.h"
 #include "stimuli/printable.h"
@@ -27,7 +28,7 @@ void note_once(const std::string& value, std::vector<std::string>& known) {
 bool has_tasks(const std::string& database) {
   data::Store store = data::Store::open(database, data::Store::Mode::read_only);
   for (const data::ProtocolInfo& protocol : store.protocols()) {
-    const auto json = nlohmann::json::parse(protocol.text, nullptr, false);
+    const auto json = data::json_or_discarded(protocol.text);
     if (json.is_object() && json.contains("version") && json["version"] == 2) return true;
   }
   return false;

@@ -8,6 +8,7 @@
 #include "analysis/input/trial_table_builder.h"
 #include "analysis/input/trials.h"
 #include "analysis/text.h"
+#include "data/base/json_text.h"
 #include "data/store/store.h"
 #include "protocols/parse.h"
 
@@ -19,7 +20,7 @@ namespace {
 /// stored, and mesh files that it names may be missing now.
 std::vector<std::string> stimuli_of(const std::string& protocol_text) {
   std::vector<std::string> names;
-  const auto json = nlohmann::json::parse(protocol_text, nullptr, false);
+  const auto json = data::json_or_discarded(protocol_text);
   if (!json.is_object() || !json.contains("stimuli") || !json["stimuli"].is_array()) return names;
   for (const auto& stimulus : json["stimuli"]) {
     if (stimulus.is_object() && stimulus.contains("name") && stimulus["name"].is_string()) {

@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "analysis/text.h"
+#include "data/base/json_text.h"
 #include "protocols/json_document.h"
 #include "protocols/object_reader.h"
 #include "protocols/parse.h"
@@ -118,7 +119,7 @@ const char* to_string(Verdict verdict) {
 
 NamedResults named_results(const std::string& analysis, double alpha) {
   NamedResults out;
-  put_numbers("", nlohmann::json::parse(analysis), out);
+  put_numbers("", data::read_json(analysis), out);
   put_short_names(out);
   out["alpha"] = alpha;
   return out;

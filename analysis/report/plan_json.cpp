@@ -6,6 +6,7 @@
 
 #include "analysis/report/plan_report.h"
 #include "analysis/statistics/paired.h"
+#include "data/base/json_text.h"
 
 namespace palpate::analysis {
 
@@ -81,9 +82,10 @@ std::size_t count_of(const Json& proportion, std::size_t studies) {
 void require_same(const std::string& what, const Json& found, const Json& expected) {
   for (const auto& [key, value] : expected.items()) {
     if (found.contains(key) && found.at(key) == value) continue;
-    throw std::invalid_argument("is of another " + what + ": " + key + " is " +
-                                (found.contains(key) ? found.at(key).dump() : "missing") +
-                                ", expected " + value.dump());
+    throw std::invalid_argument(
+        "is of another " + what + ": " + key + " is " +
+        (found.contains(key) ? data::json_excerpt(found.at(key)) : "missing") + ", expected " +
+        data::json_excerpt(value));
   }
 }
 
@@ -92,7 +94,7 @@ void require_same(const std::string& what, const Json& found, const Json& expect
 std::vector<PlanPoint> read_plan_points(const std::string& json, const StudyModel& model,
                                         const PlanSettings& settings) {
   try {
-    const Json in = Json::parse(json);
+    const Json in = data::read_ordered_json(json);
     Json simulation = settings_json(settings);
     for (const char* other : {"power", "goal", "participants"}) simulation.erase(other);
     require_same("plan", in, {{"version", 1}});
@@ -113,6 +115,9 @@ std::vector<PlanPoint> read_plan_points(const std::string& json, const StudyMode
       }
     }
     return points;
+  } catch (const data::JsonError& error) {
+    throw std::invalid_argument(std::string("is not what 'palpate plan --json' writes: ") +
+                                error.what());
   } catch (const Json::exception& error) {
     throw std::invalid_argument(std::string("is not what 'palpate plan --json' writes: ") +
                                 error.what());
@@ -152,7 +157,7 @@ bool is_first(const Json& value, const char* first, const char* second) {
   const auto word = value.get<std::string>();
   if (word != first && word != second)
     throw std::invalid_argument("expected " + std::string(first) + " or " + second + ", found " +
-                                value.dump());
+                                data::json_excerpt(value));
   return word == first;
 }
 
@@ -160,7 +165,7 @@ bool is_first(const Json& value, const char* first, const char* second) {
 
 PlanRecord read_plan(const std::string& json) {
   try {
-    const Json in = Json::parse(json);
+    const Json in = data::read_ordered_json(json);
     if (in.is_object() && !in.contains("model"))
       throw std::invalid_argument(
           "expected a plan of times (palpate plan --effect); this is another one");
@@ -192,6 +197,9 @@ PlanRecord read_plan(const std::string& json) {
       }
     }
     return plan;
+  } catch (const data::JsonError& error) {
+    throw std::invalid_argument(std::string("is not what 'palpate plan --json' writes: ") +
+                                error.what());
   } catch (const Json::exception& error) {
     throw std::invalid_argument(std::string("is not what 'palpate plan --json' writes: ") +
                                 error.what());

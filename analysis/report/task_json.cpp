@@ -4,6 +4,7 @@
 
 #include "analysis/report/report_json.h"
 #include "analysis/report/task_report.h"
+#include "data/base/json_text.h"
 #include "protocols/procedures/psychometric_names.h"
 
 namespace palpate::analysis {
@@ -298,7 +299,7 @@ std::string task_report_json(const TaskAnalysis& analysis, const std::string& pr
     out["condition_comparisons"].push_back(comparison_json(one, false));
   if (analysis.accuracy) out["accuracy_model"] = accuracy_json(*analysis.accuracy);
   if (analysis.identification)
-    out["identification"] = TaskJson::parse(report_json(*analysis.identification));
+    out["identification"] = data::read_ordered_json(report_json(*analysis.identification));
   return out.dump(1, ' ', false, TaskJson::error_handler_t::replace) + "\n";
 }
 

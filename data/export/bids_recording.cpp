@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "data/base/json_text.h"
 #include "data/export/column_values.h"
 #include "data/export/sample_slots.h"
 #include "data/files/utc.h"
@@ -61,8 +62,7 @@ void rename_files(nlohmann::ordered_json& object, const StudyLabel& study) {
 nlohmann::ordered_json objects_of(const StudyLabel& study) {
   nlohmann::ordered_json objects = nlohmann::ordered_json::object();
   for (const StimulusFacts& stimulus : study.facts.stimuli) {
-    auto& object = objects[guarded_text(stimulus.name)] =
-        nlohmann::ordered_json::parse(stimulus.object);
+    auto& object = objects[guarded_text(stimulus.name)] = read_ordered_json(stimulus.object);
     rename_files(object, study);
   }
   return objects;

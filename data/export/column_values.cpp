@@ -4,6 +4,7 @@
 #include <charconv>
 #include <nlohmann/json.hpp>
 
+#include "data/base/json_text.h"
 #include "data/export/column_definitions.h"
 
 namespace palpate::data {
@@ -70,7 +71,7 @@ void put_sample(DelimitedRow& row, const SampleRecord& sample) {
 
 bool has_bodies(const ProtocolFacts& facts) {
   return std::any_of(facts.stimuli.begin(), facts.stimuli.end(), [](const StimulusFacts& stimulus) {
-    return nlohmann::json::parse(stimulus.object).contains("body");
+    return read_json(stimulus.object).contains("body");
   });
 }
 

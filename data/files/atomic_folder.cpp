@@ -13,6 +13,7 @@
 #include <system_error>
 #include <utility>
 
+#include "data/base/json_text.h"
 #include "data/errors.h"
 #include "data/files/temporary_names.h"
 #include "data/files/trusted_links.h"
@@ -31,7 +32,8 @@ fs::path without_trailing_slash(const std::string& target) {
 
 bool made_by_palpate(const fs::path& description) {
   std::ifstream in(description);
-  const auto json = nlohmann::json::parse(in, nullptr, false);
+  const std::string text(std::istreambuf_iterator<char>(in), {});
+  const nlohmann::json json = json_or_discarded(text);
   if (!json.is_object()) return false;
   for (const auto& program : json.value("GeneratedBy", nlohmann::json::array())) {
     if (program.is_object() && program.value("Name", nlohmann::json()) == "palpate") return true;

@@ -1,7 +1,9 @@
 #include "data/store/protocol_rows.h"
 
 #include <algorithm>
+#include <nlohmann/json.hpp>
 
+#include "data/base/json_text.h"
 #include "data/errors.h"
 #include "data/files/checksum.h"
 #include "data/store/statement_values.h"
@@ -54,6 +56,16 @@ void require_same_files(SQLite::Database& db, const std::string& path, std::int6
                        "): participants would not touch the same shape; restore the file (an "
                        "export holds it), or name the changed one differently in the protocol, "
                        "which makes it another protocol");
+  }
+}
+
+/// \throws StoreRefused: such a text was never stored by palpate, and cannot even be compared.
+void require_shallow(const std::string& path, const ProtocolInfo& protocol) {
+  try {
+    read_json(protocol.text);
+  } catch (const JsonError& error) {
+    if (error.byte) return;
+    throw StoreRefused(path + ": the text of protocol " + protocol.name + ": " + error.what());
   }
 }
 
@@ -126,6 +138,7 @@ void verify_protocol_checksums(SQLite::Database& db, const std::string& path, in
     ProtocolInfo one;
     RowReader(texts) >> one.name >> one.text >> one.sha256;
     if (checksum_hex(one.text) != one.sha256) refuse("the text of protocol " + one.name);
+    require_shallow(path, one);
   }
   if (version < kFilesSince) return;
   SQLite::Statement files(db,

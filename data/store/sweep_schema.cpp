@@ -8,6 +8,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "data/base/json_text.h"
 #include "data/errors.h"
 #include "data/store/statement_values.h"
 #include "data/store/sweep_file.h"
@@ -63,7 +64,7 @@ void require_version(SQLite::Database& db, const std::string& path) {
 }
 
 std::vector<std::string> names_of(const std::string& text) {
-  const nlohmann::json list = nlohmann::json::parse(text, nullptr, false);
+  const nlohmann::json list = json_or_discarded(text);
   std::vector<std::string> out;
   if (!list.is_array()) throw SQLite::Exception("the names of columns", SQLITE_CORRUPT);
   for (const nlohmann::json& name : list) {

@@ -3,6 +3,8 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
+#include "data/base/json_text.h"
+
 namespace palpate::data {
 namespace {
 
@@ -58,7 +60,7 @@ std::string task_text(const TaskRecord& task) {
 
 TaskRecord parse_task_text(const std::string& text) {
   try {
-    const Json in = Json::parse(text);
+    const Json in = read_ordered_json(text);
     TaskRecord task;
     task.task = in.at("task").get<std::string>();
     task.block_name = in.at("block_name").get<std::string>();
@@ -73,6 +75,8 @@ TaskRecord parse_task_text(const std::string& text) {
     take_if(in, "confidence", task.confidence);
     take_if(in, "confidence_ns", task.confidence_ns);
     return task;
+  } catch (const JsonError& error) {
+    throw std::invalid_argument(std::string("its task is damaged: ") + error.what());
   } catch (const Json::exception& error) {
     throw std::invalid_argument(std::string("its task is damaged: ") + error.what());
   }

@@ -9,6 +9,7 @@
 #include <numbers>
 #include <utility>
 
+#include "data/base/json_text.h"
 #include "protocols/json_document.h"
 #include "protocols/object_reader.h"
 #include "protocols/parse_object.h"
@@ -73,7 +74,7 @@ StimulusSpec at_level(const Protocol& protocol, const TaskBlock& block, int stim
     varied.object.pose.orientation = turn * varied.object.pose.orientation;
     return varied;
   }
-  json value = json::parse(protocol.stimulus_texts[static_cast<std::size_t>(stimulus)]);
+  json value = data::read_json(protocol.stimulus_texts[static_cast<std::size_t>(stimulus)]);
   try {
     value[json::json_pointer(block.level->pointer)] = number_of(level);
   } catch (const json::exception&) {
@@ -87,7 +88,7 @@ StimulusSpec at_level(const Protocol& protocol, const TaskBlock& block, int stim
 std::optional<double> own_level(const Protocol& protocol, const TaskBlock& block, int stimulus) {
   if (!block.level) return std::nullopt;
   if (block.level->orientation) return 0;
-  const json value = json::parse(protocol.stimulus_texts[static_cast<std::size_t>(stimulus)]);
+  const json value = data::read_json(protocol.stimulus_texts[static_cast<std::size_t>(stimulus)]);
   try {
     const json& number = value.at(json::json_pointer(block.level->pointer));
     if (number.is_number()) return number.get<double>();

@@ -5,6 +5,7 @@
 #include <stdexcept>
 #include <vector>
 
+#include "data/base/json_text.h"
 #include "protocols/json_document.h"
 #include "protocols/parse.h"
 #include "protocols/sha256.h"
@@ -39,7 +40,7 @@ const std::map<std::string, std::vector<std::string>>& words() {
 
 json frozen_settings(int version) {
   for (const FrozenSettings* frozen = kFrozenSettings; frozen->version != 0; ++frozen) {
-    if (frozen->version == version) return json::parse(frozen->text);
+    if (frozen->version == version) return data::read_json(frozen->text);
   }
   throw std::invalid_argument("no version " + std::to_string(version) +
                               " of the simulated participant");
@@ -48,9 +49,9 @@ json frozen_settings(int version) {
 /// What a version did where its file has no key for it.
 json implied_settings(int version) {
   json implied = json::object();
-  if (version < 3) implied = json::parse(kBeforeVersion3);
+  if (version < 3) implied = data::read_json(kBeforeVersion3);
   if (version < 2) {
-    implied.merge_patch(json::parse(kBeforeVersion2));
+    implied.merge_patch(data::read_json(kBeforeVersion2));
     implied["search"].erase("pull_to_centre");  // its own
   }
   return implied;

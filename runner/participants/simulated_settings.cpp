@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
+#include "data/base/json_text.h"
 #include "runner/participants/settings_document.h"
 #include "runner/participants/simulated_defaults.h"
 #include "stimuli/random.h"
@@ -118,7 +119,7 @@ std::optional<int> participant_version_of(const std::string& sha256,
 }
 
 SimulatedSettings read_simulated_settings(const std::string& text) {
-  const json settings = json::parse(text);
+  const json settings = data::read_json(text);
   check_settings(settings);
   return read(settings);
 }

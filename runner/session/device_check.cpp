@@ -7,6 +7,7 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "data/base/json_text.h"
 #include "protocols/tasks/levels.h"
 
 namespace palpate::runner {
@@ -308,10 +309,10 @@ std::string to_json_text(const std::vector<LimitedMaterial>& limited,
 }
 
 bool limit_as_recorded(protocols::Protocol& protocol, const std::string& event) {
-  const Json json = Json::parse(event, nullptr, false);
+  const nlohmann::json json = data::json_or_discarded(event);
   if (!json.is_object() || !json.contains(kLimitedEvent)) return false;
   try {
-    for (const Json& one : json.at(kLimitedEvent)) {
+    for (const nlohmann::json& one : json.at(kLimitedEvent)) {
       stimuli::Material& material =
           material_of(protocol, one.at("stimulus").get<std::string>(), one.at("part").get<int>());
       if (material.stiffness != one.at("asked_stiffness_n_per_m").get<double>() ||
@@ -320,7 +321,7 @@ bool limit_as_recorded(protocols::Protocol& protocol, const std::string& event) 
       }
       scale_down(material, one.at("share").get<double>());
     }
-  } catch (const Json::exception& error) {
+  } catch (const nlohmann::json::exception& error) {
     throw std::invalid_argument(std::string("the record of limited materials is damaged: ") +
                                 error.what());
   }

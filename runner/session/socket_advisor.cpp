@@ -14,6 +14,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "data/base/json_text.h"
 #include "protocols/tasks/levels.h"
 #include "protocols/tasks/task_plan.h"
 #include "stimuli/printable.h"
@@ -174,7 +175,7 @@ std::string SocketAdvisor::refusal(const std::string& message, int trial) const 
 std::optional<double> SocketAdvisor::level_in(const std::string& line,
                                               const protocols::Trial& next) {
   const std::string found = "; found " + stimuli::printable(line, kMostShown);
-  const auto message = nlohmann::json::parse(line, nullptr, false);
+  const auto message = data::json_or_discarded(line);
   if (!message.is_object() || !message.contains("trial") || !message["trial"].is_number_integer() ||
       message.value("type", nlohmann::json()) != "level") {
     trouble_ = R"(expected {"type": "level", "trial": )" + std::to_string(next.trial) +

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "data/base/json_text.h"
 #include "protocols/object_reader.h"
 #include "runner/participants/settings_document.h"
 #include "runner/sweep/json_places.h"
@@ -124,7 +125,7 @@ void SweptStudy::check_participant(const SweepParameter& one, std::size_t number
     // All words of a choice must be known; of numbers the space may hold some that fail.
     if (!refusals.empty() && (values.front().is_string() || refusals.size() == values.size())) {
       faults.add(place, "expected what " + path + " can be: it " + refusals.front() + "; " +
-                            now->dump() + " stands there now");
+                            data::json_excerpt(*now) + " stands there now");
     }
   }
 }
@@ -144,8 +145,9 @@ std::string SweptStudy::refusal_of(const std::string& path, const json& value) c
       const std::string& at = fault.location;
       if (at != path && !path.starts_with(at + "/") && !at.starts_with(path + "/")) continue;
       const bool unknown = fault.expected.starts_with("unknown key");
-      return "expected what the protocol can have; with " + value.dump() + " it says: " + at +
-             ": " + fault.expected + (unknown ? near_text(protocol_, path) : "");
+      return "expected what the protocol can have; with " + data::json_excerpt(value) +
+             " it says: " + at + ": " + fault.expected +
+             (unknown ? near_text(protocol_, path) : "");
     }
   }
   return "";

@@ -4,6 +4,7 @@
 
 #include "stimuli/base64.h"
 #include "stimuli/mesh_file.h"
+#include "stimuli/mesh_text.h"
 #include "stimuli/parts/convex_parts.h"
 #include "stimuli/random.h"
 #include "tests/stimuli/gltf_box.h"
@@ -123,6 +124,70 @@ TEST(MeshGltfFaults, NodesAreStrictTrees) {
   for (int i = 1; i <= 101; ++i) chain += "{\"children\": [" + std::to_string(i) + "]}, ";
   EXPECT_EQ(of_nodes(chain + "{\"mesh\": 0}]"),
             "a.gltf: /nodes/101: expected nodes within at most 100 others, found a deeper one");
+}
+
+TEST(MeshGltfFaults, MemoryIsInProportionToTheFile) {
+  constexpr int kVertices = 999, kPrimitives = 3000;
+  const std::string data(kVertices * 12, '\0');
+  std::string primitives;
+  for (int i = 0; i < kPrimitives; ++i)
+    primitives += std::string(i > 0 ? "," : "") + R"({"attributes": {"POSITION": 0}})";
+  const auto of = [&](const std::string& asset) {
+    return R"({"asset": {"version": "2.0")" + asset + R"(}, "meshes": [{"primitives": [)" +
+           primitives + R"(]}],
+   "accessors": [{"bufferView": 0, "componentType": 5126, "count": 999, "type": "VEC3"}],
+   "bufferViews": [{"buffer": 0, "byteLength": 11988}],
+   "buffers": [{"byteLength": 11988, "uri": ")" +
+           gltf::data_uri(data) + R"("}]})";
+  };
+  // 2^17 are always read.
+  EXPECT_EQ(refusal_of(of("")),
+            "a.gltf: /meshes/0/primitives/131: expected at most 131072 vertices in all nodes, for "
+            "a file of this size, found more");
+  const std::string larger = of(R"(, "note": ")" + std::string(200'000, 'x') + "\"");
+  EXPECT_EQ(refusal_of(larger), "a.gltf: /meshes/0/primitives/" +
+                                    std::to_string(larger.size() / kVertices) +
+                                    ": expected at most " + std::to_string(larger.size()) +
+                                    " vertices in all nodes, for a file of this size, found more");
+  // A strip of n + 2 corners is n triangles.
+  std::string strips;
+  for (int i = 0; i < kPrimitives; ++i)
+    strips += std::string(i > 0 ? "," : "") +
+              R"({"attributes": {"POSITION": 0}, "indices": 1, "mode": 5})";
+  const std::string corners(1002, '\0'), points(36, '\0');
+  const std::string text = R"({"asset": {"version": "2.0"}, "meshes": [{"primitives": [)" + strips +
+                           R"(]}],
+   "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"},
+                 {"bufferView": 1, "componentType": 5121, "count": 1002, "type": "SCALAR"}],
+   "bufferViews": [{"buffer": 0, "byteLength": 36},
+                   {"buffer": 0, "byteOffset": 36, "byteLength": 1002}],
+   "buffers": [{"byteLength": 1038, "uri": ")" +
+                           gltf::data_uri(points + corners) + R"("}]})";
+  EXPECT_EQ(refusal_of(text), "a.gltf: /meshes/0/primitives/" + std::to_string(text.size() / 1000) +
+                                  ": expected at most " + std::to_string(text.size()) +
+                                  " triangles in all nodes, for a file of this size, found more");
+  const auto named = [](std::size_t length) {
+    return refusal_of(document("[{\"mesh\": 0, \"name\": \"" + std::string(length, 'x') + "\"}]"));
+  };
+  EXPECT_EQ(named(256), "taken");
+  EXPECT_NE(named(257).find("/nodes/0/name: expected a name of at most 256 bytes"),
+            std::string::npos);
+}
+
+TEST(MeshGltfFaults, DeepJsonIsRefused) {
+  const auto nested = [](const std::string& member, int depth) {
+    return document(R"([{"mesh": 0, ")" + member +
+                    "\": " + std::string(static_cast<std::size_t>(depth), '[') +
+                    std::string(static_cast<std::size_t>(depth), ']') + "}]");
+  };
+  EXPECT_EQ(refusal_of(nested("extras", 61)), "taken");  // and three around them
+  const std::string too_deep =
+      "a.gltf: expected objects and arrays at most 64 deep within each other, found deeper ones";
+  EXPECT_EQ(refusal_of(nested("extras", 62)), too_deep);
+  EXPECT_EQ(refusal_of(nested("extras", 100'000)), too_deep);
+  const std::string named =
+      gltf::changed(nested("extras", 100'000), R"("uri": "data:)", R"("uri": "a.bin", "x": ")");
+  EXPECT_EQ(with_buffers(named, [](const auto&, const auto&) { return std::string(); }), named);
 }
 
 TEST(MeshGltfFaults, TransformsAreRotationsAndNumbers) {

@@ -18,6 +18,7 @@
 #include "analysis/report/report_json.h"
 #include "analysis/statistics/analysis.h"
 #include "analysis/text.h"
+#include "data/base/json_text.h"
 #include "data/export/bids.h"
 #include "data/export/csv.h"
 #include "data/export/psychds.h"
@@ -281,11 +282,11 @@ int verify_bundle(const std::string& folder) {
   }
   std::cout << "DIFFERS  analysis.json, made again from " << kTrials << ", from line "
             << first_different_line(stored, made);
-  const auto json = nlohmann::json::parse(stored, nullptr, false);
+  const auto json = data::json_or_discarded(stored);
   const auto version =
       json.is_object() ? json.value("program_version", nlohmann::json()) : nlohmann::json();
   if (version != PALPATE_VERSION)
-    std::cout << "; it was made with palpate " << stimuli::printable(version.dump(), 60)
+    std::cout << "; it was made with palpate " << data::json_excerpt(version)
               << ", this is " PALPATE_VERSION;
   std::cout << "\n";
   return 1;

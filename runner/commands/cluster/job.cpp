@@ -7,6 +7,7 @@
 #include <iostream>
 #include <nlohmann/json.hpp>
 
+#include "data/base/json_text.h"
 #include "data/store/store.h"
 #include "data/store/sweep_file.h"
 #include "protocols/json_document.h"
@@ -67,10 +68,11 @@ void write_job(const fs::path& folder, const ClusterJob& job) {
 ClusterJob read_job(const fs::path& folder) {
   const std::string path = (folder / "cluster.json").string();
   try {
-    const json in = json::parse(protocols::read_text_file(path));
+    const json in = data::read_json(protocols::read_text_file(path));
     if (in.at("version") != kVersion) {
       throw UsageError(path + ": expected version " + std::to_string(kVersion) + ", found " +
-                       in.at("version").dump() + "; go on with the program that wrote it");
+                       data::json_excerpt(in.at("version")) +
+                       "; go on with the program that wrote it");
     }
     ClusterJob job;
     job.work = in.at("work");
@@ -86,6 +88,8 @@ ClusterJob read_job(const fs::path& folder) {
       throw UsageError(path + ": expected 1 or more shards of at least one item each, found " +
                        std::to_string(job.shards) + " shards of " + std::to_string(job.items));
     return job;
+  } catch (const data::JsonError& error) {
+    throw UsageError(path + ": is not what 'palpate cluster' wrote: " + error.what());
   } catch (const json::exception& error) {
     throw UsageError(path + ": is not what 'palpate cluster' wrote: " + error.what());
   }

@@ -16,6 +16,7 @@
 #include "analysis/statistics/analysis.h"
 #include "analysis/statistics/sensitivity.h"
 #include "analysis/text.h"
+#include "data/base/json_text.h"
 #include "data/files/atomic_folder.h"
 #include "data/store/store.h"
 #include "protocols/json_document.h"
@@ -267,8 +268,8 @@ void put_simulated(const RegisterOptions& options, const data::AtomicFolder& dra
   const std::string with = analyzed(first, made.too_fast);
   const std::string none = analyzed(read_table(draft, kNone), made.too_fast);
   write_member(draft, "analysis-simulated.json",
-               nlohmann::ordered_json{{"planned_effect", nlohmann::ordered_json::parse(with)},
-                                      {"no_effect", nlohmann::ordered_json::parse(none)}}
+               nlohmann::ordered_json{{"planned_effect", data::read_ordered_json(with)},
+                                      {"no_effect", data::read_ordered_json(none)}}
                        .dump(2) +
                    "\n");
   made.hypotheses = analysis::read_hypotheses(made.hypotheses_text, options.hypotheses,

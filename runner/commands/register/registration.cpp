@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
+#include "data/base/json_text.h"
 #include "data/files/checksum.h"
 #include "data/files/utc.h"
 #include "protocols/parse.h"
@@ -129,13 +130,16 @@ std::string registration_json(const Registration& registration,
 std::vector<std::string> filled_in(const std::string& folder) {
   std::vector<std::string> out;
   try {
-    const Json in = Json::parse(read_member(folder, "registration.json"));
+    const Json in = data::read_ordered_json(read_member(folder, "registration.json"));
     for (const Json& one : in.at("to_fill_in")) {
       const std::string name = one.at("file");
       if (std::ranges::find(files_to_fill_in(), name) == files_to_fill_in().end()) continue;
       if (checksum_of_member(folder, name) != one.at("sha256_when_made").get<std::string>())
         out.push_back(name);
     }
+  } catch (const data::JsonError& error) {
+    throw UsageError((std::filesystem::path(folder) / "registration.json").string() +
+                     ": is not what 'palpate register' writes: " + error.what());
   } catch (const Json::exception& error) {
     throw UsageError((std::filesystem::path(folder) / "registration.json").string() +
                      ": is not what 'palpate register' writes: " + error.what());
@@ -147,9 +151,10 @@ Registration read_registration(const std::string& folder) {
   const std::string where = (std::filesystem::path(folder) / "registration.json").string();
   Registration out;
   try {
-    const Json in = Json::parse(read_member(folder, "registration.json"));
+    const Json in = data::read_ordered_json(read_member(folder, "registration.json"));
     if (in.at("version") != 1)
-      throw std::invalid_argument("expected version 1, found " + in.at("version").dump());
+      throw std::invalid_argument("expected version 1, found " +
+                                  data::json_excerpt(in.at("version")));
     out.made_utc_ns = utc_ns_of(in.at("made_utc"));
     out.program_version = in.at("program_version");
     out.build = in.at("build");
@@ -163,6 +168,8 @@ Registration read_registration(const std::string& folder) {
     out.participant_sha256 = in.at("simulated_participant").at("settings_sha256");
     for (const Json& file : in.at("protocol").at("files"))
       out.files.push_back({file.at("file"), ""});
+  } catch (const data::JsonError& error) {
+    throw UsageError(where + ": is not what 'palpate register' writes: " + error.what());
   } catch (const Json::exception& error) {
     throw UsageError(where + ": is not what 'palpate register' writes: " + error.what());
   } catch (const std::invalid_argument& error) {

@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "data/base/json_text.h"
 #include "data/store/store.h"
 #include "protocols/protocol.h"
 #include "protocols/tasks/levels.h"
@@ -53,12 +54,21 @@ std::vector<std::pair<std::string, std::string>> questions_of(const nlohmann::or
   return questions;
 }
 
+nlohmann::ordered_json document_of(const data::ProtocolInfo& info) {
+  const std::string place = "the text of protocol " + info.name + " is damaged: expected ";
+  try {
+    nlohmann::ordered_json json = data::read_ordered_json(info.text);
+    if (json.is_object()) return json;
+  } catch (const data::JsonError& error) {
+    throw data::StoreRefused(place + error.expected + ", found " + error.found);
+  }
+  throw data::StoreRefused(place + "an object");
+}
+
 /// Reads only what an export needs from the stored text, so that old databases can be exported
 /// after the rules for protocols have changed.
 data::ProtocolFacts facts_of(const data::ProtocolInfo& info) {
-  const auto json = nlohmann::ordered_json::parse(info.text, nullptr, false);
-  if (!json.is_object())
-    throw data::StoreRefused("the text of protocol " + info.name + " is damaged");
+  const nlohmann::ordered_json json = document_of(info);
   data::ProtocolFacts facts{.servo_rate = protocols::Protocol{}.servo_rate};
   if (json.contains("title") && json["title"].is_string()) facts.title = json["title"];
   if (json.contains("servo") && json["servo"].is_object() && json["servo"].contains("rate_hz") &&

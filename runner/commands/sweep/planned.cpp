@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
+#include "data/base/json_text.h"
 #include "protocols/sha256.h"
 #include "runner/commands/shared/simulation.h"
 #include "runner/session/protocol_info.h"
@@ -17,7 +18,7 @@ using nlohmann::json;
 
 /// The protocol with --repetitions; no more blocks than those.
 json base_protocol(const protocols::Protocol& protocol, const SweepSettings& settings) {
-  json out = json::parse(protocol.source_text);
+  json out = data::read_json(protocol.source_text);
   if (settings.repetitions == 0) return out;
   if (protocol.version == 2)
     throw UsageError("--repetitions: the blocks of a protocol of version 2 have their own");
@@ -52,7 +53,7 @@ data::SweepPlan plan_of_sweep(const SweepSettings& settings, const SweptStudy& s
   plan.protocol = study.protocol().dump();
   plan.files_sha256 = sha256_of_files(protocol);
   plan.settings = study.settings().dump();
-  plan.space = json::parse(study.space().source_text).dump();
+  plan.space = data::read_json(study.space().source_text).dump();
   plan.design = settings.design;
   plan.points = design.size();
   plan.seed = settings.seed;
@@ -123,7 +124,7 @@ void check_sweep_options(const po::variables_map& values, SweepSettings& setting
 PlannedSweep::PlannedSweep(const SweepSettings& settings)
     : protocol(protocols::parse_protocol(settings.protocol)),
       study(base_protocol(protocol, settings), settings.protocol,
-            json::parse(simulated_settings_text(settings.patch, settings.version)),
+            data::read_json(simulated_settings_text(settings.patch, settings.version)),
             protocols::parse_sweep_space(settings.space), settings.space),
       design(design_of(settings, study)),
       plan(plan_of_sweep(settings, study, design, protocol)) {

@@ -14,6 +14,7 @@
 #include <thread>
 #include <vector>
 
+#include "data/base/json_text.h"
 #include "data/store/sweep_file.h"
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/progress_line.h"
@@ -183,8 +184,7 @@ int version_begun_with(const std::string& database) {
   std::set<int> begun;
   std::error_code none;  // what cannot be seen is refused where it is opened
   if (std::filesystem::exists(database, none)) {
-    const json settings =
-        json::parse(data::SweepFile::open(database).plan().settings, nullptr, false);
+    const json settings = data::json_or_discarded(data::SweepFile::open(database).plan().settings);
     for (const int version : participant_versions()) {
       if (settings.is_object() && settings.value("version", json()) == version)
         begun.insert(version);
