@@ -87,7 +87,7 @@ struct SweepFile::Impl {
   std::optional<SQLite::Database> db;
   FileIdentity identity;
   bool writes = false;
-  SweepPlan plan;
+  SweepTables tables;
 
   void resolve(bool writing) {
     std::error_code error;
@@ -151,7 +151,7 @@ struct SweepFile::Impl {
       db->exec("PRAGMA trusted_schema = OFF; PRAGMA cell_size_check = ON");
       db->exec(writes ? "PRAGMA journal_mode = DELETE; PRAGMA synchronous = FULL"
                       : "PRAGMA query_only = ON");
-      plan = read_sweep_plan(*db, path);
+      tables = read_sweep_tables(*db, path);
     });
     identity = identity_of(file);
   }
@@ -170,7 +170,7 @@ SweepFile& SweepFile::operator=(SweepFile&&) noexcept = default;
 SweepFile::~SweepFile() = default;
 
 const std::string& SweepFile::path() const { return impl_->path; }
-const SweepPlan& SweepFile::plan() const { return impl_->plan; }
+const SweepPlan& SweepFile::plan() const { return impl_->tables.plan; }
 
 SweepFile SweepFile::open(const std::string& path, const SweepPlan& plan) {
   auto impl = std::make_unique<Impl>();
@@ -179,9 +179,12 @@ SweepFile SweepFile::open(const std::string& path, const SweepPlan& plan) {
   impl->lock.emplace(impl->file);
   if (!fs::exists(impl->file)) impl->create(plan);
   impl->connect(true);
-  const std::vector<std::string> reasons = differences(impl->plan, plan);
+  const std::vector<std::string> reasons = differences(impl->tables.plan, plan);
   if (!reasons.empty()) refuse_other_plan(path, reasons);
-  return SweepFile(std::move(impl));
+  const bool sealed = impl->tables.version == kSweepVersion;
+  SweepFile file(std::move(impl));
+  if (!sealed) file.rewrite(true);
+  return file;
 }
 
 SweepFile SweepFile::open(const std::string& path, Writers writers) {
@@ -195,7 +198,7 @@ SweepFile SweepFile::open(const std::string& path, Writers writers) {
 
 std::vector<bool> SweepFile::recorded() {
   return guarded(impl_->path, [&] {
-    std::vector<bool> out(static_cast<std::size_t>(impl_->plan.points), false);
+    std::vector<bool> out(static_cast<std::size_t>(impl_->tables.plan.points), false);
     SQLite::Statement find(*impl_->db, "SELECT point FROM points");
     while (find.executeStep())
       out[static_cast<std::size_t>(find.getColumn(0).getInt64()) - 1] = true;
@@ -223,7 +226,7 @@ void SweepFile::for_each(const std::function<void(const SweepRow&)>& visit) {
       SQLite::Statement find(*impl_->db,
                              "SELECT * FROM points WHERE point > ? ORDER BY point LIMIT ?");
       Binder(find) << last << static_cast<std::int64_t>(kPageRows);
-      while (find.executeStep()) rows.push_back(read_sweep_row(find, impl_->plan));
+      while (find.executeStep()) rows.push_back(read_sweep_row(find, impl_->tables, impl_->path));
     });
     for (const SweepRow& row : rows) visit(row);
     if (!rows.empty()) last = rows.back().point;
@@ -234,22 +237,22 @@ void SweepFile::record(const std::vector<SweepRow>& rows) {
   if (!impl_->writes) throw StoreRefused(impl_->path + ": was opened for reading only");
   guarded(impl_->path, [&] {
     SQLite::Transaction transaction(*impl_->db, SQLite::TransactionBehavior::IMMEDIATE);
-    SQLite::Statement insert(*impl_->db, insert_sweep_row_sql(impl_->plan));
+    SweepRowWriter writer(*impl_->db, impl_->tables);
     for (const SweepRow& row : rows) {
-      require_fitting(impl_->plan, row, impl_->path);
-      bind_sweep_row(insert, row);
-      insert.exec();
-      insert.reset();
+      require_fitting(impl_->tables.plan, row, impl_->path);
+      writer.add(row);
     }
     transaction.commit();
   });
   impl_->require_in_place();
 }
 
-void SweepFile::finish() {
+void SweepFile::finish() { rewrite(false); }
+
+void SweepFile::rewrite(bool goes_on) {
   const AtomicFolder folder(impl_->file);
   const std::string ordered = folder / "ordered.sweep";
-  SweepCopy copy(ordered, impl_->plan);
+  SweepCopy copy(ordered, impl_->tables.plan);
   copy.add(*this);
   copy.finish();
   impl_->require_in_place();
@@ -259,12 +262,13 @@ void SweepFile::finish() {
                      ": cannot be put in order: " + std::generic_category().message(errno));
   }
   sync_path(fs::path(impl_->file).parent_path().string(), impl_->path);
-  impl_->connect(false);
+  impl_->connect(goes_on);
 }
 
 struct SweepCopy::Impl {
   std::string path;
   SweepPlan plan;
+  SweepTables tables;
   std::optional<SQLite::Database> db;
   std::optional<SQLite::Transaction> transaction;
   std::int64_t last = 0;  ///< point that was added
@@ -278,7 +282,7 @@ struct SweepCopy::Impl {
       // the number of sources: the header counts them.
       db->exec("PRAGMA page_size = 4096; PRAGMA journal_mode = OFF; PRAGMA synchronous = OFF");
       transaction.emplace(*db);
-      create_sweep_tables(*db, plan);
+      tables = create_sweep_tables(*db, plan);
     });
   }
 };
@@ -297,15 +301,15 @@ void SweepCopy::add(SweepFile& from) {
     SQLite::Statement read(*from.impl_->db, "SELECT * FROM points ORDER BY point");
     SQLite::Statement insert(db, insert_sweep_row_sql(impl_->plan));
     SQLite::Statement find(db, "SELECT * FROM points WHERE point = ?");
-    std::vector<SQLite::Column> values;
     while (read.executeStep()) {
-      if (values.empty()) values = columns_of(read);
+      require_sealed(read, from.impl_->tables, from.path());
+      const Checksum seal = seal_of_row(read, impl_->tables);
       const std::int64_t point = read.getColumn(0).getInt64();
       if (point <= impl_->last) {
         find.reset();
         find.bind(1, point);
         if (find.executeStep()) {
-          if (same_row(read, find)) continue;
+          if (seal_of_row(find, impl_->tables) == seal) continue;
           throw StoreRefused(
               from.path() + ": point " + std::to_string(point) +
               " has other results than in a file before it, with the same seeds; one of "
@@ -313,7 +317,7 @@ void SweepCopy::add(SweepFile& from) {
         }
         impl_->in_order = false;
       }
-      copy_row(values, insert);
+      copy_row(read, seal, insert);
       insert.exec();
       insert.reset();
       impl_->last = std::max(impl_->last, point);

@@ -6,6 +6,11 @@
 // of a -wal, so that it also works on file systems that several machines share; each machine writes
 // a file of its own. finish() writes the file anew, points in order, in one transaction: the bytes
 // of a finished file depend on the plan and the results alone, not on the order of their arrival.
+//
+// Seals: the plan and each row have a SHA-256 of their values, which opening and every reading
+// verify: a flipped bit is refused with the row's number. The seal of a row begins with that of the
+// plan. Files of version 1 have none; they are read as they are, and sealed when they are gone on
+// with or merged.
 
 #include <cstdint>
 #include <functional>
@@ -19,7 +24,7 @@
 namespace palpate::data {
 
 inline constexpr int kSweepApplicationId = 0x504C5053;  ///< "PLPS", PRAGMA application_id
-inline constexpr int kSweepVersion = 1;                 ///< PRAGMA user_version
+inline constexpr int kSweepVersion = 2;                 ///< PRAGMA user_version; 1: no seals
 
 /// Whether a file says at its beginning that it is a sweep's. False for what cannot be read.
 bool is_sweep_file(const std::string& path);
@@ -27,8 +32,8 @@ bool is_sweep_file(const std::string& path);
 class SweepFile {
  public:
   /// Creates the file (0600) or goes on with it, as its only writer. \throws StoreRefused: it holds
-  /// another plan (names every difference), is no sweep's file, damaged, or open for writing
-  /// elsewhere; StoreError: cannot be read or written.
+  /// another plan (names every difference), is no sweep's file, damaged (names the row), or open
+  /// for writing elsewhere; StoreError: cannot be read or written.
   static SweepFile open(const std::string& path, const SweepPlan& plan);
   enum class Writers { any, none };
   /// For reading, also beside its writer; Writers::none: keeps writers away as long as it is open.
@@ -58,6 +63,7 @@ class SweepFile {
  private:
   friend class SweepCopy;
   struct Impl;
+  void rewrite(bool goes_on);
   explicit SweepFile(std::unique_ptr<Impl> impl);
   std::unique_ptr<Impl> impl_;
 };

@@ -3,7 +3,9 @@
 #include <SQLiteCpp/Database.h>
 #include <SQLiteCpp/Statement.h>
 
+#include <bit>
 #include <chrono>
+#include <cmath>
 #include <thread>
 
 #include "tests/data/store/sweep_fixture.h"
@@ -72,6 +74,112 @@ TEST_F(Sweeps, BytesOfAFinishedFileDependOnThePlanAndTheResultsAlone) {
   make_sweep(folder_ / "b.sweep", {1, 4, 2}, true);
   EXPECT_EQ(contents_of(path_), contents_of(folder_ / "b.sweep"));
   EXPECT_FALSE(fs::exists(path_ + "-journal"));
+}
+
+/// Plan and rows as readers get them; empty where the file is refused.
+std::string readable(const std::string& path) {
+  try {
+    SweepFile file = SweepFile::open(path);
+    std::string all = file.plan().protocol + file.plan().program_version;
+    for (const bool recorded : file.recorded()) all += recorded ? '1' : '0';
+    all += std::to_string(file.count()) + " " + std::to_string(file.failed());
+    file.for_each([&](const SweepRow& row) {
+      all += "\n" + std::to_string(row.point) + row.reason + std::to_string(row.seed);
+      for (const SweepValue& value : row.values) {
+        const auto* const number = std::get_if<double>(&value);
+        all += number ? std::to_string(std::bit_cast<std::uint64_t>(*number))
+                      : std::get<std::string>(value);
+      }
+      for (const std::optional<double>& figure : row.figures)
+        all += figure ? std::to_string(std::bit_cast<std::uint64_t>(*figure)) : " -";
+    });
+    return all;
+  } catch (const StoreError& error) {
+    EXPECT_NE(std::string(error.what()).find(path), std::string::npos) << error.what();
+    return "";
+  }
+}
+
+TEST_F(Sweeps, AFlippedBitIsRefusedWithTheRowsNumber) {
+  for (const auto& [sql, said] :
+       {std::pair("UPDATE points SET time_ray_hat = time_ray_hat + 1e-9 WHERE point = 3",
+                  "point 3 does not match its checksum"),
+        {"UPDATE points SET gain_ball = NULL WHERE point = 2", "point 2 does not match"},
+        {"UPDATE points SET \"order\" = 'word 7' WHERE point = 1", "point 1 does not match"},
+        {"UPDATE points SET point = 9 WHERE point = 4", "point 9 does not match"},
+        {"UPDATE points SET status = 'failed', reason = 'x' WHERE point = 4", "point 4 does"},
+        {"UPDATE points SET seal = zeroblob(32) WHERE point = 4", "point 4 does not match"},
+        {"UPDATE sweep SET participants = 4", "the plan does not match its checksum"},
+        {"UPDATE sweep SET seal = zeroblob(32)", "the plan does not match its checksum"}}) {
+    make_sweep(path_, {1, 2, 3, 4});
+    SQLite::Database(path_, SQLite::OPEN_READWRITE).exec(sql);
+    expect_refused([&] { SweepFile::open(path_); }, said);
+    expect_refused([&] { SweepFile::open(path_, a_sweep_plan()); }, said);
+    fs::remove(path_);
+  }
+}
+
+TEST_F(Sweeps, NoFlippedBitGivesOtherValues) {
+  make_sweep(path_, {1, 2, 3, 4, 5}, true);
+  const std::string bytes = contents_of(path_), right = readable(path_);
+  ASSERT_NE(right, "");
+  const std::string flipped = folder_ / "flipped.sweep";
+  int refused = 0, flips = 0;
+  for (std::size_t at = 0; at < bytes.size(); at += 37) {  // prime: all kinds of bytes
+    std::string changed = bytes;
+    changed[at] = static_cast<char>(changed[at] ^ (1 << (flips++ % 8)));
+    write_file(flipped, changed);
+    const std::string found = readable(flipped);
+    refused += found.empty() ? 1 : 0;
+    EXPECT_TRUE(found.empty() || found == right) << "byte " << at;
+  }
+  EXPECT_GT(refused, 20) << "of " << flips << ": many bytes are of no row";
+}
+
+/// As version 1 was written: without seals.
+void make_version_1(const std::string& path, const std::string& from) {
+  SQLite::Database old(path, SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE);
+  old.exec("ATTACH '" + from + "' AS new");
+  const std::string seal = ", seal BLOB NOT NULL CHECK (length(seal) = 32)";
+  for (const char* const table : {"sweep", "points"}) {
+    const std::string name = table;
+    std::string sql =
+        old.execAndGet("SELECT sql FROM new.sqlite_schema WHERE name = '" + name + "'").getString();
+    const std::size_t at = sql.find(seal);
+    ASSERT_NE(at, std::string::npos);
+    old.exec(sql.erase(at, seal.size()));
+    std::string columns;
+    SQLite::Statement find(old, "SELECT name FROM pragma_table_info('" + name + "')");
+    while (find.executeStep())
+      columns += (columns.empty() ? "\"" : ", \"") + find.getColumn(0).getString() + "\"";
+    old.exec("INSERT INTO " + name + " SELECT " + columns + " FROM new." + name);
+  }
+  old.exec("PRAGMA application_id = " + std::to_string(kSweepApplicationId));
+  old.exec("PRAGMA user_version = 1");
+}
+
+TEST_F(Sweeps, FilesOfVersion1AreReadAndSealedWhenTheyAreGoneOnWith) {
+  make_sweep(folder_ / "b.sweep", {1, 2, 4}, true);
+  make_version_1(path_, folder_ / "b.sweep");
+  EXPECT_EQ(readable(path_), readable(folder_ / "b.sweep"));
+  {
+    SweepFile file = SweepFile::open(path_, a_sweep_plan());
+    EXPECT_EQ(file.count(), 3);
+    file.record({a_sweep_row(3)});
+    file.finish();
+  }
+  make_sweep(folder_ / "c.sweep", {1, 2, 3, 4}, true);
+  EXPECT_EQ(contents_of(path_), contents_of(folder_ / "c.sweep"));
+}
+
+TEST_F(Sweeps, WhatSQLiteDoesNotKeepIsSealedAsItIsKept) {
+  SweepRow row = a_sweep_row(1);
+  row.values[0] = -0.0;
+  row.figures[0] = -0.0;
+  row.figures[1] = std::nan("");
+  SweepFile::open(path_, a_sweep_plan()).record({row});
+  SweepFile file = SweepFile::open(path_);
+  EXPECT_EQ(rows_of(file)[0].figures[1], std::nullopt);
 }
 
 TEST_F(Sweeps, WhatDoesNotFitIsRefusedAndNothingOfItIsRecorded) {

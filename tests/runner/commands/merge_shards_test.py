@@ -14,6 +14,8 @@ import tempfile
 import time
 import unittest
 
+from sweep_seals import reseal
+
 PALPATE, PROTOCOLS = pathlib.Path(sys.argv[1]).resolve(), pathlib.Path(sys.argv[2]).resolve()
 
 
@@ -47,7 +49,8 @@ def make_shards(folder, shards, rows):
         with sqlite3.connect(path) as db:
             db.execute("PRAGMA synchronous = OFF")
             db.executemany(insert, ((shard * rows + i + 1, *point[1:figures],
-                                     *(40 * draw.random() for _ in names[figures:])) for i in range(rows)))
+                                     *(40 * draw.random() for _ in names[figures:-1]), bytes(32)) for i in range(rows)))
+            reseal(db)
         db.close()
     return [folder / f"shard{shard + 1}.sweep" for shard in range(shards)]
 

@@ -7,6 +7,7 @@ import unittest
 import xml.etree.ElementTree as xml
 
 from sweep_case import SweepCase
+from sweep_seals import reseal
 
 
 class SweepAnalyses(SweepCase):
@@ -26,7 +27,9 @@ class SweepAnalyses(SweepCase):
                     values |= dict.fromkeys(columns[8:]) | {"status": "failed", "reason": "why"}
                 else:
                     values |= {"gain_ball": row[2], "gain_hat": row[3]}
+                values["seal"] = bytes(32)
                 file.execute(f"INSERT INTO points VALUES ({', '.join('?' * len(columns))})", [values[c] for c in columns])
+            reseal(file)
         file.close()
 
     def analysis(self, name, *more):
