@@ -35,6 +35,12 @@ void make_private_file(const std::string& file) {
   ::close(descriptor);
 }
 
+/// All of the log into the file. \throws SQLite::Exception: the disk is full
+void checkpoint(SQLite::Database& db) {
+  SQLite::Statement all(db, "PRAGMA wal_checkpoint(TRUNCATE)");
+  all.executeStep();
+}
+
 /// \return the path of the backup
 std::string back_up(SQLite::Database& db, const std::string& path, int version) {
   const std::string stem = path + ".v" + std::to_string(version);
@@ -80,6 +86,7 @@ void create_database(const std::string& path) {
     db.exec("PRAGMA application_id = " + std::to_string(kApplicationId));
     set_version(db, kSchemaVersion);
     transaction.commit();
+    checkpoint(db);  // closing does it, too, but cannot say that the disk is full
   });
   if (!rename_if_absent(temporary, path)) {
     throw StoreRefused(path + ": another program created it at the same moment; start again");

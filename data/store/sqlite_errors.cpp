@@ -1,14 +1,36 @@
 #include "data/store/sqlite_errors.h"
 
 #include <sqlite3.h>
+#include <sys/statvfs.h>
+
+#include <filesystem>
 
 #include "data/errors.h"
 
 namespace palpate::data {
+namespace {
+
+/// SQLite reports a full disk as such only where it writes a page; not for the memory that it maps.
+bool disk_is_full(const std::string& path) {
+  constexpr unsigned long kMappedAtOnce = 32'768;  // bytes, of a -shm
+  const std::string folder = std::filesystem::path(path).parent_path().string();
+  struct statvfs disk {};
+  return ::statvfs(folder.empty() ? "." : folder.c_str(), &disk) == 0 &&
+         disk.f_bavail * disk.f_frsize < 2 * kMappedAtOnce;
+}
+
+/// \return the primary result code
+int cause_of(const std::string& path, const SQLite::Exception& error) {
+  const int code = error.getErrorCode() & 0xff;
+  const bool may_be_full = code == SQLITE_IOERR || code == SQLITE_CANTOPEN;
+  return may_be_full && disk_is_full(path) ? SQLITE_FULL : code;
+}
+
+}  // namespace
 
 void raise_store_error(const std::string& path, const SQLite::Exception& error) {
   const std::string detail = std::string(" (SQLite: ") + error.what() + ")";
-  switch (error.getErrorCode()) {
+  switch (cause_of(path, error)) {
     case SQLITE_NOTADB:
       throw StoreRefused(path + ": is not a palpate database" + detail +
                          "; name another file, or restore it from a backup");

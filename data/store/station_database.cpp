@@ -106,6 +106,12 @@ void StationDatabase::take_copy(const std::string& scratch) {
   } catch (const StoreError& error) {
     throw StoreError(renamed(error.what(), scratch, path_));
   }
+  // It is read without its log, which closing has written into it unless the disk is full.
+  std::error_code none;
+  if (const auto left = fs::file_size(scratch + "-wal", none); !none && left > 0) {
+    throw StoreError(path_ + ": cannot be copied to " + scratch +
+                     ": the disk is full; free some space there");
+  }
 }
 
 void StationDatabase::require_unchanged() const {

@@ -11,8 +11,9 @@
 #include <functional>
 
 #include "data/export/csv.h"
+#include "data/merge/merge.h"
 #include "data/store/store.h"
-#include "tests/data/store/store_fixture.h"
+#include "tests/data/store/sweep_fixture.h"
 
 namespace palpate::data {
 namespace {
@@ -99,6 +100,56 @@ TEST(StoreFault, AFullDiskSavesNothingOfTheTrialAndTheSessionResumesAfterwards) 
     record.attempt = store.begin_attempt(again, record, 1);
     store.finish_attempt(again, record);
     EXPECT_EQ(store.progress(person, 1).completed.size(), static_cast<std::size_t>(lost));
+  });
+  if (!possible) GTEST_SKIP() << "no small disk may be mounted here";
+}
+
+/// Creates with ever more room, from none on. Where it fails, it says that the disk is full, and
+/// works after room was made. \param name  of what appears whole or not at all
+void expect_whole_or_not_at_all(const TemporaryFolder& folder, const std::string& name,
+                                const std::function<void(const std::string& path)>& create,
+                                const std::function<void(const std::string& path)>& read) {
+  int failed = 0, done = 0;
+  for (std::size_t room = 4096; room <= 700'000 && done < 3; room += 8192) {
+    const std::string path = folder / name, ballast = folder / "ballast";
+    write_file(ballast, std::string((1U << 20U) - room, 'x'));
+    const std::string error = error_of([&] { create(path); });
+    if (error.empty()) {
+      ++done;
+    } else {
+      ++failed;
+      EXPECT_TRUE(contains(error, "disk is full") || contains(error, "No space left")) << error;
+      EXPECT_TRUE(contains(error, name)) << error;
+    }
+    fs::remove(ballast);
+    EXPECT_EQ(error_of([&] { create(path); }), "") << room << " bytes free, then: " << error;
+    EXPECT_EQ(error_of([&] { read(path); }), "") << room;
+    for (const auto& entry : fs::directory_iterator(folder.path())) fs::remove_all(entry.path());
+  }
+  EXPECT_GT(failed, 3);
+  EXPECT_EQ(done, 3);
+}
+
+TEST(StoreFault, AFullDiskLeavesNoBrokenFileUnderItsFinalName) {
+  const TemporaryFolder folder, elsewhere;
+  const std::string station = elsewhere / "station.db";
+  {
+    Store store = open_to_write(station);
+    store.begin_run(store.enrol(a_protocol(), "A"), a_run());
+  }
+  const bool possible = on_a_small_disk(folder.path(), [&] {
+    const auto reads = [](const std::string& path) { Store::open(path, Store::Mode::read_only); };
+    expect_whole_or_not_at_all(
+        folder, "study.db", [](const std::string& path) { open_to_write(path); }, reads);
+    expect_whole_or_not_at_all(
+        folder, "merged.db",
+        [&](const std::string& path) {
+          if (!fs::exists(path)) merge(path, {station});
+        },
+        reads);
+    expect_whole_or_not_at_all(
+        folder, "a.sweep", [](const std::string& path) { SweepFile::open(path, a_sweep_plan()); },
+        [](const std::string& path) { SweepFile::open(path); });
   });
   if (!possible) GTEST_SKIP() << "no small disk may be mounted here";
 }
