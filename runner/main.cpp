@@ -9,6 +9,7 @@
 //   rendering/renderer.cpp        point or ray; rendering/tick.h, rendering/facet_walk.cpp
 
 #include <fcntl.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cstdio>
@@ -124,6 +125,7 @@ int run(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  ::umask(0077);  // all that is written is the user's alone, folders as well
   occupy_standard_descriptors();
   try {
     const int status = run(argc, argv);

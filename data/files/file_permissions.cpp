@@ -65,6 +65,30 @@ void require_private_sqlite_files(const std::string& file) {
   }
 }
 
+std::string ownership_fault(const std::string& path) {
+  namespace fs = std::filesystem;
+  struct stat found {};
+  if (::lstat(path.c_str(), &found) != 0) return "is not there";
+  if (!S_ISREG(found.st_mode) && !S_ISDIR(found.st_mode)) return "is a link or no regular file";
+  const std::string owner = " belongs to another user (number ";
+  if (found.st_uid != ::geteuid()) return owner.substr(1) + std::to_string(found.st_uid) + ")";
+  if (S_ISREG(found.st_mode) && found.st_nlink > 1) return "has another name (a hard link)";
+  if (others_may_write(found))
+    return "can be written by others (mode " + octal(found.st_mode) + ")";
+  std::error_code error;
+  fs::path above = fs::canonical(path, error).parent_path();
+  if (error) return "cannot be followed: " + error.message();
+  for (;; above = above.parent_path()) {
+    const std::string folder = "is in " + above.string() + ", which";
+    if (::stat(above.c_str(), &found) != 0) return folder + " cannot be read";
+    if (is_foreign(found.st_uid)) return folder + owner + std::to_string(found.st_uid) + ")";
+    // In a sticky folder nobody can replace what is ours.
+    if (others_may_write(found) && (found.st_mode & S_ISVTX) == 0)
+      return folder + " others can write to (mode " + octal(found.st_mode) + ")";
+    if (above == above.parent_path()) return "";
+  }
+}
+
 std::string access_warning(const std::string& database) {
   std::error_code error;
   const std::filesystem::path file =

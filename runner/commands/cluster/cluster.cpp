@@ -1,5 +1,8 @@
 // `palpate cluster`: a sweep, a study or a plan as one array job on Slurm.
 
+#include <sys/stat.h>
+#include <unistd.h>
+
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -51,6 +54,11 @@ fs::path make_folder(const ClusterSettings& settings) {
   if (fs::exists(folder) && !(fs::is_directory(folder) && fs::is_empty(folder)))
     throw UsageError("--dir " + settings.folder +
                      ": exists and is not empty; 'palpate cluster submit' goes on with a folder");
+  fs::create_directories(folder);
+  struct stat found {};
+  if (::stat(folder.c_str(), &found) != 0 || found.st_uid != ::geteuid())
+    throw UsageError("--dir " + settings.folder + ": belongs to another user; name a new folder");
+  fs::permissions(folder, fs::perms::owner_all);  // of an empty one that was there
   fs::create_directories(folder / "parts");
   fs::create_directories(folder / "logs");
   return folder;

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "data/base/json_text.h"
+#include "data/files/file_permissions.h"
 #include "data/store/store.h"
 #include "data/store/sweep_file.h"
 #include "protocols/json_document.h"
@@ -46,7 +47,7 @@ std::int64_t recorded_in(const ClusterJob& job, const std::string& path) {
 }  // namespace
 
 void write_script(const fs::path& path, const std::string& text) {
-  write_whole(path.string(), "#!/bin/bash\n" + text);
+  write_whole(path.string(), "#!/bin/bash\numask 077\n" + text);
   ::chmod(path.c_str(), 0700);
 }
 
@@ -147,7 +148,30 @@ std::int64_t recorded_units(const std::vector<ShardState>& states) {
   return sum;
 }
 
+void require_own_scripts(const fs::path& folder) {
+  std::vector<fs::path> all{folder,
+                            folder / "parts",
+                            folder / "logs",
+                            folder / "cluster.json",
+                            folder / "shard.sh",
+                            folder / "finish.sh"};
+  if (const fs::path inputs = folder / "inputs"; fs::exists(inputs)) {
+    all.push_back(inputs);
+    for (const auto& entry : fs::recursive_directory_iterator(inputs)) all.push_back(entry.path());
+  }
+  for (const fs::path& path : all) {
+    const std::string fault = data::ownership_fault(path.string());
+    if (fault.empty()) continue;
+    throw UsageError(
+        path.string() + ": " + fault +
+        "; what another user put there would run as yours. If all of it is as you left "
+        "it: chmod -R go-w " +
+        shell_quoted(folder.string()));
+  }
+}
+
 void submit_shards(const fs::path& folder, ClusterJob& job) {
+  require_own_scripts(folder);
   const std::vector<ShardState> states = shard_states(folder, job);
   std::vector<std::int64_t> todo;
   for (std::size_t i = 0; i < states.size(); ++i) {
