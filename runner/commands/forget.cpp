@@ -43,8 +43,9 @@ void print(const data::ParticipantSummary& holdings, const std::string& code,
   }
   list_exports(holdings, database, std::cout);
   if (!holdings.remaining_copies.empty()) {
-    std::cout << "These lie beside the database or its exports and name " << code
-              << "; they are not changed: delete them, or give the command for each database:\n";
+    std::cout << "These lie beside the database or its exports and hold " << code
+              << ", or may; they are not changed: delete them, or give the command for each "
+                 "database:\n";
     for (const std::string& path : holdings.remaining_copies) {
       std::cout << "  " << stimuli::printable(path) << "\n";
     }

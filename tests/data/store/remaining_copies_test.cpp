@@ -30,6 +30,33 @@ TEST(RemainingCopies, CopiesTablesAndReportsBesideTheDatabaseAreNamed) {
                                 folder / "trials.csv"}));
 }
 
+TEST(RemainingCopies, FiguresInFoldersAndBackupsUnderAnyNameAreNamed) {
+  const TemporaryFolder folder;
+  const std::string path = folder / "v2.db";
+  Store store = Store::open(path, Store::Mode::write_or_create);
+  store.enrol(a_protocol(), "P07");
+  store.enrol(a_protocol(), "P08");
+  std::filesystem::create_directories(folder / "figures/more");
+  write_file(folder / "figures/figure15.svg", "<text>P07</text>");
+  write_file(folder / "figures/figure16.svg", "<text>P08</text>");
+  write_file(folder / "figures/more/plot.svg", "<text>P07</text>");
+  // Copied while it was open: the rows are in the log.
+  ASSERT_GT(std::filesystem::file_size(path + "-wal"), 0U);
+  std::filesystem::copy_file(path, folder / "backup-v2.db");
+  std::filesystem::copy_file(path + "-wal", folder / "backup-v2.db-wal");
+  const std::string log = contents_of(path + "-wal");
+  EXPECT_NE(log.find("P07"), std::string::npos);
+  write_file(folder / "v2.db~", std::string("SQLite format 3\0damaged P07a", 28));
+  write_file(folder / "v2.db.gz", "\x1f\x8b\x08");
+  write_file(folder / "other.zip", "PK\x03\x04");
+  write_file(folder / "v2.db.csv", "participant_id\r\nP08\r\n");
+  const ParticipantSummary found = store.participant_summary("P07");
+  EXPECT_EQ(found.remaining_copies,
+            (std::vector<std::string>{folder / "backup-v2.db-wal", folder / "figures/figure15.svg",
+                                      folder / "figures/more/plot.svg", folder / "v2.db.gz",
+                                      folder / "v2.db~"}));
+}
+
 TEST(RemainingCopies, OfTextsAreLookedForUpTo256MiB) {
   const TemporaryFolder folder;
   const std::string path = folder / "s.db";
