@@ -71,6 +71,19 @@ TEST_F(ProtocolFiles, ChangedInTheDatabaseIsFoundByEveryReader) {
   }
 }
 
+TEST_F(ProtocolFiles, ATextThatNestsTooDeepIsRefusedByEveryReader) {
+  ProtocolInfo deep = a_protocol();
+  deep.text =
+      R"({"version": 1, "deep": )" + std::string(200'000, '[') + std::string(200'000, ']') + "}";
+  deep.sha256 = checksum_hex(deep.text);
+  open().enrol(deep, "P1");
+  for (const Store::Mode mode : {Store::Mode::read_only, Store::Mode::write_or_create}) {
+    const std::string message = error_of([&] { Store::open(path_, mode); });
+    EXPECT_TRUE(contains(message, path_) && contains(message, "at most 64 deep")) << message;
+  }
+  EXPECT_TRUE(contains(error_of([&] { merge(folder_ / "all.db", {path_}); }), "64 deep"));
+}
+
 TEST_F(ProtocolFiles, AreMergedAndToldApart) {
   const std::string other = folder_ / "other.db";
   open().enrol(with_files("v 0 0 0"), "P1");

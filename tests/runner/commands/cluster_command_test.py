@@ -268,6 +268,57 @@ class Cluster(unittest.TestCase):
             subprocess.run([self.folder / "d" / words[0], *words[1:]], check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         self.assertEqual((self.folder / "d/all.sweep").read_bytes(), (self.folder / "one.sweep").read_bytes())
 
+    def test_all_is_private_whatever_the_umask(self):
+        (self.folder / "there").mkdir(mode=0o777)
+        (self.folder / "there").chmod(0o777)
+        before = os.umask(0)
+        try:
+            for folder in ("new", "there"):
+                self.palpate("cluster", "sweep", *self.PLAN, "--shards", 2, "--dir", folder)
+            self.palpate("simulate", PROTOCOLS / "quick.json", "--db", "s.db", "--participants", 2)
+            self.palpate("analyze", "--db", "s.db", "--figures", "figures/of/it", "--report", "r.html")
+            self.palpate("export", "--db", "s.db", "--format", "bids", "--out", "bids")
+        finally:
+            os.umask(before)
+        paths = [p for name in ("new", "there", "figures", "bids", "s.db", "r.html")
+                 for p in (self.folder / name, *(self.folder / name).rglob("*"))]
+        self.assertIn(self.folder / "new/analysis.txt", paths)
+        self.assertIn(self.folder / "there/inputs/protocol.json", paths)
+        open_to_others = {str(p): oct(p.stat().st_mode) for p in paths if p.stat().st_mode & 0o077}
+        self.assertEqual(open_to_others, {})
+
+    def test_scripts_that_others_can_change_are_not_submitted(self):
+        self.palpate("cluster", "sweep", *self.PLAN, "--shards", 2, "--dir", "d", "--no-submit")
+        d = self.folder / "d"
+
+        def refused(said):
+            text = self.palpate("cluster", "submit", "d", status=2)
+            self.assertIn(said, text)
+            self.assertFalse((self.slurm / "calls").exists())
+
+        for name in ("shard.sh", "finish.sh", "cluster.json", "inputs/protocol.json", "inputs", "parts", "logs", "."):
+            mode = (d / name).stat().st_mode
+            (d / name).chmod(mode | 0o002)
+            refused("can be written by others")
+            (d / name).chmod(mode)
+        self.folder.chmod(0o777)
+        refused("others can write to")
+        self.folder.chmod(0o1777)  # nobody else can rename what is in it
+        (d / "shard.sh").rename(d / "own.sh")
+        (d / "shard.sh").symlink_to("own.sh")
+        refused("is a link")
+        (d / "shard.sh").unlink()
+        os.link(d / "own.sh", d / "shard.sh")
+        refused("hard link")
+        (d / "own.sh").unlink()
+        if os.geteuid() == 0:
+            for path in (d / "finish.sh", d):
+                os.chown(path, 64321, 64321)
+                refused("belongs to another user")
+                os.chown(path, 0, 0)
+        self.palpate("cluster", "submit", "d")
+        self.assertTrue((d / "analysis.txt").exists())
+
     def test_wrong_usage(self):
         for arguments, said in (([], "expected sweep, simulate, plan, status or submit"), (["run"], "found 'run'"), (["status"], "one folder"),
                                 (["status", "none"], "cluster.json"), (["sweep", *self.PLAN, "--dir", "x"], "shards"),
