@@ -26,8 +26,8 @@ TEST(RemainingCopies, CopiesTablesAndReportsBesideTheDatabaseAreNamed) {
   write_file(folder / "damaged.db", std::string("SQLite format 3\0 P07", 20));
   EXPECT_EQ(
       Store::open(path, Store::Mode::write_or_create).participant_summary("P07").remaining_copies,
-      (std::vector<std::string>{folder / "bids", folder / "report.html", folder / "s.db.bak",
-                                folder / "trials.csv"}));
+      (std::vector<std::string>{folder / "bids", folder / "damaged.db", folder / "report.html",
+                                folder / "s.db.bak", folder / "trials.csv"}));
 }
 
 TEST(RemainingCopies, FiguresInFoldersAndBackupsUnderAnyNameAreNamed) {
