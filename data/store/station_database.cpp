@@ -26,6 +26,14 @@ std::string renamed(std::string message, const std::string& copy, const std::str
   return message;
 }
 
+/// Copying on a full disk may fail with another error.
+std::string cause_of(const std::error_code& error, const std::string& copy) {
+  constexpr std::uintmax_t kFull = 65'536;  // bytes
+  std::error_code unknown;
+  const fs::space_info disk = fs::space(fs::path(copy).parent_path(), unknown);
+  return !unknown && disk.available < kFull ? "the disk is full" : error.message();
+}
+
 }  // namespace
 
 StationDatabase::FileState StationDatabase::state_of_file(const std::string& file) {
@@ -94,7 +102,8 @@ void StationDatabase::take_copy(const std::string& scratch) {
     if (!fs::exists(file_ + end)) continue;
     fs::copy_file(file_ + end, scratch + end, error);
     if (error) {
-      throw StoreError(path_ + ": cannot be copied to " + scratch + ": " + error.message() +
+      throw StoreError(path_ + ": cannot be copied to " + scratch + ": " +
+                       cause_of(error, scratch) +
                        "; check the permissions and the free space there");
     }
     fs::permissions(scratch + end, fs::perms::owner_read | fs::perms::owner_write, error);
@@ -104,7 +113,7 @@ void StationDatabase::take_copy(const std::string& scratch) {
   } catch (const StoreRefused& error) {
     throw StoreRefused(renamed(error.what(), scratch, path_));
   } catch (const StoreError& error) {
-    throw StoreError(renamed(error.what(), scratch, path_));
+    throw StoreError(path_ + ": cannot be read through a copy: " + error.what());
   }
   // It is read without its log, which closing has written into it unless the disk is full.
   std::error_code none;
