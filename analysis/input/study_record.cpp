@@ -45,7 +45,7 @@ void add_trial(const data::TrialRecord& record, ServoQuality& servo) {
 }  // namespace
 
 std::string title_of_protocol(const std::string& text) {
-  const auto json = nlohmann::json::parse(text, nullptr, false);
+  const auto json = data::json_or_discarded(text);
   if (!json.is_object() || !json.contains("title") || !json["title"].is_string()) return "";
   return json["title"].get<std::string>();
 }

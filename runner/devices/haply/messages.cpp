@@ -9,6 +9,8 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
+#include "data/base/json_text.h"
+
 namespace palpate::runner::haply {
 namespace {
 
@@ -18,16 +20,8 @@ constexpr std::array<const char*, 3> kGrips = {"verse_grip", "wireless_verse_gri
                                                "custom_verse_grip"};
 
 Json parsed(std::string_view text, const char* what) {
-  constexpr int kDeepest = 32;
-  bool too_deep = false;
-  Json out = Json::parse(
-      text.begin(), text.end(),
-      [&too_deep](int depth, Json::parse_event_t, Json&) {
-        too_deep = too_deep || depth > kDeepest;
-        return true;
-      },
-      false);
-  if (out.is_discarded() || !out.is_object() || too_deep)
+  Json out = data::json_or_discarded(text);
+  if (!out.is_object())
     throw std::runtime_error(std::string("expected ") + what +
                              " as a JSON object from the service");
   return out;
