@@ -15,8 +15,8 @@ using nlohmann::json;
 
 constexpr std::array<std::string_view, 4> kTexts = {"$schema", "title", "description", "texts"};
 constexpr std::array<std::string_view, 15> kDesign = {
-    "renderers",   "renderer_order",  "stimuli",  "repetitions", "order", "blocks_per_renderer",
-    "orientation", "practice",        "sessions", "material",    "tool",  "reach",
+    "renderers",   "renderer_order",   "stimuli",  "repetitions", "order", "blocks_per_renderer",
+    "orientation", "practice",         "sessions", "material",    "tool",  "reach",
     "seed",        "gravity_m_per_s2", "torque"};
 
 template <std::size_t n>

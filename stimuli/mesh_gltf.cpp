@@ -29,7 +29,7 @@ constexpr int kMostNested = 100;  // nodes within nodes
 // memory out of proportion to its size. Data that are named once have fewer than one for each byte.
 constexpr std::size_t kAlwaysRead = 1U << 17U;
 constexpr std::size_t kLongestName = 256;  // bytes; every primitive is named after its node
-constexpr double kUnitError = 1e-3;  // of a quaternion's length: what a few digits leave
+constexpr double kUnitError = 1e-3;        // of a quaternion's length: what a few digits leave
 
 double number_at(const GltfValue& list, std::size_t i) { return list.element(i).number(); }
 

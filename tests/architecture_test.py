@@ -108,8 +108,6 @@ PUBLIC = {
     "runner/sound": "masking_noise",
     "runner/devices": "mouse registry replay self_test simulated",
     "runner/devices/falcon": "homing open registration weighing",
-    "runner/devices/forcedimension": "forcedimension",
-    "runner/devices/haply": "inverse3",
     "runner/display": "display explore_window mailbox text_display timeline touch_source window",
     "runner/display/scene": "camera display_error image_file painter scene_drawing scene_renderer",
     "runner/participants": "keyboard respondent response_box settings_document simulated simulated_settings task_participant",

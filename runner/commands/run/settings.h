@@ -10,7 +10,8 @@ namespace palpate::runner {
 struct RunSettings {
   std::string protocol, database, participant, device;
   std::optional<int> number, session;
-  std::string consent, hand, firmware, library, service, changed_protocol, calibration, sound_device = "default";
+  std::string consent, hand, firmware, library, service, changed_protocol, calibration,
+      sound_device = "default";
   std::vector<std::string> serials, markers;
   std::optional<double> response_latency;            ///< s, measured; recorded, never subtracted
   int participant_monitor = 0, console_monitor = 0;  ///< from 1; 0: as it comes
