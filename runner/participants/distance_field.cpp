@@ -38,11 +38,11 @@ Vec3 nearest_on_triangle(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3
 /// The nodes while they are worked out.
 class Filling {
  public:
-  Filling(const Vec3& low, double spacing, const std::array<std::size_t, 3>& count)
+  Filling(const Vec3& low, double spacing, const std::array<int, 3>& count)
       : low_(low),
         spacing_(spacing),
-        count_{static_cast<int>(count[0]), static_cast<int>(count[1]), static_cast<int>(count[2])},
-        inside_(count[0] * count[1] * count[2], 0),
+        count_(count),
+        inside_(size(count[0]) * size(count[1]) * size(count[2]), 0),
         distance_(inside_.size(), kUnknown),
         depth_(inside_.size(), kUnknown) {}
 
@@ -61,8 +61,9 @@ class Filling {
  private:
   using Range = std::array<int, 2>;  // nodes, first and last
 
+  static std::size_t size(int count) { return static_cast<std::size_t>(count); }
   std::size_t index(int x, int y, int z) const {
-    return static_cast<std::size_t>((z * count_[1] + y) * count_[0] + x);
+    return (size(z) * size(count_[1]) + size(y)) * size(count_[0]) + size(x);
   }
   Vec3 place(int x, int y, int z) const { return low_ + spacing_ * Vec3(x, y, z); }
   Range range(double low, double high, std::size_t axis) const {
@@ -312,28 +313,14 @@ DistanceField::DistanceField(const std::vector<PlacedPart>& parts) {
   low_ = low - Vec3(margin_);
   for (std::size_t a = 0; a < 3; ++a) {
     const auto axis = static_cast<int>(a);
-    count_[a] = static_cast<std::size_t>(std::ceil((size[axis] + 2 * margin_) / spacing_)) + 1;
+    count_[a] = static_cast<std::int32_t>(std::ceil((size[axis] + 2 * margin_) / spacing_)) + 1;
     origin_[a] = static_cast<float>(low_[axis]);
     last_[a] = static_cast<float>(count_[a] - 1);
-    high_[axis] = low_[axis] + spacing_ * static_cast<double>(count_[a] - 1);
+    high_[axis] = low_[axis] + spacing_ * (count_[a] - 1);
   }
   per_spacing_ = static_cast<float>(1 / spacing_);
   step_ = static_cast<float>(spacing_);
   nodes_ = Filling(low_, spacing_, count_).run(parts);
-}
-
-DistanceField::Value DistanceField::value(float x, float y, float z) const {
-  const Place at = place(x, y, z);
-  const std::array<float, 8> v = corners(at);
-  const auto mix = [](float a, float b, float t) { return a + t * (b - a); };
-  const float x00 = mix(v[0], v[1], at.x), x10 = mix(v[2], v[3], at.x);
-  const float x01 = mix(v[4], v[5], at.x), x11 = mix(v[6], v[7], at.x);
-  const float y0 = mix(x00, x10, at.y), y1 = mix(x01, x11, at.y);
-  const float dx =
-      mix(mix(v[1] - v[0], v[3] - v[2], at.y), mix(v[5] - v[4], v[7] - v[6], at.y), at.z);
-  const float dy = mix(x10 - x00, x11 - x01, at.z);
-  return {mix(y0, y1, at.z) + at.beyond, dx * per_spacing_, dy * per_spacing_,
-          (y1 - y0) * per_spacing_};
 }
 
 }  // namespace palpate::runner

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <memory>
 #include <vector>
 
@@ -55,46 +56,61 @@ class DistanceField {
   };
   float distance(float x, float y, float z) const {
     const Place at = place(x, y, z);
-    const std::array<float, 8> v = corners(at);
-    const float x00 = v[0] + at.x * (v[1] - v[0]), x10 = v[2] + at.x * (v[3] - v[2]);
-    const float x01 = v[4] + at.x * (v[5] - v[4]), x11 = v[6] + at.x * (v[7] - v[6]);
-    const float y0 = x00 + at.y * (x10 - x00), y1 = x01 + at.y * (x11 - x01);
-    return y0 + at.z * (y1 - y0) + at.beyond;
+    const Corners v = corners(at);
+    const float y0 = mix(mix(v.v000, v.v100, at.x), mix(v.v010, v.v110, at.x), at.y);
+    const float y1 = mix(mix(v.v001, v.v101, at.x), mix(v.v011, v.v111, at.x), at.y);
+    return mix(y0, y1, at.z) + at.beyond;
   }
-  Value value(float x, float y, float z) const;
+  Value value(float x, float y, float z) const {
+    const Place at = place(x, y, z);
+    const Corners v = corners(at);
+    const float x00 = mix(v.v000, v.v100, at.x), x10 = mix(v.v010, v.v110, at.x);
+    const float x01 = mix(v.v001, v.v101, at.x), x11 = mix(v.v011, v.v111, at.x);
+    const float y0 = mix(x00, x10, at.y), y1 = mix(x01, x11, at.y);
+    const float dx = mix(mix(v.v100 - v.v000, v.v110 - v.v010, at.y),
+                         mix(v.v101 - v.v001, v.v111 - v.v011, at.y), at.z);
+    const float dy = mix(x10 - x00, x11 - x01, at.z);
+    return {mix(y0, y1, at.z) + at.beyond, dx * per_spacing_, dy * per_spacing_,
+            (y1 - y0) * per_spacing_};
+  }
 
  private:
+  // Written so that loops over lanes are vectorised: whole numbers of 32 bits, no branches.
+  struct Coordinate {
+    std::int32_t cell;
+    float fraction;  // within the cell
+    float off;       // m, out of the grid
+  };
+  Coordinate coordinate(std::size_t axis, float p) const {
+    const float steps = (p - origin_[axis]) * per_spacing_;
+    const float inside = lane::min(lane::max(steps, 0.0F), last_[axis]);
+    const auto cell = static_cast<std::int32_t>(lane::min(inside, last_[axis] - 1));
+    return {cell, inside - static_cast<float>(cell), (steps - inside) * step_};
+  }
   struct Place {
-    std::size_t node;  // the lowest of its cell
-    float x, y, z;     // fractions within the cell
-    float beyond;      // m, out of the grid
+    std::int32_t node;  // the lowest of its cell
+    float x, y, z;      // fractions within the cell
+    float beyond;       // m, out of the grid
   };
   Place place(float x, float y, float z) const {
-    const std::array<float, 3> p{x, y, z};
-    std::array<std::size_t, 3> cell{};
-    std::array<float, 3> fraction{};
-    float beyond2 = 0;
-    for (std::size_t a = 0; a < 3; ++a) {
-      const float steps = (p[a] - origin_[a]) * per_spacing_;
-      const float inside = lane::min(lane::max(steps, 0.0F), last_[a]);
-      const float off = (steps - inside) * step_;
-      beyond2 += off * off;
-      cell[a] = static_cast<std::size_t>(lane::min(inside, last_[a] - 1));
-      fraction[a] = inside - static_cast<float>(cell[a]);
-    }
-    return {(cell[2] * count_[1] + cell[1]) * count_[0] + cell[0], fraction[0], fraction[1],
-            fraction[2], beyond2 > 0 ? std::sqrt(beyond2) : 0.0F};
+    const Coordinate a = coordinate(0, x), b = coordinate(1, y), c = coordinate(2, z);
+    return {(c.cell * count_[1] + b.cell) * count_[0] + a.cell, a.fraction, b.fraction, c.fraction,
+            std::sqrt(a.off * a.off + b.off * b.off + c.off * c.off)};
   }
-  std::array<float, 8> corners(const Place& at) const {
-    const float* const n = nodes_.data() + at.node;
-    const std::size_t up = count_[0] * count_[1];
-    return {n[0],  n[1],      n[count_[0]],      n[count_[0] + 1],
-            n[up], n[up + 1], n[up + count_[0]], n[up + count_[0] + 1]};
+  struct Corners {
+    float v000, v100, v010, v110, v001, v101, v011, v111;
+  };
+  Corners corners(const Place& at) const {
+    const float* const n = nodes_.data();
+    const std::int32_t row = count_[0], up = row * count_[1], i = at.node;
+    return {n[i],      n[i + 1],      n[i + row],      n[i + row + 1],
+            n[i + up], n[i + up + 1], n[i + up + row], n[i + up + row + 1]};
   }
+  static float mix(float a, float b, float t) { return a + t * (b - a); }
 
   Vec3 low_, high_;
   double spacing_ = 0, margin_ = 0;
-  std::array<std::size_t, 3> count_{};  // nodes
+  std::array<std::int32_t, 3> count_{};  // nodes
   std::array<float, 3> origin_{}, last_{};
   float per_spacing_ = 0, step_ = 0;
   std::vector<float> nodes_;  // m, x fastest

@@ -36,49 +36,62 @@ class SolidLine : public RotatedLine {
 
 /// A solid that is not convex may have several local minima along the line. Steps of at most
 /// `kPlaces` to its length, longer where the distance, which changes by a metre a metre at most,
-/// leaves nothing to be found; then closer around the least. Within 0.5 mm of the minimum.
+/// leaves nothing to be found; then closer around the least. Within 0.5 mm of the minimum. All
+/// hypotheses take a step at a time: one would wait for the grid's memory at each.
 inline void find_along_line(const SolidLine& shape, float length, Deepest& out) {
+  constexpr int kBlock = ShapeHypotheses::kBlock;
   constexpr int kPlaces = 16;
   constexpr int kHalvings = 5;
   const float step = length / kPlaces;
-  for (int i = 0; i < ShapeHypotheses::kBlock; ++i) {
-    float best = 0, least = shape.distance(i, 0);
-    for (float s = step; s < length + 0.5f * step;) {
-      const float place = lane::min(s, length);
+  const float end = length + 0.5f * step;
+  float best[kBlock], least[kBlock], next[kBlock];
+  for (int i = 0; i < kBlock; ++i) {
+    best[i] = 0;
+    next[i] = step;
+    least[i] = shape.distance(i, 0);
+  }
+  for (bool more = true; more;) {
+    int going_on = 0;
+    for (int i = 0; i < kBlock; ++i) {
+      const bool within = next[i] < end;
+      const float place = lane::min(next[i], length);
       const float d = shape.distance(i, place);
-      if (d < least) {
-        least = d;
-        best = place;
-      }
-      s += lane::max(step, d - least);
+      const bool closer = within && d < least[i];
+      least[i] = closer ? d : least[i];
+      best[i] = closer ? place : best[i];
+      next[i] += lane::max(step, d - least[i]);
+      going_on += next[i] < end ? 1 : 0;
     }
-    float reach = 0.5f * step;
-    for (int k = 0; k < kHalvings; ++k, reach *= 0.5f) {
-      const float before = lane::max(best - reach, 0.0f);
-      const float after = lane::min(best + reach, length);
+    more = going_on > 0;
+  }
+  float reach = 0.5f * step;
+  for (int k = 0; k < kHalvings; ++k, reach *= 0.5f) {
+    for (int i = 0; i < kBlock; ++i) {
+      const float before = lane::max(best[i] - reach, 0.0f);
+      const float after = lane::min(best[i] + reach, length);
       const float a = shape.distance(i, before), b = shape.distance(i, after);
-      if (a < least && a <= b) {
-        least = a;
-        best = before;
-      } else if (b < least) {
-        least = b;
-        best = after;
-      }
+      const bool back = a < least[i] && a <= b;
+      const bool on = !back && b < least[i];
+      least[i] = back ? a : on ? b : least[i];
+      best[i] = back ? before : on ? after : best[i];
     }
-    SurfacePoint p = shape.surface(i, best);
+  }
+  for (int i = 0; i < kBlock; ++i) {
+    const SurfacePoint p = shape.surface(i, best[i]);
     // Between the ends a contact's normal is perpendicular to the line.
-    if (best > 0 && best < length) {
-      const FloatVec u = shape.along(i);
-      const float slope = dot(p.normal, u);
-      p.normal = SolidLine::unit(
-          {p.normal.x - slope * u.x, p.normal.y - slope * u.y, p.normal.z - slope * u.z});
-    }
+    const bool between = best[i] > 0 && best[i] < length;
+    const FloatVec u = shape.along(i);
+    const float slope = dot(p.normal, u);
+    const FloatVec across = SolidLine::unit(
+        {p.normal.x - slope * u.x, p.normal.y - slope * u.y, p.normal.z - slope * u.z});
+    const FloatVec n{between ? across.x : p.normal.x, between ? across.y : p.normal.y,
+                     between ? across.z : p.normal.z};
     out.distance[i] = p.distance;
-    out.cosine[i] = shape.cosine(i, p.normal);
-    out.along[i] = best;
-    out.x[i] = p.normal.x;
-    out.y[i] = p.normal.y;
-    out.z[i] = p.normal.z;
+    out.cosine[i] = shape.cosine(i, n);
+    out.along[i] = best[i];
+    out.x[i] = n.x;
+    out.y[i] = n.y;
+    out.z[i] = n.z;
   }
 }
 

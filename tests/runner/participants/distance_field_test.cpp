@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <limits>
@@ -108,8 +109,7 @@ TEST(DistanceField, FarAwayItGrowsByAMetreAMetre) {
   test::distance_at(field, Vec3(std::nan(""), 0, std::numeric_limits<double>::infinity()));
 }
 
-// The least distance along a stylus, by looking everywhere.
-TEST(SolidLine, FindsTheDeepestPlaceOfAConcaveShape) {
+stimuli::ObjectSpec ell_of_boxes() {
   stimuli::ObjectSpec ell;
   ell.shape = stimuli::ShapeKind::compound;
   stimuli::ObjectSpec arm;
@@ -120,24 +120,80 @@ TEST(SolidLine, FindsTheDeepestPlaceOfAConcaveShape) {
   arm.size = Vec3(0.02, 0.06, 0.03);
   arm.pose.position = Vec3(0.01, 0.03, 0);
   ell.parts.push_back(arm);
-  const ShapeHypotheses hypotheses({ell});
+  return ell;
+}
+
+/// A stylus about hypotheses of a shape, and the first one of a block.
+struct Touch {
+  Vec3 tip, along;
+  Line line;
+  int first;
+
+  Touch(const ShapeHypotheses::Shape& shape, stimuli::Random& random)
+      : tip(point_around(random, Vec3(0), 0.06)),
+        along(glm::normalize(Vec3(random.normal(), random.normal(), random.normal()))),
+        line{to_float(tip), to_float(along), 0.12F, to_float(along)},
+        first(shape.first + ShapeHypotheses::kBlock * static_cast<int>(random.below(20))) {}
+};
+
+// The search takes a step of all hypotheses at a time; each alone would find the same bits.
+TEST(SolidLine, HypothesesSearchAsIfEachWereAlone) {
+  const ShapeHypotheses hypotheses({ell_of_boxes()});
+  const ShapeHypotheses::Shape& shape = hypotheses.shapes()[0];
+  stimuli::Random random(5);
+  for (int trial = 0; trial < 200; ++trial) {
+    const Touch touch(shape, random);
+    const SolidLine line(hypotheses, shape, touch.first, touch.line);
+    const float length = touch.line.length, step = length / 16;
+    Deepest found;
+    find_along_line(line, length, found);
+    for (int i = 0; i < ShapeHypotheses::kBlock; ++i) {
+      float best = 0, least = line.distance(i, 0);
+      for (float s = step; s < length + 0.5F * step;) {
+        const float place = std::min(s, length);
+        const float d = line.distance(i, place);
+        if (d < least) {
+          least = d;
+          best = place;
+        }
+        s += std::max(step, d - least);
+      }
+      float reach = 0.5F * step;
+      for (int k = 0; k < 5; ++k, reach *= 0.5F) {
+        const float before = std::max(best - reach, 0.0F), after = std::min(best + reach, length);
+        const float a = line.distance(i, before), b = line.distance(i, after);
+        if (a < least && a <= b) {
+          least = a;
+          best = before;
+        } else if (b < least) {
+          least = b;
+          best = after;
+        }
+      }
+      ASSERT_EQ(found.along[i], best) << trial << " " << i;
+      ASSERT_EQ(found.distance[i], line.surface(i, best).distance) << trial << " " << i;
+    }
+  }
+}
+
+// The least distance along a stylus, by looking everywhere.
+TEST(SolidLine, FindsTheDeepestPlaceOfAConcaveShape) {
+  const ShapeHypotheses hypotheses({ell_of_boxes()});
   const ShapeHypotheses::Shape& shape = hypotheses.shapes()[0];
   ASSERT_TRUE(shape.field);
   stimuli::Random random(4);
   for (int trial = 0; trial < 60; ++trial) {
-    const Vec3 tip = point_around(random, Vec3(0), 0.06);
-    const Vec3 along = glm::normalize(Vec3(random.normal(), random.normal(), random.normal()));
-    const Line line{to_float(tip), to_float(along), 0.12F, to_float(along)};
-    const int block = ShapeHypotheses::kBlock * static_cast<int>(random.below(20));
-    const SolidLine to_shape(hypotheses, shape, shape.first + block, line);
+    const Touch touch(shape, random);
+    const SolidLine to_shape(hypotheses, shape, touch.first, touch.line);
     Deepest deepest;
-    find_along_line(to_shape, line.length, deepest);
+    find_along_line(to_shape, touch.line.length, deepest);
     for (int i = 0; i < ShapeHypotheses::kBlock; ++i) {
-      const Mat3 r = hypotheses.rotation(shape.first + block + i);
+      const Mat3 r = hypotheses.rotation(touch.first + i);
       double least = std::numeric_limits<double>::infinity();
       for (int k = 0; k <= 1000; ++k) {
-        least = std::min(least, test::distance_at(*shape.field,
-                                                  glm::transpose(r) * (tip + 0.00012 * k * along)));
+        least = std::min(
+            least, test::distance_at(*shape.field,
+                                     glm::transpose(r) * (touch.tip + 0.00012 * k * touch.along)));
       }
       ASSERT_NEAR(deepest.distance[i], least, 0.0006);
       const Vec3 n(deepest.x[i], deepest.y[i], deepest.z[i]);
