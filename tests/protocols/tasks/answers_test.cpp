@@ -117,7 +117,8 @@ TEST(Answers, NamesOfKeysAndLabelsAreShortAndPlain) {
   const auto with_key = [](const std::string& key) {
     return faults_of_block("compare", {{"keys", {{key, "1"}, {"b", "2"}}}});
   };
-  EXPECT_EQ(with_key(std::string(32, 'k')), Places{});
+  EXPECT_EQ(with_key("k"), Places{});
+  EXPECT_EQ(with_key(std::string(32, 'k')), Places{"/blocks/0/keys/" + std::string(32, 'k')});
   EXPECT_EQ(with_key(std::string(33, 'k')), Places{"/blocks/0/keys/" + std::string(33, 'k')});
   EXPECT_EQ(with_key(""), Places{"/blocks/0/keys/"});
   EXPECT_EQ(with_key("\t"), Places{"/blocks/0/keys/\t"});
