@@ -147,8 +147,9 @@ TEST(Preflight, ADeviceThatIsLostWhileItPushesIsHomedAndPushesAgain) {
 /// Keeps every command.
 class Grip final : public Device {
  public:
-  explicit Grip(double limit) {
+  Grip(double limit, int driven) {
     able_.sensed_freedom = 5;
+    able_.actuated_freedom = driven;
     able_.max_force = limit;
   }
   const DeviceCapabilities& capabilities() const override { return able_; }
@@ -165,7 +166,7 @@ class Grip final : public Device {
 TEST(ForceDirectionCheck, PushesToTheRightWithinTheLimitsAndLetsGo) {
   for (const int driven : {3, 5}) {
     for (const double limit : {6.0, 0.8}) {
-      Grip grip(limit);
+      Grip grip(limit, driven);
       VirtualClock clock;
       const ForceLimits limits{limit, 0.5, 0.2};
       Servo servo(grip, clock, 1000, limits);
