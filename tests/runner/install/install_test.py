@@ -137,14 +137,15 @@ class ManPages(unittest.TestCase):
 
 
 class Rights(unittest.TestCase):
-    def test_the_rule_is_for_the_falcon_and_not_for_everybody(self):
+    def test_the_rules_are_for_the_devices_and_not_for_everybody(self):
         rules = (INSTALL / "60-palpate.rules").read_text()
         parameters = (SOURCES / "runner/devices/falcon/parameters.h").read_text()
         vendor, product = re.search(r"kVendor = 0x(\w+), kProduct = 0x(\w+);", parameters).groups()
         self.assertIn(f'ATTR{{idVendor}}=="{vendor.lower()}", ATTR{{idProduct}}=="{product.lower()}"', rules)
         self.assertIn('TAG+="uaccess"', rules)
+        self.assertIn('ATTR{idVendor}=="1451"', rules)  # Force Dimension
         modes = re.findall(r'MODE="(\d+)"', rules)
-        self.assertEqual(len(modes), 2)
+        self.assertEqual(len(modes), 3)
         self.assertTrue(all(mode[-1] == "0" for mode in modes), modes)
 
     def test_the_limits_are_enough_for_the_servo_and_its_guard(self):
