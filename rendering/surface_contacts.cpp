@@ -9,7 +9,7 @@
 namespace palpate::rendering {
 namespace {
 
-using Kind = SurfacePatch::Kind;
+using PatchKind = SurfacePatch::Kind;
 
 constexpr int kMostFaces = 64;      // to each side of a contact
 constexpr double kFlat = 1 - 5e-9;  // cosine of 1e-4 rad, by which rounding may bend a flat face
@@ -99,7 +99,7 @@ double place_on(const Surface& surface, const SurfacePatch& patch, const Vec3& t
   const std::uint32_t left = patch.triangle();
   int along = 0;
   double place = at;
-  if (patch.kind == Kind::edge) {
+  if (patch.kind == PatchKind::edge) {
     const std::uint32_t right = SurfaceTriangle::triangle_of(
         surface.triangles()[left].across[SurfaceTriangle::side_of(patch.side)]);
     // The triangle that the tip is over faces down along the segment.
@@ -135,7 +135,7 @@ void SurfaceTool::add_contact(const SurfacePlane& plane, const Vec3& shift) {
   const Vec3 tip = segment.start + shift;
   if (tick_.sides && segment.along != Vec3(0)) {
     c.probe_fraction = plane.patch.tail ? 1 : 0;
-    if (plane.patch.kind == Kind::edge) {
+    if (plane.patch.kind == PatchKind::edge) {
       c.contact.type = ContactType::segment_edge;
       const std::uint32_t k = SurfaceTriangle::side_of(plane.patch.side);
       const Vec3& v0 = surface_.vertices()[triangle.corners[k]];

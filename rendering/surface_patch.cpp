@@ -7,7 +7,7 @@
 namespace palpate::rendering {
 namespace {
 
-using Kind = SurfacePatch::Kind;
+using PatchKind = SurfacePatch::Kind;
 
 /// A side as its triangle has it, from v0 to v1, the triangle to its left.
 struct EdgeOf {
@@ -63,7 +63,7 @@ void sweep_end(const Surface& surface, std::uint32_t index, std::uint8_t segment
   polygon.count = 3;
   for (std::size_t k = 0; k < 3; ++k) polygon.corners[k] = surface.vertices()[t.corners[k]];
   if (!meets(polygon, from, way)) return;
-  first = {{index << 2, segment, tail, Kind::face}, time};
+  first = {{index << 2, segment, tail, PatchKind::face}, time};
 }
 
 /// A segment whose ends move linearly against an edge: where the two are in one plane is a
@@ -97,7 +97,7 @@ void sweep_edge(const Surface& surface, std::uint32_t side, std::uint8_t segment
     const double u = glm::dot(glm::cross(apart, along), normal) / size2 * edge_length;
     const double s = glm::dot(glm::cross(apart, e), normal) / size2 * length;
     if (u < -slack || u > edge_length + slack || s < -slack || s > length + slack) return;
-    first = {{side, segment, false, Kind::edge}, std::max(0.0, time)};
+    first = {{side, segment, false, PatchKind::edge}, std::max(0.0, time)};
   };
   if (std::abs(c0) <= rounding) try_at(0);
   if (std::abs(c2) <= 1e-14 * (std::abs(c0) + std::abs(c1))) {
@@ -116,7 +116,7 @@ void sweep_edge(const Surface& surface, std::uint32_t side, std::uint8_t segment
 
 PatchPlane plane_of(const Surface& surface, const SurfacePatch& patch, const PosedTool& tool) {
   const PosedTool::Segment& segment = tool.segments[patch.segment];
-  if (patch.kind == Kind::face) {
+  if (patch.kind == PatchKind::face) {
     const SurfaceTriangle& t = surface.triangles()[patch.triangle()];
     const Vec3 end = segment.end(patch.tail);
     return {t.normal, glm::dot(t.normal, surface.vertices()[t.corners[0]] - end)};
@@ -133,7 +133,7 @@ PatchPlane plane_of(const Surface& surface, const SurfacePatch& patch, const Pos
 PatchPolygon polygon_of(const Surface& surface, const SurfacePatch& patch, const PosedTool& tool) {
   const PosedTool::Segment& segment = tool.segments[patch.segment];
   PatchPolygon out;
-  if (patch.kind == Kind::face) {
+  if (patch.kind == PatchKind::face) {
     const SurfaceTriangle& t = surface.triangles()[patch.triangle()];
     const Vec3 end = segment.end(patch.tail);
     out.count = 3;
@@ -150,7 +150,7 @@ PatchPolygon polygon_of(const Surface& surface, const SurfacePatch& patch, const
 
 SurfacePatch patch_after_turn(const Surface& surface, const SurfacePatch& patch,
                               const PosedTool& tool) {
-  if (patch.kind != Kind::edge) return patch;
+  if (patch.kind != PatchKind::edge) return patch;
   const Vec3& along = tool.segments[patch.segment].along;
   const EdgeOf edge = edge_of(surface, patch.side);
   if (by_tip(edge.left, along) != by_tip(edge.right, along)) return patch;
@@ -162,7 +162,7 @@ SurfacePatch patch_after_turn(const Surface& surface, const SurfacePatch& patch,
           ? patch.triangle()
           : SurfaceTriangle::triangle_of(
                 surface.triangles()[patch.triangle()].across[SurfaceTriangle::side_of(patch.side)]);
-  return {triangle << 2, patch.segment, !by_tip(edge.left, along), Kind::face};
+  return {triangle << 2, patch.segment, !by_tip(edge.left, along), PatchKind::face};
 }
 
 bool meets(const PatchPolygon& polygon, const Vec3& from, const Vec3& way) {
