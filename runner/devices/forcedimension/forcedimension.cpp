@@ -13,7 +13,7 @@
 namespace palpate::runner::forcedimension {
 namespace {
 
-constexpr unsigned char kWatchdog = 40;        // 125 us: 5 ms
+constexpr double kWatchdogStep = 125e-6;       // s; at most 255 of them
 constexpr double kStatusPeriod = 0.008;        // s; the status costs a transfer of its own
 constexpr double kFarthest = 0.5;              // m; no model reaches so far
 constexpr double kMaxSpeed = 5, kJump = 1e-3;  // m/s and m; hands move the grip more slowly
@@ -82,6 +82,12 @@ Found open_one(const Library& library, int index) {
           name != nullptr ? stimuli::printable(name) : "a device without a name"};
 }
 
+/// In steps, as long as the guard process waits for a command: 5 ms, or 5 ticks of a slow servo.
+unsigned char watchdog_of(double rate) {
+  return static_cast<unsigned char>(
+      std::min(255.0, std::ceil(std::max(0.005, 5 / rate) / kWatchdogStep)));
+}
+
 /// Negative where the library cannot count them.
 int count_of(const Library& library) {
   constexpr int kMost = 16;
@@ -138,7 +144,7 @@ void ForceDimensionDevice::open() {
   need(library_.enable_expert_mode(), "expert mode");  // for the two below
   need(library_.set_time_guard(0, id), "no time guard");
   const bool watched =
-      library_.set_watchdog != nullptr && library_.set_watchdog(kWatchdog, id) >= 0;
+      library_.set_watchdog != nullptr && library_.set_watchdog(watchdog_of(config_.rate), id) >= 0;
   need(library_.set_brakes(1, id), "brakes on");
   need(library_.set_gravity_compensation(1, id), "gravity compensation");
   if (library_.has_gripper(id) && library_.emulate_button != nullptr)

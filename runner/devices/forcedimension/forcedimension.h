@@ -19,7 +19,8 @@ namespace palpate::runner::forcedimension {
 inline Vec3 to_world(const Vec3& v) { return {v.y, -v.x, v.z}; }
 inline Vec3 from_world(const Vec3& v) { return {-v.y, v.x, v.z}; }
 
-/// The firmware drops forces when no command comes for 5 ms, which also covers a dead guard.
+/// The firmware drops forces when no command comes for 5 ms, at servo rates below 1 kHz for 5 ticks
+/// or 32 ms, which also covers a dead guard.
 class ForceDimensionDevice final : public Device {
  public:
   /// Opens the device with the config's serial number, or the only one.

@@ -182,6 +182,15 @@ TEST_F(ForceDimension, AfterADeadGuardTheFirmwareTakesTheForceOff) {
   EXPECT_EQ(settle(*device), DeviceTrouble::none);
 }
 
+TEST_F(ForceDimension, TheFirmwareWaitsForAServoThatIsSlow) {
+  for (const auto& [rate, periods] : {std::pair(4000.0, 40), std::pair(1000.0, 40),
+                                      std::pair(500.0, 80), std::pair(100.0, 255)}) {
+    config_.rate = rate;
+    const auto device = open(config_);
+    EXPECT_EQ(one().watchdog, periods) << rate;
+  }
+}
+
 TEST_F(ForceDimension, ADeviceIsKnownByItsSerialNumberWhateverItsPlace) {
   state_->count = 2;
   other().serial = 99;
