@@ -165,6 +165,7 @@ void ForceDimensionDevice::open() {
                  "This device has no watchdog of its own firmware: zero force after a crash "
                  "depends on palpate's guard process alone.\n");
   }
+  pushed_ = false;
   read_ns_ = 0;
   until_status_ = 0;
   status_ = write_trouble_ = DeviceTrouble::none;
@@ -204,13 +205,14 @@ DeviceTrouble ForceDimensionDevice::trouble_of_status() noexcept {
   if (status[kConnected] == 0) return DeviceTrouble::unplugged;
   if (status[kPower] == 0) return DeviceTrouble::silent;
   if (status[kReset] != 0) return DeviceTrouble::not_calibrated;
-  // It was calibrated just now: forces may go on. Zero until the servo says otherwise.
-  if (status_ == DeviceTrouble::not_calibrated) {
+  const bool stopped = status[kForce] == 0 || status[kError] != 0;
+  // It was calibrated just now, or nobody commanded it after it was opened: forces may go on. Zero
+  // until the servo says otherwise.
+  if (status_ == DeviceTrouble::not_calibrated || (stopped && !pushed_)) {
     library_.set_force_and_torque(0, 0, 0, 0, 0, 0, *id_);
     return library_.enable_force(1, *id_) < 0 ? last_error() : DeviceTrouble::none;
   }
-  if (status[kForce] == 0 || status[kError] != 0) return DeviceTrouble::stopped_by_device;
-  return DeviceTrouble::none;
+  return stopped ? DeviceTrouble::stopped_by_device : DeviceTrouble::none;
 }
 
 bool ForceDimensionDevice::plausible(const Vec3& position, const Vec3& axis) noexcept {
@@ -261,6 +263,7 @@ void ForceDimensionDevice::write(const Vec3& device1, const Vec3& device2) noexc
   Vec3 force = device1 + device2, torque(0);
   if (capabilities_.actuated_freedom == 5) torque = glm::cross(tail_ - tip_, device2);
   if (lost_ || !finite(force) || !finite(torque)) force = torque = Vec3(0);
+  pushed_ = pushed_ || force != Vec3(0) || torque != Vec3(0);
   const Vec3 f = from_world(force), t = from_world(torque);
   const bool taken = library_.set_force_and_torque(f.x, f.y, f.z, t.x, t.y, t.z, *id_) >= 0;
   write_trouble_ = taken ? DeviceTrouble::none : last_error();

@@ -53,6 +53,7 @@ class ForceDimensionDevice final : public Device {
   DeviceTrouble status_ = DeviceTrouble::none;
   DeviceTrouble write_trouble_ = DeviceTrouble::none;
   bool lost_ = true;
+  bool pushed_ = false;  ///< a force was commanded since it was opened
 };
 
 /// See DeviceKind.
