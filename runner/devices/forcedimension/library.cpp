@@ -90,10 +90,6 @@ Library::Library(const std::string& path) {
   require("dhdErrorGetLastStr", error_get_last_str);
   find(from, "dhdSetWatchdog", set_watchdog);
   find(from, "dhdEmulateButton", emulate_button);
-  find(from, "drdOpenID", drd_open_id);
-  find(from, "drdAutoInit", drd_auto_init);
-  find(from, "drdIsInitialized", drd_is_initialized);
-  find(from, "drdStop", drd_stop);
   if (!missing.empty())
     throw std::runtime_error(
         "this is not a Force Dimension library that palpate can use (SDK 3.7 or newer): it has "

@@ -46,10 +46,6 @@ struct Library {
   // What older versions do not have is null.
   int (*set_watchdog)(unsigned char periods_of_125us, char id) = nullptr;
   int (*emulate_button)(unsigned char on, char id) = nullptr;
-  int (*drd_open_id)(char index) = nullptr;
-  int (*drd_auto_init)(char id) = nullptr;
-  bool (*drd_is_initialized)(char id) = nullptr;
-  int (*drd_stop)(bool forces_stay_on, char id) = nullptr;
 
  private:
   struct Unload {

@@ -1,7 +1,6 @@
 // Stands in for Force Dimension's library: its functions over a state that a test sets
 // (stub_state.h; the file is named by PALPATE_STUB_STATE). Written from the public documentation,
-// no code of the maker's. With STUB_OLD it has neither watchdog nor robotics functions, as older
-// versions.
+// no code of the maker's. With STUB_OLD it has no watchdog, as older versions.
 
 #include <array>
 #include <cmath>
@@ -231,18 +230,6 @@ int dhdSetWatchdog(unsigned char periods, char id) {
   return 0;
 }
 int dhdEmulateButton(unsigned char /*on*/, char id) { return device_of(id) == nullptr ? -1 : 0; }
-int drdOpenID(char index) { return dhdOpenID(index); }
-bool drdIsInitialized(char id) {
-  StubDevice* const device = device_of(id);
-  return device != nullptr && device->reset == 0;
-}
-int drdAutoInit(char id) {
-  StubDevice* const device = device_of(id);
-  if (device == nullptr) return -1;
-  device->reset = 0;
-  return 0;
-}
-int drdStop(bool /*forces_stay_on*/, char id) { return device_of(id) == nullptr ? -1 : 0; }
 #endif
 
 }  // extern "C"
