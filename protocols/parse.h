@@ -36,9 +36,11 @@ using StoredFiles = std::map<std::string, std::string>;
 /// Reads and checks a protocol, also that its schedule can be built. \throws InputError with every
 /// fault.
 Protocol parse_protocol(const std::string& path);
-/// \param stored  contents of files that it names; others are read from the folder of `file_name`
+enum class OtherFiles { read, refuse };
+/// \param stored  contents of files that it names
+/// \param others  files that are not stored: read from the folder of `file_name`, or a fault
 Protocol parse_protocol_text(const std::string& text, const std::string& file_name,
-                             const StoredFiles& stored = {});
+                             const StoredFiles& stored = {}, OtherFiles others = OtherFiles::read);
 
 /// Reads and checks a scene file: {"objects": [...], "tool": ..., "reach": ...}. Mesh files are
 /// resolved relative to it.

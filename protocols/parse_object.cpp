@@ -48,6 +48,9 @@ void read_file(ObjectReader& reader, const MeshFiles& files, stimuli::ObjectSpec
                                                     stimuli::kMeshExtensions + found_text(*value));
   } else if (const auto stored = files.stored.find(name); stored != files.stored.end()) {
     spec.file_bytes = std::make_shared<const std::string>(stored->second);
+  } else if (files.others == OtherFiles::refuse) {
+    reader.faults().add(reader.pointer("file"),
+                        "expected a file that is stored with the protocol; '" + name + "' is not");
   } else if (!std::filesystem::is_regular_file(path, error)) {
     reader.faults().add(reader.pointer("file"),
                         "expected an existing file; there is no " + path.string());

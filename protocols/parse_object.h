@@ -13,6 +13,7 @@ namespace palpate::protocols {
 struct MeshFiles {
   std::string folder;       ///< on disk
   StoredFiles stored = {};  ///< contents that were stored with a protocol; these are preferred
+  OtherFiles others = OtherFiles::read;
 };
 
 /// Reads an object with the keys that its shape takes. The caller refuses unknown keys, since a

@@ -281,7 +281,7 @@ Protocol parse_protocol(const std::string& path) {
 }
 
 Protocol parse_protocol_text(const std::string& text, const std::string& file_name,
-                             const StoredFiles& stored) {
+                             const StoredFiles& stored, OtherFiles others) {
   FaultList faults(file_name);
   const json root = read_json(text, faults);
   Protocol protocol;
@@ -295,7 +295,7 @@ Protocol parse_protocol_text(const std::string& text, const std::string& file_na
   read_renderer_order(reader, protocol);
   reader.section("material",
                  [&](ObjectReader& section) { read_material(section, protocol.material); });
-  const MeshFiles files{folder_of(file_name), stored};
+  const MeshFiles files{folder_of(file_name), stored, others};
   read_stimuli(reader, protocol, files);
   if (protocol.version == 2) {
     read_tasks(reader, protocol, files);

@@ -130,6 +130,9 @@ std::shared_ptr<const std::string> read_picture(const std::string& name, const s
   std::string bytes;
   if (const auto stored = files.stored.find(name); stored != files.stored.end()) {
     bytes = stored->second;
+  } else if (files.others == OtherFiles::refuse) {
+    faults.add(pointer, "expected a file that is stored with the protocol; '" + name + "' is not");
+    return nullptr;
   } else {
     const std::string path = files.folder.empty() ? name : files.folder + "/" + name;
     try {

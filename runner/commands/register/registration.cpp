@@ -179,9 +179,10 @@ Registration read_registration(const std::string& folder) {
   protocols::StoredFiles stored;
   for (data::ProtocolFile& file : out.files)
     stored[file.name] = file.bytes = read_member(folder, file.name);
-  out.protocol = protocols::parse_protocol_text(
-      read_member(folder, "protocol.json"),
-      (std::filesystem::path(folder) / "protocol.json").string(), stored);
+  out.protocol =
+      protocols::parse_protocol_text(read_member(folder, "protocol.json"),
+                                     (std::filesystem::path(folder) / "protocol.json").string(),
+                                     stored, protocols::OtherFiles::refuse);
   out.plan_text = read_member(folder, "plan.json");
   try {
     out.plan = analysis::read_plan(out.plan_text);

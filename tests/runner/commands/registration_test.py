@@ -354,6 +354,13 @@ class Check(Study):
         self.write("registration/registration.json", made)
         self.assertIn("below", self.check(status=2).stderr)
 
+    def test_a_mesh_that_the_registration_does_not_hold_is_not_read(self):
+        (self.dir / "outside.obj").write_text("v 0 0 0\nv .05 0 0\nv 0 .05 0\nv 0 0 .05\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n")
+        protocol = json.loads((self.dir / "registration/protocol.json").read_text())
+        protocol["stimuli"][0] = {"name": protocol["stimuli"][0]["name"], "shape": "mesh", "file": str(self.dir / "outside.obj")}
+        self.write("registration/protocol.json", protocol)
+        self.assertIn("stored with the protocol", self.check(status=2).stderr)
+
 
 if __name__ == "__main__":
     unittest.main(argv=[sys.argv[0]])
