@@ -67,9 +67,10 @@ class Soak:
     def start(self):
         self.counts["sessions"] += 1
         environment = dict(self.screen.environment, LIBGL_ALWAYS_SOFTWARE="1")
+        new = ["--new-participant"] if self.counts["sessions"] == 1 else []
         self.program = subprocess.Popen(
             [*self.options.using.split(), self.options.palpate, "run", self.folder / "protocol.json", "--db",
-             self.folder / "soak.db", "--participant", "P01", "--new-participant", "--device", "mouse"],
+             self.folder / "soak.db", "--participant", "P01", *new, "--device", "mouse"],
             env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=open(self.folder / "said", "w"))
         self.participant, self.console = self.window("soak, P01"), self.window("soak, P01 - console")
 
