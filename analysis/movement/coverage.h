@@ -1,0 +1,56 @@
+#pragma once
+// Which parts of a surface were touched. The object's frame, m.
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "stimuli/vec.h"
+
+namespace palpate::analysis {
+
+using SurfaceTriangle = std::array<Vec3, 3>;
+
+/// Places drawn evenly on a surface, by a fixed seed: the same surface has the same places.
+std::vector<Vec3> draw_places(const std::vector<SurfaceTriangle>& surface, std::size_t count);
+
+/// A surface to count touches on.
+class TouchedSurface {
+ public:
+  static constexpr std::size_t kPlaces = 10000, kParts = 64;
+  static constexpr double kReach = 0.005;  ///< m
+
+  /// \param places  evenly on it, at least kParts. The parts halve them six times, each time across
+  /// the longest side of their box: 64 parts of equal area.
+  explicit TouchedSurface(std::vector<Vec3> places);
+
+  /// Share of the places within kReach of a point, after each of them.
+  std::vector<double> coverage(const std::vector<Vec3>& points) const;
+  std::size_t part_of(const Vec3& point) const;
+  const std::vector<Vec3>& places() const { return places_; }
+
+ private:
+  struct Split {
+    int axis = 0;
+    double at = 0;
+  };
+  void divide(std::vector<Vec3>& places, std::size_t begin, std::size_t end, std::size_t node);
+  std::array<std::int64_t, 3> cell_of(const Vec3& point) const;
+
+  std::vector<Vec3> places_;
+  std::array<Split, kParts> splits_{};
+  Vec3 corner_{0, 0, 0};
+  double cell_ = kReach;  ///< m, at least kReach
+  std::array<std::int64_t, 3> cells_{};
+  std::vector<std::vector<std::uint32_t>> grid_;  ///< places by cell
+};
+
+/// Shannon's entropy of the parts' shares over log2 K, with Miller and Madow's term for the parts
+/// that were found from so many ticks; at most 1. None: no tick.
+std::optional<double> entropy(const std::vector<std::size_t>& parts);
+/// Changes of part from tick to tick.
+std::size_t transitions(const std::vector<std::size_t>& parts);
+
+}  // namespace palpate::analysis

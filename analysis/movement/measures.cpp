@@ -1,0 +1,283 @@
+#include "analysis/movement/measures.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <stdexcept>
+#include <string_view>
+
+#include "analysis/movement/signal.h"
+#include "analysis/movement/smoothness.h"
+#include "analysis/statistics/quantiles.h"
+
+namespace palpate::analysis {
+namespace {
+
+using enum MeasureScale;
+using Values = std::vector<double>;
+
+/// Sets values by their names.
+class Filling {
+ public:
+  void set(const char* name, std::optional<double> value) {
+    if (value && std::isfinite(*value)) values_[measure_named(name)] = value;
+  }
+  const MeasureValues& values() const { return values_; }
+
+ private:
+  MeasureValues values_{};
+};
+
+std::optional<double> mean_of(const Values& values) {
+  if (values.empty()) return std::nullopt;
+  double sum = 0;
+  for (const double value : values) sum += value;
+  return sum / static_cast<double>(values.size());
+}
+
+std::optional<double> sd_of(const Values& values) {
+  if (values.size() < 2) return std::nullopt;
+  const double centre = *mean_of(values);
+  double sum = 0;
+  for (const double value : values) sum += (value - centre) * (value - centre);
+  return std::sqrt(sum / static_cast<double>(values.size() - 1));
+}
+
+std::optional<double> greatest_of(const Values& values) {
+  if (values.empty()) return std::nullopt;
+  return *std::max_element(values.begin(), values.end());
+}
+
+template <class T>
+std::vector<T> part(const std::vector<T>& all, const Stretch& stretch) {
+  return {all.begin() + static_cast<std::ptrdiff_t>(stretch.begin),
+          all.begin() + static_cast<std::ptrdiff_t>(stretch.end)};
+}
+
+/// Mean of the movements' values, weighted by their paths.
+class ByMovement {
+ public:
+  void add(const std::optional<double>& value, double path) {
+    if (!value || !(path > 0)) return;
+    sum_ += *value * path;
+    path_ += path;
+  }
+  std::optional<double> mean() const {
+    return path_ > 0 ? std::optional(sum_ / path_) : std::nullopt;
+  }
+
+ private:
+  double sum_ = 0, path_ = 0;
+};
+
+void put_motion(const std::vector<Vec3>& path, const Values& speed, double rate, Filling& out) {
+  constexpr double kPeakShare = 0.05, kPeakLeast = 0.005;
+  const double length = path_length(path);
+  out.set("path_length", length);
+  out.set("speed_mean", mean_of(speed));
+  Values sorted = speed;
+  std::sort(sorted.begin(), sorted.end());
+  out.set("speed_p95", sorted_quantile(sorted, 0.95));
+  if (length > 0) {
+    const double least = std::max(kPeakShare * sorted.back(), kPeakLeast);
+    out.set("speed_peaks_per_m", static_cast<double>(peaks(speed, least)) / length);
+  }
+  out.set("sparc", sparc(speed, rate));
+  ByMovement arc, jerk, speed_jerk;
+  const std::vector<Stretch> found = movements(speed, rate);
+  for (const Stretch& one : found) {
+    const std::vector<Vec3> way = part(path, one);
+    const Values its_speed = part(speed, one);
+    const double its_length = path_length(way);
+    arc.add(sparc(its_speed, rate), its_length);
+    jerk.add(log_dimensionless_jerk(way, rate), its_length);
+    speed_jerk.add(log_dimensionless_jerk_of_speed(its_speed, rate), its_length);
+  }
+  out.set("movements", static_cast<double>(found.size()));
+  out.set("sparc_movement", arc.mean());
+  out.set("ldlj", jerk.mean());
+  out.set("ldlj_speed", speed_jerk.mean());
+}
+
+/// "force_mean" and its kin.
+void put_force(const std::string& suffix, const Values& force, Filling& out) {
+  out.set(("force_mean" + suffix).c_str(), mean_of(force));
+  out.set(("force_sd" + suffix).c_str(), sd_of(force));
+  out.set(("force_max" + suffix).c_str(), greatest_of(force));
+}
+
+void put_forces(const MovementTrial& trial, const std::vector<Stretch>& episodes, Filling& out) {
+  const std::size_t n = trial.tip.size();
+  Values all, along, across, normal_force(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    if (!trial.contact[i]) continue;
+    normal_force[i] = glm::dot(trial.force[i], trial.normal[i]);
+    all.push_back(glm::length(trial.force[i]));
+    along.push_back(normal_force[i]);
+    across.push_back(glm::length(trial.force[i] - normal_force[i] * trial.normal[i]));
+  }
+  put_force("", all, out);
+  put_force("_n", along, out);
+  put_force("_t", across, out);
+  Values peaks_of_episodes;
+  for (const Stretch& one : episodes)
+    peaks_of_episodes.push_back(*greatest_of(part(normal_force, one)));
+  out.set("press_peak", mean_of(peaks_of_episodes));
+  double squares = 0;
+  std::size_t rates = 0;
+  for (const Stretch& one : stretches(trial.contact)) {
+    for (std::size_t i = one.begin + 1; i + 1 < one.end; ++i, ++rates) {
+      const double rate = (normal_force[i + 1] - normal_force[i - 1]) * trial.rate / 2;
+      squares += rate * rate;
+    }
+  }
+  if (rates > 0) out.set("force_rate", std::sqrt(squares / static_cast<double>(rates)));
+}
+
+void put_procedures(const MovementTrial& trial, const Values& tangential_speed, Filling& out) {
+  std::vector<ContactMotion> motion(trial.tip.size());
+  for (std::size_t i = 0; i < motion.size(); ++i) {
+    if (trial.contact[i])
+      motion[i] = {tangential_speed[i], glm::dot(trial.force[i], trial.normal[i]),
+                   trial.on_edge[i]};
+  }
+  const std::vector<Procedure> found = procedures(trial.contact, motion, trial.rate);
+  if (found.empty()) return;
+  constexpr std::array<const char*, kProcedures> kNames = {"share_static", "share_pressure",
+                                                           "share_lateral", "share_contour"};
+  for (std::size_t k = 0; k < kProcedures; ++k) {
+    const auto count = std::count(found.begin(), found.end(), static_cast<Procedure>(k));
+    out.set(kNames[k], static_cast<double>(count) / static_cast<double>(found.size()));
+  }
+}
+
+void put_surface(const MovementTrial& trial, const TouchedSurface& surface, Filling& out) {
+  std::vector<Vec3> points;
+  std::vector<std::size_t> parts;
+  for (std::size_t i = 0; i < trial.tip.size(); ++i) {
+    if (!trial.contact[i]) continue;
+    points.push_back(trial.point[i]);
+    parts.push_back(surface.part_of(trial.point[i]));
+  }
+  if (points.empty()) {
+    out.set("coverage", 0);
+    return;
+  }
+  out.set("coverage", surface.coverage(points).back());
+  out.set("entropy", entropy(parts));
+  out.set("transitions",
+          static_cast<double>(transitions(parts)) * trial.rate / static_cast<double>(parts.size()));
+}
+
+}  // namespace
+
+const std::array<MeasureDefinition, kMeasures>& measure_definitions() {
+  static constexpr std::array<MeasureDefinition, kMeasures> kAll = {{
+      {"path_length", "m", log, "length of the tip's path"},
+      {"contact_path", "m", log, "length of the tip's path in contact"},
+      {"contact_share", "1", logit, "ticks with contact over all ticks"},
+      {"approaches", "1", count,
+       "contact episodes; gaps under 50 ms joined, episodes under 20 ms dropped"},
+      {"episode_time", "s", log, "mean length of a contact episode"},
+      {"speed_mean", "m/s", log, "mean speed of the tip"},
+      {"speed_contact", "m/s", log, "mean speed along the surface, in contact"},
+      {"speed_p95", "m/s", log, "95th percentile of the tip's speed"},
+      {"speed_peaks_per_m", "1/m", count,
+       "maxima of speed with a prominence of 5 % of the greatest and 5 mm/s, by path"},
+      {"sparc", "1", identity, "spectral arc length of the trial's speed, up to 10 Hz"},
+      {"movements", "1", count,
+       "stretches with 5 % of the greatest speed or more, for 100 ms or more"},
+      {"sparc_movement", "1", identity, "spectral arc length by movement, weighted by path"},
+      {"ldlj", "1", identity, "log dimensionless vector jerk by movement, weighted by path"},
+      {"ldlj_speed", "1", identity, "likewise of the second difference of speed"},
+      {"force_mean", "N", log, "mean force in contact"},
+      {"force_sd", "N", log, "standard deviation of the force in contact"},
+      {"force_max", "N", log, "greatest force in contact"},
+      {"force_mean_n", "N", log, "mean force along the normal in contact"},
+      {"force_sd_n", "N", log, "standard deviation of the force along the normal"},
+      {"force_max_n", "N", log, "greatest force along the normal"},
+      {"force_mean_t", "N", log, "mean force along the surface in contact"},
+      {"force_sd_t", "N", log, "standard deviation of the force along the surface"},
+      {"force_max_t", "N", log, "greatest force along the surface"},
+      {"press_peak", "N", log, "mean over episodes of the greatest force along the normal"},
+      {"force_rate", "N/s", log, "root mean square change of the force along the normal"},
+      {"stops", "1", count, "slower than 5 mm/s for 50 ms or more in contact"},
+      {"stop_time", "s", log, "mean length of a stop"},
+      {"strokes", "1", count,
+       "movements in contact of 50 ms or more between stops and turns by more than 90 degrees"},
+      {"edge_dwell", "s", count,
+       "contact within 3 mm of an edge of 30 degrees or more; compared as the log of it and 1 s"},
+      {"coverage", "1", logit,
+       "share of 10,000 places on the surface within 5 mm of a contact point"},
+      {"entropy", "1", logit, "of contact time over 64 equal parts of the surface; 1: even"},
+      {"transitions", "1/s", count, "changes of the part, by time in contact"},
+      {"coverage_rate", "1/s", count, "coverage by time of the trial"},
+      {"duration", "s", log, "of the samples"},
+      {"share_static", "1", logit,
+       "windows of 100 ms in contact slower than 10 mm/s with steady force"},
+      {"share_pressure", "1", logit,
+       "windows slower than 10 mm/s whose force changes by more than 0.3 of its mean"},
+      {"share_lateral", "1", logit, "windows of 10 mm/s or more along the surface, off edges"},
+      {"share_contour", "1", logit, "windows of 10 mm/s or more along the surface, on an edge"},
+  }};
+  return kAll;
+}
+
+std::size_t measure_named(const char* name) {
+  const auto& all = measure_definitions();
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    if (std::string_view(all[i].name) == name) return i;
+  }
+  throw std::invalid_argument(std::string("no measure is named ") + name);
+}
+
+MeasureValues measure(const MovementTrial& trial, const TouchedSurface* surface,
+                      const MovementSettings& settings) {
+  Filling out;
+  const std::size_t n = trial.tip.size();
+  if (n < 2) return out.values();
+  const std::vector<Vec3> path = low_pass(trial.tip, trial.rate, settings.cutoff);
+  const std::vector<Vec3> moves = velocity(path, trial.rate);
+  const Values speed = lengths(moves);
+  put_motion(path, speed, trial.rate, out);
+  const double duration = static_cast<double>(n) / trial.rate;
+  out.set("duration", duration);
+
+  double contact_path = 0;
+  Values along(n), along_in_contact;
+  std::size_t edge_ticks = 0;
+  for (std::size_t i = 0; i < n; ++i) {
+    if (!trial.contact[i]) continue;
+    if (i > 0 && trial.contact[i - 1]) contact_path += glm::length(path[i] - path[i - 1]);
+    along[i] = glm::length(moves[i] - glm::dot(moves[i], trial.normal[i]) * trial.normal[i]);
+    along_in_contact.push_back(along[i]);
+    if (!trial.on_edge.empty()) edge_ticks += trial.on_edge[i];
+  }
+  out.set("contact_share", static_cast<double>(along_in_contact.size()) / static_cast<double>(n));
+  out.set("contact_path", contact_path);
+  out.set("speed_contact", mean_of(along_in_contact));
+  if (!trial.on_edge.empty()) out.set("edge_dwell", static_cast<double>(edge_ticks) / trial.rate);
+
+  const auto put_stretches = [&](const char* number, const char* time,
+                                 const std::vector<Stretch>& found) {
+    out.set(number, static_cast<double>(found.size()));
+    Values times;
+    for (const Stretch& one : found) times.push_back(static_cast<double>(one.size()) / trial.rate);
+    out.set(time, mean_of(times));
+  };
+  const std::vector<Stretch> episodes = contact_episodes(trial.contact, trial.rate);
+  put_stretches("approaches", "episode_time", episodes);
+  const std::vector<Stretch> resting = stops(trial.contact, speed, trial.rate);
+  put_stretches("stops", "stop_time", resting);
+  out.set("strokes", static_cast<double>(strokes(trial.contact, resting, path, trial.rate)));
+  put_forces(trial, episodes, out);
+  if (!trial.on_edge.empty()) put_procedures(trial, along, out);
+  if (surface != nullptr) {
+    put_surface(trial, *surface, out);
+    const auto& covered = out.values()[measure_named("coverage")];
+    if (covered) out.set("coverage_rate", *covered / duration);
+  }
+  return out.values();
+}
+
+}  // namespace palpate::analysis
