@@ -11,6 +11,7 @@
 
 #include "analysis/input/column_names.h"
 #include "analysis/input/csv_reader.h"
+#include "analysis/input/torque_counts.h"
 #include "analysis/input/trial_table_builder.h"
 #include "analysis/text.h"
 #include "data/files/formula_guard.h"
@@ -22,13 +23,13 @@ namespace {
 using Columns = std::map<std::string, std::size_t, std::less<>>;
 constexpr std::size_t kMostTaskFaults = 50;
 const std::vector<std::string_view> kTaskColumns{
-    "participant_id", "task",          "renderer",        "shape",
-    "response",       "level",         "success",         "standard_level",
-    "correct",        "catch_trial",   "number",          "confidence",
-    "block_name",     "track",         "practice",        "timed_out",
-    "simulated",      "session",       "block",           "trial",
-    "response_time",  "protocol_name", "protocol_sha256", "comparison_interval",
-    "interval_onsets"};
+    "participant_id",  "task",          "renderer",        "shape",
+    "response",        "level",         "success",         "standard_level",
+    "correct",         "catch_trial",   "number",          "confidence",
+    "block_name",      "track",         "practice",        "timed_out",
+    "simulated",       "session",       "block",           "trial",
+    "response_time",   "protocol_name", "protocol_sha256", "comparison_interval",
+    "interval_onsets", "torque_driven"};
 const char* const kTasks[] = {"identify", "compare", "detect", "rate", "adjust"};
 
 Columns read_header(CsvReader& reader) {
@@ -201,6 +202,7 @@ TaskTable read_task_trials_csv(const std::string& path, const std::string& proto
           {path, "line 1", std::string("expected a column ") + needed + hint_for(needed, alike)});
   }
   for (const AlikeColumn& one : alike) table.warnings.push_back(sentence(one));
+  TorqueCounts torque;
   const bool numbered = columns.count("session") > 0 && columns.count("trial") > 0;
   std::map<std::tuple<std::string, std::pair<std::string, std::string>, int, int, int>, std::size_t>
       seen;  // line of each trial
@@ -222,6 +224,7 @@ TaskTable read_task_trials_csv(const std::string& path, const std::string& proto
     table.trials.push_back(read_trial(row));
     TaskTrial& trial = table.trials.back();
     trial.simulated = simulated;
+    if (!row.value("torque_driven").empty()) torque.add(trial.renderer, row.yes("torque_driven"));
     if (std::find(table.protocols.begin(), table.protocols.end(), named) == table.protocols.end())
       table.protocols.push_back(named);
     const auto [first, is_new] =
@@ -238,6 +241,7 @@ TaskTable read_task_trials_csv(const std::string& path, const std::string& proto
                       "expected at least one trial that is not practice" +
                           (protocol.empty() ? "" : " of the protocol " + protocol)});
   if (!faults.empty()) throw protocols::InputError(std::move(faults));
+  torque.warn(table.warnings);
   return table;
 }
 

@@ -4,8 +4,10 @@
 
 #include "analysis/input/study_record.h"
 #include "analysis/input/task_trials.h"
+#include "analysis/input/torque_counts.h"
 #include "data/base/json_text.h"
 #include "data/store/store.h"
+#include "data/store/torque_notes.h"
 #include "protocols/parse.h"
 #include "stimuli/printable.h"
 
@@ -68,6 +70,8 @@ TaskTable read_task_trials_store(const std::string& path, const std::string& pro
   TaskTable table;
   table.source = table.provenance.source = path;
   std::vector<std::string> names, observers;
+  const data::TorqueNotes torque_notes(store);
+  TorqueCounts torque;
   store.for_each_trial([&](const data::StoredTrial& stored) {
     if (!is_protocol(protocol, stored.protocol_name, stored.protocol_sha256)) return;
     const std::pair known(stored.protocol_name, stored.protocol_sha256);
@@ -81,6 +85,7 @@ TaskTable read_task_trials_store(const std::string& path, const std::string& pro
       table.trials.back().protocol_sha256 = stored.protocol_sha256;
       table.trials.back().participant_number = stored.participant.enrolled_number;
       table.trials.back().simulated = stored.participant.simulated;
+      torque.add(stored.record.renderer, torque_notes.driven(stored));
       note_once(stored.protocol_name, names);
       note_once(stored.protocol_sha256, table.provenance.protocol_sha256);
       note_once(stored.run.program_version, table.provenance.program_versions);
@@ -101,6 +106,7 @@ TaskTable read_task_trials_store(const std::string& path, const std::string& pro
         {{path, "trials",
           "expected at least one completed trial that is not practice" +
               (protocol.empty() ? "" : " of the protocol " + stimuli::printable(protocol))}});
+  torque.warn(table.warnings);
   return table;
 }
 

@@ -8,6 +8,7 @@
 
 #include "analysis/input/column_names.h"
 #include "analysis/input/csv_reader.h"
+#include "analysis/input/torque_counts.h"
 #include "analysis/input/trial_table_builder.h"
 #include "analysis/input/trials.h"
 #include "analysis/text.h"
@@ -33,12 +34,13 @@ enum Column {
   simulated,
   protocol_sha256,
   program_version,
+  torque_driven,
   n_columns
 };
 constexpr std::array<std::string_view, n_columns> kColumns{
-    "participant_id", "session",   "block",           "trial",          "renderer",
-    "shape",          "response",  "correct",         "response_time",  "practice",
-    "timed_out",      "simulated", "protocol_sha256", "program_version"};
+    "participant_id", "session",   "block",           "trial",           "renderer",
+    "shape",          "response",  "correct",         "response_time",   "practice",
+    "timed_out",      "simulated", "protocol_sha256", "program_version", "torque_driven"};
 constexpr int kNeeded = response_time + 1;
 constexpr std::size_t kAbsent = static_cast<std::size_t>(-1);
 
@@ -226,6 +228,9 @@ class CsvTrials {
         raw.timed_out && missing(field(response_time)) ? kNoTime : time(response_time);
     raw.practice = truth(practice);
     raw.simulated = truth(simulated);
+    std::optional<bool> driven;
+    if (at_[torque_driven] != kAbsent && !missing(field(torque_driven)))
+      driven = truth(torque_driven);
     raw.line = reader.line();
     if (!ok_ || too_many_) return;
     names_.number(raw.participant);
@@ -236,6 +241,7 @@ class CsvTrials {
     if (at_[protocol_sha256] != kAbsent) remember(field(protocol_sha256), protocols_);
     if (at_[program_version] != kAbsent) remember(field(program_version), versions_);
     if (faults_.count() == 0) builder_.add(raw);
+    if (!raw.practice) torque_.add(raw.renderer, driven);
   }
 
   /// Whether the numbers of names are within the limits; exceeding them is one fault, after which
@@ -274,6 +280,7 @@ class CsvTrials {
     try {
       TrialTable table = builder_.finish(std::move(provenance));
       table.warnings.insert(table.warnings.begin(), warnings_.begin(), warnings_.end());
+      torque_.warn(table.warnings);
       return table;
     } catch (const std::runtime_error& error) {
       faults_.add("file", error.what());
@@ -293,6 +300,7 @@ class CsvTrials {
   Interner names_, renderers_, stimuli_;
   std::vector<std::string> protocols_, versions_, warnings_;
   TrialTableBuilder builder_;
+  TorqueCounts torque_;
 };
 
 }  // namespace

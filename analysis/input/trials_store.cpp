@@ -5,11 +5,13 @@
 #include <utility>
 #include <vector>
 
+#include "analysis/input/torque_counts.h"
 #include "analysis/input/trial_table_builder.h"
 #include "analysis/input/trials.h"
 #include "analysis/text.h"
 #include "data/base/json_text.h"
 #include "data/store/store.h"
+#include "data/store/torque_notes.h"
 #include "protocols/parse.h"
 
 namespace palpate::analysis {
@@ -47,6 +49,8 @@ TrialTable read_trials_store(const std::string& path) {
     for (const std::string& name : stimuli_of(protocol.text)) note(name, listed);
   }
   TrialTableBuilder builder;
+  const data::TorqueNotes notes(store);
+  TorqueCounts torque;
   store.for_each_trial([&](const data::StoredTrial& trial) {
     const data::TrialRecord& record = trial.record;
     if (record.renderer != "point" && record.renderer != "ray") {
@@ -68,6 +72,7 @@ TrialTable read_trials_store(const std::string& path) {
     raw.simulated = trial.participant.simulated;
     raw.response_time = record.response_time;
     builder.add(raw);
+    if (!record.practice) torque.add(record.renderer, notes.driven(trial));
     note(trial.protocol_name, protocol_names);
     note(trial.protocol_sha256, provenance.protocol_sha256);
     note(trial.run.program_version, provenance.program_versions);
@@ -81,7 +86,9 @@ TrialTable read_trials_store(const std::string& path) {
   provenance.protocol_name = join(protocol_names);
   provenance.observer_sha256 = join(observers);
   try {
-    return builder.finish(std::move(provenance), listed);
+    TrialTable table = builder.finish(std::move(provenance), listed);
+    torque.warn(table.warnings);
+    return table;
   } catch (const std::runtime_error& error) {
     throw protocols::InputError({{path, "trials", error.what()}});
   }

@@ -21,7 +21,7 @@ constexpr const char* kBidsVersion = "1.9.0";
 
 /// The columns of trials.csv without participant_id, which is in the file name.
 std::span<const Column> beh_columns(const ExportClock& clock) {
-  return trial_columns(clock.times(), clock.tasks()).subspan(1);
+  return trial_columns(clock.times(), clock.tasks(), clock.torque().any()).subspan(1);
 }
 
 const Column kOnset{"onset",
@@ -58,6 +58,8 @@ Json describe_run(const RunInfo& run, const Participant& person, const ExportClo
             {"DeviceCalibration", clock.without_dates(run.device_calibration)},
             {"ResponseDevice", run.response_device},
             {"Hand", run.hand}};
+  if (clock.torque().left_out(person, run))
+    json["Torque"] = "left out: the device drives force alone";
   json["ResponseLatency"] = run.response_latency ? Json(*run.response_latency) : Json("unknown");
   return json;
 }

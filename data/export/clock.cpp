@@ -20,7 +20,8 @@ std::int64_t difference(std::int64_t a, std::int64_t b) {
 
 }  // namespace
 
-ExportClock::ExportClock(Store& store, Times times) : times_(times), tasks_(store.has_tasks()) {
+ExportClock::ExportClock(Store& store, Times times)
+    : times_(times), tasks_(store.has_tasks()), torque_(store) {
   if (relative()) firsts_ = store.first_onsets();
 }
 

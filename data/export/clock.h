@@ -9,6 +9,7 @@
 
 #include "data/export/settings.h"
 #include "data/store/store.h"
+#include "data/store/torque_notes.h"
 
 namespace palpate::data {
 
@@ -19,6 +20,8 @@ class ExportClock {
 
   /// Whether rows of trials have the columns of tasks: the store has a study of version 2.
   bool tasks() const { return tasks_; }
+  /// Rows of trials have the column torque_driven where any run left torque out.
+  const TorqueNotes& torque() const { return torque_; }
 
   Times times() const { return times_; }
   bool relative() const { return times_ == Times::relative; }
@@ -35,6 +38,7 @@ class ExportClock {
   std::int64_t since_first(const Participant& person, std::int64_t unix_ns) const;  // ns
   Times times_;
   bool tasks_ = false;
+  TorqueNotes torque_;
   std::map<std::string, std::int64_t, std::less<>> firsts_;  // code -> ns since 1970
 };
 

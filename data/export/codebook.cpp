@@ -30,7 +30,7 @@ void describe_table(const char* table, std::span<const Column> columns, const Pr
 }  // namespace
 
 void write_codebook(TextSink& out, const ProtocolFacts& facts, const ExportSettings& settings,
-                    bool tasks) {
+                    std::span<const Column> trials) {
   DelimitedRow row(DelimitedFormat::csv);
   row << "table"
       << "column"
@@ -38,7 +38,7 @@ void write_codebook(TextSink& out, const ProtocolFacts& facts, const ExportSetti
       << "value"
       << "meaning";
   out.write(row.end());
-  describe_table("trials", trial_columns(settings.times, tasks), facts, settings, out);
+  describe_table("trials", trials, facts, settings, out);
   describe_table("attempts", attempt_columns(settings.times), facts, settings, out);
   if (!settings.pages) return;
   describe_table("pages", page_columns(), facts, settings, out);

@@ -1,5 +1,7 @@
 #include "data/export/column_definitions.h"
 
+#include <array>
+
 namespace palpate::data {
 namespace {
 
@@ -166,6 +168,16 @@ std::vector<Column> with_tasks(std::vector<Column> columns) {
   return columns;
 }
 
+std::vector<Column> with_torque(std::vector<Column> columns) {
+  columns.push_back(
+      {"torque_driven",
+       "Whether the device drove the torque of the renderer; missing where the renderer gives none",
+       "",
+       {{"0", "it drives force alone: the force was felt at the grip, without torque"},
+        {"1", "driven, as the renderer gave it"}}});
+  return columns;
+}
+
 std::vector<Column> make_attempts() {
   return {kParticipant,
           kSession,
@@ -263,12 +275,13 @@ std::vector<Column> made_relative(std::vector<Column> columns) {
 
 }  // namespace
 
-std::span<const Column> trial_columns(Times times, bool tasks) {
-  static const std::vector<Column> absolute = make_trials(), relative = made_relative(absolute);
-  static const std::vector<Column> tasks_absolute = with_tasks(absolute),
-                                   tasks_relative = made_relative(tasks_absolute);
-  if (tasks) return times == Times::absolute ? tasks_absolute : tasks_relative;
-  return times == Times::absolute ? absolute : relative;
+std::span<const Column> trial_columns(Times times, bool tasks, bool torque) {
+  using Tables = std::array<std::vector<Column>, 4>;  // with torque 1, with tasks 2
+  static const std::vector<Column> identified = make_trials(), asked = with_tasks(identified);
+  static const Tables absolute = {identified, with_torque(identified), asked, with_torque(asked)};
+  static const Tables relative = {made_relative(absolute[0]), made_relative(absolute[1]),
+                                  made_relative(absolute[2]), made_relative(absolute[3])};
+  return (times == Times::absolute ? absolute : relative)[(tasks ? 2U : 0U) + (torque ? 1U : 0U)];
 }
 
 std::span<const Column> attempt_columns(Times times) {

@@ -24,8 +24,9 @@ struct Column {
 };
 
 /// Of trials.csv, in order. \param tasks  a protocol of version 2 is among the studies: with the
-/// columns of its tasks. Relative times add the column elapsed.
-std::span<const Column> trial_columns(Times times, bool tasks = false);
+/// columns of its tasks. \param torque  torque was left out in a run: with torque_driven. Relative
+/// times add the column elapsed.
+std::span<const Column> trial_columns(Times times, bool tasks = false, bool torque = false);
 std::span<const Column> attempt_columns(Times times);  ///< of attempts.csv, likewise
 std::span<const Column> sample_columns();              ///< of a servo tick, in order
 /// After them where a stimulus of the protocol moves: where it was after the tick.

@@ -50,6 +50,7 @@ void put_trial_without_participant(Row& row, const StoredTrial& trial, const Exp
         << task.confidence_delay << task.comparison_interval << task.onsets << task.ends
         << task.levels;
   }
+  if (clock.torque().any()) row << clock.torque().driven(trial);
   if (clock.relative()) row << clock.elapsed(trial);
 }
 /// trial_columns()

@@ -105,9 +105,9 @@ void PsychDsWriter::add(const StoredTrial& trial) {
     end_table();
     participant_ = trial.participant.id;
     table_.emplace(folder_.prepare(stem + "_data.csv"));
-    row_ << trial_columns(settings_.times, clock_.tasks());
+    row_ << trial_columns(settings_.times, clock_.tasks(), clock_.torque().any());
     table_->write(row_.end());
-    use(trial_columns(settings_.times, clock_.tasks()));
+    use(trial_columns(settings_.times, clock_.tasks(), clock_.torque().any()));
   }
   put_trial(row_, trial, clock_);
   table_->write(row_.end());
@@ -168,7 +168,7 @@ Json PsychDsWriter::variables() const {
       all.push_back(describe_variable(column, facts, settings_.fault_bits));
     }
   };
-  add(trial_columns(settings_.times, clock_.tasks()));
+  add(trial_columns(settings_.times, clock_.tasks(), clock_.torque().any()));
   add(attempt_columns(settings_.times));
   add({&interval_column(), 1});
   add({&kTimeOfTick, 1});

@@ -11,6 +11,7 @@
 #include "analysis/statistics/analysis.h"
 #include "analysis/text.h"
 #include "data/files/utc.h"
+#include "data/store/torque_notes.h"
 #include "protocols/difference.h"
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/sealed_folder.h"
@@ -383,6 +384,23 @@ CheckPoint left_out(const char* id, const char* title, const std::string& good,
   return out;
 }
 
+/// As registered where the protocol allows it, in all sessions or in none: those with torque cannot
+/// be compared with those without.
+CheckPoint of_torque(const Registration& registered, const StudyData& study) {
+  const auto sessions =
+      noted(study, [](const std::string& note) { return note == data::kTorqueLeftOutNote; });
+  const bool allowed = registered.protocol.torque == protocols::TorqueRule::left_out;
+  if (!allowed)
+    return left_out("torque", "Torque", "No session says that torque was left out.",
+                    "Sessions were run without the torque of the ray.", sessions);
+  const bool all = sessions.size() == study.runs.size();
+  return left_out("torque", "Torque",
+                  all ? "The protocol allows to leave torque out; every session did."
+                      : "The protocol allows to leave torque out; no session did.",
+                  "Torque was left out in some sessions and driven in others.",
+                  all ? std::vector<std::string>() : sessions);
+}
+
 /// The numbers of an analysis as it was reported, beside those that the registered one gives.
 CheckPoint of_reported(const analysis::TrialTable& table, const ReportedAnalysis& reported,
                        double too_fast) {
@@ -472,6 +490,7 @@ StudyCheck check_study(const Registration& registered, const std::string& folder
                                  : "The protocol has no sounds.",
       "Sessions were run without the protocol's sounds.",
       noted(study, [](const std::string& note) { return note == R"({"sounds":"left out"})"; })));
+  out.points.push_back(of_torque(registered, study));
   out.points.push_back(
       left_out("levels", "Levels from another program", "No other program chose what was shown.",
                "Another program was asked for levels.", noted(study, [](const std::string& note) {

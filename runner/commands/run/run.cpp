@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "data/store/store.h"
+#include "data/store/torque_notes.h"
 #include "protocols/sha256.h"
 #include "protocols/tasks/texts.h"
 #include "runner/commands/run/admission.h"
@@ -115,7 +116,7 @@ void tell(LiveSession& session, const LiveStation& station, const Beforehand& kn
   });
   if (side_contact && torque_is_left_out(station.device)) {
     session.say("torque is left out: this device drives force alone");
-    record.note(began_ns, R"({"torque":"left out"})");
+    record.note(began_ns, data::kTorqueLeftOutNote);
   }
   if (station.protocol.sounds && station.noise == nullptr) {
     session.say("WITHOUT the protocol's sounds");

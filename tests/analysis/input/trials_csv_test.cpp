@@ -69,6 +69,20 @@ TEST_F(TrialsCsv, ReadsTheNineColumns) {
   EXPECT_TRUE(table.warnings.empty());
 }
 
+TEST_F(TrialsCsv, SaysInHowManyTrialsTorqueWasLeftOut) {
+  const std::string header = kHeader.substr(0, kHeader.size() - 1) + ",torque_driven\n";
+  const std::string rows =
+      "P1,1,1,1,ray,cube,cube,1,2.5,0\n"
+      "P1,1,1,2,point,cone,cone,1,0.25,\n"
+      "P1,1,1,3,point,cone,cone,1,0.25,NA\n"
+      "P2,1,1,1,ray,cone,cone,1,6,1\n";
+  EXPECT_EQ(read(header + rows).warnings,
+            (std::vector<std::string>{
+                "In 1 of 2 trials with ray torque was left out: the device drives force alone."}));
+  expect_fault(header + "P1,1,1,1,ray,cube,cube,1,2.5,no\n", "line 2, column torque_driven",
+               "0 or 1");
+}
+
 TEST_F(TrialsCsv, ToleratesByteOrderMarkCrlfQuotesAnyOrderAndNoLastNewline) {
   const TrialTable table = read(
       "\xEF\xBB\xBFresponse_time,note,correct,response,shape,renderer,trial,block,session,"

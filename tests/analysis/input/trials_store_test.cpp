@@ -6,9 +6,11 @@
 #include <vector>
 
 #include "analysis/input/study_record.h"
+#include "analysis/input/task_trials.h"
 #include "analysis/input/trials.h"
 #include "data/files/checksum.h"
 #include "data/store/store.h"
+#include "data/store/torque_notes.h"
 #include "protocols/parse.h"
 #include "tests/shared/temporary_folder.h"
 
@@ -34,7 +36,8 @@ class TrialsStore : public ::testing::Test {
   /// Stimuli are in the order of the protocol, not of their first appearance.
   void study(const std::vector<data::TrialRecord>& records,
              const std::string& text =
-                 R"({"stimuli": [{"name": "wedge"}, {"name": "cube"}, {"name": "torus"}]})") {
+                 R"({"stimuli": [{"name": "wedge"}, {"name": "cube"}, {"name": "torus"}]})",
+             const std::string& note = "") {
     data::Store store = data::Store::open(path_, data::Store::Mode::write_or_create);
     const data::ProtocolInfo protocol{"test", text, data::checksum_hex(text)};
     const data::Participant participant = store.enrol(protocol, "S1", 1, true, 7);
@@ -45,6 +48,7 @@ class TrialsStore : public ::testing::Test {
     info.response_device = "simulated";
     info.observer_sha256 = std::string(64, 'b');
     const palpate::data::Run run = store.begin_run(participant, info);
+    if (!note.empty()) store.add_note(run, 0, note);
     store.record_simulated(run, records);
     store.end_run(run, data::RunEnd::done, 1'000'000'000'000LL);
   }
@@ -78,6 +82,16 @@ TEST_F(TrialsStore, ReadsCompletedTrials) {
                 R"({"stimuli": [{"name": "wedge"}, {"name": "cube"}, {"name": "torus"}]})")}));
   EXPECT_EQ(table.provenance.observer_sha256, std::string(64, 'b'));
   EXPECT_EQ(table.provenance.program_versions, (std::vector<std::string>{"9.9.9"}));
+}
+
+TEST_F(TrialsStore, SaysInHowManyTrialsTorqueWasLeftOut) {
+  study({trial(1, "ray", "torus", "torus"), trial(2, "ray", "cube", "cube"),
+         trial(3, "point", "wedge", "wedge")},
+        "{}", data::kTorqueLeftOutNote);
+  EXPECT_EQ(read_trials_store(path_).warnings,
+            (std::vector<std::string>{
+                "In 2 of 2 trials with ray torque was left out: the device drives force alone."}));
+  EXPECT_EQ(read_task_trials_store(path_).warnings, read_trials_store(path_).warnings);
 }
 
 TEST_F(TrialsStore, TheRecordHasTheServoOfEachRendererWithoutPractice) {

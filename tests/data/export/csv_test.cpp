@@ -7,6 +7,7 @@
 #include <charconv>
 
 #include "data/files/formula_guard.h"
+#include "data/store/torque_notes.h"
 #include "tests/data/export/csv_fixture.h"
 
 namespace palpate::data {
@@ -24,6 +25,38 @@ TEST_F(ExportCsv, AlwaysHasTheSameColumns) {
       "first_contact_time,onset_utc,device,simulated,missed_ticks,attempt,protocol_sha256,"
       "program_version,participant_number,started_inside,ticks,longest_period,faults,max_force,"
       "observer_sha256,before_contact,response_device,contact_share,edge_dwell\r\n");
+}
+
+TEST_F(ExportCsv, TorqueThatWasLeftOutStandsInAColumnOfItsOwn) {
+  show(a_record(3));
+  TrialRecord point = a_record(4);
+  point.renderer = "point";
+  show(point);
+  store_.add_note(run_, 0, "torque was left out, the participant says");
+  ExportSettings settings;
+  settings.force = true;
+  export_csv(store_, out_, settings);
+  EXPECT_FALSE(by_name(rows(), 1).contains("torque_driven")) << "no session left it out";
+  store_.add_note(run_, 0, kTorqueLeftOutNote);
+  const palpate::data::Run other = store_.begin_run(store_.enrol(a_protocol(), "P2"), a_run());
+  store_.begin_attempt(other, a_record(1), 1);
+  store_.finish_attempt(other, a_record(1));
+  for (const Times times : {Times::absolute, Times::relative}) {
+    settings.times = times;
+    settings.codebook = out_folder_ / "codebook.csv";
+    export_csv(store_, out_, settings);
+    const Rows all = rows();
+    ASSERT_EQ(all.size(), 4U);
+    std::map<std::string, std::string> driven;
+    for (std::size_t i = 1; i < all.size(); ++i) {
+      const auto row = by_name(all, i);
+      driven[row.at("participant_id") + row.at("renderer")] = row.at("torque_driven");
+    }
+    EXPECT_EQ(driven, (std::map<std::string, std::string>{
+                          {"P1ray", "0"}, {"P1point", ""}, {"P2ray", "1"}}));
+    const std::string book = contents_of(settings.codebook);
+    EXPECT_NE(book.find("trials,torque_driven,,0,\"it drives force alone"), std::string::npos);
+  }
 }
 
 TEST_F(ExportCsv, EveryFieldStandsInItsColumn) {

@@ -14,6 +14,7 @@
 #include "analysis/report/report_json.h"
 #include "analysis/statistics/analysis.h"
 #include "data/files/checksum.h"
+#include "data/store/torque_notes.h"
 #include "protocols/parse.h"
 #include "runner/build_info.h"
 #include "runner/commands/check/deviations.h"
@@ -298,6 +299,11 @@ TEST_F(Check, NoiseLeftOut) {
 TEST_F(Check, SoundsLeftOut) {
   run({.note = R"({"sounds":"left out"})"});
   expect_alone(check(), "sounds", {"P02, session 1"});
+}
+
+TEST_F(Check, TorqueLeftOut) {
+  run({.note = data::kTorqueLeftOutNote});
+  expect_alone(check(), "torque", {"P02, session 1"});
 }
 
 TEST_F(Check, LevelsFromOutside) {
