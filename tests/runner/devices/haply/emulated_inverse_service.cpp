@@ -2,9 +2,10 @@
 //   emulated_inverse_service [PORT]      then: palpate run ... --device inverse3 --service
 //   127.0.0.1:PORT
 // Lines on standard input change it: "hand X Y Z" (m), "grip W X Y Z", "stiffness N_PER_M",
-// "set NAME 0|1" (present, in_use, calibrated, powered, awake, button, mute, frozen), "delay S",
-// "service 0|1" (0 ends all connections), "stroke" (the hand moves to and fro by itself), "state"
-// (prints force and commands as JSON). It ends with its input, unless the hand strokes.
+// "version TEXT", "set NAME 0|1" (present, in_use, calibrated, powered, awake, button, mute,
+// frozen), "delay S", "second LINE" (of the second arm, there once "present" is set), "service 0|1"
+// (0 ends all connections), "stroke" (the hand moves to and fro by itself), "state" (prints force
+// and commands as JSON). It ends with its input, unless the hand strokes.
 
 #include <chrono>
 #include <cmath>
@@ -57,17 +58,21 @@ int main(int argc, char** argv) {
       words >> on;
       service.turn(on);
     }
-    service.with([&](EmulatedArm& arm) {
+    const std::size_t which = word == "second" ? 1 : 0;
+    if (which == 1) words >> word;
+    const auto change = [&](EmulatedArm& arm) {
       if (word == "hand") words >> arm.hand[0] >> arm.hand[1] >> arm.hand[2];
       if (word == "grip") words >> arm.grip[0] >> arm.grip[1] >> arm.grip[2] >> arm.grip[3];
       if (word == "stiffness") words >> arm.hand_stiffness;
       if (word == "delay") words >> arm.delay;
+      if (word == "version") words >> arm.version;
       std::string name;
       if (word == "set" && words >> name && flags.count(name) > 0) words >> arm.*flags.at(name);
       if (word == "state")
         std::cout << nlohmann::json{{"force_n", arm.force}, {"commands", arm.commands}}.dump()
                   << std::endl;
-    });
+    };
+    service.with(change, which);
   }
   return 0;
 }

@@ -34,6 +34,8 @@ Json vector(const std::array<double, 3>& v) { return {{"x", v[0]}, {"y", v[1]}, 
 }  // namespace
 
 EmulatedService::EmulatedService(int port) : sockets_(std::make_unique<Sockets>()) {
+  arms_[1].id = "04A1";
+  arms_[1].present = arms_[1].has_grip = false;
   const tcp::endpoint place(asio::ip::make_address("127.0.0.1"), static_cast<unsigned short>(port));
   sockets_->acceptor.open(place.protocol());
   sockets_->acceptor.set_option(tcp::acceptor::reuse_address(true));
@@ -59,7 +61,8 @@ void EmulatedService::turn(bool on) {
   if (on) return;
   const std::scoped_lock lock(sockets_->mutex);
   for (const auto& socket : sockets_->open) shutdown(socket->native_handle(), SHUT_RDWR);
-  with([](EmulatedArm& arm) { arm.force = {0, 0, 0}; });  // the arm is idle without its service
+  const std::scoped_lock arms(mutex_);
+  for (EmulatedArm& arm : arms_) arm.force = {0, 0, 0};  // idle without its service
 }
 
 void EmulatedService::accept() {
@@ -72,6 +75,7 @@ void EmulatedService::accept() {
     const std::scoped_lock lock(sockets_->mutex);
     sockets_->open.push_back(socket);
     sockets_->threads.emplace_back([this, socket] {
+      std::array<bool, 2> commanded{};
       try {
         beast::flat_buffer buffer;
         http::request<http::string_body> request;
@@ -105,20 +109,23 @@ void EmulatedService::accept() {
           const double delay = arm().delay;
           if (delay > 0) std::this_thread::sleep_for(std::chrono::duration<double>(delay));
           bool mute = false;
-          const std::string reply = answer(text, mute);
+          const std::string reply = answer(text, mute, commanded);
           if (!mute) stream.write(asio::buffer(reply));
         }
-      } catch (const std::exception&) {  // the client has gone: the arm is idle
-        with([](EmulatedArm& arm) { arm.force = {0, 0, 0}; });
+      } catch (const std::exception&) {  // the client has gone: its arms are idle
+        const std::scoped_lock arms(mutex_);
+        for (std::size_t i = 0; i < arms_.size(); ++i)
+          if (commanded[i]) arms_[i].force = {0, 0, 0};
       }
     });
   }
 }
 
 std::string EmulatedService::inventory() {
-  const EmulatedArm arm = this->arm();
+  const std::scoped_lock lock(mutex_);
   Json all = {{"session_id", 7}, {"inverse3", Json::array()}, {"verse_grip", Json::array()}};
-  if (arm.present) {
+  for (const EmulatedArm& arm : arms_) {
+    if (!arm.present) continue;
     all["inverse3"].push_back(
         {{"device_id", arm.id},
          {"config",
@@ -129,50 +136,56 @@ std::string EmulatedService::inventory() {
          {"state", Json::object()},
          {"status", {{"calibrated", arm.calibrated}, {"in_use", arm.in_use}}}});
   }
-  if (arm.has_grip) all["verse_grip"].push_back({{"device_id", "G1"}, {"state", Json::object()}});
+  if (arms_[0].has_grip)
+    all["verse_grip"].push_back({{"device_id", "G1"}, {"state", Json::object()}});
   return all.dump();
 }
 
-std::string EmulatedService::answer(const std::string& message, bool& mute) {
+std::string EmulatedService::answer(const std::string& message, bool& mute,
+                                    std::array<bool, 2>& commanded) {
   const std::scoped_lock lock(mutex_);
   const Json in = Json::parse(message);
-  ++arm_.commands;
-  // Unknown keys are ignored; a command counts once.
-  std::array<double, 3> force{0, 0, 0};
-  for (const Json& one : in.value("inverse3", Json::array())) {
-    if (one.value("device_id", "") != arm_.id || !one.contains("commands")) continue;
-    const Json& commanded = one["commands"].value("set_cursor_force", Json::object());
-    const char* const key = arm_.vector ? "vector" : "values";
-    if (!commanded.contains(key)) continue;
-    const Json& v = commanded[key];
-    force = {v["x"].get<double>(), v["y"].get<double>(), v["z"].get<double>()};
-  }
-  if (!arm_.calibrated || !arm_.powered || !arm_.present) force = {0, 0, 0};
-  if (!arm_.frozen) arm_.force = force;
-  mute = arm_.mute;
-  if (!arm_.instead.empty()) return arm_.instead;
-  std::array<double, 3> at = arm_.hand;
-  for (std::size_t i = 0; i < 3; ++i)
-    if (arm_.hand_stiffness > 0) at[i] += arm_.force[i] / arm_.hand_stiffness;
   Json out = {{"inverse3", Json::array()}, {"verse_grip", Json::array()}};
-  if (arm_.present) {
+  for (std::size_t i = 0; i < arms_.size(); ++i) {
+    EmulatedArm& arm = arms_[i];
+    // Unknown keys are ignored; a command counts once, and of this client alone.
+    std::array<double, 3> force{0, 0, 0};
+    for (const Json& one : in.value("inverse3", Json::array())) {
+      if (one.value("device_id", "") != arm.id || !one.contains("commands")) continue;
+      commanded[i] = true;
+      ++arm.commands;
+      const Json& wanted = one["commands"].value("set_cursor_force", Json::object());
+      const char* const key = arm.vector ? "vector" : "values";
+      if (wanted.contains(key) && arm.calibrated && arm.powered && arm.present) {
+        const Json& v = wanted[key];
+        force = {v["x"].get<double>(), v["y"].get<double>(), v["z"].get<double>()};
+      }
+    }
+    if (commanded[i] && !arm.frozen) arm.force = force;
+    if (!arm.present) continue;
+    std::array<double, 3> at = arm.hand;
+    for (std::size_t k = 0; k < 3; ++k)
+      if (arm.hand_stiffness > 0) at[k] += arm.force[k] / arm.hand_stiffness;
     out["inverse3"].push_back(
-        {{"device_id", arm_.id},
+        {{"device_id", arm.id},
          {"state",
           {{"cursor_position", vector(at)},
            {"cursor_velocity", vector({0, 0, 0})},
-           {"current_cursor_force", vector(arm_.force)}}},
-         {"status", {{"calibrated", arm_.calibrated}, {"power_supply", arm_.powered}}}});
+           {"current_cursor_force", vector(arm.force)}}},
+         {"status", {{"calibrated", arm.calibrated}, {"power_supply", arm.powered}}}});
   }
-  if (arm_.has_grip) {
-    const auto& q = arm_.grip;
+  const EmulatedArm& first = arms_[0];
+  mute = first.mute;
+  if (!first.instead.empty()) return first.instead;
+  if (first.has_grip) {
+    const auto& q = first.grip;
     out["verse_grip"].push_back(
         {{"device_id", "G1"},
          {"state",
-          {{"button", arm_.button},
+          {{"button", first.button},
            {"hall", 1},
            {"orientation", {{"w", q[0]}, {"x", q[1]}, {"y", q[2]}, {"z", q[3]}}}}},
-         {"status", {{"awake", arm_.awake}}}});
+         {"status", {{"awake", first.awake}}}});
   }
   return out.dump();
 }

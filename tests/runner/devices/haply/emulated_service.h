@@ -40,14 +40,15 @@ class EmulatedService {
   std::string address() const;  ///< HOST:PORT
   /// Ends all connections; new ones are refused until it is on again.
   void turn(bool on);
+  /// \param which  1: the second arm, which is there once `present` is set
   template <class Change>
-  void with(Change change) {
+  void with(Change change, std::size_t which = 0) {
     const std::scoped_lock lock(mutex_);
-    change(arm_);
+    change(arms_.at(which));
   }
-  EmulatedArm arm() {
+  EmulatedArm arm(std::size_t which = 0) {
     const std::scoped_lock lock(mutex_);
-    return arm_;
+    return arms_.at(which);
   }
 
  private:
@@ -55,10 +56,10 @@ class EmulatedService {
   void accept();
   void talk(int connection);
   std::string inventory();
-  std::string answer(const std::string& message, bool& mute);
+  std::string answer(const std::string& message, bool& mute, std::array<bool, 2>& commanded);
 
   std::mutex mutex_;
-  EmulatedArm arm_;
+  std::array<EmulatedArm, 2> arms_;
   std::unique_ptr<Sockets> sockets_;
   std::atomic<bool> quit_{false}, on_{true};
   std::thread acceptor_;
