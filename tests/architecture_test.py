@@ -93,7 +93,7 @@ PUBLIC = {
     "data": "column_table record sweep_record",
     "data/files": "atomic_file atomic_folder checksum file_identity file_permissions formula_guard output_check "
                   "temporary_names text_sink trusted_links utc",
-    "data/store": "export_log protocol_rows schema sqlite_errors statement_values station_database store sweep_file tombstones",
+    "data/store": "export_log protocol_rows schema sqlite_errors statement_values station_database store sweep_file tombstones torque_notes",
     "data/export": "bids csv psychds settings study_about sweep_csv trial_table",
     "data/merge": "merge sweep_merge",
     "analysis": "text",
