@@ -64,6 +64,7 @@ constexpr Command kCommands[] = {
      palpate::runner::stability_command},
     {"sweep", "simulated studies over a space of settings", palpate::runner::sweep_command},
     {"validate", "check a protocol and list all its faults", palpate::runner::validate_command},
+    {"watch", "a page that shows a stored trial", palpate::runner::watch_command},
 };
 
 void print_help(std::ostream& out) {

@@ -80,7 +80,7 @@ def room_of(name):
 
 # The headers of a room that other rooms use; all others are the room's own business (and that of the rooms within).
 PUBLIC = {
-    "stimuli": "closed_surface compose convex_mesh edit_distance grid_hull input_file inset large_array likely_mistakes mesh_file object_spec orientation parts/convex_parts parts/inset_parts parts/overlaps parts/triangulate signed_distance "
+    "stimuli": "base64 closed_surface compose convex_mesh edit_distance grid_hull input_file inset large_array likely_mistakes mesh_file object_spec orientation parts/convex_parts parts/inset_parts parts/overlaps parts/triangulate signed_distance "
                "primitives printable random shapes solids/gmsh_file solids/solid_mesh vec",
     "rendering": "first_contact motion probe reach render_fault renderer scene tool tool_pose",
     "rendering/bodies": "moving_scene",
@@ -109,10 +109,10 @@ PUBLIC = {
     "runner/devices": "mouse registry replay self_test simulated",
     "runner/devices/falcon": "homing open registration weighing",
     "runner/display": "display explore_window mailbox text_display timeline touch_source window",
-    "runner/display/scene": "camera display_error image_file painter scene_drawing scene_renderer",
+    "runner/display/scene": "camera display_error drawn_mesh image_file painter scene_drawing scene_renderer",
     "runner/participants": "keyboard respondent response_box settings_document simulated simulated_settings task_participant",
     "runner/session": "clock_check device_check live_session markers near_codes preflight_dialogue protocol_info recorded_trial "
-                      "replay_comparison session_plan simulated_session simulated_study socket_advisor station",
+                      "replay replay_comparison session_plan simulated_session simulated_study socket_advisor station",
     "runner/sweep": "design swept_study",
     "runner/stability": "boundary integrators soft_map",
     "runner/bench": "servo_timing tick_cost",

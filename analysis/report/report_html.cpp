@@ -220,6 +220,11 @@ class Report {
     }
     table.rows.push_back({"bootstrap seed", std::to_string(analysis_.settings.seed)});
     put_table(page_.body(), table);
+    if (!record_.protocols.empty()) {
+      page_.put_note(
+          "Where servo samples were kept, a single trial can be seen as it was felt: palpate watch "
+          "--db FILE --trial CODE/SESSION/TRIAL --out PAGE.html");
+    }
     if (!record_.seeds.empty()) {
       constexpr std::size_t kMost = 500;
       const std::size_t n = std::min(record_.seeds.size(), kMost);

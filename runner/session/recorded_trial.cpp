@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <map>
 #include <optional>
+#include <set>
 #include <stdexcept>
 #include <utility>
 
@@ -17,6 +19,36 @@ bool is_named(const data::StoredTrial& trial, const std::string& protocol) {
   constexpr std::size_t kDigits = 6;
   return protocol.empty() || trial.protocol_name == protocol ||
          (protocol.size() >= kDigits && trial.protocol_sha256.starts_with(protocol));
+}
+
+/// What is on record beside a trial that is not: "; of P03 there are 1/1 to 1/304".
+std::string what_there_is(data::Store& store, const data::TrialName& name) {
+  constexpr std::size_t kMostNamed = 8;
+  std::map<int, std::pair<int, int>> trials;  // of each session the first and the last
+  std::set<std::string> codes;
+  store.for_each_trial([&](const data::StoredTrial& trial) {
+    codes.insert(trial.participant.code);
+    if (trial.participant.code != name.code) return;
+    const int number = trial.record.trial;
+    auto& [first, last] = trials.try_emplace(trial.record.session, number, number).first->second;
+    first = std::min(first, number);
+    last = std::max(last, number);
+  });
+  if (codes.empty()) return "; it has no finished trial";
+  std::string text;
+  if (trials.empty()) {
+    std::size_t named = 0;
+    for (const std::string& code : codes) {
+      if (named++ == kMostNamed) return "; finished trials are of" + text + " and others";
+      text += (text.empty() ? " " : ", ") + code;
+    }
+    return "; finished trials are of" + text;
+  }
+  for (const auto& [session, range] : trials) {
+    text += (text.empty() ? " " : ", ") + to_string({name.code, session, range.first});
+    if (range.second > range.first) text += " to " + std::to_string(range.second);
+  }
+  return "; there are" + text;
 }
 
 data::StoredTrial find_trial(data::Store& store, const data::TrialName& name,
@@ -44,7 +76,8 @@ data::StoredTrial find_trial(data::Store& store, const data::TrialName& name,
     throw data::StoreRefused(
         place + (cut_off
                      ? " was cut off before an answer: nothing of it was kept to replay"
-                     : " is not on record" + (protocol.empty() ? "" : " in protocol " + protocol)));
+                     : " is not on record" + (protocol.empty() ? "" : " in protocol " + protocol) +
+                           what_there_is(store, name)));
   }
   if (found->record.samples.empty()) {
     throw data::StoreRefused(place +

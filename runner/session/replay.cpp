@@ -10,6 +10,7 @@
 #include "runner/servo/servo.h"
 #include "runner/session/body_record.h"
 #include "runner/session/level_scenes.h"
+#include "stimuli/compose.h"
 
 namespace palpate::runner {
 namespace {
@@ -53,6 +54,16 @@ protocols::Trial trial_of(const protocols::Protocol& protocol, const data::Trial
   return trial;
 }
 
+protocols::Interval interval_of(const protocols::Protocol& protocol,
+                                const data::IntervalRecord& recorded, bool other) {
+  protocols::Interval one;
+  one.stimulus = recorded.stimulus.empty() ? -1 : stimulus_named(protocol, recorded.stimulus);
+  one.renderer = kind_of(recorded.renderer, other);
+  one.level = recorded.level;
+  one.standard = recorded.standard;
+  return one;
+}
+
 std::vector<ShownInterval> scenes_of(const protocols::Protocol& protocol,
                                      const data::TrialRecord& recorded, bool other) {
   protocols::Trial trial = trial_of(protocol, recorded);
@@ -64,11 +75,7 @@ std::vector<ShownInterval> scenes_of(const protocols::Protocol& protocol,
   }
   LevelScenes scenes(protocol);
   for (const data::IntervalRecord& interval : recorded.task->intervals) {
-    protocols::Interval one;
-    one.stimulus = interval.stimulus.empty() ? -1 : stimulus_named(protocol, interval.stimulus);
-    one.renderer = kind_of(interval.renderer, other);
-    one.level = interval.level;
-    one.standard = interval.standard;
+    const protocols::Interval one = interval_of(protocol, interval, other);
     shown.push_back({one.renderer, scenes.scene(trial, one)});
   }
   return shown;
@@ -91,6 +98,23 @@ std::vector<std::span<const data::SampleRecord>> samples_of_intervals(
     begin = i;
   }
   return intervals;
+}
+
+std::vector<std::optional<stimuli::ObjectSpec>> shown_objects(const protocols::Protocol& protocol,
+                                                              const data::TrialRecord& recorded) {
+  const protocols::Trial trial = trial_of(protocol, recorded);
+  if (!recorded.task) {
+    stimuli::ObjectSpec object = protocol.stimuli[static_cast<std::size_t>(trial.stimulus)].object;
+    object.pose = stimuli::compose({Vec3(0), trial.orientation}, object.pose);
+    return {object};
+  }
+  std::vector<std::optional<stimuli::ObjectSpec>> shown;
+  for (const data::IntervalRecord& recorded_one : recorded.task->intervals) {
+    const protocols::Interval one = interval_of(protocol, recorded_one, false);
+    shown.push_back(one.stimulus < 0 ? std::nullopt
+                                     : std::optional(shown_object(protocol, trial, one)));
+  }
+  return shown;
 }
 
 void replay(const protocols::Protocol& protocol, const data::TrialRecord& recorded, bool other,

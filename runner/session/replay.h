@@ -10,6 +10,7 @@
 #include "data/record.h"
 #include "protocols/protocol.h"
 #include "runner/servo/sample.h"
+#include "stimuli/object_spec.h"
 
 namespace palpate::runner {
 
@@ -17,6 +18,11 @@ namespace palpate::runner {
 /// A trial of version 1 has one.
 std::vector<std::span<const data::SampleRecord>> samples_of_intervals(
     const data::TrialRecord& recorded);
+
+/// What each interval of a trial showed, as it stood in the world at its beginning; none: nothing.
+/// \throws std::invalid_argument where protocol and record do not agree
+std::vector<std::optional<stimuli::ObjectSpec>> shown_objects(const protocols::Protocol& protocol,
+                                                              const data::TrialRecord& recorded);
 
 /// What a tick has come to.
 struct ReplayedSample : Sample {

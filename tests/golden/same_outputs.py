@@ -30,7 +30,7 @@ def commands():
     """Lines of commands that build on each other; a line of its own runs beside the others."""
     yield [["--help"], ["--version"], ["nonsense"]] + [["help", word] for word in (
         "accuracy", "analyze", "bench", "bundle", "check", "cluster", "devices", "explore", "export", "forget", "merge", "plan",
-        "register", "render", "replay", "run", "schedule", "simulate", "stability", "sweep", "validate")]
+        "register", "render", "replay", "run", "schedule", "simulate", "stability", "sweep", "validate", "watch")]
     for name in PROTOCOLS:
         yield [["validate", f"protocols/{name}"], ["schedule", f"protocols/{name}", "--participant", "3"]]
     for scene in SCENES:

@@ -1,44 +1,17 @@
 // `palpate replay`: a stored trial through the servo and its renderer again.
 
-#include <charconv>
 #include <iostream>
-#include <sstream>
 #include <string>
 
 #include "data/store/store.h"
 #include "runner/commands/replay/report.h"
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/outputs.h"
+#include "runner/commands/shared/trial_option.h"
 #include "runner/session/recorded_trial.h"
 #include "runner/session/replay_comparison.h"
 
 namespace palpate::runner {
-namespace {
-
-data::TrialName trial_name(const std::string& text) {
-  const auto bad = [] {
-    return UsageError("--trial: expected CODE/SESSION/TRIAL, e.g. P03/1/12, the numbers from 1");
-  };
-  data::TrialName name;
-  std::istringstream parts(text);
-  std::string session, trial;
-  if (!std::getline(parts, name.code, '/') || !std::getline(parts, session, '/') ||
-      !std::getline(parts, trial) || name.code.empty()) {
-    throw bad();
-  }
-  const auto number = [&](const std::string& digits) {
-    int value = 0;
-    const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
-    if (error != std::errc{} || end != digits.data() + digits.size() || value < 1) throw bad();
-    return value;
-  };
-  name.session = number(session);
-  name.trial = number(trial);
-  return name;
-}
-
-}  // namespace
-
 int replay_command(const std::vector<std::string>& args) {
   CommandLine line;
   line.usage = "palpate replay --db FILE --trial CODE/SESSION/TRIAL [--compare] [--out FILE.csv]";
@@ -49,7 +22,8 @@ int replay_command(const std::vector<std::string>& args) {
   line.example =
       "  palpate replay --db study.db --trial P03/1/12\n"
       "  palpate replay --db study.db --trial P03/1/12 --compare --out both.csv   (and what the\n"
-      "      other renderer would have shown on the same way, tick by tick)";
+      "      other renderer would have shown on the same way, tick by tick)\n"
+      "  palpate watch --db study.db --trial P03/1/12 --out trial.html   (a page that shows it)";
   std::string db, trial, protocol, out, json, folder;
   auto add = line.options.add_options();
   namespace po = boost::program_options;
@@ -67,7 +41,7 @@ int replay_command(const std::vector<std::string>& args) {
   const auto values = line.parse(args);
   if (!values) return 0;
   Outputs outputs(*values, {"out", "json"}, {"db"});
-  const data::TrialName name = trial_name(trial);
+  const data::TrialName name = parse_trial_name(trial);
   data::Store store = data::Store::open(db, data::Store::Mode::read_only);
   const RecordedTrial recorded = load_recorded_trial(store, name, protocol, folder);
   for (const protocols::StimulusSpec& stimulus : recorded.protocol.stimuli)

@@ -55,5 +55,6 @@ int simulate_command(const std::vector<std::string>& args);
 int stability_command(const std::vector<std::string>& args);
 int sweep_command(const std::vector<std::string>& args);
 int validate_command(const std::vector<std::string>& args);
+int watch_command(const std::vector<std::string>& args);
 
 }  // namespace palpate::runner

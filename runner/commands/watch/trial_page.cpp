@@ -1,0 +1,370 @@
+#include "runner/commands/watch/trial_page.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <glm/geometric.hpp>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <span>
+#include <utility>
+
+#include "analysis/report/html_elements.h"
+#include "analysis/text.h"
+#include "rendering/renderer.h"
+#include "runner/commands/watch/picture_mesh.h"
+#include "runner/commands/watch/whole_numbers.h"
+#include "runner/safety/fault_table.h"
+#include "runner/scene_builder.h"
+#include "runner/session/replay.h"
+#include "stimuli/printable.h"
+
+namespace palpate::runner {
+namespace {
+
+using analysis::counted;
+using analysis::escaped;
+using analysis::fixed;
+using Json = nlohmann::ordered_json;
+using stimuli::printable;
+
+// Steps of what the page shows: finer than a device senses or shows.
+constexpr double kPerSecond = 1e6, kPerMetre = 1e8, kPerNewton = 1e5, kPerUnit = 1e7;
+constexpr std::size_t kMostTriangles = 6000;  // of all objects of a page
+
+/// The ticks of a trial by one renderer, as columns.
+struct ShownTicks {
+  std::map<std::string, std::vector<double>> columns;
+  std::vector<std::size_t> intervals;  ///< ticks of each
+  std::size_t equal = 0;               ///< to the record, bit by bit
+  std::size_t count = 0;
+
+  void put(const std::string& name, double value) { columns[name].push_back(value); }
+  void put(const std::string& name, const Vec3& v) {
+    put(name + "_x", v.x);
+    put(name + "_y", v.y);
+    put(name + "_z", v.z);
+  }
+};
+
+Vec3 vec(const std::array<double, 3>& v) { return {v[0], v[1], v[2]}; }
+
+void put_body(ShownTicks& out, const std::optional<rendering::BodyPose>& body) {
+  const Pose moved = body ? body->moved : Pose();
+  out.put("moved", moved.position);
+  const Quat& q = moved.orientation;
+  for (const auto& [name, value] :
+       {std::pair{"w", q.w}, std::pair{"x", q.x}, std::pair{"y", q.y}, std::pair{"z", q.z}})
+    out.put(std::string("moved_q") + name, value);
+}
+
+/// \param other  what the other renderer makes of the path
+ShownTicks ticks_of(const RecordedTrial& trial, bool other) {
+  ShownTicks out;
+  const data::TrialRecord& record = trial.stored.record;
+  const bool moves = std::ranges::any_of(trial.protocol.stimuli, [](const auto& stimulus) {
+    return stimulus.object.body.has_value();
+  });
+  const bool tool = !trial.protocol.tool.segments.empty();
+  double time = 0;
+  replay(trial.protocol, record, other,
+         [&](std::size_t interval, const data::SampleRecord& was, const ReplayedSample& is) {
+           if (interval == out.intervals.size()) {
+             out.intervals.push_back(0);
+             time = 0;
+           } else {
+             time += static_cast<double>(is.period_ns) * 1e-9;
+           }
+           ++out.intervals.back();
+           ++out.count;
+           const rendering::Rendering& r = is.rendering;
+           const Vec3 tip = vec(was.tip), tail = vec(was.tail);
+           if (!other) {
+             out.equal += equals_record(record, was, is);
+             out.put("t", time);
+             out.put("tip", tip);
+             out.put("tail", tail);
+           }
+           out.put("force", other ? r.force : vec(was.force));
+           out.put("depth", other ? r.deepest.depth : was.depth);
+           const int contacts = other ? recorded_contacts(r.contacts) : was.contacts;
+           out.put("contacts", contacts);
+           out.put("type", other ? static_cast<double>(r.deepest.type) : was.contact_type);
+           out.put("faults", other ? r.faults : was.faults);
+           out.put("lag_tip", r.ideal.tip - tip);
+           out.put("lag_turn", r.ideal.tail - tail - (r.ideal.tip - tip));
+           out.put("contact", contacts > 0 ? r.deepest.point - r.ideal.tip : Vec3(0));
+           if (moves) put_body(out, is.body);
+           if (tool) out.put("side", r.ideal_side);
+         });
+  return out;
+}
+
+double steps_of(const std::string& name) {
+  if (name == "t") return kPerSecond;
+  if (name.starts_with("force")) return kPerNewton;
+  if (name.starts_with("moved_q") || name.starts_with("side")) return kPerUnit;
+  if (name == "contacts" || name == "type" || name == "faults") return 1;
+  return kPerMetre;
+}
+
+std::string stimulus_words(const data::TrialRecord& record, std::size_t interval) {
+  if (!record.task) return record.shape;
+  const data::IntervalRecord& shown = record.task->intervals[interval];
+  if (shown.stimulus.empty()) return "nothing";
+  return shown.stimulus + (shown.level ? ", level " + analysis::short_number(*shown.level) : "") +
+         (shown.standard ? ", standard" : "");
+}
+
+std::string renderer_words(const std::string& renderer, bool other) {
+  return (renderer == protocols::to_string(protocols::RendererKind::ray)) != other ? "ray"
+                                                                                   : "point";
+}
+
+class PageBuilder {
+ public:
+  PageBuilder(const std::vector<WatchedTrial>& trials, bool compare)
+      : trials_(trials), compare_(compare) {}
+
+  TrialPage build() {
+    std::size_t objects = 0;
+    for (const WatchedTrial& one : trials_) objects += one.trial.stored.record.task ? 2 : 1;
+    // An object's share of the page; each trial asked about has at least one of its own.
+    most_triangles_ =
+        std::max<std::size_t>(kMostTriangles / std::max<std::size_t>(objects, 1), 300);
+    for (const WatchedTrial& one : trials_) add(one);
+    page_.html = html();
+    return std::move(page_);
+  }
+
+ private:
+  void note(const std::string& sentence) {
+    if (std::ranges::find(page_.notes, sentence) == page_.notes.end())
+      page_.notes.push_back(sentence);
+  }
+
+  Json pose_json(const Pose& pose) const {
+    const Quat& q = pose.orientation;
+    return {pose.position.x, pose.position.y, pose.position.z, q.w, q.x, q.y, q.z};
+  }
+
+  /// Its number; equal ones are in the page once.
+  std::size_t add_mesh(const stimuli::ObjectSpec& object, const std::string& name) {
+    const PictureMesh mesh = picture_mesh(object, most_triangles_);
+    if (mesh.all_triangles > mesh.triangles.size())
+      note("The picture of " + name + " has " + std::to_string(mesh.triangles.size()) + " of its " +
+           std::to_string(mesh.all_triangles) + " triangles; forces and contacts are of all.");
+    if (object.soft)
+      note(
+          "A soft object is drawn at rest; contacts and forces are those of its surface as it "
+          "gave way.");
+    std::vector<double> corners;
+    for (const auto& triangle : mesh.triangles)
+      for (const std::uint32_t corner : triangle) corners.push_back(corner);
+    WholeNumbers numbers;
+    for (int axis = 0; axis < 3; ++axis) {
+      std::vector<double> values;
+      for (const Vec3& corner : mesh.corners) values.push_back(corner[axis]);
+      // To a 16,000th of 6 cm at least.
+      const double size = std::max(1e-6, std::abs(*std::ranges::max_element(
+                                             values, {}, [](double v) { return std::abs(v); })));
+      numbers.add(std::string(1, "xyz"[axis]), values,
+                  std::pow(10, std::ceil(4 - std::log10(size))));
+    }
+    numbers.add("corner", corners, 1);
+    Json json = {{"columns", numbers.columns()}, {"data", numbers.text()}};
+    const auto found = std::ranges::find(meshes_, json);
+    if (found != meshes_.end()) return static_cast<std::size_t>(found - meshes_.begin());
+    meshes_.push_back(std::move(json));
+    return meshes_.size() - 1;
+  }
+
+  Json parts_json(const RecordedTrial& trial, const ShownTicks& ticks, bool other) {
+    const data::TrialRecord& record = trial.stored.record;
+    const auto objects = shown_objects(trial.protocol, record);
+    Json parts = Json::array();
+    for (std::size_t i = 0; i < ticks.intervals.size(); ++i) {
+      const std::string& renderer =
+          record.task ? record.task->intervals[i].renderer : record.renderer;
+      const std::string label = printable(stimulus_words(record, i));
+      Json part = {{"ticks", ticks.intervals[i]},
+                   {"label", "interval " + std::to_string(i + 1) + ": " + label + ", " +
+                                 renderer_words(renderer, other)},
+                   {"mesh", nullptr}};
+      if (objects[i]) {
+        part["mesh"] = add_mesh(*objects[i], label);
+        part["pose"] = pose_json(objects[i]->pose);
+      }
+      parts.push_back(std::move(part));
+    }
+    return parts;
+  }
+
+  static Json tool_json(const protocols::ToolSpec& tool) {
+    Json segments = Json::array();
+    for (const protocols::ToolSegmentSpec& one : tool.segments)
+      segments.push_back({{one.from.x, one.from.y, one.from.z}, {one.to.x, one.to.y, one.to.z}});
+    return segments;
+  }
+
+  static std::string answer_words(const data::TrialRecord& record) {
+    const std::string after = " after " + fixed(record.response_time, 3) + " s";
+    if (record.timed_out) return "no answer" + after;
+    std::string words = "answered " + printable(record.response) + after;
+    if (data::has_right_answer(record)) words += record.correct ? ", correct" : ", wrong";
+    return words;
+  }
+
+  std::vector<std::string> facts(const WatchedTrial& one, const ShownTicks& ticks, bool other) {
+    const RecordedTrial& trial = one.trial;
+    std::vector<std::string> out;
+    if (other) {
+      out.push_back("SIMULATED COMPARISON: the recorded path of " + one.name +
+                    " with the renderer that was not felt. The hand would have moved otherwise.");
+      return out;
+    }
+    const data::TrialRecord& record = trial.stored.record;
+    out.push_back((trial.stored.participant.simulated ? "SIMULATED participant " : "Participant ") +
+                  trial.stored.participant.code + ", study " +
+                  printable(trial.stored.protocol_name) + (record.practice ? ", practice" : "") +
+                  ": " + answer_words(record) + ".");
+    const std::string all = counted(ticks.count, "tick", "ticks");
+    if (ticks.equal == ticks.count) {
+      out.push_back("Rendered again: all " + all + " equal the record, bit by bit.");
+    } else {
+      const std::string words = std::to_string(ticks.count - ticks.equal) + " of " + all +
+                                " differ from the record when they are rendered again; forces are "
+                                "the recorded ones, contacts those of palpate " PALPATE_VERSION ".";
+      out.push_back(words);
+      note(one.name + ": " + words);
+    }
+    if (trial.limited) out.emplace_back("The material was limited to what the device can show.");
+    return out;
+  }
+
+  void add_show(const WatchedTrial& one, const ShownTicks& ticks, std::optional<std::size_t> path) {
+    const bool other = path.has_value();
+    const data::TrialRecord& record = one.trial.stored.record;
+    WholeNumbers numbers;
+    for (const auto& [name, values] : ticks.columns) numbers.add(name, values, steps_of(name));
+    std::string title = one.name;
+    if (record.task)
+      title += other ? ", the other renderer" : ": " + record.task->task;
+    else
+      title += ": " + printable(record.shape) + ", " + renderer_words(record.renderer, other);
+    Json show = {{"title", title},
+                 {"facts", facts(one, ticks, other)},
+                 {"parts", parts_json(one.trial, ticks, other)}};
+    if (path) show["path"] = *path;
+    const protocols::ToolSpec& tool = one.trial.protocol.tool;
+    if (!tool.segments.empty()) show["tool"] = tool_json(tool);
+    show["columns"] = numbers.columns();
+    show["data"] = numbers.text();
+    shows_.push_back(std::move(show));
+    page_.ticks += ticks.count;
+  }
+
+  void add(const WatchedTrial& one) {
+    const std::size_t number = shows_.size();
+    add_show(one, ticks_of(one.trial, false), std::nullopt);
+    if (compare_) add_show(one, ticks_of(one.trial, true), number);
+  }
+
+  Json document() const {
+    Json types = Json::array(), faults = Json::array();
+    for (const auto type :
+         {rendering::ContactType::none, rendering::ContactType::point_polygon,
+          rendering::ContactType::segment_edge, rendering::ContactType::segment_face})
+      types.push_back(rendering::to_string(type));
+    for (const rendering::FaultBit& fault : kFaultTable) faults.push_back({fault.bit, fault.words});
+    return {{"version", 1},
+            {"program", PALPATE_VERSION},
+            {"period", 1 / trials_.front().trial.protocol.servo_rate},
+            {"types", types},
+            {"faults", faults},
+            {"meshes", meshes_},
+            {"shows", shows_}};
+  }
+
+  bool simulated() const {
+    return std::ranges::any_of(
+        trials_, [](const WatchedTrial& one) { return one.trial.stored.participant.simulated; });
+  }
+
+  std::string title() const {
+    std::vector<std::string> names;
+    for (const WatchedTrial& one : trials_) names.push_back(one.name);
+    return (names.size() == 1 ? "Trial " : "Trials ") + analysis::joined(names) +
+           (compare_ ? ", with both renderers" : "");
+  }
+
+  std::string html() const {
+    std::string json = document().dump();
+    // A text of a protocol could end the element otherwise.
+    for (std::size_t at = 0; (at = json.find('<', at)) != std::string::npos;)
+      json.replace(at, 1, "\\u003c");
+    const std::string label = simulated() ? "SIMULATED: " : "";
+    std::string out =
+        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\"/>\n"
+        "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; script-src '" +
+        analysis::script_hash(watch_js()) +
+        "'; style-src 'unsafe-inline'; img-src data:; base-uri 'none'; form-action 'none'\"/>\n"
+        "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"/>\n<title>" +
+        escaped(label + title()) + "</title>\n<link rel=\"icon\" href=\"data:,\"/>\n<style>";
+    out += watch_css();
+    out += "</style>\n</head>\n<body>\n";
+    if (simulated())
+      out += "<div class=\"flag\" role=\"note\">SIMULATED PARTICIPANT: no person felt this</div>\n";
+    out += "<header>\n<h1>" + escaped(title()) +
+           "</h1>\n<ul class=\"legend\">"
+           "<li><i class=\"l-virtual\"></i>tool in the hand</li>"
+           "<li><i class=\"l-ideal\"></i>ideal tool, kept outside</li>"
+           "<li><i class=\"l-force\"></i>force on the hand, from the contact</li>"
+           "<li><i class=\"l-touch\"></i>in contact</li></ul>\n</header>\n<main>\n"
+           "<p id=\"loading\">This page draws with JavaScript.</p>\n"
+           "<div id=\"controls\" class=\"controls\" hidden=\"hidden\">"
+           "<button type=\"button\" id=\"play\">Play</button>"
+           "<input type=\"range\" id=\"time\" min=\"0\" max=\"1\" step=\"any\" value=\"0\" "
+           "aria-label=\"Time\"/><output id=\"clock\"></output>"
+           "<select id=\"speed\" aria-label=\"Speed\">";
+    for (const auto& [value, words] :
+         {std::pair{"0.05", "1/20"}, std::pair{"0.1", "1/10"}, std::pair{"0.2", "1/5"},
+          std::pair{"0.5", "1/2"}, std::pair{"1", "1"}, std::pair{"2", "2"}, std::pair{"4", "4"}})
+      out += std::string("<option value=\"") + value + "\">speed " + words + "</option>";
+    out +=
+        "</select><button type=\"button\" id=\"solid\">Solid</button>"
+        "<button type=\"button\" id=\"views\">Three views</button></div>\n"
+        "<div id=\"shows\" class=\"shows\"></div>\n"
+        "<p class=\"soft keys\">Keys: <kbd>Space</kbd> play or pause; <kbd>←</kbd> <kbd>→</kbd> 10 "
+        "ticks, <kbd>,</kbd> <kbd>.</kbd> one tick; <kbd>Home</kbd> <kbd>End</kbd>; <kbd>[</kbd> "
+        "<kbd>]</kbd> speed; <kbd>Shift</kbd> with an arrow turns, <kbd>+</kbd> <kbd>-</kbd> zoom, "
+        "<kbd>0</kbd> resets the view; <kbd>V</kbd> changes it. Drag a picture to turn it, pinch "
+        "or "
+        "Ctrl and the wheel to come closer; drag in a plot to move in time.</p>\n</main>\n<footer>";
+    for (const std::string& sentence : page_.notes) out += "<p>" + escaped(sentence) + "</p>\n";
+    out +=
+        "<p>World frame: x right, y away, z up. Places to 10 nm, forces to 10 µN, times to 1 µs; "
+        "<code>palpate replay --out</code> has every digit. Made by palpate " PALPATE_VERSION
+        ". This page is self-contained and loads nothing from the network.</p></footer>\n"
+        "<script type=\"application/json\" id=\"ticks\">" +
+        json + "</script>\n<script>";
+    out += watch_js();
+    return out + "</script>\n</body>\n</html>\n";
+  }
+
+  const std::vector<WatchedTrial>& trials_;
+  bool compare_;
+  std::size_t most_triangles_ = kMostTriangles;
+  std::vector<Json> meshes_, shows_;
+  TrialPage page_;
+};
+
+}  // namespace
+
+TrialPage trial_page(const std::vector<WatchedTrial>& trials, bool compare) {
+  return PageBuilder(trials, compare).build();
+}
+
+}  // namespace palpate::runner
