@@ -1,19 +1,27 @@
-// UDP, serial port, and Lab Streaming Layer where liblsl is installed.
+// UDP, serial and parallel port, and Lab Streaming Layer where liblsl is installed.
 
 #include <dlfcn.h>
 #include <fcntl.h>
+#include <linux/ppdev.h>
 #include <netdb.h>
 #include <netinet/in.h>
+#include <sys/ioctl.h>
 #include <sys/socket.h>
 #include <termios.h>
 #include <unistd.h>
 
 #include <cerrno>
 #include <charconv>
+#include <chrono>
+#include <condition_variable>
 #include <cstring>
+#include <deque>
 #include <map>
+#include <mutex>
+#include <optional>
 #include <stdexcept>
 #include <string_view>
+#include <thread>
 #include <utility>
 
 #include "runner/servo/realtime.h"
@@ -123,10 +131,18 @@ speed_t speed_of(int baud) {
   return speed->second;
 }
 
-/// One byte for each marker, 8N1.
-class SerialSink final : public MarkerSink {
+/// Where a byte can be put.
+class BytePort {
  public:
-  SerialSink(const std::string& path, int baud)
+  virtual ~BytePort() = default;
+  /// False: it was not taken. May not wait.
+  virtual bool put(unsigned char byte) noexcept = 0;
+};
+
+/// 8N1.
+class SerialPort final : public BytePort {
+ public:
+  SerialPort(const std::string& path, int baud)
       : port_(open(path.c_str(), O_WRONLY | O_NOCTTY | O_NONBLOCK | O_CLOEXEC)) {
     const speed_t speed = speed_of(baud);
     if (port_.get() < 0) fail("serial:" + path, std::strerror(errno));
@@ -140,13 +156,102 @@ class SerialSink final : public MarkerSink {
       fail("serial:" + path, std::strerror(errno));
   }
 
-  bool send(const Marker& marker) noexcept override {
-    const auto byte = static_cast<unsigned char>(marker.kind);
-    return write(port_.get(), &byte, 1) == 1;
-  }
+  bool put(unsigned char byte) noexcept override { return write(port_.get(), &byte, 1) == 1; }
 
  private:
   File port_;
+};
+
+/// The data lines of a parallel port, by Linux's ppdev.
+class ParallelPort final : public BytePort {
+ public:
+  explicit ParallelPort(const std::string& path) : port_(open(path.c_str(), O_RDWR | O_CLOEXEC)) {
+    if (port_.get() < 0) fail("parport:" + path, std::strerror(errno));
+    if (ioctl(port_.get(), PPCLAIM) != 0)
+      fail("parport:" + path, errno == ENOTTY ? "this is no parallel port" : std::strerror(errno));
+    if (!put(0)) fail("parport:" + path, std::strerror(errno));
+  }
+  ParallelPort(const ParallelPort&) = delete;
+  ParallelPort& operator=(const ParallelPort&) = delete;
+  ~ParallelPort() override {
+    put(0);
+    ioctl(port_.get(), PPRELEASE);
+  }
+
+  bool put(unsigned char byte) noexcept override { return ioctl(port_.get(), PPWDATA, &byte) == 0; }
+
+ private:
+  File port_;
+};
+
+/// One byte for each marker.
+class ByteSink final : public MarkerSink {
+ public:
+  explicit ByteSink(std::unique_ptr<BytePort> port) : port_(std::move(port)) {}
+  bool send(const Marker& marker) noexcept override {
+    return port_->put(static_cast<unsigned char>(marker.kind));
+  }
+
+ private:
+  std::unique_ptr<BytePort> port_;
+};
+
+/// A pulse for each marker: its byte, and 0 after the width. A recorder that samples the lines must
+/// see each, so the next one begins a width after the last ended. In a thread of its own.
+class PulseSink final : public MarkerSink {
+ public:
+  PulseSink(std::unique_ptr<BytePort> port, std::chrono::milliseconds width)
+      : port_(std::move(port)), width_(width), thread_([this] { work(); }) {}
+  PulseSink(const PulseSink&) = delete;
+  PulseSink& operator=(const PulseSink&) = delete;
+  /// Gives the pulses that wait.
+  ~PulseSink() override {
+    {
+      const std::lock_guard lock(mutex_);
+      quit_ = true;
+    }
+    came_.notify_one();
+  }
+
+  bool send(const Marker& marker) noexcept override {
+    constexpr std::size_t kMostWaiting = 16;
+    try {
+      const std::lock_guard lock(mutex_);
+      // What the port did not take is told with the next marker.
+      if (waiting_.size() >= kMostWaiting || std::exchange(failed_, false)) return false;
+      waiting_.push_back(static_cast<unsigned char>(marker.kind));
+    } catch (...) {  // no memory
+      return false;
+    }
+    came_.notify_one();
+    return true;
+  }
+
+ private:
+  void work() {
+    std::unique_lock lock(mutex_);
+    for (;;) {
+      came_.wait(lock, [this] { return quit_ || !waiting_.empty(); });
+      if (waiting_.empty()) return;
+      const unsigned char byte = waiting_.front();
+      waiting_.pop_front();
+      lock.unlock();
+      const bool up = port_->put(byte);
+      std::this_thread::sleep_for(width_);
+      const bool down = port_->put(0);
+      std::this_thread::sleep_for(width_);
+      lock.lock();
+      failed_ = failed_ || !up || !down;
+    }
+  }
+
+  std::unique_ptr<BytePort> port_;
+  const std::chrono::milliseconds width_;
+  std::mutex mutex_;
+  std::condition_variable came_;
+  std::deque<unsigned char> waiting_;
+  bool quit_ = false, failed_ = false;
+  std::jthread thread_;  ///< the last member: it uses the others
 };
 
 /// Lab Streaming Layer: a stream of type Markers, irregular, one JSON text each, stamped with the
@@ -211,9 +316,47 @@ class LslSink final : public MarkerSink {
   void* outlet_ = nullptr;
 };
 
+constexpr const char* kExpected =
+    "expected udp:HOST:PORT, serial:PATH[:BAUD[:PULSE_MS]], parport:PATH[:PULSE_MS] or lsl[:NAME]";
+
 [[noreturn]] void refuse(const std::string& name) {
-  throw std::invalid_argument("no markers to '" + name +
-                              "'; expected udp:HOST:PORT, serial:PATH[:BAUD] or lsl[:NAME]");
+  throw std::invalid_argument("no markers to '" + name + "'; " + kExpected);
+}
+
+/// Takes ":NUMBER" off the end of a text. None: it does not end so.
+std::optional<int> number_at_end(std::string& text) {
+  const std::size_t colon = text.rfind(':');
+  if (colon == std::string::npos || colon == 0) return std::nullopt;
+  int number = 0;
+  const char* const stop = text.data() + text.size();
+  const auto [end, error] = std::from_chars(text.data() + colon + 1, stop, number);
+  if (colon + 1 == text.size() || error != std::errc() || end != stop) return std::nullopt;
+  text.resize(colon);
+  return number;
+}
+
+std::chrono::milliseconds pulse_width(const std::string& name, int milliseconds) {
+  constexpr int kLongest = 100;
+  if (milliseconds < 1 || milliseconds > kLongest)
+    throw std::invalid_argument("markers to '" + name + "': a pulse has 1 to 100 ms, not " +
+                                std::to_string(milliseconds));
+  return std::chrono::milliseconds(milliseconds);
+}
+
+std::unique_ptr<MarkerSink> serial_sink(const std::string& name, std::string path) {
+  constexpr int kBaud = 9600;
+  const std::optional<int> last = number_at_end(path);
+  const std::optional<int> before = last ? number_at_end(path) : std::nullopt;
+  const int baud = before.value_or(last.value_or(kBaud));
+  if (!before) return std::make_unique<ByteSink>(std::make_unique<SerialPort>(path, baud));
+  const std::chrono::milliseconds width = pulse_width(name, *last);
+  return std::make_unique<PulseSink>(std::make_unique<SerialPort>(path, baud), width);
+}
+
+std::unique_ptr<MarkerSink> parallel_sink(const std::string& name, std::string path) {
+  constexpr int kPulse = 5;  // ms: five samples of an amplifier at 1 kHz
+  const std::chrono::milliseconds width = pulse_width(name, number_at_end(path).value_or(kPulse));
+  return std::make_unique<PulseSink>(std::make_unique<ParallelPort>(path), width);
 }
 
 }  // namespace
@@ -221,20 +364,15 @@ class LslSink final : public MarkerSink {
 std::unique_ptr<MarkerSink> open_marker_sink(const std::string& name, MarkerCodes codes) {
   const std::size_t colon = name.find(':');
   const std::string kind = name.substr(0, colon);
-  const std::string rest = colon == std::string::npos ? "" : name.substr(colon + 1);
+  std::string rest = colon == std::string::npos ? "" : name.substr(colon + 1);
   if (kind == "lsl") return std::make_unique<LslSink>(rest.empty() ? "palpate" : rest, codes);
-  const std::size_t last = rest.rfind(':');
-  const std::string before = rest.substr(0, last);
-  const std::string after = last == std::string::npos ? "" : rest.substr(last + 1);
-  int number = 0;
-  const auto [end, error] = std::from_chars(after.data(), after.data() + after.size(), number);
-  const bool numbered =
-      !after.empty() && error == std::errc() && end == after.data() + after.size();
-  if (kind == "udp" && numbered && number > 0 && number < 65536 && !before.empty())
-    return std::make_unique<UdpSink>(before, after, codes);
-  if (kind == "serial" && numbered && !before.empty())
-    return std::make_unique<SerialSink>(before, number);
-  if (kind == "serial" && !rest.empty()) return std::make_unique<SerialSink>(rest, 9600);
+  if (kind == "serial" && !rest.empty()) return serial_sink(name, rest);
+  if (kind == "parport" && !rest.empty()) return parallel_sink(name, rest);
+  if (kind == "udp") {
+    const std::optional<int> port = number_at_end(rest);
+    if (port && *port > 0 && *port < 65536 && !rest.empty())
+      return std::make_unique<UdpSink>(rest, std::to_string(*port), codes);
+  }
   refuse(name);
 }
 

@@ -46,7 +46,7 @@ class MarkerSink {
   virtual bool send(const Marker& marker) noexcept = 0;
 };
 
-/// From what the user names: "udp:HOST:PORT", "serial:PATH[:BAUD]", "lsl[:NAME]".
+/// From what the user names, "udp:HOST:PORT" or one of the others (kExpected in its source).
 /// \throws std::invalid_argument for another text; std::runtime_error where it cannot be opened.
 std::unique_ptr<MarkerSink> open_marker_sink(const std::string& name, MarkerCodes codes);
 

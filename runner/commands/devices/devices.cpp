@@ -3,6 +3,7 @@
 
 #include <unistd.h>
 
+#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <iostream>
@@ -16,6 +17,8 @@
 #include "runner/devices/registry.h"
 #include "runner/devices/self_test.h"
 #include "runner/safety/guarded_device.h"
+#include "runner/servo/realtime.h"
+#include "runner/session/markers.h"
 #include "stimuli/printable.h"
 
 namespace palpate::runner {
@@ -203,14 +206,17 @@ DeviceConfig config_of(const po::variables_map& values) {
 }
 
 void add_options(CommandLine& line) {
-  line.usage = "palpate devices [--device NAME] [--timing] [--calibrate] [--json FILE]";
+  line.usage =
+      "palpate devices [--device NAME] [--timing] [--calibrate] [--markers WHERE] [--json FILE]";
   line.summary =
       "Lists the connected devices with their limits and self-tests; measures whether this\n"
-      "machine keeps the servo's timing; calibrates forces. Self-tests command zero force.";
+      "machine keeps the servo's timing; calibrates forces; sends markers to try their wiring.\n"
+      "Self-tests command zero force.";
   line.example = R"(  palpate devices                                       what is there
   palpate devices --device falcon --firmware nvent.bin  opens one and tests it
   palpate devices --timing --seconds 60                 is this machine fit at 1 kHz?
   palpate devices --calibrate --device falcon --calibration lab.json --weights 0.1,0.2,0.4
+  palpate devices --markers parport:/dev/parport0       does the EEG amplifier see each code?
 )";
   line.options.add_options()                                                                //
       ("device", po::value<std::string>()->value_name("NAME"), "only this kind of device")  //
@@ -230,8 +236,11 @@ void add_options(CommandLine& line) {
       ("no-fifo", "--timing: without real-time priority")                                         //
       ("no-realtime", "--timing: without any real-time right")                                    //
       ("core", po::value<int>()->default_value(-1, "any")->value_name("N"),
-       "--timing: on this processor only")                                                  //
-      ("calibrate", "guided calibration of a device")                                       //
+       "--timing: on this processor only")             //
+      ("calibrate", "guided calibration of a device")  //
+      ("markers", po::value<std::vector<std::string>>()->composing()->value_name("WHERE"),
+       "send one marker of each kind, half a second apart, to what `palpate run --markers` takes; "
+       "exit status 1 when one is not taken")                                               //
       ("json", po::value<std::string>()->value_name("FILE"), "write the findings as JSON")  //
       ("force", "replace an existing file");
   add_calibrate_options(line.options);
@@ -261,6 +270,38 @@ int list_devices(const DeviceKind* only, const DeviceConfig& config, Json& repor
   return status;
 }
 
+/// One marker of each kind to each receiver. \return the exit status
+int try_markers(const std::vector<std::string>& names) {
+  using Kind = Marker::Kind;
+  constexpr std::chrono::milliseconds kApart(500);
+  std::vector<std::unique_ptr<MarkerSink>> sinks;
+  for (const std::string& name : names) {
+    try {
+      sinks.push_back(open_marker_sink(name, MarkerCodes::this_computer));
+    } catch (const std::invalid_argument& error) {
+      throw UsageError(std::string("--markers: ") + error.what());
+    }
+  }
+  RealClock clock;
+  int status = 0;
+  for (const Kind kind : {Kind::trial_start, Kind::first_contact, Kind::response, Kind::time_out,
+                          Kind::cut_off, Kind::interval}) {
+    Marker marker;
+    marker.kind = kind;
+    marker.participant = "TEST";
+    std::cout << static_cast<int>(kind) << "  " << to_string(kind);
+    for (std::size_t i = 0; i < sinks.size(); ++i) {
+      marker.time_ns = clock.now_ns();
+      const bool taken = sinks[i]->send(marker);
+      if (!taken) status = 1;
+      std::cout << (taken ? "  sent to " : "  NOT TAKEN by ") << stimuli::printable(names[i]);
+    }
+    std::cout << std::endl;  // each as it is sent: somebody watches the recorder
+    std::this_thread::sleep_for(kApart);
+  }
+  return status;
+}
+
 }  // namespace
 
 int devices_command(const std::vector<std::string>& args) {
@@ -268,6 +309,15 @@ int devices_command(const std::vector<std::string>& args) {
   add_options(line);
   const auto values = line.parse(args);
   if (!values) return 0;
+  if (values->count("markers") > 0) {
+    for (const char* other : {"device", "timing", "calibrate", "json"}) {
+      if (values->count(other) > 0)
+        throw UsageError(
+            std::string("--markers sends markers and does nothing else; it does not go with --") +
+            other);
+    }
+    return try_markers((*values)["markers"].as<std::vector<std::string>>());
+  }
   const DeviceConfig config = config_of(*values);
   Outputs outputs(*values, {"json"}, {"calibration", "firmware"});
   const bool named = values->count("device") > 0;

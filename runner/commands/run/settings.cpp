@@ -106,7 +106,9 @@ std::optional<RunSettings> parse_run_settings(const std::vector<std::string>& ar
       ("response-latency", po::value(&latency)->value_name("SECONDS"),
        "of keyboard or buttons, where it was measured; recorded, never subtracted")  //
       ("markers", po::value(&settings.markers)->composing()->value_name("WHERE"),
-       "udp:HOST:PORT, serial:PATH[:BAUD] or lsl[:NAME]; may be given several times")  //
+       "udp:HOST:PORT, serial:PATH[:BAUD[:PULSE_MS]], parport:PATH[:PULSE_MS] or lsl[:NAME]; may "
+       "be "
+       "given several times; 'palpate devices --markers WHERE' tries it")  //
       ("marker-codes", po::bool_switch(&settings.marker_codes),
        "markers that leave this computer (udp to another one, lsl) carry the participant's code, "
        "in "
