@@ -35,6 +35,7 @@ MAY_INCLUDE = {
     "analysis": {"stimuli"},
     "analysis/input": {"analysis", "stimuli", "protocols", "data", "data/files", "data/store"},
     "analysis/statistics": {"analysis", "analysis/input", "stimuli", "protocols/procedures"},
+    "analysis/movement": {"analysis", "analysis/input", "analysis/statistics", "stimuli"},
     "analysis/figures": {"analysis", "analysis/input", "analysis/statistics", "stimuli", "protocols/procedures"},
     "analysis/report": {"analysis", "analysis/input", "analysis/statistics", "analysis/figures", "protocols", "protocols/procedures"},
     "runner": BODIES | {"protocols", "rendering/bodies/soft"},
