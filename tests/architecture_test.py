@@ -108,7 +108,7 @@ PUBLIC = {
     "runner/safety": "fault_signals fault_table guarded_device",
     "runner/sound": "masking_noise",
     "runner/devices": "mouse registry replay self_test simulated",
-    "runner/devices/falcon": "homing open registration weighing",
+    "runner/devices/falcon": "calibration homing open registration stylus_from_ends weighing",
     "runner/display": "display explore_window mailbox text_display timeline touch_source window",
     "runner/display/scene": "camera display_error drawn_mesh image_file painter scene_drawing scene_renderer",
     "runner/participants": "keyboard respondent response_box settings_document simulated simulated_settings task_participant",

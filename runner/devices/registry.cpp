@@ -43,20 +43,46 @@ DeviceCapabilities as_opened(const DeviceConfig& config) {
   return open(config)->capabilities();
 }
 
+// Names with linkage, for templates.
+[[maybe_unused]] constexpr char kForceDimension2[] = "forcedimension2";
+[[maybe_unused]] constexpr char kInverse3x2[] = "inverse3x2";
+
+template <const char* name>
+void check_named(const DeviceConfig& config) {
+  check_pair(config, name);
+}
+
+template <const char* name, DeviceCapabilities (*nominal)(const DeviceConfig&)>
+DeviceCapabilities nominal_pair(const DeviceConfig& config) {
+  return pair_of(nominal(config), name);
+}
+
+template <const char* name, OpenEnd open_end>
+std::unique_ptr<Device> open_named(const DeviceConfig& config) {
+  return open_pair(config, name, open_end);
+}
+
 constexpr DeviceKind kKinds[] = {
     {"falcon", "a Novint Falcon: position and force of one point, no orientation", true,
      falcon::check_falcon, falcon::nominal_falcon, falcon::connected_falcons, falcon::open_falcon},
     {"falcon2", "two Novint Falcons that hold the ends of a stylus", true, falcon::check_falcon2,
-     falcon::nominal_falcon2, falcon::connected_falcons, falcon::open_falcon2},
+     falcon::nominal_falcon2, falcon::connected_falcons, falcon::open_falcon2, falcon::open_falcon},
 #ifdef PALPATE_FORCEDIMENSION
     {"forcedimension",
      "a Force Dimension omega, delta, sigma or lambda, through the maker's library", true,
      forcedimension::check, forcedimension::nominal, forcedimension::connected,
      forcedimension::open},
+    {"forcedimension2", "two Force Dimension devices that hold the ends of a stylus", true,
+     check_named<kForceDimension2>, nominal_pair<kForceDimension2, forcedimension::nominal>,
+     forcedimension::connected, open_named<kForceDimension2, forcedimension::open>,
+     forcedimension::open},
 #endif
 #ifdef PALPATE_HAPLY
     {"inverse3", "a Haply Inverse3, with or without a Verse Grip, through the maker's service",
      true, haply::check, haply::nominal, haply::connected, haply::open},
+    {"inverse3x2", "two Haply Inverse3 that hold the ends of a stylus", true,
+     check_named<kInverse3x2>, nominal_pair<kInverse3x2, haply::nominal>, haply::connected,
+     open_named<kInverse3x2, haply::open_point>, haply::open_point},
 #endif
     {"mouse", "the pointer moves a stylus in the window; contact is seen, not felt", false,
      nothing_to_check, as_opened<open_mouse>, always_there, open_mouse},

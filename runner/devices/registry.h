@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "runner/devices/pair.h"
 #include "runner/servo/device.h"
 #include "runner/servo/device_config.h"
 
@@ -27,6 +28,8 @@ struct DeviceKind {
   std::vector<ConnectedDevice> (*connected)(const DeviceConfig& config);
   /// Ready to be read and written. \throws std::runtime_error saying why not and what to do
   std::unique_ptr<Device> (*open)(const DeviceConfig& config);
+  /// Of a kind that is a pair: opens one of the two, as a point; else nullptr.
+  OpenEnd open_end = nullptr;
 };
 
 std::span<const DeviceKind> device_kinds();

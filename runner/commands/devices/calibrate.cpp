@@ -18,6 +18,7 @@
 #include "runner/devices/falcon/open.h"
 #include "runner/devices/falcon/registration.h"
 #include "runner/devices/falcon/weighing.h"
+#include "runner/devices/registry.h"
 #include "runner/safety/fault_signals.h"
 #include "runner/safety/guarded_device.h"
 #include "runner/servo/realtime.h"
@@ -128,10 +129,10 @@ DeviceConfig uncalibrated(const DeviceConfig& config, const std::string& serial)
 
 /// In a guard process, because forces are commanded. \param rate  Hz that the guard expects: lower
 /// than the ticks' 1 kHz, so that a late tick does not interrupt the procedure
-std::unique_ptr<GuardedDevice> guarded(const DeviceConfig& config, double rate) {
+std::unique_ptr<GuardedDevice> guarded(OpenEnd open, const DeviceConfig& config, double rate) {
   GuardSettings settings;
   settings.rate = rate;
-  return std::make_unique<GuardedDevice>([config] { return open_falcon(config); }, settings);
+  return std::make_unique<GuardedDevice>([open, config] { return open(config); }, settings);
 }
 constexpr double kWeighingRate = 200, kRegistrationRate = 50;  // Hz; registration uses no force
 
@@ -145,7 +146,8 @@ int calibrate_force(const DeviceConfig& config, const po::variables_map& values)
   Calibration calibration = read_calibration(config.calibration);  // reports its faults first
   FaultSignals signals;
   const auto device =
-      guarded(uncalibrated(config, config.serials.empty() ? "" : config.serials[0]), kWeighingRate);
+      guarded(open_falcon, uncalibrated(config, config.serials.empty() ? "" : config.serials[0]),
+              kWeighingRate);
   signals.watch(device.get());
   request_realtime({});
   RealClock clock;
@@ -171,14 +173,18 @@ int calibrate_force(const DeviceConfig& config, const po::variables_map& values)
   return 0;
 }
 
-int calibrate_pair(const DeviceConfig& config, const po::variables_map& values) {
+int calibrate_pair(const DeviceKind& kind, const DeviceConfig& config,
+                   const po::variables_map& values) {
   const RegistrationSettings settings = registration_settings(values);
-  check(config.serials.size() == 2,
-        "falcon2 needs two --serial: first that of the Falcon at the stylus' tip");
+  check(
+      config.serials.size() == 2 && config.serials[0] != config.serials[1],
+      std::string(kind.name) + " needs two --serial: first that of the device at the stylus' tip");
   Calibration calibration = read_calibration(config.calibration);
   FaultSignals signals;
-  const auto tip = guarded(uncalibrated(config, config.serials[0]), kRegistrationRate);
-  const auto tail = guarded(uncalibrated(config, config.serials[1]), kRegistrationRate);
+  const auto tip =
+      guarded(kind.open_end, uncalibrated(config, config.serials[0]), kRegistrationRate);
+  const auto tail =
+      guarded(kind.open_end, uncalibrated(config, config.serials[1]), kRegistrationRate);
   request_realtime({});
   RealClock clock;
   TerminalGuide guide(signals);
@@ -208,12 +214,13 @@ void add_calibrate_options(po::options_description& options) {
   add("sweep-seconds", po::value<double>()->default_value(4)->value_name("S"),
       "--calibrate falcon: time of each of the two slow movements up and down while weighing, s");
   add("stylus-length", po::value<double>()->default_value(0.12, "0.12")->value_name("L"),
-      "--calibrate falcon2: between the centres of the grips on the stylus, m");
+      "--calibrate, two devices: between the centres of the grips on the stylus, m");
   add("offset", po::value<std::string>()->default_value("0,0,0")->value_name("X,Y,Z"),
-      "--calibrate falcon2: from the tip's grip to the tail's while points are taken, x,y,z in m; "
+      "--calibrate, two devices: from the tip's grip to the tail's while points are taken, x,y,z "
+      "in m; "
       "0,0,0: pinned together");
   add("points", po::value<int>()->default_value(8)->value_name("N"),
-      "--calibrate falcon2: number of points to take");
+      "--calibrate, two devices: number of points to take");
 }
 
 int calibrate_devices(const std::string& device, const DeviceConfig& config,
@@ -224,8 +231,13 @@ int calibrate_devices(const std::string& device, const DeviceConfig& config,
   const std::string why = data::write_refusal(config.calibration, true, firmware);
   check(why.empty(), "--calibration " + config.calibration + ": " + why);
   if (device == "falcon") return calibrate_force(config, values);
-  if (device == "falcon2") return calibrate_pair(config, values);
-  throw UsageError("--calibrate is for the devices falcon and falcon2, not for '" + device + "'");
+  const DeviceKind& kind = device_kind(device);
+  if (kind.open_end != nullptr) return calibrate_pair(kind, config, values);
+  std::string able = "falcon";
+  for (const DeviceKind& one : device_kinds())
+    if (one.open_end != nullptr) able += std::string(", ") + one.name;
+  throw UsageError("--calibrate is for the devices " + able + ", not for '" + device +
+                   "': other devices have their maker's calibration");
 }
 
 }  // namespace palpate::runner

@@ -91,6 +91,8 @@ bool open_and_test(const DeviceKind& kind, const DeviceConfig& config, Json& row
 bool list_kind(const DeviceKind& kind, const DeviceConfig& config, bool named, Json& rows) {
   Json row = {{"name", kind.name}, {"description", kind.description}};
   std::printf("%s: %s\n", kind.name, kind.description);
+  if (kind.has_force_feedback)
+    std::printf("    not tried on hardware, only with what stands in for it\n");
   bool good = true, usable = false;
   row["connected"] = Json::array();
   try {
@@ -221,7 +223,7 @@ void add_options(CommandLine& line) {
   line.options.add_options()                                                                //
       ("device", po::value<std::string>()->value_name("NAME"), "only this kind of device")  //
       ("serial", po::value<std::vector<std::string>>()->value_name("S"),
-       "which one of several; falcon2: twice, the tip's first")  //
+       "which one of several; two devices of a stylus: twice, the tip's first")  //
       ("firmware", po::value<std::string>()->value_name("FILE"),
        "to upload where the device needs it")  //
       ("library", po::value<std::string>()->value_name("FILE"),

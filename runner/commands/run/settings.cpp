@@ -81,7 +81,7 @@ std::optional<RunSettings> parse_run_settings(const std::vector<std::string>& ar
        "default), or, where only texts differ, with the new texts; without it a terminal is "
        "asked")  //
       ("device", po::value(&settings.device)->required()->value_name("NAME"),
-       "falcon, falcon2, mouse or simulated")  //
+       "a kind of device (palpate devices lists them)")  //
       ("ask", po::value(&settings.advisor)->value_name("SOCKET"),
        "Unix domain socket of a program that proposes the levels of adaptive blocks")  //
       ("ask-time-out-s",
@@ -122,7 +122,7 @@ std::optional<RunSettings> parse_run_settings(const std::vector<std::string>& ar
       ("ui-scale", po::value(&scale)->value_name("FACTOR"),
        "of letters and buttons, 0.5 to 4; default: from each window's monitor")  //
       ("serial", po::value(&settings.serials)->composing()->value_name("NUMBER"),
-       "which device; falcon2: twice, tip first")  //
+       "which device; two of a stylus: twice, tip first")  //
       ("firmware", po::value(&settings.firmware)->value_name("FILE"),
        "uploaded where the device needs it")  //
       ("library", po::value(&settings.library)->value_name("FILE"),

@@ -251,7 +251,7 @@ CalibrationVerdict judge_forces(const Calibration& calibration,
 CalibrationVerdict judge_pair(const Calibration& calibration, const std::string& tip,
                               const std::string& tail, std::int64_t unix_ns) {
   const PairRegistration* pair = calibration.pair_of(tip, tail);
-  return judge("registration of the Falcons " + tip + " (tip) and " + tail + " (tail)",
+  return judge("registration of the devices " + tip + " (tip) and " + tail + " (tail)",
                pair != nullptr ? pair->made_utc : "", pair != nullptr, unix_ns);
 }
 

@@ -82,6 +82,14 @@ Found open_one(const Library& library, int index) {
           name != nullptr ? stimuli::printable(name) : "a device without a name"};
 }
 
+/// Ids that devices of this process hold, one at most each: the library has one list of devices for
+/// a process, and may give an open device's id again. For the thread that opens and closes.
+std::vector<char>& held() {
+  static std::vector<char> ids;
+  return ids;
+}
+bool is_held(char id) { return std::count(held().begin(), held().end(), id) > 0; }
+
 /// In steps, as long as the guard process waits for a command: 5 ms, or 5 ticks of a slow servo.
 unsigned char watchdog_of(double rate) {
   return static_cast<unsigned char>(
@@ -118,11 +126,13 @@ void ForceDimensionDevice::open() {
       trouble = error.what();
       continue;
     }
-    if (wanted.empty() || device.serial == wanted) {
+    const bool ours = is_held(device.id);
+    if (!ours && (wanted.empty() || device.serial == wanted)) {
       id_ = device.id;
+      held().push_back(device.id);
     } else {
       others += (others.empty() ? "" : ", ") + device.serial;
-      library_.close(device.id);
+      if (!ours) library_.close(device.id);
     }
   }
   if (!id_) {
@@ -166,7 +176,7 @@ void ForceDimensionDevice::open() {
                  "depends on palpate's guard process alone.\n");
   }
   pushed_ = false;
-  read_ns_ = 0;
+  asked_ns_ = 0;
   until_status_ = 0;
   status_ = write_trouble_ = DeviceTrouble::none;
 }
@@ -176,6 +186,7 @@ void ForceDimensionDevice::close() noexcept {
   library_.set_force_and_torque(0, 0, 0, 0, 0, 0, *id_);
   library_.enable_force(0, *id_);
   library_.close(*id_);
+  std::erase(held(), *id_);
   id_.reset();
 }
 
@@ -215,16 +226,18 @@ DeviceTrouble ForceDimensionDevice::trouble_of_status() noexcept {
   return stopped ? DeviceTrouble::stopped_by_device : DeviceTrouble::none;
 }
 
-bool ForceDimensionDevice::plausible(const Vec3& position, const Vec3& axis) noexcept {
+bool ForceDimensionDevice::plausible(const Vec3& position, const Vec3& axis,
+                                     std::int64_t asked_ns) noexcept {
+  // From before the last reading to after this one: a busy machine stops the thread anywhere.
   const std::int64_t now = RealClock().now_ns();
-  const double elapsed = read_ns_ > 0 ? static_cast<double>(now - read_ns_) * 1e-9 : 1;
+  const double elapsed = asked_ns_ > 0 ? static_cast<double>(now - asked_ns_) * 1e-9 : 1;
   const double moved = glm::length(position - tip_);
   tip_ = position;
   tail_ = position;
-  read_ns_ = now;
+  asked_ns_ = asked_ns;
   if (!finite(position) || !finite(axis) || glm::length(position) > kFarthest) {
     tip_ = tail_ = Vec3(0);
-    read_ns_ = 0;  // the next one is not measured against it
+    asked_ns_ = 0;  // the next one is not measured against it
     return false;
   }
   if (capabilities_.sensed_freedom == 5) {
@@ -239,6 +252,7 @@ DeviceReading ForceDimensionDevice::read() noexcept {
   std::uint8_t buttons = 0;
   if (id_) {
     double x = 0, y = 0, z = 0, frame[3][3] = {};
+    const std::int64_t asked_ns = RealClock().now_ns();
     if (library_.get_position_and_frame(&x, &y, &z, frame, *id_) < 0) {
       trouble = last_error();
     } else {
@@ -249,7 +263,7 @@ DeviceReading ForceDimensionDevice::read() noexcept {
       }
       if (trouble == DeviceTrouble::none) trouble = status_;
       const Vec3 along(frame[0][0], frame[1][0], frame[2][0]);
-      const bool possible = plausible(to_world({x, y, z}), to_world(along));
+      const bool possible = plausible(to_world({x, y, z}), to_world(along), asked_ns);
       if (trouble == DeviceTrouble::none && !possible) trouble = DeviceTrouble::implausible;
       buttons = static_cast<std::uint8_t>(library_.get_button_mask(*id_));
     }

@@ -41,15 +41,15 @@ class ForceDimensionDevice final : public Device {
   void close() noexcept;
   DeviceTrouble trouble_of_status() noexcept;
   DeviceTrouble last_error() const noexcept;
-  bool plausible(const Vec3& position, const Vec3& axis) noexcept;
+  bool plausible(const Vec3& position, const Vec3& axis, std::int64_t asked_ns) noexcept;
 
   DeviceConfig config_;
   Library library_;
   std::optional<char> id_;
   DeviceCapabilities capabilities_;
-  Vec3 tip_, tail_;           ///< m, world, of the last good reading
-  std::int64_t read_ns_ = 0;  ///< of the last good reading; 0: none since it was opened
-  int until_status_ = 0;      ///< readings until the status is asked for again
+  Vec3 tip_, tail_;            ///< m, world, of the last good reading
+  std::int64_t asked_ns_ = 0;  ///< for the last good reading; 0: none since it was opened
+  int until_status_ = 0;       ///< readings until the status is asked for again
   DeviceTrouble status_ = DeviceTrouble::none;
   DeviceTrouble write_trouble_ = DeviceTrouble::none;
   bool lost_ = true;

@@ -101,7 +101,7 @@ void Pump::exchange(bool first) {
   Wanted wanted;
   while (!wanted_.read(wanted)) {
   }
-  const std::int64_t age = clock.now_ns() - wanted.time_ns;
+  const std::int64_t asked_ns = clock.now_ns(), age = asked_ns - wanted.time_ns;
   Vec3 force(wanted.x, wanted.y, wanted.z);
   if (static_cast<double>(age) * 1e-9 > settings_.silence || !finite(force)) force = Vec3(0);
   link_->send(command(settings_.arm, force, settings_.dialect, first));
@@ -110,7 +110,7 @@ void Pump::exchange(bool first) {
     if (quit_.load()) return;
   const State state = parse_state(message, settings_.arm, settings_.grip);
   const DeviceTrouble before = last_.trouble;
-  last_ = {state, clock.now_ns(), before};
+  last_ = {state, asked_ns, clock.now_ns(), before};
   if (!state.has_arm) {
     last_.trouble = DeviceTrouble::unplugged;
   } else if (before == DeviceTrouble::unplugged) {
@@ -145,8 +145,8 @@ void Pump::watch(const Vec3& sent, std::string_view message) noexcept {
   }
 }
 
-Inverse3Device::Inverse3Device(const DeviceConfig& config)
-    : config_(config), period_ns_(1e9 / config.rate) {
+Inverse3Device::Inverse3Device(const DeviceConfig& config, bool grip)
+    : config_(config), may_have_grip_(grip), period_ns_(1e9 / config.rate) {
   open();
 }
 
@@ -182,7 +182,7 @@ void Inverse3Device::open() {
           "' are permuted or moved there: set its basis to XYZ, without mount");
     Pump::Settings settings;
     settings.arm = arm->id;
-    has_grip_ = !found.grips.empty();
+    has_grip_ = may_have_grip_ && !found.grips.empty();
     if (has_grip_) settings.grip = found.grips[0].id;
     const bool vector = (dialect_of(version) == Dialect::vector) != other_dialect_;
     settings.dialect = vector ? Dialect::vector : Dialect::values;
@@ -196,7 +196,7 @@ void Inverse3Device::open() {
   } catch (const std::runtime_error& error) {
     throw std::runtime_error(advice_for(service, error.what()));
   }
-  moved_ns_ = 0;
+  asked_ns_ = 0;
   // From here on there is a state.
   RealClock clock;
   const std::int64_t give_up = clock.now_ns() + 2'000'000'000;
@@ -213,15 +213,16 @@ void Inverse3Device::reopen() {
 
 bool Inverse3Device::plausible(const Pump::Newest& newest) noexcept {
   const Vec3& at = newest.state.position;
-  const double elapsed = moved_ns_ > 0 ? static_cast<double>(newest.time_ns - moved_ns_) * 1e-9 : 1;
+  // From before the last one to after this one: a busy machine stops the thread anywhere.
+  const double elapsed = asked_ns_ > 0 ? static_cast<double>(newest.time_ns - asked_ns_) * 1e-9 : 1;
   const double moved = glm::length(at - tip_);
   if (!finite(at) || glm::length(at) > kFarthest || !finite(newest.state.axis)) {
-    moved_ns_ = 0;  // the next one is not measured against it
+    asked_ns_ = 0;  // the next one is not measured against it
     return false;
   }
   tip_ = at;
   tail_ = has_grip_ ? at + config_.stylus_length * newest.state.axis : at;
-  moved_ns_ = newest.time_ns;
+  asked_ns_ = newest.asked_ns;
   return elapsed >= 1 || moved <= kMaxSpeed * elapsed + kJump;
 }
 
@@ -280,6 +281,10 @@ std::vector<ConnectedDevice> connected(const DeviceConfig& config) {
 
 std::unique_ptr<Device> open(const DeviceConfig& config) {
   return std::make_unique<Inverse3Device>(config);
+}
+
+std::unique_ptr<Device> open_point(const DeviceConfig& config) {
+  return std::make_unique<Inverse3Device>(config, false);
 }
 
 }  // namespace palpate::runner::haply

@@ -32,7 +32,7 @@ class Pump {
   };
   struct Newest {
     State state;
-    std::int64_t time_ns = 0;  ///< CLOCK_MONOTONIC, of its arrival; 0: none yet
+    std::int64_t asked_ns = 0, time_ns = 0;  ///< CLOCK_MONOTONIC, of its arrival; 0: none yet
     DeviceTrouble trouble = DeviceTrouble::none;
   };
 
@@ -75,7 +75,8 @@ class Pump {
 class Inverse3Device final : public Device {
  public:
   /// \throws std::runtime_error saying what is in the way
-  explicit Inverse3Device(const DeviceConfig& config);
+  /// \param grip  whether the axis of a Verse Grip is sensed, where there is one
+  explicit Inverse3Device(const DeviceConfig& config, bool grip = true);
 
   const DeviceCapabilities& capabilities() const override { return capabilities_; }
   /// Never waits. The stylus has its tip at the arm's cursor; without a grip tip and tail are one.
@@ -90,10 +91,10 @@ class Inverse3Device final : public Device {
   DeviceConfig config_;
   DeviceCapabilities capabilities_;
   bool other_dialect_ = false;  ///< than the version suggests
-  bool has_grip_ = false;
+  bool may_have_grip_, has_grip_ = false;
   double period_ns_;
-  Vec3 tip_, tail_;  ///< m, of the last good reading
-  std::int64_t moved_ns_ = 0;
+  Vec3 tip_, tail_;            ///< m, of the last good reading
+  std::int64_t asked_ns_ = 0;  ///< for that; 0: none
   bool lost_ = true;
   std::unique_ptr<Pump> pump_;
 };
@@ -103,5 +104,7 @@ void check(const DeviceConfig& config);
 DeviceCapabilities nominal(const DeviceConfig& config);
 std::vector<ConnectedDevice> connected(const DeviceConfig& config);
 std::unique_ptr<Device> open(const DeviceConfig& config);
+/// Without the axis of a grip.
+std::unique_ptr<Device> open_point(const DeviceConfig& config);
 
 }  // namespace palpate::runner::haply

@@ -23,8 +23,9 @@ TEST(DeviceKinds, AreThoseOfTheHandbookEachWithADescription) {
     EXPECT_EQ(&device_kind(kind.name), &kind);
     EXPECT_EQ(testing::flaw_of(kind.description), "") << kind.name;
   }
-  EXPECT_EQ(names, (std::vector<std::string>{"falcon", "falcon2", "forcedimension", "inverse3",
-                                             "mouse", "simulated"}));
+  EXPECT_EQ(names, (std::vector<std::string>{"falcon", "falcon2", "forcedimension",
+                                             "forcedimension2", "inverse3", "inverse3x2", "mouse",
+                                             "simulated"}));
 }
 
 TEST(DeviceKinds, AnUnknownNameIsRefusedWithTheKnownOnes) {
@@ -35,7 +36,8 @@ TEST(DeviceKinds, AnUnknownNameIsRefusedWithTheKnownOnes) {
     } catch (const std::invalid_argument& error) {
       EXPECT_EQ(error.what(),
                 "no device '" + name +
-                    "'; there are: falcon, falcon2, forcedimension, inverse3, mouse, simulated");
+                    "'; there are: falcon, falcon2, forcedimension, forcedimension2, inverse3, "
+                    "inverse3x2, mouse, simulated");
     }
   }
 }

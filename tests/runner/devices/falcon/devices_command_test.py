@@ -224,7 +224,7 @@ class Devices(unittest.TestCase):
     def test_wrong_usage_is_said_before_a_device_is_touched(self):
         for arguments, text in [
                 (("--device", "falcon"), "--calibration"),
-                (("--device", "mouse", "--calibration", "c.json"), "falcon and falcon2"),
+                (("--device", "mouse", "--calibration", "c.json"), "falcon, falcon2"),
                 (("--device", "falcon", "--calibration", "c.json", "--weights", "0.1,x"), "--weights"),
                 (("--device", "falcon", "--calibration", "c.json", "--weights", "-1"), "--weights"),
                 (("--device", "falcon", "--calibration", "c.json", "--gravity", "nan"), "--gravity"),

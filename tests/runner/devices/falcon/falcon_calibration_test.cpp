@@ -155,10 +155,10 @@ TEST(FalconCalibration, VerdictsNameTheDevicesAndWhatToDo) {
   EXPECT_EQ(judge_forces(calibration, {"A1"}, kNow).text,
             "force of the Falcon A1: made 2026-10-31T11:00:00Z, 1 days ago");
   EXPECT_EQ(judge_pair(calibration, "A1", "B2", kNow).text,
-            "registration of the Falcons A1 (tip) and B2 (tail): made 2026-10-30T00:00:00Z, 2 days "
+            "registration of the devices A1 (tip) and B2 (tail): made 2026-10-30T00:00:00Z, 2 days "
             "ago");
   EXPECT_EQ(judge_pair(calibration, "B2", "A1", kNow).text,
-            "registration of the Falcons B2 (tip) and A1 (tail): none is stored; run palpate "
+            "registration of the devices B2 (tip) and A1 (tail): none is stored; run palpate "
             "devices --calibrate");
   EXPECT_EQ(judge_forces(calibration, {"B2"}, kNow).text,
             "force of the Falcon B2: made 2026-01-31T11:00:00.5Z, 274 days ago; run palpate "

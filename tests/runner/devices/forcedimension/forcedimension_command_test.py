@@ -47,8 +47,9 @@ class Stub:
         self.set(serial=4711, hand_stiffness=400, connected=1, power=1)
 
     def set(self, **numbers):
-        for name, number in numbers.items():
-            struct.pack_into("d", self._map, 8 * (1 + FIELDS.index(name)), number)
+        for name, number in numbers.items():  # at once: pack_into would write a zero first
+            at = 8 * (1 + FIELDS.index(name))
+            self._map[at:at + 8] = struct.pack("d", number)
 
     def get(self, name):
         return struct.unpack_from("d", self._map, 8 * (1 + FIELDS.index(name)))[0]
