@@ -20,6 +20,7 @@
 #include "runner/devices/haply/inverse3.h"
 #include "runner/devices/mouse.h"
 #include "runner/devices/stroking.h"
+#include "runner/devices/touch/touch.h"
 
 namespace palpate::runner {
 namespace {
@@ -46,6 +47,7 @@ DeviceCapabilities as_opened(const DeviceConfig& config) {
 // Names with linkage, for templates.
 [[maybe_unused]] constexpr char kForceDimension2[] = "forcedimension2";
 [[maybe_unused]] constexpr char kInverse3x2[] = "inverse3x2";
+[[maybe_unused]] constexpr char kTouch2[] = "touch2";
 
 template <const char* name>
 void check_named(const DeviceConfig& config) {
@@ -83,6 +85,13 @@ constexpr DeviceKind kKinds[] = {
     {"inverse3x2", "two Haply Inverse3 that hold the ends of a stylus", true,
      check_named<kInverse3x2>, nominal_pair<kInverse3x2, haply::nominal>, haply::connected,
      open_named<kInverse3x2, haply::open_point>, haply::open_point},
+#endif
+#ifndef PALPATE_NO_OPENHAPTICS
+    {"touch", "a 3D Systems Touch, Touch X or Phantom, through the maker's library", true,
+     touch::check, touch::nominal, touch::connected, touch::open},
+    {"touch2", "two 3D Systems devices that hold the ends of a stylus", true, check_named<kTouch2>,
+     nominal_pair<kTouch2, touch::nominal>, touch::connected, open_named<kTouch2, touch::open>,
+     touch::open},
 #endif
     {"mouse", "the pointer moves a stylus in the window; contact is seen, not felt", false,
      nothing_to_check, as_opened<open_mouse>, always_there, open_mouse},

@@ -30,7 +30,7 @@ _palpate() {
   if [[ $before == --* ]]; then
     argument="$(_palpate_argument "$help" "$before")"
     case "$before:$argument" in
-      --device:*) _palpate_words "falcon falcon2 mouse simulated" "$word"; return ;;
+      --device:*) _palpate_words "falcon falcon2 forcedimension forcedimension2 inverse3 inverse3x2 touch touch2 mouse simulated" "$word"; return ;;
       --renderer:*) _palpate_words "point ray" "$word"; return ;;
       --times:*) _palpate_words "relative absolute" "$word"; return ;;
       --format:NAME) _palpate_words "csv bids psych-ds" "$word"; return ;;

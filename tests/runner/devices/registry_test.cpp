@@ -24,8 +24,8 @@ TEST(DeviceKinds, AreThoseOfTheHandbookEachWithADescription) {
     EXPECT_EQ(testing::flaw_of(kind.description), "") << kind.name;
   }
   EXPECT_EQ(names, (std::vector<std::string>{"falcon", "falcon2", "forcedimension",
-                                             "forcedimension2", "inverse3", "inverse3x2", "mouse",
-                                             "simulated"}));
+                                             "forcedimension2", "inverse3", "inverse3x2", "touch",
+                                             "touch2", "mouse", "simulated"}));
 }
 
 TEST(DeviceKinds, AnUnknownNameIsRefusedWithTheKnownOnes) {
@@ -37,7 +37,7 @@ TEST(DeviceKinds, AnUnknownNameIsRefusedWithTheKnownOnes) {
       EXPECT_EQ(error.what(),
                 "no device '" + name +
                     "'; there are: falcon, falcon2, forcedimension, forcedimension2, inverse3, "
-                    "inverse3x2, mouse, simulated");
+                    "inverse3x2, touch, touch2, mouse, simulated");
     }
   }
 }

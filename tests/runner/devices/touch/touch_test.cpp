@@ -1,0 +1,211 @@
+// 3D Systems' devices through a library that stands in for the maker's.
+
+#include "runner/devices/touch/touch.h"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <glm/geometric.hpp>
+#include <stdexcept>
+#include <string>
+#include <thread>
+
+#include "tests/runner/devices/forcedimension/stub_state.h"
+#include "tests/shared/temporary_folder.h"
+
+namespace palpate::runner::touch {
+namespace {
+
+using testing::StubDevice;
+using testing::StubState;
+
+class Touch : public ::testing::Test {
+ protected:
+  Touch() {
+    // The stub keeps the first file that it maps: each test writes the same one anew.
+    static const palpate::testing::TemporaryFolder folder;
+    static const std::string path = folder / "stub";
+    setenv("PALPATE_STUB_STATE", path.c_str(), 1);
+    static StubState* const mapped = testing::map_stub_state(path);
+    state_ = mapped;
+    *state_ = StubState{};
+    one().serial = 4711;
+    config_.library = STUB_LIBRARY;
+  }
+
+  StubDevice& one() { return state_->device[0]; }
+  /// Reads as a servo does, with a force upwards, until `holds` or far too long.
+  static bool until(Device& device, const std::function<bool(const DeviceReading&)>& holds,
+                    double up = 0) {
+    for (int tick = 0; tick < 10'000; ++tick) {
+      const DeviceReading reading = device.read();
+      device.write({0, 0, up}, Vec3(0));
+      if (holds(reading)) return true;
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+    return false;
+  }
+  static bool works(Device& device) {
+    return until(device, [](const DeviceReading& reading) { return !reading.lost; });
+  }
+  bool pushes(Device& device) {
+    return until(
+        device, [this](const DeviceReading&) { return one().force[1] == 1; }, 1);
+  }
+  std::string refusal() {
+    try {
+      open(config_);
+      return "";
+    } catch (const std::runtime_error& error) {
+      return error.what();
+    }
+  }
+
+  StubState* state_;
+  DeviceConfig config_;
+};
+
+TEST_F(Touch, AStylusIsReadInTheWorldFrameAndItsForcesAddUpAtTheTip) {
+  one().hand[0] = 0.01;  // right
+  one().hand[1] = 0.03;  // up
+  one().hand[2] = 0.02;  // towards the user
+  one().hand_stiffness = 0;
+  const auto device = open(config_);
+  ASSERT_TRUE(works(*device));
+  const DeviceReading reading = device->read();
+  EXPECT_LT(glm::length(reading.stylus.tip - Vec3(0.01, -0.02, 0.03)), 1e-12);
+  EXPECT_LT(glm::length(reading.stylus.tail - Vec3(0.01, -0.02 - config_.stylus_length, 0.03)),
+            1e-12);
+  const DeviceCapabilities& can = device->capabilities();
+  EXPECT_EQ(can.sensed_freedom, 5);
+  EXPECT_EQ(can.actuated_freedom, 3);
+  EXPECT_EQ(can.max_force, 3.3);
+  EXPECT_EQ(can.max_stiffness, 500);
+  EXPECT_EQ(can.calibration, "maker's: Touch, serial number 4711, OpenHaptics");
+  for (int tick = 0; tick < 10'000 && one().force[0] == 0; ++tick) {
+    device->read();
+    device->write({1, 2, 3}, {0.1, 0.2, 0.3});
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  EXPECT_DOUBLE_EQ(one().force[0], 1.1);
+  EXPECT_DOUBLE_EQ(one().force[1], 3.3);
+  EXPECT_DOUBLE_EQ(one().force[2], -2.2);  // +y of the world is away from the user
+}
+
+TEST_F(Touch, ADeviceThatDoesNotTellItsLimitsGetsTheLeast) {
+  one().model = 3;
+  EXPECT_EQ(open(config_)->capabilities().max_force, 0.88);
+}
+
+TEST_F(Touch, AForceThatIsNotRenewedBecomesZero) {
+  const auto device = open(config_);
+  ASSERT_TRUE(pushes(*device));
+  for (int i = 0; i < 10'000 && one().force[1] != 0; ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  EXPECT_EQ(one().force[1], 0);
+}
+
+TEST_F(Touch, EveryFaultIsTroubleAndZeroForceUntilItIsOver) {
+  const struct {
+    const char* name;
+    double StubDevice::*what;
+    double value, well;
+    DeviceTrouble trouble;
+  } cases[] = {{"unplugged", &StubDevice::connected, 0, 1, DeviceTrouble::unplugged},
+               {"too fast", &StubDevice::too_fast, 1, 0, DeviceTrouble::stopped_by_device},
+               {"warm", &StubDevice::error, 0x0200, 0, DeviceTrouble::stopped_by_device},
+               {"errors without end", &StubDevice::error, 1, 0, DeviceTrouble::stopped_by_device},
+               {"an unknown error", &StubDevice::error, 0x0999, 0, DeviceTrouble::silent},
+               {"calibration lost", &StubDevice::reset, 1, 0, DeviceTrouble::not_calibrated},
+               {"stalled", &StubDevice::delay, 1, 0, DeviceTrouble::silent},
+               {"NaN", &StubDevice::wrong, 1, 0, DeviceTrouble::implausible},
+               {"infinite", &StubDevice::wrong, 2, 0, DeviceTrouble::implausible},
+               {"1e9 m", &StubDevice::wrong, 3, 0, DeviceTrouble::implausible}};
+  for (const auto& [name, what, value, well, trouble] : cases) {
+    SCOPED_TRACE(name);
+    *state_ = StubState{};
+    one().serial = 4711;
+    const auto device = open(config_);
+    ASSERT_TRUE(works(*device));
+    ASSERT_TRUE(pushes(*device));
+    one().*what = value;
+    EXPECT_TRUE(until(
+        *device, [trouble](const DeviceReading& read) { return read.trouble == trouble; }, 1));
+    const DeviceReading reading = device->read();
+    EXPECT_TRUE(reading.lost);
+    EXPECT_TRUE(std::isfinite(reading.stylus.tip.x + reading.stylus.tip.y + reading.stylus.tip.z));
+    if (what != &StubDevice::delay) {  // a scheduler that stands still sets no force at all
+      EXPECT_TRUE(until(
+          *device, [this](const DeviceReading&) { return one().force[1] == 0; }, 1));
+    }
+    one().*what = well;
+    if (needs_reopening(trouble)) device->reopen();
+    EXPECT_TRUE(works(*device));
+    EXPECT_TRUE(pushes(*device)) << "it works again";
+  }
+}
+
+TEST_F(Touch, ACalibrationThatIsDueIsUpdated) {
+  one().reset = 2;
+  const auto device = open(config_);
+  EXPECT_TRUE(works(*device));
+  EXPECT_EQ(one().reset, 0);
+}
+
+TEST_F(Touch, TwoAreKnownByTheirNamesAndCalledByOneScheduler) {
+  state_->count = 2;
+  state_->device[1].serial = 99;
+  state_->device[1].hand[0] = 0.05;
+  config_.serials = {"4711"};
+  const auto tip = open(config_);
+  config_.serials = {"99"};
+  const auto tail = open(config_);
+  EXPECT_TRUE(works(*tip));
+  EXPECT_TRUE(works(*tail));
+  EXPECT_NEAR(tail->read().stylus.tip.x, 0.05, 1e-9);
+  tail->reopen();
+  EXPECT_TRUE(works(*tip)) << "called again";
+  EXPECT_NE(refusal().find("another program uses it"), std::string::npos) << refusal();
+  EXPECT_TRUE(works(*tip)) << "also after one that could not be opened";
+  config_.serials = {"5"};
+  EXPECT_NE(refusal().find("'5' of 3D Systems cannot be opened: communication error"),
+            std::string::npos)
+      << refusal();
+  config_.serials = {"1", "2"};
+  EXPECT_THROW(check(config_), std::invalid_argument);
+}
+
+TEST_F(Touch, NamesAreThoseThatTheMakersSetupStored) {
+  const palpate::testing::TemporaryFolder home;
+  std::filesystem::create_directory(home / "config");
+  for (const char* name : {"Left.config", "Default Device.config", "notes.txt"})
+    std::ofstream(home / "config/" + name) << "\n";
+  setenv("GTDD_HOME", home.path().c_str(), 1);
+  const std::vector<ConnectedDevice> found = connected(config_);
+  unsetenv("GTDD_HOME");
+  ASSERT_EQ(found.size(), 2U);
+  EXPECT_EQ(found[0].serial, "Default Device");
+  EXPECT_EQ(found[1].serial, "Left");
+  EXPECT_EQ(connected(config_).size(), 1U) << "the default one, it may be";
+}
+
+// In a process of its own: a library that was loaded stays.
+TEST_F(Touch, ALibraryThatCannotBeUsedSaysWhy) {
+  GTEST_FLAG_SET(death_test_style, "threadsafe");
+  const auto tell = [this](const char* path) {
+    config_.library = path;
+    std::fputs(refusal().c_str(), stderr);
+    _exit(0);
+  };
+  EXPECT_EXIT(tell("/nonexistent/libHD.so"), ::testing::ExitedWithCode(0),
+              "--library.*nonexistent");
+  EXPECT_EXIT(tell(FOREIGN_LIBRARY), ::testing::ExitedWithCode(0), "it has no hdInitDevice");
+}
+
+}  // namespace
+}  // namespace palpate::runner::touch
