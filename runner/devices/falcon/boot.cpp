@@ -129,9 +129,9 @@ bool firmware_runs(Transport& transport, const BootSettings& settings) {
   transport.control(request::kBaud, kBaudNormal);
   purge(transport);
   const Packet zero = encode(Command{});
+  PacketStream stream;  // of all probes: a slow machine reads one reply over several waits
   for (int probe = 0; probe < settings.packet_probes && !transport.gone(); ++probe) {
     if (!transport.send(zero)) continue;
-    PacketStream stream;
     const std::int64_t end = transport.now_ns() + settings.packet_wait_ns;
     for (std::int64_t left = settings.packet_wait_ns; left > 0; left = end - transport.now_ns()) {
       for (const std::uint8_t byte : receive(transport, 1, left)) {

@@ -15,7 +15,7 @@ struct BootSettings {
   std::int64_t monitor_wait_ns = 40'000'000;  ///< for each
   std::int64_t echo_wait_ns = 1'000'000'000;  ///< for the echo of a chunk
   int uploads = 10;                           ///< attempts; several are common
-  int packet_probes = 50;                     ///< until running firmware answers; a busy machine takes s
+  int packet_probes = 30;                     ///< until running firmware answers
   std::int64_t packet_wait_ns = 100'000'000;  ///< for each
 };
 
