@@ -214,7 +214,7 @@ CoverageResult result_of(const CoverageDesign& design, const CoverageStudy* stud
   std::vector<double> slopes;
   for (std::size_t i = 0; i < count; ++i) {
     const CoverageStudy& one = studies[i];
-    result.mean_trials += static_cast<double>(one.trials) / static_cast<double>(count);
+    result.mean_trials += one.trials;
     if (!one.fitted) {
       ++result.unfitted;
       continue;
@@ -227,6 +227,7 @@ CoverageResult result_of(const CoverageDesign& design, const CoverageStudy* stud
     result.bayes_studies += one.has_posterior ? 1 : 0;
     slopes.push_back(one.slope);
   }
+  result.mean_trials /= static_cast<double>(count);
   if (slopes.empty()) return result;
   const auto middle = slopes.begin() + static_cast<std::ptrdiff_t>(slopes.size() / 2);
   std::nth_element(slopes.begin(), middle, slopes.end());
