@@ -278,7 +278,7 @@ class Check(Study):
         self.assertEqual((check["deviations"], check["simulated"]), (0, "SIMULATED PARTICIPANTS"))
         self.assertEqual({p["id"] for p in check["points"]}, {
             "registration", "protocol", "order", "participants", "trials", "people", "dates", "exclusion", "alpha",
-            "versions", "calibration", "noise", "sounds", "levels"})
+            "versions", "calibration", "noise", "sounds", "torque", "levels"})
         self.assertRegex(next(p["sentence"] for p in check["points"] if p["id"] == "people"), r"version \d")
         for one in check["hypotheses"]:
             self.assertIn(one["verdict"], ("corroborated", "refuted", "undecided"))
