@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <set>
 
+#include "protocols/event_codes.h"
 #include "protocols/json_document.h"
 #include "protocols/parse.h"
 #include "protocols/parse_body.h"
@@ -303,6 +304,7 @@ Protocol parse_protocol_text(const std::string& text, const std::string& file_na
     read_identification(reader, protocol);
   }
   read_apparatus(reader, protocol);
+  read_event_codes(reader, protocol);  // for their faults: a schedule needs none
   check_radius(reader, protocol.tool,
                std::any_of(protocol.stimuli.begin(), protocol.stimuli.end(),
                            [](const auto& stimulus) { return stimulus.object.soft.has_value(); }));

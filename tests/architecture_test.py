@@ -88,7 +88,7 @@ PUBLIC = {
     "rendering/verification": "explain extreme_cases random_draws random_solids reference search union_cases union_search",
     "rendering/accuracy": "body_study paper_first_contact peers soft_study study union_study",
     "rendering/bodies/soft": "soft_build soft_coupling soft_scene",
-    "protocols": "answer_keys difference json_document object_reader parse protocol schedule sha256 sweep_space tasks/block_procedures tasks/levels tasks/task_plan tasks/texts tasks/typical_participant",
+    "protocols": "answer_keys difference event_codes json_document object_reader parse protocol schedule sha256 sweep_space tasks/block_procedures tasks/levels tasks/task_plan tasks/texts tasks/typical_participant",
     "protocols/procedures": "procedure procedure_spec psychometric psychometric_names recovery track_seed",
     "data/base": "json_text",
     "data": "column_table record sweep_record",

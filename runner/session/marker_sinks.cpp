@@ -189,7 +189,7 @@ class ByteSink final : public MarkerSink {
  public:
   explicit ByteSink(std::unique_ptr<BytePort> port) : port_(std::move(port)) {}
   bool send(const Marker& marker) noexcept override {
-    return port_->put(static_cast<unsigned char>(marker.kind));
+    return port_->put(static_cast<unsigned char>(marker.code));
   }
 
  private:
@@ -219,7 +219,7 @@ class PulseSink final : public MarkerSink {
       const std::lock_guard lock(mutex_);
       // What the port did not take is told with the next marker.
       if (waiting_.size() >= kMostWaiting || std::exchange(failed_, false)) return false;
-      waiting_.push_back(static_cast<unsigned char>(marker.kind));
+      waiting_.push_back(static_cast<unsigned char>(marker.code));
     } catch (...) {  // no memory
       return false;
     }

@@ -1,5 +1,6 @@
 #include "runner/session/markers.h"
 
+#include <chrono>
 #include <nlohmann/json.hpp>
 #include <utility>
 
@@ -26,13 +27,24 @@ const char* to_string(Marker::Kind kind) {
       return "cut_off";
     case Marker::Kind::interval:
       return "interval";
+    case Marker::Kind::sync:
+      return "sync";
   }
   return "";
+}
+
+int code_of(const Marker& marker, const protocols::EventCodes& codes) {
+  if (marker.kind == Marker::Kind::response) {
+    const auto own = codes.find("response:" + marker.response);
+    if (own != codes.end()) return own->second;
+  }
+  return codes.at(to_string(marker.kind));
 }
 
 std::string to_json_line(const Marker& marker, std::int64_t sent_ns, bool with_code) {
   nlohmann::ordered_json line = {
       {"marker", to_string(marker.kind)},
+      {"code", marker.code},
       {"time_ns", marker.time_ns},
       {"sent_ns", sent_ns},
       {"participant_id", marker.participant},
@@ -43,12 +55,14 @@ std::string to_json_line(const Marker& marker, std::int64_t sent_ns, bool with_c
       {"renderer", marker.renderer},
       {"shape", marker.shape},
   };
-  if (!with_code) line["participant_id"] = nullptr;
+  if (!with_code || marker.kind == Marker::Kind::sync) line["participant_id"] = nullptr;
   if (marker.kind == Marker::Kind::response) line["response"] = marker.response;
   return line.dump() + "\n";
 }
 
-Markers::Markers(std::vector<std::unique_ptr<MarkerSink>> sinks) : sinks_(std::move(sinks)) {
+Markers::Markers(std::vector<std::unique_ptr<MarkerSink>> sinks, protocols::EventCodes codes,
+                 bool sync)
+    : sinks_(std::move(sinks)), codes_(std::move(codes)), sync_(sync) {
   if (!sinks_.empty()) thread_ = std::jthread([this] { work(); });
 }
 
@@ -69,16 +83,34 @@ void Markers::send(const Marker& marker) {
       return;
     }
     queue_.push_back(marker);
+    queue_.back().code = code_of(marker, codes_);
   }
   came_.notify_one();
 }
 
 void Markers::work() {
+  using std::chrono::steady_clock;
+  constexpr std::chrono::seconds kSecond(1);
+  RealClock clock;
+  Marker second;
+  second.kind = Marker::Kind::sync;
+  second.code = code_of(second, codes_);
+  steady_clock::time_point due = steady_clock::now();  // of the next sync
+  const auto has_work = [this] { return quit_ || !queue_.empty(); };
   std::unique_lock lock(mutex_);
   while (!quit_ || !queue_.empty()) {
-    came_.wait(lock, [this] { return quit_ || !queue_.empty(); });
-    const std::vector<Marker> batch = std::exchange(queue_, {});
+    if (sync_) {
+      came_.wait_until(lock, due, has_work);
+    } else {
+      came_.wait(lock, has_work);
+    }
+    std::vector<Marker> batch = std::exchange(queue_, {});
     lock.unlock();
+    if (sync_ && steady_clock::now() >= due) {
+      second.time_ns = clock.now_ns();
+      batch.push_back(second);
+      while (due <= steady_clock::now()) due += kSecond;  // none later for those that were missed
+    }
     for (const Marker& marker : batch) {
       for (const auto& sink : sinks_) dropped_ += sink->send(marker) ? 0 : 1;
     }

@@ -12,24 +12,30 @@
 #include <thread>
 #include <vector>
 
+#include "protocols/event_codes.h"
+
 namespace palpate::runner {
 
 struct Marker {
-  enum class Kind : std::uint8_t {  // the value is what the serial port gets
-    trial_start = 1,                ///< time zero: forces go on
-    first_contact = 2,
-    response = 3,
-    time_out = 4,
-    cut_off = 5,   ///< the trial will be shown again
-    interval = 6,  ///< forces go on again, in a further interval of the trial
+  enum class Kind : std::uint8_t {
+    trial_start,  ///< time zero: forces go on
+    first_contact,
+    response,
+    time_out,
+    cut_off,   ///< the trial will be shown again
+    interval,  ///< forces go on again, in a further interval of the trial
+    sync,      ///< a second has passed; of no trial
   };
   Kind kind = Kind::trial_start;
+  int code = 0;              ///< 1 to 255, that of code_of(): what a port gets
   std::int64_t time_ns = 0;  ///< CLOCK_MONOTONIC, of the event itself
   std::string participant;
   int session = 0, block = 0, trial = 0, attempt = 0;
   std::string renderer, shape, response;  ///< response: empty but for Kind::response
 };
 const char* to_string(Marker::Kind kind);  ///< "trial_start", ...
+/// Of the answer where it has one of its own, else of the kind.
+int code_of(const Marker& marker, const protocols::EventCodes& codes);
 /// Who may read a participant's code in a marker: what goes over a network goes in clear.
 enum class MarkerCodes {
   this_computer,  ///< only receivers on this computer; others get null
@@ -52,7 +58,9 @@ std::unique_ptr<MarkerSink> open_marker_sink(const std::string& name, MarkerCode
 
 class Markers {
  public:
-  explicit Markers(std::vector<std::unique_ptr<MarkerSink>> sinks);
+  /// \param sync  sends Kind::sync once a second, too, from now on
+  explicit Markers(std::vector<std::unique_ptr<MarkerSink>> sinks,
+                   protocols::EventCodes codes = protocols::usual_event_codes(), bool sync = false);
   /// Sends what is left.
   ~Markers();
   Markers(const Markers&) = delete;
@@ -67,6 +75,8 @@ class Markers {
   void work();
 
   const std::vector<std::unique_ptr<MarkerSink>> sinks_;
+  const protocols::EventCodes codes_;
+  const bool sync_;
   std::mutex mutex_;
   std::condition_variable came_;
   std::vector<Marker> queue_;

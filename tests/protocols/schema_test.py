@@ -12,12 +12,12 @@ import jsonschema
 # Beyond JSON Schema: it cannot compare values with each other, count across the file or look for
 # files, and the JSON reader drops keys that are given twice. The program refuses these.
 PROGRAM_ONLY = {
-    "compounds-too-deep", "friction-static-below-dynamic", "grip-off-the-stylus", "key-for-unknown",
+    "codes-alike", "compounds-too-deep", "friction-static-below-dynamic", "grip-off-the-stylus", "key-for-unknown",
     "keys-that-are-one", "keys-that-are-one-elsewhere",
     "keys-given-twice", "labels-alike", "layers-out-of-order", "material-twice", "max-run-alone", "min-distance-too-far", "more-blocks-than-repetitions",
     "more-sessions-than-trials", "quaternions", "same-names", "stimulus-without-key", "surface-without-layers",
     "too-many-trials", "tool-radius", "tool-segment-without-length", "two-keys",
-    "v2-adjust-limits", "v2-answer-without-key", "v2-criterion-with-an-adaptive-procedure", "v2-easier-of-the-other-side", "v2-labels-alike", "v2-level-axis-of-no-length", "v2-level-nowhere",
+    "v2-adjust-limits", "v2-codes-of-no-answer", "v2-answer-without-key", "v2-criterion-with-an-adaptive-procedure", "v2-easier-of-the-other-side", "v2-labels-alike", "v2-level-axis-of-no-length", "v2-level-nowhere",
     "v2-level-of-another-shape", "v2-level-out-of-range",
     "v2-names-alike", "v2-order-of-an-adaptive-block", "v2-order-without-solution", "v2-page-before-unknown-block",
     "v2-renderer-not-of-the-protocol", "v2-same-different-of-three", "v2-scale-falls", "v2-sessions-in-order",

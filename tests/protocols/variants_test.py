@@ -84,7 +84,7 @@ class Variants(unittest.TestCase):
         self.assertEqual(done.returncode, 2, done.stderr)
         found = {}
         for line in done.stderr.splitlines():
-            match = re.search(rf"{number}\.json:\d+: (/[^:]*): (.*)", line)
+            match = re.search(rf"{number}\.json:\d+: (/.*?): (.*)", line)
             if match:
                 found[match[1]] = match[2]
         self.assertIn(f"/{STRANGE}", found, done.stderr)

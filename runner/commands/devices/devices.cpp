@@ -287,11 +287,12 @@ int try_markers(const std::vector<std::string>& names) {
   RealClock clock;
   int status = 0;
   for (const Kind kind : {Kind::trial_start, Kind::first_contact, Kind::response, Kind::time_out,
-                          Kind::cut_off, Kind::interval}) {
+                          Kind::cut_off, Kind::interval, Kind::sync}) {
     Marker marker;
     marker.kind = kind;
     marker.participant = "TEST";
-    std::cout << static_cast<int>(kind) << "  " << to_string(kind);
+    marker.code = code_of(marker, protocols::usual_event_codes());
+    std::cout << marker.code << "  " << to_string(kind);
     for (std::size_t i = 0; i < sinks.size(); ++i) {
       marker.time_ns = clock.now_ns();
       const bool taken = sinks[i]->send(marker);

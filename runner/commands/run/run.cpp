@@ -18,6 +18,7 @@
 
 #include "data/store/store.h"
 #include "data/store/torque_notes.h"
+#include "protocols/event_codes.h"
 #include "protocols/sha256.h"
 #include "protocols/tasks/texts.h"
 #include "runner/commands/run/admission.h"
@@ -125,6 +126,12 @@ void tell(LiveSession& session, const LiveStation& station, const Beforehand& kn
   if (station.protocol.masking_noise && station.noise == nullptr) {
     session.say("WITHOUT the protocol's masking noise");
     record.note(began_ns, R"({"masking_noise":"left out"})");
+  }
+  if (!known.settings.markers.empty()) {
+    const nlohmann::ordered_json sent = {{"markers", known.settings.markers},
+                                         {"codes", protocols::event_codes(station.protocol)},
+                                         {"sync", known.settings.sync}};
+    record.note(began_ns, sent.dump());
   }
   const std::string& missing = station.servo_thread.rights().missing;
   if (!missing.empty()) session.say(missing);
@@ -235,7 +242,7 @@ int run_command(const std::vector<std::string>& args) {
   FaultSignals signals;
   const OpenDevice open = open_device(kind, settings, protocol);
   const ZeroOnSignal guard_on_signal(signals, open.guard);
-  Markers markers(std::move(marker_sinks));
+  Markers markers(std::move(marker_sinks), protocols::event_codes(protocol), settings.sync);
   const DeviceCapabilities& device = open.device->capabilities();
   const std::vector<LimitedMaterial> limited = limit_materials(protocol, device);
   const StimulusLibrary library(protocol);

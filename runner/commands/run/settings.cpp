@@ -41,6 +41,8 @@ void check(RunSettings& settings) {
   if (settings.spoken && settings.buttons)
     throw UsageError("--spoken: the experimenter types the answers; leave out --buttons");
   check_language(settings.language);
+  if (settings.sync && settings.markers.empty())
+    throw UsageError("--sync: name a receiver with --markers");
   if (settings.device == "mouse" && settings.no_window)
     throw UsageError("--device mouse needs the window: leave out --no-window");
 }
@@ -108,7 +110,11 @@ std::optional<RunSettings> parse_run_settings(const std::vector<std::string>& ar
       ("markers", po::value(&settings.markers)->composing()->value_name("WHERE"),
        "udp:HOST:PORT, serial:PATH[:BAUD[:PULSE_MS]], parport:PATH[:PULSE_MS] or lsl[:NAME]; may "
        "be "
-       "given several times; 'palpate devices --markers WHERE' tries it")  //
+       "given several times; 'palpate devices --markers WHERE' tries it. Their bytes: the "
+       "protocol's codes")  //
+      ("sync", po::bool_switch(&settings.sync),
+       "send the marker sync (128: a parallel port's highest data line) once a second to what "
+       "--markers names")  //
       ("marker-codes", po::bool_switch(&settings.marker_codes),
        "markers that leave this computer (udp to another one, lsl) carry the participant's code, "
        "in "

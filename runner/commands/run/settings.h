@@ -21,7 +21,7 @@ struct RunSettings {
   bool spoken = false;       ///< the experimenter types the answers
   bool no_window = false, full_screen = false, buttons = false, without_calibration = false,
        without_noise = false, new_participant = false, after_withdrawal = false,
-       marker_codes = false;
+       marker_codes = false, sync = false;
   std::string advisor;          ///< socket of a program that proposes levels; empty: none
   double advisor_time_out = 1;  ///< s
 };

@@ -9,7 +9,8 @@ import unittest
 
 from command_case import CommandCase
 
-KINDS = ["trial_start", "first_contact", "response", "time_out", "cut_off", "interval"]
+KINDS = ["trial_start", "first_contact", "response", "time_out", "cut_off", "interval", "sync"]
+CODES = [1, 2, 3, 4, 5, 6, 128]
 
 
 class DevicesMarkers(CommandCase):
@@ -26,10 +27,11 @@ class DevicesMarkers(CommandCase):
         self.assertEqual([line["marker"] for line in lines], KINDS)
         self.assertEqual([b - a for a, b in zip([l["time_ns"] for l in lines], [l["time_ns"] for l in lines][1:])
                           if not b - a >= 500_000_000], [])
-        self.assertEqual(os.read(master, 100), bytes(byte for code in range(1, 7) for byte in (code, 0)))
+        self.assertEqual(os.read(master, 100), bytes(byte for code in CODES for byte in (code, 0)))
         self.assertEqual([line.split()[:2] for line in done.stdout.splitlines()],
-                         [[str(code), kind] for code, kind in enumerate(KINDS, 1)])
-        self.assertEqual(done.stdout.count("sent to"), 12)
+                         [[str(code), kind] for code, kind in zip(CODES, KINDS)])
+        self.assertEqual(done.stdout.count("sent to"), 14)
+        self.assertEqual([line["code"] for line in lines], CODES)
 
     def test_wrong_use_is_told(self):
         self.assertIn("parport:PATH[:PULSE_MS]", self.palpate("devices", "--markers", "usb:1", status=2).stderr)

@@ -10,12 +10,15 @@
 #include <sys/syscall.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <chrono>
 #include <cstdarg>
 #include <cstdlib>
+#include <memory>
 #include <mutex>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "runner/session/markers.h"
@@ -66,6 +69,7 @@ using Kind = Marker::Kind;
 Marker marker(Kind kind) {
   Marker one;
   one.kind = kind;
+  one.code = code_of(one, protocols::usual_event_codes());
   return one;
 }
 
@@ -145,6 +149,46 @@ TEST_F(ParallelMarkers, APortThatFailsIsTold) {
     told = !sink->send(marker(Kind::response));
   }
   EXPECT_TRUE(told);
+}
+
+TEST_F(ParallelMarkers, AProtocolsOwnCodesGoOut) {
+  {
+    std::vector<std::unique_ptr<MarkerSink>> sinks;
+    sinks.push_back(open_marker_sink("parport:" + path_ + ":1", MarkerCodes::this_computer));
+    protocols::EventCodes codes = protocols::usual_event_codes();
+    codes["trial_start"] = 10;
+    codes["response:cube"] = 255;
+    Markers markers(std::move(sinks), codes);
+    Marker one;
+    markers.send(one);
+    one.kind = Kind::response;
+    for (const char* answer : {"cube", "ball", ""}) {
+      one.response = answer;
+      markers.send(one);
+    }
+    one.kind = Kind::cut_off;  // its answer is an old one's
+    one.response = "cube";
+    markers.send(one);
+  }
+  EXPECT_EQ(bytes(), (std::vector<int>{0, 10, 0, 255, 0, 3, 0, 3, 0, 5, 0, 0}));
+}
+
+TEST_F(ParallelMarkers, AreInStepWithTheSecondsBetweenOthers) {
+  {
+    std::vector<std::unique_ptr<MarkerSink>> sinks;
+    sinks.push_back(open_marker_sink("parport:" + path_ + ":1", MarkerCodes::this_computer));
+    Markers markers(std::move(sinks), protocols::usual_event_codes(), true);
+    const auto seconds = [this] {
+      const std::vector<int> all = bytes();
+      return std::count(all.begin(), all.end(), 128);
+    };
+    while (seconds() < 2) usleep(1000);
+    markers.send(marker(Kind::response));
+    while (seconds() < 3) usleep(1000);
+  }
+  EXPECT_EQ(bytes(), (std::vector<int>{0, 128, 0, 128, 0, 3, 0, 128, 0, 0}));
+  // Never early; how late they may be, the computer decides.
+  EXPECT_GT(fake_.puts[7].at - fake_.puts[1].at, std::chrono::milliseconds(1500));
 }
 
 TEST(MarkerPorts, WhatIsNoPortIsRefused) {

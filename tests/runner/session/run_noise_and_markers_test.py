@@ -149,6 +149,49 @@ class Marks(Live):
             self.assertGreaterEqual(line["sent_ns"], line["time_ns"])
         self.assertIn("markers were not taken", terminal.text)
 
+    def test_a_protocols_own_codes_and_every_second(self):
+        receiver = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.addCleanup(receiver.close)
+        receiver.bind(("127.0.0.1", 0))
+        receiver.settimeout(30)
+        master, slave = pty.openpty()
+        self.addCleanup(os.close, master)
+        self.addCleanup(os.close, slave)
+        where = [f"udp:127.0.0.1:{receiver.getsockname()[1]}", f"serial:{os.ttyname(slave)}:115200"]
+        codes = {"trial_start": 10, "response:ball": 14, "sync": 99}
+        terminal = self.begin("--sync", "--markers", where[0], "--markers", where[1], repetitions=1,
+                              blocks_per_renderer=1, codes=codes)
+        lines = []
+
+        def until(kind, count):
+            while sum(line["marker"] == kind for line in lines) < count:
+                lines.append(json.loads(receiver.recv(4096)))
+
+        until("sync", 3)
+        terminal.type("1")  # ball
+        until("response", 1)
+        self.finish(terminal, "2")  # box: no code of its own
+        receiver.settimeout(0.2)
+        try:
+            while True:
+                lines.append(json.loads(receiver.recv(4096)))
+        except TimeoutError:
+            pass
+        seconds = [line for line in lines if line["marker"] == "sync"]
+        others = [(line["marker"], line["code"]) for line in lines
+                  if line["marker"] not in ("sync", "first_contact")]
+        self.assertEqual(others, [("trial_start", 10), ("response", 14), ("trial_start", 10), ("response", 3)])
+        self.assertEqual({(line["code"], line["participant_id"], line["trial"]) for line in seconds}, {(99, None, 0)})
+        for earlier, later in zip(seconds, seconds[1:]):
+            self.assertGreater(later["time_ns"] - earlier["time_ns"], 0)
+        # In step with the first one: as late as the computer is busy, never drifting.
+        self.assertLess((seconds[-1]["time_ns"] - seconds[0]["time_ns"]) / 1e9 - (len(seconds) - 1), 5)
+        self.assertEqual(list(os.read(master, 1000)), [line["code"] for line in lines])
+        noted = [json.loads(text) for (text,) in self.sql("SELECT text FROM notes") if text.startswith('{"markers"')]
+        self.assertEqual(noted, [{"markers": where, "codes": {
+            "cut_off": 5, "first_contact": 2, "interval": 6, "response": 3, "response:ball": 14, "sync": 99,
+            "time_out": 4, "trial_start": 10}, "sync": True}])
+
     def test_the_code_does_not_leave_this_computer_unless_asked_to(self):
         other, listener = "10.98.7.6", self.dir / "listen.py"
         network = ("ip link add here type veth peer name there && ip addr add 10.98.7.1/24 dev here && "
@@ -207,6 +250,11 @@ while os.getppid() == runner:
             self.assertIsNone(marker["participant_id"], "whoever is on the network may listen")
             self.assertAlmostEqual(float(at), marker["time_ns"] / 1e9, delta=0.05)
         self.assertEqual([kind for kind in kinds if kind != "first_contact"], ["trial_start", "response"] * 2)
+
+    def test_seconds_need_a_receiver(self):
+        with self.run_session("--sync") as terminal:
+            self.assertEqual(terminal.finish(), 2)
+            self.assertIn("--markers", terminal.text)
 
     def test_what_cannot_be_opened_is_said_before_anything_else(self):
         for where in ("serial:/dev/null", "serial:" + str(self.dir / "none"), "udp:no.such.host.invalid:9"):
