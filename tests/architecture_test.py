@@ -103,7 +103,7 @@ PUBLIC = {
     "analysis/figures": "axes figure_svg figures marks palette sweep_figures task_figures",
     "analysis/report": "html_elements html_page hypotheses plan_report report_html report_json report_text sweep_report tables task_report",
     "runner": "",
-    "runner/servo": "device device_config force_limiter passivity realtime sample servo servo_fault servo_thread shared_value "
+    "runner/servo": "device device_config force_limiter passivity realtime ring sample servo servo_fault servo_thread shared_value "
                     "tick_clock tick_source touched_places triple_buffer",
     "runner/safety": "fault_signals fault_table guarded_device",
     "runner/sound": "masking_noise",
@@ -113,7 +113,7 @@ PUBLIC = {
     "runner/display/scene": "camera display_error drawn_mesh image_file painter scene_drawing scene_renderer",
     "runner/participants": "keyboard respondent response_box settings_document simulated simulated_settings task_participant",
     "runner/session": "clock_check device_check live_session markers near_codes preflight_dialogue protocol_info recorded_trial "
-                      "replay replay_comparison session_plan simulated_session simulated_study socket_advisor station",
+                      "replay replay_comparison sample_stream session_plan simulated_session simulated_study socket_advisor station",
     "runner/sweep": "design swept_study",
     "runner/stability": "boundary integrators soft_map",
     "runner/bench": "servo_timing tick_cost",

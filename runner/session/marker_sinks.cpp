@@ -1,6 +1,5 @@
 // UDP, serial and parallel port, and Lab Streaming Layer where liblsl is installed.
 
-#include <dlfcn.h>
 #include <fcntl.h>
 #include <linux/ppdev.h>
 #include <netdb.h>
@@ -25,6 +24,7 @@
 #include <utility>
 
 #include "runner/servo/realtime.h"
+#include "runner/session/lsl_library.h"
 #include "runner/session/markers.h"
 
 namespace palpate::runner {
@@ -260,28 +260,23 @@ class PulseSink final : public MarkerSink {
 class LslSink final : public MarkerSink {
  public:
   LslSink(const std::string& name, MarkerCodes codes)
-      : with_code_(codes == MarkerCodes::everywhere) {
-    for (const char* library : {"liblsl.so.2", "liblsl.so", "liblsl.so.1"}) {
-      library_ = dlopen(library, RTLD_NOW | RTLD_LOCAL);
-      if (library_ != nullptr) break;
-    }
-    if (library_ == nullptr) fail("lsl", "liblsl is not installed (liblsl.so was not found)");
-    find(create_info_, "lsl_create_streaminfo");
-    find(create_outlet_, "lsl_create_outlet");
-    find(push_, "lsl_push_sample_strt");
-    find(clock_, "lsl_local_clock");
-    find(destroy_outlet_, "lsl_destroy_outlet");
-    find(destroy_info_, "lsl_destroy_streaminfo");
+      : with_code_(codes == MarkerCodes::everywhere), library_("markers to lsl") {
+    library_.find(create_info_, "lsl_create_streaminfo");
+    library_.find(create_outlet_, "lsl_create_outlet");
+    library_.find(push_, "lsl_push_sample_strt");
+    library_.find(clock_, "lsl_local_clock");
+    library_.find(destroy_outlet_, "lsl_destroy_outlet");
+    library_.find(destroy_info_, "lsl_destroy_streaminfo");
     constexpr int kString = 3;  // cft_string
     info_ = create_info_(name.c_str(), "Markers", 1, 0.0, kString, ("palpate-" + name).c_str());
     if (info_ != nullptr) outlet_ = create_outlet_(info_, 0, 360);
-    if (outlet_ == nullptr) fail("lsl", "liblsl gave no stream");
+    if (outlet_ == nullptr) library_.fail("liblsl gave no stream");
   }
   LslSink(const LslSink&) = delete;
   LslSink& operator=(const LslSink&) = delete;
   ~LslSink() override {
     destroy_outlet_(outlet_);
-    destroy_info_(info_);  // the library stays: it has threads of its own
+    destroy_info_(info_);
   }
 
   bool send(const Marker& marker) noexcept override {
@@ -298,14 +293,8 @@ class LslSink final : public MarkerSink {
   }
 
  private:
-  template <class Function>
-  void find(Function*& function, const char* name) {
-    function = reinterpret_cast<Function*>(dlsym(library_, name));
-    if (function == nullptr) fail("lsl", std::string("liblsl has no ") + name);
-  }
-
   const bool with_code_;
-  void* library_ = nullptr;
+  const LslLibrary library_;
   void* (*create_info_)(const char*, const char*, std::int32_t, double, int, const char*) = nullptr;
   void* (*create_outlet_)(void*, std::int32_t, std::int32_t) = nullptr;
   std::int32_t (*push_)(void*, const char**, double) = nullptr;

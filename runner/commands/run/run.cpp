@@ -9,8 +9,10 @@
 #include <cstdio>
 #include <exception>
 #include <functional>
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <stdexcept>
 #include <string>
 #include <thread>
 #include <utility>
@@ -32,6 +34,7 @@
 #include "runner/session/device_check.h"
 #include "runner/session/live_session.h"
 #include "runner/session/preflight_dialogue.h"
+#include "runner/session/sample_stream.h"
 #include "runner/session/socket_advisor.h"
 #include "runner/session/station.h"
 
@@ -133,6 +136,8 @@ void tell(LiveSession& session, const LiveStation& station, const Beforehand& kn
                                          {"sync", known.settings.sync}};
     record.note(began_ns, sent.dump());
   }
+  if (!known.settings.stream.empty())
+    record.note(began_ns, nlohmann::ordered_json{{"stream", known.settings.stream}}.dump());
   const std::string& missing = station.servo_thread.rights().missing;
   if (!missing.empty()) session.say(missing);
 }
@@ -208,6 +213,17 @@ bool has_joystick(const RunSettings& settings, const protocols::Protocol& protoc
   return !protocol.responses.joystick.empty() && !settings.no_window;
 }
 
+/// None where nobody asked for it.
+std::unique_ptr<SampleStream> open_stream(const RunSettings& settings,
+                                          const protocols::Protocol& protocol) {
+  if (settings.stream.empty()) return nullptr;
+  try {
+    return std::make_unique<SampleStream>(settings.stream, protocol.servo_rate);
+  } catch (const std::invalid_argument& error) {
+    throw UsageError(std::string("--stream: ") + error.what());
+  }
+}
+
 /// The texts that were shown go on record as a whole.
 void translate_texts(const RunSettings& settings, Admission& admission) {
   protocols::Protocol& protocol = admission.protocol;
@@ -243,6 +259,7 @@ int run_command(const std::vector<std::string>& args) {
   const OpenDevice open = open_device(kind, settings, protocol);
   const ZeroOnSignal guard_on_signal(signals, open.guard);
   Markers markers(std::move(marker_sinks), protocols::event_codes(protocol), settings.sync);
+  const auto stream = open_stream(settings, protocol);
   const DeviceCapabilities& device = open.device->capabilities();
   const std::vector<LimitedMaterial> limited = limit_materials(protocol, device);
   const StimulusLibrary library(protocol);
@@ -293,8 +310,11 @@ int run_command(const std::vector<std::string>& args) {
                     SocketAdvisor::Settings{settings.advisor, settings.advisor_time_out,
                                             participant.enrolled_number, session},
                     progress.completed);
+  std::optional<StreamedServo> streamed;
+  if (stream) streamed.emplace(servo, *stream);
+  TickSource& ticks = streamed ? static_cast<TickSource&>(*streamed) : servo;
   const LiveStation station{
-      {protocol, library, plan, servo, clock, began, record, advisor ? &*advisor : nullptr},
+      {protocol, library, plan, ticks, clock, began, record, advisor ? &*advisor : nullptr},
       record,
       device,
       open.guard,
@@ -313,6 +333,9 @@ int run_command(const std::vector<std::string>& args) {
       station,
       store.look_up(admission.enrolled, participant.code, std::nullopt, participant.simulated),
       outcome);
+  if (stream && stream->dropped() > 0)
+    std::fprintf(stderr, "%llu samples were not taken by the stream\n",
+                 static_cast<unsigned long long>(stream->dropped()));
   return outcome.failed ? 1 : 0;
 }
 

@@ -115,6 +115,9 @@ std::optional<RunSettings> parse_run_settings(const std::vector<std::string>& ar
       ("sync", po::bool_switch(&settings.sync),
        "send the marker sync (128: a parallel port's highest data line) once a second to what "
        "--markers names")  //
+      ("stream", po::value(&settings.stream)->value_name("lsl[:NAME]"),
+       "send every tick of a trial, 20 channels of pose and force, to Lab Streaming Layer, where "
+       "liblsl is installed; whoever is on the network may listen")  //
       ("marker-codes", po::bool_switch(&settings.marker_codes),
        "markers that leave this computer (udp to another one, lsl) carry the participant's code, "
        "in "

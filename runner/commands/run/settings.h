@@ -17,6 +17,7 @@ struct RunSettings {
   int participant_monitor = 0, console_monitor = 0;  ///< from 1; 0: as it comes
   double ui_scale = 0;                               ///< 0: from the monitors
   std::string language;      ///< of the protocol's texts; "": as they are written
+  std::string stream;        ///< of the servo's samples: "lsl" or "lsl:NAME"; "": none
   std::string response_box;  ///< serial port; "": none
   bool spoken = false;       ///< the experimenter types the answers
   bool no_window = false, full_screen = false, buttons = false, without_calibration = false,

@@ -4,9 +4,12 @@ Usage: run_noise_and_markers_test.py PALPATE FOLDER_OF_FAKE_LIBLSL
 """
 
 import array
+import csv
+import ctypes.util
 import json
 import math
 import os
+import pathlib
 import pty
 import socket
 import subprocess
@@ -251,10 +254,86 @@ while os.getppid() == runner:
             self.assertAlmostEqual(float(at), marker["time_ns"] / 1e9, delta=0.05)
         self.assertEqual([kind for kind in kinds if kind != "first_contact"], ["trial_start", "response"] * 2)
 
-    def test_seconds_need_a_receiver(self):
+    def stream(self, *options, **environment):
+        """A session with samples, streamed. \return its terminal and the lines that the stream got"""
+        said = self.dir / "lsl.txt"
+        here = {"LD_LIBRARY_PATH": FAKE_LSL, "PALPATE_FAKE_LSL": str(said)} | environment
+        with unittest.mock.patch.dict(os.environ, here):
+            terminal = self.begin("--stream", "lsl:touch", *options, repetitions=1, blocks_per_renderer=1, samples=True)
+        while "--markers" in options and "first_contact" not in said.read_text():
+            time.sleep(0.05)
+        terminal.type("1")
+        self.finish(terminal)
+        return terminal, pathlib.Path(f"{said}.samples").read_text().splitlines()
+
+    def stored(self):
+        """Of each trial, its samples as they are exported: rounded to 1 nm and 1 uN."""
+        out = self.dir / "dataset"
+        subprocess.run([PALPATE, "export", "--db", self.db, "--format", "psych-ds", "--out", out], check=True,
+                       capture_output=True)
+        table, = out.glob("data/*/*_description-haptic_data.csv")
+        trials = {}
+        with open(table, newline="", encoding="utf-8") as rows:
+            for row in csv.DictReader(rows):
+                trials.setdefault(row["trial"], []).append(row)
+        return list(trials.values())
+
+    def test_the_stream_of_samples_equals_the_stored_ones(self):
+        terminal, (head, *lines, outlet, info) = self.stream("--markers", "lsl:events")
+        self.assertEqual(head, "stream touch Haptics 20 100 2 palpate-touch")
+        self.assertEqual((outlet, info), ("outlet gone", "info gone"))
+        self.assertNotIn("not taken by the stream", terminal.text)
+        vectors = {"tip": "m", "tail": "m", "force": "N", "torque": "N m", "device1": "N", "device2": "N"}
+        channels = [(f"{name}_{axis}", unit) for name, unit in vectors.items() for axis in "xyz"]
+        channels += [("depth", "m"), ("contacts", "1")]
+        description = lines[:1 + 4 * len(channels)]
+        self.assertEqual(description[0], "<channels>")
+        self.assertEqual([tuple(description[i:i + 3]) for i in range(1, len(description), 4)],
+                         [("<channel>", f"label={label}", f"unit={unit}") for label, unit in channels])
+        rows, times, expected = [], [], 0
+        for line in lines[len(description):]:
+            if line.startswith("chunk "):
+                self.assertEqual(expected, 0, "a chunk has as many rows as it says")
+                expected = int(line.split()[1])
+                continue
+            expected -= 1
+            at, *values = map(float, line.split())
+            times.append(at)
+            rows.append(values)
+        self.assertEqual(times, sorted(times))
+        decimals = [9] * 6 + [6] * 12 + [9, 0]
+        streamed = [tuple(round(value, places) for value, places in zip(row, decimals)) for row in rows]
+        markers = [line.split(" ", 1)[1] for line in (self.dir / "lsl.txt").read_text().splitlines() if "{" in line]
+        starts = [marker["time_ns"] / 1e9 for marker in map(json.loads, markers) if marker["marker"] == "trial_start"]
+        for trial, start in zip(self.stored(), starts, strict=True):
+            kept = [tuple(float(row[label]) for label, _ in channels) for row in trial]
+            # The stylus rests at first: its poses alone do not tell where the trial begins.
+            first = min(range(len(times)), key=lambda i: abs(times[i] - start))
+            self.assertAlmostEqual(times[first], start, delta=0.001)  # one clock for both streams
+            self.assertEqual(streamed[first:first + len(kept)], kept)
+            for i in range(1, len(kept)):
+                self.assertAlmostEqual(times[first + i] - times[first + i - 1], float(trial[i]["period"]), delta=0.001)
+        self.assertEqual(len(starts), 2)
+        self.assertTrue(any(any(row[6:9]) for row in streamed), "the first trial was felt up to a contact")
+
+    def test_samples_that_the_stream_refuses_are_counted_and_hold_nobody_up(self):
+        terminal, lines = self.stream(PALPATE_FAKE_LSL_REFUSES="1")
+        self.assertNotIn("chunk", " ".join(lines))
+        self.assertRegex(terminal.text, r"[1-9]\d* samples were not taken by the stream")
+        self.assertEqual(len(self.stored()), 2)
+
+    def test_a_stream_that_cannot_be_is_said_before_anything_else(self):
+        faults = [("udp:x:1", 2, "expected lsl or lsl:NAME"), ("lsl:", 2, "expected lsl or lsl:NAME")]
+        if ctypes.util.find_library("lsl") is None:
+            faults.append(("lsl:x", 1, "liblsl is not installed"))
+        for where, status, words in faults:
+            with self.run_session("--stream", where) as terminal:
+                self.assertEqual(terminal.finish(), status)
+                self.assertIn(words, terminal.text)
         with self.run_session("--sync") as terminal:
             self.assertEqual(terminal.finish(), 2)
             self.assertIn("--markers", terminal.text)
+        self.assertFalse(self.db.exists())
 
     def test_what_cannot_be_opened_is_said_before_anything_else(self):
         for where in ("serial:/dev/null", "serial:" + str(self.dir / "none"), "udp:no.such.host.invalid:9"):

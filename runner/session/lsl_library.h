@@ -1,0 +1,39 @@
+#pragma once
+// liblsl, loaded at run time: Debian has no package of it, and its wire protocol is not specified.
+
+#include <dlfcn.h>
+
+#include <stdexcept>
+#include <string>
+
+namespace palpate::runner {
+
+/// Stays loaded until the program ends: it has threads of its own.
+class LslLibrary {
+ public:
+  /// \param user  that messages name, such as "markers to lsl". \throws std::runtime_error where
+  /// it is not installed
+  explicit LslLibrary(std::string user) : user_(std::move(user)) {
+    for (const char* library : {"liblsl.so.2", "liblsl.so", "liblsl.so.1"}) {
+      handle_ = dlopen(library, RTLD_NOW | RTLD_LOCAL);
+      if (handle_ != nullptr) return;
+    }
+    fail("liblsl is not installed (liblsl.so was not found)");
+  }
+
+  /// \throws std::runtime_error where it has no such function
+  template <class Function>
+  void find(Function*& function, const char* name) const {
+    function = reinterpret_cast<Function*>(dlsym(handle_, name));
+    if (function == nullptr) fail(std::string("liblsl has no ") + name);
+  }
+  [[noreturn]] void fail(const std::string& why) const {
+    throw std::runtime_error(user_ + ": " + why);
+  }
+
+ private:
+  const std::string user_;
+  void* handle_ = nullptr;
+};
+
+}  // namespace palpate::runner

@@ -1,0 +1,76 @@
+#pragma once
+// The servo's samples for other recorders, while they happen: a regular stream of Lab Streaming
+// Layer. Nothing waits for it: samples that it cannot take are counted and dropped.
+
+#include <array>
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+
+#include "runner/servo/sample.h"
+#include "runner/servo/tick_source.h"
+
+namespace palpate::runner {
+
+/// What a channel of the stream is, as its description says.
+struct StreamChannel {
+  const char *label, *unit, *type;
+};
+
+/// Of one tick: tip, tail (m), force (N), torque (N m), device1, device2 (N), depth (m), contacts;
+/// what a stored sample has under the same names.
+struct StreamRow {
+  std::int64_t time_ns = 0;  ///< session clock
+  std::array<double, 20> values{};
+};
+StreamRow stream_row(const Sample& sample) noexcept;
+/// Of StreamRow::values, in their order.
+std::span<const StreamChannel> stream_channels() noexcept;
+
+class SampleStream {
+ public:
+  /// \param name  "lsl" or "lsl:NAME". \param rate  Hz, of the servo
+  /// \throws std::invalid_argument for another text; std::runtime_error where liblsl is missing
+  SampleStream(const std::string& name, double rate);
+  /// Sends what is left.
+  ~SampleStream();
+  SampleStream(const SampleStream&) = delete;
+  SampleStream& operator=(const SampleStream&) = delete;
+
+  /// By one thread. Returns at once.
+  void push(const Sample& sample) noexcept;
+  /// Samples that found no room, or that liblsl did not take.
+  std::uint64_t dropped() const noexcept;
+
+ private:
+  class Sender;
+  std::unique_ptr<Sender> sender_;
+};
+
+/// A servo whose samples go into a stream when the session takes them: the servo's thread does
+/// nothing for it.
+class StreamedServo final : public TickSource {
+ public:
+  StreamedServo(TickSource& servo, SampleStream& stream) : servo_(servo), stream_(stream) {}
+
+  void prepare(const rendering::Scene& scene, const rendering::Renderer& renderer,
+               const HomeZone& home) override {
+    servo_.prepare(scene, renderer, home);
+  }
+  const Sample& next() noexcept override {
+    const Sample& sample = servo_.next();
+    stream_.push(sample);
+    return sample;
+  }
+  std::span<const rendering::BodyPose> bodies() const noexcept override { return servo_.bodies(); }
+  ServoQuality stop() noexcept override { return servo_.stop(); }
+
+ private:
+  TickSource& servo_;
+  SampleStream& stream_;
+};
+
+}  // namespace palpate::runner
