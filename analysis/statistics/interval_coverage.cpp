@@ -19,8 +19,9 @@ using protocols::ParameterGrid;
 using protocols::ProcedureSpec;
 
 std::vector<double> evenly(double low, double high, int count) {
-  std::vector<double> values;
-  for (int i = 0; i < count; ++i) values.push_back(low + (high - low) * i / (count - 1));
+  std::vector<double> values(static_cast<std::size_t>(count));
+  for (int i = 0; i < count; ++i)
+    values[static_cast<std::size_t>(i)] = low + (high - low) * i / (count - 1);
   return values;
 }
 

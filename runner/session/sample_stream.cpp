@@ -171,7 +171,8 @@ class SampleStream::Sender {
       const std::int64_t took = clock_.now_ns() - before;
       if (took >= quickest) continue;
       quickest = took;
-      ahead = there - static_cast<double>(before + took / 2) * kSecondsPerNs;
+      const std::int64_t middle = before + took / 2;
+      ahead = there - static_cast<double>(middle) * kSecondsPerNs;
     }
     return ahead;
   }
