@@ -35,22 +35,22 @@ def commands():
         yield [["validate", f"protocols/{name}"], ["schedule", f"protocols/{name}", "--participant", "3"]]
     for scene in SCENES:
         renderers = ["ray"] if scene.startswith(("fig3b", "fig17")) else ["ray", "point"]
-        yield [["validate", f"protocols/scenes/{scene}.json"]] + [
-            ["render", "--scene", f"protocols/scenes/{scene}.json", "--renderer", renderer, "--path",
-             f"protocols/scenes/{scene}.csv", "--out", f"{scene}-{renderer}.csv"] for renderer in renderers]
+        yield [["render", "--scene", f"protocols/scenes/{scene}.json", "--renderer", renderer, "--trajectory",
+                f"protocols/scenes/{scene}.csv", "--out", f"{scene}-{renderer}.csv"] for renderer in renderers]
     yield [["simulate", "protocols/quick.json", "--db", "quick.db", "--participants", "6", "--jobs", "1"], *after("quick.db"),
-           ["replay", "--db", "quick.db", "--trial", "S001/1/3", "--out", "replayed.csv"],
            ["plan", "--db", "quick.db", "--effect", "cone=22,cube=11", "--studies", "200", "--trials", "3,20", "--json", "plan.json",
             "--figure", "power.svg"],
-           ["forget", "--db", "quick.db", "--participant", "S002", "--yes"], ["export", "--db", "quick.db", "--out", "rest.csv"]]
+           ["forget", "--db", "quick.db", "--participant", "S002", "--yes"], ["export", "--db", "quick.db", "--format", "csv", "--out", "rest.csv"]]
     for version in ("1", "2"):
         yield [["simulate", "protocols/quick.json", "--db", f"v{version}.db", "--participants", "2", "--jobs", "1", "--participant-version", version],
                *after(f"v{version}.db")]
     for name in TASKS + ["concave.json", "layered.json", "floating.json", "ho2000-interleaved.json"]:
         yield [["simulate", f"protocols/{name}", "--db", "study.db", "--participants", "2", "--jobs", "1"], *after("study.db")]
+    yield [["simulate", "protocols/floating.json", "--db", "kept.db", "--participants", "1", "--jobs", "1"],
+           ["replay", "--db", "kept.db", "--trial", "S001/1/3", "--out", "replayed.csv"]]
     yield [["simulate", "protocols/quick.json", "--db", f"part{part}.db", "--participants", "4", "--jobs", "1", "--shard", f"{part}/2"]
            for part in (1, 2)] + [["merge", "--out", "whole.db", "part1.db", "part2.db"], *after("whole.db")]
-    yield [["stability", "--help"], ["accuracy", "--help"], ["plan", "--jnd-effect", "20", "--studies", "20", "--participants", "6-12"],
+    yield [["stability", "--help"], ["accuracy", "--help"], ["plan", "--jnd-effect", "20", "--studies", "100", "--participants", "6-12"],
            ["plan", "--gain-sd", "0.15", "--residual-sd", "0.5", "--effect", "cone=15", "--studies", "200", "--trials", "20"]]
 
 
@@ -122,7 +122,7 @@ def main():
     options = options.parse_args()
     programs = [pathlib.Path(program).resolve() for program in (options.before, options.after)]
     lines = [line for line in map(list, commands()) if options.only in str(line)]
-    compared, different = 0, 0
+    compared = different = failed = 0
     with tempfile.TemporaryDirectory() as scratch, concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
         root = pathlib.Path(options.keep or scratch)
         pairs = [[pool.submit(said_and_written, program, line, root / side / str(number))
@@ -130,13 +130,16 @@ def main():
         for number, (before, after_) in enumerate([run.result() for run in pair] for pair in pairs):
             for name in sorted(before.keys() | after_.keys()):
                 compared += 1
+                if " palpate " in name and not name.endswith(" nonsense") and not before.get(name, "0\n").startswith("0\n"):
+                    failed += 1
+                    print(f"{number}/{name}: shows nothing, as it fails:\n    {before[name][:200]}", flush=True)
                 if before.get(name) == after_.get(name):
                     continue
                 different += 1
                 print(f"{number}/{name}: " + ("one of them only" if name not in before or name not in after_ else
                                               first_difference(before[name], after_[name])), flush=True)
-    print(f"{compared} outputs compared, {different} differ")
-    return different > 0
+    print(f"{compared} outputs compared, {different} differ, {failed} commands fail")
+    return different + failed > 0
 
 
 if __name__ == "__main__":
