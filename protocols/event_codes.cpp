@@ -54,8 +54,8 @@ EventCodes read_event_codes(ObjectReader& reader, const Protocol& protocol) {
   const std::string pointer = reader.pointer("codes");
   ObjectReader table(*value, pointer, reader.faults());
   if (!value->is_object()) return codes;
-  std::vector<std::string> names = {"trial_start", "first_contact", "response", "time_out",
-                                    "cut_off",     "interval",      "sync"};
+  std::vector<std::string> names;
+  for (const auto& [name, code] : codes) names.push_back(name);
   for (std::string& name : answer_events(protocol)) names.push_back(std::move(name));
   EventCodes given;
   for (const auto& [name, code] : value->items()) {

@@ -33,7 +33,7 @@ constexpr std::array<StreamChannel, 20> kChannels = {{
 
 std::string stream_name(const std::string& where) {
   if (where == "lsl") return "palpate-samples";
-  if (where.rfind("lsl:", 0) == 0 && where.size() > 4) return where.substr(4);
+  if (where.starts_with("lsl:") && where.size() > 4) return where.substr(4);
   throw std::invalid_argument("no stream to '" + where + "'; expected lsl or lsl:NAME");
 }
 
