@@ -37,7 +37,8 @@ PictureMesh clustered(const DrawnMesh& drawn, double cell) {
     if (triangle[0] == triangle[1] || triangle[1] == triangle[2] || triangle[2] == triangle[0])
       continue;
     // The same way round from its lowest corner, so that equal ones are found.
-    std::ranges::rotate(triangle, std::ranges::min_element(triangle));
+    std::rotate(triangle.begin(), std::min_element(triangle.begin(), triangle.end()),
+                triangle.end());
     if (seen.insert(triangle).second) out.triangles.push_back(triangle);
   }
   for (std::size_t i = 0; i < out.corners.size(); ++i) out.corners[i] /= counts[i];
