@@ -59,6 +59,7 @@ constexpr Command kCommands[] = {
     {"run", "a live session with a person and a device", palpate::runner::run_command},
     {"schedule", "the order of trials that a participant will get",
      palpate::runner::schedule_command},
+    {"serve", "a safe haptic server for other programs", palpate::runner::serve_command},
     {"simulate", "the whole study with simulated participants", palpate::runner::simulate_command},
     {"stability", "at what stiffness a loop of hand, device and renderer buzzes",
      palpate::runner::stability_command},

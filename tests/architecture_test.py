@@ -49,6 +49,7 @@ MAY_INCLUDE = {
     "runner/participants": SERVO | {"protocols", "data", "runner/devices", "runner/display"},
     "runner/session": SERVO | {"protocols", "data", "data/files", "data/store", "runner/safety", "runner/devices",
                                "runner/display", "runner/participants", "runner/sound"},
+    "runner/serve": SERVO | {"protocols", "runner/safety", "runner/session"},
     "runner/sweep": SERVO | {"protocols", "runner/participants"},
     "runner/stability": SERVO | {"protocols", "rendering/bodies", "runner/devices"},
     "runner/bench": SERVO | {"runner/safety"},
@@ -112,8 +113,9 @@ PUBLIC = {
     "runner/display": "display explore_window mailbox text_display timeline touch_source window",
     "runner/display/scene": "camera display_error drawn_mesh image_file painter scene_drawing scene_renderer",
     "runner/participants": "keyboard respondent response_box settings_document simulated simulated_settings task_participant",
-    "runner/session": "clock_check device_check live_session markers near_codes preflight_dialogue protocol_info recorded_trial "
+    "runner/session": "clock_check device_check live_forces live_session markers near_codes preflight_dialogue protocol_info recorded_trial "
                       "replay replay_comparison sample_stream session_plan simulated_session simulated_study socket_advisor station",
+    "runner/serve": "network served_scene",
     "runner/sweep": "design swept_study",
     "runner/stability": "boundary integrators soft_map",
     "runner/bench": "servo_timing tick_cost",

@@ -7,7 +7,7 @@ seconds="${1:-10}"
 shift || true
 targets=("$@")
 [ ${#targets[@]} -gt 0 ] || targets=(protocol scene unions csv obj stl ply off packets samples database settings printable trajectory
-  gltf msh pattern sweep_space advisor haply)
+  gltf msh pattern sweep_space advisor haply serve_messages)
 
 cmake --preset asan > /dev/null
 cmake --build --preset asan --target "${targets[@]/#/fuzz_}"

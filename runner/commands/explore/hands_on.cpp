@@ -16,6 +16,7 @@
 #include "runner/commands/shared/stop_signal.h"
 #include "runner/display/explore_window.h"
 #include "runner/safety/fault_signals.h"
+#include "runner/serve/served_scene.h"
 #include "runner/session/device_check.h"
 #include "stimuli/printable.h"
 
@@ -23,23 +24,6 @@ namespace palpate::runner {
 namespace {
 
 namespace fs = std::filesystem;
-
-/// The scene as a protocol of one stimulus for each object: what is known of protocols and devices
-/// goes for it, too.
-protocols::Protocol protocol_of(const protocols::SceneSpec& spec,
-                                const rendering::Renderer& renderer) {
-  protocols::Protocol out;
-  out.name = "explore";
-  out.renderers = {renderer.side_contact() ? protocols::RendererKind::ray
-                                           : protocols::RendererKind::point};
-  out.orientation = protocols::OrientationKind::fixed;
-  out.material_limit = protocols::MaterialLimit::limit;
-  out.tool = spec.tool;
-  out.reach = spec.reach;
-  for (std::size_t i = 0; i < spec.objects.size(); ++i)
-    out.stimuli.push_back({"object-" + std::to_string(i), spec.objects[i]});
-  return out;
-}
 
 /// Keeps pictures as scene-1.png and so on, the first number that is free; clips likewise.
 std::string keep_in(const std::string& folder, const std::string& bytes, const char* kind) {
@@ -94,7 +78,8 @@ class WatchedForces {
 
 int explore_live(const protocols::SceneSpec& spec, const rendering::Renderer& renderer,
                  const HandsOnSettings& settings) {
-  const protocols::Protocol protocol = protocol_of(spec, renderer);
+  protocols::Protocol protocol = protocol_of(spec, renderer);
+  protocol.material_limit = protocols::MaterialLimit::limit;
   RunSettings run;
   run.device = settings.device;
   run.calibration = settings.calibration;

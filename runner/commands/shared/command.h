@@ -51,6 +51,7 @@ int render_command(const std::vector<std::string>& args);
 int replay_command(const std::vector<std::string>& args);
 int run_command(const std::vector<std::string>& args);
 int schedule_command(const std::vector<std::string>& args);
+int serve_command(const std::vector<std::string>& args);
 int simulate_command(const std::vector<std::string>& args);
 int stability_command(const std::vector<std::string>& args);
 int sweep_command(const std::vector<std::string>& args);

@@ -263,7 +263,7 @@ def test_stubs_and_docstrings_fit_the_module():
 def test_without_its_compiled_part_it_says_how_to_build_it(tmp_path):
     package = tmp_path / "palpate"
     package.mkdir()
-    for name in ("__init__.py", "_palpate.pyi", "py.typed"):
+    for name in ("__init__.py", "client.py", "_palpate.pyi", "py.typed"):
         shutil.copy(pathlib.Path(palpate.__file__).parent / name, package)
     done = subprocess.run([sys.executable, "-c", "import palpate"], env={**os.environ, "PYTHONPATH": str(tmp_path)},
                           capture_output=True, text=True, timeout=60)

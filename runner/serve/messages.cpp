@@ -1,0 +1,262 @@
+#include "runner/serve/messages.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <string_view>
+#include <utility>
+
+#include "protocols/json_document.h"
+#include "protocols/parse.h"
+
+namespace palpate::runner {
+namespace {
+
+using nlohmann::json;
+using nlohmann::ordered_json;
+
+struct NamedType {
+  const char* name;
+  MessageType type;
+};
+constexpr NamedType kTypes[] = {
+    {"hello", MessageType::hello},         {"load", MessageType::load},
+    {"start", MessageType::start},         {"set", MessageType::set},
+    {"answer", MessageType::answer},       {"stop", MessageType::stop},
+    {"subscribe", MessageType::subscribe}, {"mark", MessageType::mark},
+    {"note", MessageType::note},           {"clock", MessageType::clock},
+    {"alive", MessageType::alive},         {"emergency", MessageType::emergency},
+    {"clear", MessageType::clear},         {"bye", MessageType::bye}};
+
+constexpr std::pair<const char*, StreamField> kFields[] = {
+    {"tip", StreamField::tip},          {"tail", StreamField::tail},
+    {"force", StreamField::force},      {"rendered", StreamField::rendered},
+    {"contact", StreamField::contact},  {"depth", StreamField::depth},
+    {"object", StreamField::object},    {"faults", StreamField::faults},
+    {"lateness", StreamField::lateness}};
+
+constexpr std::size_t kLongestText = 1000;  // characters of a name, note or reason
+constexpr double kMostRate = 1000;          // Hz
+
+/// The members of one message; what is wrong with them is collected.
+class MemberReader {
+ public:
+  explicit MemberReader(const json& object) : object_(object) {}
+
+  const json* member(const char* key, bool required) {
+    known_.emplace_back(key);
+    const auto found = object_.find(key);
+    if (found != object_.end()) return &*found;
+    if (required) fault(key, "expected; it is missing");
+    return nullptr;
+  }
+  void text(const char* key, std::string& out, bool required, std::size_t most = kLongestText) {
+    const json* const value = member(key, required);
+    if (value == nullptr) return;
+    if (!value->is_string() || value->get_ref<const std::string&>().size() > most)
+      return fault(key, "expected a text of at most " + std::to_string(most) + " bytes");
+    out = value->get<std::string>();
+  }
+  std::optional<std::int64_t> integer(const char* key, bool required, std::int64_t least,
+                                      std::int64_t most) {
+    const json* const value = member(key, required);
+    if (value == nullptr) return {};
+    if (value->is_number_integer() &&
+        !(value->is_number_unsigned() && value->get<std::uint64_t>() > std::uint64_t{INT64_MAX})) {
+      const auto number = value->get<std::int64_t>();
+      if (number >= least && number <= most) return number;
+    }
+    fault(key,
+          "expected a whole number from " + std::to_string(least) + " to " + std::to_string(most));
+    return {};
+  }
+  void fault(const std::string& key, const std::string& expected) {
+    faults_.push_back({"bad-message", expected, protocols::child_pointer("", key)});
+  }
+  void refuse_unknown() {
+    for (const auto& [key, value] : object_.items())
+      if (std::ranges::find(known_, key) == known_.end()) fault(key, "no such key in this message");
+  }
+  std::vector<Refusal>& faults() { return faults_; }
+
+ private:
+  const json& object_;
+  std::vector<std::string> known_;
+  std::vector<Refusal> faults_;
+};
+
+void read_fields(MemberReader& reader, Message& out) {
+  const json* const fields = reader.member("fields", false);
+  if (fields == nullptr) {
+    out.fields = {StreamField::tip, StreamField::force};
+    return;
+  }
+  bool good = fields->is_array() && fields->size() <= std::size(kFields);
+  for (std::size_t i = 0; good && i < fields->size(); ++i) {
+    const auto field = (*fields)[i].is_string() ? stream_field((*fields)[i].get<std::string>())
+                                                : std::optional<StreamField>();
+    good = field && std::ranges::find(out.fields, *field) == out.fields.end();
+    if (good) out.fields.push_back(*field);
+  }
+  if (good) return;
+  std::string names;
+  for (const auto& [name, field] : kFields) names += std::string(names.empty() ? "" : ", ") + name;
+  reader.fault("fields", "expected a list of some of " + names + ", each once");
+}
+
+void read_hello(MemberReader& reader, Message& out) {
+  reader.text("token", out.token, true, 64);
+  reader.integer("version", true, kServeVersion, kServeVersion);
+  std::string role = "control";
+  reader.text("role", role, false);
+  if (role != "control" && role != "watch") reader.fault("role", "expected control or watch");
+  out.control = role == "control";
+}
+
+void read_rest(MemberReader& reader, Message& out) {
+  constexpr std::int64_t kMost = INT64_MAX;
+  switch (out.type) {
+    case MessageType::hello:
+      read_hello(reader, out);
+      break;
+    case MessageType::load:
+      if (const json* const scene = reader.member("scene", true)) {
+        if (scene->is_object())
+          out.scene = *scene;
+        else
+          reader.fault("scene", "expected an object, a scene as in scene.schema.json");
+      }
+      break;
+    case MessageType::start:
+      reader.text("renderer", out.renderer, false);
+      if (out.renderer != "point" && out.renderer != "ray")
+        reader.fault("renderer", "expected point or ray");
+      out.trial = reader.integer("trial", false, 1, 1'000'000'000);
+      break;
+    case MessageType::set:
+      reader.text("path", out.path, true);
+      if (!out.path.starts_with("/objects/"))
+        reader.fault("path",
+                     "expected a JSON pointer into the scene, as /objects/0/damping_ns_per_m");
+      if (const json* const value = reader.member("value", true)) out.value = *value;
+      break;
+    case MessageType::answer:
+      reader.text("response", out.text, true);
+      out.t_ns = reader.integer("t_ns", false, 0, kMost);
+      break;
+    case MessageType::stop:
+      reader.text("reason", out.text, false);
+      break;
+    case MessageType::subscribe:
+      if (const json* const rate = reader.member("rate_hz", true)) {
+        if (rate->is_number() && rate->get<double>() >= 0 && rate->get<double>() <= kMostRate)
+          out.rate = rate->get<double>();
+        else
+          reader.fault("rate_hz", "expected a number from 0 (no stream) to 1000");
+      }
+      read_fields(reader, out);
+      break;
+    case MessageType::mark:
+      out.code = static_cast<int>(reader.integer("code", true, 1, 255).value_or(0));
+      reader.text("text", out.text, false);
+      break;
+    case MessageType::note:
+      reader.text("text", out.text, true);
+      break;
+    case MessageType::clock:
+      if (const json* const time = reader.member("t_client", false)) {
+        if (time->is_number())
+          out.t_client = *time;
+        else
+          reader.fault("t_client", "expected a number");
+      }
+      break;
+    case MessageType::alive:
+    case MessageType::emergency:
+    case MessageType::clear:
+    case MessageType::bye:
+      break;
+  }
+}
+
+json read_text(const std::string& text) {
+  protocols::FaultList faults("message");
+  try {
+    json out = protocols::read_json(text, faults);
+    faults.throw_if_any();
+    return out;
+  } catch (const protocols::InputError& error) {
+    std::vector<Refusal> why;
+    for (const protocols::Fault& fault : error.faults())
+      why.push_back({"bad-json", fault.expected, fault.location});
+    throw MessageRefused(std::move(why));
+  }
+}
+
+}  // namespace
+
+MessageRefused::MessageRefused(std::vector<Refusal> why, std::optional<std::int64_t> id)
+    : std::runtime_error(why.empty() ? "refused" : why.front().message),
+      why_(std::move(why)),
+      id_(id) {}
+
+std::optional<StreamField> stream_field(const std::string& name) {
+  for (const auto& [known, field] : kFields)
+    if (name == known) return field;
+  return {};
+}
+
+Message parse_message(const std::string& text) {
+  const json root = read_text(text);
+  if (!root.is_object()) throw MessageRefused("bad-message", "expected an object");
+  Message out;
+  MemberReader reader(root);
+  constexpr std::int64_t kMostId = std::int64_t{1} << 53;  // a JavaScript program's numbers
+  const auto id = reader.integer("id", true, 0, kMostId);
+  out.id = id.value_or(0);
+  std::string name;
+  reader.text("type", name, true);
+  const auto* const known =
+      std::ranges::find_if(kTypes, [&](const NamedType& type) { return name == type.name; });
+  if (known == std::end(kTypes)) {
+    reader.fault("type", "no such message");
+    throw MessageRefused(std::move(reader.faults()), id);
+  }
+  out.type = known->type;
+  if (out.type != MessageType::load && text.size() > kLongestMessage)
+    throw MessageRefused({{"too-long", "expected at most 64 kB", ""}}, id);
+  read_rest(reader, out);
+  reader.refuse_unknown();
+  if (!reader.faults().empty()) throw MessageRefused(std::move(reader.faults()), id);
+  return out;
+}
+
+std::string accepted(std::int64_t id, ordered_json more) {
+  ordered_json out = {{"re", id}, {"ok", true}};
+  out.update(more);
+  return out.dump(-1, ' ', false, json::error_handler_t::replace);
+}
+
+std::string refused(const std::optional<std::int64_t>& id, const std::vector<Refusal>& why) {
+  constexpr std::size_t kMostFaults = 20;
+  const auto shown = [](const Refusal& refusal) {
+    return ordered_json{
+        {"code", refusal.code}, {"message", refusal.message}, {"place", refusal.place}};
+  };
+  ordered_json out = {{"re", id ? ordered_json(*id) : ordered_json()}, {"ok", false}};
+  out["error"] = shown(why.front());
+  if (why.size() > 1) {
+    out["error"]["faults"] = ordered_json::array();
+    for (std::size_t i = 0; i < std::min(why.size(), kMostFaults); ++i)
+      out["error"]["faults"].push_back(shown(why[i]));
+  }
+  return out.dump(-1, ' ', false, json::error_handler_t::replace);
+}
+
+std::string event(const std::string& name, std::int64_t t_ns, const ordered_json& more) {
+  ordered_json out = {{"event", name}, {"t_ns", t_ns}};
+  out.update(more);
+  return out.dump(-1, ' ', false, json::error_handler_t::replace);
+}
+
+}  // namespace palpate::runner

@@ -1,0 +1,91 @@
+#pragma once
+// What a client of `palpate serve` says, checked: nothing behind this sees text from outside. The
+// words of every message: protocols/serve.schema.json.
+
+#include <cstddef>
+#include <cstdint>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace palpate::runner {
+
+inline constexpr int kServeVersion = 1;
+inline constexpr std::size_t kLongestMessage = 64 << 10;  ///< bytes; of `load` kLongestScene
+inline constexpr std::size_t kLongestScene = 1 << 20;
+
+/// Why a message is refused.
+struct Refusal {
+  std::string code;     ///< for programs: "bad-message"
+  std::string message;  ///< for people
+  std::string place;    ///< JSON pointer, in the message or the scene
+};
+
+/// Every reason, the first one first.
+class MessageRefused : public std::runtime_error {
+ public:
+  explicit MessageRefused(std::vector<Refusal> why, std::optional<std::int64_t> id = {});
+  MessageRefused(std::string code, std::string message, std::string place = "")
+      : MessageRefused({Refusal{std::move(code), std::move(message), std::move(place)}}) {}
+  const std::vector<Refusal>& why() const { return why_; }
+  const std::optional<std::int64_t>& id() const { return id_; }  ///< where it could be read
+
+ private:
+  std::vector<Refusal> why_;
+  std::optional<std::int64_t> id_;
+};
+
+enum class MessageType {
+  hello,
+  load,
+  start,
+  set,
+  answer,
+  stop,
+  subscribe,
+  mark,
+  note,
+  clock,
+  alive,
+  emergency,
+  clear,
+  bye
+};
+
+/// What a row of a stream may hold after time and tick.
+enum class StreamField { tip, tail, force, rendered, contact, depth, object, faults, lateness };
+/// As in messages. \return empty: none of that name
+std::optional<StreamField> stream_field(const std::string& name);
+
+struct Message {
+  MessageType type = MessageType::alive;
+  std::int64_t id = 0;
+  bool control = true;                ///< hello: else it watches
+  std::string token;                  ///< hello
+  nlohmann::json scene;               ///< load
+  std::string renderer = "ray";       ///< start
+  std::optional<std::int64_t> trial;  ///< start
+  std::string path;                   ///< set: a JSON pointer into the scene
+  nlohmann::json value;               ///< set
+  std::string text;                   ///< answer's response, stop's reason, mark's and note's text
+  std::optional<std::int64_t> t_ns;   ///< answer
+  int code = 0;                       ///< mark
+  double rate = 0;                    ///< subscribe: Hz, 0: no stream
+  std::vector<StreamField> fields;    ///< subscribe
+  nlohmann::json t_client;            ///< clock: comes back as it is
+};
+
+/// \throws MessageRefused with every fault
+Message parse_message(const std::string& text);
+
+/// {"re":id,"ok":true,...}. \param more  an object
+std::string accepted(std::int64_t id,
+                     nlohmann::ordered_json more = nlohmann::ordered_json::object());
+std::string refused(const std::optional<std::int64_t>& id, const std::vector<Refusal>& why);
+/// {"event":name,"t_ns":t,...}
+std::string event(const std::string& name, std::int64_t t_ns,
+                  const nlohmann::ordered_json& more = nlohmann::ordered_json::object());
+
+}  // namespace palpate::runner

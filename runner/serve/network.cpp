@@ -1,0 +1,691 @@
+#include "runner/serve/network.h"
+
+#include <sys/random.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/local/stream_protocol.hpp>
+#include <boost/asio/post.hpp>
+#include <boost/asio/read_until.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <boost/asio/write.hpp>
+#include <boost/beast/core.hpp>
+#include <boost/beast/http.hpp>
+#include <boost/beast/websocket.hpp>
+#include <charconv>
+#include <chrono>
+#include <cmath>
+#include <deque>
+#include <map>
+#include <mutex>
+#include <stdexcept>
+#include <thread>
+#include <utility>
+
+#include "runner/servo/realtime.h"
+
+namespace palpate::runner {
+namespace {
+
+namespace asio = boost::asio;
+namespace beast = boost::beast;
+namespace http = beast::http;
+namespace websocket = beast::websocket;
+using Code = boost::system::error_code;
+using asio::ip::tcp;
+using Local = asio::local::stream_protocol;
+
+constexpr auto kHelloPatience = std::chrono::seconds(2);
+constexpr std::int64_t kSilence = 500'000'000;                // ns
+constexpr auto kStreamEvery = std::chrono::milliseconds(17);  // at most 60 messages a second
+constexpr auto kWatchEvery = std::chrono::milliseconds(5);
+constexpr std::size_t kMostWatchers = 8;
+constexpr std::size_t kMostUnknown = 16;   // connections before their hello
+constexpr int kMostMessages = 200;         // a second; of more than twice as many it is closed
+constexpr std::size_t kMostWaiting = 256;  // replies and events of a client that does not read
+constexpr std::size_t kMostCommands = 64;  // that the session has not taken
+constexpr std::size_t kMostRows = 1024;    // of a stream's message
+constexpr const char* kSubprotocol = "palpate.1";
+
+std::int64_t now_ns() {
+  RealClock clock;
+  return clock.now_ns();
+}
+
+/// In a time that does not tell how much of it is right.
+bool equal_in_constant_time(const std::string& said, const std::string& token) {
+  std::size_t difference = said.size() ^ token.size();
+  for (std::size_t i = 0; i < token.size(); ++i) {
+    const char other = i < said.size() ? said[i] : '\0';
+    difference |= static_cast<unsigned char>(token[i] ^ other);
+  }
+  return difference == 0;
+}
+
+void add_number(std::string& out, double value) {
+  if (!std::isfinite(value)) {
+    out += "null";
+    return;
+  }
+  char text[32];
+  out.append(text, std::to_chars(text, text + sizeof text, value).ptr);
+}
+
+void add_vector(std::string& out, const Vec3& v) {
+  for (const int i : {0, 1, 2}) {
+    out += ',';
+    add_number(out, v[i]);
+  }
+}
+
+void add_row(std::string& out, const StreamSample& sample, const std::vector<StreamField>& fields) {
+  out += '[' + std::to_string(sample.time_ns) + ',' + std::to_string(sample.tick);
+  for (const StreamField field : fields) {
+    switch (field) {
+      case StreamField::tip:
+        add_vector(out, sample.tip);
+        break;
+      case StreamField::tail:
+        add_vector(out, sample.tail);
+        break;
+      case StreamField::force:
+        add_vector(out, sample.force);
+        break;
+      case StreamField::rendered:
+        add_vector(out, sample.rendered);
+        break;
+      case StreamField::contact:
+        add_vector(out, sample.contact);
+        break;
+      case StreamField::depth:
+        out += ',';
+        add_number(out, sample.depth);
+        break;
+      case StreamField::object:
+        out += ',' + std::to_string(sample.object);
+        break;
+      case StreamField::faults:
+        out += ',' + std::to_string(sample.faults);
+        break;
+      case StreamField::lateness:
+        out += ',' + std::to_string(sample.lateness_ns);
+        break;
+    }
+  }
+  out += ']';
+}
+
+/// One connection. Belongs to the network's thread.
+class Client : public std::enable_shared_from_this<Client> {
+ public:
+  enum class Role { unknown, control, watch };
+
+  Client(std::uint64_t number, asio::io_context& io) : id(number), hello_timer(io) {}
+  virtual ~Client() = default;
+  Client(const Client&) = delete;
+  Client& operator=(const Client&) = delete;
+
+  /// Reads messages until it is closed.
+  virtual void begin() = 0;
+  virtual void close() = 0;
+
+  /// A client that does not read loses its connection, not the memory.
+  void send(std::string text) {
+    if (closing_ || closed) return;
+    if (waiting_.size() >= kMostWaiting) return close();
+    waiting_.push_back(std::move(text));
+    write_next();
+  }
+  /// Nothing of it has been written yet that a new one would wait behind.
+  bool idle() const { return waiting_.empty(); }
+  void close_after_writing() {
+    closing_ = true;
+    if (waiting_.empty()) close();
+  }
+
+  const std::uint64_t id;
+  Role role = Role::unknown;
+  bool closed = false;
+  asio::steady_timer hello_timer;
+  std::int64_t heard_ns = 0;
+  std::int64_t second_ns = 0;  ///< of the rate
+  int in_second = 0;           ///< messages
+  // Stream:
+  double rate = 0;  ///< Hz; 0: none
+  std::int64_t next_ns = 0;
+  std::uint64_t dropped = 0, lost_before = 0;
+  std::vector<StreamField> fields;
+  std::string rows;  ///< that wait for the next message
+  std::size_t row_count = 0;
+
+ protected:
+  virtual void write(const std::string& text) = 0;
+  void written(const Code& error) {
+    writing_ = false;
+    waiting_.pop_front();
+    if (error) return close();
+    if (closing_ && waiting_.empty()) return close();
+    write_next();
+  }
+
+ private:
+  void write_next() {
+    if (writing_ || waiting_.empty() || closed) return;
+    writing_ = true;
+    write(waiting_.front());
+  }
+  std::deque<std::string> waiting_;
+  bool writing_ = false, closing_ = false;
+};
+
+/// What connections ask of the network.
+class Hub {
+ public:
+  virtual ~Hub() = default;
+  virtual void heard(Client& client, const std::string& text) = 0;
+  virtual void gone(Client& client) = 0;
+};
+
+class WebClient final : public Client {
+ public:
+  WebClient(std::uint64_t number, asio::io_context& io, tcp::socket socket, Hub& hub)
+      : Client(number, io), hub_(hub), stream_(std::move(socket)) {}
+
+  void accept(const http::request<http::empty_body>& request) {
+    stream_.read_message_max(kLongestMessage);
+    stream_.set_option(websocket::stream_base::decorator([](websocket::response_type& response) {
+      response.set(http::field::sec_websocket_protocol, kSubprotocol);
+    }));
+    stream_.async_accept(request, [self = shared_from_this(), this](const Code& error) {
+      if (error) return close();
+      stream_.text(true);
+      begin();
+    });
+  }
+  void begin() override {
+    if (closed) return;
+    if (role == Role::control) stream_.read_message_max(kLongestScene + kLongestMessage);
+    buffer_.consume(buffer_.size());
+    stream_.async_read(buffer_, [self = shared_from_this(), this](const Code& error, std::size_t) {
+      if (error || closed) return close();
+      const auto bytes = buffer_.cdata();
+      hub_.heard(*this, {static_cast<const char*>(bytes.data()), bytes.size()});
+      begin();
+    });
+  }
+  void close() override {
+    if (closed) return;
+    closed = true;
+    Code ignored;
+    stream_.next_layer().shutdown(tcp::socket::shutdown_both, ignored);
+    stream_.next_layer().close(ignored);
+    hub_.gone(*this);
+  }
+
+ private:
+  void write(const std::string& text) override {
+    stream_.async_write(
+        asio::buffer(text),
+        [self = shared_from_this(), this](const Code& error, std::size_t) { written(error); });
+  }
+  Hub& hub_;
+  websocket::stream<tcp::socket> stream_;
+  beast::flat_buffer buffer_;
+};
+
+class LineClient final : public Client {
+ public:
+  LineClient(std::uint64_t number, asio::io_context& io, Local::socket socket, Hub& hub)
+      : Client(number, io), hub_(hub), socket_(std::move(socket)) {}
+
+  void begin() override {
+    if (closed) return;
+    const std::size_t most =
+        role == Role::control ? kLongestScene + kLongestMessage : kLongestMessage;
+    asio::async_read_until(socket_, asio::dynamic_buffer(text_, most), '\n',
+                           [self = shared_from_this(), this](const Code& error, std::size_t size) {
+                             if (error || closed) return close();
+                             std::string line = text_.substr(0, size - 1);
+                             text_.erase(0, size);
+                             if (!line.empty() && line.back() == '\r') line.pop_back();
+                             if (!line.empty()) hub_.heard(*this, line);
+                             begin();
+                           });
+  }
+  void close() override {
+    if (closed) return;
+    closed = true;
+    Code ignored;
+    socket_.close(ignored);
+    hub_.gone(*this);
+  }
+
+ private:
+  void write(const std::string& text) override {
+    line_ = text + '\n';
+    asio::async_write(
+        socket_, asio::buffer(line_),
+        [self = shared_from_this(), this](const Code& error, std::size_t) { written(error); });
+  }
+  Hub& hub_;
+  Local::socket socket_;
+  std::string text_, line_;
+};
+
+bool is_loopback_name(std::string host) {
+  const std::size_t colon = host.rfind(':');
+  if (colon != std::string::npos) host.resize(colon);
+  return host == "127.0.0.1" || host == "localhost";
+}
+
+bool offers_subprotocol(const http::request<http::empty_body>& request) {
+  for (const auto& field : request) {
+    if (field.name() != http::field::sec_websocket_protocol) continue;
+    for (const auto& word : http::token_list(field.value()))
+      if (word == kSubprotocol) return true;
+  }
+  return false;
+}
+
+}  // namespace
+
+class Network::Impl final : public Hub {
+ public:
+  explicit Impl(NetworkSettings settings)
+      : settings_(std::move(settings)),
+        acceptor_(io_),
+        local_acceptor_(io_),
+        watch_timer_(io_),
+        stream_timer_(io_) {
+    listen();
+    if (!settings_.socket.empty()) listen_local();
+  }
+  ~Impl() override {
+    end();
+    if (!settings_.socket.empty()) ::unlink(settings_.socket.c_str());
+  }
+  Impl(const Impl&) = delete;
+  Impl& operator=(const Impl&) = delete;
+
+  void begin(NetworkHooks hooks) {
+    hooks_ = std::move(hooks);
+    accept();
+    if (!settings_.socket.empty()) accept_local();
+    watch();
+    stream();
+    thread_ = std::thread([this] { io_.run(); });
+  }
+  void end() {
+    if (!thread_.joinable()) return;
+    asio::post(io_, [this] {
+      for (const auto& [id, client] : std::map(clients_)) client->close();
+      io_.stop();
+    });
+    thread_.join();
+  }
+  std::uint16_t port() const { return acceptor_.local_endpoint().port(); }
+
+  std::vector<ServeCommand> commands() {
+    std::vector<ServeCommand> out;
+    const std::lock_guard lock(mutex_);
+    out.swap(commands_);
+    return out;
+  }
+  void reply(std::uint64_t client, std::string text) {
+    asio::post(io_, [this, client, text = std::move(text)]() mutable {
+      const auto found = clients_.find(client);
+      if (found != clients_.end()) found->second->send(std::move(text));
+    });
+  }
+  void tell(std::string text) {
+    asio::post(io_, [this, text = std::move(text)] { tell_all(text); });
+  }
+
+  void heard(Client& client, const std::string& text) override {
+    const std::int64_t now = now_ns();
+    if (now - client.second_ns >= 1'000'000'000) {
+      client.second_ns = now;
+      client.in_second = 0;
+    }
+    client.heard_ns = now;
+    // Whoever floods is closed: else it would have all of this thread's time.
+    if (++client.in_second > 2 * kMostMessages) return client.close();
+    Message message;
+    try {
+      message = parse_message(text);
+    } catch (const MessageRefused& error) {
+      client.send(refused(error.id(), error.why()));
+      if (client.role == Client::Role::unknown) client.close_after_writing();
+      return;
+    }
+    const auto refuse = [&](const char* code, const char* why) {
+      client.send(refused(message.id, {{code, why, ""}}));
+    };
+    if (client.role == Client::Role::unknown) {
+      if (message.type == MessageType::hello) return welcome(client, message);
+      refuse("no-hello", "the first message must be hello");
+      return client.close_after_writing();
+    }
+    if (message.type == MessageType::emergency) {  // before every queue and limit
+      hooks_.emergency();
+      client.send(accepted(message.id, {{"t_ns", now_ns()}}));
+      return tell_all(event("emergency", now, {{"by", client.id}}));
+    }
+    if (client.in_second > kMostMessages) return refuse("busy", "at most 200 messages a second");
+    answer(client, std::move(message), now);
+  }
+
+  void gone(Client& client) override {
+    if (client.role == Client::Role::control) {
+      if (hooks_.forces_are_on()) hooks_.emergency();
+      command({client.id, true, {}});
+    }
+    clients_.erase(client.id);
+  }
+
+ private:
+  void listen() {
+    try {
+      const tcp::endpoint place(asio::ip::address_v4::loopback(), settings_.port);
+      acceptor_.open(place.protocol());
+      acceptor_.set_option(tcp::acceptor::reuse_address(true));
+      acceptor_.bind(place);
+      acceptor_.listen();
+    } catch (const boost::system::system_error& error) {
+      throw std::runtime_error("port " + std::to_string(settings_.port) +
+                               " of 127.0.0.1: " + error.code().message() +
+                               "; another server may run: --port 0 takes a free one");
+    }
+  }
+  void listen_local() {
+    try {
+      const Local::endpoint place(settings_.socket);
+      Local::socket other(io_);
+      Code error;
+      other.connect(place, error);
+      if (!error) throw std::runtime_error("--socket " + settings_.socket + ": a server is there");
+      // What a server left behind that was killed; nothing else is removed.
+      struct stat state {};
+      if (::lstat(settings_.socket.c_str(), &state) == 0 && S_ISSOCK(state.st_mode))
+        ::unlink(settings_.socket.c_str());
+      local_acceptor_.open(place.protocol());
+      local_acceptor_.bind(place);
+      ::chmod(settings_.socket.c_str(), 0600);
+      local_acceptor_.listen();
+    } catch (const boost::system::system_error& error) {
+      const std::string path = std::exchange(settings_.socket, {});
+      throw std::runtime_error("--socket " + path + ": " + error.code().message());
+    }
+  }
+
+  std::shared_ptr<Client> admit(std::shared_ptr<Client> client) {
+    clients_[client->id] = client;
+    client->hello_timer.expires_after(kHelloPatience);
+    client->hello_timer.async_wait([client](const Code& error) {
+      if (!error && client->role == Client::Role::unknown) client->close();
+    });
+    return client;
+  }
+  bool full() const {
+    return std::ranges::count_if(
+               clients_,
+               [](const auto& entry) { return entry.second->role == Client::Role::unknown; }) +
+               unread_ >=
+           static_cast<std::ptrdiff_t>(kMostUnknown);
+  }
+
+  void accept() {
+    acceptor_.async_accept([this](const Code& error, tcp::socket socket) {
+      if (error == asio::error::operation_aborted) return;
+      if (!error && !full()) read_request(std::move(socket));
+      accept();
+    });
+  }
+  void accept_local() {
+    local_acceptor_.async_accept([this](const Code& error, Local::socket socket) {
+      if (error == asio::error::operation_aborted) return;
+      if (!error && !full())
+        admit(std::make_shared<LineClient>(++newest_, io_, std::move(socket), *this))->begin();
+      accept_local();
+    });
+  }
+
+  /// The request of a connection before it is a WebSocket.
+  struct Greeting {
+    explicit Greeting(tcp::socket socket) : stream(std::move(socket)) {
+      parser.header_limit(8 << 10);
+      parser.body_limit(0);
+    }
+    beast::tcp_stream stream;
+    beast::flat_buffer buffer;
+    http::request_parser<http::empty_body> parser;
+    http::response<http::string_body> response;
+  };
+  void read_request(tcp::socket socket) {
+    Code ignored;
+    socket.set_option(tcp::no_delay(true), ignored);
+    auto greeting = std::make_shared<Greeting>(std::move(socket));
+    greeting->stream.expires_after(kHelloPatience);
+    ++unread_;
+    http::async_read(greeting->stream, greeting->buffer, greeting->parser,
+                     [this, greeting](const Code& error, std::size_t) {
+                       --unread_;
+                       if (!error) greet(greeting);
+                     });
+  }
+  void greet(const std::shared_ptr<Greeting>& greeting) {
+    const auto& request = greeting->parser.get();
+    const std::string host(request[http::field::host]), origin(request[http::field::origin]);
+    if (!is_loopback_name(host))  // a name of somebody else's that resolves to here
+      return respond(greeting, http::status::forbidden, "Host: expected 127.0.0.1 or localhost\n");
+    const std::string own = "http://" + host;
+    if (!origin.empty() && origin != own &&
+        std::ranges::find(settings_.origins, origin) == settings_.origins.end())
+      return respond(greeting, http::status::forbidden,
+                     "Origin: this page may not connect; --allow-origin allows it\n");
+    if (!websocket::is_upgrade(request)) {
+      return respond(greeting, http::status::not_found, "expected a WebSocket\n");
+    }
+    if (!offers_subprotocol(request))
+      return respond(greeting, http::status::bad_request, "expected the subprotocol palpate.1\n");
+    greeting->stream.expires_never();
+    auto client =
+        std::make_shared<WebClient>(++newest_, io_, greeting->stream.release_socket(), *this);
+    admit(client);
+    client->accept(request);
+  }
+  void respond(const std::shared_ptr<Greeting>& greeting, http::status status, std::string body) {
+    auto& response = greeting->response;
+    response.version(11);
+    response.result(status);
+    response.set(http::field::content_type, "text/plain; charset=utf-8");
+    response.set("X-Content-Type-Options", "nosniff");
+    response.keep_alive(false);
+    response.body() = std::move(body);
+    response.prepare_payload();
+    greeting->stream.expires_after(kHelloPatience);
+    http::async_write(greeting->stream, response, [greeting](const Code&, std::size_t) {
+      Code ignored;
+      greeting->stream.socket().shutdown(tcp::socket::shutdown_send, ignored);
+    });
+  }
+
+  void welcome(Client& client, const Message& message) {
+    const auto turn_away = [&](const char* code, const char* why) {
+      client.send(refused(message.id, {{code, why, ""}}));
+      client.close_after_writing();
+    };
+    if (!equal_in_constant_time(message.token, settings_.token))
+      return turn_away("bad-token", "this is not the server's token");
+    std::size_t watchers = 0;
+    bool controlled = false;
+    for (const auto& [id, other] : clients_) {
+      controlled |= other->role == Client::Role::control;
+      watchers += other->role == Client::Role::watch ? 1 : 0;
+    }
+    if (message.control && controlled)
+      return turn_away("controlled", "another program controls this server; watch instead");
+    if (!message.control && watchers >= kMostWatchers)
+      return turn_away("full", "8 programs watch already");
+    client.role = message.control ? Client::Role::control : Client::Role::watch;
+    client.hello_timer.cancel();
+    nlohmann::ordered_json more = {{"version", kServeVersion},
+                                   {"program", "palpate " PALPATE_VERSION},
+                                   {"client", client.id},
+                                   {"t_ns", now_ns()}};
+    more["scene"] = hooks_.scene();
+    client.send(accepted(message.id, more));
+  }
+
+  void answer(Client& client, Message message, std::int64_t received_ns) {
+    const auto refuse = [&](const char* code, const char* why) {
+      client.send(refused(message.id, {{code, why, ""}}));
+    };
+    switch (message.type) {
+      case MessageType::hello:
+        return refuse("bad-message", "hello was said before");
+      case MessageType::alive:
+        return client.send(accepted(message.id));
+      case MessageType::clock: {
+        nlohmann::ordered_json more = {{"t_received_ns", received_ns}, {"t_sent_ns", now_ns()}};
+        if (!message.t_client.is_null()) more["t_client"] = message.t_client;
+        return client.send(accepted(message.id, more));
+      }
+      case MessageType::subscribe:
+        client.rate = message.rate;
+        client.fields = std::move(message.fields);
+        client.next_ns = 0;
+        client.rows.clear();
+        client.row_count = 0;
+        client.lost_before = hooks_.lost();
+        return client.send(accepted(message.id));
+      case MessageType::bye:
+        client.send(accepted(message.id));
+        if (client.role == Client::Role::control) {
+          client.role = Client::Role::watch;  // in order: no emergency when it closes
+          command({client.id, true, {}});
+        }
+        return client.close_after_writing();
+      default:
+        break;
+    }
+    if (client.role != Client::Role::control)
+      return refuse("not-controller", "only the controller may say this");
+    const std::int64_t id = message.id;
+    if (!command({client.id, false, std::move(message)}))
+      client.send(refused(id, {{"busy", "64 messages wait for the session already", ""}}));
+  }
+
+  bool command(ServeCommand command) {
+    const std::lock_guard lock(mutex_);
+    if (!command.left && commands_.size() >= kMostCommands) return false;
+    commands_.push_back(std::move(command));
+    return true;
+  }
+
+  void tell_all(const std::string& text) {
+    for (const auto& [id, client] : std::map(clients_))
+      if (client->role != Client::Role::unknown) client->send(text);
+  }
+
+  /// The controller is silent while forces are on.
+  void watch() {
+    watch_timer_.expires_after(kWatchEvery);
+    watch_timer_.async_wait([this](const Code& error) {
+      if (error) return;
+      const bool on = hooks_.forces_are_on();
+      const std::int64_t now = now_ns();
+      if (!on) silent_ = false;
+      for (const auto& [id, client] : std::map(clients_)) {
+        if (client->role != Client::Role::control || !on || silent_) continue;
+        if (now - client->heard_ns <= kSilence) continue;
+        silent_ = true;
+        hooks_.silence();
+        tell_all(event("client_silent", now, {{"since_ns", client->heard_ns}}));
+      }
+      watch();
+    });
+  }
+
+  void stream() {
+    stream_timer_.expires_after(kStreamEvery);
+    stream_timer_.async_wait([this](const Code& error) {
+      if (error) return;
+      StreamSample sample;
+      while (hooks_.next_sample(sample)) {
+        for (const auto& [id, client] : clients_) add(*client, sample);
+      }
+      for (const auto& [id, client] : std::map(clients_)) send_rows(*client);
+      stream();
+    });
+  }
+  void add(Client& client, const StreamSample& sample) {
+    if (client.rate <= 0) return;
+    // Half a period early: ticks come a little sooner or later than their times.
+    constexpr double kEveryTick = 1000;  // Hz
+    const auto period = static_cast<std::int64_t>(1e9 / client.rate);
+    if (client.rate < kEveryTick && sample.time_ns + period / 2 < client.next_ns) return;
+    client.next_ns = std::max(client.next_ns + period, sample.time_ns);
+    if (client.row_count >= kMostRows) {
+      ++client.dropped;
+      return;
+    }
+    if (client.row_count++ > 0) client.rows += ',';
+    add_row(client.rows, sample, client.fields);
+  }
+  /// Rows wait while a client has not read the last message; what has no room is dropped.
+  void send_rows(Client& client) {
+    const std::uint64_t lost = hooks_.lost();
+    if (client.rate > 0) client.dropped += lost - client.lost_before;
+    client.lost_before = lost;
+    if ((client.row_count == 0 && client.dropped == 0) || !client.idle()) return;
+    client.send("{\"stream\":[" + client.rows + "],\"dropped\":" + std::to_string(client.dropped) +
+                "}");
+    client.dropped = 0;
+    client.rows.clear();
+    client.row_count = 0;
+  }
+
+  NetworkSettings settings_;
+  NetworkHooks hooks_;
+  asio::io_context io_{1};
+  tcp::acceptor acceptor_;
+  Local::acceptor local_acceptor_;
+  asio::steady_timer watch_timer_, stream_timer_;
+  std::map<std::uint64_t, std::shared_ptr<Client>> clients_;
+  std::uint64_t newest_ = 0;
+  std::ptrdiff_t unread_ = 0;  ///< connections whose request has not come
+  bool silent_ = false;
+  std::mutex mutex_;  ///< of the next one
+  std::vector<ServeCommand> commands_;
+  std::thread thread_;
+};
+
+std::string make_token() {
+  unsigned char bytes[16];
+  if (::getrandom(bytes, sizeof bytes, 0) != sizeof bytes)
+    throw std::runtime_error("the kernel gives no random numbers for a token");
+  std::string out;
+  for (const unsigned char byte : bytes) {
+    constexpr const char* kDigits = "0123456789abcdef";
+    out += kDigits[byte >> 4];
+    out += kDigits[byte & 15];
+  }
+  return out;
+}
+
+Network::Network(NetworkSettings settings) : impl_(std::make_unique<Impl>(std::move(settings))) {}
+Network::~Network() = default;
+void Network::begin(NetworkHooks hooks) { impl_->begin(std::move(hooks)); }
+void Network::end() { impl_->end(); }
+std::uint16_t Network::port() const { return impl_->port(); }
+std::vector<ServeCommand> Network::commands() { return impl_->commands(); }
+void Network::reply(std::uint64_t client, std::string text) {
+  impl_->reply(client, std::move(text));
+}
+void Network::tell(std::string text) { impl_->tell(std::move(text)); }
+
+}  // namespace palpate::runner

@@ -1,0 +1,343 @@
+#include "runner/serve/served_scene.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "protocols/json_document.h"
+#include "runner/safety/fault_table.h"
+#include "runner/scene_builder.h"
+#include "runner/session/device_check.h"
+
+namespace palpate::runner {
+namespace {
+
+using nlohmann::json;
+using nlohmann::ordered_json;
+
+// Forces begin wherever the stylus is: an object that it is inside of gives none until it was left.
+constexpr HomeZone kFromHere{.radius = 0, .rest = 0};
+constexpr std::int64_t kStartPatience = 2'000'000'000;  // ns, for the first tick with forces
+constexpr int kLeft = 20;  // ticks without contact: an edge chatters for less
+
+const rendering::Renderer& named_renderer(const std::string& name) {
+  return renderer_for(name == "ray" ? protocols::RendererKind::ray
+                                    : protocols::RendererKind::point);
+}
+
+/// \throws MessageRefused with every reason why the device cannot show it
+void hold_against(const DeviceCapabilities& device, const protocols::Protocol& protocol) {
+  std::vector<Refusal> why;
+  for (std::size_t i = 0; i < protocol.stimuli.size(); ++i) {
+    const ShowableMaterial can =
+        showable(protocol.stimuli[i].object.material, device, protocol.servo_rate,
+                 felt_gain(protocol), protocol.passivity_controller);
+    if (can.fraction < 1)
+      why.push_back({"too-stiff", can.reason, protocols::child_pointer("/objects", i)});
+  }
+  if (why.empty()) {
+    for (const std::string& reason : incompatibilities(protocol, StimulusLibrary(protocol), device))
+      why.push_back({"cannot-be-shown", reason, ""});
+  }
+  if (!why.empty()) throw MessageRefused(std::move(why));
+}
+
+}  // namespace
+
+protocols::Protocol protocol_of(const protocols::SceneSpec& spec,
+                                const rendering::Renderer& renderer) {
+  protocols::Protocol out;
+  out.name = "scene";
+  out.renderers = {renderer.side_contact() ? protocols::RendererKind::ray
+                                           : protocols::RendererKind::point};
+  out.orientation = protocols::OrientationKind::fixed;
+  out.tool = spec.tool;
+  out.reach = spec.reach;
+  for (std::size_t i = 0; i < spec.objects.size(); ++i)
+    out.stimuli.push_back({"object-" + std::to_string(i), spec.objects[i]});
+  return out;
+}
+
+ServedScene::ServedScene(Device& device, GuardedDevice* guard, Clock& clock, Settings settings)
+    : device_(device.capabilities()),
+      guard_(guard),
+      clock_(clock),
+      settings_(std::move(settings)),
+      patience_(has_motors(device_)),
+      servo_(device, clock, settings_.servo),
+      forces_(servo_, guard, clock) {
+  if (settings_.scene.empty()) return;
+  // A device of three degrees of freedom shows it to the point renderer alone.
+  const bool ray = device_.sensed_freedom >= 5;
+  read(settings_.scene, named_renderer(ray ? "ray" : "point"));
+  protocols::FaultList none(settings_.scene_path);  // it was read just now
+  scene_ = protocols::read_json(settings_.scene, none);
+}
+
+ServedScene::~ServedScene() { emergency_zero(); }
+
+void ServedScene::emergency_zero() noexcept { forces_.off(); }
+
+json ServedScene::scene() const {
+  const std::lock_guard lock(mutex_);
+  return scene_;
+}
+
+void ServedScene::keep(json scene) {
+  const std::lock_guard lock(mutex_);
+  scene_.swap(scene);
+}
+
+void ServedScene::tell(const std::string& name, std::int64_t t_ns, const ordered_json& more) {
+  output_->tell(event(name, t_ns, more));
+}
+
+/// \throws MessageRefused
+protocols::SceneSpec ServedScene::read(const std::string& text,
+                                       const rendering::Renderer& renderer) const {
+  try {
+    protocols::SceneSpec spec = protocols::parse_scene_text(text, settings_.scene_path);
+    protocols::Protocol protocol = protocol_of(spec, renderer);
+    protocol.servo_rate = settings_.servo.rate;
+    hold_against(device_, protocol);
+    return spec;
+  } catch (const protocols::InputError& error) {
+    std::vector<Refusal> why;
+    for (const protocols::Fault& fault : error.faults())
+      why.push_back({"bad-scene", fault.expected, fault.location});
+    throw MessageRefused(std::move(why));
+  } catch (const stimuli::MeshError& error) {
+    std::vector<Refusal> why;
+    for (const std::string& fault : error.faults()) why.push_back({"bad-scene", fault, ""});
+    throw MessageRefused(std::move(why));
+  }
+}
+
+void ServedScene::load(json scene) {
+  if (trial_) throw MessageRefused("running", "a scene is felt now: stop it first");
+  // The servo stretches the stylus from its beginning to its end.
+  if (scene.contains("reach") || scene_.contains("reach"))
+    throw MessageRefused("cannot-be-shown", "a reach goes with --scene alone", "/reach");
+  const bool ray = device_.sensed_freedom >= 5;
+  const std::string text = scene.dump();
+  const protocols::SceneSpec spec = read(text, named_renderer(ray ? "ray" : "point"));
+  keep(std::move(scene));
+  tell("loaded", clock_.now_ns(), {{"objects", spec.objects.size()}});
+}
+
+void ServedScene::show(const protocols::SceneSpec& spec, const rendering::Renderer& renderer) {
+  try {
+    servo_.prepare(SceneBuilder().build(
+                       spec.objects, renderer.side_contact(), tool_of(spec.tool), spec.gravity,
+                       spec.tool.radius > 0 ? spec.tool.radius : protocols::kSoftRadius),
+                   renderer, kFromHere);
+  } catch (const stimuli::MeshError& error) {
+    throw MessageRefused("bad-scene", error.what());
+  }
+  patience_.begin();
+}
+
+void ServedScene::start(std::uint64_t client, const Message& message) {
+  if (trial_) throw MessageRefused("running", "a scene is felt now: stop it first");
+  if (scene_.is_null()) throw MessageRefused("no-scene", "load a scene first");
+  if (!held_by_.empty())
+    throw MessageRefused("forces-off", "forces are off (" + held_by_ + "): clear first");
+  const rendering::Renderer& renderer = named_renderer(message.renderer);
+  show(read(scene_.dump(), renderer), renderer);
+  renderer_ = &renderer;
+  trial_ = Trial{
+      .asked_ns = clock_.now_ns(), .client = client, .id = message.id, .number = message.trial};
+}
+
+/// The scene begins anew with the value: its forces rise within the ramp.
+void ServedScene::set(std::uint64_t client, const Message& message) {
+  if (scene_.is_null()) throw MessageRefused("no-scene", "load a scene first");
+  if (trial_ && !trial_->holds) throw MessageRefused("running", "the scene is about to begin");
+  json changed = scene_;
+  try {
+    // What a scene leaves out has its default, and may be set.
+    const json::json_pointer path(message.path);
+    if (!changed.contains(path.parent_pointer()))
+      throw MessageRefused("bad-message", "no such object in the scene", "/path");
+    changed[path] = message.value;
+  } catch (const json::exception&) {
+    throw MessageRefused("bad-message", "no such place in the scene", "/path");
+  }
+  const std::string text = changed.dump();
+  const bool ray = trial_ ? renderer_->side_contact() : device_.sensed_freedom >= 5;
+  const protocols::SceneSpec spec = read(text, named_renderer(ray ? "ray" : "point"));
+  if (trial_) show(spec, *renderer_);
+  keep(std::move(changed));
+  tell("set", clock_.now_ns(), {{"path", message.path}, {"value", message.value}});
+  output_->reply(client, accepted(message.id));
+}
+
+ordered_json ServedScene::end_trial() {
+  const ServoQuality quality = servo_.stop();
+  attend();
+  const Trial trial = *std::exchange(trial_, {});
+  ordered_json out;
+  if (trial.number) out["trial"] = *trial.number;
+  const auto since_zero = [&](std::int64_t t_ns) {
+    return static_cast<double>(t_ns - trial.zero_ns) * 1e-9;
+  };
+  out["zero_t_ns"] = trial.zero_ns;
+  out["first_contact_s"] = trial.first_contact_ns > 0
+                               ? ordered_json(since_zero(trial.first_contact_ns))
+                               : ordered_json();
+  out["ticks"] = quality.ticks;
+  out["missed_ticks"] = quality.missed_ticks;
+  out["max_force_n"] = quality.max_force;
+  out["faults"] = fault_words(quality.faults);
+  return out;
+}
+
+void ServedScene::drop_pending(const std::string& code, const std::string& why) {
+  servo_.stop();
+  const Trial trial = *std::exchange(trial_, {});
+  output_->reply(trial.client, refused(trial.id, {{code, why, ""}}));
+}
+
+void ServedScene::clear(std::uint64_t client, const Message& message) {
+  if (trial_) end_trial();
+  const std::string trouble = forces_.allow(stop_);
+  if (!trouble.empty()) throw MessageRefused("forces-off", trouble);
+  held_by_.clear();
+  tell("cleared", clock_.now_ns());
+  output_->reply(client, accepted(message.id));
+}
+
+void ServedScene::obey(std::uint64_t client, const Message& message) {
+  try {
+    switch (message.type) {
+      case MessageType::load:
+        load(message.scene);
+        return output_->reply(client, accepted(message.id));
+      case MessageType::start:
+        return start(client, message);
+      case MessageType::set:
+        return set(client, message);
+      case MessageType::answer: {
+        if (!trial_ || !trial_->holds)
+          throw MessageRefused("nothing-felt", "nothing is felt now: start first");
+        const std::int64_t now = clock_.now_ns();
+        const std::int64_t at = message.t_ns.value_or(now);
+        if (at < trial_->zero_ns || at > now)
+          throw MessageRefused("bad-message",
+                               "expected a time of this trial, CLOCK_MONOTONIC in ns", "/t_ns");
+        ordered_json out = end_trial();
+        out["response"] = message.text;
+        out["t_ns"] = at;
+        out["response_time_s"] =
+            static_cast<double>(at - out["zero_t_ns"].get<std::int64_t>()) * 1e-9;
+        tell("answered", at, out);
+        return output_->reply(client, accepted(message.id, std::move(out)));
+      }
+      case MessageType::stop: {
+        if (trial_ && !trial_->holds) drop_pending("stopped", "stopped before forces were on");
+        ordered_json out = trial_ ? end_trial() : ordered_json::object();
+        tell("stopped", clock_.now_ns(), {{"reason", message.text}});
+        return output_->reply(client, accepted(message.id, std::move(out)));
+      }
+      case MessageType::mark:
+      case MessageType::note: {
+        const std::int64_t now = clock_.now_ns();
+        const bool mark = message.type == MessageType::mark;
+        ordered_json out;
+        if (mark) out["code"] = message.code;
+        out["text"] = message.text;
+        tell(mark ? "mark" : "note", now, out);
+        return output_->reply(client, accepted(message.id, {{"t_ns", now}}));
+      }
+      case MessageType::clear:
+        return clear(client, message);
+      default:
+        throw MessageRefused("bad-message", "not for a scene");
+    }
+  } catch (const MessageRefused& error) {
+    output_->reply(client, refused(message.id, error.why()));
+  }
+}
+
+void ServedScene::controller_left() {
+  if (!trial_) return;
+  if (trial_->holds)
+    end_trial();
+  else
+    drop_pending("stopped", "stopped before forces were on");
+  tell("stopped", clock_.now_ns(), {{"reason", "the controller has left"}});
+}
+
+/// By the first tick without forces.
+std::string ServedScene::why_off(const Sample& sample) {
+  if (silent_.exchange(false)) return "the client was silent";
+  return fault_words(sample.faults & ~servo_fault::kForceLimited);
+}
+
+void ServedScene::take_first(const Sample& sample) {
+  if (sample.faults & servo_fault::kTripped) {
+    held_by_ = why_off(sample);
+    return drop_pending("forces-off", "forces are off (" + held_by_ + "): clear first");
+  }
+  if (sample.phase != Phase::feeling) {
+    if (clock_.now_ns() - trial_->asked_ns > kStartPatience)
+      drop_pending("not-started", "forces did not begin: the servo gives no ticks with forces");
+    return;
+  }
+  trial_->holds = true;
+  trial_->zero_ns = sample.time_ns;
+  ordered_json out = {{"t_ns", sample.time_ns}};
+  if (trial_->number) out["trial"] = *trial_->number;
+  output_->reply(trial_->client, accepted(trial_->id, out));
+  out.erase("t_ns");
+  tell("started", sample.time_ns, out);
+}
+
+void ServedScene::take(const Sample& sample) {
+  last_ns_ = sample.time_ns;
+  if (trial_ && !trial_->holds) take_first(sample);
+  if (!trial_ || sample.phase != Phase::feeling) return;
+  if ((sample.faults & servo_fault::kTripped) != 0 && !trial_->told_off) {
+    trial_->told_off = true;
+    held_by_ = why_off(sample);
+    tell("forces_off", sample.time_ns, {{"reason", held_by_}});
+  }
+  if (sample.rendering.contacts > 0) {
+    trial_->without_contact = 0;
+    trial_->in_contact = true;
+    if (trial_->first_contact_ns == 0) {
+      trial_->first_contact_ns = sample.time_ns;
+      tell("first_contact", sample.time_ns, {{"object", sample.rendering.object}});
+    }
+  } else if (trial_->in_contact && ++trial_->without_contact == kLeft) {
+    trial_->in_contact = false;
+    tell("left", sample.time_ns);
+  }
+  const bool contact = sample.rendering.contacts > 0;
+  const StreamSample out{.time_ns = sample.time_ns,
+                         .lateness_ns = sample.lateness_ns,
+                         .tick = sample.tick,
+                         .faults = sample.faults,
+                         .object = sample.rendering.object,
+                         .tip = sample.probe.tip,
+                         .tail = sample.probe.tail,
+                         .force = sample.device1 + sample.device2,
+                         .rendered = sample.rendering.force,
+                         .contact = contact ? sample.rendering.deepest.point : Vec3(0),
+                         .depth = sample.rendering.deepest.depth};
+  if (!stream_.push(out)) lost_.fetch_add(1);
+}
+
+void ServedScene::attend() {
+  while (const Sample* const sample = servo_.next_now()) {
+    if (sample->time_ns == last_ns_) continue;
+    patience_.begin();
+    take(*sample);
+  }
+  if (!trial_ || !patience_.is_over()) return;
+  emergency_zero();
+  held_by_ = "the servo gives no more samples";
+  tell("fault", clock_.now_ns(), {{"reason", held_by_}});
+  patience_.begin();
+}
+
+}  // namespace palpate::runner

@@ -1,0 +1,438 @@
+"""palpate serve on the simulated device, from outside: who may come in, what may be said, and what ends forces.
+
+Usage: serve_test.py PALPATE PROTOCOLS CLIENT.py
+"""
+
+import contextlib
+import csv
+import importlib.util
+import json
+import os
+import pathlib
+import signal
+import socket
+import stat
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+
+import jsonschema
+
+PALPATE, PROTOCOLS, CLIENT = (pathlib.Path(word).resolve() for word in sys.argv[1:4])
+spec = importlib.util.spec_from_file_location("client", CLIENT)
+client = importlib.util.module_from_spec(spec)
+sys.modules["client"] = client
+spec.loader.exec_module(client)
+Client, ServeError = client.Client, client.ServeError
+
+PATIENCE = 120  # s; only a hang reaches it
+BALL = {"objects": [{"shape": "sphere", "radius_m": 0.03, "subdivisions": 2, "stiffness_n_per_m": 50}]}
+
+
+def schemas():
+    """Of what a client says, and of what the server does."""
+    scene = (PROTOCOLS / "scene.schema.json").read_text().replace('"#/$defs/', '"#/$defs/scene/$defs/')
+    whole = json.loads((PROTOCOLS / "serve.schema.json").read_text().replace('"scene.schema.json"', '"#/$defs/scene"'))
+    whole["$defs"]["scene"] = json.loads(scene)
+    for schema in (whole, whole["$defs"]["scene"]):  # for a validator without files
+        schema.pop("$id", None)
+    jsonschema.Draft202012Validator.check_schema(whole)
+    return (jsonschema.Draft202012Validator(whole),
+            jsonschema.Draft202012Validator({"$ref": "#/$defs/server", "$defs": whole["$defs"]}))
+
+
+class Serve(unittest.TestCase):
+    def setUp(self):
+        scratch = tempfile.TemporaryDirectory()
+        self.addCleanup(scratch.cleanup)
+        self.dir = pathlib.Path(scratch.name)
+        self.scene = self.dir / "scene.json"
+        self.scene.write_text(json.dumps(BALL))
+        self.path = self.dir / "socket"
+
+    def serve(self, *options, scene=True, rate=100):
+        """At a rate that a busy machine keeps: forces go off where ticks are missed."""
+        command = [PALPATE, "serve", "--device", "simulated", "--socket", self.path, "--rate", rate, *options]
+        if scene:
+            command += ["--scene", self.scene]
+        process = subprocess.Popen(list(map(str, command)), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+        def end():
+            process.kill()
+            process.communicate()
+        self.addCleanup(end)
+        line = process.stdout.readline()
+        self.assertTrue(line, "it does not serve")
+        self.said = json.loads(line)
+        return process
+
+    def client(self, **more):
+        made = Client(self.said["url"], self.said["token"], time_out=PATIENCE, **more)
+        self.addCleanup(made.close)
+        return made
+
+    def one_of(self, who, *names):
+        """The next event of one of these names."""
+        while True:
+            for number, event in enumerate(events := who.events()):
+                if event["event"] in names:
+                    who._events.extendleft(reversed(events[number + 1:]))
+                    return event
+            time.sleep(0.01)
+
+    def touch(self, hand, **more):
+        """Starts until something was felt: of a starved machine forces go off before. \return zero, the contact"""
+        while True:
+            zero = hand.start(**more)
+            contact = self.one_of(hand, "first_contact", "forces_off")
+            if contact["event"] == "first_contact":
+                return zero, contact
+            hand.stop()
+            hand.clear()
+
+    def refused(self, code, ask, *args, **more):
+        with self.assertRaises(ServeError) as caught:
+            ask(*args, **more)
+        self.assertEqual(caught.exception.code, code, str(caught.exception))
+        return caught.exception
+
+    def lines(self):
+        """A connection of the Unix socket that says and hears lines as they are."""
+        link = client._Lines(str(self.path), PATIENCE)
+        link.socket.settimeout(PATIENCE)
+        self.addCleanup(link.socket.close)
+        return link
+
+    def hears(self, link):
+        while True:
+            said = json.loads(link.receive())
+            if "re" in said:
+                return said
+
+    def hello(self, link, **more):
+        link.send(json.dumps({"id": 0, "type": "hello", "token": self.said["token"], "version": 1, **more}))
+        return self.hears(link)
+
+    def http(self, *headers):
+        """The status of a request of the loopback, and the rest of the answer."""
+        port = int(self.said["url"].rsplit(":", 1)[1])
+        with socket.create_connection(("127.0.0.1", port), timeout=PATIENCE) as link:
+            link.sendall("\r\n".join(["GET / HTTP/1.1", *headers, "", ""]).encode())
+            got = b""
+            while b"\r\n\r\n" not in got:
+                try:
+                    more = link.recv(4096)
+                except ConnectionResetError:
+                    more = b""
+                if not more:
+                    break
+                got += more
+        return int(got.split()[1]) if got else None
+
+    def test_a_trial(self):
+        self.serve()
+        with self.client() as hand:
+            self.assertEqual(hand.server["scene"], BALL)
+            zero, contact = self.touch(hand, renderer="ray", trial=7)
+            self.assertEqual(contact["object"], 0)
+            hand.wait_for("left", PATIENCE)
+            trial = hand.answer("ball")
+            self.assertEqual((trial["trial"], trial["response"], trial["zero_t_ns"]), (7, "ball", zero))
+            self.assertAlmostEqual(trial["response_time_s"], (trial["t_ns"] - zero) * 1e-9)
+            self.assertAlmostEqual(trial["first_contact_s"], (contact["t_ns"] - zero) * 1e-9)
+            self.assertGreater(trial["response_time_s"], trial["first_contact_s"])
+            self.assertGreater(trial["max_force_n"], 0)
+            self.refused("nothing-felt", hand.answer, "ball")
+            self.refused("bad-message", hand.ask, "start", renderer="line")
+            hand.clear()  # ticks may have been missed
+            hand.start()
+            self.refused("running", hand.start)
+            self.refused("running", hand.load, BALL)
+            self.assertGreater(hand.stop()["ticks"], 0)
+
+    def test_forces_along_the_path_equal_those_of_render(self):
+        self.serve()
+        with self.client() as hand:
+            hand.subscribe(1000, ("tip", "tail", "rendered", "contact", "depth", "faults"))
+            for renderer in ("ray", "point"):
+                hand.clear()
+                hand.start(renderer=renderer)
+                hand.wait_for("left", PATIENCE)
+                hand.stop()
+                hand.ask("alive")
+                time.sleep(0.1)
+                got = hand.samples()
+                self.assertEqual(hand.dropped, 0)
+                count = len(got["tick"])
+                self.assertEqual(list(got["tick"]), list(range(count)))
+                path, out = self.dir / f"{renderer}.csv", self.dir / f"{renderer}-forces.csv"
+                with path.open("w") as file:
+                    file.write("t,tip_x,tip_y,tip_z,tail_x,tail_y,tail_z\n")
+                    for t, tip, tail in zip(got["t_ns"], got["tip"], got["tail"]):
+                        file.write(",".join(map(repr, [float(t - got["t_ns"][0]) * 1e-9, *map(float, tip), *map(float, tail)])) + "\n")
+                subprocess.run([PALPATE, "render", "--scene", self.scene, "--renderer", renderer, "--trajectory", path,
+                                "--out", out], check=True, capture_output=True)
+                rows = list(csv.DictReader(out.read_text().splitlines()))
+                self.assertEqual(len(rows), count)
+                for axis, name in enumerate("xyz"):
+                    self.assertEqual([float(row[f"force_{name}"]) for row in rows], list(got["rendered"][:, axis]))
+                self.assertEqual([float(row["depth"]) for row in rows], list(got["depth"]))
+                self.assertGreater(abs(got["rendered"]).max(), 0.1)
+
+    def test_scenes_are_held_against_the_device_and_every_fault_has_its_place(self):
+        self.serve(scene=False)
+        with self.client() as hand:
+            self.assertIsNone(hand.server["scene"])
+            self.refused("no-scene", hand.start)
+            stiff = {"objects": [BALL["objects"][0], {**BALL["objects"][0], "stiffness_n_per_m": 90000}]}
+            self.assertEqual(self.refused("too-stiff", hand.load, stiff).place, "/objects/1")
+            bad = {"objects": [{"shape": "sphere"}, {"shape": "cubus", "edge_m": -1}]}
+            faults = self.refused("bad-scene", hand.load, bad).faults
+            self.assertGreaterEqual({fault["place"] for fault in faults}, {"/objects/0/radius_m", "/objects/1/shape"})
+            self.refused("cannot-be-shown", hand.load, {**BALL, "reach": {"factor": 2, "pivot": "grip"}})
+            hand.load(BALL)
+            hand.start()
+            hand.set("/objects/0/stiffness_n_per_m", 40)
+            hand.wait_for("set")
+            self.refused("too-stiff", hand.set, "/objects/0/stiffness_n_per_m", 90000)
+            self.refused("bad-scene", hand.set, "/objects/0/stiffness_n_per_m", "soft")
+            self.refused("bad-scene", hand.set, "/objects/0/stifness", 3)
+            self.refused("bad-message", hand.set, "/objects/9/stiffness_n_per_m", 3)
+            hand.stop()
+        with self.client(role="watch") as eye:
+            self.assertEqual(eye.server["scene"]["objects"][0]["stiffness_n_per_m"], 40)
+
+    def test_only_who_knows_the_token_comes_in(self):
+        token = self.dir / "token.json"
+        token.write_text("old")
+        token.chmod(0o644)
+        process = self.serve("--token-file", token)
+        self.assertNotIn("token", self.said)
+        self.said = json.loads(token.read_text())
+        self.assertEqual(stat.S_IMODE(token.stat().st_mode), 0o600)
+        self.assertEqual(stat.S_IMODE(self.path.stat().st_mode), 0o600)
+        self.assertRegex(self.said["token"], "^[0-9a-f]{32}$")
+        for wrong in ("", "0" * 32, self.said["token"][:-1], self.said["token"] + "0"):
+            self.refused("bad-token", Client, self.said["url"], wrong, time_out=PATIENCE)
+        link = self.lines()
+        link.send('{"id": 1, "type": "start"}')
+        self.assertEqual(self.hears(link)["error"]["code"], "no-hello")
+        self.assertIsNone(link.receive())
+        with Client.from_token_file(token, time_out=PATIENCE) as hand:
+            self.refused("controlled", self.client)
+            with contextlib.ExitStack() as stack:
+                eyes = [stack.enter_context(self.client(role="watch")) for _ in range(8)]
+                self.refused("full", self.client, role="watch")
+                self.refused("not-controller", eyes[0].start)
+                hand.note("all see it")
+                for eye in eyes:
+                    self.assertEqual(eye.wait_for("note", PATIENCE)["text"], "all see it")
+        process.send_signal(signal.SIGINT)
+        self.assertEqual(process.wait(PATIENCE), 0)
+        self.assertFalse(token.exists() or self.path.exists())
+
+    def test_pages_of_others_do_not_come_in(self):
+        self.serve("--allow-origin", "http://lab.example")
+        host = "Host: " + self.said["url"][5:]
+        socket_ = ["Upgrade: websocket", "Connection: Upgrade", "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==",
+                   "Sec-WebSocket-Version: 13"]
+        speaks = "Sec-WebSocket-Protocol: palpate.1"
+        self.assertEqual(self.http(host, *socket_, speaks), 101)
+        self.assertEqual(self.http(host, *socket_, speaks, "Origin: http://lab.example"), 101)
+        self.assertEqual(self.http(host, *socket_, speaks, "Origin: http://evil.example"), 403)
+        self.assertEqual(self.http(host, *socket_, speaks, "Origin: null"), 403)
+        self.assertEqual(self.http("Host: evil.example:80", *socket_, speaks), 403)
+        self.assertEqual(self.http(*socket_, speaks), 403)
+        self.assertEqual(self.http(host, *socket_), 400)
+        self.assertEqual(self.http(host, *socket_, "Sec-WebSocket-Protocol: palpate.2"), 400)
+        self.assertEqual(self.http(host), 404)
+        self.assertIsNone(self.http(host, "X: " + "x" * 20000))
+
+    def test_who_says_nothing_or_too_much_is_closed(self):
+        self.serve()
+        port = int(self.said["url"].rsplit(":", 1)[1])
+        silent = self.lines()
+        half = self.lines()
+        half.socket.sendall(b'{"id": 1')
+        request = socket.create_connection(("127.0.0.1", port), timeout=PATIENCE)
+        self.addCleanup(request.close)
+        request.sendall(b"GET / HTT")
+        began = time.monotonic()
+        for link in (silent.socket, half.socket, request):
+            self.assertEqual(link.recv(10), b"")
+        self.assertGreater(time.monotonic() - began, 1.5)
+        long = self.lines()
+        with contextlib.suppress(OSError):
+            long.socket.sendall(b"x" * 200_000)
+            self.assertEqual(long.socket.recv(10), b"")
+        # Before its hello a WebSocket gets 64 kB as well.
+        web = client._WebSocket(self.said["url"], PATIENCE)
+        self.addCleanup(web.socket.close)
+        with contextlib.suppress(OSError, ConnectionError):
+            web.send("x" * 100_000)
+            self.assertIsNone(web.receive())
+        with self.client() as hand:
+            self.refused("too-long", hand.ask, "note", text="x" * 70_000)
+        flood = self.lines()
+        self.assertTrue(self.hello(flood, role="watch")["ok"])
+        with contextlib.suppress(OSError):
+            for number in range(1000):
+                flood.send(json.dumps({"id": number, "type": "alive"}))
+        codes = []
+        with contextlib.suppress(TypeError, OSError):
+            while True:
+                codes.append(self.hears(flood).get("error", {}).get("code"))
+        self.assertIn("busy", codes)
+        self.assertLess(len(codes), 1000)
+
+    def test_messages_and_their_schema_agree(self):
+        self.serve()
+        says, answers = schemas()
+        ball = json.dumps(BALL)
+        good = ['{"id":1,"type":"alive"}', '{"id":2,"type":"clock","t_client":1.5}', '{"id":3,"type":"mark","code":255}',
+                '{"id":4,"type":"subscribe","rate_hz":0.5,"fields":["depth"]}', '{"id":5,"type":"clear"}',
+                '{"id":6,"type":"load","scene":' + ball + '}', '{"id":7,"type":"note","text":"h\u00e4nd"}',
+                '{"id":8,"type":"start","renderer":"point","trial":3}', '{"id":9,"type":"stop","reason":"x"}',
+                '{"id":10,"type":"set","path":"/objects/0/damping_ns_per_m","value":0}', '{"id":9007199254740992,"type":"emergency"}']
+        bad = ['{"id":1,"type":"jump"}', '{"type":"alive"}', '{"id":-1,"type":"alive"}', '{"id":1.5,"type":"alive"}',
+               '{"id":1,"type":"alive","more":0}', '{"id":1,"type":"mark","code":256}', '{"id":1,"type":"mark"}',
+               '{"id":1,"type":"subscribe","rate_hz":1001}', '{"id":1,"type":"subscribe","rate_hz":1,"fields":["tip","tip"]}',
+               '{"id":1,"type":"subscribe","rate_hz":1,"fields":["smell"]}', '{"id":1,"type":"start","renderer":"line"}',
+               '{"id":1,"type":"start","trial":0}', '{"id":1,"type":"set","path":"/gravity","value":1}', '{"id":1,"type":"note"}',
+               '{"id":1,"type":"answer","response":3}', '{"id":1,"type":"load","scene":[]}', '{"id":"1","type":"alive"}',
+               '{"id":1,"type":"clock","t_client":"now"}', '[]', '3', 'null']
+        no_json = ['', '{', '{"id":1,"type":"alive"', "{'id':1}", '{"id":1,"id":2,"type":"alive"}', '\xff', '[' * 5000,
+                   '{"id":NaN,"type":"alive"}']
+        link = self.lines()
+        self.assertTrue(self.hello(link)["ok"])
+        for text in good:
+            self.assertTrue(says.is_valid(json.loads(text)), text)
+            link.send(text)
+            reply = self.hears(link)
+            self.assertTrue(reply["ok"] and answers.is_valid(reply), (text, reply))
+        for text in bad:
+            self.assertFalse(says.is_valid(json.loads(text)), text)
+            link.send(text)
+            reply = self.hears(link)
+            self.assertFalse(reply["ok"], text)
+            self.assertEqual(reply["error"]["code"], "bad-message", text)
+            self.assertTrue(answers.is_valid(reply), reply)
+        for text in no_json[1:]:
+            link.socket.sendall(text.encode("latin-1") + b"\n")
+            reply = self.hears(link)
+            self.assertEqual((reply["re"], reply["error"]["code"]), (None, "bad-json"), text[:50])
+            self.assertTrue(answers.is_valid(reply), reply)
+
+    def test_silence_ends_forces_until_clear(self):
+        self.serve()
+        eye = self.client(role="watch")
+        with self.client(keep_alive=False) as hand:
+            while True:
+                hand.start()
+                if self.one_of(eye, "client_silent", "forces_off")["event"] == "client_silent":
+                    break
+                hand.stop()
+                hand.clear()
+            self.assertEqual(eye.wait_for("forces_off", PATIENCE)["reason"], "the client was silent")
+            hand.stop()
+            self.refused("forces-off", hand.start)
+            hand.clear()
+            eye.subscribe(1000, ("force",))
+            hand.start()
+            said = [time.monotonic()]
+            for _ in range(10):
+                time.sleep(0.1)
+                hand.ask("alive")
+                said.append(time.monotonic())
+            hand.stop()
+            if max(after - before for before, after in zip(said, said[1:])) < 0.4:  # else this machine stood still
+                self.assertEqual([e for e in eye.events() if e["event"] == "client_silent"], [])
+
+    def test_everybody_may_ask_for_zero_force(self):
+        self.serve()
+        eye, hand = self.client(role="watch"), self.client()
+        hand.subscribe(1000, ("force", "faults"))
+        self.touch(hand)
+        time.sleep(0.1)
+        eye.emergency()
+        off = hand.wait_for("forces_off", PATIENCE)
+        self.assertIn("emergency", off["reason"])
+        time.sleep(0.3)
+        got = hand.samples()
+        after = got["t_ns"] >= off["t_ns"]
+        self.assertTrue(after.any())
+        self.assertFalse(got["force"][after].any())
+        self.assertTrue(got["force"][~after].any())
+        hand.stop()
+        self.refused("forces-off", hand.start)
+        self.refused("not-controller", eye.clear)
+        hand.clear()
+        hand.start()
+        eye.events()
+        # Who goes without a word takes the forces along.
+        hand._link.socket.shutdown(socket.SHUT_RDWR)
+        self.assertEqual(eye.wait_for("stopped", PATIENCE)["reason"], "the controller has left")
+        other = self.client()
+        with contextlib.suppress(ServeError):  # it was not felt any more, or forces are off
+            other.stop()
+        other.clear()
+        other.start()
+        other.stop()
+
+    def test_clocks(self):
+        self.serve()
+        with self.client() as hand:
+            clock = hand.clock(30)
+            self.assertLess(abs(clock.offset_ns), clock.round_trip_ns / 2 + 1)  # both are CLOCK_MONOTONIC
+            self.assertEqual(hand.ask("clock", t_client=0.25)["t_client"], 0.25)
+
+    def test_a_watcher_that_does_not_read_loses_its_rows_alone(self):
+        self.serve(rate=1000)
+        hand = self.client()
+        deaf = self.lines()
+        deaf.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        self.assertTrue(self.hello(deaf, role="watch")["ok"])
+        deaf.send(json.dumps({"id": 1, "type": "subscribe", "rate_hz": 1000, "fields": ["tip", "tail", "force", "rendered"]}))
+        hand.subscribe(1000, ("force",))
+        hand.start()
+        time.sleep(3)
+        hand.stop()
+        time.sleep(0.1)
+        self.assertEqual(hand.dropped, 0)
+        self.assertGreater(len(hand.samples()["tick"]), 100)
+        dropped = 0
+        deaf.socket.settimeout(0.5)
+        with contextlib.suppress(OSError):
+            while True:
+                dropped += json.loads(deaf.receive()).get("dropped", 0)
+        self.assertGreater(dropped, 0)
+
+    def test_wrong_use(self):
+        process = self.serve()
+        port = self.said["url"].rsplit(":", 1)[1]
+        run = [PALPATE, "serve", "--device", "simulated"]
+        for options, said in ((["--port", port], "another server may run"), (["--socket", self.path], "a server is there")):
+            done = subprocess.run([*run, *options], capture_output=True, text=True, timeout=PATIENCE)
+            self.assertEqual((done.returncode, done.stdout), (1, ""))
+            self.assertIn(said, done.stderr)
+        self.scene.write_text(json.dumps({"objects": [{**BALL["objects"][0], "stiffness_n_per_m": 90000}]}))
+        for options, said in ((["--scene", self.scene], "/objects/0: "), (["--port", "70000"], "65535"),
+                              (["--scene", self.dir / "none"], "none")):
+            done = subprocess.run([*run, *options], capture_output=True, text=True, timeout=PATIENCE)
+            self.assertEqual((done.returncode, done.stdout), (2, ""), done.stderr)
+            self.assertIn(said, done.stderr)
+        self.assertTrue(self.path.exists())
+        process.kill()
+        process.wait(PATIENCE)
+        self.scene.write_text(json.dumps(BALL))
+        again = self.serve()  # beside the socket that was left
+        with self.client() as hand:
+            hand.start()
+            again.send_signal(signal.SIGTERM)
+            self.assertEqual(again.wait(PATIENCE), 0)
+
+
+if __name__ == "__main__":
+    unittest.main(argv=sys.argv[:1] + sys.argv[4:])
