@@ -1,9 +1,11 @@
 #include "runner/commands/sweep/analyze.h"
 
+#include <algorithm>
 #include <cmath>
 #include <iostream>
 #include <stdexcept>
 #include <string>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -13,6 +15,7 @@
 #include "analysis/input/study_record.h"
 #include "analysis/input/task_trials.h"
 #include "analysis/input/trials.h"
+#include "analysis/report/movement_report.h"
 #include "analysis/report/report_html.h"
 #include "analysis/report/report_json.h"
 #include "analysis/report/report_text.h"
@@ -20,6 +23,7 @@
 #include "analysis/statistics/analysis.h"
 #include "analysis/statistics/task_analysis.h"
 #include "data/store/store.h"
+#include "runner/commands/movement/movement_study.h"
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/outputs.h"
 #include "runner/commands/shared/study_trials.h"
@@ -130,6 +134,44 @@ bool is_of_tasks(const std::string& database, const std::string& csv) {
   }
 }
 
+/// What belongs to --movement alone, and what does not go with it.
+void check_movement(const boost::program_options::variables_map& values, double cutoff, int jobs) {
+  if (!values.count("movement")) {
+    for (const char* option : {"movement-csv", "meshes"}) {
+      if (values.count(option)) throw UsageError("--" + std::string(option) + ": give --movement");
+    }
+    if (!values["cutoff-hz"].defaulted() || !values["jobs"].defaulted())
+      throw UsageError("--cutoff-hz, --jobs: are for --movement");
+    return;
+  }
+  if (!values.count("db"))
+    throw UsageError("--movement: needs the samples of a database; give --db FILE");
+  for (const char* option : {"report", "figures", "protocol", "scale"}) {
+    if (values.count(option))
+      throw UsageError("--" + std::string(option) + ": does not go with --movement");
+  }
+  if (!values["function"].defaulted() || !values["too-fast-s"].defaulted())
+    throw UsageError("--function, --too-fast-s: do not go with --movement");
+  if (!(cutoff > 0) || !std::isfinite(cutoff))
+    throw UsageError("--cutoff-hz: expected a frequency in Hz above 0");
+  if (jobs < 1 || jobs > 1024) throw UsageError("--jobs: must be 1 to 1024");
+}
+
+void analyze_movement_of(const MovementRequest& request, Outputs& outputs) {
+  MovementStudy study = measure_study(request);
+  if (study.table.missing.contains("no samples") &&
+      study.table.missing["no samples"] == study.table.values.size()) {
+    throw UsageError(stimuli::printable(request.database) +
+                     ": has no servo samples; a protocol with \"samples\": true keeps them");
+  }
+  if (outputs.wanted("movement-csv")) outputs.put("movement-csv", study.csv);
+  const analysis::MovementAnalysis found =
+      analysis::analyze_movement(std::move(study.table), PALPATE_VERSION);
+  if (outputs.wanted("json")) outputs.put("json", analysis::movement_json(found));
+  outputs.write();
+  std::cout << analysis::movement_text(found);
+}
+
 }  // namespace
 
 int analyze_command(const std::vector<std::string>& args) {
@@ -137,7 +179,9 @@ int analyze_command(const std::vector<std::string>& args) {
   line.usage =
       "palpate analyze (--db FILE | --csv FILE | --sweep FILE [--pattern EXPR]) [--protocol NAME]\n"
       "       [--function logistic|normal|weibull] [--scale linear|log]\n"
-      "       [--json FILE] [--report FILE.html] [--figures DIR] [--force]";
+      "       [--json FILE] [--report FILE.html] [--figures DIR] [--force]\n"
+      "palpate analyze --db FILE --movement [--movement-csv FILE] [--cutoff-hz F] [--jobs J]\n"
+      "       [--meshes DIR] [--json FILE] [--force]";
   line.summary =
       "Compares response times with the ray and the point renderer: percent reduction for each\n"
       "shape with intervals and tests, accuracy, learning and exclusions. In data with other\n"
@@ -146,13 +190,16 @@ int analyze_command(const std::vector<std::string>& args) {
       "Of a sweep: in what share of the settings a pattern holds, how the gains are spread, and\n"
       "what they depend on (Sobol indices of a saltelli design, rank correlations of others).\n"
       "Of protocols of version 2 (databases, exports with a column 'task'): thresholds, PSE and\n"
-      "JND, d', magnitude estimation, adjustment, information and confidence, by task.";
+      "JND, d', magnitude estimation, adjustment, information and confidence, by task.\n"
+      "With --movement: what the hand did (path, speed, smoothness, contact, force, strokes,\n"
+      "procedures, coverage), from the servo samples of a database.";
   line.example =
       "  palpate analyze --db study.db\n"
       "  palpate analyze --csv trials.csv --json analysis.json --report report.html\n"
       "      (data of others: participant_id, session, block, trial, renderer, shape, response,\n"
       "      correct and response_time suffice)\n"
       "  palpate analyze --db thresholds.db --function weibull\n"
+      "  palpate analyze --db study.db --movement --movement-csv movement.csv\n"
       "  palpate analyze --sweep people.sweep --report people.html\n"
       "  palpate analyze --sweep people.sweep --pattern 'cone > 5 && cone > 2 * abs(sphere)'\n"
       "      (names: shapes, for their gains in percent, and columns of the CSV, such as delay or\n"
@@ -179,17 +226,36 @@ int analyze_command(const std::vector<std::string>& args) {
       "psychometric function of tasks: logistic, normal or weibull");
   add("scale", po::value(&scale)->value_name("NAME"),
       "of the levels of psychometric functions: linear or log; default: the procedure's");
+  MovementRequest movement;
+  movement.jobs = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+  std::string movement_csv;
+  add("movement", "measure what the hand did, in place of the times");
+  add("movement-csv", po::value(&movement_csv)->value_name("FILE"),
+      "with --movement: write every measure, a row a trial");
+  add("cutoff-hz", po::value(&movement.settings.cutoff)->default_value(20, "20")->value_name("F"),
+      "with --movement: low pass of the path");
+  add("jobs", po::value(&movement.jobs)->default_value(movement.jobs)->value_name("J"),
+      "with --movement: threads");
+  add("meshes", po::value(&movement.mesh_folder)->value_name("DIR"),
+      "with --movement: where the protocol's mesh files are, for a database of before they were "
+      "kept in it; default: the working directory");
   const auto values = line.parse(args);
   if (!values) return 0;
   check(*values, settings, line.usage);
+  check_movement(*values, movement.settings.cutoff, movement.jobs);
   const analysis::FunctionSettings functions = function_settings(*values, function, scale);
-  Outputs outputs(*values, {"json", "report"}, {"db", "csv", "sweep"}, "figures");
+  Outputs outputs(*values, {"json", "report", "movement-csv"}, {"db", "csv", "sweep"}, "figures");
   if (values->count("sweep")) {
     if (!(*values)["function"].defaulted() || values->count("scale"))
       throw UsageError("--function, --scale: a sweep's points have their figures already");
     const std::string text = analyze_sweep_file(sweep, pattern, outputs);
     outputs.write();
     std::cout << text;
+    return 0;
+  }
+  if (values->count("movement")) {
+    movement.database = database;
+    analyze_movement_of(movement, outputs);
     return 0;
   }
   if (is_of_tasks(database, csv) || !protocol.empty()) {

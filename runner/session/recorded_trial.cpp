@@ -124,6 +124,13 @@ bool limit_as_recorded(protocols::Protocol& protocol, data::Store& store,
 
 }  // namespace
 
+protocols::Protocol protocol_as_shown(data::Store& store, const data::StoredTrial& trial,
+                                      const std::string& mesh_folder, bool& limited) {
+  protocols::Protocol protocol = stored_protocol(store, trial, mesh_folder);
+  limited = limit_as_recorded(protocol, store, trial);
+  return protocol;
+}
+
 std::string to_string(const data::TrialName& name) {
   return name.code + "/" + std::to_string(name.session) + "/" + std::to_string(name.trial);
 }

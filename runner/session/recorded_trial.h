@@ -23,6 +23,12 @@ struct RecordedTrial {
 RecordedTrial load_recorded_trial(data::Store& store, const data::TrialName& name,
                                   const std::string& protocol, const std::string& mesh_folder);
 
+/// The protocol that a trial was shown with, its materials limited as its device showed them.
+/// \param limited  set where some were
+/// \throws StoreRefused, InputError, MeshError: the stored protocol cannot be read
+protocols::Protocol protocol_as_shown(data::Store& store, const data::StoredTrial& trial,
+                                      const std::string& mesh_folder, bool& limited);
+
 /// "P03/1/12"
 std::string to_string(const data::TrialName& name);
 

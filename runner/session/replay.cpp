@@ -117,11 +117,13 @@ std::vector<std::optional<stimuli::ObjectSpec>> shown_objects(const protocols::P
   return shown;
 }
 
-void replay(const protocols::Protocol& protocol, const data::TrialRecord& recorded, bool other,
-            const std::function<void(std::size_t, const data::SampleRecord&,
-                                     const ReplayedSample&)>& visit) {
+namespace {
+
+void replay_shown(const protocols::Protocol& protocol, const data::TrialRecord& recorded,
+                  const std::vector<ShownInterval>& shown,
+                  const std::function<void(std::size_t, const data::SampleRecord&,
+                                           const ReplayedSample&)>& visit) {
   const auto intervals = samples_of_intervals(recorded);
-  const std::vector<ShownInterval> shown = scenes_of(protocol, recorded, other);
   // One whose time was over before it began has none.
   const std::size_t least = shown.size() - (recorded.task && recorded.timed_out ? 1 : 0);
   if (intervals.size() > shown.size() || intervals.size() < least)
@@ -148,6 +150,23 @@ void replay(const protocols::Protocol& protocol, const data::TrialRecord& record
     }
     servo.stop();
   }
+}
+
+}  // namespace
+
+void replay(const protocols::Protocol& protocol, const data::TrialRecord& recorded, bool other,
+            const std::function<void(std::size_t, const data::SampleRecord&,
+                                     const ReplayedSample&)>& visit) {
+  replay_shown(protocol, recorded, scenes_of(protocol, recorded, other), visit);
+}
+
+void replay(const protocols::Protocol& protocol, const StimulusLibrary& library,
+            const data::TrialRecord& recorded,
+            const std::function<void(std::size_t, const data::SampleRecord&,
+                                     const ReplayedSample&)>& visit) {
+  protocols::Trial trial = trial_of(protocol, recorded);
+  trial.renderer = kind_of(recorded.renderer, false);
+  replay_shown(protocol, recorded, {{trial.renderer, library.scene(trial)}}, visit);
 }
 
 bool equals_record(const data::TrialRecord& recorded, const data::SampleRecord& tick,

@@ -14,6 +14,8 @@
 
 namespace palpate::runner {
 
+class StimulusLibrary;
+
 /// The samples of each interval of a trial, in order: what was recorded begins with tick 0 in each.
 /// A trial of version 1 has one.
 std::vector<std::span<const data::SampleRecord>> samples_of_intervals(
@@ -37,6 +39,13 @@ struct ReplayedSample : Sample {
 /// \param visit     number of the interval from 0, each recorded tick and what comes of it now
 /// \throws std::invalid_argument where protocol and record do not agree
 void replay(const protocols::Protocol& protocol, const data::TrialRecord& recorded, bool other,
+            const std::function<void(std::size_t, const data::SampleRecord&,
+                                     const ReplayedSample&)>& visit);
+
+/// A trial of version 1 by its own renderer, as above, with stimuli that were built once for many.
+/// \param library  of the protocol
+void replay(const protocols::Protocol& protocol, const StimulusLibrary& library,
+            const data::TrialRecord& recorded,
             const std::function<void(std::size_t, const data::SampleRecord&,
                                      const ReplayedSample&)>& visit);
 
