@@ -37,7 +37,8 @@ MAY_INCLUDE = {
     "analysis/statistics": {"analysis", "analysis/input", "stimuli", "protocols/procedures"},
     "analysis/movement": {"analysis", "analysis/input", "analysis/statistics", "stimuli"},
     "analysis/figures": {"analysis", "analysis/input", "analysis/statistics", "stimuli", "protocols/procedures"},
-    "analysis/report": {"analysis", "analysis/input", "analysis/statistics", "analysis/figures", "protocols", "protocols/procedures"},
+    "analysis/report": {"analysis", "analysis/input", "analysis/statistics", "analysis/movement", "analysis/figures", "protocols",
+                        "protocols/procedures"},
     "runner": BODIES | {"protocols", "rendering/bodies/soft"},
     "runner/servo": RENDERING | {"runner", "rendering/bodies/soft"},
     "runner/safety": SERVO,
@@ -96,13 +97,14 @@ PUBLIC = {
     "data/files": "atomic_file atomic_folder checksum file_identity file_permissions formula_guard output_check "
                   "temporary_names text_sink trusted_links utc",
     "data/store": "export_log protocol_rows schema sqlite_errors statement_values station_database store sweep_file tombstones torque_notes",
-    "data/export": "bids csv psychds settings study_about sweep_csv trial_table",
+    "data/export": "bids csv psychds sample_slots settings study_about sweep_csv trial_table",
     "data/merge": "merge sweep_merge",
     "analysis": "text",
     "analysis/input": "csv_reader renderers study_record sweep_table task_trials trials",
-    "analysis/statistics": "analysis conclusions describe interval_coverage model_study paired paper_effects pattern pilot plan power quantiles sensitivity sweep_analysis task_analysis threshold_plan",
+    "analysis/statistics": "analysis comparison conclusions describe interval_coverage mixed_model model_study paired paper_effects pattern pilot plan power quantiles sensitivity sweep_analysis task_analysis threshold_plan",
+    "analysis/movement": "adjusted_gain comparison measures",
     "analysis/figures": "axes figure_svg figures marks palette sweep_figures task_figures",
-    "analysis/report": "html_elements html_page hypotheses plan_report report_html report_json report_text sweep_report tables task_report",
+    "analysis/report": "html_elements html_page hypotheses movement_report plan_report report_html report_json report_text sweep_report tables task_report",
     "runner": "",
     "runner/servo": "device device_config force_limiter passivity realtime ring sample servo servo_fault servo_thread shared_value "
                     "tick_clock tick_source touched_places triple_buffer",
@@ -113,7 +115,7 @@ PUBLIC = {
     "runner/display": "display explore_window mailbox text_display timeline touch_source window",
     "runner/display/scene": "camera display_error drawn_mesh image_file painter scene_drawing scene_renderer",
     "runner/participants": "keyboard respondent response_box settings_document simulated simulated_settings task_participant",
-    "runner/session": "clock_check device_check live_forces live_session markers near_codes preflight_dialogue protocol_info recorded_trial "
+    "runner/session": "clock_check contact_log device_check live_forces live_session markers near_codes preflight_dialogue protocol_info recorded_trial "
                       "replay replay_comparison sample_stream session_plan simulated_session simulated_study socket_advisor station",
     "runner/serve": "network served_scene",
     "runner/sweep": "design swept_study",

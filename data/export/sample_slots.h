@@ -1,5 +1,5 @@
 #pragma once
-// Internal to data/export: the servo period of every sample, counted from the onset of its trial.
+// The servo period of every sample, counted from the onset of its trial.
 
 #include <cstdint>
 

@@ -129,6 +129,19 @@ class Reference(unittest.TestCase):
         of_tools = {"segment", "ideal_side_x", "ideal_side_y", "ideal_side_z"}
         self.assertEqual([column for column in told if column not in of_tools], headers["plain"])
 
+    def test_columns_of_movement(self):
+        with tempfile.TemporaryDirectory() as folder:
+            folder = pathlib.Path(folder)
+            protocol = {"version": 1, "name": "one", "renderers": ["point"], "repetitions": 1, "samples": True,
+                        "stimuli": [{"name": "ball", "shape": "sphere", "radius_m": 0.03}],
+                        "response": {"keys": {"1": "ball"}, "time_out_s": 5}}
+            (folder / "one.json").write_text(json.dumps(protocol))
+            output_of("simulate", "one.json", "--db", "one.db", "--participants", 1, folder=folder)
+            output_of("analyze", "--db", "one.db", "--movement", "--movement-csv", "m.csv", folder=folder)
+            header = (folder / "m.csv").read_text().split("\n")[0].split(",")
+        section = PAGES["analysis/README.md"].section("Reference: columns of movement.csv")
+        self.assertEqual([column for row in cells(section) for column in codes(row[0])], header)
+
     def test_fields_of_analysis_json_and_figures(self):
         with tempfile.TemporaryDirectory() as folder:
             folder = pathlib.Path(folder)

@@ -19,7 +19,7 @@
 namespace palpate::runner {
 namespace {
 
-struct Waiting {
+struct WaitingTrial {
   std::shared_ptr<const TouchedStimuli> stimuli;
   data::StoredTrial trial;
   MeasuredTrial measured;
@@ -27,9 +27,10 @@ struct Waiting {
 
 /// The stimuli of each trial; those of a protocol are built once, or once for each run whose device
 /// limited them.
-class Stimuli {
+class StudyStimuli {
  public:
-  Stimuli(data::Store& store, std::string folder) : store_(store), folder_(std::move(folder)) {}
+  StudyStimuli(data::Store& store, std::string folder)
+      : store_(store), folder_(std::move(folder)) {}
 
   std::shared_ptr<const TouchedStimuli> of(const data::StoredTrial& trial) {
     const std::string& sha = trial.protocol_sha256;
@@ -56,7 +57,7 @@ class Stimuli {
       by_run_;
 };
 
-void measure_all(std::vector<Waiting>& waiting, const MovementRequest& request) {
+void measure_all(std::vector<WaitingTrial>& waiting, const MovementRequest& request) {
   std::atomic<std::size_t> next{0};
   std::exception_ptr failed;
   std::atomic<bool> has_failed{false};
@@ -64,7 +65,7 @@ void measure_all(std::vector<Waiting>& waiting, const MovementRequest& request) 
     try {
       for (std::size_t i = next++; i < waiting.size() && !has_failed; i = next++)
         waiting[i].measured =
-            measure_trial(*waiting[i].stimuli, waiting[i].trial.record, request.settings);
+            measure_trial(*waiting[i].stimuli, waiting[i].trial, request.settings);
     } catch (...) {
       if (!has_failed.exchange(true)) failed = std::current_exception();
     }
@@ -86,7 +87,15 @@ std::vector<std::string> columns() {
   return names;
 }
 
-void put_row(CsvText& csv, const Waiting& one, const analysis::MovementSettings& settings) {
+/// As RFC 4180 has it: in quotes where there is a comma.
+std::string csv_field(const std::string& text) {
+  if (text.find_first_of(",\"\n") == std::string::npos) return text;
+  std::string quoted = "\"";
+  for (const char letter : text) quoted += letter == '"' ? "\"\"" : std::string(1, letter);
+  return quoted + "\"";
+}
+
+void put_row(CsvText& csv, const WaitingTrial& one, const analysis::MovementSettings& settings) {
   const data::TrialRecord& record = one.trial.record;
   csv << one.trial.participant.code << record.session << record.block << record.trial
       << record.renderer << record.shape << record.correct << one.trial.participant.simulated
@@ -97,7 +106,7 @@ void put_row(CsvText& csv, const Waiting& one, const analysis::MovementSettings&
     else
       csv << "";
   }
-  csv << one.measured.missing;
+  csv << csv_field(one.measured.missing);
   csv.end_row();
 }
 
@@ -109,13 +118,13 @@ MovementStudy measure_study(const MovementRequest& request) {
   study.table.settings = request.settings;
   CsvText csv(columns(), "\n");
   data::Store store = data::Store::open(request.database, data::Store::Mode::read_only);
-  Stimuli stimuli(store, request.mesh_folder);
+  StudyStimuli stimuli(store, request.mesh_folder);
   ProgressLine progress("movement");
-  std::vector<Waiting> waiting;
+  std::vector<WaitingTrial> waiting;
   std::size_t ticks = 0;
   const auto measure_waiting = [&] {
     measure_all(waiting, request);
-    for (const Waiting& one : waiting) {
+    for (const WaitingTrial& one : waiting) {
       put_row(csv, one, request.settings);
       study.table.values.push_back(one.measured.values);
       if (!one.measured.missing.empty()) ++study.table.missing[one.measured.missing];

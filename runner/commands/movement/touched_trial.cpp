@@ -1,11 +1,14 @@
 #include "runner/commands/movement/touched_trial.h"
 
 #include <algorithm>
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <limits>
 #include <stdexcept>
+#include <string>
 #include <utility>
 
+#include "data/export/sample_slots.h"
 #include "runner/session/contact_log.h"
 #include "runner/session/replay.h"
 
@@ -13,6 +16,8 @@ namespace palpate::runner {
 namespace {
 
 using analysis::SurfaceTriangle;
+
+constexpr std::int64_t kLongestGap = 5;  // ticks that are interpolated
 
 void add_part(const rendering::ScenePart& part, std::vector<SurfaceTriangle>& triangles) {
   const stimuli::ConvexMesh& mesh = *part.mesh;
@@ -99,55 +104,106 @@ int TouchedStimuli::stimulus(const std::string& name) const {
   return found == all.end() ? -1 : static_cast<int>(found - all.begin());
 }
 
-MeasuredTrial measure_trial(const TouchedStimuli& stimuli, const data::TrialRecord& record,
+namespace {
+
+/// A tick in the object's frame.
+struct TouchedTick {
+  Vec3 tip;
+  bool contact = false, on_edge = false;
+  Vec3 point, normal, force;  ///< of the deepest contact
+};
+
+void put(analysis::MovementTrial& trial, const TouchedTick& tick, bool has_edges) {
+  trial.tip.push_back(tick.tip);
+  trial.contact.push_back(tick.contact);
+  trial.point.push_back(tick.point);
+  trial.normal.push_back(tick.normal);
+  trial.force.push_back(tick.force);
+  if (has_edges) trial.on_edge.push_back(tick.on_edge);
+}
+
+/// A missed tick: on the line between its neighbours; in contact where both are.
+TouchedTick between(const TouchedTick& before, const TouchedTick& after, double share) {
+  TouchedTick tick;
+  tick.tip = glm::mix(before.tip, after.tip, share);
+  tick.contact = before.contact && after.contact;
+  if (!tick.contact) return tick;
+  const Vec3 normal = glm::mix(before.normal, after.normal, share);
+  const double length = glm::length(normal);
+  tick.normal = length > 0 ? normal / length : before.normal;
+  tick.point = glm::mix(before.point, after.point, share);
+  tick.force = glm::mix(before.force, after.force, share);
+  tick.on_edge = before.on_edge && after.on_edge;
+  return tick;
+}
+
+}  // namespace
+
+MeasuredTrial measure_trial(const TouchedStimuli& stimuli, const data::StoredTrial& stored,
                             const analysis::MovementSettings& settings) {
+  const data::TrialRecord& record = stored.record;
   MeasuredTrial result;
   result.ticks = record.samples.size();
   const int stimulus = stimuli.stimulus(record.shape);
   if (record.samples.empty()) result.missing = "no samples";
   if (record.task) result.missing = "a trial of several intervals";
   if (stimulus < 0) result.missing = "the protocol has no such stimulus";
-  for (std::size_t i = 1; i < record.samples.size() && result.missing.empty(); ++i) {
-    if (record.samples[i].tick != record.samples[i - 1].tick + 1)
-      result.missing = "ticks without a sample";
-  }
   if (!result.missing.empty()) return result;
 
   const SharpEdges& edges = stimuli.library().edges(stimulus);
   const bool soft = stimuli.library().soft(static_cast<std::size_t>(stimulus)) != nullptr;
+  const bool has_edges = !edges.too_many() && !soft;
   const auto& q = record.orientation_wxyz;
   const Quat to_object = glm::conjugate(Quat(q[0], q[1], q[2], q[3]));
   analysis::MovementTrial trial;
   trial.rate = stimuli.protocol().servo_rate;
   bool equal = true;
+  std::int64_t longest_gap = 0;
   try {
+    data::SampleSlots slots(stored, trial.rate);
+    std::int64_t last_slot = 0;
+    TouchedTick last;
     replay(stimuli.protocol(), stimuli.library(), record,
-           [&](std::size_t, const data::SampleRecord& tick, const ReplayedSample& again) {
-             equal &= equals_record(record, tick, again);
+           [&](std::size_t, const data::SampleRecord& recorded, const ReplayedSample& again) {
+             equal &= equals_record(record, recorded, again);
              const rendering::Rendering& shown = again.rendering;
-             const bool contact = shown.contacts > 0;
              Quat turn = to_object;
              Vec3 moved(0);
              if (again.body) {
                turn = to_object * glm::conjugate(again.body->moved.orientation);
                moved = again.body->moved.position;
              }
-             trial.tip.push_back(turn * (Vec3(tick.tip[0], tick.tip[1], tick.tip[2]) - moved));
-             trial.contact.push_back(contact);
-             trial.point.push_back(turn * (shown.deepest.point - moved));
-             trial.normal.push_back(turn * shown.deepest.normal);
-             trial.force.push_back(turn * shown.force);
-             if (!edges.too_many() && !soft) {
-               trial.on_edge.push_back(contact &&
-                                       edges.distance(trial.point.back()) <= ContactLog::kReach);
+             TouchedTick tick;
+             tick.contact = shown.contacts > 0;
+             tick.tip = turn * (Vec3(recorded.tip[0], recorded.tip[1], recorded.tip[2]) - moved);
+             tick.point = turn * (shown.deepest.point - moved);
+             tick.normal = turn * shown.deepest.normal;
+             tick.force = turn * shown.force;
+             tick.on_edge =
+                 has_edges && tick.contact && edges.distance(tick.point) <= ContactLog::kReach;
+             const std::int64_t slot = slots.next();
+             const std::int64_t gap = trial.tip.empty() ? 0 : slot - last_slot - 1;
+             longest_gap = std::max(longest_gap, gap);
+             for (std::int64_t k = 1; k <= gap && longest_gap <= kLongestGap; ++k) {
+               const double share = static_cast<double>(k) / static_cast<double>(gap + 1);
+               put(trial, between(last, tick, share), has_edges);
              }
+             put(trial, tick, has_edges);
+             last_slot = slot;
+             last = tick;
            });
+  } catch (const data::StoreRefused&) {
+    result.missing = "ticks are out of order or times cannot be";
   } catch (const std::invalid_argument& error) {
     result.missing = error.what();
-    return result;
   }
+  if (!result.missing.empty()) return result;
   if (!equal) {
     result.missing = "rendering it again gives other forces than were recorded";
+    return result;
+  }
+  if (longest_gap > kLongestGap) {
+    result.missing = "more than " + std::to_string(kLongestGap) + " ticks in a row were missed";
     return result;
   }
   result.values = analysis::measure(trial, stimuli.surface(stimulus), settings);

@@ -40,8 +40,9 @@ struct MeasuredTrial {
   analysis::MeasureValues values{};
 };
 
-/// Renders the trial again, which must give the recorded forces to the bit, and measures it.
-MeasuredTrial measure_trial(const TouchedStimuli& stimuli, const data::TrialRecord& record,
+/// Renders the trial again, which must give the recorded forces to the bit, and measures it. Up to
+/// 5 ticks in a row that were missed are interpolated.
+MeasuredTrial measure_trial(const TouchedStimuli& stimuli, const data::StoredTrial& stored,
                             const analysis::MovementSettings& settings);
 
 }  // namespace palpate::runner

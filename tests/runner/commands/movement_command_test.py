@@ -1,0 +1,272 @@
+"""palpate analyze --movement from outside, against measures computed from their definitions, slowly and apart from the
+program: a zero-phase low pass by its gain in the Fourier domain, peaks by their prominences, coverage by other places.
+Usage: movement_command_test.py PALPATE"""
+
+import csv
+import json
+import math
+import sys
+import unittest
+
+try:
+    import numpy as np
+except ImportError:
+    sys.exit(77)
+
+from command_case import CommandCase
+
+sys.dont_write_bytecode = True
+EDGE, RATE, CUTOFF = 0.05, 1000.0, 20.0
+
+
+def protocol(**wanted):
+    return {"version": 1, "name": "short", "renderers": ["point", "ray"], "samples": True,
+            "stimuli": [{"name": "sphere", "shape": "sphere", "radius_m": 0.03, "subdivisions": 2},
+                        {"name": "cube", "shape": "cube", "edge_m": EDGE}],
+            "repetitions": 1, "material": {"stiffness_n_per_m": 800},
+            "response": {"keys": {"1": "sphere", "2": "cube"}, "time_out_s": 20}, "seed": 7} | wanted
+
+
+def low_pass(values, cutoff):
+    """Butterworth of order 2, forwards and backwards: gain 1 / (1 + (f / fc)^4), frequencies warped as digital filters
+    do. The line from the first to the last value passes as it is; the rest is continued by point reflection."""
+    n = len(values)
+    line = values[0] + (values[-1] - values[0]) * np.arange(n)[:, None] / (n - 1)
+    rest = values - line
+    spectrum = np.fft.rfft(np.concatenate([rest, -rest[-2:0:-1]]), axis=0)
+    f = np.arange(len(spectrum)) / (2 * (n - 1))
+    gain = 1 / (1 + (np.tan(np.pi * np.minimum(f, 0.4999999)) / np.tan(np.pi * cutoff / 0.802 / RATE)) ** 4)
+    return line + np.fft.irfft(spectrum * gain[:, None], 2 * (n - 1), axis=0)[:n]
+
+
+def norm(vectors):
+    return np.sqrt((vectors ** 2).sum(axis=1))
+
+
+def runs(wanted):
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], np.asarray(wanted, int), [0]])))
+    return list(zip(edges[::2], edges[1::2]))
+
+
+def prominent(v, least):
+    count = 0
+    for i in range(1, len(v) - 1):
+        if not v[i - 1] < v[i] >= v[i + 1]:
+            continue
+        higher = np.flatnonzero(v[:i] > v[i])
+        left = v[higher[-1] if len(higher) else 0:i].min()
+        higher = np.flatnonzero(v[i + 1:] > v[i])
+        right = v[i + 1:i + 2 + higher[0] if len(higher) else len(v)].min()
+        count += v[i] - max(left, right) >= least
+    return count
+
+
+def sparc(v):
+    padded = 2 ** (math.ceil(math.log2(len(v))) + 4)
+    spectrum = np.abs(np.fft.rfft(v, padded))
+    spectrum /= spectrum.max()
+    f = np.arange(len(spectrum)) * RATE / padded
+    last = np.flatnonzero((f <= 10) & (spectrum >= 0.05))[-1]
+    return -np.sqrt((np.diff(f[:last + 1]) / f[last]) ** 2 + np.diff(spectrum[:last + 1]) ** 2).sum()
+
+
+def jerk(x):
+    third = np.diff(x, 3, axis=0) * RATE ** 3
+    v = norm(np.gradient(x, 1 / RATE, axis=0))
+    return -math.log((len(x) / RATE) ** 3 / v.max() ** 2 * (third ** 2).sum() / RATE)
+
+
+def of_motion(tip, contact):
+    x = low_pass(tip, CUTOFF)
+    velocity = np.gradient(x, 1 / RATE, axis=0)
+    v, steps = norm(velocity), norm(np.diff(x, axis=0))
+    moves = [(a, b) for a, b in runs(v >= 0.05 * v.max()) if b - a >= 100]
+    ways = [steps[a:b - 1].sum() for a, b in moves]
+    joined = [list(one) for one in runs(contact)[:1]]
+    for a, b in runs(contact)[1:]:
+        if a - joined[-1][1] < 50:
+            joined[-1][1] = b
+        else:
+            joined.append([a, b])
+    episodes = [b - a for a, b in joined if b - a >= 20]
+    stops = [(a, b) for a, b in runs(contact & (v < 0.005)) if b - a >= 50]
+    moving = contact.copy()
+    for a, b in stops:
+        moving[a:b] = False
+    strokes = 0
+    for a, b in runs(moving):
+        if b - a >= 50:
+            turns = [(x[i] - x[i - 50]) @ (x[i + 50] - x[i]) < 0 for i in range(a + 50, b - 50)]
+            strokes += 1 + len(runs(turns))
+    found = {"path_length": steps.sum(), "contact_path": steps[contact[1:] & contact[:-1]].sum(),
+             "contact_share": contact.mean(), "approaches": len(episodes), "speed_mean": v.mean(),
+             "speed_p95": np.quantile(v, 0.95), "sparc": sparc(v), "movements": len(moves),
+             "speed_peaks_per_m": prominent(v, max(0.05 * v.max(), 0.005)) / steps.sum(),
+             "sparc_movement": np.average([sparc(v[a:b]) for a, b in moves], weights=ways),
+             "ldlj": np.average([jerk(x[a:b]) for a, b in moves], weights=ways),
+             "stops": len(stops), "strokes": strokes, "duration": len(x) / RATE}
+    if episodes:
+        found["episode_time"] = np.mean(episodes) / RATE
+    if stops:
+        found["stop_time"] = np.mean([b - a for a, b in stops]) / RATE
+    return found, velocity, joined
+
+
+def of_touch(trial, tip, velocity, force, depth, contact, episodes):
+    """Of a point on a frictionless cube: the force is along the normal, the contact by the depth along it."""
+    q = [float(trial["orientation_" + k]) for k in "wxyz"]
+    w, u = q[0], np.array(q[1:])
+
+    def to_object(vectors):
+        return vectors - 2 * w * np.cross(u, vectors) + 2 * np.cross(u, np.cross(u, vectors))
+
+    size = norm(force)
+    normal = force / np.where(size > 0, size, 1)[:, None]
+    along = norm(velocity - (velocity * normal).sum(axis=1)[:, None] * normal)
+    points = to_object(tip + depth[:, None] * normal)
+    # On a face; the edge nearest to it is the nearer of the faces' other two coordinates.
+    away = np.sort(np.abs(np.abs(points) - EDGE / 2), axis=1)
+    on_edge = contact & (norm(away[:, :2]) <= 0.003)
+    inner = np.zeros(len(size), bool)
+    for a, b in runs(contact):
+        inner[a + 1:b - 1] = True
+    change = np.gradient(size) * RATE
+    kinds = []
+    for a, b in runs(contact):
+        for i in range(a, b - 99, 100):
+            part = slice(i, i + 100)
+            if along[part].mean() >= 0.01:
+                kinds.append("contour" if on_edge[part].mean() >= 0.5 else "lateral")
+            else:
+                kinds.append("pressure" if np.ptp(size[part]) > 0.3 * size[part].mean() else "static")
+    found = {"force_mean": size[contact].mean(), "force_max": size[contact].max(),
+             "force_sd": size[contact].std(ddof=1), "force_mean_n": size[contact].mean(),
+             "speed_contact": along[contact].mean(), "edge_dwell": on_edge.sum() / RATE,
+             "press_peak": np.mean([size[a:b].max() for a, b in episodes if b - a >= 20]),
+             "force_rate": math.sqrt((change[inner] ** 2).mean())}
+    for kind in ("static", "pressure", "lateral", "contour"):
+        if kinds:
+            found["share_" + kind] = kinds.count(kind) / len(kinds)
+    draws = np.random.default_rng(5)
+    places = draws.uniform(-EDGE / 2, EDGE / 2, (10000, 3))
+    places[np.arange(10000), draws.integers(0, 3, 10000)] = draws.choice([-EDGE / 2, EDGE / 2], 10000)
+    covered = np.zeros(10000, bool)
+    for point in points[contact]:
+        covered |= ((places - point) ** 2).sum(axis=1) <= 0.005 ** 2
+    found["coverage"] = covered.mean()
+    return found
+
+
+class Movement(CommandCase):
+    def study(self, name="study", participants=2, **wanted):
+        path, db = self.file(f"{name}.json", protocol(**wanted)), self.dir / f"{name}.db"
+        self.palpate("simulate", path, "--db", db, "--participants", participants, "--seed", 3)
+        return db
+
+    def measured(self, db, *args):
+        out = self.dir / "movement.csv"
+        done = self.palpate("analyze", "--db", db, "--movement", "--movement-csv", out, "--force", *args)
+        with out.open() as file:
+            return done, list(csv.DictReader(file))
+
+    def test_measures_are_what_their_definitions_say(self):
+        db = self.study()
+        _, rows = self.measured(db)
+        self.palpate("export", "--db", db, "--format", "psych-ds", "--out", self.dir / "psych")
+        _, trials = self.exported(db)
+        samples = {}
+        for file in sorted((self.dir / "psych" / "data").glob("*/*haptic_data.csv")):
+            with file.open() as opened:
+                for one in csv.DictReader(opened):
+                    samples.setdefault((one["participant_id"], one["trial"]), []).append(one)
+        self.assertEqual(len(rows), 8)
+        touched = 0
+        for row, trial in zip(rows, trials, strict=True):
+            self.assertEqual((row["participant_id"], row["trial"]), (trial["participant_id"], trial["trial"]))
+            self.assertEqual((row["missing"], row["simulated"], row["cutoff_hz"]), ("", "1", "20"))
+            ticks = samples[row["participant_id"], row["trial"]]
+            self.assertEqual(int(row["samples"]), len(ticks))
+
+            def column(*names):
+                return np.array([[float(tick[name]) for name in names] for tick in ticks])
+            tip, force = column("tip_x", "tip_y", "tip_z"), column("force_x", "force_y", "force_z")
+            contact = column("contacts")[:, 0] > 0
+            expected, velocity, episodes = of_motion(tip, contact)
+            for name in ("contact_share", "edge_dwell"):
+                self.assertAlmostEqual(float(trial[name]), float(row[name]), delta=1e-12, msg=name)  # ticks x period
+            if trial["renderer"] == "point" and trial["shape"] == "cube" and contact.any():
+                touched += 1
+                expected |= of_touch(trial, tip, velocity, force, column("depth")[:, 0], contact, episodes)
+            for name, value in expected.items():
+                # 10,000 places drawn twice; times and path that begin and end between ticks; a window at a limit.
+                delta = (0.015 if name == "coverage" else 0.003 if name == "edge_dwell" else
+                         0.005 if name == "ldlj" else 1e-3 * abs(value) + 1e-9)
+                self.assertAlmostEqual(float(row[name]), value, delta=delta, msg=f"{name} of trial {row['trial']}")
+        self.assertGreaterEqual(touched, 1)
+
+    def test_a_number_is_the_same_with_one_thread_and_with_two(self):
+        db = self.study()
+        one, rows = self.measured(db, "--jobs", 1)
+        two, again = self.measured(db, "--jobs", 2)
+        self.assertEqual((one.stdout, rows), (two.stdout, again))
+        self.assertIn("SIMULATED", one.stdout)
+        self.assertLessEqual(max(map(len, one.stdout.splitlines())), 100)
+        _, smoother = self.measured(db, "--cutoff-hz", 5)
+        for row, smooth in zip(rows, smoother, strict=True):
+            self.assertLess(float(smooth["path_length"]), float(row["path_length"]))
+            self.assertEqual(smooth["coverage"], row["coverage"])
+
+    def test_one_renderer_has_means_and_nothing_to_compare(self):
+        db = self.study(renderers=["ray"])
+        out = self.dir / "movement.json"
+        done, rows = self.measured(db, "--json", out)
+        numbers = json.loads(out.read_text())
+        self.assertEqual(numbers["simulated"], True)
+        self.assertEqual(numbers["settings"]["cutoff_hz"], 20)
+        for name, measure in numbers["measures"].items():
+            self.assertEqual(list(measure["means"]), ["ray"], name)
+        path = [float(row["path_length"]) for row in rows if row["shape"] == "cube"]
+        mean = numbers["measures"]["path_length"]["means"]["ray"]["cube"]["mean"]
+        self.assertAlmostEqual(mean, math.exp(np.log(path).mean()), delta=1e-12)
+        self.assertIn("path_length", done.stdout)
+
+    def test_differences_are_the_paired_ones_of_the_table(self):
+        db = self.study(participants=3)
+        out = self.dir / "movement.json"
+        done, rows = self.measured(db, "--json", out)
+        numbers = json.loads(out.read_text())
+        (comparison,) = numbers["measures"]["speed_mean"]["comparisons"]
+        self.assertEqual((comparison["reference"], comparison["renderer"]), ("point", "ray"))
+        for shape in ("sphere", "cube"):
+            def logs(renderer):
+                return np.array([math.log(float(row["speed_mean"])) for row in rows
+                                 if (row["shape"], row["renderer"]) == (shape, renderer)])
+            difference = logs("ray") - logs("point")  # one trial each, participants in order
+            found = comparison["by_shape"][shape]
+            self.assertEqual(found["n_pairs"], 3)
+            self.assertAlmostEqual(found["mean_difference"], difference.mean(), delta=1e-12)
+            self.assertAlmostEqual(found["t"], difference.mean() / (difference.std(ddof=1) / math.sqrt(3)), delta=1e-9)
+        self.assertIn("Gain in time beside differences of movement", done.stdout)
+
+    def test_what_has_no_samples_says_what_to_do(self):
+        db = self.study(samples=False)
+        said = self.palpate("analyze", "--db", db, "--movement", status=2).stderr
+        self.assertIn('has no servo samples; a protocol with "samples": true keeps them', said)
+
+    def test_options_that_do_not_fit_are_refused(self):
+        db = self.study(participants=1)
+        for args, why in [(["--movement", "--report", "r.html"], "--report"),
+                          (["--movement", "--cutoff-hz", "0"], "--cutoff-hz"),
+                          (["--movement", "--cutoff-hz", "nan"], "--cutoff-hz"),
+                          (["--movement", "--jobs", "0"], "--jobs"),
+                          (["--movement-csv", "m.csv"], "give --movement"),
+                          (["--cutoff-hz", "10"], "--movement")]:
+            self.assertIn(why, self.palpate("analyze", "--db", db, *args, status=2).stderr)
+        self.assertIn("--db FILE", self.palpate("analyze", "--csv", "x.csv", "--movement", status=2).stderr)
+        taken = self.file("taken.csv", "mine")
+        self.palpate("analyze", "--db", db, "--movement", "--movement-csv", taken, status=2)
+        self.assertEqual(taken.read_text(), "mine")
+
+
+if __name__ == "__main__":
+    unittest.main()
