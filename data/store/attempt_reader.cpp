@@ -254,7 +254,10 @@ void AttemptReader::read_attempt(std::optional<ChainCheck>& chain) {
     chain->add(link, values_, {.kind = "trial", .number = record.trial, .attempt = record.attempt});
   }
   if (!wanted) return;
-  if (filter_.samples != SampleReading::skip) read_samples(id, about.samples);
+  if (filter_.samples != SampleReading::skip &&
+      (filter_.samples_wanted == nullptr || (*filter_.samples_wanted)(trial_))) {
+    read_samples(id, about.samples);
+  }
   record.onset_utc = format_utc(to_unix_ns(trial_.run.clock, record.onset_ns));
   visit_(trial_);
 }

@@ -29,6 +29,8 @@ struct AttemptFilter {
   const TrialName* trial = nullptr;                          ///< this one, in every protocol
   std::optional<std::pair<std::int64_t, int>> session = {};  ///< participant's id, number
   SampleReading samples = SampleReading::skip;
+  /// Of which completed trials samples are read, asked in order; none: of all.
+  const std::function<bool(const StoredTrial&)>* samples_wanted = nullptr;
   bool seals_verified = false;  ///< already, in the same snapshot of the database
 };
 

@@ -172,6 +172,17 @@ void Store::for_each_trial(const std::function<void(const StoredTrial&)>& visit,
   impl_->seals_verified = !impl_->writes();  // a reader's snapshot does not change
 }
 
+void Store::for_each_trial(const std::function<void(const StoredTrial&)>& visit,
+                           const std::function<bool(const StoredTrial&)>& samples_wanted) {
+  guarded(impl_->path, [&] {
+    const AttemptFilter filter{.state = AttemptState::completed,
+                               .samples = SampleReading::unpack,
+                               .samples_wanted = &samples_wanted};
+    read_attempts(*impl_->db, impl_->path, impl_->version, filter, visit);
+  });
+  impl_->seals_verified = !impl_->writes();
+}
+
 void Store::for_each_cut_off(const std::function<void(const StoredTrial&)>& visit) {
   guarded(impl_->path, [&] {
     const AttemptFilter filter{.state = AttemptState::cut_off,

@@ -224,6 +224,10 @@ class Store {
   /// they need not fit into memory. `visit` must not write to this store.
   void for_each_trial(const std::function<void(const StoredTrial&)>& visit,
                       bool with_samples = false);
+  /// Likewise, with the samples of those trials that `samples_wanted` says, which is asked of each
+  /// before its visit: several threads, each with a store of its own, can share the work.
+  void for_each_trial(const std::function<void(const StoredTrial&)>& visit,
+                      const std::function<bool(const StoredTrial&)>& samples_wanted);
   /// Attempts that were cut off, in the same order, then by attempt.
   void for_each_cut_off(const std::function<void(const StoredTrial&)>& visit);
   /// All attempts of one trial with their samples: those that were cut off, then the completed one,
