@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <stdexcept>
 #include <string_view>
@@ -48,10 +49,15 @@ std::optional<double> greatest_of(const Values& values) {
   return *std::max_element(values.begin(), values.end());
 }
 
-template <class T>
-std::vector<T> part(const std::vector<T>& all, const Stretch& stretch) {
-  return {all.begin() + static_cast<std::ptrdiff_t>(stretch.begin),
-          all.begin() + static_cast<std::ptrdiff_t>(stretch.end)};
+/// What is found in each piece, where it stands in the trial.
+template <class Find>
+std::vector<Stretch> in_pieces(const std::vector<Stretch>& pieces, const Find& find) {
+  std::vector<Stretch> all;
+  for (const Stretch& piece : pieces) {
+    for (const Stretch& one : find(piece))
+      all.push_back({piece.begin + one.begin, piece.begin + one.end});
+  }
+  return all;
 }
 
 /// Mean of the movements' values, weighted by their paths.
@@ -70,9 +76,12 @@ class ByMovement {
   double sum_ = 0, path_ = 0;
 };
 
-void put_motion(const std::vector<Vec3>& path, const Values& speed, double rate, Filling& out) {
+void put_motion(const SmoothPath& smooth, const std::vector<Stretch>& pieces, double rate,
+                Filling& out) {
   constexpr double kPeakShare = 0.05, kPeakLeast = 0.005;
-  const double length = path_length(path);
+  const Values& speed = smooth.speed;
+  double length = 0;
+  for (const Stretch& piece : pieces) length += path_length(part_of(smooth.place, piece));
   out.set("path_length", length);
   out.set("speed_mean", mean_of(speed));
   Values sorted = speed;
@@ -80,20 +89,23 @@ void put_motion(const std::vector<Vec3>& path, const Values& speed, double rate,
   out.set("speed_p95", sorted_quantile(sorted, 0.95));
   if (length > 0) {
     const double least = std::max(kPeakShare * sorted.back(), kPeakLeast);
-    out.set("speed_peaks_per_m", static_cast<double>(peaks(speed, least)) / length);
+    std::size_t found = 0;
+    for (const Stretch& piece : pieces) found += peaks(part_of(speed, piece), least);
+    out.set("speed_peaks_per_m", static_cast<double>(found) / length);
   }
-  out.set("sparc", sparc(speed, rate));
-  ByMovement arc, jerk, speed_jerk;
-  const std::vector<Stretch> found = movements(speed, rate);
-  for (const Stretch& one : found) {
-    const std::vector<Vec3> way = part(path, one);
-    const Values its_speed = part(speed, one);
+  ByMovement whole, arc, jerk, speed_jerk;
+  for (const Stretch& piece : pieces)
+    whole.add(sparc(part_of(speed, piece), rate), path_length(part_of(smooth.place, piece)));
+  out.set("sparc", whole.mean());
+  for (const Stretch& one : smooth.movements) {
+    const std::vector<Vec3> way = part_of(smooth.place, one);
+    const Values its_speed = part_of(speed, one);
     const double its_length = path_length(way);
     arc.add(sparc(its_speed, rate), its_length);
     jerk.add(log_dimensionless_jerk(way, rate), its_length);
     speed_jerk.add(log_dimensionless_jerk_of_speed(its_speed, rate), its_length);
   }
-  out.set("movements", static_cast<double>(found.size()));
+  out.set("movements", static_cast<double>(smooth.movements.size()));
   out.set("sparc_movement", arc.mean());
   out.set("ldlj", jerk.mean());
   out.set("ldlj_speed", speed_jerk.mean());
@@ -106,7 +118,8 @@ void put_force(const std::string& suffix, const Values& force, Filling& out) {
   out.set(("force_max" + suffix).c_str(), greatest_of(force));
 }
 
-void put_forces(const MovementTrial& trial, const std::vector<Stretch>& episodes, Filling& out) {
+void put_forces(const MovementTrial& trial, const std::vector<Stretch>& pieces,
+                const std::vector<Stretch>& episodes, Filling& out) {
   const std::size_t n = trial.tip.size();
   Values all, along, across, normal_force(n);
   for (std::size_t i = 0; i < n; ++i) {
@@ -121,11 +134,13 @@ void put_forces(const MovementTrial& trial, const std::vector<Stretch>& episodes
   put_force("_t", across, out);
   Values peaks_of_episodes;
   for (const Stretch& one : episodes)
-    peaks_of_episodes.push_back(*greatest_of(part(normal_force, one)));
+    peaks_of_episodes.push_back(*greatest_of(part_of(normal_force, one)));
   out.set("press_peak", mean_of(peaks_of_episodes));
   double squares = 0;
   std::size_t rates = 0;
-  for (const Stretch& one : stretches(trial.contact)) {
+  for (const Stretch& one : in_pieces(pieces, [&](const Stretch& piece) {
+         return stretches(part_of(trial.contact, piece));
+       })) {
     for (std::size_t i = one.begin + 1; i + 1 < one.end; ++i, ++rates) {
       const double rate = (normal_force[i + 1] - normal_force[i - 1]) * trial.rate / 2;
       squares += rate * rate;
@@ -134,14 +149,20 @@ void put_forces(const MovementTrial& trial, const std::vector<Stretch>& episodes
   if (rates > 0) out.set("force_rate", std::sqrt(squares / static_cast<double>(rates)));
 }
 
-void put_procedures(const MovementTrial& trial, const Values& tangential_speed, Filling& out) {
+void put_procedures(const MovementTrial& trial, const std::vector<Stretch>& pieces,
+                    const Values& tangential_speed, Filling& out) {
   std::vector<ContactMotion> motion(trial.tip.size());
   for (std::size_t i = 0; i < motion.size(); ++i) {
     if (trial.contact[i])
       motion[i] = {tangential_speed[i], glm::dot(trial.force[i], trial.normal[i]),
                    trial.on_edge[i]};
   }
-  const std::vector<Procedure> found = procedures(trial.contact, motion, trial.rate);
+  std::vector<Procedure> found;
+  for (const Stretch& piece : pieces) {
+    for (const Procedure one :
+         procedures(part_of(trial.contact, piece), part_of(motion, piece), trial.rate))
+      found.push_back(one);
+  }
   if (found.empty()) return;
   constexpr std::array<const char*, kProcedures> kNames = {"share_static", "share_pressure",
                                                            "share_lateral", "share_contour"};
@@ -152,18 +173,15 @@ void put_procedures(const MovementTrial& trial, const Values& tangential_speed, 
 }
 
 void put_surface(const MovementTrial& trial, const TouchedSurface& surface, Filling& out) {
-  std::vector<Vec3> points;
   std::vector<std::size_t> parts;
   for (std::size_t i = 0; i < trial.tip.size(); ++i) {
-    if (!trial.contact[i]) continue;
-    points.push_back(trial.point[i]);
-    parts.push_back(surface.part_of(trial.point[i]));
+    if (trial.contact[i]) parts.push_back(surface.part_of(trial.point[i]));
   }
-  if (points.empty()) {
+  if (parts.empty()) {
     out.set("coverage", 0);
     return;
   }
-  out.set("coverage", surface.coverage(points).back());
+  out.set("coverage", coverage_by_tick(trial, surface).back());
   out.set("entropy", entropy(parts));
   out.set("transitions",
           static_cast<double>(transitions(parts)) * trial.rate / static_cast<double>(parts.size()));
@@ -208,7 +226,9 @@ const std::array<MeasureDefinition, kMeasures>& measure_definitions() {
       {"edge_dwell", "s", count,
        "contact within 3 mm of an edge of 30 degrees or more; compared as the log of it and 1 s"},
       {"coverage", "1", logit,
-       "share of 10,000 places on the surface within 5 mm of a contact point"},
+       "share of 10,000 places on the surface within 5 mm of a contact point, or of the touched "
+       "part "
+       "of the segment"},
       {"entropy", "1", logit, "of contact time over 64 equal parts of the surface; 1: even"},
       {"transitions", "1/s", count, "changes of the part, by time in contact"},
       {"coverage_rate", "1/s", count, "coverage by time of the trial"},
@@ -231,15 +251,66 @@ std::size_t measure_named(const char* name) {
   throw std::invalid_argument(std::string("no measure is named ") + name);
 }
 
+std::vector<Stretch> pieces_of(const MovementTrial& trial) {
+  std::vector<Stretch> pieces;
+  std::size_t begin = 0;
+  for (const std::size_t at : trial.breaks) {
+    if (at > begin) pieces.push_back({begin, at});
+    begin = at;
+  }
+  if (trial.tip.size() > begin) pieces.push_back({begin, trial.tip.size()});
+  return pieces;
+}
+
+SmoothPath smooth_path(const MovementTrial& trial, const MovementSettings& settings) {
+  SmoothPath smooth;
+  const std::vector<Stretch> pieces = pieces_of(trial);
+  for (const Stretch& piece : pieces) {
+    const std::vector<Vec3> path = low_pass(part_of(trial.tip, piece), trial.rate, settings.cutoff);
+    const std::vector<Vec3> moves = velocity(path, trial.rate);
+    smooth.place.insert(smooth.place.end(), path.begin(), path.end());
+    smooth.velocity.insert(smooth.velocity.end(), moves.begin(), moves.end());
+  }
+  smooth.speed = lengths(smooth.velocity);
+  const double greatest = greatest_of(smooth.speed).value_or(0);
+  smooth.movements = in_pieces(pieces, [&](const Stretch& piece) {
+    return movements(part_of(smooth.speed, piece), trial.rate, greatest);
+  });
+  return smooth;
+}
+
+std::vector<double> coverage_by_tick(const MovementTrial& trial, const TouchedSurface& surface) {
+  constexpr double kStep = TouchedSurface::kReach / 2;
+  std::vector<Vec3> points;
+  std::vector<std::size_t> last;  // of each tick in contact: its last point
+  for (std::size_t i = 0; i < trial.tip.size(); ++i) {
+    if (!trial.contact[i]) continue;
+    points.push_back(trial.point[i]);
+    if (!trial.touched.empty()) {
+      const auto& [from, to] = trial.touched[i];
+      const auto steps = static_cast<int>(std::ceil(glm::length(to - from) / kStep));
+      for (int k = 0; k <= steps && steps > 0; ++k)
+        points.push_back(glm::mix(from, to, static_cast<double>(k) / steps));
+    }
+    last.push_back(points.size() - 1);
+  }
+  const std::vector<double> shares = surface.coverage(points);
+  std::vector<double> by_tick;
+  by_tick.reserve(last.size());
+  for (const std::size_t at : last) by_tick.push_back(shares[at]);
+  return by_tick;
+}
+
 MeasureValues measure(const MovementTrial& trial, const TouchedSurface* surface,
                       const MovementSettings& settings) {
   Filling out;
   const std::size_t n = trial.tip.size();
   if (n < 2) return out.values();
-  const std::vector<Vec3> path = low_pass(trial.tip, trial.rate, settings.cutoff);
-  const std::vector<Vec3> moves = velocity(path, trial.rate);
-  const Values speed = lengths(moves);
-  put_motion(path, speed, trial.rate, out);
+  const std::vector<Stretch> pieces = pieces_of(trial);
+  const SmoothPath smooth = smooth_path(trial, settings);
+  const std::vector<Vec3>&path = smooth.place, &moves = smooth.velocity;
+  const Values& speed = smooth.speed;
+  put_motion(smooth, pieces, trial.rate, out);
   const double duration = static_cast<double>(n) / trial.rate;
   out.set("duration", duration);
 
@@ -248,10 +319,15 @@ MeasureValues measure(const MovementTrial& trial, const TouchedSurface* surface,
   std::size_t edge_ticks = 0;
   for (std::size_t i = 0; i < n; ++i) {
     if (!trial.contact[i]) continue;
-    if (i > 0 && trial.contact[i - 1]) contact_path += glm::length(path[i] - path[i - 1]);
     along[i] = glm::length(moves[i] - glm::dot(moves[i], trial.normal[i]) * trial.normal[i]);
     along_in_contact.push_back(along[i]);
     if (!trial.on_edge.empty()) edge_ticks += trial.on_edge[i];
+  }
+  for (const Stretch& piece : pieces) {
+    for (std::size_t i = piece.begin + 1; i < piece.end; ++i) {
+      if (trial.contact[i] && trial.contact[i - 1])
+        contact_path += glm::length(path[i] - path[i - 1]);
+    }
   }
   out.set("contact_share", static_cast<double>(along_in_contact.size()) / static_cast<double>(n));
   out.set("contact_path", contact_path);
@@ -265,13 +341,21 @@ MeasureValues measure(const MovementTrial& trial, const TouchedSurface* surface,
     for (const Stretch& one : found) times.push_back(static_cast<double>(one.size()) / trial.rate);
     out.set(time, mean_of(times));
   };
-  const std::vector<Stretch> episodes = contact_episodes(trial.contact, trial.rate);
+  const std::vector<Stretch> episodes = in_pieces(pieces, [&](const Stretch& piece) {
+    return contact_episodes(part_of(trial.contact, piece), trial.rate);
+  });
   put_stretches("approaches", "episode_time", episodes);
-  const std::vector<Stretch> resting = stops(trial.contact, speed, trial.rate);
+  std::size_t stroked = 0;
+  const std::vector<Stretch> resting = in_pieces(pieces, [&](const Stretch& piece) {
+    const std::vector<bool> contact = part_of(trial.contact, piece);
+    std::vector<Stretch> found = stops(contact, part_of(speed, piece), trial.rate);
+    stroked += strokes(contact, found, part_of(path, piece), trial.rate);
+    return found;
+  });
   put_stretches("stops", "stop_time", resting);
-  out.set("strokes", static_cast<double>(strokes(trial.contact, resting, path, trial.rate)));
-  put_forces(trial, episodes, out);
-  if (!trial.on_edge.empty()) put_procedures(trial, along, out);
+  out.set("strokes", static_cast<double>(stroked));
+  put_forces(trial, pieces, episodes, out);
+  if (!trial.on_edge.empty()) put_procedures(trial, pieces, along, out);
   if (surface != nullptr) {
     put_surface(trial, *surface, out);
     const auto& covered = out.values()[measure_named("coverage")];

@@ -43,7 +43,24 @@ struct MovementTrial {
   std::vector<bool> contact;
   std::vector<Vec3> point, normal, force;  ///< of the deepest contact; in free space not used
   std::vector<bool> on_edge;               ///< empty: the object's edges are not known
+  /// Ends of the part of the segment that touches the surface, in contact; empty: the point alone.
+  std::vector<std::array<Vec3, 2>> touched;
+  /// Indexes at which the record goes on after a gap, ascending: nothing is derived across one.
+  std::vector<std::size_t> breaks;
 };
+
+/// The stretches without a gap.
+std::vector<Stretch> pieces_of(const MovementTrial& trial);
+
+/// The path as it is measured: each piece on its own.
+struct SmoothPath {
+  std::vector<Vec3> place, velocity;
+  std::vector<double> speed;
+  std::vector<Stretch> movements;
+};
+SmoothPath smooth_path(const MovementTrial& trial, const MovementSettings& settings);
+/// The places that have touched by each tick in contact: share of the surface, a value for each.
+std::vector<double> coverage_by_tick(const MovementTrial& trial, const TouchedSurface& surface);
 
 /// A value for each of measure_definitions(); none where it is not defined.
 using MeasureValues = std::array<std::optional<double>, kMeasures>;

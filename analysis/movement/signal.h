@@ -30,4 +30,10 @@ struct Stretch {
 /// The maximal stretches of true.
 std::vector<Stretch> stretches(const std::vector<bool>& wanted);
 
+template <class T>
+std::vector<T> part_of(const std::vector<T>& all, const Stretch& stretch) {
+  return {all.begin() + static_cast<std::ptrdiff_t>(stretch.begin),
+          all.begin() + static_cast<std::ptrdiff_t>(stretch.end)};
+}
+
 }  // namespace palpate::analysis

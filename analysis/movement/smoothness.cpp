@@ -18,8 +18,17 @@ Complex times(const Complex& a, const Complex& b) {
   return {a.real() * b.real() - a.imag() * b.imag(), a.real() * b.imag() + a.imag() * b.real()};
 }
 
-/// In place, radix 2, e^(-2 pi i k n / N).
-void transform(std::vector<Complex>& x) {
+/// e^(-2 pi i k / n) for the first half of k.
+std::vector<Complex> turns_of(std::size_t n) {
+  std::vector<Complex> turns(n / 2);
+  for (std::size_t k = 0; k < n / 2; ++k)
+    turns[k] =
+        std::polar(1.0, -2 * std::numbers::pi * static_cast<double>(k) / static_cast<double>(n));
+  return turns;
+}
+
+/// In place, radix 2, e^(-2 pi i k n / N). \param turns  of its size
+void transform(std::vector<Complex>& x, const std::vector<Complex>& turns) {
   const std::size_t n = x.size();
   for (std::size_t i = 1, j = 0; i < n; ++i) {
     std::size_t bit = n >> 1;
@@ -27,10 +36,6 @@ void transform(std::vector<Complex>& x) {
     j ^= bit;
     if (i < j) std::swap(x[i], x[j]);
   }
-  std::vector<Complex> turns(n / 2);
-  for (std::size_t k = 0; k < n / 2; ++k)
-    turns[k] =
-        std::polar(1.0, -2 * std::numbers::pi * static_cast<double>(k) / static_cast<double>(n));
   for (std::size_t half = 1; half < n; half *= 2) {
     const std::size_t stride = n / (2 * half);
     for (std::size_t first = 0; first < n; first += 2 * half) {
@@ -47,24 +52,26 @@ void transform(std::vector<Complex>& x) {
 /// the lowest percent of a long transform is all that is needed.
 std::vector<double> low_bins(const std::vector<double>& values, std::size_t padded,
                              std::size_t bins) {
-  const auto chirp = [padded](std::uint64_t n) {
-    const std::uint64_t turn = n * n % (2 * padded);
-    return std::polar(1.0,
-                      -std::numbers::pi * static_cast<double>(turn) / static_cast<double>(padded));
-  };
   const std::size_t n = values.size();
+  std::vector<Complex> chirp(std::max(n, bins));
+  for (std::uint64_t i = 0; i < chirp.size(); ++i) {
+    const std::uint64_t turn = i * i % (2 * padded);
+    chirp[i] = std::polar(
+        1.0, -std::numbers::pi * static_cast<double>(turn) / static_cast<double>(padded));
+  }
   const std::size_t size = std::bit_ceil(n + bins);
   std::vector<Complex> a(size), b(size);
-  for (std::size_t i = 0; i < n; ++i) a[i] = values[i] * chirp(i);
-  for (std::size_t i = 0; i < std::max(n, bins); ++i) {
-    const Complex back = std::conj(chirp(i));
+  for (std::size_t i = 0; i < n; ++i) a[i] = values[i] * chirp[i];
+  for (std::size_t i = 0; i < chirp.size(); ++i) {
+    const Complex back = std::conj(chirp[i]);
     if (i < bins) b[i] = back;
     if (i > 0 && i < n) b[size - i] = back;
   }
-  transform(a);
-  transform(b);
+  const std::vector<Complex> turns = turns_of(size);
+  transform(a, turns);
+  transform(b, turns);
   for (std::size_t i = 0; i < size; ++i) a[i] = std::conj(times(a[i], b[i]));
-  transform(a);
+  transform(a, turns);
   std::vector<double> magnitudes(bins);
   for (std::size_t k = 0; k < bins; ++k) magnitudes[k] = std::abs(a[k]) / static_cast<double>(size);
   return magnitudes;
@@ -123,10 +130,9 @@ std::optional<double> log_dimensionless_jerk_of_speed(const std::vector<double>&
                  *std::max_element(speed.begin(), speed.end()), sum / rate);
 }
 
-std::vector<Stretch> movements(const std::vector<double>& speed, double rate) {
+std::vector<Stretch> movements(const std::vector<double>& speed, double rate, double greatest) {
   constexpr double kShare = 0.05, kShortest = 0.1;
-  if (speed.empty()) return {};
-  const double least = kShare * *std::max_element(speed.begin(), speed.end());
+  const double least = kShare * greatest;
   std::vector<bool> moving(speed.size());
   for (std::size_t i = 0; i < speed.size(); ++i) moving[i] = speed[i] > 0 && speed[i] >= least;
   std::vector<Stretch> found = stretches(moving);

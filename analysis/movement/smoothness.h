@@ -25,7 +25,13 @@ std::optional<double> log_dimensionless_jerk_of_speed(const std::vector<double>&
                                                       double rate);
 
 /// Stretches with at least 5 % of the greatest speed, for 100 ms or more.
-std::vector<Stretch> movements(const std::vector<double>& speed, double rate);
+/// \param greatest  m/s, of the whole trial
+std::vector<Stretch> movements(const std::vector<double>& speed, double rate, double greatest);
+inline std::vector<Stretch> movements(const std::vector<double>& speed, double rate) {
+  double greatest = 0;
+  for (const double one : speed) greatest = one > greatest ? one : greatest;
+  return movements(speed, rate, greatest);
+}
 
 /// Number of maxima with a prominence of at least `least`: one must go down by as much on both
 /// sides before it goes higher. A plateau counts once.

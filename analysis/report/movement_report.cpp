@@ -1,8 +1,14 @@
 #include "analysis/report/movement_report.h"
 
+#include <algorithm>
+#include <cctype>
 #include <cmath>
+#include <string_view>
 #include <utility>
 
+#include "analysis/figures/movement_figures.h"
+#include "analysis/report/html_elements.h"
+#include "analysis/report/html_page.h"
 #include "analysis/report/inference_json.h"
 #include "analysis/report/report_text.h"
 #include "analysis/report/table_cells.h"
@@ -114,6 +120,37 @@ Table gains_table(const MovementAnalysis& analysis) {
   return table;
 }
 
+/// A sentence for each shape: gain in time, and what else differs.
+std::vector<std::string> gain_sentences(const MovementAnalysis& analysis) {
+  std::vector<std::string> sentences;
+  const auto percent = [](double log_ratio) { return 100 * (std::exp(log_ratio) - 1); };
+  for (const AdjustedGain& gain : analysis.gains) {
+    if (std::string_view(definition(gain.measure).name) != "coverage_rate" ||
+        !gain.time_difference || !gain.time_difference_at_equal_measure) {
+      continue;
+    }
+    const RendererPair& pair = analysis.measures.front().comparisons[gain.comparison].pair;
+    const double change = percent(*gain.time_difference);
+    sentences.push_back(stimuli::printable(analysis.table.trials.shapes[gain.shape], 40) + ": " +
+                        fixed(std::abs(change), 1) + " % " + (change < 0 ? "less" : "more") +
+                        " time with " + stimuli::printable(pair.renderer, 40) + " than with " +
+                        stimuli::printable(pair.reference, 40) + "; at equal coverage a second, " +
+                        fixed(std::abs(percent(*gain.time_difference_at_equal_measure)), 1) +
+                        " % " + (*gain.time_difference_at_equal_measure < 0 ? "less" : "more") +
+                        ".");
+  }
+  return sentences;
+}
+
+constexpr const char* kHowToRead =
+    "Each trial with servo samples was rendered again, which gives the recorded forces to the bit "
+    "and the place of every contact. The path of the stylus's tip, in the frame of the object, was "
+    "freed from noise by a low pass without delay; from path, contacts and forces follow the "
+    "measures that are defined below. They are compared between renderers as response times are: "
+    "each participant's mean on the measure's scale, then paired t-tests over participants, "
+    "adjusted by Holm over the shapes of a measure, beside a mixed model. With so many measures "
+    "some p are small by chance: choose the measures before you look.";
+
 Json measure_json(const MovementAnalysis& analysis, const MeasureComparison& measure) {
   const MeasureDefinition& known = definition(measure.measure);
   const TrialTable& trials = analysis.table.trials;
@@ -191,6 +228,79 @@ std::string movement_text(const MovementAnalysis& analysis) {
     out += "\n" + table_text(measures_table(analysis, c));
   if (!analysis.gains.empty()) out += "\n" + table_text(gains_table(analysis));
   return out + "\n" + table_text(definitions_table());
+}
+
+std::string movement_html(const MovementAnalysis& analysis, const MovementPictures& pictures) {
+  const TrialTable& trials = analysis.table.trials;
+  const std::string label = simulated_label(trials.simulated);
+  const std::string study = trials.provenance.protocol_name;
+  HtmlPage page("What the hand did" + (study.empty() ? "" : ": " + stimuli::printable(study, 200)),
+                label);
+  if (!label.empty()) page.put_banner(label + ": the movements here are a model's, not of humans.");
+  std::size_t missing = 0;
+  for (const auto& [reason, count] : analysis.table.missing) missing += count;
+  page.below_title() +=
+      "<p class=\"lead\">" + counted(trials.participants.size(), "participant", "participants") +
+      ", " + counted(trials.rows.size() - missing, "trial", "trials") + " measured of " +
+      std::to_string(trials.rows.size()) + ".</p>\n<p>" + escaped_sentence(kHowToRead) + "</p>\n";
+  std::vector<std::string> reasons;
+  for (const auto& [reason, count] : analysis.table.missing)
+    reasons.push_back("Missing: " + counted(count, "trial", "trials") + ": " + reason + ".");
+  put_list(page.below_title(), reasons);
+  for (const Figure& figure : movement_figures(analysis.table, pictures)) {
+    std::string link = figure.id.substr(figure.id.find('-') + 1);  // "paths"
+    link.front() = static_cast<char>(std::toupper(link.front()));
+    page.put_figure_section(figure, link);
+  }
+  if (!pictures.typical.empty() && !trials.provenance.source.empty()) {
+    std::string trial_options;
+    for (const TypicalTrial& one : pictures.typical) {
+      if (trials.rows[one.row].shape != trials.rows[pictures.typical.front().row].shape) break;
+      trial_options += " --trial " + one.name;
+    }
+    page.put_note(
+        "A trial can be seen as it was felt, here the first of the paths: palpate watch "
+        "--db " +
+        stimuli::printable(trials.provenance.source, 400) + trial_options + " --out trial.html");
+  }
+  if (!analysis.gains.empty()) {
+    page.begin_section("gain", "Gain in time beside differences of movement", "Gain");
+    page.body() +=
+        "<p>Does the hand move differently where a shape is found in less time? For each shape the "
+        "table has the difference of time between the renderers, the difference of a measure, and "
+        "the difference of time that is left between trials of equal measure. It describes what "
+        "occurs together. The movements were not set by the experiment, so it does not tell which "
+        "of them comes first.</p>\n";
+    put_list(page.body(), gain_sentences(analysis));
+    put_table(page.body(), gains_table(analysis));
+    page.end_section();
+  }
+  page.begin_section("measures", "Measures by shape and renderer", "Measures");
+  for (std::size_t c = 0; c < analysis.measures.front().comparisons.size(); ++c)
+    put_table(page.body(), measures_table(analysis, c));
+  put_collapsible_tables(page.body(), "What each measure is", {definitions_table()});
+  page.end_section();
+  page.begin_section("source", "Source and settings", "Source");
+  Table source;
+  source.caption = movement_caption(analysis, "Source");
+  source.header = {"what", "value"};
+  source.n_names = 2;
+  const auto add = [&](const char* what, const std::string& value) {
+    if (!value.empty()) source.rows.push_back({what, stimuli::printable(value, 400)});
+  };
+  add("database", trials.provenance.source);
+  add("protocol", trials.provenance.protocol_name);
+  for (const std::string& sha256 : trials.provenance.protocol_sha256)
+    add("protocol SHA-256", sha256);
+  for (const std::string& version : trials.provenance.program_versions)
+    add("recorded by palpate", version);
+  add("simulated participants' settings SHA-256", trials.provenance.observer_sha256);
+  add("low pass of the path", fixed(analysis.table.settings.cutoff, 1) + " Hz");
+  add("coverage", std::to_string(TouchedSurface::kPlaces) + " places, within " +
+                      fixed(1000 * TouchedSurface::kReach, 0) + " mm");
+  put_table(page.body(), source);
+  page.end_section();
+  return page.html("palpate " + analysis.program_version + ".");
 }
 
 std::string movement_json(const MovementAnalysis& analysis) {

@@ -1,11 +1,12 @@
 #pragma once
-// The measures of movement as text, JSON and CSV.
+// The measures of movement as text, JSON and a page.
 
 #include <string>
 #include <vector>
 
 #include "analysis/movement/adjusted_gain.h"
 #include "analysis/movement/comparison.h"
+#include "analysis/movement/pictures.h"
 #include "analysis/report/tables.h"
 
 namespace palpate::analysis {
@@ -24,5 +25,7 @@ MovementAnalysis analyze_movement(MovementTable table, const std::string& progra
 std::string movement_text(const MovementAnalysis& analysis);
 /// Every number, setting and definition.
 std::string movement_json(const MovementAnalysis& analysis);
+/// A self-contained page with the figures, and what they show in words.
+std::string movement_html(const MovementAnalysis& analysis, const MovementPictures& pictures);
 
 }  // namespace palpate::analysis

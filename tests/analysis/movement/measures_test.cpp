@@ -11,6 +11,7 @@
 
 #include "analysis/movement/contacts.h"
 #include "analysis/movement/coverage.h"
+#include "analysis/movement/pictures.h"
 #include "analysis/movement/signal.h"
 #include "analysis/movement/smoothness.h"
 #include "stimuli/random.h"
@@ -291,6 +292,95 @@ TEST(Measures, NoContactHasNoValuesOfContact) {
                            "coverage", "speed_contact"})
     EXPECT_FALSE(values[measure_named(name)]) << name;
   EXPECT_FALSE(measure({}, nullptr, {})[0]);
+}
+
+/// Twice the same, the second half as far away as one likes: nothing is made of the way there.
+TEST(Measures, AGapSplitsTheTrial) {
+  const MovementTrial one = strokes_on_a_sphere(2000, 1000);
+  MovementTrial both = one;
+  both.breaks = {one.tip.size()};
+  const Vec3 far(0.2, 0.1, 0);
+  for (const Vec3& tip : one.tip) both.tip.push_back(tip + far);
+  for (const bool contact : one.contact) both.contact.push_back(contact);
+  for (const auto& [from, to] :
+       {std::pair(&one.point, &both.point), {&one.normal, &both.normal}, {&one.force, &both.force}})
+    to->insert(to->end(), from->begin(), from->end());
+  for (const bool edge : one.on_edge) both.on_edge.push_back(edge);
+  EXPECT_EQ(pieces_of(both), (std::vector<Stretch>{{0, 2000}, {2000, 4000}}));
+  const MeasureValues once = measure(one, nullptr, {}), twice = measure(both, nullptr, {});
+  for (const char* name :
+       {"path_length", "contact_path", "approaches", "movements", "stops", "strokes", "duration"})
+    EXPECT_NEAR(value(twice, name), 2 * value(once, name), 1e-9) << name;
+  for (const char* name : {"speed_mean", "speed_p95", "speed_peaks_per_m", "sparc", "ldlj",
+                           "contact_share", "episode_time", "force_rate", "press_peak"})
+    EXPECT_NEAR(value(twice, name), value(once, name), 1e-3 * (1 + std::abs(value(once, name))))
+        << name;
+  both.breaks.clear();
+  EXPECT_GT(value(measure(both, nullptr, {}), "path_length"),
+            2 * value(once, "path_length") + 0.9 * glm::length(far));
+}
+
+/// On a plate: what is within the reach of a line of length L is 2 r L + pi r^2.
+TEST(Coverage, TheTouchedPartOfASegmentCovers) {
+  constexpr double kSide = 0.1, kLength = 0.04, kReach = TouchedSurface::kReach;
+  const Vec3 a(0, 0, 0), b(kSide, 0, 0), c(kSide, kSide, 0), d(0, kSide, 0);
+  const TouchedSurface plate(draw_places({{a, b, c}, {a, c, d}}, TouchedSurface::kPlaces));
+  MovementTrial trial;
+  trial.tip.assign(2, Vec3(0.05, 0.05, 0));
+  trial.contact = {false, true};
+  trial.point = trial.tip;
+  EXPECT_NEAR(coverage_by_tick(trial, plate).back(), kPi * kReach * kReach / (kSide * kSide),
+              0.003);
+  const std::array<Vec3, 2> segment = {Vec3(0.03, 0.05, 0), Vec3(0.03 + kLength, 0.05, 0)};
+  trial.touched = {{a, a}, segment};
+  const std::vector<double> covered = coverage_by_tick(trial, plate);
+  ASSERT_EQ(covered.size(), 1U);  // of the tick in contact
+  // Placed every half reach, circles leave 3 % of the strip's edge out.
+  EXPECT_NEAR(covered.back(), (2 * kReach * kLength + kPi * kReach * kReach) / (kSide * kSide),
+              0.006);
+}
+
+TEST(Pictures, EvenContactIsOneOnTheWholeMap) {
+  const TouchedSurface surface(draw_places(sphere(0.03), TouchedSurface::kPlaces));
+  MovementTable table;
+  table.trials.participants = {"P1"};
+  table.trials.renderers = {"point"};
+  table.trials.shapes = {"ball"};
+  table.trials.rows = {TrialRow{.correct = true, .response_time = 1}};
+  table.values.resize(1);
+  table.values[0][measure_named("duration")] = 10.0;
+  MovementTrial trial;
+  trial.tip = trial.point = surface.places();
+  trial.contact.assign(trial.tip.size(), true);
+  MovementPictures pictures;
+  pictures.outlines = {{surface.places(), {}}};
+  add_up(table, {tally_of(trial, surface)}, pictures);
+  const ContactMap& map = pictures.contact[0][0];
+  ASSERT_EQ(map.density.size(), SurfaceMap::kCells);
+  for (const double density : map.density) EXPECT_NEAR(density, 1, 1e-4);
+  const CoverageCurve& curve = pictures.coverage[0][0];
+  EXPECT_EQ(curve.mean.front(), 0);
+  EXPECT_TRUE(std::is_sorted(curve.mean.begin(), curve.mean.end()));
+  EXPECT_NEAR(curve.mean.back(), 1, 1e-6);  // the 10,000 ticks are over after 10 s
+  EXPECT_EQ(curve.mean[40], curve.mean.back());
+  EXPECT_LT(curve.mean[1], 0.95);
+  EXPECT_EQ(curve.median_duration, 10);
+}
+
+TEST(Pictures, TheTypicalTrialIsARightOneNearTheMedian) {
+  MovementTable table;
+  table.trials.participants = {"P1"};
+  table.trials.renderers = {"point"};
+  table.trials.shapes = {"ball"};
+  const std::size_t duration = measure_named("duration");
+  for (const auto& [seconds, correct] :
+       {std::pair(9.0, true), {3.0, false}, {3.5, true}, {1.0, true}, {2.0, true}}) {
+    table.trials.rows.push_back(TrialRow{.correct = correct, .response_time = seconds});
+    table.values.emplace_back()[duration] = seconds;
+  }
+  table.trials.rows.push_back(TrialRow{.correct = true, .response_time = 3});
+  table.values.emplace_back();  // not measured
+  EXPECT_EQ(typical_rows(table), std::vector<std::size_t>{2});
 }
 
 }  // namespace
