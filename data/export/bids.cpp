@@ -8,6 +8,7 @@
 #include "data/export/column_values.h"
 #include "data/export/dataset_description.h"
 #include "data/export/dataset_writer.h"
+#include "data/export/derived_table.h"
 #include "data/export/sample_slots.h"
 #include "data/files/text_sink.h"
 #include "data/files/utc.h"
@@ -65,20 +66,33 @@ Json describe_run(const RunInfo& run, const Participant& person, const ExportClo
 }
 
 std::string readme_text(const std::map<std::string, StudyLabel>& labels, bool simulated,
-                        bool relative, const StudyAbout& about) {
+                        bool relative, const ExportSettings& settings) {
+  const std::string samples =
+      settings.motion
+          ? "Where a table's name has run-N, servo-rate samples were kept: motion/ beside beh/ "
+            "holds those of\nall its trials as a motion recording, one row a period of the servo; "
+            "channels.tsv names the columns,\nevents.tsv says when each trial was, and the table's "
+            "JSON file where it stands, which object was\nfelt, how it was turned and with which "
+            "renderer. "
+          : "Where a table's name has run-N, servo-rate samples were kept: recording-haptic beside "
+            "it holds\nthose of all its trials, one row a period of the servo, and its JSON file "
+            "where each trial stands,\nwhich object was felt, how it was turned and with which "
+            "renderer. ";
   return dataset_name(labels, simulated) + "\n\n" + dataset_description(labels, simulated) +
-         "\n\n" + about_text(about) +
+         "\n\n" + about_text(settings.about) +
          "sub-CODE/ses-S/beh/ holds the trials of session S of a participant, one row a trial, "
          "sorted by\nonset. Every column is described in the JSON file beside the table. The "
          "protocol that was run\nis in sourcedata/, byte for byte; protocol_sha256 is its "
-         "checksum.\n\n"
-         "Where a table's name has run-N, servo-rate samples were kept: recording-haptic beside "
-         "it "
-         "holds\nthose of all its trials, one row a period of the servo, and its JSON file where "
-         "each trial stands,\nwhich object was felt, how it was turned and with which renderer. A "
-         "new run begins with every\nstart of the program and after more than a minute between "
+         "checksum.\n\n" +
+         samples +
+         "A new run begins with every\nstart of the program and after more than a minute between "
          "two trials. Periods between trials, and\nthose whose tick was missed, are rows of n/a. "
          "Places are rounded to 1 nm, forces to 1 uN and\ntorques to 1 uN m.\n\n" +
+         (settings.derived
+              ? "derivatives/palpate/ holds measures that were derived from the "
+                "samples, one row a trial, with a\nJSON file that says what each is. " +
+                    settings.derived->how + "\n\n"
+              : "") +
          (relative ? kRelativeSentence : "") + kGuardSentence +
          "\n"
          "sourcedata/attempts.csv, where it is there, lists attempts that were cut off; their "
@@ -107,7 +121,8 @@ class BidsWriter : public DatasetWriter {
   };
   /// The session, or with samples the BIDS run, whose rows are being collected.
   struct Table {
-    std::string stem;  // of its files, with folders
+    std::string stem;         // of its files, with folders
+    std::string motion, run;  // likewise of those of motion, before and after tracksys
     const StudyLabel* study = nullptr;
     Participant person;
     std::vector<Row> rows;
@@ -117,19 +132,33 @@ class BidsWriter : public DatasetWriter {
   void add_row(const StoredTrial& trial);
   void write_table();
   void write_sidecar();
+  std::string recording_name() const;
+  void write_recording();
+  void end_session();
+  void describe_derivatives(bool simulated);
   void describe_participants();
 
   std::map<std::string, std::string> participants_;  // code -> value of the column simulated
   std::int64_t participant_ = -1;
   int session_ = 0;
-  std::string session_stem_;
+  std::string session_stem_, scans_stem_;
   int run_ = 0;  // of BIDS, within the session; 0: it has no servo samples
   Table table_;
   std::optional<BidsRecording> recording_;
+  std::string scans_;                    // rows of the session
+  std::optional<DerivedTable> derived_;  // of the session
   DelimitedRow row_{DelimitedFormat::tsv};
 };
 
+/// "sub-S001/ses-1/KIND/sub-S001_ses-1": begin of the names of a session's files.
+std::string session_files(const StoredTrial& trial, const std::string& kind) {
+  const std::string who = "sub-" + trial.participant.code;
+  const std::string when = "ses-" + std::to_string(trial.record.session);
+  return who + "/" + when + "/" + (kind.empty() ? "" : kind + "/") + who + "_" + when;
+}
+
 void BidsWriter::begin_session(const StoredTrial& trial) {
+  end_session();
   const std::string who = "sub-" + trial.participant.code;
   const std::string when = "ses-" + std::to_string(trial.record.session);
   participant_ = trial.participant.id;
@@ -140,6 +169,20 @@ void BidsWriter::begin_session(const StoredTrial& trial) {
   const std::string simulated = trial.participant.simulated ? "1" : "0";
   const auto [at, added] = participants_.emplace(trial.participant.code, simulated);
   if (!added && at->second != simulated) at->second = "mixed";
+  scans_stem_ = session_files(trial, "");
+  if (!settings_.derived) return;
+  const std::string stem =
+      "derivatives/palpate/" + session_stem_ + "_desc-" + settings_.derived->name + "_beh";
+  derived_.emplace(folder_.prepare(stem + ".tsv"), DelimitedFormat::tsv, *settings_.derived);
+  write(stem + ".json",
+        json_text(describe_derived(*settings_.derived, labels_.at(trial.protocol_sha256).facts)));
+}
+
+void BidsWriter::end_session() {
+  if (derived_) derived_->close();
+  derived_.reset();
+  if (!scans_.empty()) write(scans_stem_ + "_scans.tsv", "filename\tacq_time\n" + scans_);
+  scans_.clear();
 }
 
 void BidsWriter::add(const StoredTrial& trial) {
@@ -154,11 +197,16 @@ void BidsWriter::add(const StoredTrial& trial) {
     table_.study = &labels_.at(trial.protocol_sha256);
     table_.stem = session_stem_ + (run_ > 0 ? "_run-" + std::to_string(run_) : "");
     table_.person = trial.participant;
-    if (run_ > 0) recording_.emplace(trial, *table_.study);
+    const std::string run = run_ > 0 ? "_run-" + std::to_string(run_) : "";
+    const std::string task = "_task-" + table_.study->label;
+    table_.motion = session_files(trial, "motion") + task;
+    table_.run = run;
+    if (run_ > 0) recording_.emplace(trial, *table_.study, settings_);
   }
   add_row(trial);
+  if (derived_ && !trial.record.practice) derived_->add(trial);
   if (!recording_) return;
-  recording_->add(trial, folder_.prepare(table_.stem + "_recording-haptic_physio.tsv.gz"));
+  recording_->add(trial, folder_.prepare(recording_name()));
   samples_ += static_cast<std::int64_t>(trial.record.samples.size());
 }
 
@@ -178,13 +226,32 @@ void BidsWriter::end_table() {
     write_table();
     write_sidecar();
   }
-  if (recording_) {
-    if (const auto about = recording_->finish(settings_.fault_bits)) {
-      write(table_.stem + "_recording-haptic_physio.json", json_text(*about));
-    }
-  }
+  if (recording_ && recording_->finish()) write_recording();
   recording_.reset();
   table_ = {};
+}
+
+std::string BidsWriter::recording_name() const {
+  if (!settings_.motion) return table_.stem + "_recording-haptic_physio.tsv.gz";
+  return table_.motion + "_tracksys-" + kTrackingSystem + table_.run + "_motion.tsv";
+}
+
+/// What describes it.
+void BidsWriter::write_recording() {
+  if (!settings_.motion) {
+    write(table_.stem + "_recording-haptic_physio.json", json_text(recording_->physio_sidecar()));
+    return;
+  }
+  const std::string tracked = table_.motion + "_tracksys-" + kTrackingSystem + table_.run;
+  const std::string events = table_.motion + table_.run + "_events";
+  write(tracked + "_motion.json", json_text(recording_->motion_sidecar()));
+  write(tracked + "_channels.tsv", motion_channels(recording_->columns()));
+  write(tracked + "_channels.json", json_text(motion_frames()));
+  write(events + ".tsv", recording_->motion_events());
+  write(events + ".json", json_text(MotionEvents::description(table_.study->facts)));
+  const std::string name = recording_name();
+  scans_ += name.substr(name.find("/motion/") + 1) + "\t" +
+            clock_.utc(table_.person, recording_->first_row_ns()) + "\n";
 }
 
 void BidsWriter::write_table() {
@@ -224,6 +291,7 @@ void BidsWriter::write_sidecar() {
     const Json levels = recorded_levels(column.name, table_.runs, study);
     if (!levels.is_null()) about["Levels"] = levels;
   }
+  if (recording_ && settings_.motion) recording_->put_trials(json);
   write(table_.stem + "_beh.json", json_text(json));
 }
 
@@ -253,7 +321,24 @@ void BidsWriter::describe_participants() {
   write("participants.json", json_text(json));
 }
 
+/// A dataset of its own, as BIDS has derivatives.
+void BidsWriter::describe_derivatives(bool simulated) {
+  if (!settings_.derived) return;
+  const Json json{
+      {"Name", dataset_name(labels_, simulated) + ": " + settings_.derived->name},
+      {"BIDSVersion", kBidsVersion},
+      {"DatasetType", "derivative"},
+      {"GeneratedBy",
+       {{{"Name", "palpate"},
+         {"Version", settings_.program_version},
+         {"Description", "palpate export --movement. " + settings_.derived->how +
+                             (simulated ? std::string(" ") + kSimulatedSentence : "")}}}}};
+  write("derivatives/palpate/dataset_description.json", json_text(json));
+}
+
 void BidsWriter::describe_dataset(bool simulated) {
+  end_session();
+  describe_derivatives(simulated);
   describe_participants();
   for (const auto& [sha256, study] : labels_) {
     write("sourcedata/" + study.label + "_protocol.json", study.protocol.text);
@@ -268,7 +353,7 @@ void BidsWriter::describe_dataset(bool simulated) {
                {"Description", "palpate export --format bids; trials recorded by palpate"}}}}};
   json.update(bids_fields(settings_.about));
   write("dataset_description.json", json_text(json));
-  write("README", readme_text(labels_, simulated, clock_.relative(), settings_.about));
+  write("README", readme_text(labels_, simulated, clock_.relative(), settings_));
 }
 
 bool BidsWriter::has_file(const std::string& name) {
@@ -276,7 +361,12 @@ bool BidsWriter::has_file(const std::string& name) {
       R"(dataset_description\.json|README|participants\.(tsv|json)|)"
       R"(sourcedata/([0-9A-Za-z]+_protocol\.json|attempts\.csv|pages\.(csv|json))|stimuli/[0-9A-Za-z]+/[^/]+|)"
       R"(sub-[0-9A-Za-z]+/ses-\d+/beh/sub-[0-9A-Za-z]+_ses-\d+_task-[0-9A-Za-z]+(_run-\d+)?)"
-      R"((_beh\.(tsv|json)|_recording-haptic_physio\.(tsv\.gz|json)))");
+      R"((_beh\.(tsv|json)|_recording-haptic_physio\.(tsv\.gz|json))|)"
+      R"(sub-[0-9A-Za-z]+/ses-\d+/sub-[0-9A-Za-z]+_ses-\d+_scans\.tsv|)"
+      R"(sub-[0-9A-Za-z]+/ses-\d+/motion/sub-[0-9A-Za-z]+_ses-\d+_task-[0-9A-Za-z]+)"
+      R"((_run-\d+_events|_tracksys-stylus_run-\d+_(motion|channels))\.(tsv|json)|)"
+      R"(derivatives/palpate/(dataset_description\.json|)"
+      R"(sub-[0-9A-Za-z]+/ses-\d+/beh/sub-[0-9A-Za-z]+_ses-\d+_task-[0-9A-Za-z]+_desc-movement_beh\.(tsv|json)))");
   return std::regex_match(name, pattern);
 }
 

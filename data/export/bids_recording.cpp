@@ -15,11 +15,12 @@ constexpr double kLongestGap = 60;  // s
 
 const Column kTrialOfSample{"trial", "Trial within the session, from 1, that the tick is of", "1"};
 
-std::vector<Column> columns_of(const StudyLabel& study) {
+std::vector<Column> columns_of(const StudyLabel& study, bool contacts) {
   std::vector<Column> all{kTrialOfSample};
   if (!study.facts.blocks.empty()) all.push_back(interval_column());
   all.insert(all.end(), sample_columns().begin(), sample_columns().end());
   if (has_bodies(study.facts)) all.insert(all.end(), body_columns().begin(), body_columns().end());
+  if (contacts) all.insert(all.end(), contact_columns().begin(), contact_columns().end());
   return all;
 }
 
@@ -70,11 +71,13 @@ nlohmann::ordered_json objects_of(const StudyLabel& study) {
 
 }  // namespace
 
-BidsRecording::BidsRecording(const StoredTrial& first, const StudyLabel& study)
+BidsRecording::BidsRecording(const StoredTrial& first, const StudyLabel& study,
+                             const ExportSettings& settings)
     : study_(study),
+      settings_(settings),
       run_(first.run),
       simulated_(first.participant.simulated),
-      columns_(columns_of(study)),
+      columns_(columns_of(study, settings.contacts != nullptr)),
       begin_ns_(to_unix_ns(first.run.clock, first_onset_ns(first.record))) {}
 
 std::optional<std::int64_t> BidsRecording::slot_of(std::int64_t unix_ns) const {
@@ -104,21 +107,26 @@ void BidsRecording::add(const StoredTrial& trial, const std::string& path) {
   SampleSlots slots(trial, study_.facts.servo_rate);
   const bool bodies = has_bodies(study_.facts);
   const std::string nothing = empty_row(columns_.size());
+  std::vector<std::optional<TickContact>> contacts;
+  if (settings_.contacts) contacts = settings_.contacts(trial);
+  contacts.resize(record.samples.size());
+  auto contact = contacts.begin();
   DelimitedRow row(DelimitedFormat::tsv);
   std::int64_t first = 0;
   for (const SampleRecord& sample : record.samples) {
     const std::int64_t slot = onset + slots.next();
     if (!file_) {
-      file_.emplace(path);
+      file_.emplace(path, !settings_.motion);
       first_row_ = next_row_ = slot;
     }
     if (&sample == &record.samples.front()) first = slot;
-    for (; next_row_ < slot; ++next_row_) file_->gzip.write(nothing);
+    for (; next_row_ < slot; ++next_row_) file_->write(nothing);
     row << record.trial;
     if (!study_.facts.blocks.empty()) row << slots.interval();
     put_sample(row, sample);
     if (bodies) put_body(row, record, sample);
-    file_->gzip.write(row.end());
+    if (settings_.contacts) put_contact(row, *contact++);
+    file_->write(row.end());
     ++next_row_;
   }
   free_ = std::max(free_, next_row_);
@@ -131,13 +139,17 @@ void BidsRecording::add(const StoredTrial& trial, const std::string& path) {
                              {"shape", guarded_text(record.shape)},
                              {"orientation_wxyz", record.orientation_wxyz}});
   if (record.task) about["intervals"] = intervals_of(*record.task);
+  if (settings_.motion) events_.add(trial, onset);
 }
 
-std::optional<nlohmann::ordered_json> BidsRecording::finish(
-    const std::vector<FaultMeaning>& fault_bits) {
-  if (!file_) return std::nullopt;
-  file_->gzip.finish();
+bool BidsRecording::finish() {
+  if (!file_) return false;
+  if (file_->gzip) file_->gzip->finish();
   file_->sink.close(false);
+  return true;
+}
+
+nlohmann::ordered_json BidsRecording::physio_sidecar() const {
   nlohmann::ordered_json json{
       {"SamplingFrequency", study_.facts.servo_rate},
       {"StartTime", static_cast<double>(first_row_) / study_.facts.servo_rate},
@@ -146,18 +158,41 @@ std::optional<nlohmann::ordered_json> BidsRecording::finish(
       {"Simulated", simulated_},
       {"Device", run_.device}};
   for (const Column& column : columns_) json["Columns"].push_back(column.name);
-  for (const Column& column : columns_) json[column.name] = describe_column(column, {}, fault_bits);
-  json["TrialsDescription"] =
+  for (const Column& column : columns_)
+    json[column.name] = describe_column(column, {}, settings_.fault_bits);
+  put_trials(json);
+  return json;
+}
+
+nlohmann::ordered_json BidsRecording::motion_sidecar() const {
+  // BIDS has no other key that could say it.
+  const std::string label = simulated_ ? "SIMULATED participant, no person. " : "";
+  nlohmann::ordered_json json{{"TaskName", study_.protocol.name},
+                              {"TaskDescription", label + study_.facts.title}};
+  json.update(motion_facts(columns_, study_.facts.servo_rate, next_row_ - first_row_, run_));
+  return json;
+}
+
+void BidsRecording::put_trials(nlohmann::ordered_json& sidecar) const {
+  sidecar["TrialsDescription"] =
       "Where each trial stands (first_row counts from 0, onset in s) and what was felt: the object "
       "of that name in Objects, turned by the quaternion about the origin of the world frame; "
       "intervals, where a trial has "
       "them: what was felt in each, null for nothing, or a level of its own";
-  json["Trials"] = trials_;
-  json["ObjectsDescription"] =
+  sidecar["Trials"] = trials_;
+  sidecar["ObjectsDescription"] =
       "The protocol's stimuli: position_m, where it is there, and orientation_wxyz place the "
       "object before it is turned; lengths in m";
-  json["Objects"] = objects_of(study_);
-  return json;
+  sidecar["Objects"] = objects_of(study_);
+}
+
+std::string BidsRecording::motion_events() const {
+  return events_.table(first_row_, study_.facts.servo_rate);
+}
+
+std::int64_t BidsRecording::first_row_ns() const {
+  return begin_ns_ + static_cast<std::int64_t>(std::llround(static_cast<double>(first_row_) * 1e9 /
+                                                            study_.facts.servo_rate));
 }
 
 }  // namespace palpate::data

@@ -254,6 +254,21 @@ std::vector<Column> make_bodies() {
   };
 }
 
+/// By the names of `palpate render`.
+std::vector<Column> make_contacts() {
+  return {
+      {"contact_x", "Place of the deepest contact, by rendering the trial again, world frame, x",
+       "m"},
+      {"contact_y", "Place of the deepest contact, by rendering the trial again, world frame, y",
+       "m"},
+      {"contact_z", "Place of the deepest contact, by rendering the trial again, world frame, z",
+       "m"},
+      {"normal_x", "Direction of the surface there, out of the object, world frame, x", "1"},
+      {"normal_y", "Direction of the surface there, out of the object, world frame, y", "1"},
+      {"normal_z", "Direction of the surface there, out of the object, world frame, z", "1"},
+  };
+}
+
 /// With shifted dates, and the seconds between them in the column elapsed.
 std::vector<Column> made_relative(std::vector<Column> columns) {
   for (Column& column : columns) {
@@ -297,6 +312,11 @@ const Column& interval_column() {
 
 std::span<const Column> sample_columns() {
   static const std::vector<Column> all = make_samples();
+  return all;
+}
+
+std::span<const Column> contact_columns() {
+  static const std::vector<Column> all = make_contacts();
   return all;
 }
 

@@ -31,6 +31,8 @@ std::span<const Column> attempt_columns(Times times);  ///< of attempts.csv, lik
 std::span<const Column> sample_columns();              ///< of a servo tick, in order
 /// After them where a stimulus of the protocol moves: where it was after the tick.
 std::span<const Column> body_columns();
+/// After those where contacts are asked for.
+std::span<const Column> contact_columns();
 /// Before them where a protocol of version 2 is among the studies.
 const Column& interval_column();
 

@@ -69,6 +69,16 @@ void put_sample(DelimitedRow& row, const SampleRecord& sample) {
       << static_cast<double>(sample.compute_ns) / 1e9;
 }
 
+void put_contact(DelimitedRow& row, const std::optional<TickContact>& contact) {
+  constexpr int kDecimals = 9;
+  for (std::size_t k = 0; k < contact_columns().size(); ++k) {
+    if (contact)
+      row.rounded(k < 3 ? contact->point[k] : contact->normal[k - 3], kDecimals);
+    else
+      row << "";
+  }
+}
+
 bool has_bodies(const ProtocolFacts& facts) {
   return std::any_of(facts.stimuli.begin(), facts.stimuli.end(), [](const StimulusFacts& stimulus) {
     return read_json(stimulus.object).contains("body");

@@ -64,6 +64,8 @@ void put_attempt(DelimitedRow& row, const StoredTrial& attempt, const ExportCloc
 /// sample_columns(): positions rounded to 1 nm, forces to 1 uN and torques to 1 uN m, a thousandth
 /// of the resolution of any device; the database has all digits.
 void put_sample(DelimitedRow& row, const SampleRecord& sample);
+/// contact_columns(), places rounded to 1 nm; missing in free space.
+void put_contact(DelimitedRow& row, const std::optional<TickContact>& contact);
 /// Whether a stimulus of the protocol moves: samples then have body_columns() as well.
 bool has_bodies(const ProtocolFacts& facts);
 /// body_columns(), rounded to 1e-9 of their unit; missing where nothing moved.

@@ -8,6 +8,7 @@
 #include "data/export/column_values.h"
 #include "data/export/dataset_description.h"
 #include "data/export/dataset_writer.h"
+#include "data/export/derived_table.h"
 #include "data/export/sample_slots.h"
 #include "data/files/text_sink.h"
 
@@ -40,8 +41,14 @@ Json describe_variable(const Column& column, const ProtocolFacts& facts,
 }
 
 std::string dataset_readme(const std::string& name, const std::string& description, bool relative,
-                           const StudyAbout& about) {
-  return "# " + name + "\n\n" + description + "\n\n" + about_text(about) +
+                           const ExportSettings& settings) {
+  const std::string derived =
+      settings.derived
+          ? "`..._description-movement_data.csv` holds measures that were derived from the "
+            "samples, one row a trial.\n" +
+                settings.derived->how + "\n"
+          : "";
+  return "# " + name + "\n\n" + description + "\n\n" + about_text(settings.about) +
          "`data/subject-CODE/study-T_subject-CODE_data.csv` holds all trials of a participant, "
          "one row a trial.\n"
          "`..._session-S_description-haptic_data.csv`, where it is there, holds the servo-rate "
@@ -51,7 +58,8 @@ std::string dataset_readme(const std::string& name, const std::string& descripti
          "first one. What was felt, how it was turned and with\nwhich renderer stands in the "
          "trial's "
          "row. Places are rounded to 1 nm, forces to "
-         "1 uN and torques to 1 uN m.\n"
+         "1 uN and torques to 1 uN m.\n" +
+         derived +
          "`data/study-T_description-attempts_data.csv`, where it is there, lists attempts that "
          "were cut off; their\ntrials were shown again.\n"
          "`data/study-T_description-pages_data.csv`, where it is there, has the participants' "
@@ -94,6 +102,7 @@ class PsychDsWriter : public DatasetWriter {
   std::int64_t participant_ = -1;
   int session_ = 0;  // of haptic_
   std::optional<FileSink> table_, haptic_;
+  std::optional<DerivedTable> derived_;
   DelimitedRow row_{DelimitedFormat::csv};
 };
 
@@ -108,7 +117,13 @@ void PsychDsWriter::add(const StoredTrial& trial) {
     row_ << trial_columns(settings_.times, clock_.tasks(), clock_.torque().any());
     table_->write(row_.end());
     use(trial_columns(settings_.times, clock_.tasks(), clock_.torque().any()));
+    if (settings_.derived) {
+      derived_.emplace(
+          folder_.prepare(stem + "_description-" + settings_.derived->name + "_data.csv"),
+          DelimitedFormat::csv, *settings_.derived);
+    }
   }
+  if (derived_ && !trial.record.practice) derived_->add(trial);
   put_trial(row_, trial, clock_);
   table_->write(row_.end());
   if (!trial.record.samples.empty()) write_samples(trial, stem, study.facts);
@@ -119,6 +134,8 @@ void PsychDsWriter::end_table() {
     if (*file) (*file)->close(false);
     file->reset();
   }
+  if (derived_) derived_->close();
+  derived_.reset();
 }
 
 void PsychDsWriter::write_samples(const StoredTrial& trial, const std::string& stem,
@@ -139,12 +156,18 @@ void PsychDsWriter::write_samples(const StoredTrial& trial, const std::string& s
     if (clock_.tasks()) row_ << interval_column().name;
     row_ << kTimeOfTick.name << sample_columns();
     if (bodies) row_ << body_columns();
+    if (settings_.contacts) row_ << contact_columns();
     haptic_->write(row_.end());
     if (clock_.tasks()) use({&interval_column(), 1});
     use({&kTimeOfTick, 1});
     use(sample_columns());
     if (bodies) use(body_columns());
+    if (settings_.contacts) use(contact_columns());
   }
+  std::vector<std::optional<TickContact>> contacts;
+  if (settings_.contacts) contacts = settings_.contacts(trial);
+  contacts.resize(record.samples.size());
+  auto contact = contacts.begin();
   SampleSlots slots(trial, facts.servo_rate);
   for (const SampleRecord& sample : record.samples) {
     const std::int64_t slot = slots.next();
@@ -153,6 +176,7 @@ void PsychDsWriter::write_samples(const StoredTrial& trial, const std::string& s
     row_ << static_cast<double>(slot) / facts.servo_rate;
     put_sample(row_, sample);
     if (bodies) put_body(row_, record, sample);
+    if (settings_.contacts) put_contact(row_, *contact++);
     haptic_->write(row_.end());
   }
   samples_ += static_cast<std::int64_t>(record.samples.size());
@@ -174,7 +198,18 @@ Json PsychDsWriter::variables() const {
   add({&kTimeOfTick, 1});
   add(sample_columns());
   add(body_columns());
+  add(contact_columns());
   add(page_columns());
+  if (settings_.derived) {
+    for (const DerivedColumn& column : settings_.derived->columns) {
+      if (!described.insert(column.name).second) continue;  // a trial's own column of that name
+      Json variable{
+          {"@type", "PropertyValue"}, {"name", column.name}, {"description", column.description}};
+      if (column.unit != "1") variable["unitText"] = column.unit;
+      all.push_back(std::move(variable));
+    }
+    all.push_back(describe_variable(DerivedTable::missing(), facts, {}));
+  }
   return all;
 }
 
@@ -193,7 +228,7 @@ void PsychDsWriter::describe_dataset(bool simulated) {
   json["measurementTechnique"] = "palpate " + settings_.program_version;
   json["variableMeasured"] = variables();
   write("dataset_description.json", json_text(json));
-  write("README.md", dataset_readme(name, description, clock_.relative(), settings_.about));
+  write("README.md", dataset_readme(name, description, clock_.relative(), settings_));
 }
 
 bool PsychDsWriter::has_file(const std::string& name) {
@@ -201,7 +236,7 @@ bool PsychDsWriter::has_file(const std::string& name) {
       R"(dataset_description\.json|README\.md|materials/[0-9A-Za-z]+(_protocol\.json|/[^/]+)|)"
       R"(data/study-[0-9A-Za-z]+_description-(attempts|pages)_data\.csv|)"
       R"(data/subject-[0-9A-Za-z]+/study-[0-9A-Za-z]+_subject-[0-9A-Za-z]+)"
-      R"((_session-\d+(_trial-\d+)?_description-haptic)?_data\.csv)");
+      R"(((_session-\d+(_trial-\d+)?_description-haptic|_description-movement))?_data\.csv)");
   return std::regex_match(name, pattern);
 }
 

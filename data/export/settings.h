@@ -1,8 +1,10 @@
 #pragma once
 // Settings and results that all export formats share.
 
+#include <array>
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -39,6 +41,31 @@ struct FaultMeaning {
   std::string text;
 };
 
+struct StoredTrial;
+
+/// Where the deepest contact of a tick was, and the surface's direction there. World frame.
+struct TickContact {
+  std::array<double, 3> point{};   ///< m, on the ideal probe
+  std::array<double, 3> normal{};  ///< unit, out of the object
+};
+
+struct DerivedColumn {
+  std::string name, description;
+  std::string unit;  ///< "1": a pure number
+};
+
+/// Numbers that were derived from the samples of each trial, for tables of their own.
+struct DerivedMeasures {
+  struct Values {
+    std::vector<std::optional<double>> numbers;  ///< of the columns; empty: none of them
+    std::string missing;                         ///< why there are none
+  };
+  std::string name;  ///< of the tables, "movement"
+  std::string how;   ///< a sentence on the settings
+  std::vector<DerivedColumn> columns;
+  std::function<Values(const StoredTrial&)> of;
+};
+
 enum class Times {
   absolute,  ///< on the calendar
   /// Seconds from the participant's first trial; dates are shifted so that this trial is at the
@@ -54,6 +81,12 @@ struct ExportSettings {
   std::vector<FaultMeaning> fault_bits = {};  ///< lowest first
   StudyAbout about = {};                      ///< BIDS and Psych-DS: goes into their descriptions
   bool pages = false;  ///< with the answers to pages, which are personal data
+  /// BIDS: samples as a motion recording in place of a physiological one.
+  bool motion = false;
+  /// Contacts of each sample of a trial; samples have their columns then. May return none at all
+  /// for a trial: they are missing.
+  std::function<std::vector<std::optional<TickContact>>(const StoredTrial&)> contacts = {};
+  std::optional<DerivedMeasures> derived = {};  ///< BIDS and Psych-DS: tables of them as well
   /// Parses the text of a protocol; called by exports with descriptions only. May throw.
   std::function<ProtocolFacts(const ProtocolInfo&)> facts = {};
   /// Called every so many trials with their number; may throw to stop the export, which then leaves

@@ -91,14 +91,14 @@ class Dictionary(unittest.TestCase):
         self.assertEqual(set(header), set(self.documented("pages")))
 
     def test_columns_of_samples_with_their_units(self):
-        output_of("export", "--db", "one.db", "--format", "bids", "--out", "bids", folder=self.folder)
+        output_of("export", "--db", "one.db", "--format", "bids", "--contacts", "--out", "bids", folder=self.folder)
         about = json.loads(next(self.folder.glob("bids/sub-*/ses-1/beh/*_physio.json")).read_text())
         documented = {column: unit for column, unit in self.documented("samples").items()
                       if not column.startswith("body_")}  # where something moves: moving_stimuli_test.py
         self.assertEqual({"trial", *documented}, set(about["Columns"]))
         for column, unit in documented.items():
             self.assertEqual(about[column].get("Units", ""), unit, column)
-        output_of("export", "--db", "one.db", "--format", "psych-ds", "--out", "psychds", folder=self.folder)
+        output_of("export", "--db", "one.db", "--format", "psych-ds", "--contacts", "--out", "psychds", folder=self.folder)
         table = next(self.folder.glob("psychds/data/*/*description-haptic_data.csv"))
         header = table.read_text().split("\n", 1)[0].split(",")
         self.assertEqual(set(header), {"participant_id", "session", "trial", "time", *documented})

@@ -48,14 +48,14 @@ def validator():
     return command
 
 
-def simulate(folder, name, participants, /, start="quick", about=None, **changes):
+def simulate(folder, name, participants, /, start="quick", about=None, more=(), **changes):
     protocol = json.loads((PROTOCOLS / f"{start}.json").read_text())
     protocol.pop("$schema")
     protocol.update(changes)
     (folder / f"{name}.json").write_text(json.dumps(protocol))
     who = ["--about", about] if about else []
     for words in (["simulate", folder / f"{name}.json", "--db", folder / f"{name}.db", "--participants", participants],
-                  ["export", "--db", folder / f"{name}.db", "--format", "bids", *who, "--out", folder / name]):
+                  ["export", "--db", folder / f"{name}.db", "--format", "bids", *who, *more, "--out", folder / name]):
         subprocess.run([PALPATE, *map(str, words)], check=True, capture_output=True, timeout=600)
     return folder / name
 
@@ -94,6 +94,13 @@ def main():
         about = PROTOCOLS.parent / "tests" / "protocols" / "studies" / "good" / "everything.json"
         errors, warnings = issues(command, simulate(folder, "authors", 2, about=about))
         good &= expect(errors == [] and warnings == [], f"with --about: no errors {errors}, no warnings {warnings}")
+        for name, start, changes in [("motion", "quick", {"repetitions": 1}), ("motion-tasks", "stiffness-2afc", {}),
+                                     ("motion-body", "floating", {"repetitions": 1})]:
+            dataset = simulate(folder, name, 1, start=start, about=about, samples=True, **changes,
+                               more=["--motion", "--contacts", "--movement"] if start != "stiffness-2afc" else ["--motion"])
+            errors, warnings = issues(command, dataset)
+            # It looks for a header in every TSV file, and motion files have none.
+            good &= expect(errors == [] and set(warnings) <= {"CUSTOM_COLUMN_WITHOUT_DESCRIPTION"}, f"{name}: no errors {errors}, {warnings}")
         table = next(plain.glob("sub-S001/ses-1/beh/*_beh.tsv"))
         table.rename(table.with_name("sub-S001_trials.tsv"))
         good &= expect("NOT_INCLUDED" in issues(command, plain)[0], "a name that is none is found")
