@@ -160,6 +160,14 @@ class PageBuilder {
       note(
           "A soft object is drawn at rest; contacts and forces are those of its surface as it "
           "gave way.");
+    if (!object.material.layers.empty()) {
+      std::vector<std::string> depths;
+      for (const auto& layer : object.material.layers)
+        depths.push_back(fixed(1000 * layer.depth, 1) + " mm");
+      note("Of " + name + " the surface is drawn; it has " +
+           counted(depths.size(), "layer", "layers") + " below it, from a depth of " +
+           analysis::joined(depths) + ".");
+    }
     std::vector<double> corners;
     for (const auto& triangle : mesh.triangles)
       for (const std::uint32_t corner : triangle) corners.push_back(corner);

@@ -147,6 +147,15 @@ class Watch(CommandCase):
         for axis in "xyz":
             self.assert_column(c[f"moved_{axis}"], [row[f"recorded_body_{axis}"] for row in rows], METRE)
 
+    def test_what_is_not_drawn_is_said(self):
+        layers = [{"depth_m": 0.001, "stiffness_n_per_m": 50}, {"depth_m": 0.004, "stiffness_n_per_m": 50}]
+        stimuli = [{"name": "sphere", "shape": "sphere", "radius_m": 0.03, "material": {"layers": layers}},
+                   {"name": "cube", "shape": "cube", "edge_m": 0.05}]
+        db = self.study("layers", stimuli=stimuli, renderers=["point"])
+        said = [self.page(db, f"S001/1/{k}")[0] for k in (1, 2)]
+        words = "Of sphere the surface is drawn; it has 2 layers below it, from a depth of 1.0 mm and 4.0 mm."
+        self.assertEqual(sorted(words in page for page in said), [False, True])
+
     def test_intervals_of_a_task_each_have_their_object(self):
         design = json.loads((PROTOCOLS / "size-questplus.json").read_text())
         design.pop("$schema")
