@@ -93,6 +93,13 @@ void SharpEdges::add_surface(const rendering::PlacedSurface& placed) {
   }
 }
 
+std::vector<std::array<Vec3, 2>> SharpEdges::lines() const {
+  std::vector<std::array<Vec3, 2>> all;
+  all.reserve(lines_.size());
+  for (const Line& line : lines_) all.push_back({line.from, line.from + line.along});
+  return all;
+}
+
 double SharpEdges::distance(const Vec3& point) const {
   double least2 = std::numeric_limits<double>::infinity();
   for (const Line& line : lines_) {

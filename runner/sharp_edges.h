@@ -1,6 +1,7 @@
 #pragma once
 // Where a stimulus has edges that can be felt: what edge dwell is measured from.
 
+#include <array>
 #include <cstddef>
 #include <vector>
 
@@ -26,6 +27,8 @@ class SharpEdges {
   double distance(const Vec3& point) const;
   /// More than kMost were found, and none kept.
   bool too_many() const { return too_many_; }
+  /// m, ends of each edge; a sharp vertex is one of no length.
+  std::vector<std::array<Vec3, 2>> lines() const;
 
  private:
   struct Line {

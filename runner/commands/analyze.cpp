@@ -11,6 +11,7 @@
 
 #include "analysis/figures/figure_svg.h"
 #include "analysis/figures/figures.h"
+#include "analysis/figures/movement_figures.h"
 #include "analysis/figures/task_figures.h"
 #include "analysis/input/study_record.h"
 #include "analysis/input/task_trials.h"
@@ -146,7 +147,7 @@ void check_movement(const boost::program_options::variables_map& values, double 
   }
   if (!values.count("db"))
     throw UsageError("--movement: needs the samples of a database; give --db FILE");
-  for (const char* option : {"report", "figures", "protocol", "scale"}) {
+  for (const char* option : {"protocol", "scale"}) {
     if (values.count(option))
       throw UsageError("--" + std::string(option) + ": does not go with --movement");
   }
@@ -157,17 +158,22 @@ void check_movement(const boost::program_options::variables_map& values, double 
   if (jobs < 1 || jobs > 1024) throw UsageError("--jobs: must be 1 to 1024");
 }
 
-void analyze_movement_of(const MovementRequest& request, Outputs& outputs) {
+void analyze_movement_of(MovementRequest request, Outputs& outputs) {
+  request.pictures = outputs.wanted("report") || outputs.wanted("figures");
   MovementStudy study = measure_study(request);
-  if (study.table.missing.contains("no samples") &&
-      study.table.missing["no samples"] == study.table.values.size()) {
-    throw UsageError(stimuli::printable(request.database) +
-                     ": has no servo samples; a protocol with \"samples\": true keeps them");
-  }
+  require_samples(study, request.database);
   if (outputs.wanted("movement-csv")) outputs.put("movement-csv", study.csv);
   const analysis::MovementAnalysis found =
       analysis::analyze_movement(std::move(study.table), PALPATE_VERSION);
   if (outputs.wanted("json")) outputs.put("json", analysis::movement_json(found));
+  if (outputs.wanted("report"))
+    outputs.put("report", analysis::movement_html(found, study.pictures));
+  if (outputs.wanted("figures")) {
+    for (const analysis::Figure& figure : analysis::movement_figures(found.table, study.pictures)) {
+      outputs.put_into_folder(figure.id + ".svg",
+                              analysis::figure_svg(figure, analysis::light_palette()));
+    }
+  }
   outputs.write();
   std::cout << analysis::movement_text(found);
 }
@@ -181,7 +187,7 @@ int analyze_command(const std::vector<std::string>& args) {
       "       [--function logistic|normal|weibull] [--scale linear|log]\n"
       "       [--json FILE] [--report FILE.html] [--figures DIR] [--force]\n"
       "palpate analyze --db FILE --movement [--movement-csv FILE] [--cutoff-hz F] [--jobs J]\n"
-      "       [--meshes DIR] [--json FILE] [--force]";
+      "       [--meshes DIR] [--json FILE] [--report FILE.html] [--figures DIR] [--force]";
   line.summary =
       "Compares response times with the ray and the point renderer: percent reduction for each\n"
       "shape with intervals and tests, accuracy, learning and exclusions. In data with other\n"
@@ -200,6 +206,7 @@ int analyze_command(const std::vector<std::string>& args) {
       "      correct and response_time suffice)\n"
       "  palpate analyze --db thresholds.db --function weibull\n"
       "  palpate analyze --db study.db --movement --movement-csv movement.csv\n"
+      "  palpate analyze --db study.db --movement --report movement.html --figures figures\n"
       "  palpate analyze --sweep people.sweep --report people.html\n"
       "  palpate analyze --sweep people.sweep --pattern 'cone > 5 && cone > 2 * abs(sphere)'\n"
       "      (names: shapes, for their gains in percent, and columns of the CSV, such as delay or\n"

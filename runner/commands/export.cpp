@@ -3,6 +3,7 @@
 #include <iostream>
 #include <stdexcept>
 #include <string>
+#include <thread>
 
 #include "data/export/bids.h"
 #include "data/export/csv.h"
@@ -10,6 +11,7 @@
 #include "data/export/sweep_csv.h"
 #include "data/store/store.h"
 #include "data/store/sweep_file.h"
+#include "runner/commands/movement/movement_export.h"
 #include "runner/commands/shared/about_file.h"
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/progress_line.h"
@@ -58,16 +60,16 @@ data::ExportResult export_as(const std::string& format, data::Store& store, cons
 }
 
 struct Request {
-  std::string database, format, out, codebook, about;
+  std::string database, format, out, codebook, about, meshes;
   data::Times times = data::Times::absolute;
-  bool force = false, pages = false;
+  bool force = false, pages = false, motion = false, contacts = false, movement = false;
 };
 
 void add_options(CommandLine& line) {
   line.usage =
       "palpate export --db FILE --format csv|bids|psych-ds --out PATH\n"
       "       [--times relative|absolute] [--codebook FILE] [--about FILE.json]\n"
-      "       [--pages] [--force]";
+      "       [--motion] [--contacts] [--movement] [--meshes DIR] [--pages] [--force]";
   line.summary =
       "Writes the trials of a database for others, completely or not at all. Can be used while a\n"
       "session runs. csv: every completed trial as a row of PATH, and the attempts that were cut\n"
@@ -84,6 +86,8 @@ void add_options(CommandLine& line) {
   palpate export --db study.db --format bids --about study.json --out study-bids
       (study.json: {"version": 1, "authors": ["Ada Example", "Bo Example"], "license": "CC-BY-4.0"};
       all its keys: protocols/study.schema.json)
+  palpate export --db study.db --format bids --motion --contacts --out study-motion
+      (samples as Motion-BIDS, with the place and direction of each contact)
   palpate export --db people.sweep --format csv --out people.csv         a sweep: a row a point
   palpate export --db study.db --format psych-ds --out study-psychds --force
       (replaces an earlier export; a folder that palpate did not make is never replaced))";
@@ -103,15 +107,29 @@ void add_options(CommandLine& line) {
   add("pages", po::bool_switch(),
       "the answers to pages as well, which are personal data: pages.csv in the same folder, or in "
       "the dataset");
+  add("motion", po::bool_switch(),
+      "bids: servo samples as Motion-BIDS, in place of a physiological recording; larger, because "
+      "BIDS does not compress motion");
+  add("contacts", po::bool_switch(),
+      "bids and psych-ds: samples with the place of the deepest contact and the surface's normal "
+      "there, by rendering each trial again");
+  add("movement", po::bool_switch(),
+      "bids and psych-ds: tables of the measures of movement as well (analyze --movement)");
+  add("meshes", po::value<std::string>()->default_value("", "")->value_name("DIR"),
+      "with --contacts, --movement: where the protocol's mesh files are, for a database of before "
+      "they were kept in it; default: the working directory");
   add("force", po::bool_switch(), "replace an existing export");
 }
 
 Request request_of(const po::variables_map& values, const std::string& usage) {
-  Request request{values["db"].as<std::string>(), values["format"].as<std::string>(),
-                  values["out"].as<std::string>(), values["codebook"].as<std::string>(),
-                  values["about"].as<std::string>()};
+  Request request{values["db"].as<std::string>(),    values["format"].as<std::string>(),
+                  values["out"].as<std::string>(),   values["codebook"].as<std::string>(),
+                  values["about"].as<std::string>(), values["meshes"].as<std::string>()};
   request.force = values["force"].as<bool>();
   request.pages = values["pages"].as<bool>();
+  request.motion = values["motion"].as<bool>();
+  request.contacts = values["contacts"].as<bool>();
+  request.movement = values["movement"].as<bool>();
   if (request.format != "csv" && request.format != "bids" && request.format != "psych-ds") {
     throw UsageError("no format '" + request.format +
                      "'; there are: csv, bids, psych-ds\nUsage: " + usage);
@@ -123,6 +141,15 @@ Request request_of(const po::variables_map& values, const std::string& usage) {
   }
   if (!request.about.empty() && request.format == "csv")
     throw UsageError("--about is for bids and psych-ds; a CSV file has no description");
+  if (request.motion && request.format != "bids")
+    throw UsageError("--motion: is for --format bids");
+  if ((request.contacts || request.movement) && request.format == "csv") {
+    throw UsageError(
+        "--contacts, --movement: are for bids and psych-ds; for CSV there is palpate analyze "
+        "--movement --movement-csv FILE");
+  }
+  if (!request.meshes.empty() && !request.contacts && !request.movement)
+    throw UsageError("--meshes: is for --contacts and --movement");
   return request;
 }
 
@@ -137,7 +164,23 @@ data::ExportResult write_export(const Request& request) {
   settings.codebook = request.codebook;
   Progress progress(store, catch_stop_signals());
   settings.progress = [&](std::int64_t trials) { progress.show(trials); };
-  return export_as(request.format, store, request.out, settings);
+  settings.motion = request.motion;
+  MovementExport hand(store, request.meshes);
+  if (request.contacts) hand.add_contacts(settings);
+  if (request.movement) {
+    MovementRequest measures;
+    measures.database = request.database;
+    measures.mesh_folder = request.meshes;
+    measures.jobs = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+    hand.add_measures(settings, measures);
+  }
+  data::ExportResult done = export_as(request.format, store, request.out, settings);
+  if (hand.not_rendered() > 0) {
+    std::cerr << "warning: " << hand.not_rendered()
+              << " trials have no contacts: rendering them again gives other forces than were "
+                 "recorded\n";
+  }
+  return done;
 }
 
 void print(const Request& request, const data::ExportResult& done) {

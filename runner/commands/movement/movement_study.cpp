@@ -4,6 +4,7 @@
 #include <exception>
 #include <map>
 #include <memory>
+#include <mutex>
 #include <thread>
 #include <tuple>
 #include <utility>
@@ -15,68 +16,92 @@
 #include "runner/commands/shared/progress_line.h"
 #include "runner/commands/shared/study_trials.h"
 #include "runner/session/recorded_trial.h"
+#include "stimuli/printable.h"
 
 namespace palpate::runner {
 namespace {
 
-struct WaitingTrial {
-  std::shared_ptr<const TouchedStimuli> stimuli;
-  data::StoredTrial trial;
+/// What is kept of a trial.
+struct TrialRow {
+  MovementStudy::TrialKey key;
+  std::string participant, renderer, shape;
+  int session = 0, block = 0, trial = 0;
+  bool correct = false, simulated = false;
   MeasuredTrial measured;
 };
 
-/// The stimuli of each trial; those of a protocol are built once, or once for each run whose device
-/// limited them.
-class StudyStimuli {
+/// Reads the trials of a study, each in one of several threads: most of the time goes into
+/// unpacking samples and rendering them again.
+class StudyReader {
  public:
-  StudyStimuli(data::Store& store, std::string folder)
-      : store_(store), folder_(std::move(folder)) {}
+  StudyReader(const MovementRequest& request, StudyStimuli& stimuli, std::size_t trials)
+      : request_(request), stimuli_(stimuli), taken_(trials), rows_(trials) {}
 
-  std::shared_ptr<const TouchedStimuli> of(const data::StoredTrial& trial) {
-    const std::string& sha = trial.protocol_sha256;
-    const auto run = std::tuple(trial.participant.id, trial.record.session, trial.run.clock.utc_ns,
-                                trial.run.clock.monotonic_ns);
-    if (const auto known = by_run_.find(run); known != by_run_.end()) return known->second;
-    bool limited = false;
-    protocols::Protocol protocol = protocol_as_shown(store_, trial, folder_, limited);
-    std::shared_ptr<const TouchedStimuli> made;
-    if (const auto known = by_protocol_.find(sha); !limited && known != by_protocol_.end())
-      made = known->second;
-    else
-      made = std::make_shared<TouchedStimuli>(std::move(protocol));
-    if (!limited) by_protocol_[sha] = made;
-    return by_run_[run] = made;
+  /// \throws UsageError: the database has changed meanwhile
+  const std::vector<TrialRow>& read() {
+    {
+      std::vector<std::jthread> threads;
+      for (int i = 1; i < request_.jobs; ++i) threads.emplace_back([this] { work(nullptr); });
+      ProgressLine progress("movement");
+      work(&progress);
+    }
+    if (failed_) std::rethrow_exception(failed_);
+    return rows_;
   }
 
  private:
-  data::Store& store_;
-  std::string folder_;
-  std::map<std::string, std::shared_ptr<const TouchedStimuli>> by_protocol_;
-  std::map<std::tuple<std::int64_t, int, std::int64_t, std::int64_t>,
-           std::shared_ptr<const TouchedStimuli>>
-      by_run_;
-};
-
-void measure_all(std::vector<WaitingTrial>& waiting, const MovementRequest& request) {
-  std::atomic<std::size_t> next{0};
-  std::exception_ptr failed;
-  std::atomic<bool> has_failed{false};
-  const auto work = [&] {
+  void work(ProgressLine* progress) {
     try {
-      for (std::size_t i = next++; i < waiting.size() && !has_failed; i = next++)
-        waiting[i].measured =
-            measure_trial(*waiting[i].stimuli, waiting[i].trial, request.settings);
+      read_share(progress);
     } catch (...) {
-      if (!has_failed.exchange(true)) failed = std::current_exception();
+      if (!has_failed_.exchange(true)) failed_ = std::current_exception();
     }
-  };
-  {
-    std::vector<std::jthread> threads;
-    for (int i = 1; i < request.jobs; ++i) threads.emplace_back(work);
-    work();
   }
-  if (failed) std::rethrow_exception(failed);
-}
+
+  /// Walks through all trials and takes those that no other thread has.
+  void read_share(ProgressLine* progress) {
+    data::Store store = data::Store::open(request_.database, data::Store::Mode::read_only);
+    std::size_t index = 0;
+    bool mine = false;
+    const auto take = [&](const data::StoredTrial& trial) {
+      if (trial.record.practice || has_failed_) return mine = false;
+      if (index >= taken_.size()) {
+        throw UsageError(request_.database + ": trials were added while they were read; try again");
+      }
+      return mine = !taken_[index].exchange(true);
+    };
+    const auto visit = [&](const data::StoredTrial& trial) {
+      if (trial.record.practice) return;
+      const std::size_t at = index++;
+      if (!mine) return;
+      const data::TrialRecord& record = trial.record;
+      rows_[at] = {
+          key_of(trial),
+          trial.participant.code,
+          record.renderer,
+          record.shape,
+          record.session,
+          record.block,
+          record.trial,
+          record.correct,
+          trial.participant.simulated,
+          measure_trial(*stimuli_.of(store, trial), trial, request_.settings, request_.pictures)};
+      const std::size_t done = ++done_;
+      if (progress) progress->show(static_cast<double>(done) / static_cast<double>(rows_.size()));
+    };
+    store.for_each_trial(visit, take);
+    if (index < rows_.size() && !has_failed_)
+      throw UsageError(request_.database + ": trials went away while they were read; try again");
+  }
+
+  const MovementRequest& request_;
+  StudyStimuli& stimuli_;
+  std::vector<std::atomic<bool>> taken_;
+  std::vector<TrialRow> rows_;
+  std::atomic<std::size_t> done_{0};
+  std::exception_ptr failed_;
+  std::atomic<bool> has_failed_{false};
+};
 
 std::vector<std::string> columns() {
   std::vector<std::string> names = {"participant_id", "session", "block",   "trial",
@@ -95,11 +120,9 @@ std::string csv_field(const std::string& text) {
   return quoted + "\"";
 }
 
-void put_row(CsvText& csv, const WaitingTrial& one, const analysis::MovementSettings& settings) {
-  const data::TrialRecord& record = one.trial.record;
-  csv << one.trial.participant.code << record.session << record.block << record.trial
-      << record.renderer << record.shape << record.correct << one.trial.participant.simulated
-      << settings.cutoff << one.measured.ticks;
+void put_row(CsvText& csv, const TrialRow& one, const analysis::MovementSettings& settings) {
+  csv << one.participant << one.session << one.block << one.trial << one.renderer << one.shape
+      << one.correct << one.simulated << settings.cutoff << one.measured.ticks;
   for (const auto& value : one.measured.values) {
     if (value)
       csv << *value;
@@ -112,41 +135,66 @@ void put_row(CsvText& csv, const WaitingTrial& one, const analysis::MovementSett
 
 }  // namespace
 
+namespace {
+
+/// Reads the typical trials again, and the surfaces of their objects.
+void add_pictures(const MovementRequest& request, StudyStimuli& stimuli,
+                  const std::vector<TrialRow>& rows, MovementStudy& study) {
+  analysis::MovementPictures& pictures = study.pictures;
+  pictures.outlines.resize(study.table.trials.shapes.size());
+  data::Store store = data::Store::open(request.database, data::Store::Mode::read_only);
+  for (const std::size_t at : analysis::typical_rows(study.table)) {
+    const data::TrialName name{rows[at].participant, rows[at].session, rows[at].trial};
+    for (const data::StoredTrial& stored : store.attempts(name)) {
+      if (!stored.cut_off_reason.empty() || key_of(stored) != rows[at].key) continue;
+      const std::shared_ptr<const TouchedStimuli> touched = stimuli.of(store, stored);
+      analysis::TypicalTrial typical{at, to_string(name), {}};
+      if (!read_movement(*touched, stored, typical.trial).empty()) continue;
+      pictures.typical.push_back(std::move(typical));
+      analysis::ShapeOutline& outline = pictures.outlines[study.table.trials.rows[at].shape];
+      const int stimulus = touched->stimulus(stored.record.shape);
+      const analysis::TouchedSurface* surface = touched->surface(stimulus);
+      if (!outline.places.empty() || surface == nullptr) continue;
+      outline.places = surface->places();
+      outline.edges = touched->library().edges(stimulus).lines();
+    }
+  }
+  std::vector<analysis::TrialTally> tallies;
+  tallies.reserve(rows.size());
+  for (const TrialRow& one : rows) tallies.push_back(one.measured.tally);
+  analysis::add_up(study.table, tallies, pictures);
+}
+
+}  // namespace
+
+MovementStudy::TrialKey key_of(const data::StoredTrial& trial) {
+  return {trial.participant.id, trial.record.session, trial.record.trial};
+}
+
+void require_samples(const MovementStudy& study, const std::string& database) {
+  const auto without = study.table.missing.find("no samples");
+  if (without == study.table.missing.end() || without->second < study.table.values.size()) return;
+  throw UsageError(stimuli::printable(database) +
+                   ": has no servo samples; a protocol with \"samples\": true keeps them");
+}
+
 MovementStudy measure_study(const MovementRequest& request) {
   MovementStudy study;
   study.table.trials = read_study_trials(request.database, "");
   study.table.settings = request.settings;
   CsvText csv(columns(), "\n");
-  data::Store store = data::Store::open(request.database, data::Store::Mode::read_only);
-  StudyStimuli stimuli(store, request.mesh_folder);
-  ProgressLine progress("movement");
-  std::vector<WaitingTrial> waiting;
-  std::size_t ticks = 0;
-  const auto measure_waiting = [&] {
-    measure_all(waiting, request);
-    for (const WaitingTrial& one : waiting) {
-      put_row(csv, one, request.settings);
-      study.table.values.push_back(one.measured.values);
-      if (!one.measured.missing.empty()) ++study.table.missing[one.measured.missing];
-    }
-    waiting.clear();
-    ticks = 0;
-    progress.show(static_cast<double>(study.table.values.size()) /
-                  static_cast<double>(study.table.trials.rows.size()));
-  };
-  store.for_each_trial(
-      [&](const data::StoredTrial& trial) {
-        constexpr std::size_t kTicksAtOnce = 500'000;  // some 200 MB
-        if (trial.record.practice) return;
-        waiting.push_back({stimuli.of(trial), trial, {}});
-        ticks += trial.record.samples.size();
-        if (ticks >= kTicksAtOnce || waiting.size() >= 1000) measure_waiting();
-      },
-      true);
-  measure_waiting();
+  StudyStimuli stimuli(request.mesh_folder);
+  StudyReader reader(request, stimuli, study.table.trials.rows.size());
+  const std::vector<TrialRow>& rows = reader.read();
+  for (const TrialRow& one : rows) {
+    put_row(csv, one, request.settings);
+    study.rows[one.key] = study.table.values.size();
+    study.missing.push_back(one.measured.missing);
+    study.table.values.push_back(one.measured.values);
+    if (!one.measured.missing.empty()) ++study.table.missing[one.measured.missing];
+  }
   study.csv = csv.text();
-  if (study.table.values.size() != study.table.trials.rows.size())
-    throw UsageError(request.database + ": trials were added while they were read; try again");
+  if (request.pictures) add_pictures(request, stimuli, rows, study);
   return study;
 }
 

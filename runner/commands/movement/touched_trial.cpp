@@ -10,6 +10,7 @@
 
 #include "data/export/sample_slots.h"
 #include "runner/session/contact_log.h"
+#include "runner/session/recorded_trial.h"
 #include "runner/session/replay.h"
 
 namespace palpate::runner {
@@ -86,15 +87,65 @@ TouchedStimuli::TouchedStimuli(protocols::Protocol protocol)
     : protocol_(std::move(protocol)), library_(protocol_) {
   for (std::size_t i = 0; i < protocol_.stimuli.size(); ++i) {
     surfaces_.emplace_back();
+    flat_.emplace_back();
     if (library_.soft(i) != nullptr) continue;
     protocols::Trial upright;
     upright.stimulus = static_cast<int>(i);
     upright.renderer = protocols::RendererKind::point;
     upright.orientation = Quat(1, 0, 0, 0);
-    std::vector<Vec3> places = places_of(library_.scene(upright));
+    const rendering::Scene scene = library_.scene(upright);
+    add_flat_parts(scene);
+    std::vector<Vec3> places = places_of(scene);
     if (places.size() >= analysis::TouchedSurface::kParts)
       surfaces_.back() = std::make_unique<analysis::TouchedSurface>(std::move(places));
   }
+}
+
+/// Those of the outer surface that have a facet longer than the reach of a touch: on shorter ones
+/// the touched part is within the reach of the contact.
+void TouchedStimuli::add_flat_parts(const rendering::Scene& scene) {
+  for (const rendering::ScenePart& part : scene.parts()) {
+    if (part.layer != 0) continue;
+    const stimuli::ConvexMesh& mesh = *part.mesh;
+    double longest = 0;
+    for (const stimuli::Edge& edge : mesh.edges())
+      longest = std::max(longest, glm::length(edge.to - edge.from));
+    if (longest <= analysis::TouchedSurface::kReach) continue;
+    ConvexPart& planes = flat_.back().emplace_back();
+    for (const stimuli::Facet& facet : mesh.facets()) {
+      const Vec3 normal = part.world_vector(facet.normal);
+      planes.push_back({normal, facet.offset + glm::dot(normal, part.position)});
+    }
+  }
+}
+
+std::array<Vec3, 2> TouchedStimuli::touched(int stimulus, const Vec3& tip, const Vec3& tail,
+                                            const Vec3& contact) const {
+  constexpr double kOn = 5e-5;  // m
+  std::array<Vec3, 2> longest = {contact, contact};
+  const Vec3 along = tail - tip;
+  const double square = glm::dot(along, along);
+  if (!(square > 0)) return longest;
+  const double at = glm::dot(contact - tip, along) / square;
+  double length = 0;
+  for (const ConvexPart& part : flat_[static_cast<std::size_t>(stimulus)]) {
+    double from = 0, to = 1;
+    for (const Plane& plane : part) {
+      const double room = plane.offset + kOn - glm::dot(plane.normal, tip);
+      const double slope = glm::dot(plane.normal, along);
+      if (slope > 0)
+        to = std::min(to, room / slope);
+      else if (slope < 0)
+        from = std::max(from, room / slope);
+      else if (room < 0)
+        to = -1;
+      if (from > to) break;
+    }
+    if (from > at || to < at || to - from <= length) continue;
+    length = to - from;
+    longest = {tip + from * along, tip + to * along};
+  }
+  return longest;
 }
 
 int TouchedStimuli::stimulus(const std::string& name) const {
@@ -111,6 +162,7 @@ struct TouchedTick {
   Vec3 tip;
   bool contact = false, on_edge = false;
   Vec3 point, normal, force;  ///< of the deepest contact
+  std::array<Vec3, 2> touched;
 };
 
 void put(analysis::MovementTrial& trial, const TouchedTick& tick, bool has_edges) {
@@ -119,6 +171,7 @@ void put(analysis::MovementTrial& trial, const TouchedTick& tick, bool has_edges
   trial.point.push_back(tick.point);
   trial.normal.push_back(tick.normal);
   trial.force.push_back(tick.force);
+  trial.touched.push_back(tick.touched);
   if (has_edges) trial.on_edge.push_back(tick.on_edge);
 }
 
@@ -133,32 +186,47 @@ TouchedTick between(const TouchedTick& before, const TouchedTick& after, double 
   tick.normal = length > 0 ? normal / length : before.normal;
   tick.point = glm::mix(before.point, after.point, share);
   tick.force = glm::mix(before.force, after.force, share);
+  tick.touched = {tick.point, tick.point};
   tick.on_edge = before.on_edge && after.on_edge;
   return tick;
 }
 
 }  // namespace
 
-MeasuredTrial measure_trial(const TouchedStimuli& stimuli, const data::StoredTrial& stored,
-                            const analysis::MovementSettings& settings) {
+std::shared_ptr<const TouchedStimuli> StudyStimuli::of(data::Store& store,
+                                                       const data::StoredTrial& trial) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const std::string& sha = trial.protocol_sha256;
+  const auto run = std::tuple(trial.participant.id, trial.record.session, trial.run.clock.utc_ns,
+                              trial.run.clock.monotonic_ns);
+  if (const auto known = by_run_.find(run); known != by_run_.end()) return known->second;
+  bool limited = false;
+  protocols::Protocol protocol = protocol_as_shown(store, trial, folder_, limited);
+  std::shared_ptr<const TouchedStimuli> made;
+  if (const auto known = by_protocol_.find(sha); !limited && known != by_protocol_.end())
+    made = known->second;
+  else
+    made = std::make_shared<TouchedStimuli>(std::move(protocol));
+  if (!limited) by_protocol_[sha] = made;
+  return by_run_[run] = made;
+}
+
+std::string read_movement(const TouchedStimuli& stimuli, const data::StoredTrial& stored,
+                          analysis::MovementTrial& trial) {
   const data::TrialRecord& record = stored.record;
-  MeasuredTrial result;
-  result.ticks = record.samples.size();
   const int stimulus = stimuli.stimulus(record.shape);
-  if (record.samples.empty()) result.missing = "no samples";
-  if (record.task) result.missing = "a trial of several intervals";
-  if (stimulus < 0) result.missing = "the protocol has no such stimulus";
-  if (!result.missing.empty()) return result;
+  if (record.task) return "a trial of several intervals";
+  if (stimulus < 0) return "the protocol has no such stimulus";
+  if (record.samples.empty()) return "no samples";
 
   const SharpEdges& edges = stimuli.library().edges(stimulus);
   const bool soft = stimuli.library().soft(static_cast<std::size_t>(stimulus)) != nullptr;
   const bool has_edges = !edges.too_many() && !soft;
+  const bool ray = record.renderer == protocols::to_string(protocols::RendererKind::ray);
   const auto& q = record.orientation_wxyz;
   const Quat to_object = glm::conjugate(Quat(q[0], q[1], q[2], q[3]));
-  analysis::MovementTrial trial;
   trial.rate = stimuli.protocol().servo_rate;
   bool equal = true;
-  std::int64_t longest_gap = 0;
   try {
     data::SampleSlots slots(stored, trial.rate);
     std::int64_t last_slot = 0;
@@ -181,10 +249,15 @@ MeasuredTrial measure_trial(const TouchedStimuli& stimuli, const data::StoredTri
              tick.force = turn * shown.force;
              tick.on_edge =
                  has_edges && tick.contact && edges.distance(tick.point) <= ContactLog::kReach;
+             tick.touched = {tick.point, tick.point};
+             if (ray && tick.contact) {
+               tick.touched = stimuli.touched(stimulus, turn * (shown.ideal.tip - moved),
+                                              turn * (shown.ideal.tail - moved), tick.point);
+             }
              const std::int64_t slot = slots.next();
              const std::int64_t gap = trial.tip.empty() ? 0 : slot - last_slot - 1;
-             longest_gap = std::max(longest_gap, gap);
-             for (std::int64_t k = 1; k <= gap && longest_gap <= kLongestGap; ++k) {
+             if (gap > kLongestGap) trial.breaks.push_back(trial.tip.size());
+             for (std::int64_t k = 1; k <= gap && gap <= kLongestGap; ++k) {
                const double share = static_cast<double>(k) / static_cast<double>(gap + 1);
                put(trial, between(last, tick, share), has_edges);
              }
@@ -193,21 +266,52 @@ MeasuredTrial measure_trial(const TouchedStimuli& stimuli, const data::StoredTri
              last = tick;
            });
   } catch (const data::StoreRefused&) {
-    result.missing = "ticks are out of order or times cannot be";
+    return "ticks are out of order or times cannot be";
   } catch (const std::invalid_argument& error) {
-    result.missing = error.what();
+    return error.what();
   }
+  return equal ? "" : "rendering it again gives other forces than were recorded";
+}
+
+MeasuredTrial measure_trial(const TouchedStimuli& stimuli, const data::StoredTrial& stored,
+                            const analysis::MovementSettings& settings, bool with_tally) {
+  MeasuredTrial result;
+  result.ticks = stored.record.samples.size();
+  analysis::MovementTrial trial;
+  result.missing = read_movement(stimuli, stored, trial);
   if (!result.missing.empty()) return result;
-  if (!equal) {
-    result.missing = "rendering it again gives other forces than were recorded";
-    return result;
-  }
-  if (longest_gap > kLongestGap) {
-    result.missing = "more than " + std::to_string(kLongestGap) + " ticks in a row were missed";
-    return result;
-  }
-  result.values = analysis::measure(trial, stimuli.surface(stimulus), settings);
+  const analysis::TouchedSurface* surface = stimuli.surface(stimuli.stimulus(stored.record.shape));
+  result.values = analysis::measure(trial, surface, settings);
+  if (with_tally && surface != nullptr) result.tally = analysis::tally_of(trial, *surface);
   return result;
+}
+
+std::vector<std::optional<data::TickContact>> contacts_of(const TouchedStimuli& stimuli,
+                                                          const data::StoredTrial& stored) {
+  const data::TrialRecord& record = stored.record;
+  std::vector<std::optional<data::TickContact>> contacts;
+  contacts.reserve(record.samples.size());
+  bool equal = true;
+  const auto visit = [&](std::size_t, const data::SampleRecord& recorded,
+                         const ReplayedSample& again) {
+    equal &= equals_record(record, recorded, again);
+    const rendering::Contact& deepest = again.rendering.deepest;
+    auto& contact = contacts.emplace_back();
+    if (again.rendering.contacts > 0) {
+      contact = {{deepest.point.x, deepest.point.y, deepest.point.z},
+                 {deepest.normal.x, deepest.normal.y, deepest.normal.z}};
+    }
+  };
+  try {
+    if (record.task)
+      replay(stimuli.protocol(), record, false, visit);
+    else
+      replay(stimuli.protocol(), stimuli.library(), record, visit);
+  } catch (const std::invalid_argument&) {
+    equal = false;
+  }
+  if (!equal) contacts.clear();
+  return contacts;
 }
 
 }  // namespace palpate::runner

@@ -3,12 +3,15 @@ program: a zero-phase low pass by its gain in the Fourier domain, peaks by their
 Usage: movement_command_test.py PALPATE"""
 
 import csv
+import gzip
+import html.parser
 import json
 import math
 import os
 import pathlib
 import sys
 import unittest
+import xml.etree.ElementTree
 
 try:
     import numpy as np
@@ -253,6 +256,105 @@ class Movement(CommandCase):
             self.assertAlmostEqual(found["t"], difference.mean() / (difference.std(ddof=1) / math.sqrt(3)), delta=1e-9)
         self.assertIn("Gain in time beside differences of movement", done.stdout)
 
+    def test_figures_and_page_show_the_trials(self):
+        db = self.study(participants=1)
+        figures, page = self.dir / "figures", self.dir / "movement.html"
+        self.palpate("analyze", "--db", db, "--movement", "--figures", figures, "--report", page)
+        names = ["contact", "coverage", "paths", "procedures", "speed"]
+        self.assertEqual(sorted(file.name for file in figures.iterdir()), [f"movement-{name}.svg" for name in names])
+        for file in figures.iterdir():
+            drawing = xml.etree.ElementTree.parse(file).getroot()
+            text = " ".join(drawing.itertext())
+            self.assertIn("SIMULATED PARTICIPANTS", text)
+            self.assertNotIn("nan", text)
+            for shape in ("sphere", "cube"):
+                self.assertIn(shape, text)
+        text = page.read_text()
+        for name in names:
+            self.assertIn(f'<section id="movement-{name}"', text)
+        for said in ("SIMULATED PARTICIPANTS", "low pass of the path", "palpate watch --db", "was rendered again"):
+            self.assertIn(said, text)
+        html.parser.HTMLParser().feed(text)
+
+    def test_exports_have_contacts_measures_and_motion(self):
+        db = self.study(participants=1, sessions={"count": 2})
+        exports = {"physio": ["bids"], "motion": ["bids", "--motion"], "psych": ["psych-ds"]}
+        for name, args in exports.items():
+            self.palpate("export", "--db", db, "--format", *args, "--contacts", "--movement", "--out", self.dir / name)
+        _, trials = self.exported(db)
+        _, measures = self.measured(db)
+        by_point = 0
+        for session in (1, 2):
+            stem = f"ses-{session}"
+            file = next((self.dir / "physio").glob(f"sub-*/{stem}/beh/*physio.tsv.gz"))
+            columns = json.loads(file.with_name(file.name.replace(".tsv.gz", ".json")).read_text())["Columns"]
+            recorded = gzip.decompress(file.read_bytes()).decode()
+            moved = next((self.dir / "motion").glob(f"sub-*/{stem}/motion/*_motion.tsv"))
+            self.assertEqual(moved.read_text(), recorded)
+            with moved.with_name(moved.name.replace("_motion", "_channels")).open() as opened:
+                channels = list(csv.DictReader(opened, delimiter="\t"))
+            self.assertEqual([one["name"] for one in channels], columns)
+            self.assertEqual([one["name"] for one in channels if one["type"] == "POS"],
+                             [f"{end}_{axis}" for end in ("tip", "tail") for axis in "xyz"])
+            about = json.loads(moved.with_suffix(".json").read_text())
+            rows = [dict(zip(columns, line.split("\t"), strict=True)) for line in recorded.splitlines()]
+            self.assertEqual((about["RecordingDuration"], about["POSChannelCount"], about["MotionChannelCount"]),
+                             (len(rows) / RATE, 6, len(columns)))
+            with next(moved.parent.glob("*_events.tsv")).open() as opened:
+                events = list(csv.DictReader(opened, delimiter="\t"))
+            for event in events:
+                row = rows[round(float(event["onset"]) * RATE)]
+                self.assertEqual((row["trial"], row["tick"]), (event["trial"], "0"))
+                (trial,) = [one for one in trials if (one["session"], one["trial"]) == (str(session), event["trial"])]
+                self.assertEqual((event["shape"], event["renderer"]), (trial["shape"], trial["renderer"]))
+                self.assertAlmostEqual(float(event["duration"]), float(trial["response_time"]), delta=1e-9)
+            with (moved.parents[1] / f"{moved.name.split('_task')[0]}_scans.tsv").open() as opened:
+                self.assertEqual([one["filename"] for one in csv.DictReader(opened, delimiter="\t")],
+                                 [f"motion/{moved.name}"])
+            by_point += self.check_contacts(rows, {one["trial"] for one in events if one["renderer"] == "point"})
+            table = next((self.dir / "motion" / "derivatives" / "palpate").glob(f"sub-*/{stem}/beh/*_desc-movement_beh.tsv"))
+            told = json.loads(table.with_suffix(".json").read_text())
+            with table.open() as opened:
+                for row in csv.DictReader(opened, delimiter="\t"):
+                    self.assertEqual(set(row), set(told))
+                    (own,) = [one for one in measures if (one["session"], one["trial"]) == (str(session), row["trial"])]
+                    for name in ("path_length", "coverage", "share_lateral"):
+                        self.assertEqual(None if row[name] == "n/a" else float(row[name]), float(own[name]) if own[name] else None)
+        self.assertGreater(by_point, 100)
+        table = next((self.dir / "psych" / "data").glob("*/*_description-movement_data.csv"))
+        with table.open() as opened:
+            rows = list(csv.DictReader(opened))
+        self.assertEqual([float(row["sparc"]) for row in rows], [float(one["sparc"]) for one in measures])
+        described = {one["name"] for one in json.loads((self.dir / "psych" / "dataset_description.json").read_text())["variableMeasured"]}
+        self.assertLessEqual(set(rows[0]) | {"contact_x", "normal_z"}, described)
+        self.palpate("export", "--db", db, "--format", "bids", "--out", self.dir / "motion", "--force")
+        for args, why in [(["psych-ds", "--motion"], "--motion"), (["csv", "--contacts"], "--contacts"),
+                          (["csv", "--movement"], "--movement"), (["bids", "--meshes", "."], "--meshes")]:
+            said = self.palpate("export", "--db", db, "--format", *args, "--out", self.dir / "no", status=2).stderr
+            self.assertIn(why, said)
+
+    def check_contacts(self, rows, points):
+        """On the ideal stylus, which the depth along the normal separates from the recorded one; without friction the
+        force is along the normal."""
+        def column(name):
+            return np.array([[float(row[f"{name}_{k}"]) for k in "xyz"] for row in touching])
+        touching = [row for row in rows if row["contacts"] not in ("0", "n/a")]
+        for row in rows:
+            if row["contacts"] == "0":
+                self.assertEqual({row[f"{name}_{k}"] for name in ("contact", "normal") for k in "xyz"}, {"n/a"})
+        self.assertGreater(len(touching), 100)
+        normal, force, tip = column("normal"), column("force"), column("tip")
+        depth = np.array([[float(row["depth"])] for row in touching])
+        self.assertLess(np.abs(norm(normal) - 1).max(), 1e-8)
+        self.assertLess(np.abs((normal * force).sum(axis=1) - norm(force)).max(), 3e-6)
+        touched, along = column("contact") - depth * normal, column("tail") - tip
+        share = ((touched - tip) * along).sum(axis=1) / (along ** 2).sum(axis=1)
+        self.assertTrue((share > -1e-6).all() and (share < 1 + 1e-6).all())
+        self.assertLess(norm(touched - tip - share[:, None] * along).max(), 1e-8)
+        of_points = norm(touched - tip)[[row["trial"] in points for row in touching]]
+        self.assertTrue((of_points < 1e-8).all())
+        return len(of_points)
+
     def test_what_has_no_samples_says_what_to_do(self):
         db = self.study(samples=False)
         said = self.palpate("analyze", "--db", db, "--movement", status=2).stderr
@@ -260,7 +362,7 @@ class Movement(CommandCase):
 
     def test_options_that_do_not_fit_are_refused(self):
         db = self.study(participants=1)
-        for args, why in [(["--movement", "--report", "r.html"], "--report"),
+        for args, why in [(["--movement", "--protocol", "x"], "--protocol"),
                           (["--movement", "--cutoff-hz", "0"], "--cutoff-hz"),
                           (["--movement", "--cutoff-hz", "nan"], "--cutoff-hz"),
                           (["--movement", "--jobs", "0"], "--jobs"),

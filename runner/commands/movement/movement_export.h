@@ -1,0 +1,36 @@
+#pragma once
+// What exports have of the hand: where each sample touched, and the measures of each trial.
+
+#include <cstddef>
+#include <map>
+#include <string>
+#include <tuple>
+
+#include "data/export/settings.h"
+#include "data/store/store.h"
+#include "runner/commands/movement/movement_study.h"
+#include "runner/commands/movement/touched_trial.h"
+
+namespace palpate::runner {
+
+/// Must outlive the export whose settings it is put into.
+class MovementExport {
+ public:
+  MovementExport(data::Store& store, std::string mesh_folder)
+      : store_(store), stimuli_(std::move(mesh_folder)) {}
+
+  /// Places and normals of the contacts beside the samples, each trial rendered again.
+  void add_contacts(data::ExportSettings& settings);
+  /// Tables of the measures. \throws UsageError: no trial has samples
+  void add_measures(data::ExportSettings& settings, const MovementRequest& request);
+  /// Trials whose contacts are left out because rendering gives other forces than were recorded.
+  std::size_t not_rendered() const { return not_rendered_; }
+
+ private:
+  data::Store& store_;
+  StudyStimuli stimuli_;
+  std::size_t not_rendered_ = 0;
+  std::map<MovementStudy::TrialKey, data::DerivedMeasures::Values> measured_;
+};
+
+}  // namespace palpate::runner
