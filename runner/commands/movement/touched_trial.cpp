@@ -175,6 +175,14 @@ void put(analysis::MovementTrial& trial, const TouchedTick& tick, bool has_edges
   if (has_edges) trial.on_edge.push_back(tick.on_edge);
 }
 
+void reserve(analysis::MovementTrial& trial, std::size_t ticks) {
+  for (auto* vectors : {&trial.tip, &trial.point, &trial.normal, &trial.force})
+    vectors->reserve(ticks);
+  trial.touched.reserve(ticks);
+  trial.contact.reserve(ticks);
+  trial.on_edge.reserve(ticks);
+}
+
 /// A missed tick: on the line between its neighbours; in contact where both are.
 TouchedTick between(const TouchedTick& before, const TouchedTick& after, double share) {
   TouchedTick tick;
@@ -226,6 +234,7 @@ std::string read_movement(const TouchedStimuli& stimuli, const data::StoredTrial
   const auto& q = record.orientation_wxyz;
   const Quat to_object = glm::conjugate(Quat(q[0], q[1], q[2], q[3]));
   trial.rate = stimuli.protocol().servo_rate;
+  reserve(trial, record.samples.size());
   bool equal = true;
   try {
     data::SampleSlots slots(stored, trial.rate);
