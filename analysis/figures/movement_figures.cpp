@@ -169,12 +169,8 @@ std::vector<std::pair<bool, std::vector<Vec3>>> runs_of(const MovementTrial& tri
       open = false;
       continue;
     }
-    if (!open || runs.back().first != trial.contact[i]) {
-      const bool joins = open;
-      const Vec3 last = joins ? runs.back().second.back() : place;
-      runs.push_back({trial.contact[i], {}});
-      if (joins) runs.back().second.push_back(last);
-    }
+    // Not joined: with the ray the contact may be far along the stylus from its tip.
+    if (!open || runs.back().first != trial.contact[i]) runs.push_back({trial.contact[i], {}});
     runs.back().second.push_back(place);
     open = true;
   }
