@@ -56,11 +56,17 @@ def mean_and_interval(values, decimals):
     return text
 
 
-def gain_of(one, shape, measure, key):
-    for row in one["gain_beside_movement"]:
-        if (row["shape"], row["measure"]) == (shape, measure):
-            return None if row[key] is None else percent(row[key])
-    return None
+def gain(studies, shape, measure, key):
+    """The gain of a mean over seeds of the difference of log time, with its interval, in %."""
+    known = [row[key] for one in studies for row in one["gain_beside_movement"]
+             if (row["shape"], row["measure"]) == (shape, measure) and row[key] is not None]
+    if not known:
+        return "-"
+    mean = statistics.mean(known)
+    if len(known) < 2:
+        return f"{percent(mean):.1f}"
+    half = interval(known)
+    return f"{percent(mean):.1f} [{percent(mean + half):.1f}, {percent(mean - half):.1f}]"
 
 
 def mean_of(one, measure, renderer, shape):
@@ -81,11 +87,10 @@ def print_table(done):
         for shape in SHAPES:
             shares = " / ".join(mean_and_interval([mean_of(one, "contact_share", renderer, shape) for one in studies], 2)
                                 for renderer in ("point", "ray"))
-            cells = [mean_and_interval([gain_of(one, shape, MEASURES[0], "log_time_difference") for one in studies], 1),
+            cells = [gain(studies, shape, MEASURES[0], "log_time_difference"),
                      mean_and_interval([ratio(one, "coverage_rate", shape) for one in studies], 2),
                      mean_and_interval([ratio(one, "strokes", shape) for one in studies], 2), shares]
-            cells += [mean_and_interval([gain_of(one, shape, measure, "log_time_difference_at_equal_measure")
-                                         for one in studies], 1) for measure in MEASURES]
+            cells += [gain(studies, shape, measure, "log_time_difference_at_equal_measure") for measure in MEASURES]
             print(f"| {version}, {shape} | {len(studies)} | " + " | ".join(cells) + " |")
 
 
