@@ -49,7 +49,7 @@ struct IntervalRecord {
 /// What a trial of version 2 has besides. Onset, response time and contact are those of the
 /// interval that was felt last.
 struct TaskRecord {
-  std::string task;  ///< "identify", "compare", "detect", "rate", "adjust"
+  std::string task;  ///< "identify", "compare", "detect", "rate", "adjust", "external"
   std::string block_name;
   int track = 1;                         ///< stimulus, renderer and procedure
   std::optional<double> level;           ///< asked about; adjust: where it started

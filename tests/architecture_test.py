@@ -117,7 +117,7 @@ PUBLIC = {
     "runner/participants": "keyboard respondent response_box settings_document simulated simulated_settings task_participant",
     "runner/session": "clock_check contact_log device_check live_forces live_session markers near_codes preflight_dialogue protocol_info recorded_trial "
                       "replay replay_comparison sample_stream session_plan simulated_session simulated_study socket_advisor station",
-    "runner/serve": "network served_scene",
+    "runner/serve": "network served_scene served_session",
     "runner/sweep": "design swept_study",
     "runner/stability": "boundary integrators soft_map",
     "runner/bench": "servo_timing tick_cost",

@@ -30,7 +30,7 @@ const std::vector<std::string_view> kTaskColumns{
     "simulated",       "session",       "block",           "trial",
     "response_time",   "protocol_name", "protocol_sha256", "comparison_interval",
     "interval_onsets", "torque_driven"};
-const char* const kTasks[] = {"identify", "compare", "detect", "rate", "adjust"};
+const char* const kTasks[] = {"identify", "compare", "detect", "rate", "adjust", "external"};
 
 Columns read_header(CsvReader& reader) {
   Columns columns;
@@ -170,7 +170,7 @@ TaskTrial read_trial(TaskRow& row) {
             row.hint("success") + row.hint("comparison_interval"));
   if (trial.participant.empty()) row.add_fault("participant_id", "expected a participant");
   if (std::find(std::begin(kTasks), std::end(kTasks), trial.task) == std::end(kTasks))
-    row.add_fault("task", "expected identify, compare, detect, rate or adjust");
+    row.add_fault("task", "expected identify, compare, detect, rate, adjust or external");
   return trial;
 }
 

@@ -39,6 +39,7 @@ void set_intervals(const TaskBlock& block, int position, Trial& trial) {
                           block.standard_renderer.value_or(trial.renderer), std::nullopt, true};
   switch (block.task) {
     case TaskKind::identify:
+    case TaskKind::external:
       trial.intervals = {asked};
       break;
     case TaskKind::compare:

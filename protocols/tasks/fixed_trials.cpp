@@ -102,6 +102,14 @@ std::vector<int> positions(int count, int intervals, stimuli::Random& random) {
 std::vector<Trial> fixed_trials(const Protocol& protocol, int participant, int index,
                                 std::uint64_t round) {
   const TaskBlock& block = protocol.blocks[static_cast<std::size_t>(index)];
+  if (block.task == TaskKind::external) {  // each until somebody says what it is
+    Trial trial;
+    trial.stimulus = block.stimuli.front();
+    trial.renderer = block.renderers.front();
+    trial.track = 1;
+    set_intervals(block, 0, trial);
+    return std::vector<Trial>(static_cast<std::size_t>(block.repetitions), trial);
+  }
   const auto number = static_cast<std::uint64_t>(index);
   std::vector<Category> categories = categories_of(protocol, block);
   stimuli::Random places = task_stream(protocol.seed, participant, number, kTaskPosition, round);

@@ -106,7 +106,7 @@ std::optional<double> own_level(const Protocol& protocol, const TaskBlock& block
 std::vector<double> levels_of(const TaskBlock& block) {
   if (!block.level) return {};
   std::vector<double> levels = block.starts;
-  if (block.task == TaskKind::adjust) {
+  if (block.task == TaskKind::adjust || block.task == TaskKind::external) {
     levels.push_back(*block.least);
     levels.push_back(*block.most);
   }

@@ -65,6 +65,8 @@ std::vector<TaskAnswer> answers_of(const Protocol& protocol, const TaskBlock& bl
       add("switch");
       add("done");
       break;
+    case TaskKind::external:
+      break;
   }
   return answers;
 }
@@ -168,11 +170,42 @@ void read_answer_keys(ObjectReader& reader, const Protocol& protocol, TaskBlock&
             [](const TaskAnswer& a, const TaskAnswer& b) { return a.key < b.key; });
 }
 
+/// What another program may say; without a list the names of the stimuli.
+void read_external_answers(ObjectReader& reader, const Protocol& protocol, TaskBlock& block) {
+  constexpr std::size_t kMostAnswers = 100;
+  const json* const list = reader.array("answers", 1, kMostAnswers);
+  if (list == nullptr) {
+    for (const int i : block.stimuli) {
+      const std::string& name = protocol.stimuli[static_cast<std::size_t>(i)].name;
+      block.answers.push_back({"", name, name, 0});
+    }
+    return;
+  }
+  for (std::size_t i = 0; i < list->size(); ++i) {
+    const json& value = (*list)[i];
+    const std::string text = value.is_string() ? value.get<std::string>() : "";
+    if (!is_label(text, kMostLabel)) {
+      reader.faults().add(child_pointer(reader.pointer("answers"), i),
+                          "expected a text of 1 to " + std::to_string(kMostLabel) +
+                              " bytes without control characters" + found_text(value));
+    }
+    block.answers.push_back({"", text, text, 0});
+  }
+}
+
+/// The key that says what the answers are.
+const char* answers_key(TaskKind task) {
+  if (task == TaskKind::rate) return "scale";
+  return task == TaskKind::external ? "answers" : "keys";
+}
+
 }  // namespace
 
 void read_answers(ObjectReader& reader, const Protocol& protocol, TaskBlock& block) {
   if (block.task == TaskKind::rate) {
     read_rating(reader, block);
+  } else if (block.task == TaskKind::external) {
+    read_external_answers(reader, protocol, block);
   } else {
     read_answer_keys(reader, protocol, block);
   }
@@ -180,10 +213,11 @@ void read_answers(ObjectReader& reader, const Protocol& protocol, TaskBlock& blo
   for (const TaskAnswer& answer : block.answers) {
     if (!labels.insert(answer.label).second) {
       reader.faults().add(
-          reader.pointer(block.task == TaskKind::rate ? "scale" : "keys"),
+          reader.pointer(answers_key(block.task)),
           "expected a label of its own for each answer, found '" + answer.label + "' again");
     }
   }
+  if (block.task == TaskKind::external) return;  // the program asks for it, if it wants to
   reader.section("confidence", [&](ObjectReader& section) {
     ConfidenceSpec& confidence = block.confidence.emplace();
     section.text("question", confidence.question);

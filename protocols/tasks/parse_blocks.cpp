@@ -191,6 +191,25 @@ void read_adjust(ObjectReader& reader, const Protocol& protocol, TaskBlock& bloc
   }
 }
 
+/// The levels that a program may ask for.
+void read_external(ObjectReader& reader, TaskBlock& block) {
+  reader.integer("trials", block.repetitions, kManyTimes, Presence::required);
+  read_level(reader, block);
+  const Presence presence = block.level ? Presence::required : Presence::optional;
+  double least = 0, most = 0;
+  reader.number("min", least, kAnyNumber, presence);
+  reader.number("max", most, kAnyNumber, presence);
+  for (const char* const key : {"min", "max"}) {
+    if (reader.has(key) && !reader.has("level"))
+      reader.faults().add(reader.pointer(key), "expected the level whose range it limits");
+  }
+  if (!block.level) return;
+  if (!(least < most) && reader.has("min") && reader.has("max"))
+    reader.faults().add(reader.pointer("max"), "expected more than min");
+  block.least = least;
+  block.most = std::max(least, most);
+}
+
 void read_task_keys(ObjectReader& reader, const Protocol& protocol, TaskBlock& block) {
   switch (block.task) {
     case TaskKind::identify:
@@ -207,6 +226,9 @@ void read_task_keys(ObjectReader& reader, const Protocol& protocol, TaskBlock& b
       break;
     case TaskKind::adjust:
       read_adjust(reader, protocol, block);
+      break;
+    case TaskKind::external:
+      read_external(reader, block);
       break;
   }
 }
@@ -242,7 +264,10 @@ void read_practice(ObjectReader& reader, TaskBlock& block) {
 
 void check_practice(ObjectReader& reader, const TaskBlock& block) {
   if (!block.criterion) return;
-  if (block.task == TaskKind::rate || block.task == TaskKind::adjust) {
+  if (block.task == TaskKind::external) {
+    reader.faults().add(reader.pointer("practice"),
+                        "expected no criterion: the program says how many trials there are");
+  } else if (block.task == TaskKind::rate || block.task == TaskKind::adjust) {
     reader.faults().add(reader.pointer("practice"),
                         "expected no criterion: no answer to this task is right or wrong");
   } else if (is_adaptive(block)) {
@@ -261,7 +286,8 @@ TaskBlock read_block(ObjectReader& reader, const Protocol& protocol) {
                                           {"compare", TaskKind::compare},
                                           {"detect", TaskKind::detect},
                                           {"rate", TaskKind::rate},
-                                          {"adjust", TaskKind::adjust}},
+                                          {"adjust", TaskKind::adjust},
+                                          {"external", TaskKind::external}},
                                          Presence::required);
   if (!task) return block;  // its other keys depend on it
   block.task = *task;
@@ -272,19 +298,20 @@ TaskBlock read_block(ObjectReader& reader, const Protocol& protocol) {
   read_block_renderers(reader, protocol, block);
   read_stimulus_names(reader, protocol, block);
   read_task_keys(reader, protocol, block);
-  read_variation(reader, block);
+  if (block.task != TaskKind::external) read_variation(reader, block);
   check_practice(reader, block);
-  reader.section("order", [&](ObjectReader& order) {
-    order.integer("max_run", block.max_run, kManyTimes);
-    order.integer("min_distance", block.min_distance, kManyTimes);
-  });
+  if (block.task != TaskKind::external)
+    reader.section("order", [&](ObjectReader& order) {
+      order.integer("max_run", block.max_run, kManyTimes);
+      order.integer("min_distance", block.min_distance, kManyTimes);
+    });
   reader.number("time_out_s", block.time_out, kPresentation);
   if (block.interval_limit && !(block.time_out > *block.interval_limit)) {
     reader.faults().add(reader.pointer("time_out_s"),
                         "expected more than interval_limit_s: the time for the answer begins with "
                         "the last interval");
   }
-  reader.boolean("feedback", block.feedback);
+  if (block.task != TaskKind::external) reader.boolean("feedback", block.feedback);
   if (block.feedback && (block.task == TaskKind::rate || block.task == TaskKind::adjust)) {
     reader.faults().add(reader.pointer("feedback"),
                         "expected no feedback: no answer to this task is right or wrong");

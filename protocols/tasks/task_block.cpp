@@ -6,7 +6,7 @@
 namespace palpate::protocols {
 
 const char* to_string(TaskKind kind) {
-  constexpr std::array kNames = {"identify", "compare", "detect", "rate", "adjust"};
+  constexpr std::array kNames = {"identify", "compare", "detect", "rate", "adjust", "external"};
   return kNames[static_cast<std::size_t>(kind)];
 }
 

@@ -19,6 +19,7 @@ enum class TaskKind {
   detect,    ///< was there anything?
   rate,      ///< a number, or a step of a labelled scale
   adjust,    ///< turns a parameter until the stimulus equals the standard
+  external,  ///< another program says what is shown, and what the answer was (palpate serve)
 };
 const char* to_string(TaskKind kind);  ///< "identify", ...
 
@@ -70,7 +71,8 @@ struct TaskBlock {
   std::optional<int> absent;  ///< detect: shown in catch trials; none: nothing at all
   std::optional<LevelTarget> level;
   std::vector<ProcedureSpec> procedures;  ///< tracks for each stimulus and renderer; none: no level
-  int repetitions = 1;                    ///< of each stimulus and renderer, without procedure
+  /// Of each stimulus and renderer, without procedure; external: trials of the block.
+  int repetitions = 1;
   std::optional<int> max_run, min_distance;  ///< of equal stimulus, renderer and level
   double catch_trials = 0;  ///< share of all trials: detect: absent; same_different: both standard
 
@@ -82,7 +84,7 @@ struct TaskBlock {
   std::optional<double> interval_limit;  ///< s, forces on; none: until the participant goes on
 
   std::vector<TaskAnswer> answers;    ///< keys, in order of key; rate: empty, a number is typed
-  std::optional<double> least, most;  ///< rate: of a typed number; adjust: of the level
+  std::optional<double> least, most;  ///< rate: of a typed number; adjust, external: of the level
   double modulus = 0;                 ///< rate: the standard's number; 0: none is given
   double turn = 0;                    ///< adjust: of the level, a key press
   std::vector<double> starts;         ///< adjust: levels, in turn

@@ -70,6 +70,7 @@ bool is_adaptive(const TaskBlock& block) {
 
 long long most_trials_of(const TaskBlock& block) {
   if (block.criterion) return block.criterion->most_trials;
+  if (block.task == TaskKind::external) return block.repetitions;
   long long trials = 0;
   for (const BlockTrack& track : tracks_of(block)) {
     trials += track.procedure == nullptr ? block.repetitions
@@ -89,6 +90,11 @@ void check_order(const Protocol& protocol, int block) {
   } else if (!is_adaptive(checked)) {
     fixed_trials(protocol, 1, block);
   }
+}
+
+bool is_external(const Protocol& protocol) {
+  return std::ranges::any_of(
+      protocol.blocks, [](const TaskBlock& block) { return block.task == TaskKind::external; });
 }
 
 std::vector<int> blocks_in_order(const Protocol& protocol, int participant_number, int session) {
@@ -216,6 +222,19 @@ void TaskPlan::propose(double level) {
   for (Interval& interval : next_->intervals) {
     if (!interval.standard) interval.level = level;
   }
+}
+
+void TaskPlan::choose(const TrialChoice& choice) {
+  next_->stimulus = choice.stimulus;
+  next_->renderer = choice.renderer;
+  next_->level = choice.level;
+  if (choice.orientation) next_->orientation = *choice.orientation;
+  const std::vector<BlockTrack> tracks = tracks_of(block());
+  for (std::size_t i = 0; i < tracks.size(); ++i) {
+    if (tracks[i].stimulus == choice.stimulus && tracks[i].renderer == choice.renderer)
+      next_->track = static_cast<int>(i) + 1;
+  }
+  set_intervals(block(), 0, *next_);
 }
 
 void TaskPlan::answered(const TrialOutcome& outcome) {

@@ -26,6 +26,14 @@ struct TrialOutcome {
   std::optional<double> level = std::nullopt;
 };
 
+/// What is shown in a trial of an external block.
+struct TrialChoice {
+  int stimulus = 0;  ///< index into Protocol::stimuli, one of the block's
+  RendererKind renderer = RendererKind::point;
+  std::optional<double> level = std::nullopt;      ///< within the block's
+  std::optional<Quat> orientation = std::nullopt;  ///< none: the plan's
+};
+
 class TaskPlan {
  public:
   /// \param protocol  of version 2; must outlive it
@@ -40,6 +48,8 @@ class TaskPlan {
   /// The next trial is shown at another level, which the procedure takes note of with the answer.
   /// \pre it is one of an adaptive block, and no catch trial
   void propose(double level);
+  /// Another program says what the next trial is. \pre it is one of an external block
+  void choose(const TrialChoice& choice);
   void answered(const TrialOutcome& outcome);
   /// The tracks of an adaptive block under way.
   const std::optional<InterleavedTracks>& tracks() const { return tracks_; }
@@ -70,6 +80,8 @@ class TaskPlan {
 
 /// The blocks of a session in the order in which a participant gets them: indices.
 std::vector<int> blocks_in_order(const Protocol& protocol, int participant_number, int session);
+/// Whether another program says what is shown: only `palpate serve` has one.
+bool is_external(const Protocol& protocol);
 /// Whether answers choose its levels.
 bool is_adaptive(const TaskBlock& block);
 /// No participant has more trials in it, but for those that are not answered.

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "protocols/schedule.h"
+#include "protocols/tasks/task_plan.h"
 #include "runner/servo/servo.h"
 
 namespace palpate::runner {
@@ -19,6 +19,8 @@ struct Answer {
   bool goes_on = false;      ///< no answer: on to the next interval
   double number = 0;         ///< rate: as it was typed
   int times = 1;             ///< adjust: so many turns at once
+  /// external: as the program says; none: whether it is the stimulus.
+  std::optional<bool> correct = std::nullopt;
 };
 
 /// What is asked in an interval of a trial of version 2.
@@ -58,6 +60,10 @@ class Respondent {
   virtual void rest(const std::string& text, std::int64_t /*until_ns*/) { read(text); }
   /// Shows whether the last answer was correct, if the protocol asks for feedback.
   virtual void feedback(bool correct) = 0;
+  /// The next trial is due. \return what is shown in it, where a program says so: external blocks
+  virtual std::optional<protocols::TrialChoice> choose(const protocols::Trial& /*next*/) {
+    return std::nullopt;
+  }
   /// A trial is about to begin; the stylus must first be in the home zone.
   virtual void begin_trial(const protocols::Trial& trial) = 0;
   /// Version 2: an interval of that trial is about to begin.

@@ -19,14 +19,21 @@ struct NamedType {
   const char* name;
   MessageType type;
 };
-constexpr NamedType kTypes[] = {
-    {"hello", MessageType::hello},         {"load", MessageType::load},
-    {"start", MessageType::start},         {"set", MessageType::set},
-    {"answer", MessageType::answer},       {"stop", MessageType::stop},
-    {"subscribe", MessageType::subscribe}, {"mark", MessageType::mark},
-    {"note", MessageType::note},           {"clock", MessageType::clock},
-    {"alive", MessageType::alive},         {"emergency", MessageType::emergency},
-    {"clear", MessageType::clear},         {"bye", MessageType::bye}};
+constexpr NamedType kTypes[] = {{"hello", MessageType::hello},
+                                {"load", MessageType::load},
+                                {"start", MessageType::start},
+                                {"set", MessageType::set},
+                                {"answer", MessageType::answer},
+                                {"stop", MessageType::stop},
+                                {"subscribe", MessageType::subscribe},
+                                {"mark", MessageType::mark},
+                                {"note", MessageType::note},
+                                {"clock", MessageType::clock},
+                                {"alive", MessageType::alive},
+                                {"emergency", MessageType::emergency},
+                                {"clear", MessageType::clear},
+                                {"picture", MessageType::picture},
+                                {"bye", MessageType::bye}};
 
 constexpr std::pair<const char*, StreamField> kFields[] = {
     {"tip", StreamField::tip},          {"tail", StreamField::tail},
@@ -70,6 +77,15 @@ class MemberReader {
           "expected a whole number from " + std::to_string(least) + " to " + std::to_string(most));
     return {};
   }
+  std::optional<double> number(const char* key, double least, double most) {
+    const json* const value = member(key, false);
+    if (value == nullptr) return {};
+    if (value->is_number() && value->get<double>() >= least && value->get<double>() <= most)
+      return value->get<double>();
+    fault(key, "expected a number");
+    return {};
+  }
+  bool has(const char* key) const { return object_.contains(key); }
   void fault(const std::string& key, const std::string& expected) {
     faults_.push_back({"bad-message", expected, protocols::child_pointer("", key)});
   }
@@ -113,6 +129,22 @@ void read_hello(MemberReader& reader, Message& out) {
   out.control = role == "control";
 }
 
+void read_orientation(MemberReader& reader, Message& out) {
+  constexpr double kRoundings = 1e-3;  // of the length of a quaternion that is meant as unit
+  const json* const value = reader.member("orientation_wxyz", false);
+  if (value == nullptr) return;
+  bool good = value->is_array() && value->size() == 4;
+  double q[4] = {1, 0, 0, 0};
+  for (std::size_t i = 0; good && i < 4; ++i) {
+    good = (*value)[i].is_number();
+    if (good) q[i] = (*value)[i].get<double>();
+  }
+  const double size = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+  if (!good || !(std::abs(size - 1) <= kRoundings))
+    return reader.fault("orientation_wxyz", "expected a unit quaternion, four numbers");
+  out.orientation = Quat(q[0] / size, q[1] / size, q[2] / size, q[3] / size);
+}
+
 void read_rest(MemberReader& reader, Message& out) {
   constexpr std::int64_t kMost = INT64_MAX;
   switch (out.type) {
@@ -128,9 +160,12 @@ void read_rest(MemberReader& reader, Message& out) {
       }
       break;
     case MessageType::start:
+      reader.text("stimulus", out.stimulus, false);
       reader.text("renderer", out.renderer, false);
-      if (out.renderer != "point" && out.renderer != "ray")
+      if (reader.has("renderer") && out.renderer != "point" && out.renderer != "ray")
         reader.fault("renderer", "expected point or ray");
+      out.level = reader.number("level", -1e9, 1e9);
+      read_orientation(reader, out);
       out.trial = reader.integer("trial", false, 1, 1'000'000'000);
       break;
     case MessageType::set:
@@ -143,6 +178,12 @@ void read_rest(MemberReader& reader, Message& out) {
     case MessageType::answer:
       reader.text("response", out.text, true);
       out.t_ns = reader.integer("t_ns", false, 0, kMost);
+      if (const json* const correct = reader.member("correct", false)) {
+        if (correct->is_boolean())
+          out.correct = correct->get<bool>();
+        else
+          reader.fault("correct", "expected true or false");
+      }
       break;
     case MessageType::stop:
       reader.text("reason", out.text, false);
@@ -174,6 +215,7 @@ void read_rest(MemberReader& reader, Message& out) {
     case MessageType::alive:
     case MessageType::emergency:
     case MessageType::clear:
+    case MessageType::picture:
     case MessageType::bye:
       break;
   }

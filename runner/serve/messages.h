@@ -10,6 +10,8 @@
 #include <string>
 #include <vector>
 
+#include "stimuli/vec.h"
+
 namespace palpate::runner {
 
 inline constexpr int kServeVersion = 1;
@@ -51,6 +53,7 @@ enum class MessageType {
   alive,
   emergency,
   clear,
+  picture,
   bye
 };
 
@@ -65,12 +68,15 @@ struct Message {
   bool control = true;                ///< hello: else it watches
   std::string token;                  ///< hello
   nlohmann::json scene;               ///< load
-  std::string renderer = "ray";       ///< start
+  std::string stimulus, renderer;     ///< start; empty: not said
+  std::optional<double> level;        ///< start
+  std::optional<Quat> orientation;    ///< start, unit
   std::optional<std::int64_t> trial;  ///< start
   std::string path;                   ///< set: a JSON pointer into the scene
   nlohmann::json value;               ///< set
   std::string text;                   ///< answer's response, stop's reason, mark's and note's text
   std::optional<std::int64_t> t_ns;   ///< answer
+  std::optional<bool> correct;        ///< answer
   int code = 0;                       ///< mark
   double rate = 0;                    ///< subscribe: Hz, 0: no stream
   std::vector<StreamField> fields;    ///< subscribe

@@ -22,6 +22,7 @@
 #include <map>
 #include <mutex>
 #include <stdexcept>
+#include <string_view>
 #include <thread>
 #include <utility>
 
@@ -380,7 +381,11 @@ class Network::Impl final : public Hub {
 
   void gone(Client& client) override {
     if (client.role == Client::Role::control) {
-      if (hooks_.forces_are_on()) hooks_.emergency();
+      const std::int64_t now = now_ns();
+      if (hooks_.forces_are_on()) {
+        hooks_.emergency();
+        tell_all(event("controller_gone", now));
+      }
       command({client.id, true, {}});
     }
     clients_.erase(client.id);
@@ -487,7 +492,9 @@ class Network::Impl final : public Hub {
       return respond(greeting, http::status::forbidden,
                      "Origin: this page may not connect; --allow-origin allows it\n");
     if (!websocket::is_upgrade(request)) {
-      return respond(greeting, http::status::not_found, "expected a WebSocket\n");
+      if (request.target() == "/" && request.method() == http::verb::get)
+        return show_page(greeting);
+      return respond(greeting, http::status::not_found, "expected a WebSocket, or the page /\n");
     }
     if (!offers_subprotocol(request))
       return respond(greeting, http::status::bad_request, "expected the subprotocol palpate.1\n");
@@ -497,11 +504,30 @@ class Network::Impl final : public Hub {
     admit(client);
     client->accept(request);
   }
-  void respond(const std::shared_ptr<Greeting>& greeting, http::status status, std::string body) {
+  /// It knows no token: whoever opens it needs the whole address.
+  void show_page(const std::shared_ptr<Greeting>& greeting) {
+    const std::string nonce = make_token(), port = std::to_string(this->port());
+    std::string page = settings_.page;
+    constexpr std::string_view kMark = "@NONCE@";
+    for (std::size_t at = 0; (at = page.find(kMark, at)) != std::string::npos;)
+      page.replace(at, kMark.size(), nonce);
+    auto& response = greeting->response;
+    response.set("Content-Security-Policy",
+                 "default-src 'none'; script-src 'nonce-" + nonce + "'; style-src 'nonce-" + nonce +
+                     "'; img-src data:; connect-src ws://127.0.0.1:" + port + " ws://localhost:" +
+                     port + "; base-uri 'none'; form-action 'none'; frame-ancestors 'none'");
+    response.set(http::field::cache_control, "no-store");
+    response.set("Referrer-Policy", "no-referrer");
+    response.set("Cross-Origin-Opener-Policy", "same-origin");
+    response.set("Cross-Origin-Resource-Policy", "same-origin");
+    respond(greeting, http::status::ok, std::move(page), "text/html; charset=utf-8");
+  }
+  void respond(const std::shared_ptr<Greeting>& greeting, http::status status, std::string body,
+               const char* type = "text/plain; charset=utf-8") {
     auto& response = greeting->response;
     response.version(11);
     response.result(status);
-    response.set(http::field::content_type, "text/plain; charset=utf-8");
+    response.set(http::field::content_type, type);
     response.set("X-Content-Type-Options", "nosniff");
     response.keep_alive(false);
     response.body() = std::move(body);
@@ -536,7 +562,7 @@ class Network::Impl final : public Hub {
                                    {"program", "palpate " PALPATE_VERSION},
                                    {"client", client.id},
                                    {"t_ns", now_ns()}};
-    more["scene"] = hooks_.scene();
+    more.update(hooks_.state());
     client.send(accepted(message.id, more));
   }
 
@@ -560,8 +586,13 @@ class Network::Impl final : public Hub {
         client.next_ns = 0;
         client.rows.clear();
         client.row_count = 0;
-        client.lost_before = hooks_.lost();
+        client.lost_before = hooks_.ticks->lost();
         return client.send(accepted(message.id));
+      case MessageType::picture: {
+        const std::string members = hooks_.picture();
+        return client.send("{\"re\":" + std::to_string(message.id) + ",\"ok\":true," + members +
+                           "}");
+      }
       case MessageType::bye:
         client.send(accepted(message.id));
         if (client.role == Client::Role::control) {
@@ -615,7 +646,7 @@ class Network::Impl final : public Hub {
     stream_timer_.async_wait([this](const Code& error) {
       if (error) return;
       StreamSample sample;
-      while (hooks_.next_sample(sample)) {
+      while (hooks_.ticks->next(sample)) {
         for (const auto& [id, client] : clients_) add(*client, sample);
       }
       for (const auto& [id, client] : std::map(clients_)) send_rows(*client);
@@ -638,7 +669,7 @@ class Network::Impl final : public Hub {
   }
   /// Rows wait while a client has not read the last message; what has no room is dropped.
   void send_rows(Client& client) {
-    const std::uint64_t lost = hooks_.lost();
+    const std::uint64_t lost = hooks_.ticks->lost();
     if (client.rate > 0) client.dropped += lost - client.lost_before;
     client.lost_before = lost;
     if ((client.row_count == 0 && client.dropped == 0) || !client.idle()) return;

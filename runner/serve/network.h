@@ -6,10 +6,11 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
-#include "runner/serve/served_scene.h"
+#include "runner/serve/outlets.h"
 
 namespace palpate::runner {
 
@@ -18,22 +19,17 @@ struct NetworkSettings {
   std::string socket;      ///< path; empty: none
   std::string token;
   std::vector<std::string> origins;  ///< whose pages may connect
+  /// For watchers, as HTML; its elements of style and script have the nonce @NONCE@.
+  std::string page;
 };
 
 /// What the network asks for. Called in its thread; must not wait.
 struct NetworkHooks {
-  std::function<void()> emergency, silence;  ///< zero force at once; likewise, as nobody steers
+  std::function<void()> emergency, silence;  ///< zero force at once; by the ramp: nobody steers
   std::function<bool()> forces_are_on;
-  std::function<nlohmann::json()> scene;  ///< null without one
-  std::function<bool(StreamSample&)> next_sample;
-  std::function<std::uint64_t()> lost;  ///< samples that nobody got
-};
-
-/// What the controller said, for the session's thread.
-struct ServeCommand {
-  std::uint64_t client = 0;
-  bool left = false;  ///< the controller is gone; no message
-  Message message;
+  std::function<nlohmann::json()> state;  ///< an object: the answer to hello has its members
+  std::function<std::string()> picture;   ///< of what is felt: the members of an answer, as JSON
+  TickStream* ticks = nullptr;
 };
 
 /// 128 bits as 32 hexadecimal digits, from the kernel. \throws std::runtime_error

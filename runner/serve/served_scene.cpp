@@ -68,23 +68,30 @@ ServedScene::ServedScene(Device& device, GuardedDevice* guard, Clock& clock, Set
   if (settings_.scene.empty()) return;
   // A device of three degrees of freedom shows it to the point renderer alone.
   const bool ray = device_.sensed_freedom >= 5;
-  read(settings_.scene, named_renderer(ray ? "ray" : "point"));
+  const protocols::SceneSpec spec = read(settings_.scene, named_renderer(ray ? "ray" : "point"));
   protocols::FaultList none(settings_.scene_path);  // it was read just now
-  scene_ = protocols::read_json(settings_.scene, none);
+  keep(protocols::read_json(settings_.scene, none), spec);
 }
 
 ServedScene::~ServedScene() { emergency_zero(); }
 
 void ServedScene::emergency_zero() noexcept { forces_.off(); }
 
-json ServedScene::scene() const {
+json ServedScene::state() const {
   const std::lock_guard lock(mutex_);
-  return scene_;
+  return {{"scene", scene_}};
 }
 
-void ServedScene::keep(json scene) {
+std::string ServedScene::picture() const {
+  const std::lock_guard lock(mutex_);
+  return picture_;
+}
+
+void ServedScene::keep(json scene, const protocols::SceneSpec& spec) {
+  std::string picture = settings_.picture(spec.objects);
   const std::lock_guard lock(mutex_);
   scene_.swap(scene);
+  picture_.swap(picture);
 }
 
 void ServedScene::tell(const std::string& name, std::int64_t t_ns, const ordered_json& more) {
@@ -120,7 +127,7 @@ void ServedScene::load(json scene) {
   const bool ray = device_.sensed_freedom >= 5;
   const std::string text = scene.dump();
   const protocols::SceneSpec spec = read(text, named_renderer(ray ? "ray" : "point"));
-  keep(std::move(scene));
+  keep(std::move(scene), spec);
   tell("loaded", clock_.now_ns(), {{"objects", spec.objects.size()}});
 }
 
@@ -141,7 +148,10 @@ void ServedScene::start(std::uint64_t client, const Message& message) {
   if (scene_.is_null()) throw MessageRefused("no-scene", "load a scene first");
   if (!held_by_.empty())
     throw MessageRefused("forces-off", "forces are off (" + held_by_ + "): clear first");
-  const rendering::Renderer& renderer = named_renderer(message.renderer);
+  if (!message.stimulus.empty() || message.level || message.orientation)
+    throw MessageRefused("bad-message", "stimulus, level and orientation go with --protocol alone");
+  const rendering::Renderer& renderer =
+      named_renderer(message.renderer.empty() ? "ray" : message.renderer);
   show(read(scene_.dump(), renderer), renderer);
   renderer_ = &renderer;
   trial_ = Trial{
@@ -166,7 +176,7 @@ void ServedScene::set(std::uint64_t client, const Message& message) {
   const bool ray = trial_ ? renderer_->side_contact() : device_.sensed_freedom >= 5;
   const protocols::SceneSpec spec = read(text, named_renderer(ray ? "ray" : "point"));
   if (trial_) show(spec, *renderer_);
-  keep(std::move(changed));
+  keep(std::move(changed), spec);
   tell("set", clock_.now_ns(), {{"path", message.path}, {"value", message.value}});
   output_->reply(client, accepted(message.id));
 }
@@ -312,19 +322,7 @@ void ServedScene::take(const Sample& sample) {
     trial_->in_contact = false;
     tell("left", sample.time_ns);
   }
-  const bool contact = sample.rendering.contacts > 0;
-  const StreamSample out{.time_ns = sample.time_ns,
-                         .lateness_ns = sample.lateness_ns,
-                         .tick = sample.tick,
-                         .faults = sample.faults,
-                         .object = sample.rendering.object,
-                         .tip = sample.probe.tip,
-                         .tail = sample.probe.tail,
-                         .force = sample.device1 + sample.device2,
-                         .rendered = sample.rendering.force,
-                         .contact = contact ? sample.rendering.deepest.point : Vec3(0),
-                         .depth = sample.rendering.deepest.depth};
-  if (!stream_.push(out)) lost_.fetch_add(1);
+  ticks_.push(sample);
 }
 
 void ServedScene::attend() {
@@ -332,6 +330,11 @@ void ServedScene::attend() {
     if (sample->time_ns == last_ns_) continue;
     patience_.begin();
     take(*sample);
+  }
+  if (forces_.newest().trouble == DeviceTrouble::guard_lost) {
+    held_by_ = "the guard process has ended";
+    tell("fault", clock_.now_ns(), {{"reason", held_by_}});
+    forces_.end_without_guard();
   }
   if (!trial_ || !patience_.is_over()) return;
   emergency_zero();

@@ -13,7 +13,7 @@
 #include "protocols/parse.h"
 #include "runner/safety/guarded_device.h"
 #include "runner/serve/messages.h"
-#include "runner/servo/ring.h"
+#include "runner/serve/outlets.h"
 #include "runner/servo/servo_thread.h"
 #include "runner/session/live_forces.h"
 
@@ -24,28 +24,6 @@ namespace palpate::runner {
 protocols::Protocol protocol_of(const protocols::SceneSpec& spec,
                                 const rendering::Renderer& renderer);
 
-/// What a stream tells of a tick.
-struct StreamSample {
-  std::int64_t time_ns = 0, lateness_ns = 0;
-  std::uint32_t tick = 0, faults = 0;
-  int object = -1;
-  Vec3 tip, tail;    ///< m, virtual stylus
-  Vec3 force;        ///< N, commanded to the hand, after the limits
-  Vec3 rendered;     ///< N, before them
-  Vec3 contact;      ///< m, the deepest; zero in free space
-  double depth = 0;  ///< m
-};
-
-/// Where what a scene says goes to.
-class ServeOutput {
- public:
-  virtual ~ServeOutput() = default;
-  /// To the client that asked. From any thread; never waits.
-  virtual void reply(std::uint64_t client, std::string text) = 0;
-  /// To all. From any thread; never waits.
-  virtual void tell(std::string text) = 0;
-};
-
 /// All functions belong to one thread, the session's, but those that say otherwise.
 class ServedScene {
  public:
@@ -53,6 +31,7 @@ class ServedScene {
     std::string scene_path;  ///< its folder has the meshes; faults name it
     std::string scene;       ///< JSON; empty: none yet
     ServoSettings servo;
+    PictureOf picture;
   };
 
   /// \param guard  may be none. \throws InputError, MeshError, MessageRefused: the first scene
@@ -68,25 +47,26 @@ class ServedScene {
   /// The controller has left: nothing is felt any more.
   void controller_left();
   /// Takes what the servo gave since the last call. Call it every few milliseconds.
+  /// \throws EndOfSession: the guard process has ended, forces are zero and cannot come back
   void attend();
   /// While true, clear() and what waits for the device gives up.
   void give_up_when(std::function<bool()> stop) { stop_ = std::move(stop); }
 
   /// Zero force at once, until `clear`. From any thread.
   void emergency_zero() noexcept;
-  /// The same, because the controller says nothing any more. From any thread.
+  /// The same by the ramp, because the controller says nothing any more. From any thread.
   void controller_is_silent() noexcept {
     silent_.store(true);
-    emergency_zero();
+    forces_.fade();
   }
   /// From any thread.
   bool forces_are_on() const noexcept { return !servo_.forces_are_off(); }
-  /// Ticks for the network's thread, in order; false where there is none.
-  bool next_of_stream(StreamSample& out) noexcept { return stream_.pop(out); }
-  /// Ticks that the stream had no room for. From any thread.
-  std::uint64_t lost() const noexcept { return lost_.load(); }
-  /// The scene of now; null without one. From any thread.
-  nlohmann::json scene() const;
+  /// Ticks, for the network's thread.
+  TickStream& ticks() noexcept { return ticks_; }
+  /// What hello is answered with: the scene of now, null without one. From any thread.
+  nlohmann::json state() const;
+  /// What `picture` is answered with. From any thread.
+  std::string picture() const;
   ServoThread& servo() { return servo_; }  ///< for signal handlers
 
  private:
@@ -102,7 +82,7 @@ class ServedScene {
   };
   protocols::SceneSpec read(const std::string& text, const rendering::Renderer& renderer) const;
   void load(nlohmann::json scene);
-  void keep(nlohmann::json scene);
+  void keep(nlohmann::json scene, const protocols::SceneSpec& spec);
   void start(std::uint64_t client, const Message& message);
   void set(std::uint64_t client, const Message& message);
   void show(const protocols::SceneSpec& spec, const rendering::Renderer& renderer);
@@ -121,14 +101,14 @@ class ServedScene {
   const Settings settings_;
   ServeOutput* output_ = nullptr;
   std::function<bool()> stop_ = [] { return false; };
-  mutable std::mutex mutex_;  ///< of the next one: written by this thread, read by others
+  mutable std::mutex mutex_;  ///< of the next two: written by this thread, read by others
   nlohmann::json scene_;      ///< null: none
+  std::string picture_ = R"("objects":[])";
   const rendering::Renderer* renderer_ = nullptr;  ///< of the trial
   std::optional<Trial> trial_;
   std::int64_t last_ns_ = 0;  ///< of the newest sample that was taken
   std::string held_by_;       ///< why forces were taken off, until `clear`
-  Ring<StreamSample> stream_{4096};
-  std::atomic<std::uint64_t> lost_{0};
+  TickStream ticks_;
   std::atomic<bool> silent_{false};
   Patience patience_;
   ServoThread servo_;

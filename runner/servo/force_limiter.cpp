@@ -24,8 +24,9 @@ DeviceForces ForceLimiter::apply(const Vec3& device1, const Vec3& device2) noexc
     if (!std::isfinite(size1 + size2)) trip();
     strongest = std::max(size1, size2);
   }
+  if (fading_ && ramp_ <= ramp_step_) trip();
   if (tripped_) return {};
-  ramp_ = std::min(1.0, ramp_ + ramp_step_);
+  ramp_ = fading_ ? ramp_ - ramp_step_ : std::min(1.0, ramp_ + ramp_step_);
   DeviceForces out;
   out.limited = strongest > limits_.max_force;
   const double scale = ramp_ * (out.limited ? limits_.max_force / strongest : 1);

@@ -29,15 +29,17 @@ class ForceLimiter {
   void release() noexcept;
   /// Zero force at once and until clear().
   void trip() noexcept;
+  /// The ramp the other way from the next apply() on, then as trip().
+  void fade() noexcept { fading_ = true; }
   bool tripped() const noexcept { return tripped_; }
-  void clear() noexcept { tripped_ = false; }
+  void clear() noexcept { tripped_ = fading_ = false; }
 
  private:
   ForceLimits limits_;
   double ramp_step_;
   double ramp_ = 0;  ///< 0 to 1
   Vec3 last1_, last2_;
-  bool tripped_ = false;
+  bool tripped_ = false, fading_ = false;
 };
 
 }  // namespace palpate::runner

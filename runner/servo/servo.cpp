@@ -88,6 +88,7 @@ void Servo::begin(TrialScene& shown) noexcept {
 
 void Servo::clear_fault() noexcept {
   emergency_.store(false);  // first: a request that comes from now on is kept
+  fade_.store(false);
   clear_trip();
 }
 
@@ -164,6 +165,7 @@ void Servo::command(Vec3 device1, Vec3 device2) noexcept {
     sample_.faults |= servo_fault::kEmergency;
     limiter_.trip();
   }
+  if (fade_.load(std::memory_order_relaxed)) limiter_.fade();
   // A device with one grip adds both forces up: the limits and the energy account see their sum.
   // Its torque is left out.
   if (drives_force_alone_) {

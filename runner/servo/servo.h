@@ -77,6 +77,8 @@ class Servo final : public TickSource {
   }
   /// Zero force from the current tick on, until clear_fault(). From any thread or signal handler.
   void emergency_zero() noexcept { emergency_.store(true); }
+  /// The same by the ramp, as nobody is in a hurry: from full force in ForceLimits::ramp.
+  void fade_out() noexcept { fade_.store(true); }
   /// The experimenter allows forces again. From any thread.
   void clear_fault() noexcept;
   /// The same, but zero force that was asked for stays asked for.
@@ -138,7 +140,7 @@ class Servo final : public TickSource {
   Sample sample_;
   ServoQuality quality_;
   double strongest2_ = 0;  ///< N^2, of the forces on the hand: its root is quality_'s, in the end
-  std::atomic<bool> emergency_{false}, clear_{false};
+  std::atomic<bool> emergency_{false}, fade_{false}, clear_{false};
   static_assert(std::atomic<bool>::is_always_lock_free);  // set from signal handlers
 };
 

@@ -90,6 +90,8 @@ class ServoThread final : public TickSource {
   bool latest(Sample& sample) noexcept { return latest_.read(sample); }
   /// Zero force within the tick and until clear_fault(). From any thread or signal handler.
   void emergency_zero() noexcept { servo_.emergency_zero(); }
+  /// Zero force by the ramp and until clear_fault(). From any thread.
+  void fade_out() noexcept { servo_.fade_out(); }
   void clear_fault() noexcept { servo_.clear_fault(); }
   void clear_trip() noexcept { servo_.clear_trip(); }
   /// True once zero force was commanded to the device after emergency_zero(). Signal safe.

@@ -18,6 +18,8 @@ class LiveForces {
 
   /// Zero force at once, until allow().
   void off() noexcept;
+  /// Likewise by the servo's ramp. From any thread.
+  void fade() noexcept { servo_.fade_out(); }
   /// Allows forces again, once the device has given a good reading. One that is unplugged or silent
   /// is opened again first, which may take seconds.
   /// \param stop  asked every few milliseconds: true gives it up

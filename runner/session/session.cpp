@@ -182,6 +182,7 @@ std::optional<Answer> Session::wait_for_answer(ServoState& servo) {
 
 bool Session::run_trial() {
   ask_level();
+  if (const auto choice = participant_.choose(station_.plan.next())) station_.plan.choose(*choice);
   const protocols::Trial& trial = station_.plan.next();
   record_ = planned_record(trial);
   record_.attempt = station_.log.begin(record_, station_.clock.now_ns());

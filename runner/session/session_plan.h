@@ -36,6 +36,10 @@ class SessionPlan {
   void propose(double level) {
     if (tasks_) tasks_->propose(level);
   }
+  /// Version 2: a program says what the next trial, of an external block, is.
+  void choose(const protocols::TrialChoice& choice) {
+    if (tasks_) tasks_->choose(choice);
+  }
   /// The next trial has been answered.
   void answered(const protocols::TrialOutcome& outcome);
   void answered(bool correct) { answered(protocols::TrialOutcome{correct, correct}); }

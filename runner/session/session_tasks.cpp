@@ -237,6 +237,10 @@ void Session::take_task_answer(const protocols::Trial& trial, const std::optiona
       task.success = record_.response == "yes";
       record_.correct = task.success != trial.catch_trial;
       break;
+    case TaskKind::external:
+      record_.response = chosen(block, *answer).name;
+      record_.correct = task.success = answer->correct.value_or(record_.response == record_.shape);
+      break;
     case TaskKind::rate:
       task.number = block.answers.empty() ? answer->number : chosen(block, *answer).number;
       record_.response = protocols::level_text(*task.number);

@@ -306,6 +306,10 @@ std::vector<std::string> simulation_faults(const protocols::Protocol& protocol,
                                            const SimulatedSettings& settings) {
   SimulatedStylus device = simulated_stylus(protocol, settings);
   std::vector<std::string> faults = incompatibilities(protocol, library, device.capabilities());
+  if (protocols::is_external(protocol)) {
+    faults.emplace_back(
+        "another program says what a block of the task 'external' shows: palpate serve runs it");
+  }
   for (const protocols::StimulusSpec& stimulus : protocol.stimuli) {
     if (protocol.version == 2) break;  // its tasks are not answered by the shape
     const std::string fault = ShapeHypotheses::fault_of(stimulus.object);

@@ -63,6 +63,14 @@ void check_fitness(const OpenDevice& open, const RunSettings& settings,
                    "--without-calibration runs the session without");
 }
 
+ServoSettings servo_settings_of(const protocols::Protocol& protocol) {
+  ServoSettings settings;
+  settings.rate = protocol.servo_rate;
+  settings.workspace = workspace_of(protocol);
+  settings.passivity_controller = protocol.passivity_controller;
+  return settings;
+}
+
 std::vector<std::unique_ptr<MarkerSink>> open_markers(const RunSettings& settings) {
   const MarkerCodes codes =
       settings.marker_codes ? MarkerCodes::everywhere : MarkerCodes::this_computer;

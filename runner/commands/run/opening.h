@@ -14,6 +14,7 @@
 #include "runner/participants/response_box.h"
 #include "runner/safety/guarded_device.h"
 #include "runner/scene_builder.h"
+#include "runner/servo/servo_thread.h"
 #include "runner/session/markers.h"
 #include "runner/sound/masking_noise.h"
 
@@ -33,6 +34,8 @@ OpenDevice open_device(const DeviceKind& kind, const RunSettings& settings,
 /// \throws UsageError where the device cannot or should not show the protocol.
 void check_fitness(const OpenDevice& open, const RunSettings& settings,
                    const protocols::Protocol& protocol, const StimulusLibrary& library);
+
+ServoSettings servo_settings_of(const protocols::Protocol& protocol);
 
 /// \throws UsageError: no markers go there
 std::vector<std::unique_ptr<MarkerSink>> open_markers(const RunSettings& settings);

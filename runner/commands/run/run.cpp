@@ -22,6 +22,7 @@
 #include "data/store/torque_notes.h"
 #include "protocols/event_codes.h"
 #include "protocols/sha256.h"
+#include "protocols/tasks/task_plan.h"
 #include "protocols/tasks/texts.h"
 #include "runner/commands/run/admission.h"
 #include "runner/commands/run/opening.h"
@@ -65,14 +66,6 @@ class ZeroOnSignal {
  private:
   FaultSignals& signals_;
 };
-
-ServoSettings servo_settings_of(const protocols::Protocol& protocol) {
-  ServoSettings settings;
-  settings.rate = protocol.servo_rate;
-  settings.workspace = workspace_of(protocol);
-  settings.passivity_controller = protocol.passivity_controller;
-  return settings;
-}
 
 ForceLimits limits_of(const ServoSettings& settings, const DeviceCapabilities& device) {
   ForceLimits limits = settings.limits;
@@ -249,6 +242,10 @@ int run_command(const std::vector<std::string>& args) {
   // Who takes part, in which protocol.
   const DeviceKind& kind = find_device_kind(settings.device);
   Admission admission = admit(settings);
+  if (protocols::is_external(admission.protocol))
+    throw UsageError(
+        "this protocol has a block of the task 'external': palpate serve runs it, with the program "
+        "that says what is shown");
   settings.participant = admission.participant;
   protocols::Protocol& protocol = admission.protocol;
   translate_texts(settings, admission);

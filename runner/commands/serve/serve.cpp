@@ -3,17 +3,27 @@
 #include <chrono>
 #include <fstream>
 #include <iostream>
+#include <optional>
 #include <sstream>
 #include <thread>
 
 #include "data/files/atomic_file.h"
+#include "data/store/store.h"
 #include "runner/commands/render/forces.h"
+#include "runner/commands/run/admission.h"
 #include "runner/commands/run/opening.h"
+#include "runner/commands/run/report.h"
+#include "runner/commands/run/resumption.h"
+#include "runner/commands/run/run_info.h"
+#include "runner/commands/serve/live_page.h"
 #include "runner/commands/shared/command.h"
+#include "runner/commands/watch/picture_mesh.h"
 #include "runner/safety/fault_signals.h"
 #include "runner/serve/network.h"
 #include "runner/serve/served_scene.h"
+#include "runner/serve/served_session.h"
 #include "runner/servo/realtime.h"
+#include "runner/session/device_check.h"
 #include "stimuli/printable.h"
 
 namespace palpate::runner {
@@ -30,6 +40,23 @@ std::string contents(const std::string& path) {
   std::stringstream out;
   out << file.rdbuf();
   return out.str();
+}
+
+/// Surfaces in the world, for watchers.
+std::string picture_of(const std::vector<stimuli::ObjectSpec>& objects) {
+  constexpr std::size_t kMostTriangles = 6000;  // of all
+  nlohmann::ordered_json out = nlohmann::ordered_json::array();
+  for (const stimuli::ObjectSpec& object : objects) {
+    const PictureMesh mesh = picture_mesh(object, kMostTriangles / objects.size() + 1);
+    nlohmann::ordered_json corners = nlohmann::ordered_json::array();
+    for (const Vec3& corner : mesh.corners) {
+      const Vec3 p = object.pose.position + object.pose.orientation * corner;
+      corners.push_back(
+          {static_cast<float>(p.x), static_cast<float>(p.y), static_cast<float>(p.z)});
+    }
+    out.push_back({{"corners", std::move(corners)}, {"triangles", mesh.triangles}});
+  }
+  return "\"objects\":" + out.dump();
 }
 
 /// The file with the token while the server runs; only its owner can read it.
@@ -52,26 +79,80 @@ class TokenFile {
   const std::string path_;
 };
 
-int serve(const po::variables_map& values) {
-  RunSettings run;
-  run.device = text_of(values, "device");
-  run.calibration = text_of(values, "calibration");
-  run.without_calibration = values["without-calibration"].as<bool>();
+/// The scene's or session's thread beside the network's: what both kinds of server have.
+class Server {
+ public:
+  Server(const po::variables_map& values, FaultSignals& signals)
+      : values_(values), signals_(signals), network_(settings_of(values)) {}
+  ~Server() {
+    network_.end();  // it asks what is served
+    signals_.watch(static_cast<ServoThread*>(nullptr));
+    signals_.watch(static_cast<GuardedDevice*>(nullptr));
+  }
+  Server(const Server&) = delete;
+  Server& operator=(const Server&) = delete;
+
+  Network& network() { return network_; }
+  /// Says where it is, and answers from now on. \param served  a ServedScene or ServedSession
+  template <class Served>
+  void begin(Served& served, ServoThread& servo) {
+    signals_.watch(&servo);
+    nlohmann::ordered_json serving = {{"type", "serving"},
+                                      {"url", "ws://127.0.0.1:" + std::to_string(network_.port())}};
+    if (const std::string socket = text_of(values_, "socket"); !socket.empty())
+      serving["socket"] = socket;
+    serving["token"] = token_;
+    serving["page"] = "http://127.0.0.1:" + std::to_string(network_.port()) + "/#" + token_;
+    token_file_.emplace(text_of(values_, "token-file"), serving.dump());
+    network_.begin({.emergency = [&served] { served.emergency_zero(); },
+                    .silence = [&served] { served.controller_is_silent(); },
+                    .forces_are_on = [&servo] { return !servo.forces_are_off(); },
+                    .state = [&served] { return served.state(); },
+                    .picture = [&served] { return served.picture(); },
+                    .ticks = &served.ticks()});
+    // The token is in the file, where one is asked for: not in a log as well.
+    if (values_.count("token-file") > 0) {
+      serving.erase("token");
+      serving.erase("page");
+    }
+    std::cout << serving.dump() << std::endl;
+    if (!std::cout) throw std::runtime_error("standard output could not be written");
+  }
+
+ private:
+  NetworkSettings settings_of(const po::variables_map& values) {
+    token_ = make_token();
+    NetworkSettings net{.port = static_cast<std::uint16_t>(values["port"].as<int>()),
+                        .socket = text_of(values, "socket"),
+                        .token = token_,
+                        .origins = {},
+                        .page = std::string(live_page())};
+    if (values.count("allow-origin") > 0)
+      net.origins = values["allow-origin"].as<std::vector<std::string>>();
+    return net;
+  }
+
+  const po::variables_map& values_;
+  FaultSignals& signals_;
+  std::string token_;
+  Network network_;
+  std::optional<TokenFile> token_file_;
+};
+
+void tell_of_servo(const ServoThread& servo) {
+  const ServoHealth& health = servo.health();
+  std::cerr << "palpate serve ends: " << health.ticks() << " ticks, " << health.missed_ticks()
+            << " missed\n";
+}
+
+int serve_scene(const po::variables_map& values, const RunSettings& run) {
   const DeviceKind& kind = find_device_kind(run.device);
   const std::string path = text_of(values, "scene");
   protocols::SceneSpec spec;
   if (!path.empty()) spec = protocols::parse_scene(path);
-  const int port = values["port"].as<int>();
-  if (port < 0 || port > 65535) throw UsageError("--port: expected a number from 0 to 65535");
   const double rate = values["rate"].as<double>();
   if (!(rate >= 100 && rate <= 4000))
     throw UsageError("--rate: expected a number from 100 to 4000");
-  NetworkSettings net{.port = static_cast<std::uint16_t>(port),
-                      .socket = text_of(values, "socket"),
-                      .token = make_token(),
-                      .origins = {}};
-  if (values.count("allow-origin") > 0)
-    net.origins = values["allow-origin"].as<std::vector<std::string>>();
 
   FaultSignals signals;
   protocols::Protocol protocol = protocol_of(spec, renderer_named("point"));
@@ -79,7 +160,6 @@ int serve(const po::variables_map& values) {
   const OpenDevice open = open_device(kind, run, protocol);  // forks: before there are threads
   signals.watch(open.guard);
   if (open.guard != nullptr) check_fitness(open, run, protocol, StimulusLibrary(protocol));
-  Network network(net);
   RealClock clock;
   ServoSettings servo;
   servo.rate = protocol.servo_rate;
@@ -87,50 +167,116 @@ int serve(const po::variables_map& values) {
   ServedScene scene(*open.device, open.guard, clock,
                     {.scene_path = path.empty() ? "scene" : path,
                      .scene = path.empty() ? "" : contents(path),
-                     .servo = servo});
-  signals.watch(&scene.servo());
-  struct AtTheEnd {
-    Network& network;
-    FaultSignals& signals;
-    ~AtTheEnd() {
-      network.end();  // it asks the scene
-      signals.watch(static_cast<ServoThread*>(nullptr));
-      signals.watch(static_cast<GuardedDevice*>(nullptr));
-    }
-  } const at_the_end{network, signals};
-  scene.answer_through(network);
+                     .servo = servo,
+                     .picture = picture_of});
+  Server server(values, signals);
+  scene.answer_through(server.network());
   scene.give_up_when([&signals] { return signals.end_requested() != 0; });
-
-  nlohmann::ordered_json serving = {{"type", "serving"},
-                                    {"url", "ws://127.0.0.1:" + std::to_string(network.port())}};
-  if (!net.socket.empty()) serving["socket"] = net.socket;
-  serving["token"] = net.token;
-  const TokenFile token_file(text_of(values, "token-file"), serving.dump());
-  network.begin({.emergency = [&scene] { scene.emergency_zero(); },
-                 .silence = [&scene] { scene.controller_is_silent(); },
-                 .forces_are_on = [&scene] { return scene.forces_are_on(); },
-                 .scene = [&scene] { return scene.scene(); },
-                 .next_sample = [&scene](StreamSample& out) { return scene.next_of_stream(out); },
-                 .lost = [&scene] { return scene.lost(); }});
-  // The token is in the file, where one is asked for: not in a log as well.
-  if (values.count("token-file") > 0) serving.erase("token");
-  std::cout << serving.dump() << std::endl;
-  if (!std::cout) throw std::runtime_error("standard output could not be written");
-  while (signals.end_requested() == 0) {
-    for (const ServeCommand& command : network.commands()) {
-      if (command.left)
-        scene.controller_left();
-      else
-        scene.obey(command.client, command.message);
+  server.begin(scene, scene.servo());
+  try {
+    while (signals.end_requested() == 0) {
+      for (const ServeCommand& command : server.network().commands()) {
+        if (command.left)
+          scene.controller_left();
+        else
+          scene.obey(command.client, command.message);
+      }
+      scene.attend();
+      std::this_thread::sleep_for(std::chrono::milliseconds(2));
     }
-    scene.attend();
-    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  } catch (const EndOfSession& end) {
+    scene.emergency_zero();
+    std::cerr << end.what() << "\n";
+    return 1;
   }
   scene.emergency_zero();
-  const ServoHealth& health = scene.servo().health();
-  std::cerr << "palpate serve ends: " << health.ticks() << " ticks, " << health.missed_ticks()
-            << " missed\n";
+  tell_of_servo(scene.servo());
   return 0;
+}
+
+int serve_session(const RunSettings& settings, const po::variables_map& values) {
+  const DeviceKind& kind = find_device_kind(settings.device);
+  const Admission admission = admit(settings);
+  protocols::Protocol protocol = admission.protocol;
+  if (const std::string why = unserved(protocol); !why.empty())
+    throw UsageError("--protocol: " + why);
+
+  FaultSignals signals;
+  const OpenDevice open = open_device(kind, settings, protocol);  // forks: before there are threads
+  signals.watch(open.guard);
+  const DeviceCapabilities& device = open.device->capabilities();
+  const std::vector<LimitedMaterial> limited = limit_materials(protocol, device);
+  const StimulusLibrary library(protocol);
+  check_fitness(open, settings, protocol, library);
+
+  data::Store store = data::Store::open(settings.database, data::Store::Mode::write_or_create);
+  warn_of_exposure(store.path());
+  RealClock clock;
+  const data::Participant participant =
+      store.look_up(admission.enrolled, admission.participant, admission.number, device.simulated);
+  const int session = choose_session(store, participant, protocol, settings);
+  print_participant(participant, session, protocol.sessions.count, device.simulated);
+  const data::ClockStamp began = stamp_now(clock);
+  data::RunInfo info = run_info(settings, device, session, began, false);
+  info.response_device = "another program";
+  RunRecord record(store, admission.enrolled, participant, info, other_texts(admission));
+  const data::SessionProgress progress = store.progress(participant, session);
+  SessionPlan plan(protocol, participant.enrolled_number, session);
+  for (const data::TrialRecord& trial : progress.completed) plan.answered(outcome_of(trial));
+  if (const std::string resumed = resumption(store, participant, session, plan); !resumed.empty())
+    std::cerr << resumed << "\n";
+
+  record.note(clock.now_ns(), R"({"served":{"preflight":"left out"}})");
+  for (const std::string& note : admission.notes) record.note(clock.now_ns(), note);
+  if (!limited.empty())
+    record.note(clock.now_ns(), to_json_text(limited, device, protocol.servo_rate));
+  ServoThread servo(*open.device, clock, servo_settings_of(protocol));
+  const Station station{protocol, library, plan, servo, clock, began, record};
+  ServedSession served({.station = station,
+                        .record = record,
+                        .servo = servo,
+                        .guard = open.guard,
+                        .end_requested = [&signals] { return signals.end_requested(); },
+                        .stored = progress.completed,
+                        .picture = picture_of});
+  Server server(values, signals);
+  server.begin(served, servo);
+  const ServedSession::Outcome outcome =
+      served.run(server.network(), [&server] { return server.network().commands(); });
+  served.emergency_zero();
+  tell_of_servo(servo);
+  if (!outcome.reason.empty()) std::cerr << outcome.reason << "\n";
+  return outcome.failed ? 1 : 0;
+}
+
+int serve(const po::variables_map& values) {
+  RunSettings run;
+  run.device = text_of(values, "device");
+  run.calibration = text_of(values, "calibration");
+  run.without_calibration = values["without-calibration"].as<bool>();
+  const int port = values["port"].as<int>();
+  if (port < 0 || port > 65535) throw UsageError("--port: expected a number from 0 to 65535");
+  const bool recorded = values.count("protocol") > 0;
+  for (const char* const option : {"db", "participant"}) {
+    if ((values.count(option) > 0) != recorded)
+      throw UsageError("expected --protocol, --db and --participant together, or none of them");
+  }
+  for (const char* const option : {"number", "session", "consent"}) {
+    if (values.count(option) > 0 && !recorded)
+      throw UsageError(std::string("--") + option + ": goes with --protocol");
+  }
+  if (!recorded) return serve_scene(values, run);
+  if (values.count("scene") > 0 || !values["rate"].defaulted())
+    throw UsageError("--protocol: it has stimuli and a servo rate; leave --scene and --rate out");
+  run.protocol = text_of(values, "protocol");
+  run.database = text_of(values, "db");
+  run.participant = text_of(values, "participant");
+  run.consent = text_of(values, "consent");
+  if (values.count("number") > 0) run.number = values["number"].as<int>();
+  if (values.count("session") > 0) run.session = values["session"].as<int>();
+  run.new_participant = values["new-participant"].as<bool>();
+  run.no_window = true;
+  return serve_session(run, values);
 }
 
 }  // namespace
@@ -139,21 +285,33 @@ int serve_command(const std::vector<std::string>& args) {
   CommandLine line;
   line.usage =
       "palpate serve --device NAME [--scene SCENE.json] [--port N] [--socket PATH]\n"
-      "              [--token-file FILE] [--allow-origin URL ...]";
+      "              [--token-file FILE] [--allow-origin URL ...]\n"
+      "palpate serve --device NAME --protocol P.json --db FILE --participant CODE ...";
   line.summary =
       "Lets another program put scenes before the hand: messages in JSON over a WebSocket of\n"
       "127.0.0.1, or a line each over a Unix socket (protocols/serve.schema.json). It says\n"
       "which scene and when; the forces are palpate's, limited and guarded. A program that is\n"
-      "silent for half a second, or goes, ends them. Nothing is recorded. Ctrl-C ends it.";
+      "silent for half a second, or goes, ends them. Ctrl-C ends it. With a protocol it is a\n"
+      "session on record: the program begins each trial and says the answer, and in blocks of the\n"
+      "task 'external' what is shown.";
   line.example =
       "  palpate serve --device simulated --scene scene.json\n"
       "  palpate serve --device inverse3 --socket /run/user/1000/palpate --token-file token.json\n"
-      "  palpate serve --device simulated --port 7000 --allow-origin http://localhost:8000\n";
+      "  palpate serve --device simulated --port 7000 --allow-origin http://localhost:8000\n"
+      "  palpate serve --device simulated --protocol p.json --db study.db --participant P03\n";
   line.options.add_options()  //
       ("device", po::value<std::string>()->value_name("NAME")->required(),
        "as for palpate run")  //
       ("scene", po::value<std::string>()->value_name("FILE"),
        "the first scene; without it the client loads one")  //
+      ("protocol", po::value<std::string>()->value_name("FILE"),
+       "whose trials are shown and recorded")                                                 //
+      ("db", po::value<std::string>()->value_name("FILE"), "the record, as for palpate run")  //
+      ("participant", po::value<std::string>()->value_name("CODE"), "as for palpate run")     //
+      ("number", po::value<int>()->value_name("N"), "as for palpate run")                     //
+      ("session", po::value<int>()->value_name("N"), "as for palpate run")                    //
+      ("new-participant", po::bool_switch(), "as for palpate run")                            //
+      ("consent", po::value<std::string>()->value_name("VERSION"), "as for palpate run")      //
       ("port", po::value<int>()->value_name("N")->default_value(0),
        "of 127.0.0.1; 0: one that is free")  //
       ("socket", po::value<std::string>()->value_name("PATH"),
@@ -164,7 +322,7 @@ int serve_command(const std::vector<std::string>& args) {
       ("allow-origin", po::value<std::vector<std::string>>()->value_name("URL"),
        "pages from there may connect; repeatable")  //
       ("rate", po::value<double>()->value_name("HZ")->default_value(1000, "1000"),
-       "of the servo")  //
+       "of the servo; with --protocol the protocol's")  //
       ("calibration", po::value<std::string>()->value_name("FILE"),
        "of the device, as for palpate run")  //
       ("without-calibration", po::bool_switch(), "a device that was not calibrated may be used");

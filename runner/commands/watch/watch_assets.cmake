@@ -1,15 +1,27 @@
-# What the page of a trial carries beside its numbers: style and script.
+# What pages carry, embedded: style and script of the page of a trial, and the watchers' page of palpate serve. Both draw
+# with drawing.js.
 
-set(assets "${CMAKE_CURRENT_BINARY_DIR}/watch_assets.cpp")
-set(draft "${assets}.draft")
-file(WRITE "${draft}" "// Made by watch_assets.cmake when the build is configured.\n"
-     "#include \"runner/commands/watch/trial_page.h\"\n\nnamespace palpate::runner {\n\n")
-# A literal may have 64 kB: more would need pieces.
-foreach(asset css js)
-  set(file "${CMAKE_CURRENT_SOURCE_DIR}/commands/watch/watch.${asset}")
-  file(READ "${file}" text)
-  file(APPEND "${draft}" "std::string_view watch_${asset}() {\n  return R\"palpate~(" "${text}" ")palpate~\";\n}\n\n")
-  set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS "${file}")
+# palpate_embed(NAME HEADER FUNCTION TEXT...): functions that return these texts, in NAME.cpp of the build.
+function(palpate_embed name header)
+  set(assets "${CMAKE_CURRENT_BINARY_DIR}/${name}.cpp")
+  set(draft "${assets}.draft")
+  file(WRITE "${draft}" "// Made by watch_assets.cmake when the build is configured.\n"
+       "#include \"${header}\"\n\nnamespace palpate::runner {\n\n")
+  while(ARGN)
+    list(POP_FRONT ARGN function text)
+    # A literal may have 64 kB: more would need pieces.
+    file(APPEND "${draft}" "std::string_view ${function}() {\n  return R\"palpate~(" "${${text}}" ")palpate~\";\n}\n\n")
+  endwhile()
+  file(APPEND "${draft}" "}  // namespace palpate::runner\n")
+  configure_file("${draft}" "${assets}" COPYONLY)  # an equal one is left as it is
+endfunction()
+
+foreach(file IN ITEMS watch/watch.css watch/watch.js watch/drawing.js serve/live.html serve/live.js)
+  string(MAKE_C_IDENTIFIER "${file}" name)
+  file(READ "${CMAKE_CURRENT_SOURCE_DIR}/commands/${file}" ${name})
+  set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS "${CMAKE_CURRENT_SOURCE_DIR}/commands/${file}")
 endforeach()
-file(APPEND "${draft}" "}  // namespace palpate::runner\n")
-configure_file("${draft}" "${assets}" COPYONLY)  # an equal one is left as it is
+set(watch_script "${watch_drawing_js}${watch_watch_js}")
+palpate_embed(watch_assets runner/commands/watch/trial_page.h watch_css watch_watch_css watch_js watch_script)
+string(REPLACE "@SCRIPT@" "${watch_drawing_js}${serve_live_js}" live_text "${serve_live_html}")
+palpate_embed(live_page runner/commands/serve/live_page.h live_page live_text)

@@ -1,0 +1,11 @@
+#pragma once
+// The watchers' page, embedded by the build: live.html with its script, watch/drawing.js and
+// live.js.
+
+#include <string_view>
+
+namespace palpate::runner {
+
+std::string_view live_page();
+
+}  // namespace palpate::runner

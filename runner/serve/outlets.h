@@ -1,0 +1,78 @@
+#pragma once
+// What goes between the session's thread of `palpate serve` and the network's: ticks and messages
+// out, commands in.
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "runner/serve/messages.h"
+#include "runner/servo/ring.h"
+#include "runner/servo/sample.h"
+#include "stimuli/object_spec.h"
+
+namespace palpate::runner {
+
+/// What a stream tells of a tick.
+struct StreamSample {
+  std::int64_t time_ns = 0, lateness_ns = 0;
+  std::uint32_t tick = 0, faults = 0;
+  int object = -1;
+  Vec3 tip, tail;    ///< m, virtual stylus
+  Vec3 force;        ///< N, commanded to the hand, after the limits
+  Vec3 rendered;     ///< N, before them
+  Vec3 contact;      ///< m, the deepest; zero in free space
+  double depth = 0;  ///< m
+};
+
+/// From the session's thread to the network's, which may be late: then ticks are lost.
+class TickStream {
+ public:
+  void push(const Sample& sample) noexcept {
+    const bool contact = sample.rendering.contacts > 0;
+    const StreamSample out{.time_ns = sample.time_ns,
+                           .lateness_ns = sample.lateness_ns,
+                           .tick = sample.tick,
+                           .faults = sample.faults,
+                           .object = sample.rendering.object,
+                           .tip = sample.probe.tip,
+                           .tail = sample.probe.tail,
+                           .force = sample.device1 + sample.device2,
+                           .rendered = sample.rendering.force,
+                           .contact = contact ? sample.rendering.deepest.point : Vec3(0),
+                           .depth = sample.rendering.deepest.depth};
+    if (!ring_.push(out)) lost_.fetch_add(1);
+  }
+  /// In order; false where there is none.
+  bool next(StreamSample& out) noexcept { return ring_.pop(out); }
+  /// Ticks that found no room. From any thread.
+  std::uint64_t lost() const noexcept { return lost_.load(); }
+
+ private:
+  Ring<StreamSample> ring_{4096};
+  std::atomic<std::uint64_t> lost_{0};
+};
+
+/// Where answers and events go to.
+class ServeOutput {
+ public:
+  virtual ~ServeOutput() = default;
+  /// To the client that asked. From any thread; never waits.
+  virtual void reply(std::uint64_t client, std::string text) = 0;
+  /// To all. From any thread; never waits.
+  virtual void tell(std::string text) = 0;
+};
+
+/// What draws: surfaces of objects in the world, as the members of an answer to `picture`.
+using PictureOf = std::function<std::string(const std::vector<stimuli::ObjectSpec>&)>;
+
+/// What the controller said, for the session's thread.
+struct ServeCommand {
+  std::uint64_t client = 0;
+  bool left = false;  ///< the controller is gone; no message
+  Message message;
+};
+
+}  // namespace palpate::runner

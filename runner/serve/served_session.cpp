@@ -1,0 +1,494 @@
+#include "runner/serve/served_session.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <cstring>
+#include <utility>
+
+#include "runner/safety/fault_table.h"
+#include "runner/session/level_scenes.h"
+#include "stimuli/compose.h"
+
+namespace palpate::runner {
+namespace {
+
+using nlohmann::ordered_json;
+using protocols::TaskBlock;
+using protocols::TaskKind;
+
+constexpr std::int64_t kSteadyWait_ns = 150'000'000;  // at the edge of the home zone
+constexpr double kSecond = 1e-9;
+
+ordered_json number_or_null(const std::optional<double>& value) {
+  return value ? ordered_json(*value) : ordered_json();
+}
+
+/// Of a trial on record, for a program that goes on with it.
+ordered_json short_json(const data::TrialRecord& record) {
+  ordered_json out = {{"trial", record.trial},        {"block", record.block},
+                      {"stimulus", record.shape},     {"renderer", record.renderer},
+                      {"response", record.response},  {"correct", record.correct},
+                      {"timed_out", record.timed_out}};
+  if (record.task && record.task->level) out["level"] = *record.task->level;
+  return out;
+}
+
+}  // namespace
+
+std::string unserved(const protocols::Protocol& protocol) {
+  for (const protocols::PageSpec& page : protocol.pages) {
+    if (!page.items.empty() || page.kind == protocols::PageSpec::Kind::consent)
+      return "page '" + page.name + "' asks something, which palpate run can show";
+  }
+  for (const TaskBlock& block : protocol.blocks) {
+    const std::string name = "block '" + block.name + "' ";
+    if (block.confidence) return name + "asks how sure they are, which palpate run can show";
+    if (block.task == TaskKind::compare || block.task == TaskKind::adjust || block.standard)
+      return name + "has trials of several intervals, which palpate run can show";
+  }
+  return "";
+}
+
+ServedSession::ServedSession(const Parts& parts)
+    : parts_(parts),
+      clock_(parts.station.clock),
+      forces_(parts.servo, parts.guard, parts.station.clock),
+      session_(parts.station, *this, this, largest_reach(parts.station)) {
+  for (const data::TrialRecord& record : parts.stored) trials_.push_back(short_json(record));
+  keep_state();
+}
+
+void ServedSession::keep_state() {
+  const data::Participant& person = parts_.record.participant();
+  ordered_json record = {{"participant", person.code},
+                         {"number", person.enrolled_number},
+                         {"session", parts_.record.session()},
+                         {"protocol", parts_.station.protocol.name},
+                         {"done", session_.plan().done()},
+                         {"trials", session_.plan().size()},
+                         {"next", next_trial()},
+                         {"stored", trials_}};
+  const std::lock_guard lock(mutex_);
+  state_ = {{"scene", nullptr}, {"record", std::move(record)}};
+}
+
+nlohmann::json ServedSession::state() const {
+  const std::lock_guard lock(mutex_);
+  return state_;
+}
+
+std::string ServedSession::picture() const {
+  const std::lock_guard lock(mutex_);
+  return picture_;
+}
+
+void ServedSession::draw(const protocols::Trial& trial) {
+  std::vector<stimuli::ObjectSpec> objects;
+  const protocols::Protocol& protocol = parts_.station.protocol;
+  if (trial.task_block >= 0) {
+    for (const protocols::Interval& interval : trial.intervals) {
+      if (interval.stimulus >= 0) objects.push_back(shown_object(protocol, trial, interval));
+    }
+  } else {
+    objects.push_back(protocol.stimuli[static_cast<std::size_t>(trial.stimulus)].object);
+    objects.back().pose = stimuli::compose({Vec3(0), trial.orientation}, objects.back().pose);
+  }
+  std::string picture = parts_.picture(objects);
+  const std::lock_guard lock(mutex_);
+  picture_.swap(picture);
+}
+
+void ServedSession::tell(const std::string& name, std::int64_t t_ns, const ordered_json& more) {
+  output_->tell(event(name, t_ns, more));
+}
+
+void ServedSession::refuse(const std::optional<Asked>& asked, const std::string& code,
+                           const std::string& why) {
+  if (asked) output_->reply(asked->client, refused(asked->message.id, {{code, why, ""}}));
+}
+
+const TaskBlock* ServedSession::block_of(const protocols::Trial& trial) const {
+  if (trial.task_block < 0) return nullptr;
+  return &parts_.station.protocol.blocks[static_cast<std::size_t>(trial.task_block)];
+}
+
+/// Null behind the last one.
+ordered_json ServedSession::next_trial() const {
+  if (session_.plan().finished()) return {};
+  const protocols::Trial& trial = session_.plan().next();
+  const TaskBlock* const block = block_of(trial);
+  ordered_json out = {{"trial", trial.trial}, {"block", trial.block}, {"practice", trial.practice}};
+  const auto& stimuli = parts_.station.protocol.stimuli;
+  const auto name = [&](int i) { return stimuli[static_cast<std::size_t>(i)].name; };
+  if (block != nullptr) {
+    out["task"] = to_string(block->task);
+    out["block_name"] = block->name;
+  }
+  out["answers"] = ordered_json::array();
+  if (block == nullptr) {
+    for (const protocols::StimulusSpec& one : stimuli) out["answers"].push_back(one.name);
+  } else {
+    for (const protocols::TaskAnswer& one : block->answers) out["answers"].push_back(one.name);
+  }
+  if (block != nullptr && block->task == TaskKind::external) {
+    out["stimuli"] = ordered_json::array();
+    for (const int i : block->stimuli) out["stimuli"].push_back(name(i));
+    if (block->level) out["level_range"] = {*block->least, *block->most};
+    return out;
+  }
+  const Quat& q = trial.orientation;
+  out["stimulus"] = name(trial.stimulus);
+  out["renderer"] = protocols::to_string(trial.renderer);
+  out["orientation_wxyz"] = {q.w, q.x, q.y, q.z};
+  if (trial.level) out["level"] = *trial.level;
+  return out;
+}
+
+ServedSession::Outcome ServedSession::run(ServeOutput& output,
+                                          std::function<std::vector<ServeCommand>()> commands) {
+  output_ = &output;
+  source_ = std::move(commands);
+  Outcome outcome;
+  try {
+    outcome = run_trials();
+  } catch (const data::StoreError&) {
+    forces_.off();
+    throw;
+  }
+  const std::int64_t now = clock_.now_ns();
+  if (!outcome.reason.empty()) parts_.record.note(now, "ended: " + outcome.reason);
+  parts_.record.note(now, to_json_text(parts_.servo.health(), parts_.station.protocol.servo_rate));
+  parts_.record.end(outcome.end, now);
+  tell("over", now,
+       {{"done", session_.plan().done()},
+        {"trials", session_.plan().size()},
+        {"reason", outcome.reason}});
+  if (outcome.end == data::RunEnd::done) wait_for_the_end();
+  return outcome;
+}
+
+ServedSession::Outcome ServedSession::run_trials() {
+  while (session_.state() != Session::State::end) {
+    try {
+      session_.step();
+    } catch (const SessionFault& fault) {
+      in_trial_ = false;
+      held(silent_.exchange(false) ? "the client was silent" : fault.reason);
+      if (fault.trouble == DeviceTrouble::guard_lost)
+        return {data::RunEnd::aborted, fault.reason, true};
+    } catch (const EndOfSession& end) {
+      in_trial_ = false;
+      if (session_.plan().finished()) break;
+      return {end.end, end.what(), end.failed};
+    }
+    in_trial_ = in_trial_ && session_.state() == Session::State::response;
+    if (!stored_) continue;
+    keep_state();
+    ordered_json said = short_json(*stored_);
+    said["response_time_s"] = stored_->response_time;
+    said["first_contact_s"] = number_or_null(stored_->first_contact_time);
+    said["zero_t_ns"] = stored_->onset_ns;
+    said["t_ns"] = stored_->response_ns;
+    said["ticks"] = stored_->ticks;
+    said["missed_ticks"] = stored_->missed_ticks;
+    said["max_force_n"] = stored_->max_force;
+    said["faults"] = fault_words(stored_->faults);
+    said["next"] = next_trial();
+    tell("stored", clock_.now_ns(), said);
+    if (answer_) output_->reply(answer_->client, accepted(answer_->message.id, std::move(said)));
+    answer_.reset();
+    stored_.reset();
+  }
+  return {};
+}
+
+/// Everything is on record: there is nothing to do but to say so.
+void ServedSession::wait_for_the_end() {
+  keep_state();
+  while (controller_ != 0) {
+    try {
+      attend();
+    } catch (const EndOfSession&) {
+      return;
+    }
+    clock_.wait_until(clock_.now_ns() + kSessionNap_ns);
+  }
+}
+
+void ServedSession::held(const std::string& reason) {
+  held_by_ = reason;
+  const std::string why = "forces are off (" + reason + "): clear first";
+  refuse(std::exchange(start_, {}), "forces-off", why);
+  refuse(std::exchange(answer_, {}), "forces-off", why);
+  tell("forces_off", clock_.now_ns(), {{"reason", reason}});
+}
+
+/// \throws EndOfSession, TrialCutOff
+void ServedSession::attend() {
+  if (const int signal = parts_.end_requested())
+    throw EndOfSession(data::RunEnd::paused, std::string("signal: ") + strsignal(signal));
+  for (ServeCommand& command : source_()) commands_.push_back(std::move(command));
+  while (!commands_.empty()) {  // one of them may throw: the rest is obeyed later
+    ServeCommand command = std::move(commands_.front());
+    commands_.pop_front();
+    if (command.left) {
+      controller_ = 0;
+      left();
+      continue;
+    }
+    controller_ = command.client;
+    const Asked asked{command.client, std::move(command.message)};
+    try {
+      obey(asked);
+    } catch (const MessageRefused& error) {
+      output_->reply(asked.client, refused(asked.message.id, error.why()));
+    }
+  }
+  forces_.newest();
+  forces_.end_without_guard();
+}
+
+void ServedSession::left() {
+  start_.reset();
+  answer_.reset();
+  if (in_trial_) throw TrialCutOff("the controller has left");
+}
+
+void ServedSession::obey(const Asked& asked) {
+  const Message& message = asked.message;
+  switch (message.type) {
+    case MessageType::start:
+      return start(asked);
+    case MessageType::answer:
+      return answer(asked);
+    case MessageType::stop:
+      if (!in_trial_) {
+        refuse(std::exchange(start_, {}), "stopped", "stopped before forces were on");
+        return output_->reply(asked.client, accepted(message.id));
+      }
+      stop_ = asked;
+      throw TrialCutOff(message.text.empty() ? "stopped by the program" : message.text);
+    case MessageType::mark:
+    case MessageType::note: {
+      const std::int64_t now = clock_.now_ns();
+      const bool mark = message.type == MessageType::mark;
+      ordered_json out;
+      if (mark) out["code"] = message.code;
+      out["text"] = message.text;
+      try {
+        parts_.record.note(now, mark ? ordered_json{{"mark", out}}.dump() : message.text);
+      } catch (const data::StoreRefused& error) {
+        throw MessageRefused("bad-message", error.what(), "/text");
+      }
+      tell(mark ? "mark" : "note", now, out);
+      return output_->reply(asked.client, accepted(message.id, {{"t_ns", now}}));
+    }
+    case MessageType::clear:
+      return clear(asked);
+    default:
+      throw MessageRefused("recorded", "the protocol says what is shown: load and set go without");
+  }
+}
+
+void ServedSession::start(const Asked& asked) {
+  if (session_.plan().finished()) throw MessageRefused("over", "the last trial is on record");
+  if (in_trial_ || start_) throw MessageRefused("running", "a trial is under way");
+  if (!held_by_.empty())
+    throw MessageRefused("forces-off", "forces are off (" + held_by_ + "): clear first");
+  choice_of(asked.message, session_.plan().next());  // refused at once, also in a break
+  start_ = asked;
+}
+
+/// \throws MessageRefused: it is not the trial that is due, or cannot be shown
+std::optional<protocols::TrialChoice> ServedSession::choice_of(const Message& message,
+                                                               const protocols::Trial& next) const {
+  const auto refused_as = [](const char* place, const std::string& expected) {
+    return MessageRefused("bad-trial", "expected " + expected, place);
+  };
+  if (message.trial && *message.trial != next.trial)
+    throw refused_as("/trial", std::to_string(next.trial) + ", the trial that is due");
+  const auto& stimuli = parts_.station.protocol.stimuli;
+  const auto named = [&](int i) { return stimuli[static_cast<std::size_t>(i)].name; };
+  const TaskBlock* const block = block_of(next);
+  if (block == nullptr || block->task != TaskKind::external) {
+    if (!message.stimulus.empty() && message.stimulus != named(next.stimulus))
+      throw refused_as("/stimulus", named(next.stimulus) + ", as the protocol has it");
+    if (!message.renderer.empty() && message.renderer != protocols::to_string(next.renderer))
+      throw refused_as("/renderer", std::string(protocols::to_string(next.renderer)) +
+                                        ", as the protocol has it");
+    if (message.level && message.level != next.level) throw refused_as("/level", "the protocol's");
+    if (message.orientation)
+      throw refused_as("/orientation_wxyz", "none: the protocol has orientations of its own");
+    return std::nullopt;
+  }
+  protocols::TrialChoice choice;
+  const auto wanted =
+      std::ranges::find_if(block->stimuli, [&](int i) { return named(i) == message.stimulus; });
+  if (wanted == block->stimuli.end() && (!message.stimulus.empty() || block->stimuli.size() > 1))
+    throw refused_as("/stimulus", "a stimulus of the block");
+  choice.stimulus = wanted == block->stimuli.end() ? block->stimuli.front() : *wanted;
+  const auto renderer = std::ranges::find_if(block->renderers, [&](protocols::RendererKind kind) {
+    return protocols::to_string(kind) == message.renderer;
+  });
+  if (renderer == block->renderers.end() &&
+      (!message.renderer.empty() || block->renderers.size() > 1))
+    throw refused_as("/renderer", "a renderer of the block");
+  choice.renderer = renderer == block->renderers.end() ? block->renderers.front() : *renderer;
+  if (block->level.has_value() != message.level.has_value())
+    throw refused_as("/level", block->level ? "a level" : "none: the block has no level");
+  if (message.level && !(*message.level >= *block->least && *message.level <= *block->most))
+    throw refused_as("/level", "a level from min to max of the block");
+  choice.level = message.level;
+  choice.orientation = message.orientation;
+  return choice;
+}
+
+Answer ServedSession::answer_of(const Message& message) const {
+  const TaskBlock* const block = block_of(trial_);
+  Answer out;
+  if (message.correct && (block == nullptr || block->task != TaskKind::external))
+    throw MessageRefused("bad-answer", "expected none: palpate knows what is right", "/correct");
+  out.correct = message.correct;
+  if (block != nullptr && block->answers.empty()) {  // a number is typed
+    const char* const end = message.text.data() + message.text.size();
+    const auto [rest, error] = std::from_chars(message.text.data(), end, out.number);
+    const bool within = !(block->least && out.number < *block->least) &&
+                        !(block->most && out.number > *block->most);
+    if (error != std::errc() || rest != end || !std::isfinite(out.number) || !within)
+      throw MessageRefused("bad-answer", "expected a number within the block's range", "/response");
+    return out;
+  }
+  std::vector<std::string> names;
+  if (block == nullptr) {
+    for (const protocols::StimulusSpec& one : parts_.station.protocol.stimuli)
+      names.push_back(one.name);
+  } else {
+    for (const protocols::TaskAnswer& one : block->answers) names.push_back(one.name);
+  }
+  const auto found = std::ranges::find(names, message.text);
+  if (found == names.end()) {
+    std::string words;
+    for (const std::string& name : names) words += (words.empty() ? "" : ", ") + name;
+    throw MessageRefused("bad-answer", "expected one of " + words, "/response");
+  }
+  out.stimulus = static_cast<int>(found - names.begin());
+  return out;
+}
+
+void ServedSession::answer(const Asked& asked) {
+  if (!in_trial_ || onset_ns_ == 0)
+    throw MessageRefused("nothing-felt", "nothing is felt now: start first");
+  if (given_) throw MessageRefused("answered", "the trial is answered");
+  Answer given = answer_of(asked.message);
+  const std::int64_t now = clock_.now_ns();
+  given.time_ns = asked.message.t_ns.value_or(now);
+  if (given.time_ns < onset_ns_ || given.time_ns > now)
+    throw MessageRefused("bad-message", "expected a time of this trial, CLOCK_MONOTONIC in ns",
+                         "/t_ns");
+  if (asked.message.t_ns) {
+    const ordered_json stamped = {{"answer_time",
+                                   {{"by", "the program"},
+                                    {"trial", trial_.trial},
+                                    {"t_ns", given.time_ns},
+                                    {"arrived_ns", now}}}};
+    parts_.record.note(now, stamped.dump());
+  }
+  given_ = given;
+  answer_ = asked;
+}
+
+void ServedSession::clear(const Asked& asked) {
+  if (in_trial_) throw MessageRefused("running", "a trial is under way");
+  const std::string trouble = forces_.allow([this] { return parts_.end_requested() != 0; });
+  if (!trouble.empty()) throw MessageRefused("forces-off", trouble);
+  held_by_.clear();
+  silent_.store(false);
+  tell("cleared", clock_.now_ns());
+  output_->reply(asked.client, accepted(asked.message.id));
+}
+
+void ServedSession::read(const std::string& text) {
+  if (!text.empty()) tell("text", clock_.now_ns(), {{"text", text}});
+}
+
+void ServedSession::rest(const std::string& text, std::int64_t until_ns) {
+  tell("rest", clock_.now_ns(), {{"text", text}, {"until_ns", until_ns}});
+  while (clock_.now_ns() < until_ns) {
+    attend();
+    clock_.wait_until(std::min(until_ns, clock_.now_ns() + kSessionNap_ns));
+  }
+}
+
+/// Waits for `start`, whichever the block.
+std::optional<protocols::TrialChoice> ServedSession::choose(const protocols::Trial& next) {
+  while (true) {
+    attend();
+    try {
+      if (start_) return choice_of(start_->message, next);
+    } catch (const MessageRefused& error) {  // a practice that goes on is another trial
+      output_->reply(start_->client, refused(start_->message.id, error.why()));
+      start_.reset();
+    }
+    clock_.wait_until(clock_.now_ns() + kSessionNap_ns / 5);
+  }
+}
+
+void ServedSession::begin_trial(const protocols::Trial& trial) {
+  in_trial_ = true;
+  trial_ = trial;
+  onset_ns_ = 0;
+  draw(trial);
+  given_.reset();
+  waits_for_ = Waiting::nothing;
+}
+
+std::optional<Answer> ServedSession::step(const Sample& sample) {
+  ticks_.push(sample);
+  if (sample.phase == Phase::feeling && onset_ns_ == 0) {
+    onset_ns_ = sample.time_ns;
+    const ordered_json more = {{"trial", trial_.trial}};
+    if (start_) {
+      output_->reply(start_->client,
+                     accepted(start_->message.id, {{"t_ns", onset_ns_}, {"trial", trial_.trial}}));
+    }
+    start_.reset();
+    tell("started", onset_ns_, more);
+  }
+  if (onset_ns_ == 0 && sample.waiting != waits_for_ &&
+      sample.time_ns - waits_since_ns_ > kSteadyWait_ns) {
+    waits_for_ = sample.waiting;
+    waits_since_ns_ = sample.time_ns;
+    tell("waiting", sample.time_ns,
+         {{"for", sample.waiting == Waiting::for_distance ? "distance" : "rest"}});
+  }
+  attend();
+  if (given_ && sample.time_ns >= given_->time_ns) return given_;
+  return std::nullopt;
+}
+
+void ServedSession::onset(const data::TrialRecord&) {}
+
+void ServedSession::first_contact(const data::TrialRecord& so_far, std::int64_t time_ns) {
+  tell("first_contact", time_ns, {{"trial", so_far.trial}});
+}
+
+void ServedSession::cut_off(const std::string& reason) {
+  in_trial_ = false;
+  const std::int64_t now = clock_.now_ns();
+  tell("cut_off", now, {{"trial", trial_.trial}, {"reason", reason}});
+  if (stop_) output_->reply(stop_->client, accepted(stop_->message.id, {{"t_ns", now}}));
+  stop_.reset();
+  refuse(std::exchange(start_, {}), "stopped", "the trial was cut off: " + reason);
+  if (answer_ && held_by_.empty())
+    refuse(std::exchange(answer_, {}), "stopped", "the trial was cut off: " + reason);
+}
+
+void ServedSession::recorded(const data::TrialRecord& record) {
+  stored_ = record;
+  stored_->samples.clear();
+  stored_->bodies.clear();
+  trials_.push_back(short_json(record));
+}
+
+}  // namespace palpate::runner

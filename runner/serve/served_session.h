@@ -1,0 +1,136 @@
+#pragma once
+// A session on record whose participant is reached through another program: it says when a trial
+// begins, in external blocks what is shown, and what was answered. Plan, forces, samples and record
+// are those of every session.
+
+#include <atomic>
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "runner/serve/outlets.h"
+#include "runner/session/live_forces.h"
+#include "runner/session/session.h"
+#include "runner/session/session_end.h"
+#include "runner/session/station.h"
+
+namespace palpate::runner {
+
+/// Why a program cannot answer this protocol's trials, in words; empty: it can. Questions of pages,
+/// confidence and trials of several intervals need the displays of `palpate run`.
+std::string unserved(const protocols::Protocol& protocol);
+
+/// All functions belong to one thread, the session's, but those that say otherwise.
+class ServedSession final : public Respondent, public SessionEvents {
+ public:
+  /// What it works with. All must outlive it.
+  struct Parts {
+    const Station& station;
+    RunRecord& record;
+    ServoThread& servo;
+    GuardedDevice* guard;  ///< none without force feedback
+    std::function<int()> end_requested;
+    const std::vector<data::TrialRecord>& stored;  ///< completed trials of the session
+    PictureOf picture;
+  };
+  explicit ServedSession(const Parts& parts);
+
+  /// How it ended.
+  struct Outcome {
+    data::RunEnd end = data::RunEnd::done;
+    std::string reason;  ///< empty when done
+    bool failed = false;
+  };
+  /// Until the last trial is on record and the controller has gone, or a signal. Answers go to
+  /// `output`, commands come from `commands`.
+  Outcome run(ServeOutput& output, std::function<std::vector<ServeCommand>()> commands);
+
+  /// Zero force at once, until `clear`. From any thread.
+  void emergency_zero() noexcept { forces_.off(); }
+  /// The same by the ramp, because the controller says nothing any more. From any thread.
+  void controller_is_silent() noexcept {
+    silent_.store(true);
+    forces_.fade();
+  }
+  /// Ticks, for the network's thread.
+  TickStream& ticks() noexcept { return ticks_; }
+  /// What hello is answered with. From any thread.
+  nlohmann::json state() const;
+  /// What `picture` is answered with. From any thread.
+  std::string picture() const;
+
+  // As Respondent:
+  void read(const std::string& text) override;
+  void rest(const std::string& text, std::int64_t until_ns) override;
+  void feedback(bool /*correct*/) override {}  // the answer to `answer` has it
+  std::optional<protocols::TrialChoice> choose(const protocols::Trial& next) override;
+  void begin_trial(const protocols::Trial& trial) override;
+  std::optional<Answer> step(const Sample& sample) override;
+  // As SessionEvents:
+  void began(const protocols::Trial& /*trial*/) override {}
+  void onset(const data::TrialRecord& so_far) override;
+  void first_contact(const data::TrialRecord& so_far, std::int64_t time_ns) override;
+  void answered(const data::TrialRecord& /*record*/) override {}
+  void cut_off(const std::string& reason) override;
+  void recorded(const data::TrialRecord& record) override;
+
+ private:
+  /// A message that is not answered yet.
+  struct Asked {
+    std::uint64_t client = 0;
+    Message message;
+  };
+  Outcome run_trials();
+  void wait_for_the_end();
+  void attend();
+  void obey(const Asked& asked);
+  void start(const Asked& asked);
+  void answer(const Asked& asked);
+  void clear(const Asked& asked);
+  void left();
+  std::optional<protocols::TrialChoice> choice_of(const Message& message,
+                                                  const protocols::Trial& next) const;
+  Answer answer_of(const Message& message) const;
+  const protocols::TaskBlock* block_of(const protocols::Trial& trial) const;
+  nlohmann::ordered_json next_trial() const;
+  void keep_state();
+  void draw(const protocols::Trial& trial);
+  void held(const std::string& reason);
+  void refuse(const std::optional<Asked>& asked, const std::string& code, const std::string& why);
+  void tell(const std::string& name, std::int64_t t_ns,
+            const nlohmann::ordered_json& more = nlohmann::ordered_json::object());
+
+  const Parts parts_;
+  Clock& clock_;
+  LiveForces forces_;
+  Session session_;
+  TickStream ticks_;
+  ServeOutput* output_ = nullptr;
+  std::function<std::vector<ServeCommand>()> source_;
+  std::deque<ServeCommand> commands_;  ///< not obeyed yet
+  // Of the trial under way:
+  bool in_trial_ = false;
+  protocols::Trial trial_;
+  std::optional<Asked> start_;   ///< waits for forces
+  std::optional<Asked> answer_;  ///< waits until it is on record
+  std::optional<Asked> stop_;    ///< waits for forces off
+  std::optional<Answer> given_;
+  std::int64_t onset_ns_ = 0;  ///< 0: not yet
+  Waiting waits_for_ = Waiting::nothing;
+  std::int64_t waits_since_ns_ = 0;
+
+  std::optional<data::TrialRecord> stored_;  ///< just now, without samples
+  std::uint64_t controller_ = 0;             ///< who spoke last; 0: nobody, or it has gone
+  std::string held_by_;                      ///< why forces are off, until `clear`
+  std::atomic<bool> silent_{false};
+  mutable std::mutex mutex_;  ///< of the next two: written by this thread, read by others
+  nlohmann::ordered_json state_;
+  std::string picture_ = R"("objects":[])";
+  nlohmann::ordered_json trials_ = nlohmann::ordered_json::array();  ///< on record
+};
+
+}  // namespace palpate::runner

@@ -1,0 +1,236 @@
+"""palpate serve with a protocol: its record is that of palpate run, whatever happens to the program or the server.
+
+Usage: served_session_test.py PALPATE PROTOCOLS CLIENT.py
+"""
+
+import contextlib
+import csv
+import json
+import pathlib
+import random
+import signal
+import sqlite3
+import subprocess
+import sys
+import threading
+import time
+import unittest
+
+from serve_case import PALPATE, PATIENCE, ServeCase, ServeError
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "session"))
+from terminal import Terminal  # noqa: E402
+
+LEVEL = {"level": {"path": "/stiffness_n_per_m"}, "min": 20, "max": 60}
+PROTOCOL = {
+    "version": 2, "name": "served", "renderers": ["point", "ray"], "seed": 5, "samples": True,
+    # Slow and soft: five ticks must not be missed in a row where many tests share a processor.
+    "servo": {"rate_hz": 100}, "home": {"rest_s": 0.1}, "material": {"stiffness_n_per_m": 50},
+    "stimuli": [{"name": "ball", "shape": "sphere", "radius_m": 0.02, "subdivisions": 1},
+                {"name": "box", "shape": "cube", "edge_m": 0.03}],
+}
+IDENTIFY = {"name": "which", "task": "identify", "stimuli": ["ball", "box"], "repetitions": 1}
+EXTERNAL = {"name": "free", "task": "external", "stimuli": ["ball", "box"], "trials": 4}
+# Of when it was, and of a machine that is too busy.
+OF_TIME = {"response_time", "first_contact_time", "onset_utc", "missed_ticks", "attempt", "ticks", "faults", "max_force_n",
+           "longest_period_s", "contact_share", "edge_dwell", "interval_onsets", "interval_ends", "started_inside",
+           "response_device", "note"}
+
+
+class Served(ServeCase):
+    def setUp(self):
+        super().setUp()
+        self.db = self.dir / "served.db"
+
+    def protocol(self, *blocks, **changes):
+        path = self.dir / "protocol.json"
+        path.write_text(json.dumps(PROTOCOL | {"blocks": list(blocks)} | changes))
+        return path
+
+    def begin(self, protocol, *options, db=None):
+        return self.run_server([PALPATE, "serve", "--device", "simulated", "--protocol", protocol, "--db", db or self.db,
+                                "--participant", "P01", *options])
+
+    def trial(self, hand, answer, **start):
+        """One that is on record: what a busy machine cuts off is shown again. \\return what it was like"""
+        while True:
+            try:
+                hand.start(**start)
+                if hand.next is None:
+                    return None
+                return hand.answer(answer)
+            except ServeError as error:
+                if error.code not in ("forces-off", "nothing-felt", "stopped"):
+                    raise
+                hand.clear()
+
+    def sql(self, query, db=None):
+        with contextlib.closing(sqlite3.connect(db or self.db)) as opened:
+            self.assertEqual(opened.execute("PRAGMA integrity_check").fetchone()[0], "ok")
+            return opened.execute(query).fetchall()
+
+    def run_palpate(self, *args, status=0):
+        done = subprocess.run([PALPATE, *map(str, args)], capture_output=True, text=True, timeout=PATIENCE)
+        self.assertEqual(done.returncode, status, done.stderr)
+        return done.stderr if status else done.stdout
+
+    def rows(self, db=None):
+        out = self.dir / "trials.csv"
+        self.run_palpate("export", "--db", db or self.db, "--format", "csv", "--out", out, "--force")
+        with open(out, newline="", encoding="utf-8") as table:
+            return list(csv.DictReader(table))
+
+    def test_rows_equal_those_of_run_with_the_same_answers(self):
+        protocol = self.protocol(IDENTIFY)
+        live = self.dir / "live.db"
+        with Terminal([PALPATE, "run", protocol, "--db", live, "--participant", "P01", "--device", "simulated", "--no-window",
+                       "--new-participant"]) as terminal:
+            while True:
+                came = terminal.wait_for("1 ball   2 box", "[fault, ", " on record; ")
+                if came == " on record; ":
+                    break
+                terminal.type(":clear\n:go\n" if came == "[fault, " else "2")
+            self.assertEqual(terminal.finish(), 0, terminal.text)
+        process = self.begin(protocol)
+        with self.client() as hand:
+            self.assertEqual(hand.server["record"]["trials"], 4)
+            while hand.next is not None:
+                due = hand.next
+                said = self.trial(hand, "box", trial=due["trial"], stimulus=due["stimulus"], renderer=due["renderer"])
+                self.assertEqual((said["stimulus"], said["correct"]), (due["stimulus"], due["stimulus"] == "box"))
+        self.assertEqual(process.wait(PATIENCE), 0)
+        ran, served = self.rows(live), self.rows()
+        self.assertEqual([len(ran), list(ran[0])], [4, list(served[0])])
+        for a, b in zip(ran, served):
+            self.assertEqual({k: v for k, v in a.items() if k not in OF_TIME},
+                             {k: v for k, v in b.items() if k not in OF_TIME})
+        self.assertEqual(self.sql("SELECT end_reason FROM runs"), [("done",)])
+        for trial in range(1, 5):  # forces of the record are those that rendering its path gives
+            said = self.run_palpate("replay", "--db", self.db, "--trial", f"P01/1/{trial}", "--compare")
+            self.assertRegex(said, r"(?m)(\d+) of \1 ticks|all \d+ ticks", said)
+
+    def test_an_external_block(self):
+        answers = {"answers": ["soft", "hard"], **LEVEL}
+        process = self.begin(self.protocol({**EXTERNAL, **answers}))
+        turned = [0.6, 0, 0.8, 0]
+        with self.client() as hand:
+            self.assertEqual(hand.next["stimuli"], ["ball", "box"])
+            self.assertEqual(hand.next["level_range"], [20, 60])
+            for wrong in ({}, {"stimulus": "cone", "level": 30}, {"stimulus": "ball"}, {"stimulus": "ball", "level": 61},
+                          {"stimulus": "ball", "level": 30, "renderer": "line"}, {"stimulus": "ball", "level": 30},
+                          {"stimulus": "ball", "level": 30, "renderer": "ray", "trial": 2}):
+                with self.assertRaises(ServeError) as caught:
+                    hand.start(**wrong)
+                self.assertIn(caught.exception.code, ("bad-trial", "bad-message"), wrong)
+            self.refused("recorded", hand.load, {"objects": []})
+            self.refused("nothing-felt", hand.answer, "soft")
+            first = self.trial(hand, "soft", stimulus="box", level=25, renderer="ray", orientation_wxyz=turned, trial=1)
+            self.assertEqual((first["response"], first["level"], first["correct"]), ("soft", 25, False))
+            self.assertEqual(hand.next["trial"], 2)
+            hand.start(stimulus="ball", level=60, renderer="point")
+            self.refused("bad-answer", hand.answer, "box")
+            self.refused("running", hand.start, stimulus="ball", level=60, renderer="point")
+            hand.stop("the participant sneezed")
+            hand.mark(7, "flash")
+            hand.note("a bell rang")
+            self.assertEqual(hand.next["trial"], 2)
+        self.assertIsNone(process.poll())  # it waits for another controller
+        with self.client() as hand:  # resumes
+            self.assertEqual([(t["trial"], t["stimulus"], t["response"]) for t in hand.server["record"]["stored"]],
+                             [(1, "box", "soft")])
+            while True:
+                try:
+                    hand.start(stimulus="ball", level=60, renderer="point")
+                    said = hand.answer("hard", correct=True)
+                    break
+                except ServeError:
+                    hand.clear()
+            self.assertTrue(said["correct"])
+            hand.clock()
+            zero = hand.start(stimulus="ball", level=40, renderer="point")
+            time.sleep(0.05)
+            now = time.monotonic_ns()
+            with self.assertRaises(ServeError):
+                hand.answer("hard", t_ns=zero - 1)
+            said = hand.answer("hard", t_ns=now)
+            self.assertAlmostEqual(said["response_time_s"], (now - zero) * 1e-9, places=9)
+        process.send_signal(signal.SIGTERM)
+        self.assertEqual(process.wait(PATIENCE), 0)
+        rows = self.rows()
+        self.assertEqual([(row["shape"], row["level"], row["renderer"], row["response"], row["correct"], row["task"]) for row in rows],
+                         [("box", "25", "ray", "soft", "0", "external"), ("ball", "60", "point", "hard", "1", "external"),
+                          ("ball", "40", "point", "hard", "0", "external")])
+        self.assertEqual([float(rows[0][f"orientation_{axis}"]) for axis in "wxyz"], turned)
+        notes = [text for (text,) in self.sql("SELECT text FROM notes ORDER BY id")]
+        self.assertIn('{"mark":{"code":7,"text":"flash"}}', notes)
+        self.assertIn("a bell rang", notes)
+        self.assertIn(("the participant sneezed",), self.sql("SELECT cut_off_reason FROM attempts WHERE state = 'cut_off'"))
+        self.assertEqual(self.sql("SELECT end_reason FROM runs"), [("paused",)])
+        self.run_palpate("analyze", "--db", self.db)
+        again = self.begin(self.dir / "protocol.json")
+        with self.client() as hand:
+            self.assertEqual((hand.server["record"]["done"], hand.next["trial"]), (3, 4))
+        again.kill()
+
+    def test_wrong_use(self):
+        external = self.protocol(EXTERNAL)
+        run = ["run", external, "--db", self.db, "--participant", "P01", "--device", "simulated", "--no-window"]
+        self.assertIn("palpate serve runs it", self.run_palpate(*run, status=2))
+        self.assertIn("palpate serve runs it", self.run_palpate("simulate", external, "--db", self.db, status=2))
+        serve = ["serve", "--device", "simulated", "--protocol", external]
+        self.assertIn("together", self.run_palpate(*serve, status=2))
+        self.assertIn("--scene", self.run_palpate(*serve, "--db", self.db, "--participant", "P01", "--scene", self.scene, status=2))
+        self.assertIn("--consent", self.run_palpate("serve", "--device", "simulated", "--consent", "1", status=2))
+        pairs = {"name": "pairs", "task": "compare", "stimuli": ["ball"], "standard": "ball", "repetitions": 1}
+        serve[-1] = self.protocol(pairs)
+        self.assertIn("several intervals", self.run_palpate(*serve, "--db", self.db, "--participant", "P01", status=2))
+        self.assertFalse(self.db.exists())
+
+    def test_silence_cuts_the_trial_off(self):
+        self.begin(self.protocol(EXTERNAL))
+        with self.client(keep_alive=False) as hand:
+            hand.start(stimulus="ball", renderer="ray")
+            self.assertEqual(self.one_of(hand, "cut_off")["trial"], 1)
+            off = hand.wait_for("forces_off", PATIENCE)
+            self.refused("forces-off", hand.start, stimulus="ball", renderer="ray")
+            self.assertTrue(off["reason"])
+            hand.clear()
+            hand.start(stimulus="ball", renderer="ray")
+            hand._link.socket.shutdown(2)  # goes without a word
+        eye = self.client(role="watch")
+        while eye.server["record"]["done"] != 0 or len(self.sql("SELECT 1 FROM attempts WHERE state = 'cut_off'")) < 2:
+            time.sleep(0.05)
+
+    def test_twelve_kills_lose_no_trial_that_was_acknowledged(self):
+        protocol = self.protocol({**EXTERNAL, "trials": 30})
+        chance = random.Random(34)
+        acknowledged, kills = [], 0
+        while kills < 12:
+            process = self.begin(protocol)
+            killer = threading.Timer(chance.uniform(0.3, 1.2), process.kill)
+            with contextlib.suppress(ServeError, OSError, ConnectionError):
+                with self.client() as hand:
+                    stored = [(t["trial"], t["stimulus"], t["response"]) for t in hand.server["record"]["stored"]]
+                    self.assertEqual(stored[:len(acknowledged)], acknowledged)
+                    # The last one may be on record without its answer having come through.
+                    self.assertLessEqual(len(stored), len(acknowledged) + 1)
+                    acknowledged = stored
+                    killer.start()
+                    while hand.next is not None:
+                        said = self.trial(hand, chance.choice(["ball", "box"]), renderer="point",
+                                          stimulus=chance.choice(["ball", "box"]), trial=hand.next["trial"])
+                        acknowledged.append((said["trial"], said["stimulus"], said["response"]))
+            killer.cancel()
+            if process.wait(PATIENCE) == -signal.SIGKILL:
+                kills += 1
+            else:
+                break  # all trials were done before
+        self.assertGreater(kills, 3)
+        rows = [(int(row["trial"]), row["shape"], row["response"]) for row in self.rows()]
+        self.assertEqual(rows[:len(acknowledged)], acknowledged)
+        self.assertLessEqual(len(rows), len(acknowledged) + 1)
+        self.assertGreater(len(acknowledged), 5)
+
+
+if __name__ == "__main__":
+    unittest.main()
