@@ -115,8 +115,8 @@ PUBLIC = {
     "runner/display": "display explore_window mailbox text_display timeline touch_source window",
     "runner/display/scene": "camera display_error drawn_mesh image_file painter scene_drawing scene_renderer",
     "runner/participants": "keyboard respondent response_box settings_document simulated simulated_settings task_participant",
-    "runner/session": "clock_check contact_log device_check live_forces live_session markers near_codes preflight_dialogue protocol_info recorded_trial "
-                      "replay replay_comparison sample_stream session_plan simulated_session simulated_study socket_advisor station",
+    "runner/session": "clock_check contact_log device_check level_scenes live_forces live_session markers near_codes preflight_dialogue protocol_info recorded_trial "
+                      "replay replay_comparison sample_stream session session_end session_plan simulated_session simulated_study socket_advisor station",
     "runner/serve": "network served_scene served_session",
     "runner/sweep": "design swept_study",
     "runner/stability": "boundary integrators soft_map",

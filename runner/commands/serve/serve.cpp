@@ -12,7 +12,6 @@
 #include "runner/commands/render/forces.h"
 #include "runner/commands/run/admission.h"
 #include "runner/commands/run/opening.h"
-#include "runner/commands/run/report.h"
 #include "runner/commands/run/resumption.h"
 #include "runner/commands/run/run_info.h"
 #include "runner/commands/serve/live_page.h"
@@ -215,7 +214,8 @@ int serve_session(const RunSettings& settings, const po::variables_map& values) 
   const data::Participant participant =
       store.look_up(admission.enrolled, admission.participant, admission.number, device.simulated);
   const int session = choose_session(store, participant, protocol, settings);
-  print_participant(participant, session, protocol.sessions.count, device.simulated);
+  // Standard output is the program's.
+  std::cerr << "participant " << participant.code << ", session " << session << "\n";
   const data::ClockStamp began = stamp_now(clock);
   data::RunInfo info = run_info(settings, device, session, began, false);
   info.response_device = "another program";

@@ -24,7 +24,8 @@ class Browser:
 
     PATIENCE = 120  # s until a missing reply counts as a hang
 
-    def __init__(self, path):
+    def __init__(self, path, loopback=False):
+        """`loopback`: whether pages of 127.0.0.1 may be reached."""
         self.profile = tempfile.mkdtemp(prefix="palpate-chromium-")
         to_browser, self.write_end = os.pipe()
         self.read_end, from_browser = os.pipe()
@@ -33,7 +34,7 @@ class Browser:
             ["bash", "-c", f'exec "$@" 3<&{to_browser} 4>&{from_browser}', "bash", path, "--headless=new",
              "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--remote-debugging-pipe",
              "--no-first-run", "--disable-background-networking", "--disable-component-update",
-             "--disable-extensions", "--host-resolver-rules=MAP * ~NOTFOUND", f"--user-data-dir={self.profile}",
+             "--disable-extensions", "--host-resolver-rules=MAP * ~NOTFOUND" + (", EXCLUDE 127.0.0.1" if loopback else ""), f"--user-data-dir={self.profile}",
              "about:blank"],
             pass_fds=(to_browser, from_browser), stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL, env={**os.environ, "HOME": self.profile})
@@ -77,8 +78,11 @@ class Browser:
 
     def open(self, path):
         """Loads a file and waits until it is loaded."""
+        self.open_url(pathlib.Path(path).resolve().as_uri())
+
+    def open_url(self, url):
         self.events.clear()
-        self.call("Page.navigate", url=pathlib.Path(path).resolve().as_uri())
+        self.call("Page.navigate", url=url)
         while not any(name == "Page.loadEventFired" for name, _ in self.events):
             message = self._read()
             if "method" in message:

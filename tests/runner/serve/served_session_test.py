@@ -32,8 +32,8 @@ PROTOCOL = {
 IDENTIFY = {"name": "which", "task": "identify", "stimuli": ["ball", "box"], "repetitions": 1}
 EXTERNAL = {"name": "free", "task": "external", "stimuli": ["ball", "box"], "trials": 4}
 # Of when it was, and of a machine that is too busy.
-OF_TIME = {"response_time", "first_contact_time", "onset_utc", "missed_ticks", "attempt", "ticks", "faults", "max_force_n",
-           "longest_period_s", "contact_share", "edge_dwell", "interval_onsets", "interval_ends", "started_inside",
+OF_TIME = {"response_time", "first_contact_time", "onset_utc", "missed_ticks", "attempt", "ticks", "faults", "max_force", "before_contact",
+           "longest_period", "contact_share", "edge_dwell", "interval_onsets", "interval_ends", "started_inside",
            "response_device", "note"}
 
 

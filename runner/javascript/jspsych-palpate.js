@@ -1,0 +1,108 @@
+// A jsPsych plugin (version 7 or 8): one trial felt through `palpate serve`, answered with a button or a key.
+//
+//   import {connect} from './palpate.js';
+//   import {palpate_plugin} from './jspsych-palpate.js';
+//   const hand = await connect(url, token);
+//   const trial = {type: palpate_plugin(hand), choices: ['ball', 'box'], stimulus: 'ball', renderer: 'ray'};
+//
+// `data` gets what palpate has on record: trial, stimulus, renderer, response, correct, response_time_s,
+// first_contact_s, missed_ticks and more; `rt` in ms, as other plugins have it.
+
+const TEXT = 'STRING', YES = 'BOOL', NUMBER = 'FLOAT';  // jsPsych's ParameterType, without its module
+
+export const info = {
+  name: 'palpate',
+  version: '1.0.0',
+  parameters: {
+    choices: {type: TEXT, array: true, default: undefined},  // what may be answered, as palpate knows it
+    labels: {type: TEXT, array: true, default: []},          // what is read instead
+    keys: {type: TEXT, array: true, default: []},            // one for each choice; none: buttons alone
+    prompt: {type: 'HTML_STRING', default: ''},
+    waiting: {type: 'HTML_STRING', default: 'Take the stylus away from the middle and hold it still.'},
+    stimulus: {type: TEXT, default: null},                   // in a block that palpate does not plan
+    renderer: {type: TEXT, default: null},
+    level: {type: NUMBER, default: null},
+    orientation_wxyz: {type: NUMBER, array: true, default: []},
+    try_again: {type: YES, default: true},                   // where forces went off before the answer
+  },
+  data: {
+    trial: {type: 'INT'}, stimulus: {type: TEXT}, renderer: {type: TEXT}, response: {type: TEXT}, correct: {type: YES},
+    response_time_s: {type: NUMBER}, first_contact_s: {type: NUMBER}, missed_ticks: {type: 'INT'}, rt: {type: NUMBER},
+  },
+  citations: {apa: '', bibtex: ''},
+};
+
+const element = (kind, parent, text = '') => {
+  const out = document.createElement(kind);
+  out.textContent = text;
+  parent.append(out);
+  return out;
+};
+
+/** The plugin for a connection of palpate.js. */
+export function palpate_plugin(hand) {
+  return class PalpatePlugin {
+    static info = info;
+
+    constructor(jsPsych) {
+      this.jsPsych = jsPsych;
+    }
+
+    async trial(display, trial) {
+      const what = {};
+      for (const name of ['stimulus', 'renderer', 'level', 'orientation_wxyz'])
+        if (trial[name] !== null && trial[name].length !== 0) what[name] = trial[name];
+      if (hand.next) what.trial = hand.next.trial;
+      for (;;) {
+        try {
+          display.innerHTML = trial.waiting;
+          await hand.start(what);
+          const said = await hand.answer(await this.#choice(display, trial));
+          const data = {...said, rt: 1000 * said.response_time_s};
+          for (const name of ['re', 'ok', 'next', 'record']) delete data[name];
+          display.innerHTML = '';
+          return this.jsPsych.finishTrial(data);
+        } catch (error) {
+          if (!trial.try_again || !['forces-off', 'stopped', 'nothing-felt'].includes(error.code)) throw error;
+          await this.#go_on(display, error);
+        }
+      }
+    }
+
+    /** Resolves with one of the choices. */
+    #choice(display, trial) {
+      display.innerHTML = trial.prompt;
+      return new Promise((resolve, reject) => {
+        const off = event => done(() => reject(Object.assign(new Error(event.detail.reason), {code: 'forces-off'})));
+        const pressed = event => {
+          const at = (trial.keys ?? []).indexOf(event.key);
+          if (at >= 0) done(() => resolve(trial.choices[at]));
+        };
+        const done = act => {
+          document.removeEventListener('keydown', pressed);
+          hand.removeEventListener('forces_off', off);
+          act();
+        };
+        const row = element('div', display);
+        trial.choices.forEach((choice, i) => {
+          const button = element('button', row, trial.labels?.[i] ?? choice);
+          button.className = 'jspsych-btn';
+          button.dataset.choice = choice;
+          button.addEventListener('click', () => done(() => resolve(choice)));
+        });
+        document.addEventListener('keydown', pressed);
+        hand.addEventListener('forces_off', off);
+      });
+    }
+
+    /** Forces went off: the experimenter, or the participant, says when they may come again. */
+    #go_on(display, error) {
+      display.innerHTML = '';
+      element('p', display, `Forces are off: ${error.reason ?? error.message}`);
+      const button = element('button', display, 'Go on');
+      button.className = 'jspsych-btn';
+      button.dataset.choice = 'go on';
+      return new Promise(resolve => button.addEventListener('click', () => resolve(hand.clear().catch(() => {}))));
+    }
+  };
+}

@@ -1,0 +1,162 @@
+// Drives `palpate serve` from a page: an ES module without dependencies.
+//
+//   import {connect} from './palpate.js';
+//   const hand = await connect('ws://127.0.0.1:49213', token);
+//   await hand.start({stimulus: 'cube', renderer: 'ray', trial: 1});  // resolves once forces are on
+//   const trial = await hand.answer('cube');                         // on record, where there is a protocol
+//
+// The messages: protocols/serve.schema.json. Forces stay palpate's. A page that is hidden or closed says nothing any
+// more: forces go off.
+
+const ALIVE_EVERY = 200;  // ms; the server waits for half a second
+const WIDTHS = {tip: 3, tail: 3, force: 3, rendered: 3, contact: 3};  // columns; else one
+
+/** The server refused a message, or has gone. `code` is for programs, `place` a JSON pointer. */
+export class ServeError extends Error {
+  constructor({code, message, place = '', faults = []}) {
+    super(`${code}: ${message}${place ? ` (${place})` : ''}`);
+    this.name = 'ServeError';
+    Object.assign(this, {code, reason: message, place, faults});
+  }
+}
+
+/** One connection; made by connect(). */
+export class Hand extends EventTarget {
+  #socket;
+  #number = 0;
+  #waiting = new Map();
+  #fields = [];
+  #alive = null;
+
+  /** What the server said of itself; with a protocol `server.record` has participant, session and what is stored. */
+  server = {};
+  /** With a protocol: the trial that is due; null behind the last one. */
+  next = null;
+  /** Rows that the server left out because this page did not keep up. */
+  dropped = 0;
+
+  constructor(socket) {
+    super();
+    this.#socket = socket;
+    socket.addEventListener('message', event => this.#take(JSON.parse(event.data)));
+    socket.addEventListener('close', () => this.#end());
+  }
+
+  #end() {
+    clearInterval(this.#alive);
+    for (const {reject} of this.#waiting.values()) reject(new ServeError({code: 'closed', message: 'the server has gone'}));
+    this.#waiting.clear();
+    this.dispatchEvent(new Event('closed'));
+  }
+
+  #take(message) {
+    if (message.re !== undefined && message.re !== null) {
+      const waiting = this.#waiting.get(message.re);
+      this.#waiting.delete(message.re);
+      if (!waiting) return;
+      if (message.ok) waiting.resolve(message);
+      else waiting.reject(new ServeError(message.error));
+    } else if (message.stream) {
+      this.dropped += message.dropped;
+      this.dispatchEvent(new CustomEvent('samples', {detail: this.#rows(message.stream)}));
+    } else if (message.event) {
+      this.dispatchEvent(new CustomEvent(message.event, {detail: message}));
+      this.dispatchEvent(new CustomEvent('event', {detail: message}));
+    }
+  }
+
+  #rows(rows) {
+    return rows.map(([t_ns, tick, ...values]) => {
+      const row = {t_ns, tick};
+      let at = 0;
+      for (const field of this.#fields) {
+        const width = WIDTHS[field] ?? 1;
+        row[field] = width > 1 ? values.slice(at, at + width) : values[at];
+        at += width;
+      }
+      return row;
+    });
+  }
+
+  #next(said) {
+    if (said.record) this.next = said.record.next;
+    else if (said.next !== undefined) this.next = said.next;
+    return said;
+  }
+
+  /** Any message; resolves with its answer, rejects with ServeError where it is refused. */
+  ask(type, values = {}) {
+    if (this.#socket.readyState !== WebSocket.OPEN)
+      return Promise.reject(new ServeError({code: 'closed', message: 'the server has gone'}));
+    const id = ++this.#number;
+    return new Promise((resolve, reject) => {
+      this.#waiting.set(id, {resolve, reject});
+      this.#socket.send(JSON.stringify({id, type, ...values}));
+    });
+  }
+
+  /** For connect(). */
+  async hello(token, role) {
+    this.server = this.#next(await this.ask('hello', {token, version: 1, role}));
+    if (role !== 'control') return;
+    this.#alive = setInterval(() => {
+      if (this.#socket.readyState === WebSocket.OPEN) this.#socket.send(JSON.stringify({id: 0, type: 'alive'}));
+    }, ALIVE_EVERY);
+  }
+
+  /** A scene, as in scene.schema.json; every fault is in ServeError.faults. */
+  load(scene) { return this.ask('load', {scene}); }
+  /** Forces on: {stimulus, renderer, trial, level, orientation_wxyz}, each may be left out. Resolves once they are. */
+  start(what = {}) { return this.ask('start', what); }
+  /** Ends the trial; resolves with what it was like. `more`: {correct, t_ns}. */
+  async answer(response, more = {}) { return this.#next(await this.ask('answer', {response, ...more})); }
+  /** Changes the scene at a JSON pointer. */
+  set(path, value) { return this.ask('set', {path, value}); }
+  /** Forces off, without an answer. */
+  stop(reason = '') { return this.ask('stop', {reason}); }
+  /** An event for all clients; in words. */
+  mark(code, text = '') { return this.ask('mark', {code, text}); }
+  note(text) { return this.ask('note', {text}); }
+  /** Zero force at once, until clear(). */
+  emergency() { return this.ask('emergency'); }
+  clear() { return this.ask('clear'); }
+  /** Rows of ticks from now on, as 'samples' events; 0 ends them. */
+  async subscribe(rate_hz = 60, fields = ['tip', 'force']) {
+    const said = await this.ask('subscribe', {rate_hz, fields});
+    this.#fields = fields;
+    return said;
+  }
+  /** The server's clock less performance.now(), in ms, by the quickest of so many questions. */
+  async clock(times = 10) {
+    let best = null;
+    for (let i = 0; i < times; ++i) {
+      const sent = performance.now();
+      const said = await this.ask('clock');
+      const came = performance.now();
+      const round_trip_ms = came - sent - (said.t_sent_ns - said.t_received_ns) / 1e6;
+      const offset_ms = (said.t_received_ns + said.t_sent_ns) / 2e6 - (sent + came) / 2;
+      if (!best || round_trip_ms < best.round_trip_ms) best = {offset_ms, round_trip_ms};
+    }
+    return best;
+  }
+  /** The next event of that name, as {event, t_ns, ...}. */
+  wait_for(name) {
+    return new Promise(resolve => this.addEventListener(name, event => resolve(event.detail), {once: true}));
+  }
+  /** Says goodbye: what is felt stops. */
+  async close() {
+    await this.ask('bye').catch(() => {});
+    this.#socket.close();
+  }
+}
+
+/** @returns a Hand. `role`: 'control', or 'watch' for a second monitor. */
+export function connect(url, token, {role = 'control'} = {}) {
+  return new Promise((resolve, reject) => {
+    const socket = new WebSocket(url, 'palpate.1');
+    const hand = new Hand(socket);
+    socket.addEventListener('open', () => hand.hello(token, role).then(() => resolve(hand), reject));
+    socket.addEventListener('error', () => reject(new ServeError({
+      code: 'closed', message: `no server at ${url}, or it does not allow pages from ${location.origin}`})));
+  });
+}

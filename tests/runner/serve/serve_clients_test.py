@@ -1,0 +1,194 @@
+"""The clients of palpate serve and their examples: asyncio, a pipe, Octave, and programs as labs have them.
+
+Usage: serve_clients_test.py PALPATE PROTOCOLS CLIENT.py
+"""
+
+import asyncio
+import csv
+import importlib.util
+import io
+import json
+import pathlib
+import shutil
+import subprocess
+import sys
+import time
+import unittest
+
+from serve_case import BALL, CLIENT, PALPATE, PATIENCE, ServeCase, ServeError, client
+
+EXAMPLES = CLIENT.parents[1] / "examples"
+OCTAVE = CLIENT.parents[2] / "octave"
+PROTOCOL = {
+    "version": 2, "name": "clients", "renderers": ["ray"], "seed": 5, "servo": {"rate_hz": 100}, "home": {"rest_s": 0.1},
+    "material": {"stiffness_n_per_m": 50},
+    "stimuli": [{"name": "ball", "shape": "sphere", "radius_m": 0.02, "subdivisions": 1},
+                {"name": "box", "shape": "cube", "edge_m": 0.03}],
+    "blocks": [{"name": "free", "task": "external", "stimuli": ["ball", "box"], "trials": 3}],
+}
+
+
+class Clients(ServeCase):
+    def setUp(self):
+        super().setUp()
+        self.token = self.dir / "token.json"
+        self.db = self.dir / "study.db"
+
+    def record(self):
+        (self.dir / "p.json").write_text(json.dumps(PROTOCOL))
+        process = self.run_server([PALPATE, "serve", "--device", "simulated", "--protocol", self.dir / "p.json", "--db", self.db,
+                                   "--participant", "P01", "--token-file", self.token])
+        self.said = json.loads(self.token.read_text())
+        return process
+
+    def rows(self):
+        out = self.dir / "rows.csv"
+        subprocess.run([PALPATE, "export", "--db", self.db, "--format", "csv", "--out", out], check=True, capture_output=True)
+        with open(out, newline="", encoding="utf-8") as table:
+            return list(csv.DictReader(table))
+
+    def run_program(self, *command, **more):
+        done = subprocess.run(list(map(str, command)), capture_output=True, text=True, timeout=PATIENCE, cwd=self.dir, **more)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        return done.stdout
+
+    def assert_on_record(self, table):
+        """A table of trial, stimulus, response, correct and response time against the record."""
+        rows = self.rows()
+        self.assertEqual(len(rows), 3)
+        self.assertEqual([(r["trial"], r["shape"], r["response"], r["correct"]) for r in rows],
+                         [(t["trial"], t["stimulus"], t["response"], {"True": "1", "False": "0"}.get(t["correct"], t["correct"]))
+                          for t in table])
+        for row, told in zip(rows, table):
+            self.assertAlmostEqual(float(row["response_time"]), float(told.get("response_time_s") or told["response_time"]), places=6)
+
+    def test_asyncio_does_what_the_blocking_client_does(self):
+        self.serve()
+
+        async def session(**where):
+            async with await client.AsyncClient.connect(**where, token=self.said["token"], time_out=PATIENCE) as hand:
+                self.assertIn("objects", hand.server["scene"])
+                with self.assertRaises(ServeError) as caught:
+                    await client.AsyncClient.connect(**where, token="0" * 32)
+                self.assertEqual(caught.exception.code, "bad-token")
+                await hand.load(BALL)
+                await hand.subscribe(100, ("tip", "force", "depth"))
+                while True:
+                    zero = await hand.start(renderer="point", trial=3)
+                    first = asyncio.ensure_future(hand.wait_for("first_contact", PATIENCE))
+                    off = asyncio.ensure_future(asyncio.sleep(20))
+                    await asyncio.wait({first, off}, return_when=asyncio.FIRST_COMPLETED)
+                    off.cancel()
+                    if first.done():
+                        break
+                    first.cancel()
+                    await hand.stop()
+                    await hand.clear()
+                # Two questions at once have each its answer.
+                clock, marked = await asyncio.gather(hand.clock(), hand.mark(3, "x"))
+                self.assertLess(abs(clock.offset_ns), clock.round_trip_ns / 2 + 1)
+                self.assertGreater(marked, zero)
+                await asyncio.sleep(0.7)  # it says that it lives
+                said = await hand.answer("ball")
+                self.assertEqual((said["trial"], said["zero_t_ns"]), (3, zero))
+                await asyncio.sleep(0.1)
+                samples = hand.samples()
+                count = len(samples["tick"])
+                self.assertGreater(count, 10)
+                self.assertEqual([samples[name].shape for name in ("tip", "force", "depth")], [(count, 3), (count, 3), (count,)])
+                with self.assertRaises(TimeoutError):
+                    await hand.wait_for("never", 0.05)
+                await hand.set("/objects/0/stiffness_n_per_m", 40)
+                await hand.note("n")
+                await hand.emergency()
+                await hand.clear()
+                await hand.stop("enough")
+                self.assertIn("stopped", [event["event"] for event in hand.events()])
+            with self.assertRaises(ServeError) as caught:
+                await hand.stop()
+            self.assertEqual(caught.exception.code, "closed")
+
+        asyncio.run(session(url=self.said["url"]))
+        asyncio.run(session(socket_path=str(self.path)))
+
+    def test_a_pipe_passes_messages_on(self):
+        self.serve("--token-file", self.token)
+        lines = ['{"type": "start"}', '{"type": "stop"}', '{"type": "jump"}', "nonsense", '{"type": "subscribe", "rate_hz": 50}',
+                 '{"type": "events"}', '{"type": "samples"}', "[]"]
+        out = self.run_program(sys.executable, CLIENT, self.token, input="\n".join(lines) + "\n")
+        said = [json.loads(line) for line in out.splitlines()]
+        self.assertEqual([one["ok"] for one in said], [True, True, True, False, False, True, True, True, False])
+        self.assertEqual(said[3]["error"]["code"], "bad-message")
+        self.assertIn("started", [event["event"] for event in said[6]["events"]])
+        self.assertEqual(said[7]["tick"], [])
+        done = subprocess.run([sys.executable, CLIENT, self.dir / "none"], capture_output=True, text=True, timeout=PATIENCE)
+        self.assertEqual(done.returncode, 1)
+        self.assertNotIn("Traceback", done.stderr)
+
+    def test_a_time_needs_a_clock(self):
+        self.serve()
+        with self.client() as hand:
+            with self.assertRaises(ValueError):
+                hand.answer("ball", t_ns=1)
+            hand.best_clock = client.Clock(0, 3_000_000)
+            with self.assertRaises(ValueError):
+                hand.answer("ball", t_ns=1)
+
+    def test_the_trial_loop_on_record(self):
+        process = self.record()
+        out = self.dir / "trials.csv"
+        # A busy machine's servo may cut a trial off: then a key more is taken.
+        self.run_program(sys.executable, EXAMPLES / "serve_trials.py", self.token, "--out", out, "--keys", "12" * 50)
+        self.assertEqual(process.wait(PATIENCE), 0)
+        with open(out, newline="") as table:
+            self.assert_on_record(list(csv.DictReader(table)))
+
+    def test_frames_of_a_game_engine(self):
+        self.serve("--token-file", self.token, scene=False)
+        frames = [json.loads(line) for line in self.run_program(
+            sys.executable, EXAMPLES / "serve_frames.py", self.token, "--frames", 60).splitlines()]
+        self.assertEqual([frame["frame"] for frame in frames], list(range(60)))
+        for frame in frames:
+            self.assertLess(max(map(abs, frame["tip"])), 0.3)
+            length = sum(x * x for x in frame["points_to"]) ** 0.5
+            self.assertAlmostEqual(length, 0.12, places=3)
+
+    def test_a_live_plot(self):
+        if importlib.util.find_spec("matplotlib") is None:
+            self.skipTest("matplotlib is not installed")
+        self.serve("--token-file", self.token)
+        self.said = json.loads(self.token.read_text())
+        picture = self.dir / "plot.png"
+        with self.client() as hand:
+            program = subprocess.Popen([sys.executable, EXAMPLES / "serve_plot.py", self.token, "--out", picture, "--seconds", "1.5"],
+                                       cwd=self.dir, stderr=subprocess.PIPE, text=True)
+            self.addCleanup(program.kill)
+            while program.poll() is None:
+                try:
+                    hand.start()
+                    while program.poll() is None and not hand._events:
+                        time.sleep(0.1)
+                    self.one_of(hand, "forces_off", "started", "first_contact", "left")
+                    time.sleep(0.5)
+                    hand.stop()
+                except ServeError:
+                    hand.clear()
+        self.assertEqual(program.returncode, 0, program.stderr.read())
+        program.stderr.close()
+        self.assertEqual(picture.read_bytes()[:8], b"\x89PNG\r\n\x1a\n")
+        self.assertGreater(picture.stat().st_size, 5000)
+
+    def test_octave(self):
+        if shutil.which("octave-cli") is None:
+            self.skipTest("Octave is not installed")
+        process = self.record()
+        out = self.run_program("octave-cli", "--no-init-file", OCTAVE / "trials.m", self.token)
+        self.assertEqual(process.wait(PATIENCE), 0)
+        self.assert_on_record(list(csv.DictReader(io.StringIO(out))))
+        lost = subprocess.run(["octave-cli", "--no-init-file", OCTAVE / "trials.m", self.token], capture_output=True, text=True,
+                              timeout=PATIENCE, cwd=self.dir)
+        self.assertNotEqual(lost.returncode, 0)
+
+
+if __name__ == "__main__":
+    unittest.main()
