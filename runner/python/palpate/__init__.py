@@ -34,9 +34,9 @@ except ModuleNotFoundError as error:
         "  cmake --preset release -DPALPATE_PYTHON=ON && cmake --build --preset release --target palpate_python\n"
         "and import it with PYTHONPATH=.build/release/runner/python") from error
 
-from .client import Client, ServeError
+from .client import AsyncClient, Client, ServeError
 
-__all__ = ["Client", "InputError", "ServeError", "render", "schedule", "settings", "simulate", "__version__"]
+__all__ = ["AsyncClient", "Client", "InputError", "ServeError", "render", "schedule", "settings", "simulate", "__version__"]
 
 Path = Union[str, "os.PathLike[str]"]
 Columns = Dict[str, NDArray[Any]]

@@ -22,7 +22,7 @@ sys.argv.insert(2, str(pathlib.Path(__file__).resolve().parents[3] / "protocols"
 from emulator_control import EmulatorControl  # noqa: E402
 from serve_case import PATIENCE, ServeCase, ServeError  # noqa: E402
 
-RATE = 200  # Hz, that a busy machine keeps
+RATE = 100  # Hz, that a busy machine keeps
 TICK_NS = 1_000_000_000 // RATE
 BALL = {"objects": [{"shape": "sphere", "radius_m": 0.02, "subdivisions": 2, "stiffness_n_per_m": 100}]}
 # Holds the forces on, in a process of its own, until something is done to it.
@@ -38,8 +38,13 @@ while True:
         hand.wait_for("forces_off", 1000)
     except ServeError:
         pass
-    hand.stop()
-    hand.clear()
+    try:
+        hand.stop()
+        hand.clear()
+    except ServeError as error:  # the guard of a starved machine is late
+        if error.code == "closed":
+            raise
+        time.sleep(0.2)
 """
 
 
@@ -56,8 +61,15 @@ class Falcon(ServeCase):
         self.last = self.dir / "last.json"
         self.server = self.run_server([EMULATED, "--last", self.last, "--control", self.control.fifo, PALPATE, "serve",
                                        "--device", "falcon", "--scene", self.scene, "--rate", RATE, "--calibration", calibration])
+        # First of all: what killed the bus alone would leave the server, and its pipes, behind.
+        self.addCleanup(lambda: [os.kill(pid, signal.SIGKILL) for pid in self.children(self.server.pid)])
         self.eye = self.client(role="watch")
         self.eye.subscribe(RATE, ("force", "faults"))
+
+    @staticmethod
+    def children(pid):
+        said = subprocess.run(["pgrep", "-P", str(pid)], capture_output=True, text=True).stdout
+        return [int(word) for word in said.split()]
 
     def hand_at(self, x, y, z):
         self.control.tell(f"hand 1 {x} {y} {0.125 + z} 400 10")
@@ -73,8 +85,14 @@ class Falcon(ServeCase):
             stdout=subprocess.PIPE, text=True)
         self.addCleanup(lambda: (program.kill(), program.communicate()))
         self.assertEqual(program.stdout.readline(), "on\n")
-        self.hand_at(0.012, 0, 0)  # in the ball
-        self.control.wait_until(self.torque)
+        # Forces that went off on a starved machine begin anew with the hand in the ball, which then gives none.
+        end = time.monotonic() + PATIENCE
+        while not self.torque():
+            self.assertLess(time.monotonic(), end, "nothing was felt")
+            self.hand_at(0.03, 0, 0)
+            time.sleep(0.3)
+            self.hand_at(0.012, 0, 0)  # in the ball
+            time.sleep(0.3)
         time.sleep(0.4)  # until the ramp is over
         return program
 
