@@ -8,7 +8,7 @@
 #include <string_view>
 #include <vector>
 
-#include "stimuli/printable.h"
+#include "stimuli/text.h"
 
 namespace palpate::analysis {
 

@@ -6,7 +6,7 @@
 #include <string_view>
 #include <utility>
 
-#include "stimuli/edit_distance.h"
+#include "stimuli/text.h"
 
 namespace palpate::protocols {
 namespace {

@@ -9,7 +9,7 @@
 
 #include "data/base/json_text.h"
 #include "stimuli/input_file.h"
-#include "stimuli/likely_mistakes.h"
+#include "stimuli/text.h"
 
 namespace palpate::protocols {
 namespace {

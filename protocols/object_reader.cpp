@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "data/base/json_text.h"
-#include "stimuli/edit_distance.h"
+#include "stimuli/text.h"
 
 namespace palpate::protocols {
 namespace {

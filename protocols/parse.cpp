@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include "stimuli/printable.h"
+#include "stimuli/text.h"
 
 namespace palpate::protocols {
 namespace {

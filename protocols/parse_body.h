@@ -4,7 +4,7 @@
 #include <optional>
 
 #include "protocols/object_reader.h"
-#include "stimuli/object_spec.h"
+#include "stimuli/shapes.h"
 
 namespace palpate::protocols {
 

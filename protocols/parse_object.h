@@ -5,7 +5,7 @@
 
 #include "protocols/object_reader.h"
 #include "protocols/parse.h"
-#include "stimuli/object_spec.h"
+#include "stimuli/shapes.h"
 
 namespace palpate::protocols {
 

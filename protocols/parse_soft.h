@@ -2,7 +2,7 @@
 // Reading of what makes an object give (scene.schema.json), for scenes and protocols.
 
 #include "protocols/object_reader.h"
-#include "stimuli/object_spec.h"
+#include "stimuli/shapes.h"
 
 namespace palpate::protocols {
 

@@ -10,7 +10,7 @@
 
 #include "protocols/scene_spec.h"
 #include "protocols/tasks/task_block.h"
-#include "stimuli/object_spec.h"
+#include "stimuli/shapes.h"
 
 namespace palpate::protocols {
 

@@ -6,7 +6,7 @@
 #include <optional>
 #include <vector>
 
-#include "stimuli/object_spec.h"
+#include "stimuli/shapes.h"
 
 namespace palpate::protocols {
 

@@ -9,7 +9,7 @@
 
 #include "rendering/contact.h"
 #include "rendering/probe.h"
-#include "stimuli/object_spec.h"
+#include "stimuli/shapes.h"
 
 namespace palpate::rendering {
 

@@ -19,7 +19,7 @@
 #include "rendering/tool.h"
 #include "rendering/union_state.h"
 #include "stimuli/convex_mesh.h"
-#include "stimuli/object_spec.h"
+#include "stimuli/shapes.h"
 
 namespace palpate::rendering {
 

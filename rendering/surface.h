@@ -10,7 +10,7 @@
 
 #include "stimuli/closed_surface.h"
 #include "stimuli/large_array.h"
-#include "stimuli/object_spec.h"
+#include "stimuli/shapes.h"
 #include "stimuli/vec.h"
 
 namespace palpate::rendering {

@@ -22,8 +22,7 @@
 #include "protocols/parse.h"
 #include "runner/commands/shared/command.h"
 #include "stimuli/convex_mesh.h"
-#include "stimuli/edit_distance.h"
-#include "stimuli/printable.h"
+#include "stimuli/text.h"
 
 namespace {
 

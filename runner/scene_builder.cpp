@@ -11,10 +11,10 @@
 #include "protocols/tasks/levels.h"
 #include "rendering/bodies/soft/soft_build.h"
 #include "stimuli/closed_surface.h"
-#include "stimuli/compose.h"
 #include "stimuli/parts/convex_parts.h"
 #include "stimuli/parts/inset_parts.h"
 #include "stimuli/primitives.h"
+#include "stimuli/shapes.h"
 
 namespace palpate::runner {
 namespace {

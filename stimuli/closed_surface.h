@@ -36,4 +36,13 @@ struct CleanedSurface {
 /// turned, inside out, winds round some place a negative number of times, not finite, too large.
 CleanedSurface closed_surface(const PolygonSoup& soup);
 
+// Merging of points that coincide.
+
+/// For each point the number of the first point at the same place.
+std::vector<std::uint32_t> weld_equal(const std::vector<Vec3>& points);
+
+/// For each point the number of the point that it is welded to (itself, for the first of its
+/// cluster). Points at most `tolerance` (m) apart are one; all coordinates must be finite.
+std::vector<std::uint32_t> weld(const std::vector<Vec3>& points, double tolerance);
+
 }  // namespace palpate::stimuli

@@ -1,26 +1,44 @@
 #include "stimuli/convex_mesh.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <limits>
+#include <string>
 #include <utility>
+#include <vector>
 
-#include "stimuli/convexity.h"
 #include "stimuli/coplanar.h"
-#include "stimuli/facet_outlines.h"
+#include "stimuli/face_triangles.h"
 #include "stimuli/grid_hull.h"
 #include "stimuli/half_edges.h"
-#include "stimuli/polygon.h"
+#include "stimuli/inset.h"
+#include "stimuli/mesh_names.h"
 
 namespace palpate::stimuli {
+
+// Checks that a mesh is convex. The last step of building a ConvexMesh.
+
+/// Reports where a closed, connected mesh is not the surface of a convex body. It is one when it is
+/// convex at every edge, round every vertex and in every facet (van Heijenoort 1952): it must wind
+/// round each just once, for a star that is wound twice has convex edges only. A final check of
+/// every facet for vertices in front of its plane guards against accumulated tolerances.
+/// \param soup_vertex the number of each vertex in the input, for messages with what `naming` calls
+/// it
+/// \param error m, how far a coordinate may be from where it was meant
+void check_convexity(const ConvexMesh& mesh, const std::vector<std::uint32_t>& soup_vertex,
+                     const MeshNaming& naming, double error, MeshFaults& faults);
+
 namespace {
 
 using Index = std::uint32_t;
 
-// In errors: how far a corner may be below the hull of all; as far as it may be in front of a facet
-// (convexity.cpp).
+// In errors: how far a corner may be below the hull of all; as far as it may be in front of a
+// facet.
 constexpr double kDeepest = 16 * kCoplanar;
 
 struct Bulk {
@@ -305,6 +323,329 @@ ConvexMesh::ConvexMesh(const PolygonSoup& soup) {
     return;
   }
   faults.throw_if_any();
+}
+
+namespace {
+
+using Index = std::uint32_t;
+
+// Whether a closed plane polygon without reflex corners, given by the directions of its sides,
+// turns by 360 degrees and no more: then their components along any axis of the plane change sign
+// exactly twice. Several axes, because close to zero a sign may be rounding.
+bool turns_once(const std::vector<Vec3>& directions, const Vec3& normal) {
+  const Vec3 u = glm::normalize(directions[0]), v = glm::cross(normal, u);
+  constexpr std::array<std::array<double, 2>, 3> kAxes{{{0.8, 0.6}, {-0.28, 0.96}, {0.6, -0.8}}};
+  for (const auto& [along, aside] : kAxes) {
+    const Vec3 axis = along * u + aside * v;
+    int changes = 0;
+    bool was_positive = glm::dot(directions.back(), axis) >= 0;
+    for (const Vec3& direction : directions) {
+      const bool positive = glm::dot(direction, axis) >= 0;
+      if (positive != was_positive) ++changes;
+      was_positive = positive;
+    }
+    if (changes == 2) return true;
+  }
+  return false;
+}
+
+Index other_end(const Edge& edge, Index vertex) { return edge.v0 == vertex ? edge.v1 : edge.v0; }
+
+class Checker {
+ public:
+  Checker(const ConvexMesh& mesh, const std::vector<Index>& soup_vertex, const MeshNaming& naming,
+          double error, MeshFaults& faults)
+      : mesh_(mesh), soup_vertex_(soup_vertex), naming_(naming), error_(error), faults_(faults) {}
+
+  void check_facet(Index facet) {
+    const Facet& shape = mesh_.facets()[facet];
+    directions_.clear();
+    Index lowest = corner(facet, 0);
+    for (Index k = 0; k < shape.side_count; ++k) {
+      const Index here = corner(facet, k), next = corner(facet, (k + 1) % shape.side_count);
+      directions_.push_back(position(next) - position(here));
+      if (valence(here) < valence(lowest)) lowest = here;
+    }
+    if (!turns_once(directions_, shape.normal)) {
+      faults_.add("wound facet", [&] {
+        return "the facet with the vertices " + names(facet) +
+               " winds round more than once; expected a convex polygon";
+      });
+      return;
+    }
+    check_plane(facet, lowest);
+  }
+
+  // Edges were checked before facets were merged. But concave edges within the error merge as well,
+  // and many of them add up to concave edges between facets that are beyond it.
+  void check_edge(Index number) {
+    const Edge& edge = mesh_.edges()[number];
+    const Vec3 side = position(edge.v1) - position(edge.v0);
+    const double deviation = plane_deviation(
+        mesh_.facets()[edge.left].normal, mesh_.facets()[edge.right].normal, side,
+        extent_of(edge.left, edge.v0, side), extent_of(edge.right, edge.v1, -side), error_);
+    if (deviation >= -2 * kCoplanar) return;
+    faults_.add("not convex", [&] {
+      return "the facets with the vertices " + names(edge.left) + " and " + names(edge.right) +
+             " form a dent; expected convex edges only";
+    });
+  }
+
+  void check_vertex(Index vertex) {
+    const auto& fan = mesh_.fan_edges();
+    const Index first = mesh_.fan_first()[vertex], end = mesh_.fan_first()[vertex + 1];
+    Vec3 inside;
+    for (Index k = first; k < end; ++k) inside -= leaving_facet(fan[k], vertex).normal;
+    inside = glm::normalize(inside);
+    // The edges, seen from inside along this direction, are the corners of a plane polygon.
+    corners_.clear();
+    for (Index k = first; k < end; ++k) {
+      const Vec3 along =
+          glm::normalize(position(other_end(mesh_.edges()[fan[k]], vertex)) - position(vertex));
+      const double ahead = glm::dot(along, inside);
+      if (!(ahead > 0)) return;  // flat within rounding: nothing can wind round
+      corners_.push_back(along / ahead);
+    }
+    directions_.clear();
+    for (std::size_t k = 0; k < corners_.size(); ++k) {
+      directions_.push_back(corners_[(k + 1) % corners_.size()] - corners_[k]);
+    }
+    if (turns_once(directions_, inside)) return;
+    faults_.add("wound vertex", [&] {
+      return "the faces wind round " + name(vertex) + " more than once; expected a convex corner";
+    });
+  }
+
+ private:
+  const Vec3& position(Index vertex) const { return mesh_.vertices()[vertex]; }
+  Index valence(Index v) const { return mesh_.fan_first()[v + 1] - mesh_.fan_first()[v]; }
+
+  Index corner(Index facet, Index k) const {
+    const Edge& edge = mesh_.edges()[mesh_.sides()[mesh_.facets()[facet].first_side + k].edge];
+    return edge.left == facet ? edge.v0 : edge.v1;
+  }
+
+  PolygonExtent extent_of(Index facet, Index from, const Vec3& side) const {
+    const Index corners = mesh_.facets()[facet].side_count;
+    // A sample of the corners of a large facet is enough.
+    const Index stride = std::max<Index>(1, corners / 16);
+    PolygonExtent extent(side);
+    for (Index k = 0; k < corners; k += stride) {
+      extent.include(position(corner(facet, k)) - position(from));
+    }
+    return extent;
+  }
+
+  const Facet& leaving_facet(Index edge, Index vertex) const {
+    const Edge& e = mesh_.edges()[edge];
+    return mesh_.facets()[e.v0 == vertex ? e.left : e.right];
+  }
+
+  std::string label(Index vertex) const {
+    return naming_.label(soup_vertex_[vertex], position(vertex));
+  }
+  std::string name(Index vertex) const {
+    return naming_.vertex(soup_vertex_[vertex], position(vertex));
+  }
+
+  std::string names(Index facet) const {
+    std::string text;
+    for (Index k = 0; k < std::min<Index>(mesh_.facets()[facet].side_count, 8); ++k) {
+      text += (k == 0 ? "" : " ") + label(corner(facet, k));
+    }
+    return text + (mesh_.facets()[facet].side_count > 8 ? " ..." : "");
+  }
+
+  // Hill climbing along the facet's normal from one of its corners; on a convex body it stays
+  // there.
+  void check_plane(Index facet, Index from) {
+    const Facet& shape = mesh_.facets()[facet];
+    Index top = from;
+    double height = 16 * kCoplanar * error_;
+    for (bool climbing = true; climbing;) {
+      climbing = false;
+      const Index here = top;
+      for (Index k = mesh_.fan_first()[here]; k < mesh_.fan_first()[here + 1]; ++k) {
+        const Index next = other_end(mesh_.edges()[mesh_.fan_edges()[k]], here);
+        const double above = glm::dot(shape.normal, position(next)) - shape.offset;
+        if (above <= height) continue;
+        top = next;
+        height = above;
+        climbing = true;
+      }
+    }
+    if (top == from) return;
+    faults_.add("not convex", [&] {
+      return name(top) + " stands " + std::to_string(height / mesh_.size()) +
+             " of the object's size in front of the facet with the vertices " + names(facet);
+    });
+  }
+
+  const ConvexMesh& mesh_;
+  const std::vector<Index>& soup_vertex_;
+  const MeshNaming& naming_;
+  double error_;
+  MeshFaults& faults_;
+  std::vector<Vec3> directions_, corners_;
+};
+
+}  // namespace
+
+void check_convexity(const ConvexMesh& mesh, const std::vector<Index>& soup_vertex,
+                     const MeshNaming& naming, double error, MeshFaults& faults) {
+  Checker checker(mesh, soup_vertex, naming, error, faults);
+  for (Index f = 0; f < mesh.facets().size(); ++f) checker.check_facet(f);
+  for (Index e = 0; e < mesh.edges().size(); ++e) checker.check_edge(e);
+  for (Index v = 0; v < mesh.vertices().size(); ++v) checker.check_vertex(v);
+}
+
+namespace {
+
+// The largest ball (c, r): the linear program "maximise r with n_i.c + r <= d_i for all facets", by
+// the dual simplex method (Lemke 1954). Its basis is four planes that a ball touches on all sides;
+// each round takes in the plane that is violated most and leaves out the one that then must go.
+class BallProgram {
+ public:
+  explicit BallProgram(const ConvexMesh& mesh) : mesh_(mesh) {
+    // A regular tetrahedron far outside, whose planes all must go.
+    const double a = 1 / std::sqrt(3.0), far = 10 * mesh.size();
+    basis_ = {Row{{a, a, a, 1}, far}, Row{{a, -a, -a, 1}, far}, Row{{-a, a, -a, 1}, far},
+              Row{{-a, -a, a, 1}, far}};
+    weight_.fill(0.25);
+  }
+
+  Ball solve() {
+    constexpr int kMostRounds = 100000, kBlandFrom = 1000;
+    const double rounding = 4 * std::numeric_limits<double>::epsilon() * mesh_.size();
+    for (int round = 0; round < kMostRounds; ++round) {
+      Matrix rows{};
+      std::array<double, 4> offsets{};
+      for (int i = 0; i < 4; ++i) {
+        rows[i] = basis_[i].a;
+        offsets[i] = basis_[i].d;
+      }
+      const std::array<double, 4> x = solved(rows, offsets);
+      const Vec3 centre(x[0], x[1], x[2]);
+      const std::size_t enters = violated(centre, x[3], rounding, round >= kBlandFrom);
+      if (enters == kNone || !exchange(row_of(enters)))
+        return {mesh_.centre() + centre, clearance(centre)};
+    }
+    return {mesh_.centre(), clearance(Vec3(0))};
+  }
+
+ private:
+  using Matrix = std::array<std::array<double, 4>, 4>;
+  struct Row {
+    std::array<double, 4> a;  // unit outward normal, 1
+    double d = 0;             // m, from the mesh's centre
+  };
+  static constexpr std::size_t kNone = static_cast<std::size_t>(-1);
+
+  Row row_of(std::size_t facet) const {
+    const Facet& f = mesh_.facets()[facet];
+    return {{f.normal.x, f.normal.y, f.normal.z, 1}, f.offset - glm::dot(f.normal, mesh_.centre())};
+  }
+
+  double room(const Facet& f, const Vec3& centre) const {
+    return f.offset - glm::dot(f.normal, mesh_.centre() + centre);
+  }
+
+  double clearance(const Vec3& centre) const {
+    double least = std::numeric_limits<double>::infinity();
+    for (const Facet& f : mesh_.facets()) least = std::min(least, room(f, centre));
+    return least;
+  }
+
+  /// The facet that the ball is through most, or (Bland 1977: then no basis comes again) the first.
+  std::size_t violated(const Vec3& centre, double radius, double rounding, bool first) const {
+    std::size_t worst = kNone;
+    double least = -rounding;
+    for (std::size_t i = 0; i < mesh_.facets().size(); ++i) {
+      const double left = room(mesh_.facets()[i], centre) - radius;
+      if (left >= least) continue;
+      least = left;
+      worst = i;
+      if (first) break;
+    }
+    return worst;
+  }
+
+  /// False: nothing may go, within rounding.
+  bool exchange(const Row& enters) {
+    Matrix columns{};
+    for (int r = 0; r < 4; ++r) {
+      for (int c = 0; c < 4; ++c) columns[r][c] = basis_[c].a[r];
+    }
+    const std::array<double, 4> share = solved(columns, enters.a);
+    int goes = -1;
+    double step = std::numeric_limits<double>::infinity();
+    for (int i = 0; i < 4; ++i) {
+      if (share[i] <= 1e-12) continue;
+      const double ratio = std::max(0.0, weight_[i]) / share[i];
+      if (goes >= 0 && (ratio > step || (ratio == step && share[i] <= share[goes]))) continue;
+      step = ratio;
+      goes = i;
+    }
+    if (goes < 0) return false;
+    for (int i = 0; i < 4; ++i) weight_[i] -= step * share[i];
+    weight_[goes] = step;
+    basis_[goes] = enters;
+    return true;
+  }
+
+  /// Gaussian elimination with partial pivoting.
+  static std::array<double, 4> solved(Matrix m, std::array<double, 4> b) {
+    for (int k = 0; k < 4; ++k) {
+      int pivot = k;
+      for (int r = k + 1; r < 4; ++r) {
+        if (std::abs(m[r][k]) > std::abs(m[pivot][k])) pivot = r;
+      }
+      std::swap(m[k], m[pivot]);
+      std::swap(b[k], b[pivot]);
+      for (int r = k + 1; r < 4; ++r) {
+        const double factor = m[r][k] / m[k][k];
+        for (int c = k; c < 4; ++c) m[r][c] -= factor * m[k][c];
+        b[r] -= factor * b[k];
+      }
+    }
+    for (int k = 3; k >= 0; --k) {
+      for (int c = k + 1; c < 4; ++c) b[k] -= m[k][c] * b[c];
+      b[k] /= m[k][k];
+    }
+    return b;
+  }
+
+  const ConvexMesh& mesh_;
+  std::array<Row, 4> basis_;
+  std::array<double, 4> weight_{};  // of the rows of the basis in the objective, r
+};
+
+}  // namespace
+
+Ball largest_inscribed_ball(const ConvexMesh& mesh) { return BallProgram(mesh).solve(); }
+
+PolygonExtent::PolygonExtent(const Vec3& side)
+    : along_(glm::normalize(side)), length_(glm::length(side)) {}
+
+void PolygonExtent::include(const Vec3& arm) {
+  const double t = glm::dot(arm, along_);
+  across_ = std::max(across_, glm::length(arm - t * along_));
+  overhang_ = std::max({overhang_, -t / length_, t / length_ - 1});
+}
+
+double plane_deviation(const Vec3& normal, const Vec3& normal_across, const Vec3& side,
+                       const PolygonExtent& extent, const PolygonExtent& extent_across,
+                       double error) {
+  const double sine = glm::dot(glm::cross(normal, normal_across), glm::normalize(side));
+  // Past a right angle the sine falls again, the deviation does not. At more than 60 degrees
+  // polygons are not coplanar, whatever the error.
+  const bool sharp = glm::dot(normal, normal_across) < 0.5;
+  const double near = extent.across(), far = extent_across.across();
+  const double moved = (sharp ? 1 : std::abs(sine)) * near * far / (near + far);
+  const double lever = 1 + std::max(extent.overhang(), extent_across.overhang());
+  double deviation = moved / (error * lever);
+  if (sharp) deviation = std::max(deviation, 2 * kCoplanar);
+  return std::copysign(deviation, sine);
 }
 
 }  // namespace palpate::stimuli

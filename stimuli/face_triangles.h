@@ -1,7 +1,8 @@
 #pragma once
-// A face of any number of corners as triangles.
+// Faces of any number of corners as triangles.
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -9,6 +10,31 @@
 #include "stimuli/vec.h"
 
 namespace palpate::stimuli {
+
+// Plane, area and diameter of a polygon.
+
+/// Of a plane polygon, counter-clockwise seen from outside.
+struct PolygonPlane {
+  Vec3 normal;          ///< unit, outward; zero for a polygon without area
+  Vec3 middle;          ///< m, mean of the corners
+  double area = 0;      ///< m^2
+  double diameter = 0;  ///< m, within a factor of two of the largest distance of two corners
+};
+
+/// As exact as the corners allow, also for polygons a million times longer than wide.
+PolygonPlane plane_of(std::span<const Vec3> corners);
+
+// Triangles without area in a closed surface.
+
+/// Takes triangles no higher than `tolerance` (m) out of a closed surface, which stays closed:
+/// where the shortest side is that short its ends become one, else the neighbour over the longest
+/// side is cut at the corner that lies on it. No other triangle turns over; what can only be done
+/// so is left. Triangles that are gone get the corners 0xffffffff; `across` holds until the end.
+/// \return how many were taken out
+std::size_t collapse_flat_triangles(const std::vector<Vec3>& points,
+                                    std::vector<std::array<std::uint32_t, 3>>& triangles,
+                                    std::vector<std::array<std::uint32_t, 3>>& across,
+                                    double tolerance);
 
 /// Triangles with the numbers of the corners, turned as the face is: together they have its sides,
 /// each once, and no others at their rim. The face may be concave, bent, or visit a place twice (a

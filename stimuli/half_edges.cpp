@@ -8,8 +8,7 @@
 #include <limits>
 #include <numeric>
 
-#include "stimuli/pair_map.h"
-#include "stimuli/weld.h"
+#include "stimuli/closed_surface.h"
 
 namespace palpate::stimuli {
 namespace {

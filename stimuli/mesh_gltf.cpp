@@ -1,9 +1,8 @@
-// glTF 2.0 (Khronos 2021; .gltf and .glb): triangles of the default scene's nodes, each primitive a
-// group. Materials, skins and animations do not describe the solid.
-
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <cstdio>
 #include <glm/common.hpp>
@@ -11,14 +10,377 @@
 #include <glm/mat4x4.hpp>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
 
 #include "data/base/json_text.h"
-#include "stimuli/base64.h"
-#include "stimuli/mesh_gltf_accessors.h"
-#include "stimuli/mesh_gltf_document.h"
-#include "stimuli/mesh_text.h"
+#include "stimuli/input_file.h"
+#include "stimuli/mesh_formats.h"
+#include "stimuli/text.h"
+#include "stimuli/vec.h"
 
 namespace palpate::stimuli {
+
+// A glTF document: its JSON, of which every value knows its place, and the data of a .glb.
+
+/// What reading gives up with.
+struct GltfRefused {
+  std::string place;  ///< a JSON pointer, a line or a byte; empty: the file
+  std::string expected, found;
+};
+
+/// A value of the document, or none, and its place. All that is read of it is checked:
+/// GltfRefused says what was expected there and what was found.
+class GltfValue {
+ public:
+  /// \param value  nullptr: none; not owned
+  GltfValue(const nlohmann::json* value, std::string place)
+      : value_(value), place_(std::move(place)) {}
+
+  const std::string& place() const { return place_; }
+  bool present() const { return value_ != nullptr; }
+  [[noreturn]] void refuse(const std::string& expected) const;
+
+  GltfValue member(const char* key) const;       ///< of an object; none where it has no such key
+  GltfValue element(std::size_t index) const;    ///< of a list; must be there
+  std::size_t size() const;                      ///< of a list; none: 0
+  std::string text(const char* expected) const;  ///< \param expected  "a name"
+  double number() const;                         ///< finite
+  double number_or(double otherwise) const { return present() ? number() : otherwise; }
+  /// A whole number from 0 to 2^53, also written as 3.0.
+  /// \param expected  "a number of bytes"
+  std::size_t whole(const std::string& expected) const;
+  std::size_t whole_or(std::size_t otherwise, const std::string& expected) const {
+    return present() ? whole(expected) : otherwise;
+  }
+  /// The number of one of `count` things. \param kind  "mesh"
+  std::size_t number_of(const char* kind, std::size_t count) const;
+  void require_numbers(std::size_t count) const;  ///< a list of so many numbers
+
+ private:
+  std::optional<std::size_t> as_whole() const;
+  const nlohmann::json* value_;
+  std::string place_;
+};
+
+class GltfDocument {
+ public:
+  /// \param bytes  of a .gltf or .glb; must live as long as the document \throws GltfRefused
+  explicit GltfDocument(std::string_view bytes);
+
+  GltfValue root() const { return {&root_, ""}; }
+  GltfValue list(const char* name) const { return root().member(name); }
+  /// What a value names by its number. \param kind  of the list's entries, "mesh"
+  GltfValue named_by(const GltfValue& number, const char* list_name, const char* kind) const;
+  /// The data chunk of a .glb.
+  const std::optional<std::string_view>& binary() const { return binary_; }
+
+ private:
+  std::string_view take_chunks(std::string_view bytes);
+
+  std::optional<std::string_view> binary_;
+  nlohmann::json root_;
+};
+
+// The data of a glTF document: buffers, and what accessors read of them.
+
+/// \throws GltfRefused, all of it.
+class GltfAccessors {
+ public:
+  explicit GltfAccessors(const GltfDocument& document);
+
+  /// How many values an accessor has. \param number  the value that names the accessor
+  std::size_t count(const GltfValue& number) const;
+  /// m, as they stand: single precision, glTF's axes.
+  std::vector<Vec3> positions(const GltfValue& number) const;
+  /// Numbers of vertices. \param vertices  how many there are; all are below it
+  std::vector<std::uint32_t> indices(const GltfValue& number, std::size_t vertices) const;
+
+ private:
+  struct Values {
+    std::string_view data;
+    std::size_t count, stride;
+  };
+  GltfValue accessor(const GltfValue& number) const;
+  Values values(const GltfValue& accessor, std::size_t bytes_each) const;
+  std::string_view view_of(const GltfValue& accessor, std::size_t bytes_each,
+                           std::size_t& stride) const;
+
+  const GltfDocument& document_;
+  std::vector<std::string> buffers_;
+};
+
+namespace {
+
+using nlohmann::json;
+
+constexpr std::uint32_t kMagic = 0x46546C67, kJsonChunk = 0x4E4F534A, kBinaryChunk = 0x004E4942;
+constexpr std::size_t kFileHeader = 12, kChunkFileHeader = 8;
+
+std::string byte_place(std::size_t at) { return "byte " + std::to_string(at); }
+
+// At most so much of what was found is shown.
+constexpr std::size_t kShownBytes = 60;
+
+std::string found_text(const json* value) {
+  if (value == nullptr) return "nothing";
+  if (value->is_object()) return "an object";
+  if (value->is_array()) return "a list of " + std::to_string(value->size());
+  return printable(value->dump(), kShownBytes);
+}
+
+json parsed(std::string_view text) {
+  try {
+    return data::read_json(text);
+  } catch (const data::JsonError& error) {
+    if (!error.byte) throw GltfRefused{"", error.expected, error.found};
+    const std::size_t at = *error.byte;
+    const auto line =
+        1 + std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(at), '\n');
+    std::size_t begin = text.substr(0, at).find_last_of('\n') + 1;  // 0 where there is none
+    if (at - begin > 20) begin = at - 20;
+    const std::string rest(text.substr(begin, std::min(text.find('\n', at), text.size()) - begin));
+    throw GltfRefused{"line " + std::to_string(line), "JSON (glTF 2.0)",
+                      at >= text.size() ? std::string("the end of the text")
+                                        : "\"" + printable(rest, kShownBytes) + "\""};
+  }
+}
+
+}  // namespace
+
+void GltfValue::refuse(const std::string& expected) const {
+  throw GltfRefused{place_, expected, found_text(value_)};
+}
+
+GltfValue GltfValue::member(const char* key) const {
+  if (!present() || !value_->is_object()) refuse("an object");
+  const auto at = value_->find(key);
+  return {at == value_->end() ? nullptr : &*at, place_ + "/" + key};
+}
+
+GltfValue GltfValue::element(std::size_t index) const {
+  if (index >= size()) refuse("a list of at least " + std::to_string(index + 1));
+  return {&(*value_)[index], place_ + "/" + std::to_string(index)};
+}
+
+std::size_t GltfValue::size() const {
+  if (present() && !value_->is_array()) refuse("a list");
+  return present() ? value_->size() : 0;
+}
+
+std::string GltfValue::text(const char* expected) const {
+  if (!present() || !value_->is_string()) refuse(expected);
+  return value_->get<std::string>();
+}
+
+double GltfValue::number() const {
+  if (!present() || !value_->is_number()) refuse("a number");
+  return value_->get<double>();
+}
+
+std::optional<std::size_t> GltfValue::as_whole() const {
+  if (!present() || !value_->is_number()) return std::nullopt;
+  const double value = value_->get<double>();
+  if (!(value >= 0 && value <= 0x1p53) || value != std::floor(value)) return std::nullopt;
+  return static_cast<std::size_t>(value);
+}
+
+std::size_t GltfValue::whole(const std::string& expected) const {
+  const std::optional<std::size_t> value = as_whole();
+  if (!value) refuse(expected);
+  return *value;
+}
+
+std::size_t GltfValue::number_of(const char* kind, std::size_t count) const {
+  const bool vowel = std::string_view("aeiou").find(kind[0]) != std::string_view::npos;
+  const std::string named = std::string("the number of a") + (vowel ? "n " : " ") + kind;
+  const std::optional<std::size_t> value = as_whole();
+  if (value && *value < count) return *value;
+  refuse(count == 0 ? named + ", of which there are none"
+                    : named + " from 0 to " + std::to_string(count - 1));
+}
+
+void GltfValue::require_numbers(std::size_t count) const {
+  if (!present() || !value_->is_array() || value_->size() != count)
+    refuse("a list of " + std::to_string(count) + " numbers");
+  for (std::size_t i = 0; i < count; ++i) element(i).number();
+}
+
+GltfDocument::GltfDocument(std::string_view bytes) : root_(parsed(take_chunks(bytes))) {
+  if (!root_.is_object()) root().refuse("a JSON object");
+  const GltfValue version = root().member("asset");
+  if (!version.present()) version.refuse("an object with the version of glTF");
+  if (!version.member("version").text("\"2.0\"").starts_with("2."))
+    version.member("version").refuse("\"2.0\"");
+  const GltfValue extensions = list("extensionsRequired");
+  if (extensions.size() > 0)
+    extensions.element(0).refuse("a file that needs no extension (export without compression)");
+}
+
+GltfValue GltfDocument::named_by(const GltfValue& number, const char* list_name,
+                                 const char* kind) const {
+  const GltfValue all = list(list_name);
+  return all.element(number.number_of(kind, all.size()));
+}
+
+// A .glb is a header and chunks; a .gltf is its JSON alone.
+std::string_view GltfDocument::take_chunks(std::string_view bytes) {
+  if (bytes.size() < 4 || little_endian(bytes, 0) != kMagic) return bytes;
+  const std::string size = std::to_string(bytes.size()) + " bytes";
+  if (bytes.size() < kFileHeader + kChunkFileHeader)
+    throw GltfRefused{byte_place(0), "the headers of a .glb, 20 bytes", size};
+  if (little_endian(bytes, 4) != 2)
+    throw GltfRefused{byte_place(4), "glTF version 2", std::to_string(little_endian(bytes, 4))};
+  if (little_endian(bytes, 8) != bytes.size()) {
+    throw GltfRefused{byte_place(8),
+                      "a file of " + std::to_string(little_endian(bytes, 8)) + " bytes", size};
+  }
+  std::optional<std::string_view> text;
+  for (std::size_t at = kFileHeader; at < bytes.size();) {
+    const std::size_t left = bytes.size() - at;
+    if (left < kChunkFileHeader)
+      throw GltfRefused{byte_place(at), "the header of a chunk, 8 bytes",
+                        std::to_string(left) + " bytes"};
+    const std::size_t length = little_endian(bytes, at), kind = little_endian(bytes, at + 4);
+    if (length > left - kChunkFileHeader) {
+      throw GltfRefused{byte_place(at), "a chunk of " + std::to_string(length) + " bytes",
+                        std::to_string(left - kChunkFileHeader) + " bytes"};
+    }
+    const std::string_view chunk = bytes.substr(at + kChunkFileHeader, length);
+    if (!text && kind != kJsonChunk)
+      throw GltfRefused{byte_place(at + 4), "the chunk of JSON first", "another"};
+    if (!text) text = chunk;
+    if (kind == kBinaryChunk && !binary_) binary_ = chunk;
+    at += kChunkFileHeader + length;
+  }
+  return *text;
+}
+
+namespace {
+
+constexpr std::size_t kByte = 5121, kShort = 5123, kInt = 5125, kFloat = 5126;  // componentType
+constexpr const char* kBytes = "a number of bytes";
+
+std::string of_uri(const GltfValue& uri) {
+  const std::string text = uri.text("a text");
+  const std::size_t comma = text.find(";base64,");
+  // Files that a .gltf names were put into it when it was read (with_buffers).
+  if (!text.starts_with("data:") || comma == std::string::npos)
+    uri.refuse("data in base64 (a .glb has no other files)");
+  std::optional<std::string> data = base64_decoded(std::string_view(text).substr(comma + 8));
+  if (!data) uri.refuse("data in base64");
+  return std::move(*data);
+}
+
+}  // namespace
+
+GltfAccessors::GltfAccessors(const GltfDocument& document) : document_(document) {
+  const GltfValue list = document.list("buffers");
+  for (std::size_t i = 0; i < list.size(); ++i) {
+    const GltfValue buffer = list.element(i), uri = buffer.member("uri");
+    if (!uri.present() && (i > 0 || !document.binary())) uri.refuse("where its data are");
+    buffers_.push_back(uri.present() ? of_uri(uri) : std::string(*document.binary()));
+    const GltfValue length = buffer.member("byteLength");
+    if (length.whole(kBytes) > buffers_.back().size()) {
+      throw GltfRefused{length.place(), std::to_string(length.whole(kBytes)) + " bytes of data",
+                        std::to_string(buffers_.back().size())};
+    }
+  }
+}
+
+GltfValue GltfAccessors::accessor(const GltfValue& number) const {
+  return document_.named_by(number, "accessors", "accessor");
+}
+
+std::size_t GltfAccessors::count(const GltfValue& number) const {
+  return accessor(number).member("count").whole("a number of values");
+}
+
+std::string_view GltfAccessors::view_of(const GltfValue& accessor, std::size_t bytes_each,
+                                        std::size_t& stride) const {
+  if (accessor.member("sparse").present())
+    accessor.member("sparse").refuse("none (export without sparse accessors)");
+  const GltfValue view =
+      document_.named_by(accessor.member("bufferView"), "bufferViews", "bufferView");
+  const GltfValue step = view.member("byteStride"), length = view.member("byteLength");
+  stride = step.whole_or(bytes_each, kBytes);
+  if (stride < bytes_each || stride > 252)
+    step.refuse(std::to_string(bytes_each) + " to 252 bytes from one value to the next");
+  const std::string_view buffer =
+      buffers_[view.member("buffer").number_of("buffer", buffers_.size())];
+  const std::size_t start = view.member("byteOffset").whole_or(0, kBytes);
+  if (start > buffer.size() || length.whole(kBytes) > buffer.size() - start) {
+    throw GltfRefused{
+        view.place(), "at most the " + std::to_string(buffer.size()) + " bytes of its buffer",
+        std::to_string(length.whole(kBytes)) + " bytes from byte " + std::to_string(start)};
+  }
+  return buffer.substr(start, length.whole(kBytes));
+}
+
+GltfAccessors::Values GltfAccessors::values(const GltfValue& accessor,
+                                            std::size_t bytes_each) const {
+  Values all{};
+  const std::string_view view = view_of(accessor, bytes_each, all.stride);
+  const std::size_t offset = accessor.member("byteOffset").whole_or(0, kBytes);
+  all.count = accessor.member("count").whole("a number of values");
+  if (all.count == 0) accessor.member("count").refuse("one value or more");
+  const std::size_t room = offset <= view.size() ? view.size() - offset : 0;
+  if (room < bytes_each || (all.count - 1) > (room - bytes_each) / all.stride) {
+    throw GltfRefused{accessor.place(),
+                      "room for " + std::to_string(all.count) + " values of " +
+                          std::to_string(bytes_each) + " bytes in its bufferView",
+                      std::to_string(room) + " bytes"};
+  }
+  all.data = view.substr(offset);
+  return all;
+}
+
+std::vector<Vec3> GltfAccessors::positions(const GltfValue& number) const {
+  const GltfValue source = accessor(number);
+  const GltfValue type = source.member("type"), component = source.member("componentType");
+  if (type.text("\"VEC3\"") != "VEC3") type.refuse("\"VEC3\"");
+  if (component.whole("5126") != kFloat) component.refuse("5126 (positions in single precision)");
+  const Values all = values(source, 12);
+  std::vector<Vec3> positions(all.count);
+  for (std::size_t i = 0; i < all.count; ++i) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const auto value = std::bit_cast<float>(little_endian(all.data, i * all.stride + 4 * axis));
+      if (!std::isfinite(value)) {
+        throw GltfRefused{source.place(), "finite coordinates",
+                          "infinity or no number at vertex " + std::to_string(i)};
+      }
+      positions[i][static_cast<int>(axis)] = value;
+    }
+  }
+  return positions;
+}
+
+std::vector<std::uint32_t> GltfAccessors::indices(const GltfValue& number,
+                                                  std::size_t vertices) const {
+  const GltfValue source = accessor(number);
+  const GltfValue type = source.member("type"), component = source.member("componentType");
+  if (type.text("\"SCALAR\"") != "SCALAR") type.refuse("\"SCALAR\"");
+  const std::string kinds = "5121, 5123 or 5125 (unsigned indices)";
+  const std::size_t kind = component.whole(kinds);
+  const std::size_t size = kind == kByte ? 1 : kind == kShort ? 2 : kind == kInt ? 4 : 0;
+  if (size == 0) component.refuse(kinds);
+  const Values all = values(source, size);
+  std::vector<std::uint32_t> corners(all.count);
+  for (std::size_t i = 0; i < all.count; ++i) {
+    corners[i] = little_endian(all.data, i * all.stride, size);
+    if (corners[i] < vertices) continue;
+    throw GltfRefused{source.place(),
+                      "numbers of vertices from 0 to " + std::to_string(vertices - 1),
+                      std::to_string(corners[i]) + " as number " + std::to_string(i)};
+  }
+  return corners;
+}
+
+// glTF 2.0 (Khronos 2021; .gltf and .glb): triangles of the default scene's nodes, each primitive a
+// group. Materials, skins and animations do not describe the solid.
+
 namespace {
 
 using Matrix = glm::dmat4;

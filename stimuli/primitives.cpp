@@ -7,8 +7,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "stimuli/half_edges.h"
 #include "stimuli/mesh_file.h"
-#include "stimuli/pair_map.h"
 
 namespace palpate::stimuli {
 namespace {

@@ -3,7 +3,7 @@
 // vertex k of a rim stands at the angle 2 pi k / segments from +x. SI units.
 
 #include "stimuli/convex_mesh.h"
-#include "stimuli/object_spec.h"
+#include "stimuli/shapes.h"
 
 namespace palpate::stimuli {
 

@@ -5,11 +5,91 @@
 
 #include <array>
 #include <cstddef>
+#include <memory>
+#include <optional>
 #include <stdexcept>
+#include <string>
+#include <vector>
 
-#include "stimuli/object_spec.h"
+#include "stimuli/vec.h"
 
 namespace palpate::stimuli {
+
+// An object as a scene file or protocol describes it, as plain values (the keys:
+// protocols/scene.schema.json). SI units.
+
+enum class ShapeKind { sphere, cone, cylinder, cube, box, mesh, compound };
+
+/// A layer of an object: its surface moved inwards, felt beside the surface.
+struct Layer {
+  double depth = 0;      ///< m, by which each plane of the surface is moved inwards
+  double stiffness = 0;  ///< N/m
+  double damping = 0;    ///< N s/m
+  std::optional<double> break_force =
+      std::nullopt;  ///< N; a greater force makes the layer give way
+};
+
+/// Mechanical properties of an object. What is 0 or empty is left out of the tick.
+struct Material {
+  double stiffness = 800;       ///< N/m, along the contact normal, from the surface on
+  double damping = 0;           ///< N s/m, along the contact normal
+  double friction_static = 0;   ///< Coulomb's coefficient while the contact sticks; >= dynamic
+  double friction_dynamic = 0;  ///< while it slides
+  std::vector<Layer> layers;    ///< of other stiffness under the surface, by increasing depth
+
+  bool has_friction() const { return friction_static > 0; }
+  bool plain_spring() const { return damping == 0 && !has_friction() && layers.empty(); }
+};
+
+/// What makes an object give.
+struct Soft {
+  enum class Fixed {
+    base,    ///< the lowest nodes, local frame, at least three; of a sphere a tenth of its height
+    none,    ///< it moves freely
+    points,  ///< the node nearest to each of `points`
+  };
+  double young = 20000;   ///< Pa
+  double poisson = 0.45;  ///< 0 to 0.495
+  double density = 1000;  ///< kg/m^3
+  double damping = 0.01;  ///< s; stress by rate of strain over stress by strain
+  Fixed fixed = Fixed::base;
+  std::vector<Vec3> points;  ///< m, local frame
+  int resolution = 10;       ///< elements along the longest side
+};
+
+/// What makes an object move by itself.
+struct Body {
+  std::optional<double> mass = std::nullopt;     ///< kg; or
+  std::optional<double> density = std::nullopt;  ///< kg/m^3
+  Vec3 velocity{0, 0, 0};                        ///< m/s, of the centre of mass, at first
+  Vec3 spin{0, 0, 0};                            ///< rad/s, at first
+  double damping = 0;                            ///< 1/s, of velocity and spin
+  double restitution = 0.5;  ///< of speed along the normal, in collisions with objects
+  double friction = 0.3;     ///< Coulomb's coefficient, against objects; the probe's: Material
+};
+
+/// Local frames: sphere, cube, box and cylinder centred, cylinder axis +z; cone axis +z, apex at
+/// +height/2, base at -height/2.
+struct ObjectSpec {
+  ShapeKind shape = ShapeKind::sphere;
+  double radius = 0.03;   ///< m; sphere, cone, cylinder
+  double height = 0.06;   ///< m; cone, cylinder
+  double edge = 0.06;     ///< m; cube
+  Vec3 size{0.06};        ///< m; box, its three edges
+  int subdivisions = 4;   ///< sphere: an icosphere of 20 * 4^subdivisions triangles
+  int segments = 64;      ///< cone, cylinder: corners of the rim
+  std::string file_name;  ///< mesh: as the scene or protocol names its file
+  std::string file;       ///< mesh: resolved path of a file that mesh_file.h reads
+  /// mesh: paths of all that was read from the disk for it, a .gltf's buffers among them.
+  std::vector<std::string> files_read;
+  /// mesh: what the file held when it was named; nullptr: to be read from the disk.
+  std::shared_ptr<const std::string> file_bytes;
+  std::vector<ObjectSpec> parts;  ///< compound: placed relative to the compound
+  Pose pose;
+  Material material;
+  std::optional<Body> body = std::nullopt;  ///< it moves; else it stands still
+  std::optional<Soft> soft = std::nullopt;  ///< it gives; else it is rigid
+};
 
 struct ShapeTraits {
   const char* name;                                   ///< in files
@@ -64,5 +144,13 @@ inline constexpr auto kShapes = [] {
   for (std::size_t i = 0; i < all.size(); ++i) all[i] = static_cast<ShapeKind>(i);
   return all;
 }();
+
+// Poses within poses.
+
+/// The pose in the frame of `outer` of what has the pose `inner` in its own.
+inline Pose compose(const Pose& outer, const Pose& inner) {
+  return {outer.orientation * inner.position + outer.position,
+          outer.orientation * inner.orientation};
+}
 
 }  // namespace palpate::stimuli

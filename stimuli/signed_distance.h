@@ -3,7 +3,7 @@
 // Local frame, SI units.
 
 #include "stimuli/convex_mesh.h"
-#include "stimuli/object_spec.h"
+#include "stimuli/shapes.h"
 
 namespace palpate::stimuli {
 

@@ -11,7 +11,7 @@
 #include <optional>
 #include <utility>
 
-#include "stimuli/mesh_faults.h"
+#include "stimuli/mesh_names.h"
 
 namespace palpate::stimuli {
 namespace {

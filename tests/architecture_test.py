@@ -83,45 +83,62 @@ def room_of(name):
 
 # The headers of a room that other rooms use; all others are the room's own business (and that of the rooms within).
 PUBLIC = {
-    "stimuli": "base64 closed_surface compose convex_mesh edit_distance grid_hull input_file inset large_array likely_mistakes mesh_file object_spec orientation parts/convex_parts parts/inset_parts parts/overlaps parts/triangulate signed_distance "
-               "primitives printable random shapes solids/gmsh_file solids/solid_mesh vec",
+    "stimuli": "text closed_surface shapes convex_mesh grid_hull input_file inset large_array "
+               "mesh_file orientation parts/convex_parts parts/inset_parts parts/overlaps "
+               "parts/facets signed_distance primitives random solids/gmsh_file solids/solid_mesh "
+               "vec",
     "rendering": "first_contact motion probe reach render_fault renderer scene tool tool_pose",
     "rendering/bodies": "moving_scene",
-    "rendering/verification": "explain extreme_cases random_draws random_solids reference search union_cases union_search",
+    "rendering/verification": "explain extreme_cases random_draws random_solids reference search "
+                              "union_cases union_search",
     "rendering/accuracy": "body_study paper_first_contact peers soft_study study union_study",
     "rendering/bodies/soft": "soft_build soft_coupling soft_scene",
-    "protocols": "answer_keys difference event_codes json_document object_reader parse protocol schedule sha256 sweep_space tasks/block_procedures tasks/levels tasks/task_plan tasks/texts tasks/typical_participant",
-    "protocols/procedures": "procedure procedure_spec psychometric psychometric_names recovery track_seed",
+    "protocols": "answer_keys difference event_codes json_document object_reader parse protocol "
+                 "schedule sha256 sweep_space tasks/block_procedures tasks/levels tasks/task_plan "
+                 "tasks/texts tasks/typical_participant",
+    "protocols/procedures": "procedure procedure_spec psychometric psychometric_names recovery "
+                            "track_seed",
     "data/base": "json_text",
     "data": "column_table record sweep_record",
-    "data/files": "atomic_file atomic_folder checksum file_identity file_permissions formula_guard output_check "
-                  "temporary_names text_sink trusted_links utc",
-    "data/store": "export_log protocol_rows schema sqlite_errors statement_values station_database store sweep_file tombstones torque_notes",
+    "data/files": "atomic_file atomic_folder checksum file_identity file_permissions formula_guard "
+                  "output_check temporary_names text_sink trusted_links utc",
+    "data/store": "export_log protocol_rows schema sqlite_errors statement_values station_database "
+                  "store sweep_file tombstones torque_notes",
     "data/export": "bids csv psychds sample_slots settings study_about sweep_csv trial_table",
     "data/merge": "merge sweep_merge",
     "analysis": "text",
     "analysis/input": "csv_reader renderers study_record sweep_table task_trials trials",
-    "analysis/statistics": "analysis comparison conclusions describe interval_coverage mixed_model model_study paired paper_effects pattern pilot plan power quantiles sensitivity sweep_analysis task_analysis threshold_plan",
+    "analysis/statistics": "analysis comparison conclusions describe interval_coverage mixed_model "
+                           "model_study paired paper_effects pattern pilot plan power quantiles "
+                           "sensitivity sweep_analysis task_analysis threshold_plan",
     "analysis/movement": "adjusted_gain comparison measures pictures",
-    "analysis/figures": "axes figure_svg figures marks movement_figures palette sweep_figures task_figures",
-    "analysis/report": "html_elements html_page hypotheses movement_report plan_report report_html report_json report_text sweep_report tables task_report",
+    "analysis/figures": "axes figure_svg figures marks movement_figures palette sweep_figures "
+                        "task_figures",
+    "analysis/report": "html_elements html_page hypotheses movement_report plan_report report_html "
+                       "report_json report_text sweep_report tables task_report",
     "runner": "",
-    "runner/servo": "device device_config force_limiter passivity realtime ring sample servo servo_fault servo_thread shared_value "
-                    "tick_clock tick_source touched_places triple_buffer",
+    "runner/servo": "device device_config force_limiter passivity realtime ring sample servo "
+                    "servo_fault servo_thread shared_value tick_clock tick_source touched_places "
+                    "triple_buffer",
     "runner/safety": "fault_signals fault_table guarded_device",
     "runner/sound": "masking_noise",
     "runner/devices": "mouse registry replay self_test simulated",
     "runner/devices/falcon": "calibration homing open registration stylus_from_ends weighing",
     "runner/display": "display explore_window mailbox text_display timeline touch_source window",
-    "runner/display/scene": "camera display_error drawn_mesh image_file painter scene_drawing scene_renderer",
-    "runner/participants": "keyboard respondent response_box settings_document simulated simulated_settings task_participant",
-    "runner/session": "clock_check contact_log device_check level_scenes live_forces live_session markers near_codes preflight_dialogue protocol_info recorded_trial "
-                      "replay replay_comparison sample_stream session session_end session_plan simulated_session simulated_study socket_advisor station",
+    "runner/display/scene": "camera display_error drawn_mesh image_file painter scene_drawing "
+                            "scene_renderer",
+    "runner/participants": "keyboard respondent response_box settings_document simulated "
+                           "simulated_settings task_participant",
+    "runner/session": "clock_check contact_log device_check level_scenes live_forces live_session "
+                      "markers near_codes preflight_dialogue protocol_info recorded_trial replay "
+                      "replay_comparison sample_stream session session_end session_plan "
+                      "simulated_session simulated_study socket_advisor station",
     "runner/serve": "network served_scene served_session",
     "runner/sweep": "design swept_study",
     "runner/stability": "boundary integrators soft_map",
     "runner/bench": "servo_timing tick_cost",
-    "runner/commands": "render/forces render/trajectory_csv shared/command shared/schedule_rows shared/simulation",
+    "runner/commands": "render/forces render/trajectory_csv shared/command shared/schedule_rows "
+                       "shared/simulation",
 }
 
 

@@ -3,8 +3,7 @@
 #include <algorithm>
 #include <cstddef>
 
-#include "stimuli/edit_distance.h"
-#include "stimuli/printable.h"
+#include "stimuli/text.h"
 
 namespace palpate::analysis {
 namespace {

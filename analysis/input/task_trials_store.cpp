@@ -9,7 +9,7 @@
 #include "data/store/store.h"
 #include "data/store/torque_notes.h"
 #include "protocols/parse.h"
-#include "stimuli/printable.h"
+#include "stimuli/text.h"
 
 namespace palpate::analysis {
 namespace {

@@ -1,7 +1,7 @@
 #include "analysis/input/torque_counts.h"
 
 #include "analysis/text.h"
-#include "stimuli/printable.h"
+#include "stimuli/text.h"
 
 namespace palpate::analysis {
 

@@ -3,7 +3,7 @@
 #include <utility>
 
 #include "analysis/statistics/pattern_tree.h"
-#include "stimuli/edit_distance.h"
+#include "stimuli/text.h"
 
 namespace palpate::analysis {
 

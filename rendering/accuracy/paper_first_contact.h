@@ -6,7 +6,7 @@
 
 #include "rendering/probe.h"
 #include "stimuli/convex_mesh.h"
-#include "stimuli/object_spec.h"
+#include "stimuli/shapes.h"
 
 namespace palpate::rendering {
 

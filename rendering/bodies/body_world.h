@@ -9,7 +9,7 @@
 #include "rendering/bodies/complementarity.h"
 #include "rendering/bodies/convex_gap.h"
 #include "rendering/bodies/rigid_motion.h"
-#include "stimuli/object_spec.h"
+#include "stimuli/shapes.h"
 
 namespace palpate::rendering {
 

@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "rendering/bodies/moving_bodies.h"
-#include "stimuli/compose.h"
+#include "stimuli/shapes.h"
 
 namespace palpate::rendering {
 namespace {

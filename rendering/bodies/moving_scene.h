@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "rendering/scene.h"
-#include "stimuli/object_spec.h"
+#include "stimuli/shapes.h"
 
 namespace palpate::rendering {
 

@@ -8,7 +8,7 @@
 #include "data/store/store.h"
 #include "runner/commands/shared/ask.h"
 #include "runner/commands/shared/command.h"
-#include "stimuli/printable.h"
+#include "stimuli/text.h"
 
 namespace palpate::runner {
 namespace {

@@ -24,7 +24,7 @@
 #include "runner/commands/shared/stop_signal.h"
 #include "runner/commands/shared/study_options.h"
 #include "runner/session/simulated_study.h"
-#include "stimuli/printable.h"
+#include "stimuli/text.h"
 
 namespace palpate::runner {
 namespace {

@@ -18,7 +18,7 @@
 #include "stimuli/parts/convex_parts.h"
 #include "stimuli/parts/overlaps.h"
 #include "stimuli/primitives.h"
-#include "stimuli/printable.h"
+#include "stimuli/text.h"
 
 namespace palpate::runner {
 namespace {

@@ -11,7 +11,7 @@
 
 #include "rendering/tool.h"
 #include "runner/servo/servo.h"
-#include "stimuli/object_spec.h"
+#include "stimuli/shapes.h"
 
 namespace palpate::runner {
 

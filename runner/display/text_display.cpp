@@ -14,7 +14,7 @@
 #include "runner/display/terminal.h"
 #include "runner/display/text_input.h"
 #include "runner/display/text_screens.h"
-#include "stimuli/printable.h"
+#include "stimuli/text.h"
 
 namespace palpate::runner {
 namespace {

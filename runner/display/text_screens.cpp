@@ -4,7 +4,7 @@
 #include <utility>
 
 #include "runner/display/text_input.h"
-#include "stimuli/printable.h"
+#include "stimuli/text.h"
 
 namespace palpate::runner {
 namespace {

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "runner/display/scene/scene_drawing.h"
-#include "stimuli/object_spec.h"
+#include "stimuli/shapes.h"
 
 namespace palpate::runner {
 

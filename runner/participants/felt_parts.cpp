@@ -5,10 +5,10 @@
 #include <utility>
 
 #include "stimuli/closed_surface.h"
-#include "stimuli/compose.h"
 #include "stimuli/parts/convex_parts.h"
 #include "stimuli/parts/inset_parts.h"
 #include "stimuli/primitives.h"
+#include "stimuli/shapes.h"
 
 namespace palpate::runner {
 namespace {

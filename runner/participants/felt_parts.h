@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "runner/participants/distance_field.h"
-#include "stimuli/object_spec.h"
+#include "stimuli/shapes.h"
 
 namespace palpate::runner {
 

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "runner/participants/distance_field.h"
-#include "stimuli/object_spec.h"
+#include "stimuli/shapes.h"
 #include "stimuli/vec.h"
 
 namespace palpate::runner {

@@ -6,7 +6,7 @@
 
 #include "runner/participants/shape_lines.h"
 #include "runner/participants/solid_line.h"
-#include "stimuli/object_spec.h"
+#include "stimuli/shapes.h"
 
 namespace palpate::runner {
 

@@ -21,7 +21,7 @@
 #include "runner/python/arrays.h"
 #include "runner/session/simulated_session.h"
 #include "stimuli/convex_mesh.h"
-#include "stimuli/printable.h"
+#include "stimuli/text.h"
 
 namespace palpate::runner {
 namespace {

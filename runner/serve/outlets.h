@@ -11,7 +11,7 @@
 #include "runner/serve/messages.h"
 #include "runner/servo/ring.h"
 #include "runner/servo/sample.h"
-#include "stimuli/object_spec.h"
+#include "stimuli/shapes.h"
 
 namespace palpate::runner {
 

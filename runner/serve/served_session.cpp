@@ -8,7 +8,7 @@
 
 #include "runner/safety/fault_table.h"
 #include "runner/session/level_scenes.h"
-#include "stimuli/compose.h"
+#include "stimuli/shapes.h"
 
 namespace palpate::runner {
 namespace {

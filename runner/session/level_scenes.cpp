@@ -4,7 +4,7 @@
 #include <utility>
 
 #include "protocols/tasks/levels.h"
-#include "stimuli/compose.h"
+#include "stimuli/shapes.h"
 
 namespace palpate::runner {
 namespace {

@@ -10,7 +10,7 @@
 #include "runner/servo/servo.h"
 #include "runner/session/body_record.h"
 #include "runner/session/level_scenes.h"
-#include "stimuli/compose.h"
+#include "stimuli/shapes.h"
 
 namespace palpate::runner {
 namespace {

@@ -10,7 +10,7 @@
 #include "data/record.h"
 #include "protocols/protocol.h"
 #include "runner/servo/sample.h"
-#include "stimuli/object_spec.h"
+#include "stimuli/shapes.h"
 
 namespace palpate::runner {
 

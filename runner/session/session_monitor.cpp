@@ -7,7 +7,7 @@
 
 #include "protocols/tasks/levels.h"
 #include "runner/session/level_scenes.h"
-#include "stimuli/compose.h"
+#include "stimuli/shapes.h"
 
 namespace palpate::runner {
 namespace {

@@ -17,7 +17,7 @@
 #include "data/base/json_text.h"
 #include "protocols/tasks/levels.h"
 #include "protocols/tasks/task_plan.h"
-#include "stimuli/printable.h"
+#include "stimuli/text.h"
 
 namespace palpate::runner {
 namespace {

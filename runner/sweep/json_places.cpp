@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <charconv>
 
-#include "stimuli/edit_distance.h"
+#include "stimuli/text.h"
 
 namespace palpate::runner {
 namespace {

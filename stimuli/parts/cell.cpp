@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <numbers>
 #include <utility>
 
 namespace palpate::stimuli {
@@ -178,6 +179,44 @@ CutCell cut(Cell&& cell, std::uint32_t plane, const PlaneTable& planes) {
   }
   cutter.divide(cell.surface, halves.below.surface, halves.above.surface, false);
   return halves;
+}
+
+PlaneSide PlaneTable::number(const Plane& plane, std::span<const Vec3> points) {
+  // Small polygons fit many planes within the tolerance: those are told apart by their normals.
+  constexpr double kSameDirection = 0.99;
+  for (std::uint32_t i = 0; i < size(); ++i) {
+    const double turned = glm::dot(planes_[i].normal, plane.normal);
+    if (std::abs(turned) < kSameDirection) continue;
+    const bool on = std::all_of(points.begin(), points.end(), [&](const Vec3& point) {
+      return std::abs(planes_[i].height(point)) <= tolerance_;
+    });
+    if (on) return {i, turned < 0};
+  }
+  planes_.push_back(plane);
+  return {size() - 1, false};
+}
+
+SolidBulk bulk_of(const TriangleSurface& surface) {
+  SolidBulk bulk;
+  for (const auto& [a, b, c] : surface) {
+    const Vec3 twice_area = glm::cross(b - a, c - a);
+    bulk.area += glm::length(twice_area) / 2;
+    // From a corner of the solid: far from the origin the terms would cancel.
+    bulk.volume += glm::dot(twice_area, a - surface[0][0]) / 6;
+  }
+  return bulk;
+}
+
+double winding_number(const TriangleSurface& surface, const Vec3& point) {
+  double angle = 0;
+  for (const auto& triangle : surface) {
+    const Vec3 a = triangle[0] - point, b = triangle[1] - point, c = triangle[2] - point;
+    const double la = glm::length(a), lb = glm::length(b), lc = glm::length(c);
+    const double over =
+        la * lb * lc + glm::dot(a, b) * lc + glm::dot(b, c) * la + glm::dot(c, a) * lb;
+    angle += std::atan2(glm::dot(a, glm::cross(b, c)), over);
+  }
+  return angle / (2 * std::numbers::pi);
 }
 
 }  // namespace palpate::stimuli

@@ -1,19 +1,283 @@
 #include "stimuli/parts/convex_parts.h"
 
 #include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <cstdio>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <limits>
 #include <memory>
 #include <string>
 #include <utility>
 
+#include "stimuli/closed_surface.h"
 #include "stimuli/half_edges.h"
-#include "stimuli/parts/convex_parts_groups.h"
-#include "stimuli/parts/cover_check.h"
+#include "stimuli/mesh_names.h"
+#include "stimuli/parts/cell.h"
+#include "stimuli/parts/convex_sets.h"
 #include "stimuli/parts/cutting.h"
-#include "stimuli/parts/merging.h"
 #include "stimuli/primitives.h"
-#include "stimuli/weld.h"
+#include "stimuli/random.h"
 
 namespace palpate::stimuli {
+namespace {
+
+constexpr int kPoints = 256;
+
+// m, how far a point is out of a part; negative inside.
+double out_of(const ConvexMesh& part, const Vec3& point) {
+  double most = -std::numeric_limits<double>::infinity();
+  for (const Facet& facet : part.facets())
+    most = std::max(most, glm::dot(facet.normal, point) - facet.offset);
+  return most;
+}
+
+void check_volume(const TriangleSurface& solid, const std::vector<ConvexMesh>& parts, double slack,
+                  MeshFaults& faults) {
+  const SolidBulk expected = bulk_of(solid);
+  double volume = 0;
+  for (const ConvexMesh& part : parts) volume += volume_of(part);
+  const double off = std::abs(volume - expected.volume);
+  if (off <= 1e-9 * expected.volume + slack * expected.area) return;
+  faults.add("not covered", [&] {
+    char text[160];
+    std::snprintf(text, sizeof text,
+                  "expected convex parts of %.9g m^3 in all, found %.9g m^3 in %zu parts",
+                  expected.volume, volume, parts.size());
+    return std::string(text) + "; does the surface pass through itself?";
+  });
+}
+
+}  // namespace
+
+double volume_of(const ConvexMesh& mesh) {
+  double volume = 0;
+  for (std::uint32_t f = 0; f < mesh.facets().size(); ++f) {
+    const Facet& facet = mesh.facets()[f];
+    const auto corner = [&](std::uint32_t k) {
+      const Edge& edge = mesh.edges()[mesh.sides()[facet.first_side + k].edge];
+      return (edge.left == f ? edge.from : edge.to) - mesh.centre();
+    };
+    const Vec3 first = corner(0);
+    for (std::uint32_t k = 2; k < facet.side_count; ++k)
+      volume += glm::dot(first, glm::cross(corner(k - 1), corner(k))) / 6;
+  }
+  return volume;
+}
+
+void check_cover(const TriangleSurface& solid, const std::vector<ConvexMesh>& parts, double slack,
+                 MeshFaults& faults) {
+  check_volume(solid, parts, slack, faults);
+  Vec3 low = solid[0][0], high = low;
+  for (const auto& triangle : solid) {
+    for (const Vec3& corner : triangle) {
+      low = glm::min(low, corner);
+      high = glm::max(high, corner);
+    }
+  }
+  const double near = 1e-6 * glm::length(high - low);  // of a surface: either answer is right
+  Random random(1);
+  for (int i = 0; i < kPoints; ++i) {
+    Vec3 point;
+    for (int axis = 0; axis < 3; ++axis)
+      point[axis] = low[axis] + (high[axis] - low[axis]) * random.unit();
+    int in = 0;
+    bool doubtful = false;
+    for (const ConvexMesh& part : parts) {
+      const double out = out_of(part, point);
+      doubtful |= std::abs(out) < near;
+      in += out < 0 ? 1 : 0;
+    }
+    const double winding = winding_number(solid, point);
+    if (doubtful || std::abs(winding - in) < 0.01) continue;
+    faults.add("not covered", [&] {
+      char text[200];
+      std::snprintf(
+          text, sizeof text,
+          "the point (%.4g, %.4g, %.4g) m lies in %d of the convex parts, but the surface "
+          "winds round it %.2f times",
+          point.x, point.y, point.z, in, winding);
+      return std::string(text);
+    });
+  }
+}
+
+namespace {
+
+using Index = std::uint32_t;
+
+/// Takes some faces of a soup out, with the vertices that they use.
+class Subsets {
+ public:
+  explicit Subsets(const PolygonSoup& soup) : soup_(soup), number_(soup.vertices.size()) {}
+
+  PolygonSoup of(const std::vector<Index>& faces) {
+    PolygonSoup some;
+    some.coordinate_error = soup_.coordinate_error;
+    vertices_.clear();
+    for (const Index f : faces)
+      vertices_.insert(vertices_.end(), soup_.faces[f].begin(), soup_.faces[f].end());
+    std::sort(vertices_.begin(), vertices_.end());
+    vertices_.erase(std::unique(vertices_.begin(), vertices_.end()), vertices_.end());
+    for (Index i = 0; i < vertices_.size(); ++i) {
+      number_[vertices_[i]] = i;
+      some.vertices.push_back(soup_.vertices[vertices_[i]]);
+    }
+    for (const Index f : faces) {
+      std::vector<Index>& face = some.faces.emplace_back();
+      for (const Index v : soup_.faces[f]) face.push_back(number_[v]);
+    }
+    some.names = std::make_shared<const MeshNames>(names_of(faces));
+    return some;
+  }
+
+ private:
+  MeshNames names_of(const std::vector<Index>& faces) const {
+    if (soup_.names) return soup_.names->subset(vertices_, faces);
+    MeshNames names;
+    for (const Index v : vertices_) names.vertices.push_back({v, 0});
+    for (const Index f : faces) names.faces.push_back({f, 0});
+    return names;
+  }
+
+  const PolygonSoup& soup_;
+  std::vector<Index> vertices_;  // of the subset that is being made
+  std::vector<Index> number_;    // of each of them in it
+};
+
+bool is_closed(const PolygonSoup& soup) {
+  MeshFaults faults;
+  link_half_edges(soup, faults, Pieces::any);
+  return faults.empty();
+}
+
+TriangleSurface triangles_of(const PolygonSoup& soup) {
+  TriangleSurface triangles;
+  for (const auto& face : soup.faces) {
+    for (std::size_t k = 2; k < face.size(); ++k)
+      triangles.push_back(
+          {soup.vertices[face[0]], soup.vertices[face[k - 1]], soup.vertices[face[k]]});
+  }
+  return triangles;
+}
+
+/// A group, and what decides whether another lies in it.
+struct Solid {
+  SolidGroup group;
+  TriangleSurface triangles;
+  double volume = 0;     // m^3; 0 where it is none
+  bool is_void = false;  // all faces are turned
+  std::vector<std::size_t> voids = {};
+  Vec3 low{std::numeric_limits<double>::max()}, high{-low};
+};
+
+Solid solid_of(SolidGroup group) {
+  Solid solid{std::move(group), {}};
+  solid.triangles = triangles_of(solid.group.soup);
+  for (const Vec3& vertex : solid.group.soup.vertices) {
+    solid.low = glm::min(solid.low, vertex);
+    solid.high = glm::max(solid.high, vertex);
+  }
+  if (!is_closed(solid.group.soup)) return solid;
+  const SolidBulk bulk = bulk_of(solid.triangles);
+  const double error =
+      std::max(solid.group.soup.coordinate_error, 1e-11 * glm::length(solid.high - solid.low));
+  solid.is_void = bulk.volume < -2 * error * bulk.area;
+  solid.volume = std::abs(bulk.volume);
+  return solid;
+}
+
+// Some of the corners: where the two surfaces cross elsewhere, the cutting says so.
+bool lies_in(const Solid& inner, const Solid& outer) {
+  if (glm::any(glm::lessThan(inner.low, outer.low)) ||
+      glm::any(glm::greaterThan(inner.high, outer.high)))
+    return false;
+  constexpr std::size_t kCorners = 16;
+  const std::vector<Vec3>& corners = inner.group.soup.vertices;
+  for (std::size_t i = 0; i < corners.size(); i += 1 + corners.size() / kCorners) {
+    if (winding_number(outer.triangles, corners[i]) < 0.9) return false;
+  }
+  return true;
+}
+
+void append(PolygonSoup& soup, const PolygonSoup& other) {
+  const auto first = static_cast<Index>(soup.vertices.size());
+  MeshNames names = *soup.names;
+  names.vertices.insert(names.vertices.end(), other.names->vertices.begin(),
+                        other.names->vertices.end());
+  names.faces.insert(names.faces.end(), other.names->faces.begin(), other.names->faces.end());
+  soup.names = std::make_shared<const MeshNames>(std::move(names));
+  soup.vertices.insert(soup.vertices.end(), other.vertices.begin(), other.vertices.end());
+  for (std::vector<Index> face : other.faces) {
+    for (Index& v : face) v += first;
+    soup.faces.push_back(std::move(face));
+  }
+}
+
+std::vector<SolidGroup> with_voids(std::vector<Solid> solids) {
+  std::vector<std::string> faults;
+  for (std::size_t i = 0; i < solids.size(); ++i) {
+    if (!solids[i].is_void) continue;
+    std::size_t least = solids.size();
+    for (std::size_t k = 0; k < solids.size(); ++k) {
+      if (solids[k].is_void || solids[k].volume <= solids[i].volume) continue;
+      if (least < solids.size() && solids[k].volume >= solids[least].volume) continue;
+      if (lies_in(solids[i], solids[k])) least = k;
+    }
+    if (least == solids.size()) {
+      faults.push_back(
+          solids[i].group.name +
+          ": inside out: all faces are clockwise seen from outside, as of a void; expected "
+          "counter-clockwise, or another closed group round it");
+    } else {
+      solids[least].voids.push_back(i);
+    }
+  }
+  if (!faults.empty()) throw MeshError(std::move(faults));
+  std::vector<SolidGroup> groups;
+  for (Solid& solid : solids) {
+    if (solid.is_void) continue;
+    for (const std::size_t inner : solid.voids) append(solid.group.soup, solids[inner].group.soup);
+    groups.push_back(std::move(solid.group));
+  }
+  return groups;
+}
+
+}  // namespace
+
+std::vector<SolidGroup> solid_groups(const PolygonSoup& soup) {
+  if (soup.group_names.size() < 2) return {};
+  std::vector<std::vector<Index>> faces_of(soup.group_names.size());
+  for (Index f = 0; f < soup.faces.size(); ++f) faces_of[soup.group_of[f]].push_back(f);
+  Subsets subsets(soup);
+  std::vector<Solid> closed;
+  std::vector<Index> rest;
+  for (std::size_t g = 0; g < faces_of.size(); ++g) {
+    if (faces_of[g].empty()) continue;
+    PolygonSoup group = subsets.of(faces_of[g]);
+    if (!is_closed(group)) {
+      rest.insert(rest.end(), faces_of[g].begin(), faces_of[g].end());
+      continue;
+    }
+    closed.push_back(solid_of({"group '" + soup.group_names[g] + "'", std::move(group)}));
+    if (closed.size() > kMostClosedGroups) {
+      MeshFaults faults;
+      faults.add("too many groups", [] {
+        return "expected at most " + std::to_string(kMostClosedGroups) +
+               " that are closed by themselves, found more";
+      });
+      faults.throw_if_any();
+    }
+  }
+  if (closed.empty()) return {};
+  if (!rest.empty()) {
+    std::sort(rest.begin(), rest.end());
+    closed.push_back(solid_of({"the groups that are not closed by themselves", subsets.of(rest)}));
+  }
+  return with_voids(std::move(closed));
+}
+
 namespace {
 
 // m, of the coordinates' error: facets are taken for plane within 8 errors, and a corner must not

@@ -2,12 +2,41 @@
 // Any closed solid as convex parts: what the renderers need.
 
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "stimuli/convex_mesh.h"
-#include "stimuli/object_spec.h"
+#include "stimuli/mesh_names.h"
+#include "stimuli/parts/cell.h"
+#include "stimuli/shapes.h"
 
 namespace palpate::stimuli {
+
+// Whether convex parts are a solid, no more and no less.
+
+/// m^3
+double volume_of(const ConvexMesh& mesh);
+
+/// Adds a fault where the volumes do not add up (within 1e-9 of the volume and `slack`, m, times
+/// the area) or where a sampled point lies in more or fewer parts than it should.
+void check_cover(const TriangleSurface& solid, const std::vector<ConvexMesh>& parts, double slack,
+                 MeshFaults& faults);
+
+// The groups of a mesh file that are solids of their own.
+
+struct SolidGroup {
+  std::string name;  ///< for messages: "group 'left'"
+  PolygonSoup soup;  ///< its own vertices only
+};
+
+/// At most so many groups of a file may be closed.
+inline constexpr std::size_t kMostClosedGroups = 10000;
+
+/// Each group that is closed by itself, then the faces of all others together. A closed group whose
+/// faces are all turned is a void: it goes with the least of the others that it lies in. Nothing
+/// where no group is closed by itself or the soup has no two groups. \throws MeshError: more than
+/// kMostClosedGroups
+std::vector<SolidGroup> solid_groups(const PolygonSoup& soup);
 
 /// The convex parts of a primitive or mesh file in its local frame: one of a convex shape, the very
 /// mesh that ConvexMesh makes of it. Groups of a file that are closed by themselves are parts; they

@@ -1,10 +1,11 @@
 #pragma once
-// A linked surface as cutting needs it: planes of its facets, convex polygons, concave edges.
+// A linked surface as cutting needs it: planes of its facets, convex polygons, concave edges,
+// triangles.
+
+#include <span>
 
 #include "stimuli/half_edges.h"
 #include "stimuli/parts/cell.h"
-#include "stimuli/parts/planes.h"
-#include "stimuli/parts/solid.h"
 
 namespace palpate::stimuli {
 
@@ -26,5 +27,18 @@ struct FacetedSolid {
 
 /// Adds the facets' planes to the table. Adds a fault for each polygon that crosses itself.
 FacetedSolid faceted_solid(const HalfEdges& mesh, PlaneTable& planes, MeshFaults& faults);
+
+// Triangles of a plane polygon that need not be convex.
+
+/// Whether a simple plane polygon has no reflex corner (beyond rounding).
+bool is_convex_polygon(std::span<const Vec3> corners, const Vec3& normal);
+
+/// Cuts off ears (Meisters 1975), the best-shaped first. Counter-clockwise about `normal` (of any
+/// length), as the corners are. Empty where the polygon crosses itself. Costs corners^3 at worst,
+/// corners where it is convex.
+TriangleSurface triangulate(std::span<const Vec3> corners, const Vec3& normal);
+
+/// The same, about the polygon's own normal.
+TriangleSurface triangulate(std::span<const Vec3> corners);
 
 }  // namespace palpate::stimuli

@@ -7,9 +7,7 @@
 #include <utility>
 
 #include "stimuli/parts/convex_parts.h"
-#include "stimuli/parts/convex_parts_groups.h"
 #include "stimuli/parts/convex_sets.h"
-#include "stimuli/parts/cover_check.h"
 #include "stimuli/primitives.h"
 
 namespace palpate::stimuli {

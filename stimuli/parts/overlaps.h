@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "stimuli/convex_mesh.h"
-#include "stimuli/object_spec.h"
+#include "stimuli/shapes.h"
 
 namespace palpate::stimuli {
 

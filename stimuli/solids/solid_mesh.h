@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "stimuli/convex_mesh.h"
-#include "stimuli/object_spec.h"
+#include "stimuli/shapes.h"
 #include "stimuli/vec.h"
 
 namespace palpate::stimuli {

@@ -1,10 +1,10 @@
 // Whatever is printed: what comes out cannot move a cursor, colour a line or turn its direction,
 // and is UTF-8 that stays as it is when it is made printable again.
 
-#include "stimuli/printable.h"
-
 #include <cstdlib>
 #include <string>
+
+#include "stimuli/text.h"
 
 namespace {
 

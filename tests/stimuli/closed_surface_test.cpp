@@ -13,7 +13,7 @@
 
 #include "stimuli/mesh_file.h"
 #include "stimuli/orientation.h"
-#include "stimuli/parts/solid.h"
+#include "stimuli/parts/cell.h"
 #include "stimuli/primitives.h"
 #include "stimuli/random.h"
 #include "tests/shared/random_polyhedron.h"

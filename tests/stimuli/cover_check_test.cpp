@@ -1,14 +1,13 @@
 // Parts that do not cover their solid, or cover it twice, are found.
 
-#include "stimuli/parts/cover_check.h"
-
 #include <gtest/gtest.h>
 
 #include <functional>
 #include <string>
 #include <vector>
 
-#include "stimuli/mesh_faults.h"
+#include "stimuli/mesh_names.h"
+#include "stimuli/parts/convex_parts.h"
 #include "stimuli/primitives.h"
 
 namespace palpate::stimuli {

@@ -1,11 +1,10 @@
-#include "stimuli/edit_distance.h"
-
 #include <gtest/gtest.h>
 
 #include <string>
 #include <vector>
 
 #include "stimuli/random.h"
+#include "stimuli/text.h"
 
 namespace palpate::stimuli {
 namespace {

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <string>
 
-#include "stimuli/base64.h"
+#include "stimuli/text.h"
 
 namespace palpate::stimuli::gltf {
 

@@ -12,7 +12,7 @@
 
 #include "stimuli/inset.h"
 #include "stimuli/parts/convex_parts.h"
-#include "stimuli/parts/triangulate.h"
+#include "stimuli/parts/facets.h"
 #include "stimuli/primitives.h"
 #include "stimuli/random.h"
 #include "tests/stimuli/concave_solids.h"

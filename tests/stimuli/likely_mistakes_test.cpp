@@ -1,9 +1,8 @@
-#include "stimuli/likely_mistakes.h"
-
 #include <gtest/gtest.h>
 
 #include "stimuli/convex_mesh.h"
 #include "stimuli/mesh_file.h"
+#include "stimuli/text.h"
 
 namespace palpate::stimuli {
 namespace {

@@ -1,11 +1,11 @@
 // Convex cells that share a plane become one where their union is convex.
 
-#include "stimuli/parts/merging.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <utility>
+
+#include "stimuli/parts/convex_sets.h"
 
 namespace palpate::stimuli {
 namespace {

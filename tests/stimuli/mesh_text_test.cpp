@@ -1,7 +1,5 @@
 // Words, numbers and messages of mesh files.
 
-#include "stimuli/mesh_text.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -11,6 +9,7 @@
 #include <vector>
 
 #include "stimuli/convex_mesh.h"
+#include "stimuli/mesh_formats.h"
 
 namespace palpate::stimuli {
 namespace {

@@ -1,7 +1,5 @@
 // Plane, middle, area and diameter of polygons whose measures are known.
 
-#include "stimuli/polygon.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -11,6 +9,7 @@
 #include <numbers>
 #include <vector>
 
+#include "stimuli/face_triangles.h"
 #include "stimuli/random.h"
 
 namespace palpate::stimuli {

@@ -1,9 +1,9 @@
-#include "stimuli/printable.h"
-
 #include <gtest/gtest.h>
 
 #include <random>
 #include <string>
+
+#include "stimuli/text.h"
 
 namespace palpate::stimuli {
 namespace {

@@ -1,7 +1,5 @@
 // Which points are one: against every pair looked at.
 
-#include "stimuli/weld.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -11,6 +9,7 @@
 #include <glm/geometric.hpp>
 #include <vector>
 
+#include "stimuli/closed_surface.h"
 #include "stimuli/random.h"
 #include "tests/shared/rounds.h"
 

@@ -5,7 +5,7 @@
 #include <memory>
 
 #include "rendering/bodies/soft/soft_coupling.h"
-#include "stimuli/object_spec.h"
+#include "stimuli/shapes.h"
 
 namespace palpate::rendering {
 

@@ -32,7 +32,7 @@
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/protocol_facts.h"
 #include "runner/commands/shared/sealed_folder.h"
-#include "stimuli/printable.h"
+#include "stimuli/text.h"
 
 namespace palpate::runner {
 namespace {

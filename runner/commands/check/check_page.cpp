@@ -9,7 +9,7 @@
 #include "data/files/utc.h"
 #include "runner/commands/check/deviations.h"
 #include "runner/commands/shared/command.h"
-#include "stimuli/printable.h"
+#include "stimuli/text.h"
 
 namespace palpate::runner {
 namespace {

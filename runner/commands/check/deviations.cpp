@@ -16,7 +16,7 @@
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/sealed_folder.h"
 #include "runner/participants/simulated_settings.h"
-#include "stimuli/printable.h"
+#include "stimuli/text.h"
 
 namespace palpate::runner {
 namespace {

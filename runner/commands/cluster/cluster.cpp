@@ -21,7 +21,7 @@
 #include "runner/commands/shared/simulation.h"
 #include "runner/commands/shared/study_options.h"
 #include "runner/commands/sweep/planned.h"
-#include "stimuli/printable.h"
+#include "stimuli/text.h"
 
 namespace palpate::runner {
 namespace {

@@ -22,7 +22,7 @@
 #include "runner/safety/fault_signals.h"
 #include "runner/safety/guarded_device.h"
 #include "runner/servo/realtime.h"
-#include "stimuli/printable.h"
+#include "stimuli/text.h"
 
 namespace palpate::runner {
 namespace {

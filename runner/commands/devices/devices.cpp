@@ -19,7 +19,7 @@
 #include "runner/safety/guarded_device.h"
 #include "runner/servo/realtime.h"
 #include "runner/session/markers.h"
-#include "stimuli/printable.h"
+#include "stimuli/text.h"
 
 namespace palpate::runner {
 namespace {

@@ -18,7 +18,7 @@
 #include "runner/safety/fault_signals.h"
 #include "runner/serve/served_scene.h"
 #include "runner/session/device_check.h"
-#include "stimuli/printable.h"
+#include "stimuli/text.h"
 
 namespace palpate::runner {
 namespace {

@@ -8,7 +8,7 @@
 
 #include "runner/commands/shared/command.h"
 #include "runner/display/scene/painter.h"
-#include "stimuli/printable.h"
+#include "stimuli/text.h"
 
 namespace palpate::runner {
 namespace {

@@ -4,7 +4,7 @@
 
 #include "analysis/text.h"
 #include "runner/commands/shared/command.h"
-#include "stimuli/printable.h"
+#include "stimuli/text.h"
 
 namespace palpate::runner {
 

@@ -16,7 +16,7 @@
 #include "runner/commands/shared/progress_line.h"
 #include "runner/commands/shared/study_trials.h"
 #include "runner/session/recorded_trial.h"
-#include "stimuli/printable.h"
+#include "stimuli/text.h"
 
 namespace palpate::runner {
 namespace {

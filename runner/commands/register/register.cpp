@@ -30,7 +30,7 @@
 #include "runner/commands/shared/sealed_folder.h"
 #include "runner/participants/simulated_settings.h"
 #include "runner/session/protocol_info.h"
-#include "stimuli/printable.h"
+#include "stimuli/text.h"
 
 namespace palpate::runner {
 namespace {

@@ -11,7 +11,7 @@
 #include "analysis/text.h"
 #include "data/files/utc.h"
 #include "runner/commands/shared/command.h"
-#include "stimuli/printable.h"
+#include "stimuli/text.h"
 
 namespace palpate::runner {
 namespace {

@@ -7,7 +7,7 @@
 #include "runner/commands/shared/outputs.h"
 #include "runner/commands/shared/scene_notes.h"
 #include "stimuli/parts/overlaps.h"
-#include "stimuli/printable.h"
+#include "stimuli/text.h"
 
 namespace palpate::runner {
 namespace {

@@ -21,7 +21,7 @@
 #include "runner/session/clock_check.h"
 #include "runner/session/near_codes.h"
 #include "runner/session/protocol_info.h"
-#include "stimuli/printable.h"
+#include "stimuli/text.h"
 
 namespace palpate::runner {
 namespace {

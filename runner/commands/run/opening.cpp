@@ -10,7 +10,7 @@
 #include "runner/commands/shared/command.h"
 #include "runner/display/text_display.h"
 #include "runner/session/device_check.h"
-#include "stimuli/printable.h"
+#include "stimuli/text.h"
 
 namespace palpate::runner {
 const DeviceKind& find_device_kind(const std::string& name) {

@@ -3,7 +3,7 @@
 #include <cstdio>
 #include <string>
 
-#include "stimuli/printable.h"
+#include "stimuli/text.h"
 
 namespace palpate::runner {
 

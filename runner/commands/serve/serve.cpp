@@ -23,7 +23,7 @@
 #include "runner/serve/served_session.h"
 #include "runner/servo/realtime.h"
 #include "runner/session/device_check.h"
-#include "stimuli/printable.h"
+#include "stimuli/text.h"
 
 namespace palpate::runner {
 namespace {

@@ -7,8 +7,7 @@
 #include <typeinfo>
 
 #include "data/files/file_permissions.h"
-#include "stimuli/edit_distance.h"
-#include "stimuli/printable.h"
+#include "stimuli/text.h"
 
 namespace palpate::runner {
 

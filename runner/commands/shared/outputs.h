@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "data/files/output_check.h"
-#include "stimuli/object_spec.h"
+#include "stimuli/shapes.h"
 
 namespace palpate::runner {
 

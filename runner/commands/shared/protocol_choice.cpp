@@ -7,7 +7,7 @@
 #include "data/files/utc.h"
 #include "runner/commands/shared/ask.h"
 #include "runner/commands/shared/command.h"
-#include "stimuli/printable.h"
+#include "stimuli/text.h"
 
 namespace palpate::runner {
 namespace {

@@ -10,7 +10,7 @@
 
 #include "stimuli/closed_surface.h"
 #include "stimuli/primitives.h"
-#include "stimuli/printable.h"
+#include "stimuli/text.h"
 
 namespace palpate::runner {
 

@@ -16,7 +16,7 @@
 #include "data/files/checksum.h"
 #include "data/files/text_sink.h"
 #include "runner/commands/shared/command.h"
-#include "stimuli/printable.h"
+#include "stimuli/text.h"
 
 namespace palpate::runner {
 namespace {

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "stimuli/printable.h"
+#include "stimuli/text.h"
 
 namespace palpate::runner {
 

@@ -2,7 +2,7 @@
 
 #include "runner/commands/shared/simulation.h"
 #include "runner/session/socket_advisor.h"
-#include "stimuli/printable.h"
+#include "stimuli/text.h"
 
 namespace palpate::runner {
 

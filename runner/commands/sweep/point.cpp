@@ -14,7 +14,7 @@
 #include "analysis/statistics/task_analysis.h"
 #include "runner/session/simulated_session.h"
 #include "runner/session/simulated_study.h"
-#include "stimuli/printable.h"
+#include "stimuli/text.h"
 
 namespace palpate::runner {
 namespace {

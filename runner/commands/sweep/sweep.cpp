@@ -23,7 +23,7 @@
 #include "runner/commands/shared/stop_signal.h"
 #include "runner/commands/sweep/planned.h"
 #include "runner/commands/sweep/point.h"
-#include "stimuli/printable.h"
+#include "stimuli/text.h"
 
 namespace palpate::runner {
 namespace {

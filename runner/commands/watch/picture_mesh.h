@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "stimuli/object_spec.h"
+#include "stimuli/shapes.h"
 
 namespace palpate::runner {
 

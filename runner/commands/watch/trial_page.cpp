@@ -19,7 +19,7 @@
 #include "runner/safety/fault_table.h"
 #include "runner/scene_builder.h"
 #include "runner/session/replay.h"
-#include "stimuli/printable.h"
+#include "stimuli/text.h"
 
 namespace palpate::runner {
 namespace {

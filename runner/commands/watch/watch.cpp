@@ -8,7 +8,7 @@
 #include "runner/commands/shared/outputs.h"
 #include "runner/commands/shared/trial_option.h"
 #include "runner/commands/watch/trial_page.h"
-#include "stimuli/printable.h"
+#include "stimuli/text.h"
 
 namespace palpate::runner {
 namespace {

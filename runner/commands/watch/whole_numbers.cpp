@@ -7,7 +7,7 @@
 #include <stdexcept>
 #include <vector>
 
-#include "stimuli/base64.h"
+#include "stimuli/text.h"
 
 namespace palpate::runner {
 namespace {

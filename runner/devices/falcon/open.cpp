@@ -15,7 +15,7 @@
 #include "runner/devices/falcon/image.h"
 #include "runner/devices/falcon/parameters.h"
 #include "runner/devices/falcon/usb.h"
-#include "stimuli/printable.h"
+#include "stimuli/text.h"
 
 namespace palpate::runner::falcon {
 namespace {

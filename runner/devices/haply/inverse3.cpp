@@ -7,7 +7,7 @@
 #include <stdexcept>
 
 #include "runner/servo/realtime.h"
-#include "stimuli/printable.h"
+#include "stimuli/text.h"
 
 namespace palpate::runner::haply {
 namespace {

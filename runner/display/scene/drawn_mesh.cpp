@@ -8,10 +8,10 @@
 #include <span>
 #include <utility>
 
-#include "stimuli/compose.h"
 #include "stimuli/input_file.h"
-#include "stimuli/parts/triangulate.h"
+#include "stimuli/parts/facets.h"
 #include "stimuli/primitives.h"
+#include "stimuli/shapes.h"
 #include "stimuli/solids/gmsh_file.h"
 #include "stimuli/solids/solid_mesh.h"
 

@@ -10,7 +10,7 @@
 #include <span>
 
 #include "runner/display/scene/tool_shape.h"
-#include "stimuli/compose.h"
+#include "stimuli/shapes.h"
 
 namespace palpate::runner {
 namespace {

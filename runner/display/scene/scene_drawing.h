@@ -16,7 +16,7 @@
 #include "runner/display/scene/picture.h"
 #include "runner/servo/sample.h"
 #include "runner/servo/touched_places.h"
-#include "stimuli/object_spec.h"
+#include "stimuli/shapes.h"
 
 namespace palpate::runner {
 

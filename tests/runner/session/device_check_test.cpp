@@ -7,7 +7,7 @@
 #include <cmath>
 
 #include "protocols/parse.h"
-#include "stimuli/object_spec.h"
+#include "stimuli/shapes.h"
 
 namespace palpate::runner {
 namespace {
