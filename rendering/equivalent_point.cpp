@@ -4,7 +4,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
-#include "rendering/segment_probe.h"
+#include "rendering/probes.h"
 
 namespace palpate::rendering {
 namespace {

@@ -5,8 +5,8 @@
 #include <cstddef>
 #include <span>
 
+#include "rendering/contact.h"
 #include "rendering/facet_walk.h"
-#include "rendering/force.h"
 #include "rendering/scene.h"
 
 namespace palpate::rendering {

@@ -3,8 +3,6 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
-#include "rendering/minkowski_facets.h"
-
 namespace palpate::rendering {
 namespace {
 

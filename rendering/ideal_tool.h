@@ -1,14 +1,13 @@
 #pragma once
-// One ideal tool in one tick: it turns (ideal_tool_turn.cpp), translates (ideal_tool_translate.cpp)
-// and says where it touches (ideal_tool_contacts.cpp). Internal to the contact law of unions
-// (union_contact.h). World frame, SI units.
+// One ideal tool in one tick: it turns, translates and reports where it touches. Internal to
+// the contact law of unions (union_contact.h). World frame, SI units.
 
 #include <cstddef>
 #include <cstdint>
 
 #include "rendering/near_pairs.h"
 #include "rendering/union_contact.h"
-#include "rendering/union_planes.h"
+#include "rendering/union_state.h"
 
 namespace palpate::rendering {
 
@@ -39,14 +38,14 @@ class IdealTool {
   // union_contact.cpp
   ToolPose first_contact(const ToolPose& from, bool& entered);
 
-  // ideal_tool_turn.cpp
+  // Turning.
   double turn(const ToolPose& from, double most);
   bool settle(const ToolPose& from, const PlacedTool& placed_from, const ToolPose& to,
               double most_push);
   bool push_out(const Vec3& from, double most_push);
   bool put_plane(std::uint32_t near, ContactFeature feature);
 
-  // ideal_tool_translate.cpp
+  // Translating.
   void resume_planes();
   void translate();
   bool find_goal(Vec3& goal);
@@ -63,7 +62,7 @@ class IdealTool {
   bool past_a_facet_at_rest() const;
   bool parted_here(const NearPair& near) const;
 
-  // ideal_tool_contacts.cpp
+  // Contacts.
   void add_contacts();
   void add_contact(const Plane& plane, const Vec3& shift);
   void spread_over_parts(const NearPair& carrying, const WalkResult& hit, const Vec3& tip,

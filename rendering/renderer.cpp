@@ -3,8 +3,7 @@
 #include <array>
 #include <utility>
 
-#include "rendering/point_probe.h"
-#include "rendering/segment_probe.h"
+#include "rendering/probes.h"
 #include "rendering/tick.h"
 
 namespace palpate::rendering {

@@ -9,11 +9,9 @@
 #include <memory>
 #include <vector>
 
-#include "rendering/bounding_tree.h"
+#include "rendering/contact.h"
 #include "rendering/facet_walk.h"
 #include "rendering/first_contact.h"
-#include "rendering/force.h"
-#include "rendering/motion.h"
 #include "rendering/probe.h"
 #include "rendering/separation.h"
 #include "rendering/tool.h"

@@ -4,7 +4,7 @@
 #include <array>
 #include <cmath>
 
-#include "rendering/support_map.h"
+#include "rendering/direction_maps.h"
 
 namespace palpate::rendering {
 namespace {

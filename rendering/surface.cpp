@@ -7,7 +7,7 @@
 #include <limits>
 #include <numeric>
 
-#include "rendering/surface_query.h"
+#include "rendering/surface_patch.h"
 
 namespace palpate::rendering {
 namespace {

@@ -59,7 +59,7 @@ class Surface {
   const stimuli::LargeArray<std::uint32_t>& order() const { return order_; }
 
   /// Calls visit(triangle) for those whose box is within `room` of the segment, and some more
-  /// (surface_query.h).
+  /// (surface_patch.h).
   /// \param visit  returns whether to go on
   template <class Visit>
   void near_segment(const Vec3& start, const Vec3& along, double room, const Visit& visit) const;

@@ -1,14 +1,13 @@
 #pragma once
-// One ideal tool on one closed surface in one tick: it turns (surface_turn.cpp), translates
-// (surface_translate.cpp) and says where it touches (surface_contacts.cpp). Internal to the law of
-// surfaces (surface_contact.h). Local frame of the surface, SI units; poses are in the world.
+// One ideal tool on one closed surface in one tick: it turns, translates and reports
+// where it touches (surface_contact.cpp). Internal to the law of surfaces (surface_contact.h).
+// Local frame of the surface, SI units; poses are in the world.
 
 #include <cstddef>
 #include <cstdint>
 
 #include "rendering/surface_contact.h"
-#include "rendering/surface_state.h"
-#include "rendering/union_planes.h"
+#include "rendering/union_state.h"
 
 namespace palpate::rendering {
 
@@ -53,12 +52,12 @@ class SurfaceTool {
   double moved_from_list(const PosedTool& at, const Vec3& by) const;
   SurfacePlane plane_at(const SurfacePatch& patch) const;
 
-  // surface_turn.cpp
+  // Turning.
   double turn(const ToolPose& from, double most);
   bool settle(const PosedTool& from, double most_push);
   PatchHit sweep(const PosedTool& from, const PosedTool& to, const Vec3& shift) const;
 
-  // surface_translate.cpp
+  // Translating.
   void collect_patches();
   PatchHit cast(const Vec3& from, const Vec3& to) const;
   void resume_planes();
@@ -76,7 +75,7 @@ class SurfaceTool {
   bool parted_here(const SurfacePatch& patch) const;
   bool holds(const SurfacePatch& patch) const;
 
-  // surface_contacts.cpp
+  // surface_contact.cpp
   void add_contacts();
   void add_contact(const SurfacePlane& plane, const Vec3& shift);
   void remember(std::size_t first_contact);

@@ -9,7 +9,7 @@
 #include <stdexcept>
 
 #include "protocols/tasks/levels.h"
-#include "rendering/bodies/soft/soft_build.h"
+#include "rendering/bodies/soft/soft_scene.h"
 #include "stimuli/closed_surface.h"
 #include "stimuli/parts/convex_parts.h"
 #include "stimuli/parts/inset_parts.h"

@@ -87,12 +87,12 @@ PUBLIC = {
                "mesh_file orientation parts/convex_parts parts/inset_parts parts/overlaps "
                "parts/facets signed_distance primitives random solids/gmsh_file solids/solid_mesh "
                "vec",
-    "rendering": "first_contact motion probe reach render_fault renderer scene tool tool_pose",
+    "rendering": "first_contact probe reach render_fault renderer scene tool",
     "rendering/bodies": "moving_scene",
     "rendering/verification": "explain extreme_cases random_draws random_solids reference search "
                               "union_cases union_search",
     "rendering/accuracy": "body_study paper_first_contact peers soft_study study union_study",
-    "rendering/bodies/soft": "soft_build soft_coupling soft_scene",
+    "rendering/bodies/soft": "soft_scene",
     "protocols": "answer_keys difference event_codes json_document object_reader parse protocol "
                  "schedule sha256 sweep_space tasks/block_procedures tasks/levels tasks/task_plan "
                  "tasks/texts tasks/typical_participant",

@@ -1,7 +1,7 @@
 #include "rendering/accuracy/body_engines.h"
 
 #include "rendering/bodies/moving_scene.h"
-#include "rendering/motion.h"
+#include "rendering/probe.h"
 #include "rendering/renderer.h"
 #include "stimuli/primitives.h"
 

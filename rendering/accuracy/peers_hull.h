@@ -7,8 +7,8 @@
 #include <memory>
 
 #include "rendering/accuracy/peers.h"
+#include "rendering/direction_maps.h"
 #include "rendering/separation.h"
-#include "rendering/support_map.h"
 
 namespace palpate::rendering::peers {
 

@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "rendering/accuracy/line_contact.h"
-#include "rendering/bodies/soft/soft_coupling.h"
+#include "rendering/bodies/soft/soft_scene.h"
 #include "stimuli/random.h"
 
 namespace palpate::rendering {

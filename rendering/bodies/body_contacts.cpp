@@ -4,7 +4,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
-#include "rendering/bodies/body_sleep.h"
+#include "rendering/bodies/body_world.h"
 
 namespace palpate::rendering {
 

@@ -1,5 +1,5 @@
 #pragma once
-// The contacts of a step and the impulses in them. Internal to body_step.cpp.
+// The contacts of a step and the impulses in them. Internal to body_world.cpp.
 
 #include <cstddef>
 #include <span>

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "rendering/bodies/complementarity.h"
@@ -62,7 +63,7 @@ struct BodyWorld {
   std::vector<PartPair> part_pairs;
   std::vector<std::uint32_t> first_part;  ///< of each body, and one more: counts of parts before it
   Vec3 gravity{0, 0, 0};
-  bool sleeps = true;  ///< what has come to rest is left alone (body_sleep.h)
+  bool sleeps = true;  ///< what has come to rest is left alone
 
   /// Sets the pairs and first_part from bodies and obstacles.
   void pair_up();
@@ -91,7 +92,7 @@ struct PressingSpring {
   double impulse = 0;     ///< N s; the result
 };
 
-/// Whether a body sleeps (body_sleep.h), and since when it has gone nowhere.
+/// Whether a body sleeps, and since when it has gone nowhere.
 struct SleepState {
   bool asleep = false;
   double rested = 0;        ///< s
@@ -161,5 +162,67 @@ ConvexPlace place_of(const CollidingPart& part, const Pose& frame);
 double kinetic_energy(const BodyWorld& world, const BodyWorldState& state);
 Vec3 momentum(const BodyWorld& world, const BodyWorldState& state);
 Vec3 angular_momentum(const BodyWorld& world, const BodyWorldState& state);  ///< about the origin
+
+// A step of bodies that collide. Free motion goes up to the time at which a pair meets; there the
+// bodies bounce, and the step goes on. What touches or may meet within the rest of the step is held
+// apart by impulses that solve a linear complementarity problem. Nothing here allocates.
+
+/// Moves all bodies on. \param duration  s
+void step_bodies(const BodyWorld& world, BodyWorldState& state, double duration);
+
+/// Moves those bodies on that springs press on, and what they touch, in one go, so that a body
+/// between a spring and a wall is held. They start where `state` has them; springs get their
+/// impulses.
+/// \param chosen  1 for each body that is to move
+void step_pressed(const BodyWorld& world, BodyWorldState& state, std::span<const char> chosen,
+                  std::span<PressingSpring> springs, double duration);
+
+/// Marks all that is connected with a marked body through what touches, or may meet within a step
+/// in which bodies are pushed by a distance besides, m.
+/// \return whether a marked body has anything to touch
+bool mark_connected(const BodyWorld& world, BodyWorldState& state, double duration, double distance,
+                    std::span<char> marked);
+
+/// Whether a body that is awake touches nothing, nor may within a step in which it goes so much
+/// farther, m. Wakes nothing.
+bool touches_nothing(const BodyWorld& world, BodyWorldState& state, std::uint32_t body,
+                     double duration, double distance);
+
+// Bodies that have come to rest sleep: they are neither moved nor held against each other until
+// something comes near. Nothing here allocates.
+
+/// After a step: those that touch each other fall asleep together when each has gone nowhere for
+/// half a second. Where neither gravity nor damping acts, a body sleeps only if it has no momentum
+/// at all, so that none is lost.
+/// \param duration  s, of the step
+void fall_asleep(const BodyWorld& world, BodyWorldState& state, double duration);
+
+/// Wakes a body and those that fell asleep with it.
+void wake(BodyWorldState& state, std::uint32_t body);
+
+// A mass against a one-sided spring for the length of a tick, in closed form: the spring is entered
+// and left at their times within the tick, so that energy is neither made nor lost. A force that is
+// held over a tick makes energy (1 g at 1 kN/m leaves with 2.1 times its speed), an implicit one
+// loses it.
+
+/// A depth that would grow freely.
+struct SpringStart {
+  double depth = 0;      ///< m, at the beginning; negative before the spring is met
+  double speed = 0;      ///< m/s, by which it grows
+  double growth = 0;     ///< m/s^2, constant
+  double mass = 1;       ///< kg, effective at the place of contact
+  double stiffness = 1;  ///< N/m
+};
+
+/// What the spring did.
+struct SpringPass {
+  double impulse = 0;         ///< N s, integral of the force
+  double double_impulse = 0;  ///< kg m, integral of the impulse so far: moves mass by 1/mass of it
+  double depth = 0;           ///< m, at the end
+  double speed = 0;           ///< m/s, at the end
+};
+
+/// \param duration  s
+SpringPass pass_spring(const SpringStart& start, double duration);
 
 }  // namespace palpate::rendering

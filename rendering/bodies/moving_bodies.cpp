@@ -5,7 +5,8 @@
 #include <glm/geometric.hpp>
 #include <utility>
 
-#include "rendering/bodies/body_sleep.h"
+#include "rendering/bodies/body_world.h"
+#include "rendering/render_fault.h"
 
 namespace palpate::rendering {
 namespace {
@@ -339,6 +340,439 @@ void MovingBodies::settle_shape(BodiesState& state, std::size_t body, const Stro
   shape.last = into(frame, stroke.to);
   if (shape.unions.last.d != Vec3(0) || !shape.unions.pairs.empty())
     shape.unions.last = into(frame, stroke.to, stroke.frame_to);
+}
+
+// A body that goes fast at the probe and touches nothing else: steps of its own within a step. Part
+// of moving_bodies.h.
+
+namespace {
+
+constexpr double kFarthest = 5e-4;  // m, in a step against the probe
+constexpr int kMostSteps = 20;
+
+}  // namespace
+
+/// Steps that a body makes within a step, so that against the probe none of its points goes farther
+/// in one than levers and normals stay what they are; 1 where the probe is far or slow, or where it
+/// may touch something else: then it goes with the others.
+int MovingBodies::inner_steps(const BodiesState& state, std::size_t body,
+                              const Stroke& stroke) const {
+  const double duration = stroke.duration;
+  if (!(duration > 0) || !stroke.touches || state.world.sleep[body].asleep) return 1;
+  const BodyMotion& motion = state.world.motion[body];
+  const MovingBody& of = world_.bodies[body];
+  const Vec3 way = duration * motion.velocity;
+  const double turn = glm::length(spin_of(of.inertia, motion)) * of.radius * duration;
+  const Vec3 tip = stroke.to.tip - stroke.from.tip, tail = stroke.to.tail - stroke.from.tail;
+  const double moved = turn + std::max(glm::distance(tip, way), glm::distance(tail, way));
+  if (!(moved > kFarthest)) return 1;
+  double reach = 0;
+  if (fixed_.tool() != nullptr) {
+    for (const ToolSegment& segment : fixed_.tool()->segments)
+      reach = std::max({reach, glm::length(segment.from), glm::length(segment.to)});
+  }
+  const int steps = static_cast<int>(std::min(std::ceil(moved / kFarthest), double{kMostSteps}));
+  const double near = of.radius + reach + moved / steps;
+  for (int k = 0; k <= steps; ++k) {
+    const double share = static_cast<double>(k) / steps;
+    const Vec3 d =
+        glm::mix(stroke.from.tail - stroke.from.tip, stroke.to.tail - stroke.to.tip, share);
+    const Vec3 off = motion.centre + share * (way - tip) - stroke.from.tip;
+    const double length2 = glm::dot(d, d);
+    const double along = length2 > 0 ? std::clamp(glm::dot(off, d) / length2, 0.0, 1.0) : 0;
+    if (glm::distance(off, along * d) <= near) return steps;
+  }
+  return 1;
+}
+
+/// Whether it touches nothing else in a step, however the probe may strike it: in the probe's frame
+/// it has no more energy afterwards than it came with.
+bool MovingBodies::stays_alone(BodiesState& state, std::size_t body, const Stroke& stroke) const {
+  const BodyMotion& motion = state.world.motion[body];
+  const MovingBody& of = world_.bodies[body];
+  const double hand = std::max(glm::distance(stroke.to.tip, stroke.from.tip),
+                               glm::distance(stroke.to.tail, stroke.from.tail)) /
+                      stroke.duration;
+  const double speed = glm::length(motion.velocity) + hand;
+  const double turning = 0.5 * glm::dot(motion.spin_momentum, spin_of(of.inertia, motion));
+  const BodiesState::Held& held = state.held[body];
+  const double depth = held.holds ? held.contact.depth_after : 0;
+  const double energy = 0.5 * of.inertia.mass * speed * speed + turning +
+                        0.5 * held.contact.spring.stiffness * depth * depth;
+  const double farthest = speed + std::sqrt(2 * energy * of.inertia.per_mass) +
+                          of.radius * std::sqrt(2 * energy * of.inertia.most_per_inertia);
+  return touches_nothing(world_, state.world, static_cast<std::uint32_t>(body), stroke.duration,
+                         stroke.duration * farthest);
+}
+
+/// Gives a body what the probe pushes it with, which are all contacts there are.
+void MovingBodies::push_alone(BodiesState& state, std::size_t body, const Stroke& stroke) const {
+  ProbeContact& only = state.contacts.front();
+  if (state.contacts.size() == 1 && only.spring.damping == 0) {
+    push_freely(state, only, stroke.duration);
+    hold(state, stroke, only);
+    only.spring.normal = only.pressing;
+    return;
+  }
+  state.springs.clear();
+  std::fill(state.chosen.begin(), state.chosen.end(), 0);
+  add_springs(state, 0, state.contacts.size(), stroke.duration);
+  state.world.motion[body] = state.before[body];
+  push_pressed(state, stroke.duration);
+}
+
+void MovingBodies::step_finely(const Renderer& renderer, BodiesState& state, std::size_t body,
+                               const Stroke& stroke) const {
+  const int steps = state.inner[body];
+  const MovingBody& of = world_.bodies[body];
+  BodyMotion& motion = state.world.motion[body];
+  motion = state.before[body];
+  const BodyMotion began = motion;
+  ProbeContact mean;
+  mean.spring.body = static_cast<std::uint32_t>(body);
+  double weight = 0, most = -1;
+  Vec3 push(0);
+  Rendering felt;
+  Pose shown;
+  std::uint32_t faults = 0;
+  for (int part = 0; part < steps; ++part) {
+    const Stroke inner = part_of(stroke, part, steps);
+    state.before[body] = motion;
+    move_freely(of.inertia, world_.gravity, of.of.damping, inner.duration, motion);
+    state.contacts.clear();
+    feel(renderer, state, body, inner);
+    faults |= state.felt[body].faults;
+    find_probe_contacts(state, body, inner);
+    if (!state.contacts.empty()) {
+      wake(state.world, static_cast<std::uint32_t>(body));
+      state.ahead[body] = motion;
+      push_alone(state, body, inner);
+      for (ProbeContact& contact : state.contacts) push_sideways(state, contact, inner.duration);
+    }
+    remember_depth(state, body);
+    settle_shape(state, body, inner);
+    for (const ProbeContact& contact : state.contacts) {
+      if (!(contact.force > 0)) continue;
+      push += contact.force * contact.spring.normal;
+      mean.tangential += contact.tangential;
+      mean.on_probe += contact.force * (contact.on_probe - inner.to.tip);
+      mean.along += contact.force * contact.along;
+      mean.offset += contact.force * contact.offset;
+      weight += contact.force;
+      if (contact.force > most) {
+        most = contact.force;
+        mean.segment = contact.segment;
+        mean.spring.group = contact.spring.group;
+        mean.spring.stiffness = contact.spring.stiffness;
+        felt = state.felt[body];
+        shown = state.shown[body];
+      }
+    }
+  }
+  state.contacts.clear();
+  state.before[body] = began;
+  if (weight > 0) {
+    state.felt[body] = felt;
+    state.shown[body] = shown;
+    mean.force = glm::length(push) / steps;
+    mean.spring.normal = mean.force > 0 ? glm::normalize(push) : Vec3(0);
+    mean.tangential /= steps;
+    mean.on_probe = stroke.to.tip + mean.on_probe / weight;
+    mean.along /= weight;
+    mean.offset /= weight;
+    mean.felt_depth = mean.spring.stiffness > 0 ? mean.force / mean.spring.stiffness : 0;
+    state.means.push_back(mean);
+  }
+  state.felt[body].faults = faults;
+}
+
+// What the probe gives bodies and gets back. Part of moving_bodies.h.
+
+/// One spring on a body that touches nothing else: its impulse in closed form, given to the body as
+/// a blow at the mean time of that impulse, with the normal and the lever as they are then; before
+/// and after it the body moves freely. A bounce within a step so keeps the energy to rounding,
+/// however far the body turns in it: where speed, lever and inertia are of different times, it
+/// would not. Changes the body's motion.
+void MovingBodies::push_freely(BodiesState& state, ProbeContact& contact, double duration) const {
+  PressingSpring& spring = contact.spring;
+  const MovingBody& body = world_.bodies[spring.body];
+  const BodyMotion& before = state.before[spring.body];
+  BodiesState::Held& held = state.held[spring.body];
+  BodyMotion& motion = state.world.motion[spring.body];
+  // As it was at the beginning of the step.
+  const Rendering& felt = state.felt[spring.body];
+  constexpr double kSame = 1 - 2e-4;  // cosine; beyond it another feature is touched
+  const bool known =
+      held.holds &&
+      (felt.contacts == 0 ||
+       (felt.deepest.type == held.type &&
+        glm::dot(motion.orientation * held.contact.spring.normal, spring.normal) > kSame));
+  const Vec3 first_normal =
+      before.orientation *
+      (known ? held.contact.spring.normal : glm::conjugate(motion.orientation) * spring.normal);
+  const Vec3 first_place =
+      known ? out_of({before.centre, before.orientation}, held.contact.spring.place)
+            : contact.on_probe - contact.moved;
+  SpringStart start;
+  start.stiffness = spring.stiffness;
+  const double first_closing =
+      glm::dot(first_normal, velocity_at(spin_of(body.inertia, before), before, first_place) -
+                                 contact.moved / duration);
+  start.growth = (spring.closing - first_closing) / duration;
+  const Quat out_of_world = glm::conjugate(motion.orientation);
+  const Vec3 last_normal = out_of_world * spring.normal;
+  const Vec3 from_normal = glm::conjugate(before.orientation) * first_normal;
+  const Vec3 from_place = glm::conjugate(before.orientation) * (first_place - before.centre);
+  const Vec3 last_place = out_of_world * (spring.place - motion.centre);
+  constexpr int kRounds = 2;
+  double when = 0.5 * duration;  // s; of the blow
+  BodyMotion struck;
+  Vec3 normal, moment;
+  SpringPass pass;
+  for (int round = 1;; ++round) {
+    struck = before;
+    move_freely(body.inertia, world_.gravity, body.of.damping, when, struck);
+    const double share = when / duration;
+    normal = struck.orientation * glm::normalize(glm::mix(from_normal, last_normal, share));
+    const Vec3 lever = known ? struck.orientation * glm::mix(from_place, last_place, share)
+                             : contact.on_probe - (1 - share) * contact.moved - struck.centre;
+    moment = glm::cross(lever, normal);
+    const Vec3 turn = world_per_inertia(body.inertia, struck.orientation) * moment;
+    start.mass = 1 / (body.inertia.per_mass + glm::dot(turn, moment));
+    start.speed = glm::dot(normal, struck.velocity - contact.moved / duration) +
+                  glm::dot(turn, struck.spin_momentum) - when * start.growth;
+    start.depth = spring.depth - duration * (start.speed + 0.5 * duration * start.growth);
+    pass = pass_spring(start, duration);
+    if (!(pass.impulse > 0) || round == kRounds) break;
+    when = std::clamp(duration - pass.double_impulse / pass.impulse, 0.0, duration);
+  }
+  if (!held.holds) {
+    const double depth = std::max(0.0, start.depth);
+    held.energy = kinetic_energy(body.inertia, before) + 0.5 * spring.stiffness * depth * depth;
+    held.leeway = 0;
+    held.balanced = true;
+  }
+  held.energy += kinetic_energy(body.inertia, motion) - kinetic_energy(body.inertia, before) -
+                 glm::dot(world_.gravity, normal) * pass.double_impulse -
+                 pass.impulse * glm::dot(normal, contact.moved) / duration;
+  spring.impulse = pass.impulse;
+  contact.pressing = normal;
+  contact.depth_after = pass.depth;
+  struck.velocity -= pass.impulse * body.inertia.per_mass * normal;
+  struck.spin_momentum -= pass.impulse * moment;
+  move_freely(body.inertia, world_.gravity, body.of.damping, duration - when, struck);
+  struck.centre -=
+      (pass.double_impulse - pass.impulse * (duration - when)) * body.inertia.per_mass * normal;
+  motion = struck;
+  // Where the spring is in touch over several steps, its depth is exact but for the body's turning
+  // in them: of what the spring does along the body's way, the share that normal and lever turn by.
+  const double spin = std::max(glm::length(spin_of(body.inertia, before)),
+                               glm::length(spin_of(body.inertia, motion)));
+  const double speed = std::max(glm::length(before.velocity), glm::length(motion.velocity)) +
+                       spin * glm::distance(spring.place, motion.centre);
+  held.leeway += pass.impulse * speed * spin * duration;
+  balance(state, contact, moment, duration);
+}
+
+/// On its way off the probe a body's energy, with the spring's, has to be what it came with and
+/// what hand and weight have given it since. What steps of finite length have lost or won of it
+/// (some 1e-4, where the body turns on the probe) the impulse makes good, but no more than that:
+/// what else the sum is off by comes from the hand's way over edges and corners, and to give that
+/// to a heavy body, which hardly moves, would take the whole force of a tick.
+void MovingBodies::balance(BodiesState& state, ProbeContact& contact, const Vec3& moment,
+                           double duration) const {
+  constexpr double kMostShare = 1e-2;  // of the speed: more is no rounding of steps
+  PressingSpring& spring = contact.spring;
+  BodiesState::Held& held = state.held[spring.body];
+  if (contact.tangential != Vec3(0)) held.balanced = false;
+  if (!held.balanced) return;
+  const BodyInertia& inertia = world_.bodies[spring.body].inertia;
+  BodyMotion& motion = state.world.motion[spring.body];
+  const double leaving = glm::dot(contact.pressing, motion.velocity - contact.moved / duration) +
+                         glm::dot(moment, spin_of(inertia, motion));
+  const double per_mass =
+      inertia.per_mass + glm::dot(moment, world_per_inertia(inertia, motion.orientation) * moment);
+  const double depth = std::max(0.0, contact.depth_after);
+  const double surplus = std::clamp(
+      kinetic_energy(inertia, motion) + 0.5 * spring.stiffness * depth * depth - held.energy,
+      -held.leeway, held.leeway);
+  const double under = leaving * leaving - 2 * surplus * per_mass;
+  if (!(leaving < 0) || !(under >= 0.25 * leaving * leaving)) return;
+  const double impulse = std::max((leaving + std::sqrt(under)) / per_mass, -spring.impulse);
+  if (!(std::abs(impulse) * per_mass <= -kMostShare * leaving)) return;
+  spring.impulse += impulse;
+  held.leeway = std::max(0.0, held.leeway - std::abs(surplus));
+  held.energy -= impulse * glm::dot(contact.pressing, contact.moved) / duration;
+  motion.velocity -= impulse * inertia.per_mass * contact.pressing;
+  motion.spin_momentum -= impulse * moment;
+}
+
+/// What presses on a body in a step that holds it apart from other things, too.
+void MovingBodies::add_springs(BodiesState& state, std::size_t first, std::size_t end,
+                               double duration) const {
+  const std::uint32_t body = state.contacts[first].spring.body;
+  state.held[body].holds = false;
+  state.chosen[body] = 1;
+  for (std::size_t k = first; k < end; ++k) {
+    PressingSpring& spring = state.contacts[k].spring;
+    const BodyMotion &from = state.before[body], &to = state.ahead[body];
+    const Vec3 began =
+        from.orientation * (glm::conjugate(to.orientation) * (spring.place - to.centre)) +
+        from.centre;
+    spring.free_speed = -glm::dot(spring.normal, spring.place - began) / duration;
+    spring.impulse = 0;
+    state.springs.push_back(spring);
+  }
+}
+
+/// Moves the chosen bodies on from where they began, with the springs.
+void MovingBodies::push_pressed(BodiesState& state, double duration) const {
+  step_pressed(world_, state.world, state.chosen, state.springs, duration);
+  std::size_t next = 0;
+  for (ProbeContact& contact : state.contacts) {
+    if (next < state.springs.size() && state.springs[next].body == contact.spring.body)
+      contact.spring.impulse = state.springs[next++].impulse;
+  }
+}
+
+/// Gives the bodies what the probe pushes them with.
+void MovingBodies::push_held(BodiesState& state, const Stroke& stroke) const {
+  const double duration = stroke.duration;
+  std::fill(state.chosen.begin(), state.chosen.end(), 0);
+  state.springs.clear();
+  for (std::size_t first = 0; first < state.contacts.size();) {
+    std::size_t end = first + 1;
+    const std::uint32_t body = state.contacts[first].spring.body;
+    while (end < state.contacts.size() && state.contacts[end].spring.body == body) ++end;
+    ProbeContact& only = state.contacts[first];
+    bool alone = end == first + 1 && only.spring.damping == 0;
+    if (alone) {
+      push_freely(state, only, duration);
+      state.held[body].holds = false;
+      // With that it must not meet anything: seen from where it began.
+      const double way = glm::distance(state.world.motion[body].centre, state.ahead[body].centre);
+      const BodyMotion pushed = state.world.motion[body];
+      std::swap(state.world.motion, state.before);
+      std::vector<char>& marked = state.chosen;
+      const char was = std::exchange(marked[body], 1);
+      alone = !mark_connected(world_, state.world, duration, 2 * way, marked);
+      std::swap(state.world.motion, state.before);
+      if (alone) marked[body] = was;
+      if (alone) {
+        hold(state, stroke, only);
+        only.spring.normal = only.pressing;
+      }
+      state.world.motion[body] = alone ? pushed : state.ahead[body];
+    }
+    if (!alone) add_springs(state, first, end, duration);
+    first = end;
+  }
+  if (!state.springs.empty()) {
+    std::swap(state.world.motion, state.before);
+    mark_connected(world_, state.world, duration, 0, state.chosen);
+    for (std::size_t i = 0; i < world_.bodies.size(); ++i) {
+      if (!state.chosen[i]) state.world.motion[i] = state.before[i];
+    }
+    push_pressed(state, duration);
+  }
+}
+
+void MovingBodies::remember_depth(BodiesState& state, std::size_t body) const {
+  double& deepest = state.held[body].deepest = 0;
+  for (const ProbeContact& contact : state.contacts) {
+    if (contact.spring.body == body)
+      deepest = std::max({deepest, contact.felt_depth, contact.depth_after});
+  }
+}
+
+/// The mean force of the step, and friction's share of it. Friction is a spring along the surface;
+/// it yields as the body would within the step, so that a light body does not ring.
+void MovingBodies::push_sideways(BodiesState& state, ProbeContact& contact, double duration) const {
+  const PressingSpring& spring = contact.spring;
+  const MovingBody& body = world_.bodies[spring.body];
+  BodyMotion& motion = state.world.motion[spring.body];
+  const double elastic = contact.force;
+  contact.force = spring.impulse / duration;
+  contact.felt_depth = spring.stiffness > 0 ? contact.force / spring.stiffness : 0;
+  const double sideways = glm::length(contact.tangential);
+  if (!(sideways > 0)) return;
+  const Vec3 direction = contact.tangential / sideways;
+  const Vec3 moment = glm::cross(spring.place - motion.centre, direction);
+  const Vec3 turn = world_per_inertia(body.inertia, motion.orientation) * moment;
+  const double per_mass = body.inertia.per_mass + glm::dot(turn, moment);
+  const double yield = 1 + duration * duration * spring.stiffness * per_mass;
+  const double share = elastic > 0 ? std::min(1.0, contact.force / elastic) : 0;
+  contact.tangential *= share / yield;
+  contact.offset *= share / yield;
+  const double impulse = sideways * share / yield * duration;
+  motion.velocity -= impulse * body.inertia.per_mass * direction;
+  motion.spin_momentum -= impulse * moment;
+}
+
+// The wrench of all that is touched, bodies with what stands still. Part of moving_bodies.h.
+
+/// Adds what one body does to the hand.
+void MovingBodies::add_body(const Renderer& renderer, const BodiesState& state, std::size_t body,
+                            const LineProbe& probe, Rendering& out) const {
+  const Rendering& felt = state.felt[body];
+  const bool tool = fixed_.tool() != nullptr;
+  const Quat& turn = state.shown[body].orientation;
+  out.faults |= felt.faults;
+  const ProbeContact* deepest = nullptr;
+  Vec3 torque(0);
+  double along = 0;  // N m, as in sum_unions
+  const Vec3 d = probe.tail - probe.tip;
+  const double length2 = glm::dot(d, d);
+  for (const ProbeContact& c : state.contacts) {
+    if (c.spring.body != body || !(c.force > 0)) continue;
+    const Vec3 force = c.force * c.spring.normal + c.tangential;
+    const Vec3 place = c.on_probe + c.felt_depth * c.spring.normal + c.offset;
+    out.force += force;
+    ++out.contacts;
+    if (renderer.side_contact()) {
+      torque += glm::cross(place - probe.tip, force);
+      if (tool && length2 > 0)
+        along += glm::dot(place - probe.tip, d) * glm::dot(force, d) / length2;
+      if (!tool) out.device2 += c.along * force;
+    }
+    if (deepest == nullptr || c.felt_depth > deepest->felt_depth) deepest = &c;
+  }
+  out.torque += torque;
+  if (tool && renderer.side_contact()) out.device2 += tail_force(torque, along, d);
+  if (deepest == nullptr || (out.object >= 0 && deepest->felt_depth <= out.deepest.depth)) return;
+  Vec3 shift = deepest->offset;
+  for (const ProbeContact& c : state.contacts) {
+    if (c.spring.body == body && c.spring.group == deepest->spring.group)
+      shift += c.felt_depth * c.spring.normal;
+  }
+  out.deepest = felt.deepest;
+  if (felt.contacts == 0) out.deepest.type = state.held[body].type;
+  out.deepest.along = renderer.side_contact() ? deepest->along * std::sqrt(length2) : 0;
+  out.deepest.normal = deepest->spring.normal;
+  out.deepest.depth = deepest->felt_depth;
+  out.deepest.point =
+      deepest->on_probe + deepest->felt_depth * deepest->spring.normal + deepest->offset;
+  out.ideal.tip = probe.tip + shift;
+  out.ideal.tail = out.ideal.tip + turn * (felt.ideal.tail - felt.ideal.tip);
+  out.object = world_.bodies[body].object;
+  if (tool) {
+    out.segment = deepest->segment;
+    out.ideal_side = turn * felt.ideal_side;
+  }
+}
+
+Rendering MovingBodies::sum(const Renderer& renderer, const BodiesState& state,
+                            const Rendering& fixed, const LineProbe& probe) const {
+  Rendering out = fixed;
+  if (state.world.dropped) out.faults |= render_fault::kContactsDropped;
+  for (std::size_t i = 0; i < world_.bodies.size(); ++i) add_body(renderer, state, i, probe, out);
+  out.device1 = out.force - out.device2;
+  const Vec3 all = out.force + out.torque + out.device2;
+  if (std::isfinite(all.x + all.y + all.z)) return out;
+  Rendering none;
+  none.ideal = probe;
+  none.faults = out.faults | render_fault::kNonFinite;
+  return none;
 }
 
 }  // namespace palpate::rendering

@@ -5,11 +5,10 @@
 #include <memory>
 #include <vector>
 
-#include "rendering/bodies/body_step.h"
 #include "rendering/bodies/body_world.h"
 #include "rendering/renderer.h"
 #include "rendering/scene.h"
-#include "rendering/tool_pose.h"
+#include "rendering/tool.h"
 #include "rendering/union_contact.h"
 
 namespace palpate::rendering {

@@ -3,8 +3,7 @@
 #include <cmath>
 #include <memory>
 
-#include "rendering/point_probe.h"
-#include "rendering/segment_probe.h"
+#include "rendering/probes.h"
 #include "rendering/tick.h"
 #include "rendering/verification/explain.h"
 #include "rendering/verification/surface_stroke.h"

@@ -9,7 +9,7 @@
 #include <new>
 #include <utility>
 
-#include "rendering/tool_pose.h"
+#include "rendering/tool.h"
 
 namespace palpate::runner {
 namespace {

@@ -2,7 +2,7 @@
 // Where a stimulus that moves is, as the store keeps it.
 
 #include "data/record.h"
-#include "rendering/motion.h"
+#include "rendering/probe.h"
 
 namespace palpate::runner {
 

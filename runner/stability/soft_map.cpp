@@ -7,8 +7,7 @@
 #include <limits>
 #include <memory>
 
-#include "rendering/bodies/soft/soft_build.h"
-#include "rendering/bodies/soft/soft_coupling.h"
+#include "rendering/bodies/soft/soft_scene.h"
 #include "stimuli/random.h"
 #include "stimuli/solids/solid_mesh.h"
 

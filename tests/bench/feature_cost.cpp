@@ -11,8 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "rendering/point_probe.h"
-#include "rendering/segment_probe.h"
+#include "rendering/probes.h"
 #include "rendering/tick.h"
 #include "rendering/verification/surface_stroke.h"
 #include "stimuli/primitives.h"

@@ -1,14 +1,13 @@
 // Tracking the probe before the contact gives the same first contact as testing every facet and
 // edge.
 
-#include "rendering/approach.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
 
+#include "rendering/contact_detection.h"
 #include "stimuli/primitives.h"
 #include "tests/shared/probe_paths.h"
 #include "tests/shared/random_mesh.h"

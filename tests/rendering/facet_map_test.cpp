@@ -1,8 +1,6 @@
 // Where walks over a large mesh begin: near the place that they look for on any shape, and so that
 // nothing but time depends on it.
 
-#include "rendering/facet_map.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -12,7 +10,8 @@
 #include <set>
 #include <vector>
 
-#include "rendering/pair_cast.h"
+#include "rendering/direction_maps.h"
+#include "rendering/near_pairs.h"
 #include "rendering/renderer.h"
 #include "stimuli/primitives.h"
 #include "tests/shared/probe_paths.h"

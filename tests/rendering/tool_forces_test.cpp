@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "rendering/force.h"
+#include "rendering/contact.h"
 #include "rendering/renderer.h"
 #include "tests/shared/random_clusters.h"
 

@@ -7,7 +7,7 @@
 
 #include <numbers>
 
-#include "rendering/active_planes.h"
+#include "rendering/union_state.h"
 #include "runner/bench/allocation_count.h"
 #include "tests/shared/union_scenes.h"
 

@@ -2,7 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <limits>
+#include <map>
+#include <numeric>
 #include <stdexcept>
 #include <utility>
 
@@ -199,6 +203,219 @@ void SoftBody::find_trial_gradient(SoftState& state) const noexcept {
   solid_.energy(state.trial, state.strains, settings_.material.damping / settings_.step,
                 state.trial_gradient.data());
   work_against(state, state.trial, state.trial_gradient.data());
+}
+
+// One step of a soft body: quasi-Newton with a guard.
+
+namespace {
+
+constexpr double kArmijo = 1e-4;  // of the decrease that the slope promises
+constexpr int kHalvings = 30;
+constexpr double kRounding = 1e-14;  // of the energy: less is no increase
+// Where a whole step lowers the potential by this share of what the quadratic model says, or less
+// than 1 / it, the model does not hold, and another iteration is worth its time.
+constexpr double kTrusted = 0.9;
+
+double longest(const std::vector<Vec3>& ways) {
+  double square = 0;
+  for (const Vec3& way : ways) square = std::max(square, glm::dot(way, way));
+  return std::sqrt(square);
+}
+
+double dot(const std::vector<Vec3>& a, const std::vector<Vec3>& b) {
+  double sum = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) sum += glm::dot(a[i], b[i]);
+  return sum;
+}
+
+}  // namespace
+
+/// m, that the body moves in a step as a whole, if nothing holds it: no search for the least
+/// potential may take its momentum.
+Vec3 SoftBody::rigid_way(const SoftState& state) const noexcept {
+  if (free_nodes_.size() < state.x.size()) return Vec3(0);
+  Vec3 momentum(0);
+  double mass = 0;
+  for (std::size_t i = 0; i < state.x.size(); ++i) {
+    momentum += solid_.masses()[i] * state.v[i];
+    mass += solid_.masses()[i];
+  }
+  return settings_.step * (momentum / mass + settings_.step * settings_.gravity);
+}
+
+/// From state.trial along state.step to what lowers the potential, which is put into state.trial.
+/// \param change  the potential at the trial; changed with it
+SoftBody::LineSearch SoftBody::search_line(SoftState& state, double& change) const noexcept {
+  const double slope = dot(state.trial_gradient, state.step);
+  const double rounding = kRounding * (std::abs(state.energy) + std::abs(change));
+  if (!(-slope > rounding)) return LineSearch::stays;
+  // Where elements are inside out the stiffness at rest may promise ways of many times the body.
+  const double most = longest(state.step);
+  double part = most > extent_ ? extent_ / most : 1;
+  for (int halving = 0; halving <= kHalvings; ++halving, part *= 0.5) {
+    for (std::size_t i = 0; i < state.trial.size(); ++i) state.trial[i] += part * state.step[i];
+    const double there = change_at_trial(state);
+    if (there <= change + kArmijo * part * slope + rounding) {
+      const double share = (change - there) / (-0.5 * slope);
+      change = there;
+      if (part < 1) ++state.shortened;
+      return part == 1 && share > kTrusted && share < 1 / kTrusted ? LineSearch::as_expected
+                                                                   : LineSearch::moves;
+    }
+    for (std::size_t i = 0; i < state.trial.size(); ++i) state.trial[i] -= part * state.step[i];
+    state.next_is_trial = false;
+  }
+  return LineSearch::stays;
+}
+
+void SoftBody::step(SoftState& state, std::span<const NodeForce> forces) const noexcept {
+  const double h = settings_.step;
+  add_forces(state, forces);
+  ++state.steps;
+  const Vec3 way = rigid_way(state);
+  double change = 0;
+  for (std::size_t i = 0; i < state.x.size(); ++i) {
+    const double mass = solid_.masses()[i];
+    const Vec3 pull = state.load[i] + mass * (state.v[i] / h + settings_.gravity);
+    const Vec3 inertia = mass / (h * h) * way;
+    state.trial[i] = state.x[i] + way;
+    state.trial_gradient[i] = is_fixed_[i] ? Vec3(0) : state.gradient[i] - pull + inertia;
+    state.step[i] = state.ahead[i] - way;
+    change += glm::dot(way, 0.5 * inertia - pull);
+  }
+  state.next_is_trial = false;
+  LineSearch found = search_line(state, change);
+  for (int iteration = 1; found == LineSearch::moves && iteration < settings_.iterations;
+       ++iteration) {
+    find_trial_gradient(state);
+    for (std::size_t i = 0; i < state.x.size(); ++i) {
+      if (is_fixed_[i]) state.trial_gradient[i] = Vec3(0);
+      state.step[i] = -state.trial_gradient[i];
+    }
+    solve(state, state.step);
+    found = search_line(state, change);
+  }
+  for (std::size_t i = 0; i < state.x.size(); ++i) {
+    state.v[i] = (state.trial[i] - state.x[i]) / h;
+    state.x[i] = state.trial[i];
+  }
+  if (state.next_is_trial) {
+    state.energy = state.next_energy;
+    std::swap(state.gradient, state.next_gradient);
+    std::swap(state.strains, state.next_strains);
+  } else {
+    state.energy = solid_.energy(state.x, state.gradient.data(), state.strains);
+  }
+  look_ahead(state);
+}
+
+namespace {
+
+constexpr std::size_t kClusterTriangles = 16;
+
+/// Cuts a list of things with places in halves along their longest extent.
+void halve(std::vector<std::uint32_t>& order, std::size_t from, std::size_t to,
+           const std::vector<Vec3>& places, std::vector<std::size_t>& ends) {
+  if (to - from <= kClusterTriangles) {
+    ends.push_back(to);
+    return;
+  }
+  Vec3 low(std::numeric_limits<double>::infinity()), high = -low;
+  for (std::size_t i = from; i < to; ++i) {
+    low = glm::min(low, places[order[i]]);
+    high = glm::max(high, places[order[i]]);
+  }
+  const Vec3 size = high - low;
+  const int axis = size.x >= size.y && size.x >= size.z ? 0 : (size.y >= size.z ? 1 : 2);
+  std::stable_sort(
+      order.begin() + static_cast<std::ptrdiff_t>(from),
+      order.begin() + static_cast<std::ptrdiff_t>(to),
+      [&](std::uint32_t a, std::uint32_t b) { return places[a][axis] < places[b][axis]; });
+  const std::size_t middle = from + (to - from) / 2;
+  halve(order, from, middle, places, ends);
+  halve(order, middle, to, places, ends);
+}
+
+}  // namespace
+
+SoftSurface::SoftSurface(const SoftBody& body) {
+  const auto& surface = body.surface();
+  std::vector<Vec3> places;
+  places.reserve(surface.size());
+  for (const stimuli::SurfaceTriangle& t : surface) {
+    places.push_back((body.mesh().nodes[t[0]] + body.mesh().nodes[t[1]] + body.mesh().nodes[t[2]]) /
+                     3.0);
+  }
+  std::vector<std::uint32_t> order(surface.size());
+  std::iota(order.begin(), order.end(), 0U);
+  std::vector<std::size_t> ends;
+  halve(order, 0, order.size(), places, ends);
+  for (const std::uint32_t t : order) {
+    triangles_.push_back({body.surface_index(surface[t][0]), body.surface_index(surface[t][1]),
+                          body.surface_index(surface[t][2])});
+  }
+  std::map<std::pair<std::uint32_t, std::uint32_t>, std::size_t> known;
+  std::vector<bool> owned(body.surface_nodes().size(), false);
+  std::uint32_t first = 0;
+  for (const std::size_t end : ends) {
+    Cluster cluster{first, static_cast<std::uint32_t>(end) - first,
+                    static_cast<std::uint32_t>(edges_.size()), 0};
+    for (std::uint32_t t = first; t < end; ++t) {
+      for (std::size_t k = 0; k < 3; ++k) {
+        const std::uint32_t a = triangles_[t][k], b = triangles_[t][(k + 1) % 3];
+        const auto [found, is_new] = known.try_emplace(std::minmax(a, b), edges_.size());
+        if (!is_new) {
+          edges_[found->second].triangles[1] = t;
+          continue;
+        }
+        edges_.push_back({{a, b}, {t, t}, {!owned[a], !owned[b]}});
+        owned[a] = owned[b] = true;
+      }
+    }
+    cluster.edges = static_cast<std::uint32_t>(edges_.size()) - cluster.first_edge;
+    clusters_.push_back(cluster);
+    first = static_cast<std::uint32_t>(end);
+  }
+}
+
+SoftView SoftSurface::first_view(const SoftBody& body, const SoftState& state) const {
+  SoftView view;
+  for (auto* const field : {&view.x, &view.ahead, &view.by_load})
+    field->resize(body.surface_nodes().size());
+  view.normals.resize(triangles_.size());
+  view.boxes.resize(clusters_.size());
+  look(body, state, view);
+  return view;
+}
+
+void SoftSurface::look(const SoftBody& body, const SoftState& state,
+                       SoftView& view) const noexcept {
+  const auto& nodes = body.surface_nodes();
+  for (std::size_t i = 0; i < nodes.size(); ++i) {
+    view.x[i] = state.x[nodes[i]];
+    view.ahead[i] = state.ahead[nodes[i]];
+    view.by_load[i] = state.by_load[nodes[i]];
+  }
+  for (std::size_t t = 0; t < triangles_.size(); ++t) {
+    const auto& [a, b, c] = triangles_[t];
+    const Vec3 normal = glm::cross(view.x[b] - view.x[a], view.x[c] - view.x[a]);
+    const double length = glm::length(normal);
+    view.normals[t] = length > 0 ? normal / length : Vec3(0);
+  }
+  for (std::size_t c = 0; c < clusters_.size(); ++c) {
+    SoftView::Box box{Vec3(std::numeric_limits<double>::infinity()),
+                      Vec3(-std::numeric_limits<double>::infinity())};
+    const auto add = [&](std::uint32_t node) {
+      const Vec3 later = view.x[node] + 2.0 * view.ahead[node];
+      box.low = glm::min(box.low, glm::min(view.x[node], later));
+      box.high = glm::max(box.high, glm::max(view.x[node], later));
+    };
+    const Cluster& of = clusters_[c];
+    for (std::uint32_t t = of.first_triangle; t < of.first_triangle + of.triangles; ++t) {
+      for (const std::uint32_t node : triangles_[t]) add(node);
+    }
+    view.boxes[c] = box;
+  }
 }
 
 }  // namespace palpate::rendering

@@ -8,13 +8,13 @@
 // stiffness at rest, not a Laplacian. Guarded: it starts from the last positions, and accepts only
 // what lowers the potential, so a step cannot diverge, whatever the forces.
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <span>
 #include <vector>
 
-#include "rendering/bodies/soft/factor.h"
 #include "rendering/bodies/soft/solid.h"
 #include "stimuli/solids/solid_mesh.h"
 
@@ -106,6 +106,50 @@ class SoftBody {
   std::vector<stimuli::SurfaceTriangle> surface_;
   std::vector<std::uint32_t> surface_nodes_, surface_index_;
   std::vector<float> compliance_;
+};
+
+// The surface of a soft body as a tool meets it: triangles, edges and corners that move. World
+// frame, m.
+
+/// What a servo knows of a soft body between two of its steps; all by surface node. With the load
+/// of the last step held, a node goes from x to x + ahead within a step.
+struct SoftView {
+  std::vector<Vec3> x, ahead;
+  std::vector<Vec3> by_load;  ///< the part of where a node is that is the load's, by the compliance
+  std::vector<Vec3> normals;  ///< of the triangles, outwards, unit; zero where one is flat
+  struct Box {
+    Vec3 low, high;
+  };
+  std::vector<Box> boxes;  ///< of the clusters, at x and two steps on
+};
+
+/// Immutable.
+class SoftSurface {
+ public:
+  struct Edge {
+    std::array<std::uint32_t, 2> nodes;      ///< surface nodes
+    std::array<std::uint32_t, 2> triangles;  ///< on both sides
+    std::array<bool, 2> owns;                ///< its ends that no other edge stands for
+  };
+  /// Edges and triangles that are near each other.
+  struct Cluster {
+    std::uint32_t first_triangle = 0, triangles = 0, first_edge = 0, edges = 0;
+  };
+
+  explicit SoftSurface(const SoftBody& body);
+
+  const std::vector<std::array<std::uint32_t, 3>>& triangles() const { return triangles_; }
+  const std::vector<Edge>& edges() const { return edges_; }
+  const std::vector<Cluster>& clusters() const { return clusters_; }
+
+  SoftView first_view(const SoftBody& body, const SoftState& state) const;
+  /// Does not allocate where the view is of this surface.
+  void look(const SoftBody& body, const SoftState& state, SoftView& view) const noexcept;
+
+ private:
+  std::vector<std::array<std::uint32_t, 3>> triangles_;  ///< surface nodes; by cluster
+  std::vector<Edge> edges_;                              ///< by cluster
+  std::vector<Cluster> clusters_;
 };
 
 }  // namespace palpate::rendering

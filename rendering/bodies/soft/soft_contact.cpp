@@ -6,8 +6,6 @@
 #include <glm/geometric.hpp>
 #include <limits>
 
-#include "rendering/bodies/soft/segment_distance.h"
-
 namespace palpate::rendering {
 namespace {
 

@@ -1,15 +1,205 @@
 #include "rendering/bodies/soft/solid.h"
 
+#include <Eigen/SparseCholesky>
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <glm/mat3x3.hpp>
 #include <glm/matrix.hpp>
+#include <span>
 #include <stdexcept>
 #include <string>
 #include <type_traits>
 
-#include "rendering/bodies/soft/element_shapes.h"
+namespace palpate::rendering::elements {
+
+// Shape functions of the elements, and where they are integrated. The room's own.
+
+/// Derivatives of the shape functions by the element's own coordinates, at a point of integration.
+template <int kNodes>
+struct Derivatives {
+  double value[kNodes];
+  double slope[kNodes][3];
+  double weight;
+};
+
+/// Trilinear hexahedron, 2 x 2 x 2 points of Gauss.
+inline Derivatives<8> at_point(std::integral_constant<int, 8> /*nodes*/, int point) {
+  constexpr int kSigns[8][3] = {{-1, -1, -1}, {1, -1, -1}, {1, 1, -1}, {-1, 1, -1},
+                                {-1, -1, 1},  {1, -1, 1},  {1, 1, 1},  {-1, 1, 1}};
+  const double g = 1 / std::sqrt(3.0);
+  double at[3];
+  for (int i = 0; i < 3; ++i) at[i] = g * kSigns[point][i];
+  Derivatives<8> d{};
+  d.weight = 1;
+  for (int a = 0; a < 8; ++a) {
+    double f[3];
+    for (int i = 0; i < 3; ++i) f[i] = 0.5 * (1 + kSigns[a][i] * at[i]);
+    d.value[a] = f[0] * f[1] * f[2];
+    for (int i = 0; i < 3; ++i)
+      d.slope[a][i] = 0.5 * kSigns[a][i] * f[(i + 1) % 3] * f[(i + 2) % 3];
+  }
+  return d;
+}
+
+/// Quadratic tetrahedron, four points, exact to second degree (Keast 1986).
+inline Derivatives<10> at_point(std::integral_constant<int, 10> /*nodes*/, int point) {
+  constexpr int kEdges[6][2] = {{0, 1}, {1, 2}, {0, 2}, {0, 3}, {1, 3}, {2, 3}};
+  const double small = (5 - std::sqrt(5.0)) / 20;
+  double l[4];
+  for (int i = 0; i < 4; ++i) l[i] = i == point ? 1 - 3 * small : small;
+  constexpr double kSlopes[4][3] = {{-1, -1, -1}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+  Derivatives<10> d{};
+  d.weight = 1.0 / 24;
+  for (int a = 0; a < 4; ++a) {
+    d.value[a] = l[a] * (2 * l[a] - 1);
+    for (int i = 0; i < 3; ++i) d.slope[a][i] = (4 * l[a] - 1) * kSlopes[a][i];
+  }
+  for (int e = 0; e < 6; ++e) {
+    const int a = kEdges[e][0], b = kEdges[e][1];
+    d.value[4 + e] = 4 * l[a] * l[b];
+    for (int i = 0; i < 3; ++i)
+      d.slope[4 + e][i] = 4 * (l[a] * kSlopes[b][i] + l[b] * kSlopes[a][i]);
+  }
+  return d;
+}
+
+}  // namespace palpate::rendering::elements
 
 namespace palpate::rendering {
+
+Factor::Factor(std::size_t size, const std::vector<MatrixEntry>& entries) {
+  using Matrix = Eigen::SparseMatrix<double>;
+  std::vector<Eigen::Triplet<double>> triplets;
+  triplets.reserve(entries.size());
+  for (const MatrixEntry& e : entries) {
+    if (e.row >= e.column)
+      triplets.emplace_back(static_cast<int>(e.row), static_cast<int>(e.column), e.value);
+  }
+  const auto n = static_cast<Eigen::Index>(size);
+  Matrix matrix(n, n);
+  matrix.setFromTriplets(triplets.begin(), triplets.end());
+  const Eigen::SimplicialLLT<Matrix> cholesky(matrix);
+  if (cholesky.info() != Eigen::Success)
+    throw std::invalid_argument("a matrix that is not positive definite");
+  const Matrix lower = cholesky.matrixL();
+  order_.resize(size);
+  for (std::size_t i = 0; i < size; ++i)
+    order_[i] =
+        static_cast<std::uint32_t>(cholesky.permutationP().indices()[static_cast<Eigen::Index>(i)]);
+  const auto pattern = [&](Eigen::Index column) {
+    return std::span<const int>(lower.innerIndexPtr() + lower.outerIndexPtr()[column],
+                                lower.innerIndexPtr() + lower.outerIndexPtr()[column + 1]);
+  };
+  entries_ = static_cast<std::size_t>(lower.nonZeros());
+  for (Eigen::Index first = 0; first < n;) {
+    Eigen::Index next = first + 1;  // each pattern begins with the diagonal
+    while (next < n && std::ranges::equal(pattern(next - 1).subspan(1), pattern(next))) ++next;
+    const std::span<const int> below = pattern(next - 1).subspan(1);
+    Panel panel;
+    panel.first_column = static_cast<std::uint32_t>(first);
+    panel.columns = static_cast<std::uint32_t>(next - first);
+    panel.first_row = static_cast<std::uint32_t>(rows_.size());
+    panel.rows = static_cast<std::uint32_t>(below.size());
+    panel.triangle = values_.size();
+    panel.below = panel.triangle + std::size_t{panel.columns} * panel.columns;
+    values_.resize(panel.below + std::size_t{panel.rows} * panel.columns);
+    rows_.insert(rows_.end(), below.begin(), below.end());
+    for (std::size_t c = 0; c < panel.columns; ++c) {
+      const auto column = first + static_cast<Eigen::Index>(c);
+      const double* const value = lower.valuePtr() + lower.outerIndexPtr()[column];
+      const std::size_t in_triangle = panel.columns - c;
+      double* const triangle = values_.data() + panel.triangle + c * panel.columns + c;
+      std::copy(value, value + in_triangle, triangle);
+      triangle[0] = 1 / triangle[0];
+      std::copy(value + in_triangle, value + in_triangle + panel.rows,
+                values_.data() + panel.below + c * panel.rows);
+    }
+    panels_.push_back(panel);
+    first = next;
+  }
+}
+
+// Side s of row i is at [i * kSides + s].
+template <std::size_t kSides>
+void Factor::solve_sides(double* b, double* work) const {
+  const std::size_t n = order_.size();
+  double* const gathered = work + n * kSides;
+  for (std::size_t i = 0; i < n; ++i) {
+    for (std::size_t s = 0; s < kSides; ++s) work[order_[i] * kSides + s] = b[i * kSides + s];
+  }
+  for (const Panel& panel : panels_) {
+    double* const own = work + std::size_t{panel.first_column} * kSides;
+    // A force at a few places leaves most of the columns out of its way to the root.
+    if (std::all_of(own, own + panel.columns * kSides, [](double x) { return x == 0; })) continue;
+    const std::size_t rows = panel.rows;
+    std::fill(gathered, gathered + rows * kSides, 0.0);
+    for (std::size_t c = 0; c < panel.columns; ++c) {
+      const double* const triangle = values_.data() + panel.triangle + c * panel.columns;
+      const double* const below = values_.data() + panel.below + c * rows;
+      double x[kSides];
+      for (std::size_t s = 0; s < kSides; ++s)
+        x[s] = own[c * kSides + s] = own[c * kSides + s] * triangle[c];
+      for (std::size_t k = c + 1; k < panel.columns; ++k) {
+        for (std::size_t s = 0; s < kSides; ++s) own[k * kSides + s] -= triangle[k] * x[s];
+      }
+      for (std::size_t k = 0; k < rows; ++k) {
+        for (std::size_t s = 0; s < kSides; ++s) gathered[k * kSides + s] += below[k] * x[s];
+      }
+    }
+    const std::uint32_t* const where = rows_.data() + panel.first_row;
+    for (std::size_t k = 0; k < rows; ++k) {
+      for (std::size_t s = 0; s < kSides; ++s)
+        work[where[k] * kSides + s] -= gathered[k * kSides + s];
+    }
+  }
+  for (std::size_t p = panels_.size(); p-- > 0;) {
+    const Panel& panel = panels_[p];
+    double* const own = work + std::size_t{panel.first_column} * kSides;
+    const std::size_t rows = panel.rows;
+    const std::uint32_t* const where = rows_.data() + panel.first_row;
+    for (std::size_t k = 0; k < rows; ++k) {
+      for (std::size_t s = 0; s < kSides; ++s)
+        gathered[k * kSides + s] = work[where[k] * kSides + s];
+    }
+    for (std::size_t c = panel.columns; c-- > 0;) {
+      const double* const triangle = values_.data() + panel.triangle + c * panel.columns;
+      const double* const below = values_.data() + panel.below + c * rows;
+      double x[kSides];
+      for (std::size_t s = 0; s < kSides; ++s) x[s] = own[c * kSides + s];
+      for (std::size_t k = c + 1; k < panel.columns; ++k) {
+        for (std::size_t s = 0; s < kSides; ++s) x[s] -= triangle[k] * own[k * kSides + s];
+      }
+      if constexpr (kSides == 1) {
+        // Four sums side by side: the additions do not wait for each other.
+        double sums[4] = {};
+        std::size_t k = 0;
+        for (; k + 4 <= rows; k += 4) {
+          for (std::size_t i = 0; i < 4; ++i) sums[i] += below[k + i] * gathered[k + i];
+        }
+        for (; k < rows; ++k) sums[0] += below[k] * gathered[k];
+        x[0] -= (sums[0] + sums[1]) + (sums[2] + sums[3]);
+      } else {
+        for (std::size_t k = 0; k < rows; ++k) {
+          for (std::size_t s = 0; s < kSides; ++s) x[s] -= below[k] * gathered[k * kSides + s];
+        }
+      }
+      for (std::size_t s = 0; s < kSides; ++s) own[c * kSides + s] = x[s] * triangle[c];
+    }
+  }
+  for (std::size_t i = 0; i < n; ++i) {
+    for (std::size_t s = 0; s < kSides; ++s) b[i * kSides + s] = work[order_[i] * kSides + s];
+  }
+}
+
+void Factor::solve(std::span<double> b, std::span<double> work) const {
+  solve_sides<1>(b.data(), work.data());
+}
+
+void Factor::solve_several(std::span<double> b, std::span<double> work) const {
+  solve_sides<kTogether>(b.data(), work.data());
+}
+
 namespace {
 
 /// Several 3 x 3 matrices side by side: [row][column][which].

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "rendering/motion.h"
+#include "rendering/probe.h"
 #include "rendering/renderer.h"
 #include "runner/commands/shared/csv_text.h"
 

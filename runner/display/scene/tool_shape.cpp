@@ -1,6 +1,6 @@
 #include "runner/display/scene/tool_shape.h"
 
-#include "rendering/tool_pose.h"
+#include "rendering/tool.h"
 
 namespace palpate::runner {
 namespace {

@@ -6,7 +6,7 @@
 #include <glm/geometric.hpp>
 
 #include "rendering/bodies/body_contacts.h"
-#include "rendering/motion.h"
+#include "rendering/probe.h"
 #include "runner/bench/allocation_count.h"
 #include "stimuli/random.h"
 #include "tests/rendering/bodies/body_fixtures.h"

@@ -7,9 +7,9 @@
 #include <vector>
 
 #include "rendering/bodies/body_world.h"
-#include "rendering/bodies/mass_properties.h"
 #include "rendering/bodies/moving_bodies.h"
 #include "rendering/bodies/moving_scene.h"
+#include "rendering/bodies/rigid_motion.h"
 #include "rendering/renderer.h"
 #include "rendering/scene.h"
 #include "stimuli/convex_mesh.h"

@@ -1,11 +1,10 @@
-#include "rendering/bodies/body_sleep.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <ctime>
 #include <glm/geometric.hpp>
 
+#include "rendering/bodies/body_world.h"
 #include "tests/rendering/bodies/body_fixtures.h"
 
 namespace palpate::rendering::test {

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
-#include "rendering/bodies/spring_pass.h"
+#include "rendering/bodies/body_world.h"
 #include "stimuli/random.h"
 #include "tests/rendering/bodies/body_fixtures.h"
 

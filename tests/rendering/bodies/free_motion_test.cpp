@@ -4,8 +4,8 @@
 #include <glm/geometric.hpp>
 #include <numbers>
 
+#include "rendering/bodies/body_world.h"
 #include "rendering/bodies/rigid_motion.h"
-#include "rendering/bodies/spring_pass.h"
 #include "tests/rendering/bodies/body_fixtures.h"
 
 namespace palpate::rendering::test {

@@ -1,5 +1,3 @@
-#include "rendering/bodies/mass_properties.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -8,6 +6,7 @@
 #include <numbers>
 #include <vector>
 
+#include "rendering/bodies/rigid_motion.h"
 #include "stimuli/orientation.h"
 #include "tests/rendering/bodies/body_fixtures.h"
 

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
-#include "rendering/force.h"
+#include "rendering/contact.h"
 #include "stimuli/random.h"
 #include "tests/rendering/bodies/body_fixtures.h"
 

@@ -1,5 +1,7 @@
 // A tool on a soft body: Hertz, several contacts, the two rates, what a servo may not do.
 
+#include "rendering/bodies/soft/soft_contact.h"
+
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -7,8 +9,7 @@
 #include <glm/geometric.hpp>
 #include <vector>
 
-#include "rendering/bodies/soft/segment_distance.h"
-#include "rendering/bodies/soft/soft_coupling.h"
+#include "rendering/bodies/soft/soft_scene.h"
 #include "runner/bench/allocation_count.h"
 #include "stimuli/random.h"
 

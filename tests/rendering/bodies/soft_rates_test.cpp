@@ -10,7 +10,7 @@
 #include <limits>
 #include <string>
 
-#include "rendering/bodies/soft/soft_build.h"
+#include "rendering/bodies/soft/soft_scene.h"
 
 namespace palpate::rendering {
 namespace {

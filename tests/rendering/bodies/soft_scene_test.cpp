@@ -10,7 +10,6 @@
 #include <utility>
 #include <vector>
 
-#include "rendering/bodies/soft/soft_build.h"
 #include "rendering/renderer.h"
 #include "runner/bench/allocation_count.h"
 #include "stimuli/primitives.h"

@@ -9,7 +9,7 @@
 #include <glm/geometric.hpp>
 #include <random>
 
-#include "rendering/force.h"
+#include "rendering/contact.h"
 #include "rendering/renderer.h"
 #include "runner/display/scene/camera.h"
 #include "stimuli/primitives.h"

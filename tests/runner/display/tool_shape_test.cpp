@@ -6,7 +6,7 @@
 
 #include <glm/geometric.hpp>
 
-#include "rendering/tool_pose.h"
+#include "rendering/tool.h"
 #include "stimuli/primitives.h"
 
 namespace palpate::runner {

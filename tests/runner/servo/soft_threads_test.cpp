@@ -15,7 +15,7 @@
 #include <utility>
 #include <vector>
 
-#include "rendering/bodies/soft/soft_build.h"
+#include "rendering/bodies/soft/soft_scene.h"
 #include "rendering/renderer.h"
 #include "runner/bench/allocation_count.h"
 #include "runner/servo/servo_thread.h"

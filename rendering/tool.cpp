@@ -1,4 +1,4 @@
-#include "rendering/tool_pose.h"
+#include "rendering/tool.h"
 
 #include <algorithm>
 #include <glm/gtc/quaternion.hpp>

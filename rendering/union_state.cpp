@@ -1,4 +1,4 @@
-#include "rendering/active_planes.h"
+#include "rendering/union_state.h"
 
 #include <algorithm>
 #include <glm/geometric.hpp>

@@ -1,11 +1,11 @@
-#include "rendering/approach.h"
+#include "rendering/contact_detection.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <glm/geometric.hpp>
 
-#include "rendering/minkowski_facets.h"
+#include "rendering/facet_walk.h"
 
 namespace palpate::rendering {
 namespace {
