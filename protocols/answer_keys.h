@@ -1,8 +1,11 @@
 #pragma once
-// Keys of the keyboard by the names that a protocol gives them.
+// What an answer is on the outside: keys of the keyboard by the names that a protocol gives them,
+// and codes of events.
 
 #include <map>
 #include <string>
+
+#include "protocols/protocol.h"
 
 namespace palpate::protocols {
 
@@ -22,5 +25,22 @@ class KeysTaken {
  private:
   std::map<std::string, std::string> names_;  ///< by one_key()
 };
+
+// What other recorders get for the events of a session: a byte each.
+
+class ObjectReader;
+
+/// By the event's name, "trial_start" or "response:cube"; 1 to 255.
+using EventCodes = std::map<std::string, int>;
+
+/// Of the events that every protocol has.
+EventCodes usual_event_codes();
+
+/// Reads `codes` of a protocol whose stimuli, keys and blocks are read already. Events without a
+/// code of their own keep the usual one.
+EventCodes read_event_codes(ObjectReader& reader, const Protocol& protocol);
+
+/// Of a protocol that has no fault, from its text: nobody but a live session asks for them.
+EventCodes event_codes(const Protocol& protocol);
 
 }  // namespace palpate::protocols

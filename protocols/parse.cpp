@@ -1,10 +1,113 @@
 #include "protocols/parse.h"
 
+#include <algorithm>
+#include <cstddef>
+#include <map>
+#include <optional>
+#include <set>
+#include <string>
 #include <utility>
 
+#include "protocols/answer_keys.h"
+#include "protocols/json_document.h"
+#include "protocols/parse_scene.h"
+#include "protocols/protocol.h"
+#include "protocols/schedule.h"
+#include "protocols/sha256.h"
+#include "protocols/tasks/parse_blocks.h"
 #include "stimuli/text.h"
 
 namespace palpate::protocols {
+
+/// Reads `keys` of a response of version 1: every stimulus has one key, every label is its own.
+void read_response_keys(ObjectReader& response, Protocol& protocol);
+
+namespace {
+
+using nlohmann::json;
+
+constexpr std::size_t kMaxLabel = 80;  // bytes of a label
+
+/// The stimulus that a key stands for: its name, or an object of name and label. Not a string, and
+/// a fault, otherwise.
+json read_answer(const json& value, const std::string& pointer, std::string& label,
+                 FaultList& faults) {
+  if (!value.is_object()) return value;
+  ObjectReader answer(value, pointer, faults);
+  const json* const stimulus = answer.member("stimulus", Presence::required);
+  const json* const words = answer.member("label");
+  answer.refuse_unknown_keys();
+  if (words != nullptr) {
+    const auto printable = [](unsigned char c) { return c >= 0x20 && c != 0x7f; };
+    label = words->is_string() ? words->get<std::string>() : "";
+    if (label.empty() || label.size() > kMaxLabel ||
+        !std::all_of(label.begin(), label.end(), printable)) {
+      faults.add(answer.pointer("label"), "expected a text of 1 to " + std::to_string(kMaxLabel) +
+                                              " bytes without control characters" +
+                                              found_text(*words));
+      label.clear();
+    }
+  }
+  return stimulus != nullptr ? *stimulus : json();
+}
+
+/// Labels must differ: two responses that read the same cannot be told apart.
+void check_labels(const Protocol& protocol, const std::string& pointer, FaultList& faults) {
+  std::map<std::string, std::string> key_of;  // by what is read
+  for (const auto& [key, stimulus] : protocol.response.keys) {
+    const std::string& label = answer_label(protocol, stimulus);
+    const auto [before, is_new] = key_of.emplace(label, key);
+    if (is_new || protocol.response.keys.at(before->second) == stimulus) continue;
+    faults.add(child_pointer(pointer, key), "expected a label of its own; '" + label +
+                                                "' is what the key '" + before->second +
+                                                "' says already");
+  }
+}
+
+}  // namespace
+
+void read_response_keys(ObjectReader& response, Protocol& protocol) {
+  const json* const keys = response.member("keys", Presence::required);
+  if (keys == nullptr) return;
+  FaultList& faults = response.faults();
+  const std::string pointer = response.pointer("keys");
+  if (!keys->is_object()) {
+    faults.add(pointer, "expected an object of a stimulus for each key" + found_text(*keys));
+    return;
+  }
+  std::map<std::string, std::optional<std::string>> key_of;  // by stimulus
+  for (const StimulusSpec& stimulus : protocol.stimuli) key_of[stimulus.name];
+  KeysTaken taken;
+  for (const auto& [key, value] : keys->items()) {
+    const std::string here = child_pointer(pointer, key);
+    if (const std::string fault = taken.add(key); !fault.empty()) faults.add(here, fault);
+    std::string label;
+    const json name = read_answer(value, here, label, faults);
+    const auto stimulus = name.is_string() ? key_of.find(name.get<std::string>()) : key_of.end();
+    if (stimulus == key_of.end()) {
+      if (!value.is_object()) {
+        faults.add(here, "expected the name of a stimulus, or an object of 'stimulus' and 'label'" +
+                             found_text(value));
+      } else if (value.contains("stimulus")) {
+        faults.add(child_pointer(here, "stimulus"),
+                   "expected the name of a stimulus" + found_text(name));
+      }
+      continue;
+    }
+    if (stimulus->second) {
+      faults.add(here, "expected one key for each stimulus; '" + stimulus->first +
+                           "' has the key '" + *stimulus->second + "' already");
+    }
+    stimulus->second = key;
+    protocol.response.keys[key] = stimulus->first;
+    if (!label.empty()) protocol.response.labels[stimulus->first] = label;
+  }
+  check_labels(protocol, pointer, faults);
+  for (const auto& [name, key] : key_of) {
+    if (!key && !name.empty()) faults.add(pointer, "no key for the stimulus '" + name + "'");
+  }
+}
+
 namespace {
 
 // Keys and names from a file must not add lines to the list.
@@ -24,5 +127,311 @@ std::string list(const std::vector<Fault>& faults) {
 
 InputError::InputError(std::vector<Fault> faults)
     : std::runtime_error(list(faults)), faults_(std::move(faults)) {}
+
+namespace {
+
+using nlohmann::json;
+
+// More than a laboratory needs; a larger value is a mistake.
+constexpr std::size_t kMaxStimuli = 100;
+constexpr std::size_t kMaxOrientations = 10000;
+constexpr long long kMaxTrials = 1000000;
+constexpr NumberRange kRepetitions{1, 1e6};
+constexpr NumberRange kCount{1, 1e6};
+constexpr NumberRange kFewFromZero{0, 10000};
+constexpr NumberRange kFew{1, 10000};
+constexpr int kRoundsWithCriterion = 5;  // of practice, unless max_rounds says otherwise
+
+void read_renderers(ObjectReader& reader, Protocol& protocol) {
+  const json* const list = reader.array("renderers", 1, 2, Presence::required);
+  if (list == nullptr) return;
+  for (std::size_t i = 0; i < list->size(); ++i) {
+    const std::string pointer = child_pointer(reader.pointer("renderers"), i);
+    RendererKind kind{};
+    if (!read_choice((*list)[i], pointer, kind,
+                     {{to_string(RendererKind::point), RendererKind::point},
+                      {to_string(RendererKind::ray), RendererKind::ray}},
+                     reader.faults())) {
+      continue;
+    }
+    const auto& renderers = protocol.renderers;
+    if (std::find(renderers.begin(), renderers.end(), kind) != renderers.end()) {
+      reader.faults().add(pointer,
+                          "expected each renderer once" + found_text((*list)[i]) + " again");
+    }
+    protocol.renderers.push_back(kind);
+  }
+}
+
+StimulusSpec read_stimulus(ObjectReader& reader, const Protocol& protocol, const MeshFiles& files) {
+  StimulusSpec stimulus;
+  reader.name("name", stimulus.name);
+  stimuli::Material material = protocol.material;
+  reader.section("material", [&](ObjectReader& section) {
+    read_material(section, material);
+    for (const char* key : {"stiffness_n_per_m", "damping_ns_per_m", "friction_static",
+                            "friction_dynamic", "layers"}) {
+      if (section.has(key) && reader.has(key)) {
+        reader.faults().add(reader.pointer(key), "expected in 'material' or here, found in both");
+      }
+    }
+  });
+  stimulus.object = read_object(reader, material, files);
+  reader.refuse_unknown_keys();
+  return stimulus;
+}
+
+void read_stimuli(ObjectReader& reader, Protocol& protocol, const MeshFiles& files) {
+  const json* const list = reader.array("stimuli", 1, kMaxStimuli, Presence::required);
+  if (list == nullptr) return;
+  std::set<std::string> names;
+  for (std::size_t i = 0; i < list->size(); ++i) {
+    const std::string pointer = child_pointer(reader.pointer("stimuli"), i);
+    ObjectReader item((*list)[i], pointer, reader.faults());
+    protocol.stimuli.push_back(read_stimulus(item, protocol, files));
+    if (protocol.version == 2) protocol.stimulus_texts.push_back((*list)[i].dump());
+    const std::string& name = protocol.stimuli.back().name;
+    if (!name.empty() && !names.insert(name).second) {
+      reader.faults().add(item.pointer("name"),
+                          "expected a name of its own, found '" + name + "' again");
+    }
+  }
+}
+
+void read_orientation(ObjectReader& reader, Protocol& protocol) {
+  const json* const value = reader.member("orientation");
+  if (value == nullptr) return;
+  if (!value->is_array()) {
+    if (value->is_string()) {
+      read_choice(*value, reader.pointer("orientation"), protocol.orientation,
+                  {{"uniform", OrientationKind::uniform}, {"fixed", OrientationKind::fixed}},
+                  reader.faults());
+    } else {
+      reader.faults().add(
+          reader.pointer("orientation"),
+          "expected 'uniform', 'fixed' or an array of quaternions" + found_text(*value));
+    }
+    return;
+  }
+  protocol.orientation = OrientationKind::listed;
+  if (reader.array("orientation", 1, kMaxOrientations) == nullptr) return;
+  for (std::size_t i = 0; i < value->size(); ++i) {
+    const std::string pointer = child_pointer(reader.pointer("orientation"), i);
+    if (const auto rotation = read_quaternion((*value)[i], pointer, reader.faults())) {
+      protocol.orientations.push_back(*rotation);
+    }
+  }
+}
+
+void read_breaks(ObjectReader& reader, Protocol& protocol) {
+  reader.section("breaks", [&](ObjectReader& section) {
+    section.integer("every_trials", protocol.breaks.every_trials, kCount);
+    section.number("min_seconds", protocol.breaks.min_seconds, {0, 3600, "s"});
+  });
+}
+
+void read_texts(ObjectReader& reader, Protocol& protocol) {
+  reader.section("texts", [&](ObjectReader& section) {
+    section.text("instructions", protocol.texts.instructions);
+    section.text("practice", protocol.texts.practice);
+    section.text("break", protocol.texts.break_text);
+    section.text("end", protocol.texts.end);
+    section.text("move_away", protocol.texts.move_away);
+    section.text("ready", protocol.texts.ready);
+    section.text("go", protocol.texts.go);
+    section.text("wait", protocol.texts.wait);
+    section.text("other_key", protocol.texts.other_key);
+    if (protocol.version < 2) return;
+    section.text("next_interval", protocol.texts.next_interval);
+    section.text("answer_now", protocol.texts.answer_now);
+    section.text("type_number", protocol.texts.type_number);
+    section.text("agree", protocol.texts.agree);
+    section.text("disagree", protocol.texts.disagree);
+    section.text("other_number", protocol.texts.other_number);
+    section.text("answer_first", protocol.texts.answer_first);
+  });
+}
+
+void read_session_settings(ObjectReader& reader, Protocol& protocol) {
+  reader.section("practice", [&](ObjectReader& section) {
+    auto& practice = protocol.practice;
+    section.integer("repetitions", practice.repetitions, kFewFromZero);
+    section.number("criterion", practice.criterion, {0, 1, "", true});
+    if (practice.criterion) practice.max_rounds = kRoundsWithCriterion;
+    section.integer("max_rounds", practice.max_rounds, kFew);
+    if (practice.criterion && practice.repetitions == 0) {
+      section.faults().add(section.pointer("criterion"), "a criterion needs repetitions above 0");
+    }
+  });
+  reader.section("sessions", [&](ObjectReader& section) {
+    section.integer("count", protocol.sessions.count, {1, 1000});
+    section.number("max_minutes", protocol.sessions.max_minutes, {0, 1440, "min", true});
+    section.integer("warm_up_trials", protocol.sessions.warm_up_trials, kFewFromZero);
+  });
+  read_breaks(reader, protocol);
+  reader.section(
+      "response",
+      [&](ObjectReader& section) {
+        read_response_keys(section, protocol);
+        section.number("time_out_s", protocol.response.time_out, {0, 3600, "s", true});
+        section.boolean("feedback", protocol.response.feedback);
+      },
+      Presence::required);
+  read_texts(reader, protocol);
+}
+
+void read_renderer_order(ObjectReader& reader, Protocol& protocol) {
+  protocol.renderer_order = RendererOrder::fixed;
+  if (protocol.version == 2) return;  // its blocks say it
+  protocol.renderer_order = RendererOrder::counterbalanced;
+  reader.choice("renderer_order", protocol.renderer_order,
+                {{"fixed", RendererOrder::fixed},
+                 {"counterbalanced", RendererOrder::counterbalanced},
+                 {"interleaved", RendererOrder::interleaved}});
+}
+
+/// What version 1 says of the one task that it has.
+void read_identification(ObjectReader& reader, Protocol& protocol) {
+  reader.integer("repetitions", protocol.repetitions, kRepetitions, Presence::required);
+  reader.section("order", [&](ObjectReader& section) {
+    section.choice("kind", protocol.order.kind,
+                   {{"random", OrderKind::random}, {"sequential", OrderKind::sequential}});
+    section.integer("max_run", protocol.order.max_run, kCount);
+    section.integer("min_distance", protocol.order.min_distance, kCount);
+  });
+  reader.integer("blocks_per_renderer", protocol.blocks_per_renderer, kCount);
+  read_orientation(reader, protocol);
+  read_session_settings(reader, protocol);
+}
+
+/// Version 2: blocks of tasks, and pages.
+void read_tasks(ObjectReader& reader, Protocol& protocol, const MeshFiles& files) {
+  read_blocks(reader, protocol);
+  read_pages(reader, protocol, files);
+  read_periphery(reader, protocol);
+  read_orientation(reader, protocol);
+  reader.section("sessions", [&](ObjectReader& section) {
+    section.number("max_minutes", protocol.sessions.max_minutes, {0, 1440, "min", true});
+  });
+  read_breaks(reader, protocol);
+  read_texts(reader, protocol);
+}
+
+void read_apparatus(ObjectReader& reader, Protocol& protocol) {
+  reader.section("stylus", [&](ObjectReader& section) {
+    section.number("length_m", protocol.stylus.length, {0, 10, "m", true});
+    section.number("grip_m", protocol.stylus.grip, {0, 10, "m"});
+    if (protocol.stylus.grip > protocol.stylus.length) {
+      section.faults().add(section.pointer("grip_m"),
+                           "expected a grip on the stylus, at most at "
+                           "its length_m from the tip");
+    }
+  });
+  reader.section("workspace", [&](ObjectReader& section) {
+    section.vector("centre_m", protocol.workspace.centre, {-10, 10, "m"});
+    section.number("scale", protocol.workspace.scale, {0.001, 1000});
+  });
+  read_tool(reader, protocol.tool);
+  read_reach(reader, protocol.reach);
+  read_gravity(reader, protocol.gravity);
+  reader.section("servo", [&](ObjectReader& section) {
+    section.number("rate_hz", protocol.servo_rate, {100, 10000, "Hz"});
+    section.boolean("passivity_controller", protocol.passivity_controller);
+    section.choice("material_limit", protocol.material_limit,
+                   {{"refuse", MaterialLimit::refuse}, {"limit", MaterialLimit::limit}});
+    if (protocol.version == 2 && protocol.material_limit == MaterialLimit::limit) {
+      section.faults().add(section.pointer("material_limit"),
+                           "expected 'refuse' in version 2: a level that the device limits would "
+                           "not be the one on record");
+    }
+  });
+  reader.choice("torque", protocol.torque,
+                {{"required", TorqueRule::required}, {"left_out", TorqueRule::left_out}});
+  reader.section("masking_noise", [&](ObjectReader& section) {
+    MaskingNoise& noise = protocol.masking_noise.emplace();
+    section.choice("kind", noise.kind,
+                   {{to_string(NoiseKind::white), NoiseKind::white},
+                    {to_string(NoiseKind::pink), NoiseKind::pink}});
+    // Above, pink noise would be clipped; below, it would be lost in 16 bits.
+    section.number("level_db", noise.level_db, {-80, -12, "dB"});
+  });
+  reader.section("home", [&](ObjectReader& section) {
+    section.number("rest_s", protocol.home.rest, {0, 60, "s"});
+    section.number("margin_m", protocol.home.margin, {0, 1, "m"});
+  });
+}
+
+void read_version(ObjectReader& reader, Protocol& protocol) {
+  reader.integer("version", protocol.version, {1, 2}, Presence::required);
+}
+
+/// Checks of the whole protocol: whether a schedule exists.
+void check_schedule(const Protocol& protocol, FaultList& faults) {
+  const long long trials = main_trials(protocol);
+  if (trials > kMaxTrials) {
+    faults.add("/repetitions", "expected at most " + std::to_string(kMaxTrials) +
+                                   " trials for each participant, found " + std::to_string(trials));
+  }
+  if (protocol.blocks_per_renderer > protocol.repetitions) {
+    faults.add("/blocks_per_renderer", "expected at most as many blocks as repetitions (" +
+                                           std::to_string(protocol.repetitions) + "), found " +
+                                           std::to_string(protocol.blocks_per_renderer));
+  }
+  if (protocol.sessions.count > trials) {
+    faults.add("/sessions/count", "expected at most as many sessions as trials (" +
+                                      std::to_string(trials) + "), found " +
+                                      std::to_string(protocol.sessions.count));
+  }
+  faults.throw_if_any();
+  try {
+    for (int n = 1; n <= renderer_orders(protocol); ++n) schedule(protocol, n);
+  } catch (const ScheduleError& error) {
+    faults.add("/order", error.what());
+  }
+}
+
+}  // namespace
+
+Protocol parse_protocol(const std::string& path) {
+  return parse_protocol_text(read_text_file(path), path);
+}
+
+Protocol parse_protocol_text(const std::string& text, const std::string& file_name,
+                             const StoredFiles& stored, OtherFiles others) {
+  FaultList faults(file_name);
+  const json root = read_json(text, faults);
+  Protocol protocol;
+  ObjectReader reader(root, "", faults);
+  reader.member("$schema");
+  read_version(reader, protocol);
+  reader.name("name", protocol.name);
+  reader.text("title", protocol.title);
+  reader.text("description", protocol.description);
+  read_renderers(reader, protocol);
+  read_renderer_order(reader, protocol);
+  reader.section("material",
+                 [&](ObjectReader& section) { read_material(section, protocol.material); });
+  const MeshFiles files{folder_of(file_name), stored, others};
+  read_stimuli(reader, protocol, files);
+  if (protocol.version == 2) {
+    read_tasks(reader, protocol, files);
+  } else {
+    read_identification(reader, protocol);
+  }
+  read_apparatus(reader, protocol);
+  read_event_codes(reader, protocol);  // for their faults: a schedule needs none
+  check_radius(reader, protocol.tool,
+               std::any_of(protocol.stimuli.begin(), protocol.stimuli.end(),
+                           [](const auto& stimulus) { return stimulus.object.soft.has_value(); }));
+  reader.boolean("samples", protocol.samples);
+  reader.seed("seed", protocol.seed);
+  reader.refuse_unknown_keys();
+  if (faults.empty()) (protocol.version == 2 ? check_blocks : check_schedule)(protocol, faults);
+  faults.throw_if_any();
+
+  protocol.source_text = text;
+  protocol.sha256 = sha256_hex(text);
+  return protocol;
+}
 
 }  // namespace palpate::protocols

@@ -1,12 +1,518 @@
+#include "protocols/parse_scene.h"
+
 #include <algorithm>
+#include <filesystem>
+#include <glm/geometric.hpp>
+#include <iterator>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "protocols/json_document.h"
 #include "protocols/parse.h"
-#include "protocols/parse_body.h"
-#include "protocols/parse_object.h"
-#include "protocols/parse_tool.h"
+#include "stimuli/mesh_file.h"
+#include "stimuli/shapes.h"
+#include "stimuli/solids/gmsh_file.h"
+#include "stimuli/solids/solid_mesh.h"
 
 namespace palpate::protocols {
+
+// Reading of what makes an object give (scene.schema.json), for scenes and protocols.
+
+/// The key `soft` of an object whose other keys were read. Faults what cannot be soft.
+void read_soft(ObjectReader& reader, stimuli::ObjectSpec& spec);
+
+namespace {
+
+using nlohmann::json;
+
+constexpr NumberRange kPlace{-10, 10, "m"};
+constexpr NumberRange kWorld{-1000, 1000, "m"};
+constexpr NumberRange kFactor{0, 100, "", true};
+constexpr double kThinnest = 0.0005;  // m; thinner than any mesh can follow
+constexpr NumberRange kRadius{0, 0.05, "m"};
+constexpr double kShortest = 1e-6;  // m: a shorter segment is a slip of the decimal point
+
+ToolSegmentSpec read_segment(ObjectReader& reader) {
+  ToolSegmentSpec segment;
+  reader.vector("from_m", segment.from, kPlace, Presence::required);
+  reader.vector("to_m", segment.to, kPlace, Presence::required);
+  reader.refuse_unknown_keys();
+  return segment;
+}
+
+}  // namespace
+
+void read_tool(ObjectReader& reader, ToolSpec& tool) {
+  reader.section("tool", [&](ObjectReader& section) {
+    section.number("radius_m", tool.radius, kRadius);
+    const json* const list =
+        section.array("segments", 1, ToolSpec::kMostSegments, Presence::required);
+    if (list == nullptr) return;
+    FaultList& faults = section.faults();
+    for (std::size_t i = 0; i < list->size(); ++i) {
+      const std::string pointer = child_pointer(section.pointer("segments"), i);
+      const std::size_t before = faults.count();
+      ObjectReader item((*list)[i], pointer, faults);
+      const ToolSegmentSpec segment = read_segment(item);
+      if (faults.count() == before && !(glm::distance(segment.from, segment.to) >= kShortest)) {
+        faults.add(item.pointer("to_m"),
+                   "expected another point than from_m, at least 1e-6 m from it: a segment has a "
+                   "length");
+      }
+      tool.segments.push_back(segment);
+    }
+  });
+}
+
+void check_radius(ObjectReader& reader, const ToolSpec& tool, bool soft) {
+  if (soft ? tool.radius == 0 || tool.radius >= kThinnest : tool.radius == 0) return;
+  reader.faults().add(
+      reader.pointer("tool") + "/radius_m",
+      soft ? "expected 0.0005 to 0.05 m, or 0 for 0.002 m: what touches a soft object has a radius"
+           : "expected 0: objects are rigid, and rigid objects are touched by segments without "
+             "thickness");
+}
+
+void read_reach(ObjectReader& reader, std::optional<ReachSpec>& reach) {
+  reader.section("reach", [&](ObjectReader& section) {
+    ReachSpec& read = reach.emplace();
+    section.number("factor", read.factor, kFactor, Presence::required);
+    const json* const pivot = section.member("pivot");
+    if (pivot == nullptr) return;
+    if (pivot->is_array()) {
+      read.pivot = ReachSpec::Pivot::point;
+      section.vector("pivot", read.point, kWorld);
+    } else if (pivot->is_string()) {
+      read_choice(*pivot, section.pointer("pivot"), read.pivot,
+                  {{"grip", ReachSpec::Pivot::grip}, {"tail", ReachSpec::Pivot::tail}},
+                  section.faults());
+    } else {
+      section.faults().add(
+          section.pointer("pivot"),
+          "expected 'grip', 'tail' or a point [x, y, z] of the world" + found_text(*pivot));
+    }
+  });
+}
+
+namespace {
+
+constexpr NumberRange kMass{1e-6, 1e4, "kg"};
+constexpr NumberRange kDensity{0.01, 1e5, "kg/m^3"};
+// Ten times as fast as a hand: beyond it a unit was mistaken.
+constexpr NumberRange kVelocity{-100, 100, "m/s"};
+constexpr NumberRange kSpin{-1000, 1000, "rad/s"};
+constexpr NumberRange kBodyDamping{0, 1000, "1/s"};
+constexpr NumberRange kRestitution{0, 1};
+constexpr NumberRange kBodyFriction{0, 10};
+constexpr NumberRange kGravity{-1000, 1000, "m/s^2"};
+
+}  // namespace
+
+void read_body(ObjectReader& reader, std::optional<stimuli::Body>& body) {
+  reader.section("body", [&](ObjectReader& section) {
+    if (!reader.member("body")->is_object()) return;
+    stimuli::Body& read = body.emplace();
+    const auto number = [&section](const char* key, std::optional<double>& out,
+                                   const NumberRange& range) {
+      if (section.member(key) == nullptr) return;  // known now, for faults of unknown ones
+      double value = 1;
+      section.number(key, value, range);
+      out = value;
+    };
+    number("mass_kg", read.mass, kMass);
+    number("density_kg_per_m3", read.density, kDensity);
+    if (section.has("mass_kg") == section.has("density_kg_per_m3")) {
+      section.faults().add(section.pointer(),
+                           section.has("mass_kg")
+                               ? "expected mass_kg or density_kg_per_m3, not both"
+                               : "expected mass_kg or density_kg_per_m3");
+    }
+    section.vector("velocity_m_per_s", read.velocity, kVelocity);
+    section.vector("spin_rad_per_s", read.spin, kSpin);
+    section.number("damping_per_s", read.damping, kBodyDamping);
+    section.number("restitution", read.restitution, kRestitution);
+    section.number("friction", read.friction, kBodyFriction);
+  });
+}
+
+void read_gravity(ObjectReader& reader, Vec3& gravity) {
+  reader.vector("gravity_m_per_s2", gravity, kGravity);
+}
+
+namespace {
+
+using nlohmann::json;
+
+constexpr NumberRange kWeight{0, 1e9, "", true};
+
+std::vector<double> read_list(const json& list, const std::string& pointer,
+                              const GridLimits& limits, FaultList& faults) {
+  std::vector<double> values;
+  if (list.empty() || list.size() > limits.most) {
+    faults.add(pointer, "expected 1 to " + std::to_string(limits.most) + " numbers, found " +
+                            std::to_string(list.size()));
+    return values;
+  }
+  const std::size_t before = faults.count();
+  for (std::size_t i = 0; i < list.size(); ++i) {
+    double value = 0;
+    read_number(list[i], child_pointer(pointer, i), value, limits.range, faults);
+    if (faults.count() == before && !limits.may_repeat &&
+        std::find(values.begin(), values.end(), value) != values.end())
+      faults.add(child_pointer(pointer, i), "expected each value once" + found_text(list[i]));
+    values.push_back(value);
+  }
+  return faults.count() == before ? values : std::vector<double>();
+}
+
+std::vector<double> read_range(ObjectReader& reader, const GridLimits& limits) {
+  FaultList& faults = reader.faults();
+  const std::size_t before = faults.count();
+  double from = 0, to = 0;
+  int count = 0;
+  LevelScale spacing = LevelScale::linear;
+  reader.choice("spacing", spacing, {{"linear", LevelScale::linear}, {"log", LevelScale::log10}});
+  reader.number("from", from, limits.range, Presence::required);
+  reader.number("to", to, limits.range, Presence::required);
+  reader.integer("count", count, {2, static_cast<double>(limits.most)}, Presence::required);
+  if (faults.count() != before) return {};
+  if (!(from < to)) {
+    faults.add(reader.pointer("to"), "expected more than from");
+    return {};
+  }
+  if (spacing == LevelScale::log10 && !(from > 0)) {
+    faults.add(reader.pointer("from"), "expected more than 0 with spacing 'log'");
+    return {};
+  }
+  const double low = scale_position(spacing, from), high = scale_position(spacing, to);
+  std::vector<double> values{from};
+  for (int i = 1; i < count - 1; ++i)
+    values.push_back(level_at(spacing, low + (high - low) * i / (count - 1)));
+  values.push_back(to);
+  return values;
+}
+
+/// {"values": [...], "weights": [...]}
+ParameterGrid read_weighted(ObjectReader& reader, const GridLimits& limits) {
+  ParameterGrid grid;
+  const GridLimits weights{kWeight, limits.most, Presence::optional, true};
+  grid.values = read_grid_values(reader, "values", limits);
+  grid.weights = read_grid_values(reader, "weights", weights);
+  if (!grid.values.empty() && !grid.weights.empty() && grid.values.size() != grid.weights.size()) {
+    reader.faults().add(reader.pointer("weights"), "expected as many numbers as values, " +
+                                                       std::to_string(grid.values.size()) +
+                                                       ", found " +
+                                                       std::to_string(grid.weights.size()));
+  }
+  return grid;
+}
+
+}  // namespace
+
+std::vector<double> read_grid_values(ObjectReader& reader, const char* key,
+                                     const GridLimits& limits) {
+  const json* const value = reader.member(key, limits.presence);
+  if (value == nullptr) return {};
+  const std::string pointer = reader.pointer(key);
+  if (value->is_array()) return read_list(*value, pointer, limits, reader.faults());
+  if (value->is_object()) {
+    ObjectReader inner(*value, pointer, reader.faults());
+    std::vector<double> values = read_range(inner, limits);
+    inner.refuse_unknown_keys();
+    return values;
+  }
+  double number = 0;
+  if (!read_number(*value, pointer, number, limits.range, reader.faults())) return {};
+  return {number};
+}
+
+ParameterGrid read_grid(ObjectReader& reader, const char* key, const GridLimits& limits) {
+  ParameterGrid grid;
+  const json* const value = reader.member(key, limits.presence);
+  if (value == nullptr || !value->is_object() || !value->contains("values")) {
+    if (value != nullptr) grid.values = read_grid_values(reader, key, limits);
+    return grid;
+  }
+  reader.section(key, [&](ObjectReader& inner) { grid = read_weighted(inner, limits); });
+  return grid;
+}
+
+namespace {
+
+// What the coupling of the body's steps with the servo was found stable over (rendering/README.md).
+constexpr NumberRange kYoung{1e3, 1e7, "Pa"};
+constexpr NumberRange kSpring{200, 3000, "N/m, on a soft object"};
+constexpr NumberRange kPoisson{0, 0.495};
+constexpr NumberRange kSoftDensity{100, 20000, "kg/m^3"};
+constexpr NumberRange kStrainDamping{0, 1, "s"};
+constexpr NumberRange kResolution{stimuli::kLeastResolution, stimuli::kMostResolution};
+constexpr NumberRange kPoint{-1000, 1000, "m"};
+constexpr std::size_t kMostPoints = 1000;
+
+bool can_be_soft(const stimuli::ObjectSpec& spec) {
+  switch (spec.shape) {
+    case stimuli::ShapeKind::cube:
+    case stimuli::ShapeKind::box:
+    case stimuli::ShapeKind::sphere:
+    case stimuli::ShapeKind::cylinder:
+      return true;
+    case stimuli::ShapeKind::mesh:
+      return stimuli::is_gmsh_file_name(spec.file);
+    case stimuli::ShapeKind::cone:
+    case stimuli::ShapeKind::compound:
+      return false;
+  }
+  return false;
+}
+
+void read_fixed(ObjectReader& reader, stimuli::Soft& soft) {
+  const nlohmann::json* const value = reader.member("fixed");
+  if (value == nullptr) return;
+  if (!value->is_array()) {
+    read_choice(*value, reader.pointer("fixed"), soft.fixed,
+                {{"base", stimuli::Soft::Fixed::base}, {"none", stimuli::Soft::Fixed::none}},
+                reader.faults());
+    return;
+  }
+  soft.fixed = stimuli::Soft::Fixed::points;
+  const nlohmann::json* const list = reader.array("fixed", 1, kMostPoints);
+  if (list == nullptr) return;
+  for (std::size_t i = 0; i < list->size(); ++i) {
+    const std::string pointer = child_pointer(reader.pointer("fixed"), i);
+    const nlohmann::json& point = (*list)[i];
+    Vec3 read(0);
+    if (!point.is_array() || point.size() != 3) {
+      reader.faults().add(pointer,
+                          "expected [x, y, z], m, in the object's frame" + found_text(point));
+      continue;
+    }
+    for (int c = 0; c < 3; ++c) {
+      const auto k = static_cast<std::size_t>(c);
+      read_number(point[k], child_pointer(pointer, k), read[c], kPoint, reader.faults());
+    }
+    soft.points.push_back(read);
+  }
+}
+
+void refuse_with(ObjectReader& reader, bool has, const char* key, const char* why) {
+  if (has) reader.faults().add(reader.pointer(key), why);
+}
+
+}  // namespace
+
+void read_soft(ObjectReader& reader, stimuli::ObjectSpec& spec) {
+  const bool is_gmsh =
+      spec.shape == stimuli::ShapeKind::mesh && stimuli::is_gmsh_file_name(spec.file);
+  if (reader.member("soft") == nullptr) {
+    refuse_with(reader, is_gmsh, "file",
+                "expected the key 'soft' beside a .msh file: its tetrahedra are for what gives");
+    return;
+  }
+  stimuli::Soft& soft = spec.soft.emplace();
+  reader.section("soft", [&](ObjectReader& section) {
+    section.number("young_pa", soft.young, kYoung, Presence::required);
+    section.number("poisson", soft.poisson, kPoisson);
+    section.number("density_kg_per_m3", soft.density, kSoftDensity);
+    section.number("damping_s", soft.damping, kStrainDamping);
+    read_fixed(section, soft);
+    soft.resolution = 0;  // the highest that can be stepped
+    section.integer("resolution", soft.resolution, kResolution);
+    refuse_with(section, is_gmsh && section.has("resolution"), "resolution",
+                "expected none: a .msh file brings its elements");
+  });
+  if (!can_be_soft(spec)) {
+    reader.faults().add(
+        reader.pointer("soft"),
+        "expected a cube, box, sphere, cylinder or a mesh with a .msh file; found " +
+            std::string(stimuli::traits_of(spec.shape).name));
+  }
+  if (!(spec.material.stiffness >= kSpring.min && spec.material.stiffness <= kSpring.max)) {
+    reader.faults().add(reader.pointer("stiffness_n_per_m"),
+                        "expected 200 to 3000 N/m on a soft object, the spring between tool and "
+                        "surface: there its coupling was found stable");
+  }
+  refuse_with(reader, spec.body.has_value(), "body",
+              "expected body or soft, not both: a soft object moves by itself with fixed: none");
+  refuse_with(reader, spec.material.has_friction(), "friction_static",
+              "expected none on a soft object: friction on what gives is not rendered");
+  refuse_with(reader, spec.material.damping > 0, "damping_ns_per_m",
+              "expected none on a soft object: its damping is soft/damping_s");
+  refuse_with(reader, !spec.material.layers.empty(), "layers", "expected none on a soft object");
+}
+
+namespace {
+
+using nlohmann::json;
+
+// Wide: a wrong unit (30 for 30 mm) is caught by the device's workspace, not here.
+constexpr NumberRange kLength{0, 1000, "m", true};
+constexpr NumberRange kPosition{-1000, 1000, "m"};
+// Ten times stiffer than the stiffest haptic devices: beyond it a decimal point has slipped.
+constexpr NumberRange kStiffness{0, 1e5, "N/m"};
+constexpr NumberRange kLayerStiffness{0, 1e5, "N/m", true};
+constexpr NumberRange kBreakForce{0, 1000, "N", true};
+constexpr NumberRange kDamping{0, 1000, "N s/m"};
+constexpr NumberRange kFriction{0, 10};
+constexpr std::size_t kMaxLayers = 16;
+constexpr NumberRange kSubdivisions{0, 8};  // 8: 1.3 million triangles
+constexpr NumberRange kSegments{3, 4096};
+constexpr int kMaxCompounds = 8;  // within each other
+constexpr std::size_t kMaxParts = 1000;
+
+stimuli::ObjectSpec read_nested(ObjectReader& reader, const stimuli::Material& default_material,
+                                const MeshFiles& files, int compounds);
+
+void read_file(ObjectReader& reader, const MeshFiles& files, stimuli::ObjectSpec& spec) {
+  std::string name;
+  reader.text("file", name);
+  const json* const value = reader.member("file", Presence::required);
+  if (value == nullptr || !value->is_string()) return;
+  const std::filesystem::path path = std::filesystem::path(files.folder) / name;
+  std::error_code error;
+  if (!stimuli::is_mesh_file_name(path.string()) && !stimuli::is_gmsh_file_name(path.string())) {
+    reader.faults().add(reader.pointer("file"), std::string("expected a file ") +
+                                                    stimuli::kMeshExtensions + found_text(*value));
+  } else if (const auto stored = files.stored.find(name); stored != files.stored.end()) {
+    spec.file_bytes = std::make_shared<const std::string>(stored->second);
+  } else if (files.others == OtherFiles::refuse) {
+    reader.faults().add(reader.pointer("file"),
+                        "expected a file that is stored with the protocol; '" + name + "' is not");
+  } else if (!std::filesystem::is_regular_file(path, error)) {
+    reader.faults().add(reader.pointer("file"),
+                        "expected an existing file; there is no " + path.string());
+  } else {
+    try {
+      stimuli::MeshFileBytes read = stimuli::mesh_file_bytes(path.string());
+      spec.file_bytes = std::make_shared<const std::string>(std::move(read.bytes));
+      spec.files_read = std::move(read.files);
+    } catch (const stimuli::MeshError& unreadable) {
+      reader.faults().add(reader.pointer("file"), unreadable.what());
+    }
+  }
+  spec.file_name = name;
+  spec.file = path.string();
+}
+
+void read_parts(ObjectReader& reader, const MeshFiles& files, int compounds,
+                stimuli::ObjectSpec& spec) {
+  const json* const parts = reader.array("parts", 1, kMaxParts, Presence::required);
+  if (parts == nullptr) return;
+  if (compounds == kMaxCompounds) {
+    reader.faults().add(
+        reader.pointer("parts"),
+        "expected compounds at most " + std::to_string(kMaxCompounds) + " deep within each other");
+    return;
+  }
+  for (std::size_t i = 0; i < parts->size(); ++i) {
+    ObjectReader part((*parts)[i], child_pointer(reader.pointer("parts"), i), reader.faults());
+    spec.parts.push_back(read_nested(part, spec.material, files, compounds + 1));
+    if (part.member("soft") != nullptr)
+      part.faults().add(part.pointer("soft"), "expected at an object, not at a part of a compound");
+    if (part.member("body") != nullptr)
+      part.faults().add(part.pointer("body"), "expected at the object: its parts move as one");
+    part.refuse_unknown_keys();
+  }
+}
+
+stimuli::ObjectSpec read_nested(ObjectReader& reader, const stimuli::Material& default_material,
+                                const MeshFiles& files, int compounds) {
+  stimuli::ObjectSpec spec;
+  spec.material = default_material;
+  reader.vector("position_m", spec.pose.position, kPosition);
+  reader.quaternion("orientation_wxyz", spec.pose.orientation);
+  read_material(reader, spec.material);
+
+  std::optional<stimuli::ShapeKind> shape;
+  std::vector<std::pair<const char*, std::optional<stimuli::ShapeKind>>> shapes;
+  shapes.reserve(std::size(stimuli::kShapes));
+  for (const stimuli::ShapeKind kind : stimuli::kShapes)
+    shapes.emplace_back(stimuli::traits_of(kind).name, kind);
+  reader.choice<std::optional<stimuli::ShapeKind>>("shape", shape, shapes, Presence::required);
+  if (!shape) {
+    // Without a shape no key of any shape is called unknown.
+    for (const char* key : {"radius_m", "height_m", "edge_m", "size_m", "subdivisions", "segments",
+                            "file", "parts"}) {
+      reader.member(key);
+    }
+    return spec;
+  }
+  spec.shape = *shape;
+  const stimuli::ShapeTraits traits = stimuli::traits_of(spec.shape);
+  if (traits.radius) reader.number("radius_m", spec.radius, kLength, Presence::required);
+  if (traits.height) reader.number("height_m", spec.height, kLength, Presence::required);
+  if (traits.edge) reader.number("edge_m", spec.edge, kLength, Presence::required);
+  if (traits.size) reader.vector("size_m", spec.size, kLength, Presence::required);
+  if (traits.subdivisions) reader.integer("subdivisions", spec.subdivisions, kSubdivisions);
+  if (traits.segments) reader.integer("segments", spec.segments, kSegments);
+  if (spec.shape == stimuli::ShapeKind::mesh) read_file(reader, files, spec);
+  if (spec.shape == stimuli::ShapeKind::compound) {
+    read_parts(reader, files, compounds, spec);
+  } else if (spec.material.stiffness == 0 && spec.material.layers.empty()) {
+    reader.faults().add(reader.pointer("layers"),
+                        "expected layers under a surface of stiffness 0: there is nothing to feel");
+  }
+  return spec;
+}
+
+/// A coefficient given alone is used for both; static friction must be at least dynamic friction.
+void read_friction(ObjectReader& reader, stimuli::Material& material) {
+  reader.number("friction_dynamic", material.friction_dynamic, kFriction);
+  if (reader.has("friction_dynamic") && !reader.has("friction_static"))
+    material.friction_static = material.friction_dynamic;
+  reader.number("friction_static", material.friction_static, kFriction);
+  if (reader.has("friction_static") && !reader.has("friction_dynamic"))
+    material.friction_dynamic = material.friction_static;
+  if (reader.has("friction_static") && reader.has("friction_dynamic") &&
+      material.friction_static < material.friction_dynamic) {
+    reader.faults().add(
+        reader.pointer("friction_static"),
+        "expected at least friction_dynamic: static friction is not below dynamic friction");
+  }
+}
+
+void read_layers(ObjectReader& reader, stimuli::Material& material) {
+  const nlohmann::json* const list = reader.array("layers", 0, kMaxLayers);
+  if (list == nullptr) return;
+  material.layers.clear();
+  double above = 0;
+  for (std::size_t i = 0; i < list->size(); ++i) {
+    ObjectReader layer((*list)[i], child_pointer(reader.pointer("layers"), i), reader.faults());
+    stimuli::Layer read;
+    layer.number("depth_m", read.depth, kLength, Presence::required);
+    layer.number("stiffness_n_per_m", read.stiffness, kLayerStiffness, Presence::required);
+    layer.number("damping_ns_per_m", read.damping, kDamping);
+    layer.number("break_n", read.break_force, kBreakForce);
+    layer.refuse_unknown_keys();
+    if (layer.has("depth_m") && read.depth <= above && read.depth > 0) {
+      reader.faults().add(layer.pointer("depth_m"), "expected to be deeper than the layer above");
+    }
+    above = read.depth;
+    material.layers.push_back(read);
+  }
+}
+
+}  // namespace
+
+void read_material(ObjectReader& reader, stimuli::Material& material) {
+  reader.number("stiffness_n_per_m", material.stiffness, kStiffness);
+  reader.number("damping_ns_per_m", material.damping, kDamping);
+  read_friction(reader, material);
+  read_layers(reader, material);
+}
+
+stimuli::ObjectSpec read_object(ObjectReader& reader, const stimuli::Material& default_material,
+                                const MeshFiles& files) {
+  stimuli::ObjectSpec spec = read_nested(reader, default_material, files, 0);
+  read_body(reader, spec.body);
+  read_soft(reader, spec);
+  return spec;
+}
+
+std::string folder_of(const std::string& file) {
+  return std::filesystem::path(file).parent_path().string();
+}
 
 SceneSpec parse_scene(const std::string& path) {
   return parse_scene_text(read_text_file(path), path);

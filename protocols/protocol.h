@@ -2,17 +2,57 @@
 // The design of an experiment as plain values. Meaning and default of each key:
 // protocol.schema.json. SI units.
 
+#include <cstddef>
 #include <cstdint>
 #include <map>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "protocols/scene_spec.h"
 #include "protocols/tasks/task_block.h"
 #include "stimuli/shapes.h"
 
 namespace palpate::protocols {
+
+// What a scene or protocol says besides its objects: the tool on the stylus and the extended probe
+// (the keys: scene.schema.json). SI units.
+
+/// One straight piece of a tool, in the frame of the stylus: origin at its tip, +z from tip to
+/// tail. m, of a length above 0.
+struct ToolSegmentSpec {
+  Vec3 from, to;
+};
+
+/// What the stylus carries; without segments the plain stylus from tip to tail.
+struct ToolSpec {
+  static constexpr std::size_t kMostSegments = 16;
+  std::vector<ToolSegmentSpec> segments;
+  double radius = 0;  ///< m, on soft objects; 0: kSoftRadius. Rigid ones are touched by lines
+};
+
+/// m, of a tool or stylus on soft objects that gives none: a line without thickness would sink into
+/// an elastic solid without end.
+inline constexpr double kSoftRadius = 0.002;
+
+/// The extended probe: the virtual stylus is the real one stretched by `factor` about a pivot.
+struct ReachSpec {
+  enum class Pivot {
+    grip,   ///< the point of the stylus that the hand holds
+    tail,   ///< the stylus's end
+    point,  ///< a point that stands still in the world
+  };
+  double factor = 1;
+  Pivot pivot = Pivot::grip;
+  Vec3 point{0, 0, 0};  ///< m, world frame, of Pivot::point
+};
+
+/// A scene file as plain values.
+struct SceneSpec {
+  std::vector<stimuli::ObjectSpec> objects;
+  ToolSpec tool;
+  std::optional<ReachSpec> reach;
+  Vec3 gravity{0, 0, 0};  ///< m/s^2, on what moves
+};
 
 enum class RendererKind { point, ray };
 const char* to_string(RendererKind kind);  ///< "point", "ray"

@@ -5,7 +5,6 @@
 #include <iterator>
 #include <numeric>
 
-#include "protocols/latin_square.h"
 #include "protocols/order.h"
 #include "stimuli/orientation.h"
 #include "stimuli/random.h"

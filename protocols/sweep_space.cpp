@@ -9,7 +9,6 @@
 #include <set>
 
 #include "protocols/json_document.h"
-#include "protocols/object_reader.h"
 
 namespace palpate::protocols {
 namespace {
@@ -19,8 +18,7 @@ using nlohmann::json;
 constexpr std::size_t kMaxParameters = 200;
 constexpr std::size_t kMaxPaths = 100;
 constexpr std::size_t kMaxChoices = 1000;
-constexpr std::size_t kMaxName = 64;  // it is a column's name
-constexpr double kLargest = 1e12;     // larger values are mistakes
+constexpr double kLargest = 1e12;  // larger values are mistakes
 
 /// Share of a standard normal distribution below z. Accurate in both tails.
 double normal_share(double z) { return 0.5 * std::erfc(-z / std::numbers::sqrt2); }

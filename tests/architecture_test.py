@@ -93,11 +93,9 @@ PUBLIC = {
                               "union_cases union_search",
     "rendering/accuracy": "body_study paper_first_contact peers soft_study study union_study",
     "rendering/bodies/soft": "soft_scene",
-    "protocols": "answer_keys difference event_codes json_document object_reader parse protocol "
-                 "schedule sha256 sweep_space tasks/block_procedures tasks/levels tasks/task_plan "
-                 "tasks/texts tasks/typical_participant",
-    "protocols/procedures": "procedure procedure_spec psychometric psychometric_names recovery "
-                            "track_seed",
+    "protocols": "answer_keys difference json_document parse protocol schedule sha256 sweep_space "
+                 "tasks/task_plan tasks/levels tasks/texts",
+    "protocols/procedures": "procedure procedure_spec psychometric recovery",
     "data/base": "json_text",
     "data": "column_table record sweep_record",
     "data/files": "atomic_file atomic_folder checksum file_identity file_permissions formula_guard "

@@ -9,7 +9,7 @@
 
 #include "analysis/input/trials.h"
 #include "data/record.h"
-#include "protocols/tasks/block_procedures.h"
+#include "protocols/tasks/task_plan.h"
 
 namespace palpate::analysis {
 

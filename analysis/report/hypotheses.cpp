@@ -9,7 +9,6 @@
 #include "analysis/text.h"
 #include "data/base/json_text.h"
 #include "protocols/json_document.h"
-#include "protocols/object_reader.h"
 #include "protocols/parse.h"
 
 namespace palpate::analysis {

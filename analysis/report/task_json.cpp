@@ -5,7 +5,7 @@
 #include "analysis/report/report_json.h"
 #include "analysis/report/task_report.h"
 #include "data/base/json_text.h"
-#include "protocols/procedures/psychometric_names.h"
+#include "protocols/procedures/psychometric.h"
 
 namespace palpate::analysis {
 namespace {

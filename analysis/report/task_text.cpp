@@ -5,7 +5,7 @@
 #include "analysis/report/report_text.h"
 #include "analysis/report/task_report.h"
 #include "analysis/text.h"
-#include "protocols/procedures/psychometric_names.h"
+#include "protocols/procedures/psychometric.h"
 
 namespace palpate::analysis {
 namespace {

@@ -2,20 +2,127 @@
 // Which level comes next: a pure function of the spec, the seed and the answers so far, the same on
 // every machine and compiler.
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <variant>
 #include <vector>
 
-#include "protocols/procedures/constant_stimuli.h"
-#include "protocols/procedures/estimate.h"
-#include "protocols/procedures/limits.h"
 #include "protocols/procedures/procedure_spec.h"
-#include "protocols/procedures/quest_plus.h"
-#include "protocols/procedures/staircase.h"
 
 namespace palpate::protocols {
+
+/// One answered trial.
+struct Response {
+  double level = 0;      ///< as it was shown
+  bool success = false;  ///< correct (forced choice), or "yes"
+};
+
+/// What a procedure makes of the answers so far; a number that it does not estimate is missing.
+struct Estimate {
+  std::optional<double> threshold;           ///< a level
+  std::optional<double> threshold_scale_sd;  ///< on the procedure's scale
+  std::optional<double> slope, guess, lapse;
+  int trials = 0;
+  int reversals = 0;
+  /// Trials at an end of the range (Staircase), series without a change (Limits): where there are
+  /// many, the threshold lies outside.
+  int at_limit = 0;
+};
+
+class ConstantStimuliRun {
+ public:
+  ConstantStimuliRun(const ConstantStimuli& spec, std::uint64_t seed);
+
+  std::optional<double> next_level() const;
+  void record(const Response& response);
+  Estimate estimate() const;  ///< counts only: a threshold is the analysis' business
+
+ private:
+  std::vector<double> order_;
+  std::size_t trials_ = 0;
+};
+
+/// Levels of a series until its end, from `inside` steps within the range.
+std::vector<double> series_levels(const Limits& spec, bool ascending, int inside);
+
+class LimitsRun {
+ public:
+  LimitsRun(const Limits& spec, std::uint64_t seed);
+
+  std::optional<double> next_level() const;
+  void record(const Response& response);
+  /// Threshold: mean on the scale over the series with a change, each half a step before it.
+  Estimate estimate() const;
+
+ private:
+  struct Series {
+    bool ascending = true;
+    std::vector<double> levels;
+  };
+
+  Limits spec_;
+  std::vector<Series> series_;
+  std::size_t current_ = 0, place_ = 0;  // series, level within it
+  std::vector<double> changes_;          // on the scale
+  int trials_ = 0, unchanged_ = 0;
+};
+
+/// Goes on from the level that was shown, also where it is not the one that was asked for.
+class StaircaseRun {
+ public:
+  explicit StaircaseRun(Staircase spec);
+
+  std::optional<double> next_level() const;
+  void record(const Response& response);
+  /// Threshold: mean on the scale of an even number of reversals after the discarded ones; of an
+  /// odd number the first is left out, too, so that peaks and valleys balance (Levitt 1971).
+  Estimate estimate() const;
+  /// Levels at which the track turned.
+  std::vector<double> reversal_levels() const;
+
+ private:
+  void move(bool harder);
+
+  Staircase spec_;
+  double position_, low_, high_;  // on the scale
+  int successes_ = 0, failures_ = 0;
+  int direction_ = 0;  // of the last move: 1 harder, -1 easier
+  std::vector<double> reversals_;
+  int trials_ = 0, at_limit_ = 0;
+};
+
+struct QuestPlusTables;
+
+/// Watson 2017, "QUEST+: A general multidimensional Bayesian adaptive psychometric method".
+/// Departs: the expected entropy is worked out as what is known before less the mutual information
+/// of answer and parameters, so that no logarithm is taken of the posterior. Of levels that are
+/// equally good to 1e-10 bit the first is taken.
+class QuestPlusRun {
+ public:
+  explicit QuestPlusRun(const QuestPlus& spec);
+
+  std::optional<double> next_level() const;
+  /// A level beside the grid counts as what it is.
+  void record(const Response& response);
+  /// Means of the posterior, the threshold's on the scale.
+  Estimate estimate() const;
+
+  /// Expected information of an answer at each level, bit.
+  std::vector<double> expected_information() const;
+  double entropy_bits() const;  ///< of the posterior
+  /// Posterior of all parameters, the lapse varying fastest, then guess, slope, threshold.
+  const std::vector<double>& posterior() const { return posterior_; }
+  /// Posterior of one parameter: 0 threshold, 1 slope, 2 guess, 3 lapse.
+  std::vector<double> marginal(std::size_t parameter) const;
+
+ private:
+  std::shared_ptr<const QuestPlusTables> tables_;
+  std::vector<double> posterior_;
+  int trials_ = 0;
+};
 
 /// A procedure and the answers to it. Copies are independent. The answers of a session that goes on
 /// are recorded again, one by one.

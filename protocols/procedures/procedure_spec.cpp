@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "protocols/procedures/limits.h"
+#include "protocols/procedures/procedure.h"
 
 namespace palpate::protocols {
 namespace {

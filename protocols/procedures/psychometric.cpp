@@ -7,6 +7,31 @@
 #include "protocols/procedures/portable_math.h"
 
 namespace palpate::protocols {
+
+const char* to_string(LevelScale scale) {
+  switch (scale) {
+    case LevelScale::linear:
+      return "linear";
+    case LevelScale::log10:
+      return "log";
+    case LevelScale::decibel:
+      return "db";
+  }
+  return "";
+}
+
+const char* to_string(PsychometricShape shape) {
+  switch (shape) {
+    case PsychometricShape::logistic:
+      return "logistic";
+    case PsychometricShape::normal:
+      return "normal";
+    case PsychometricShape::weibull:
+      return "weibull";
+  }
+  return "";
+}
+
 namespace {
 
 constexpr double kLn10 = 2.302585092994045684;

@@ -56,4 +56,7 @@ struct PsychometricParticipant {
   }
 };
 
+const char* to_string(LevelScale scale);         ///< as protocols say it: "linear", "log", "db"
+const char* to_string(PsychometricShape shape);  ///< "logistic", ...
+
 }  // namespace palpate::protocols

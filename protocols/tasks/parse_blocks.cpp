@@ -5,13 +5,558 @@
 #include <cstddef>
 #include <glm/geometric.hpp>
 #include <iterator>
+#include <optional>
 #include <set>
+#include <string>
 #include <utility>
+#include <vector>
 
-#include "protocols/tasks/parse_answers.h"
+#include "protocols/answer_keys.h"
+#include "protocols/json_document.h"
+#include "protocols/order.h"
+#include "protocols/parse_scene.h"
+#include "protocols/protocol.h"
+#include "protocols/schedule.h"
+#include "protocols/tasks/levels.h"
 #include "protocols/tasks/task_plan.h"
 
 namespace palpate::protocols {
+
+// Reading of what a participant can answer in a block.
+
+/// Reads keys, scale or range, and confidence of a block whose task has been read. Every answer of
+/// the task has one key; keys that the block does not say are 1, 2, ... in order.
+void read_answers(ObjectReader& reader, const Protocol& protocol, TaskBlock& block);
+
+namespace {
+
+using nlohmann::json;
+
+constexpr std::size_t kMostSteps = 11;  // of a scale
+constexpr std::size_t kMostLabel = 80;
+constexpr NumberRange kScaleNumber{-1e9, 1e9};
+// Keys that mean the same in every task.
+constexpr const char* kGoOn[] = {"space", "enter"};
+
+bool is_label(const std::string& text, std::size_t most) {
+  return !text.empty() && text.size() <= most &&
+         std::all_of(text.begin(), text.end(),
+                     [](unsigned char c) { return c >= 0x20 && c != 0x7f; });
+}
+
+void read_label(ObjectReader& reader, const char* key, std::string& label, Presence presence) {
+  const json* const value = reader.member(key, presence);
+  if (value == nullptr) return;
+  label = value->is_string() ? value->get<std::string>() : "";
+  if (is_label(label, kMostLabel)) return;
+  reader.faults().add(reader.pointer(key), "expected a text of 1 to " + std::to_string(kMostLabel) +
+                                               " bytes without control characters" +
+                                               found_text(*value));
+}
+
+/// The answers of a task, in the order of their keys where a block names none.
+std::vector<TaskAnswer> answers_of(const Protocol& protocol, const TaskBlock& block) {
+  std::vector<TaskAnswer> answers;
+  const auto add = [&](const std::string& name, const std::string& label = "") {
+    const std::string number = std::to_string(answers.size() + 1);
+    answers.push_back({number, name, label.empty() ? name : label, 0});
+  };
+  switch (block.task) {
+    case TaskKind::identify:
+      for (const int i : block.stimuli) add(protocol.stimuli[static_cast<std::size_t>(i)].name);
+      break;
+    case TaskKind::compare:
+      if (block.same_different) {
+        add("same");
+        add("different");
+      } else {
+        for (int i = 1; i <= block.intervals; ++i) add(std::to_string(i));
+      }
+      break;
+    case TaskKind::detect:
+      add("yes");
+      add("no");
+      break;
+    case TaskKind::rate:
+      break;
+    case TaskKind::adjust:
+      add("down", "-");
+      add("up", "+");
+      add("switch");
+      add("done");
+      break;
+    case TaskKind::external:
+      break;
+  }
+  return answers;
+}
+
+std::vector<ScaleStep> read_scale_steps(ObjectReader& reader, const char* key, Presence presence) {
+  std::vector<ScaleStep> steps;
+  const json* const list = reader.array(key, 2, kMostSteps, presence);
+  if (list == nullptr) return steps;
+  for (std::size_t i = 0; i < list->size(); ++i) {
+    ObjectReader item((*list)[i], child_pointer(reader.pointer(key), i), reader.faults());
+    ScaleStep step{static_cast<double>(i + 1), ""};
+    item.number("number", step.number, kScaleNumber);
+    read_label(item, "label", step.label, Presence::required);
+    item.refuse_unknown_keys();
+    if (!steps.empty() && step.number <= steps.back().number)
+      reader.faults().add(item.pointer("number"), "expected more than the step before");
+    steps.push_back(std::move(step));
+  }
+  return steps;
+}
+
+/// 1, 2, ..., 9, 0, then letters: a key of its own for each step.
+std::string step_key(std::size_t i) {
+  return i < 9    ? std::to_string(i + 1)
+         : i == 9 ? "0"
+                  : std::string(1, static_cast<char>('a' + i - 10));
+}
+
+void read_rating(ObjectReader& reader, TaskBlock& block) {
+  const auto steps = read_scale_steps(reader, "scale", Presence::optional);
+  for (std::size_t i = 0; i < steps.size(); ++i) {
+    const std::string key = step_key(i);
+    block.answers.push_back({key, key, steps[i].label, steps[i].number});
+  }
+  reader.number("min", block.least, kScaleNumber);
+  reader.number("max", block.most, kScaleNumber);
+  if (reader.has("scale") && (reader.has("min") || reader.has("max")))
+    reader.faults().add(reader.pointer("scale"), "expected a scale, or min and max, not both");
+  if (block.least && block.most && !(*block.least < *block.most))
+    reader.faults().add(reader.pointer("max"), "expected more than min");
+}
+
+/// A key's answer: its name, or an object of answer and label.
+std::string read_answer_name(const json& value, const std::string& pointer, std::string& label,
+                             FaultList& faults) {
+  if (value.is_string()) return value.get<std::string>();
+  ObjectReader answer(value, pointer, faults);
+  std::string name;
+  answer.text("answer", name);
+  answer.member("answer", Presence::required);
+  read_label(answer, "label", label, Presence::optional);
+  answer.refuse_unknown_keys();
+  return name;
+}
+
+void read_key(const std::string& key, const json& value, const std::string& pointer,
+              std::vector<TaskAnswer>& answers, std::set<std::string>& given, KeysTaken& taken,
+              FaultList& faults) {
+  const bool goes_on = std::find(std::begin(kGoOn), std::end(kGoOn), key) != std::end(kGoOn);
+  const std::string fault =
+      goes_on ? "expected another key: '" + key + "' goes on in every task" : taken.add(key);
+  if (!fault.empty()) faults.add(pointer, fault);
+  std::string label;
+  const std::size_t before = faults.count();
+  const std::string name = read_answer_name(value, pointer, label, faults);
+  const auto answer = std::find_if(answers.begin(), answers.end(),
+                                   [&](const TaskAnswer& a) { return a.name == name; });
+  if (answer == answers.end()) {
+    std::string words;
+    for (const TaskAnswer& a : answers) words += (words.empty() ? "'" : ", '") + a.name + "'";
+    if (faults.count() == before)
+      faults.add(pointer, "expected one of the answers " + words + found_text(value));
+    return;
+  }
+  if (!given.insert(name).second)
+    faults.add(pointer, "expected one key for each answer; '" + name + "' has the key '" +
+                            answer->key + "' already");
+  answer->key = key;
+  if (!label.empty()) answer->label = label;
+}
+
+void read_answer_keys(ObjectReader& reader, const Protocol& protocol, TaskBlock& block) {
+  block.answers = answers_of(protocol, block);
+  const json* const keys = reader.member("keys");
+  if (keys == nullptr) return;
+  const std::string pointer = reader.pointer("keys");
+  if (!keys->is_object()) {
+    reader.faults().add(pointer,
+                        "expected an object of an answer for each key" + found_text(*keys));
+    return;
+  }
+  std::set<std::string> given;
+  KeysTaken taken;
+  for (const auto& [key, value] : keys->items())
+    read_key(key, value, child_pointer(pointer, key), block.answers, given, taken, reader.faults());
+  for (const TaskAnswer& answer : block.answers) {
+    if (!given.contains(answer.name))
+      reader.faults().add(pointer, "no key for the answer '" + answer.name + "'");
+  }
+  std::sort(block.answers.begin(), block.answers.end(),
+            [](const TaskAnswer& a, const TaskAnswer& b) { return a.key < b.key; });
+}
+
+/// What another program may say; without a list the names of the stimuli.
+void read_external_answers(ObjectReader& reader, const Protocol& protocol, TaskBlock& block) {
+  constexpr std::size_t kMostAnswers = 100;
+  const json* const list = reader.array("answers", 1, kMostAnswers);
+  if (list == nullptr) {
+    for (const int i : block.stimuli) {
+      const std::string& name = protocol.stimuli[static_cast<std::size_t>(i)].name;
+      block.answers.push_back({"", name, name, 0});
+    }
+    return;
+  }
+  for (std::size_t i = 0; i < list->size(); ++i) {
+    const json& value = (*list)[i];
+    const std::string text = value.is_string() ? value.get<std::string>() : "";
+    if (!is_label(text, kMostLabel)) {
+      reader.faults().add(child_pointer(reader.pointer("answers"), i),
+                          "expected a text of 1 to " + std::to_string(kMostLabel) +
+                              " bytes without control characters" + found_text(value));
+    }
+    block.answers.push_back({"", text, text, 0});
+  }
+}
+
+/// The key that says what the answers are.
+const char* answers_key(TaskKind task) {
+  if (task == TaskKind::rate) return "scale";
+  return task == TaskKind::external ? "answers" : "keys";
+}
+
+}  // namespace
+
+void read_answers(ObjectReader& reader, const Protocol& protocol, TaskBlock& block) {
+  if (block.task == TaskKind::rate) {
+    read_rating(reader, block);
+  } else if (block.task == TaskKind::external) {
+    read_external_answers(reader, protocol, block);
+  } else {
+    read_answer_keys(reader, protocol, block);
+  }
+  std::set<std::string> labels;
+  for (const TaskAnswer& answer : block.answers) {
+    if (!labels.insert(answer.label).second) {
+      reader.faults().add(
+          reader.pointer(answers_key(block.task)),
+          "expected a label of its own for each answer, found '" + answer.label + "' again");
+    }
+  }
+  if (block.task == TaskKind::external) return;  // the program asks for it, if it wants to
+  reader.section("confidence", [&](ObjectReader& section) {
+    ConfidenceSpec& confidence = block.confidence.emplace();
+    section.text("question", confidence.question);
+    confidence.scale = read_scale_steps(section, "scale", Presence::required);
+  });
+}
+
+namespace {
+
+using nlohmann::json;
+
+constexpr NumberRange kAnyLevel{-1e9, 1e9};
+constexpr NumberRange kPositiveLevel{0, 1e9, "", true};
+constexpr NumberRange kStep{0, 1e9, "", true};
+constexpr NumberRange kTrials{1, 10000};
+constexpr NumberRange kRun{1, 10};
+constexpr NumberRange kShare{0, 1};
+constexpr std::size_t kMostLevels = 1000;
+constexpr double kMostSeriesLevels = 1000;
+// 32 MB of tables and some ms for a trial; Watson's examples have a tenth.
+constexpr double kMostCells = 4e6;
+
+const NumberRange& level_range(LevelScale scale) {
+  return scale == LevelScale::linear ? kAnyLevel : kPositiveLevel;
+}
+
+void read_scale(ObjectReader& reader, LevelScale& scale) {
+  reader.choice(
+      "scale", scale,
+      {{"linear", LevelScale::linear}, {"log", LevelScale::log10}, {"db", LevelScale::decibel}});
+}
+
+void read_easier(ObjectReader& reader, Easier& easier) {
+  reader.choice("easier", easier, {{"higher", Easier::higher}, {"lower", Easier::lower}});
+}
+
+ConstantStimuli read_constant(ObjectReader& reader) {
+  ConstantStimuli spec;
+  const GridLimits limits{kAnyLevel, kMostLevels, Presence::required};
+  spec.levels = read_grid_values(reader, "levels", limits);
+  reader.integer("repetitions", spec.repetitions, kTrials, Presence::required);
+  return spec;
+}
+
+/// `target` is another way to say step_ratio.
+void read_weights(ObjectReader& reader, Staircase& spec) {
+  reader.number("step_ratio", spec.step_ratio, {0.01, 100});
+  double target = 0;
+  reader.number("target", target, {0.05, 0.99});
+  if (!reader.has("target") || target == 0) return;
+  if (reader.has("step_ratio")) {
+    reader.faults().add(reader.pointer("target"),
+                        "expected target or step_ratio, not both: one says the other");
+  } else if (spec.up != 1) {
+    reader.faults().add(reader.pointer("target"),
+                        "expected up = 1 with a target; say step_ratio otherwise");
+  } else {
+    spec.step_ratio = step_ratio_for(target, spec.down);
+  }
+}
+
+void read_stop(ObjectReader& reader, Staircase& spec) {
+  reader.section(
+      "stop",
+      [&](ObjectReader& stop) {
+        stop.integer("reversals", spec.stop_reversals, {2, 1000});
+        stop.integer("trials", spec.stop_trials, kTrials);
+        if (!stop.has("reversals") && !stop.has("trials"))
+          stop.faults().add(stop.pointer(), "expected reversals, trials or both");
+      },
+      Presence::required);
+}
+
+Staircase read_staircase(ObjectReader& reader) {
+  Staircase spec;
+  FaultList& faults = reader.faults();
+  read_scale(reader, spec.scale);
+  read_easier(reader, spec.easier);
+  const NumberRange& range = level_range(spec.scale);
+  reader.number("start", spec.start, range, Presence::required);
+  reader.number("min", spec.min, range, Presence::required);
+  reader.number("max", spec.max, range, Presence::required);
+  spec.steps = read_grid_values(reader, "steps", {kStep, 100, Presence::required, true});
+  reader.integer("up", spec.up, kRun);
+  reader.integer("down", spec.down, kRun);
+  read_weights(reader, spec);
+  read_stop(reader, spec);
+  reader.integer("discard_reversals", spec.discard_reversals, {0, 1000});
+  if (!(spec.min < spec.max) && reader.has("min") && reader.has("max")) {
+    faults.add(reader.pointer("max"), "expected more than min");
+  } else if (!(spec.start >= spec.min && spec.start <= spec.max)) {
+    faults.add(reader.pointer("start"), "expected a level from min to max");
+  }
+  if (spec.stop_reversals.has_value() && spec.discard_reversals + 2 > *spec.stop_reversals) {
+    faults.add(reader.pointer("discard_reversals"),
+               "expected at least two reversals left: stop.reversals is " +
+                   std::to_string(*spec.stop_reversals));
+  }
+  return spec;
+}
+
+void read_quest_stop(ObjectReader& reader, QuestPlus& spec) {
+  reader.section(
+      "stop",
+      [&](ObjectReader& stop) {
+        stop.integer("trials", spec.stop_trials, kTrials, Presence::required);
+        stop.number("entropy_bits", spec.stop_entropy_bits, {0, 64});
+      },
+      Presence::required);
+}
+
+/// What no single key shows to be wrong.
+void check_quest(ObjectReader& reader, const QuestPlus& spec) {
+  FaultList& faults = reader.faults();
+  if (spec.function.shape == PsychometricShape::weibull &&
+      spec.function.scale == LevelScale::linear) {
+    faults.add(reader.pointer("function"),
+               "expected scale 'log' or 'db' with the Weibull function: its levels are ratios");
+  }
+  const auto& guess = spec.guess.values;
+  const auto& lapse = spec.lapse.values;
+  if (guess.empty() || lapse.empty()) return;
+  if (!(*std::max_element(guess.begin(), guess.end()) +
+            *std::max_element(lapse.begin(), lapse.end()) <
+        1)) {
+    faults.add(reader.pointer("lapse"), "expected less than 1 together with the largest guess");
+  }
+  const auto size = [](const ParameterGrid& grid) {
+    return static_cast<double>(grid.values.size());
+  };
+  const double parameters =
+      size(spec.threshold) * size(spec.slope) * size(spec.guess) * size(spec.lapse);
+  const double cells = parameters * static_cast<double>(spec.levels.size());
+  if (cells > kMostCells) {
+    faults.add(reader.pointer("threshold"),
+               "expected at most 4000000 combinations of level and parameters; these grids have " +
+                   std::to_string(static_cast<long long>(cells)));
+  }
+  if (spec.stop_entropy_bits.has_value() && *spec.stop_entropy_bits >= std::log2(parameters)) {
+    faults.add(reader.pointer("stop") + "/entropy_bits",
+               "expected less than the entropy before the first trial, " +
+                   std::to_string(std::log2(parameters)) + " bit");
+  }
+}
+
+QuestPlus read_quest(ObjectReader& reader) {
+  QuestPlus spec;
+  reader.choice("function", spec.function.shape,
+                {{"logistic", PsychometricShape::logistic},
+                 {"normal", PsychometricShape::normal},
+                 {"weibull", PsychometricShape::weibull}},
+                Presence::required);
+  read_scale(reader, spec.function.scale);
+  read_easier(reader, spec.function.easier);
+  const NumberRange& range = level_range(spec.function.scale);
+  spec.levels = read_grid_values(reader, "levels", {range, kMostLevels, Presence::required});
+  spec.threshold = read_grid(reader, "threshold", {range, kMostLevels, Presence::required});
+  spec.slope = read_grid(reader, "slope", {kStep, kMostLevels, Presence::required});
+  spec.guess = read_grid(reader, "guess", {kShare, kMostLevels, Presence::required});
+  spec.lapse = read_grid(reader, "lapse", {kShare, kMostLevels});
+  if (!reader.has("lapse")) spec.lapse.values = {0.02};
+  read_quest_stop(reader, spec);
+  check_quest(reader, spec);
+  return spec;
+}
+
+Limits read_limits(ObjectReader& reader) {
+  Limits spec;
+  FaultList& faults = reader.faults();
+  read_scale(reader, spec.scale);
+  read_easier(reader, spec.easier);
+  const NumberRange& range = level_range(spec.scale);
+  reader.number("low", spec.low, range, Presence::required);
+  reader.number("high", spec.high, range, Presence::required);
+  reader.number("step", spec.step, kStep, Presence::required);
+  reader.integer("series", spec.series, {1, 1000});
+  reader.choice("first", spec.ascending_first, {{"ascending", true}, {"descending", false}});
+  reader.integer("jitter_steps", spec.jitter_steps, {0, 100});
+  if (!reader.has("low") || !reader.has("high") || !reader.has("step")) return spec;
+  if (!(spec.low < spec.high)) {
+    faults.add(reader.pointer("high"), "expected more than low");
+    return spec;
+  }
+  const double steps =
+      (scale_position(spec.scale, spec.high) - scale_position(spec.scale, spec.low)) / spec.step;
+  if (!(steps < kMostSeriesLevels)) {
+    faults.add(reader.pointer("step"), "expected at most 1000 levels from low to high");
+  } else if (steps < spec.jitter_steps + 1) {
+    faults.add(reader.pointer("step"),
+               "expected at least two levels in every series, also where it starts jitter_steps "
+               "inside");
+  }
+  return spec;
+}
+
+enum class ProcedureKind { none, constant, staircase, quest_plus, limits };
+
+ProcedureSpec read_kind(ObjectReader& reader, ProcedureKind kind) {
+  switch (kind) {
+    case ProcedureKind::staircase:
+      return read_staircase(reader);
+    case ProcedureKind::quest_plus:
+      return read_quest(reader);
+    case ProcedureKind::limits:
+      return read_limits(reader);
+    default:
+      return read_constant(reader);
+  }
+}
+
+}  // namespace
+
+std::optional<ProcedureSpec> read_procedure(ObjectReader& reader) {
+  const std::size_t before = reader.faults().count();
+  ProcedureKind kind = ProcedureKind::none;
+  reader.choice("kind", kind,
+                {{"constant", ProcedureKind::constant},
+                 {"staircase", ProcedureKind::staircase},
+                 {"quest_plus", ProcedureKind::quest_plus},
+                 {"limits", ProcedureKind::limits}},
+                Presence::required);
+  if (kind == ProcedureKind::none) return std::nullopt;  // other keys depend on it
+  ProcedureSpec spec = read_kind(reader, kind);
+  reader.refuse_unknown_keys();
+  if (reader.faults().count() != before) return std::nullopt;
+  return spec;
+}
+
+// Whether the blocks of a protocol can be shown as they stand.
+
+namespace {
+
+constexpr long long kMostTaskTrials = 1000000;
+
+std::string pointer_of_block(std::size_t i) { return "/blocks/" + std::to_string(i); }
+
+void check_levels_of(const Protocol& protocol, const TaskBlock& block, const std::string& pointer,
+                     FaultList& faults) {
+  std::set<std::string> told;
+  for (const int stimulus : block.stimuli) {
+    for (const double level : levels_of(block)) {
+      try {
+        at_level(protocol, block, stimulus, level);
+      } catch (const InputError& error) {
+        const Fault& fault = error.faults().front();
+        const std::string text =
+            "expected a level that '" + protocol.stimuli[static_cast<std::size_t>(stimulus)].name +
+            "' can have: at " + level_text(level) + ", " + fault.location + ": " + fault.expected;
+        // One level of a kind tells it.
+        if (told.insert(protocol.stimuli[static_cast<std::size_t>(stimulus)].name + fault.location)
+                .second)
+          faults.add(pointer + "/level/path", text);
+      }
+    }
+  }
+}
+
+/// Which levels have more successes of two intervals follows from what is asked. \return nullopt:
+/// the task does not tell
+std::optional<Easier> expected_easier(const Protocol& protocol, const TaskBlock& block) {
+  if (block.task != TaskKind::compare || block.same_different || block.intervals > 2)
+    return std::nullopt;
+  if (const int side = side_of_levels(protocol, block); side != 0)
+    return side > 0 ? Easier::higher : Easier::lower;
+  if (!block.standard || !own_level(protocol, block, *block.standard)) return std::nullopt;
+  return block.asks_smaller ? Easier::lower : Easier::higher;
+}
+
+void check_easier(const Protocol& protocol, const TaskBlock& block, const std::string& pointer,
+                  FaultList& faults) {
+  const std::optional<Easier> expected =
+      block.level ? expected_easier(protocol, block) : std::nullopt;
+  if (!expected) return;
+  for (std::size_t i = 0; i < block.procedures.size(); ++i) {
+    const std::optional<Easier> easier = easier_of(block.procedures[i]);
+    if (!easier || *easier == *expected) continue;
+    const bool one_side = side_of_levels(protocol, block) != 0;
+    const std::string place =
+        pointer + "/procedure" + (block.procedures.size() > 1 ? "/" + std::to_string(i) : "");
+    faults.add(
+        place + "/easier",
+        std::string("expected '") + (*expected == Easier::higher ? "higher" : "lower") +
+            (one_side ? "': all levels lie on one side of the standard, farther ones are easier"
+                      : "': levels lie on both sides of the standard, and what counts is that "
+                        "the comparison is chosen"));
+  }
+}
+
+}  // namespace
+
+void check_blocks(const Protocol& protocol, FaultList& faults) {
+  for (std::size_t i = 0; i < protocol.blocks.size(); ++i) {
+    const TaskBlock& block = protocol.blocks[i];
+    check_levels_of(protocol, block, pointer_of_block(i), faults);
+    if (block.level && block.task != TaskKind::detect && block.standard &&
+        !own_level(protocol, block, *block.standard)) {
+      faults.add(pointer_of_block(i) + "/standard",
+                 "expected a stimulus that has " + block.level->pointer + " itself");
+    }
+  }
+  faults.throw_if_any();
+  for (std::size_t i = 0; i < protocol.blocks.size(); ++i)
+    check_easier(protocol, protocol.blocks[i], pointer_of_block(i), faults);
+  long long trials = 0;
+  for (const TaskBlock& block : protocol.blocks) trials += most_trials_of(block);
+  if (trials > kMostTaskTrials) {
+    faults.add("/blocks", "expected at most " + std::to_string(kMostTaskTrials) +
+                              " trials for each participant, found " + std::to_string(trials));
+    return;
+  }
+  for (std::size_t i = 0; i < protocol.blocks.size(); ++i) {
+    try {
+      check_order(protocol, static_cast<int>(i));
+    } catch (const ScheduleError& error) {
+      faults.add(pointer_of_block(i) + "/order", error.what());
+    }
+  }
+}
+
 namespace {
 
 using nlohmann::json;

@@ -1,11 +1,18 @@
 #pragma once
 // Reading of what version 2 of a protocol has besides: blocks of tasks, and pages.
 
-#include "protocols/object_reader.h"
-#include "protocols/parse_object.h"
+#include <optional>
+
+#include "protocols/json_document.h"
+#include "protocols/parse_scene.h"
+#include "protocols/procedures/procedure_spec.h"
 #include "protocols/protocol.h"
 
 namespace palpate::protocols {
+
+/// Reads {"kind": "staircase", ...}; the keys stand in README.md. nullopt where something is at
+/// fault. Unknown keys become faults.
+std::optional<ProcedureSpec> read_procedure(ObjectReader& reader);
 
 /// Reads blocks, which refer to the renderers and stimuli of the protocol, and block_order.
 void read_blocks(ObjectReader& reader, Protocol& protocol);

@@ -3,14 +3,358 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
+#include <string>
 #include <utility>
+#include <vector>
 
-#include "protocols/latin_square.h"
-#include "protocols/tasks/block_tracks.h"
-#include "protocols/tasks/fixed_trials.h"
+#include "protocols/order.h"
+#include "protocols/procedures/procedure_spec.h"
+#include "protocols/schedule.h"
+#include "protocols/tasks/levels.h"
+#include "protocols/tasks/parse_blocks.h"
 #include "stimuli/orientation.h"
+#include "stimuli/random.h"
 
 namespace palpate::protocols {
+
+// The trials of a block whose levels do not follow from the answers.
+
+/// In an order by chance under the limits of the block. \param index  of the block
+/// \param round  of practice with a criterion, from 0. \throws ScheduleError
+std::vector<Trial> fixed_trials(const Protocol& protocol, int participant, int index,
+                                std::uint64_t round = 0);
+
+/// Identification as version 1 has it, whose order it then has: whatever is the same in two
+/// protocols gives the same trials. Limits on the order of several renderers are of other things.
+bool has_order_of_version_1(const TaskBlock& block);
+/// What of a protocol of version 1 an order follows from. \param block  none: all stimuli
+Protocol version_1_view(const Protocol& protocol, const TaskBlock* block);
+/// Practice has its orientations, main trials get theirs from version_1_view of the whole.
+std::vector<Trial> trials_of_version_1(const Protocol& protocol, int participant, int index,
+                                       int round = 0);
+
+// What the trials of a block are made of: its tracks, their intervals, and streams of chance.
+
+// Of random streams: part of the meaning of a seed, never to be renumbered. schedule.cpp has 1
+// to 4.
+enum TaskUse : std::uint64_t {
+  kTaskOrder = 1,
+  kTaskPosition = 2,
+  kTaskOrientation = 3,
+  kTaskCatch = 4,
+  kTaskTracks = 5
+};
+/// \param seed  of the protocol. \param block  its index
+stimuli::Random task_stream(std::uint64_t seed, int participant, std::uint64_t block, TaskUse use,
+                            std::uint64_t number = 0);
+
+/// What a track varies the level of.
+struct BlockTrack {
+  int stimulus = 0;
+  RendererKind renderer = RendererKind::point;
+  const ProcedureSpec* procedure = nullptr;  ///< of the block; nullptr: none
+};
+
+/// In the order of their numbers, which begin with 1: the procedure varies fastest.
+std::vector<BlockTrack> tracks_of(const TaskBlock& block);
+/// The number of trials with catch trials among them.
+long long with_catch_trials(const TaskBlock& block, long long trials);
+/// The intervals of a trial whose stimulus, renderer and level are set.
+/// \param position  of the comparison, from 0
+void set_intervals(const TaskBlock& block, int position, Trial& trial);
+
+namespace {
+
+/// Trials that are alike: a track at a level, or the catch trials.
+struct Category {
+  std::string name;
+  Trial trial;
+  int count = 0;
+};
+
+void add_levels(const TaskBlock& block, const BlockTrack& track, Category category,
+                std::vector<Category>& categories) {
+  if (track.procedure == nullptr) {
+    category.count = block.repetitions;
+    categories.push_back(category);
+    return;
+  }
+  const auto& constant = std::get<ConstantStimuli>(*track.procedure);
+  for (const double level : constant.levels) {
+    Category one = category;
+    one.name += " at " + level_text(level);
+    one.trial.level = level;
+    one.count = constant.repetitions;
+    categories.push_back(std::move(one));
+  }
+}
+
+std::vector<Category> categories_of(const Protocol& protocol, const TaskBlock& block) {
+  std::vector<Category> categories;
+  int number = 0;
+  long long trials = 0;
+  for (const BlockTrack& track : tracks_of(block)) {
+    Category category;
+    category.name = protocol.stimuli[static_cast<std::size_t>(track.stimulus)].name + " (" +
+                    to_string(track.renderer) + ")";
+    category.trial.stimulus = track.stimulus;
+    category.trial.renderer = track.renderer;
+    category.trial.track = ++number;
+    add_levels(block, track, category, categories);
+  }
+  for (const Category& category : categories) trials += category.count;
+  const auto catch_trials = static_cast<int>(with_catch_trials(block, trials) - trials);
+  if (catch_trials == 0) return categories;
+  // Shown as evenly as they go with every track.
+  const int tracks = number;
+  for (int t = 0; t < tracks; ++t) {
+    const BlockTrack track = tracks_of(block)[static_cast<std::size_t>(t)];
+    Category category;
+    category.name = "catch trial";
+    category.trial.stimulus = track.stimulus;
+    category.trial.renderer = track.renderer;
+    category.trial.track = t + 1;
+    category.trial.catch_trial = true;
+    category.count = catch_trials / tracks + (t < catch_trials % tracks ? 1 : 0);
+    if (category.count > 0) categories.push_back(std::move(category));
+  }
+  return categories;
+}
+
+std::vector<int> ordered_categories(const std::vector<Category>& categories, const TaskBlock& block,
+                                    stimuli::Random random) {
+  Protocol::Order order;
+  order.max_run = block.max_run;
+  order.min_distance = block.min_distance;
+  std::vector<int> counts;
+  std::vector<std::string> names;
+  counts.reserve(categories.size());
+  names.reserve(categories.size());
+  for (const Category& category : categories) {
+    counts.push_back(category.count);
+    names.push_back(category.name);
+  }
+  return order_block(counts, order, names, random);
+}
+
+/// Where the comparison stands in each of `count` trials: everywhere equally often, by chance.
+std::vector<int> positions(int count, int intervals, stimuli::Random& random) {
+  std::vector<int> all, places;
+  for (int i = 0; i < intervals; ++i) places.push_back(i);
+  while (static_cast<int>(all.size()) < count) {
+    random.shuffle(places);
+    all.insert(all.end(), places.begin(), places.end());
+  }
+  all.resize(static_cast<std::size_t>(count));
+  random.shuffle(all);
+  return all;
+}
+
+}  // namespace
+
+std::vector<Trial> fixed_trials(const Protocol& protocol, int participant, int index,
+                                std::uint64_t round) {
+  const TaskBlock& block = protocol.blocks[static_cast<std::size_t>(index)];
+  if (block.task == TaskKind::external) {  // each until somebody says what it is
+    Trial trial;
+    trial.stimulus = block.stimuli.front();
+    trial.renderer = block.renderers.front();
+    trial.track = 1;
+    set_intervals(block, 0, trial);
+    return std::vector<Trial>(static_cast<std::size_t>(block.repetitions), trial);
+  }
+  const auto number = static_cast<std::uint64_t>(index);
+  std::vector<Category> categories = categories_of(protocol, block);
+  stimuli::Random places = task_stream(protocol.seed, participant, number, kTaskPosition, round);
+  std::vector<std::vector<int>> left;
+  left.reserve(categories.size());
+  for (const Category& category : categories)
+    left.push_back(positions(category.count, block.intervals, places));
+  std::vector<std::size_t> shown(categories.size(), static_cast<std::size_t>(participant - 1));
+  std::vector<Trial> trials;
+  for (const int which : ordered_categories(
+           categories, block, task_stream(protocol.seed, participant, number, kTaskOrder, round))) {
+    const auto c = static_cast<std::size_t>(which);
+    Trial trial = categories[c].trial;
+    // Starts in turn; the next participant begins with the next one.
+    if (block.task == TaskKind::adjust)
+      trial.level = block.starts[shown[c]++ % block.starts.size()];
+    set_intervals(block, left[c].back(), trial);
+    left[c].pop_back();
+    trials.push_back(std::move(trial));
+  }
+  return trials;
+}
+
+bool has_order_of_version_1(const TaskBlock& block) {
+  return block.task == TaskKind::identify && block.procedures.empty() &&
+         (block.renderers.size() == 1 || (!block.max_run && !block.min_distance));
+}
+
+Protocol version_1_view(const Protocol& protocol, const TaskBlock* block) {
+  Protocol view;
+  view.seed = protocol.seed;
+  view.renderers = protocol.renderers;
+  view.orientation = protocol.orientation;
+  view.orientations = protocol.orientations;
+  const auto add = [&](const StimulusSpec& stimulus) {
+    view.stimuli.push_back({stimulus.name, {}});
+  };
+  if (block == nullptr) {
+    for (const StimulusSpec& stimulus : protocol.stimuli) add(stimulus);
+    return view;
+  }
+  for (const int stimulus : block->stimuli)
+    add(protocol.stimuli[static_cast<std::size_t>(stimulus)]);
+  view.renderers = block->renderers;
+  view.renderer_order =
+      block->renderers.size() > 1 ? RendererOrder::interleaved : RendererOrder::fixed;
+  view.order.max_run = block->max_run;
+  view.order.min_distance = block->min_distance;
+  view.practice.repetitions = block->repetitions;
+  return view;
+}
+
+std::vector<Trial> trials_of_version_1(const Protocol& protocol, int participant, int index,
+                                       int round) {
+  const TaskBlock& block = protocol.blocks[static_cast<std::size_t>(index)];
+  const Protocol view = version_1_view(protocol, &block);
+  const auto before = std::count_if(
+      protocol.blocks.begin(), protocol.blocks.begin() + index, [&](const TaskBlock& other) {
+        return has_order_of_version_1(other) && other.practice == block.practice &&
+               other.renderers == block.renderers;
+      });
+  const int number = static_cast<int>(before);
+  std::vector<Trial> trials =
+      block.practice
+          ? practice_round(view, participant, block.renderers.front(), number + 1 + round)
+          : block_of_trials(view, participant, block.renderers, number, block.repetitions);
+  const std::vector<BlockTrack> tracks = tracks_of(block);
+  for (Trial& trial : trials) {
+    trial.stimulus = block.stimuli[static_cast<std::size_t>(trial.stimulus)];
+    const auto is_its = [&](const BlockTrack& track) {
+      return track.stimulus == trial.stimulus && track.renderer == trial.renderer;
+    };
+    const auto track = std::find_if(tracks.begin(), tracks.end(), is_its);
+    trial.track = static_cast<int>(track - tracks.begin()) + 1;
+    set_intervals(block, 0, trial);
+  }
+  return trials;
+}
+
+namespace {
+
+constexpr std::uint64_t kTaskStream = 5;
+
+}  // namespace
+
+stimuli::Random task_stream(std::uint64_t seed, int participant, std::uint64_t block, TaskUse use,
+                            std::uint64_t number) {
+  return stimuli::Random(
+      seed, {static_cast<std::uint64_t>(participant), kTaskStream, block, use, number});
+}
+
+std::vector<BlockTrack> tracks_of(const TaskBlock& block) {
+  std::vector<BlockTrack> tracks;
+  for (const int stimulus : block.stimuli) {
+    for (const RendererKind renderer : block.renderers) {
+      if (block.procedures.empty()) tracks.push_back({stimulus, renderer, nullptr});
+      for (const ProcedureSpec& procedure : block.procedures)
+        tracks.push_back({stimulus, renderer, &procedure});
+    }
+  }
+  return tracks;
+}
+
+long long with_catch_trials(const TaskBlock& block, long long trials) {
+  return trials +
+         std::llround(static_cast<double>(trials) * block.catch_trials / (1 - block.catch_trials));
+}
+
+void set_intervals(const TaskBlock& block, int position, Trial& trial) {
+  const Interval asked{trial.stimulus, trial.renderer, trial.level};
+  const Interval standard{block.standard.value_or(-1),
+                          block.standard_renderer.value_or(trial.renderer), std::nullopt, true};
+  switch (block.task) {
+    case TaskKind::identify:
+    case TaskKind::external:
+      trial.intervals = {asked};
+      break;
+    case TaskKind::compare:
+      trial.intervals.assign(static_cast<std::size_t>(block.intervals), standard);
+      if (!trial.catch_trial) trial.intervals[static_cast<std::size_t>(position)] = asked;
+      break;
+    case TaskKind::detect:
+      trial.intervals = {asked};
+      if (trial.catch_trial) trial.intervals[0] = {block.absent.value_or(-1), trial.renderer};
+      break;
+    case TaskKind::rate:
+      trial.intervals = {asked};
+      if (block.standard) trial.intervals.insert(trial.intervals.begin(), standard);
+      break;
+    case TaskKind::adjust:
+      trial.intervals = {asked, standard};  // in turn, as the participant wants it
+      break;
+  }
+  if (trial.catch_trial) trial.level.reset();
+}
+
+namespace {
+
+using nlohmann::json;
+
+constexpr std::size_t kMaxTracks = 16;
+
+}  // namespace
+
+void read_procedures(ObjectReader& block, std::vector<ProcedureSpec>& procedures) {
+  const json* const value = block.member("procedure");
+  if (value == nullptr) return;
+  const std::string pointer = block.pointer("procedure");
+  const auto read_one = [&](const json& one, const std::string& where) {
+    ObjectReader procedure(one, where, block.faults());
+    if (auto spec = read_procedure(procedure)) procedures.push_back(std::move(*spec));
+  };
+  if (!value->is_array()) return read_one(*value, pointer);
+  if (block.array("procedure", 1, kMaxTracks) == nullptr) return;
+  for (std::size_t i = 0; i < value->size(); ++i) read_one((*value)[i], child_pointer(pointer, i));
+}
+
+const ProcedureSpec& BlockProcedures::spec_of(int track) const {
+  return specs[static_cast<std::size_t>(track - 1) % specs.size()];
+}
+
+Procedure BlockProcedures::begin(int participant_number, int track) const {
+  const std::uint64_t seed =
+      task_stream(protocol_seed, participant_number, index, kTaskTracks).next();
+  return {spec_of(track), track_seed(seed, static_cast<std::size_t>(track - 1))};
+}
+
+std::map<std::string, BlockProcedures> procedures_of_blocks(const std::string& text,
+                                                            const std::string& file_name) {
+  FaultList faults(file_name);
+  const nlohmann::json root = read_json(text, faults);
+  std::map<std::string, BlockProcedures> all;
+  if (!root.is_object() || !root.contains("blocks") || !root["blocks"].is_array()) return all;
+  std::uint64_t seed = 0;
+  ObjectReader(root, "", faults).seed("seed", seed);
+  for (const nlohmann::json& one : root["blocks"]) {
+    ObjectReader block(one, "/blocks/" + std::to_string(all.size()), faults);
+    std::string name;
+    block.name("name", name);
+    BlockProcedures procedures{seed, all.size(), {}};
+    read_procedures(block, procedures.specs);
+    block.choice("asks", procedures.asks_smaller, {{"larger", false}, {"smaller", true}});
+    const nlohmann::json::json_pointer path("/level/path");
+    if (one.is_object() && one.contains(path) && one[path].is_string())
+      procedures.level_unit = unit_of_level(one[path].get<std::string>());
+    all.emplace(name, std::move(procedures));
+  }
+  faults.throw_if_any();
+  return all;
+}
+
 namespace {
 
 constexpr std::size_t kCatchWindow = 20;    // trials

@@ -7,7 +7,6 @@
 #include <system_error>
 
 #include "protocols/json_document.h"
-#include "protocols/object_reader.h"
 
 namespace palpate::protocols {
 namespace {

@@ -6,7 +6,6 @@
 #include <string>
 
 #include "protocols/tasks/levels.h"
-#include "protocols/tasks/typical_participant.h"
 
 namespace palpate::runner {
 

@@ -6,7 +6,7 @@
 //             chosen. Of two intervals, the comparison is chosen with probability
 //             Phi((level - standard) / (sqrt(2) sd)) = Phi((level - standard) / (weber standard)).
 //             same_different: differ by more than sd
-//   detect    "yes" by a psychometric function (protocols/tasks/typical_participant.h)
+//   detect    "yes" by a psychometric function (protocols/tasks/levels.h)
 //   rate      number = level^exponent, times exp(noise)
 //   adjust    feels both; turns as many times as it would take if what was felt were true; feels
 //   what it

@@ -12,7 +12,7 @@
 #include <thread>
 #include <vector>
 
-#include "protocols/event_codes.h"
+#include "protocols/answer_keys.h"
 
 namespace palpate::runner {
 

@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "data/base/json_text.h"
-#include "protocols/object_reader.h"
+#include "protocols/json_document.h"
 #include "runner/participants/settings_document.h"
 #include "runner/sweep/json_places.h"
 #include "stimuli/random.h"

@@ -1,11 +1,11 @@
-#include "protocols/latin_square.h"
-
 #include <gtest/gtest.h>
 
 #include <map>
 #include <set>
 #include <stdexcept>
 #include <utility>
+
+#include "protocols/order.h"
 
 namespace palpate::protocols {
 namespace {

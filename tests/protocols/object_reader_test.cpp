@@ -1,8 +1,6 @@
 // Members of a JSON object by kind: what is taken, what leaves the variable as it was, and what a
 // fault says and where.
 
-#include "protocols/object_reader.h"
-
 #include <gtest/gtest.h>
 
 #include <cstdint>
@@ -11,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "protocols/json_document.h"
 #include "protocols/parse.h"
 
 namespace palpate::protocols {

@@ -1,10 +1,10 @@
-#include "protocols/parse_procedure.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <fstream>
 #include <sstream>
+
+#include "protocols/tasks/parse_blocks.h"
 
 namespace palpate::protocols {
 namespace {

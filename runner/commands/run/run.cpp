@@ -20,7 +20,7 @@
 
 #include "data/store/store.h"
 #include "data/store/torque_notes.h"
-#include "protocols/event_codes.h"
+#include "protocols/answer_keys.h"
 #include "protocols/sha256.h"
 #include "protocols/tasks/task_plan.h"
 #include "protocols/tasks/texts.h"

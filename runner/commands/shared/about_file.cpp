@@ -6,7 +6,6 @@
 #include <regex>
 
 #include "protocols/json_document.h"
-#include "protocols/object_reader.h"
 
 namespace palpate::runner {
 namespace {

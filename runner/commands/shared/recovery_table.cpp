@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "protocols/procedures/recovery.h"
-#include "protocols/tasks/typical_participant.h"
+#include "protocols/tasks/levels.h"
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/csv_text.h"
 #include "runner/commands/shared/task_words.h"

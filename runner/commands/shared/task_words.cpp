@@ -6,7 +6,6 @@
 #include <sstream>
 
 #include "protocols/tasks/levels.h"
-#include "protocols/tasks/typical_participant.h"
 #include "stimuli/random.h"
 
 namespace palpate::runner {

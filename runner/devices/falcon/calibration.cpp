@@ -13,7 +13,7 @@
 #include <sstream>
 #include <string_view>
 
-#include "protocols/object_reader.h"
+#include "protocols/json_document.h"
 #include "runner/devices/falcon/parameters.h"
 
 namespace palpate::runner::falcon {

@@ -1,10 +1,8 @@
-#include "protocols/procedures/limits.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
 
-#include "protocols/procedures/constant_stimuli.h"
+#include "protocols/procedures/procedure.h"
 
 namespace palpate::protocols {
 namespace {

@@ -1,9 +1,8 @@
-#include "protocols/procedures/quest_plus.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 
+#include "protocols/procedures/procedure.h"
 #include "stimuli/random.h"
 
 namespace palpate::protocols {

@@ -1,5 +1,3 @@
-#include "protocols/procedures/staircase.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>

@@ -1,10 +1,9 @@
 // Procedures read from a text that is stored are those of the session that was shown.
 
-#include "protocols/tasks/block_procedures.h"
-
 #include <gtest/gtest.h>
 
-#include "protocols/tasks/typical_participant.h"
+#include "protocols/tasks/levels.h"
+#include "protocols/tasks/task_plan.h"
 #include "tests/protocols/tasks/task_study.h"
 
 namespace palpate::protocols {
