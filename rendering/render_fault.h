@@ -22,7 +22,7 @@ inline constexpr std::uint32_t kNonFinite = 1;
 inline constexpr std::uint32_t kStartedInside = 2;
 inline constexpr std::uint32_t kWalkCapped = 4;
 inline constexpr std::uint32_t kContactsDropped = 8;
-// 16 to 2048 are the servo's (runner/servo/servo_fault.h).
+// 16 to 2048 are the servo's (runner/servo/sample.h).
 inline constexpr std::uint32_t kContactCapped = 4096;
 inline constexpr std::uint32_t kReleased = 8192;
 inline constexpr std::uint32_t kSoftLate = 16384;

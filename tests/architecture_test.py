@@ -115,18 +115,17 @@ PUBLIC = {
     "analysis/report": "html_elements html_page hypotheses movement_report plan_report report_html "
                        "report_json report_text sweep_report tables task_report",
     "runner": "",
-    "runner/servo": "device device_config force_limiter passivity realtime ring sample servo "
-                    "servo_fault servo_thread shared_value tick_clock tick_source touched_places "
-                    "triple_buffer",
-    "runner/safety": "fault_signals fault_table guarded_device",
+    "runner/servo": "device force_limiter passivity realtime ring sample servo servo_thread "
+                    "shared_value tick_clock tick_source touched_places triple_buffer",
+    "runner/safety": "fault_signals guarded_device",
     "runner/sound": "masking_noise",
     "runner/devices": "mouse registry replay self_test simulated",
-    "runner/devices/falcon": "calibration homing open registration stylus_from_ends weighing",
-    "runner/display": "display explore_window mailbox text_display timeline touch_source window",
-    "runner/display/scene": "camera display_error drawn_mesh image_file painter scene_drawing "
+    "runner/devices/falcon": "calibration open stylus_from_ends weighing",
+    "runner/display": "display explore_window mailbox text_display timeline window",
+    "runner/display/scene": "camera picture drawn_mesh image_file painter scene_drawing "
                             "scene_renderer",
-    "runner/participants": "keyboard respondent response_box settings_document simulated "
-                           "simulated_settings task_participant",
+    "runner/participants": "keyboard respondent response_box simulated_settings simulated "
+                           "task_participant",
     "runner/session": "clock_check contact_log device_check level_scenes live_forces live_session "
                       "markers near_codes preflight_dialogue protocol_info recorded_trial replay "
                       "replay_comparison sample_stream session session_end session_plan "

@@ -8,7 +8,6 @@
 
 #include "runner/devices/falcon/stylus_from_ends.h"
 #include "runner/servo/device.h"
-#include "runner/servo/device_config.h"
 
 namespace palpate::runner {
 

@@ -8,7 +8,6 @@
 
 #include "runner/devices/pair.h"
 #include "runner/servo/device.h"
-#include "runner/servo/device_config.h"
 
 namespace palpate::runner {
 

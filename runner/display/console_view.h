@@ -1,6 +1,8 @@
 #pragma once
 // The experimenter's console: layout of its panels, and what it keeps from frame to frame.
 
+#include <imgui.h>
+
 #include <array>
 #include <deque>
 #include <optional>
@@ -12,6 +14,40 @@
 #include "runner/display/window.h"
 
 namespace palpate::runner {
+
+// Colours and small elements that the console's panels are made of, in Dear ImGui.
+
+namespace console_colour {
+inline const ImVec4 kQuiet{0.60F, 0.64F, 0.69F, 1};
+inline const ImVec4 kBright{0.95F, 0.94F, 0.91F, 1};
+inline const ImVec4 kGood{0.47F, 0.78F, 0.55F, 1};
+inline const ImVec4 kBad{0.97F, 0.46F, 0.40F, 1};
+inline const ImVec4 kButton{0.20F, 0.24F, 0.28F, 1};
+inline const ImVec4 kDue{0.16F, 0.42F, 0.27F, 1};
+inline const ImVec4 kRed{0.74F, 0.16F, 0.15F, 1};
+inline const ImVec4 kRedLit{0.86F, 0.23F, 0.21F, 1};
+}  // namespace console_colour
+
+void coloured_text(const ImVec4& colour, const std::string& words);
+/// Breaks lines at spaces only: Dear ImGui would break "0.5" apart.
+void wrapped_text(const ImVec4& colour, const std::string& words);
+/// Name and value in the next two cells of a table.
+void table_row(const char* name, const std::string& value,
+               const ImVec4& colour = console_colour::kBright);
+
+enum class Look { plain, lit, due };  ///< due: the button to press next
+bool wide_button(const char* words, float width, Look look = Look::plain);
+
+struct SliderRange {
+  float least, most;  ///< logarithmic where least > 0
+  int digits;         ///< behind the point, to which it rounds
+  const char* unit;   ///< with a space before it
+};
+/// Name and value stand beside it: in it, the handle would hide the value. \return  whether it was
+/// moved
+bool slider(const char* name, float& value, const SliderRange& range);
+
+std::string fixed_point(double value, int digits);
 
 /// A point of the force plot.
 struct ForcePoint {
@@ -73,5 +109,32 @@ class ConsoleView {
   std::size_t messages_seen_ = 0;
   int frames_to_scroll_ = 0;  ///< to the newest message
 };
+
+// Panels of the experimenter's console. Each function draws into the current Dear ImGui window.
+
+/// \param hidden  leaves out the shape and whether answers were correct
+/// \param compact  two values in a row, for low windows
+void draw_status(const ConsoleState& state, bool hidden, bool compact);
+/// The steps before the first trial: the current one large, with a button for each possible answer.
+void draw_checklist(const Checklist& list, EndRequest& ending,
+                    std::vector<ConsoleCommand>& commands);
+/// Buttons pressed are added to `commands`, without a time. The dialog for ending the session takes
+/// the place of the buttons: the console has no pop-ups, so nothing can cover the emergency button.
+/// \param compact  as for the status
+void draw_buttons(const ConsoleState& state, bool compact, EndRequest& ending,
+                  std::vector<ConsoleCommand>& commands);
+/// The emergency button along the upper edge of the window, over everything else. Only drawn: its
+/// clicks are handled by ConsoleWindow. \return its lower edge, px
+float draw_emergency(bool lit);
+/// Whether forces are off, why, and the button to allow them again.
+/// \param silence  s without an update from the session; 0: updates arrive
+void draw_forces_off(const ConsoleState& state, double silence,
+                     std::vector<ConsoleCommand>& commands);
+/// \param brief  only the servo's faults
+void draw_health(const ConsoleState& state, bool brief);
+/// \param height  px
+void draw_forces(const std::deque<ForcePoint>& forces, float width, float height);
+void draw_times(const std::vector<double>& times, float width, float height);
+void draw_scores(const std::vector<ShapeScore>& scores, float width, float height);
 
 }  // namespace palpate::runner

@@ -11,7 +11,7 @@
 #include <utility>
 
 #include "runner/display/console_words.h"
-#include "runner/display/imgui_context.h"
+#include "runner/display/fonts.h"
 #include "runner/display/key_names.h"
 #include "runner/display/x11_errors.h"
 

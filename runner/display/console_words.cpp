@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstdio>
 
-#include "runner/safety/fault_table.h"
+#include "runner/safety/fault_signals.h"
 
 namespace palpate::runner {
 

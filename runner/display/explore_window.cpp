@@ -13,7 +13,7 @@
 #include <string>
 
 #include "runner/display/explore_view.h"
-#include "runner/display/imgui_context.h"
+#include "runner/display/fonts.h"
 #include "runner/display/window_layout.h"
 #include "runner/display/x11_errors.h"
 

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "runner/display/display.h"
 #include "runner/display/scene/scene_drawing.h"
-#include "runner/display/touch_source.h"
 #include "runner/display/window.h"
 
 namespace palpate::runner {

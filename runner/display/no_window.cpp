@@ -1,6 +1,6 @@
 #include "runner/display/explore_window.h"
-#include "runner/display/scene/display_error.h"
 #include "runner/display/scene/painter.h"
+#include "runner/display/scene/picture.h"
 #include "runner/display/window.h"
 
 namespace palpate::runner {

@@ -10,7 +10,7 @@
 
 #include "runner/devices/mouse.h"
 #include "runner/display/display.h"
-#include "runner/display/scene/display_error.h"
+#include "runner/display/scene/picture.h"
 #include "runner/display/window_places.h"
 
 namespace palpate::runner {

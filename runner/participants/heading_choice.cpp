@@ -8,9 +8,8 @@
 #include <string>
 #include <type_traits>
 
-#include "runner/participants/deepest_point.h"
 #include "runner/participants/lane_math.h"
-#include "runner/participants/shape_line_class.h"
+#include "runner/participants/shape_lines.h"
 
 // As in shape_observer.cpp the loops over the drawn hypotheses are written to be vectorised.
 

@@ -1,10 +1,16 @@
 #include "runner/participants/keyboard.h"
 
 #include <algorithm>
+#include <array>
+#include <bit>
+#include <charconv>
+#include <cmath>
+#include <cstddef>
 #include <iterator>
 #include <utility>
 
 #include "protocols/answer_keys.h"
+#include "protocols/tasks/levels.h"
 
 namespace palpate::runner {
 namespace {
@@ -240,6 +246,378 @@ std::optional<Answer> KeyboardRespondent::step(const Sample& sample) {
   if (pending_ && onset_ns_ > 0 && sample.time_ns >= pending_->time_ns) return pending_;
   attendant_.attend();
   return std::nullopt;
+}
+
+// The part of KeyboardRespondent that version 2 has: intervals, typed numbers, confidence, pages.
+
+namespace {
+
+using protocols::TaskKind;
+
+constexpr std::int64_t kAskPause_ns = 5'000'000;
+constexpr std::size_t kMostTyped = 200;  // bytes
+
+using NamedKeys = std::vector<std::pair<std::string, std::string>>;
+
+/// 1, 2, ..., 9, 0, then letters, with the texts: keys of a page.
+NamedKeys numbered(const std::vector<std::string>& texts) {
+  NamedKeys keys;
+  keys.reserve(texts.size());
+  for (std::size_t i = 0; i < texts.size(); ++i) {
+    const std::string key = i < 9    ? std::to_string(i + 1)
+                            : i == 9 ? "0"
+                                     : std::string(1, static_cast<char>('a' + i - 10));
+    keys.emplace_back(key, texts[i]);
+  }
+  return keys;
+}
+
+std::vector<ReadScreen> screens_of_text(const std::string& text) {
+  std::vector<ReadScreen> screens(1);
+  for (const char c : text) {
+    if (c == '\f') {
+      screens.emplace_back();
+    } else {
+      screens.back().text += c;
+    }
+  }
+  return screens;
+}
+
+/// "(18 \u2013 120)", "(\u2265 0)"; in any language.
+std::string range_text(std::optional<double> least, std::optional<double> most) {
+  const auto text = [](double number) { return protocols::level_text(number); };
+  if (least && most) return " (" + text(*least) + " \u2013 " + text(*most) + ")";
+  if (least) return " (\u2265 " + text(*least) + ")";
+  return most ? " (\u2264 " + text(*most) + ")" : "";
+}
+
+std::string lower_case(std::string text) {
+  for (char& c : text) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c + ('a' - 'A')) : c;
+  return text;
+}
+
+bool is_turn(const protocols::TaskBlock& block, const Answer& answer) {
+  if (block.task != TaskKind::adjust) return false;
+  const std::string& act = block.answers[static_cast<std::size_t>(answer.stimulus)].name;
+  return act == "up" || act == "down";
+}
+
+}  // namespace
+
+const protocols::TaskBlock* KeyboardRespondent::task() const {
+  return task_block_ < 0 ? nullptr : &protocol_.blocks[static_cast<std::size_t>(task_block_)];
+}
+
+void KeyboardRespondent::begin_interval(const protocols::Trial&, const IntervalView& view) {
+  view_ = view;
+  onset_ns_ = 0;
+  buttons_ = 0xFF;
+  pending_.reset();
+  if (view.continues) return;  // the page stands, and nothing that was pressed is lost
+  keys_.clear();
+  if (view.answers) {
+    for (const protocols::TaskAnswer& answer : task()->answers) {
+      const std::string button = "button " + std::to_string(keys_.size() + 1);
+      keys_.emplace_back(by_ == AnswerBy::buttons ? button : answer.key, answer.label);
+    }
+  }
+  Page page;
+  page.kind = Page::Kind::neutral;
+  page.keys = keys_;
+  if (!view.felt) page.text = interval_text();
+  show(std::move(page));
+  early_ = true;
+  take_keys();
+  cue_ = Cue::none;
+  cue_since_ns_ = 0;
+}
+
+/// What is read while an interval is felt: which one it is, what is asked.
+std::string KeyboardRespondent::interval_text() const {
+  const auto& texts = protocol_.texts;
+  std::string text;
+  if (view_.intervals > 1 && view_.felt)
+    text = std::to_string(view_.interval) + " / " + std::to_string(view_.intervals) + "\n";
+  if (!view_.answers) return text + texts.next_interval;
+  const protocols::TaskBlock& asked = *task();
+  text += asked.question.empty() ? texts.answer_now : asked.question;
+  if (asked.answers.empty()) text += "\n" + texts.type_number;
+  return text;
+}
+
+bool KeyboardRespondent::listen_to_task(const KeyPress& press) {
+  const bool in_time = view_.continues || (onset_ns_ > 0 && press.time_ns >= onset_ns_);
+  if (!in_time) {
+    reply();
+    return true;
+  }
+  const bool turning = pending_ && is_turn(*task(), *pending_);
+  if (pending_ && !turning) return true;
+  const std::optional<Answer> meant = meaning_in_interval(press.key);
+  if (!meant) return true;
+  if (!pending_) {
+    pending_ = meant;
+    pending_->time_ns = press.time_ns;
+    return true;
+  }
+  if (meant->stimulus != pending_->stimulus) return false;
+  ++pending_->times;  // turned again before the last turn was felt
+  return true;
+}
+
+/// A character, where one is being typed; numbers have digits, a point or comma and a minus.
+bool KeyboardRespondent::type(const std::string& key) {
+  const bool text = page_.typing == Page::Typing::text;
+  std::string& typed = page_.typed;
+  if (key == "backspace") {
+    // A character of UTF-8 goes as a whole.
+    while (!typed.empty() && (static_cast<unsigned char>(typed.back()) & 0xC0U) == 0x80U)
+      typed.pop_back();
+    if (!typed.empty()) typed.pop_back();
+    screen_.show(page_);
+    return true;
+  }
+  const bool digit = key.size() == 1 && key.find_first_of("0123456789.,-") == 0;
+  constexpr std::array kNames = {"up", "down", "left", "tab"};  // no others are so short
+  const bool name = std::find(kNames.begin(), kNames.end(), key) != kNames.end();
+  const bool letter = text && !name && (key == "space" || key.size() <= 4);
+  if (!(digit || letter) || typed.size() + key.size() > kMostTyped) return false;
+  typed += key == "space" ? " " : !text && key == "," ? "." : key;
+  screen_.show(page_);
+  return true;
+}
+
+std::optional<double> KeyboardRespondent::number_in(const std::string& typed,
+                                                    std::optional<double> least,
+                                                    std::optional<double> most) {
+  double number = 0;
+  const char* const end = typed.data() + typed.size();
+  const auto [at, error] = std::from_chars(typed.data(), end, number);
+  if (error != std::errc{} || at != end || !std::isfinite(number)) return std::nullopt;
+  if ((least && number < *least) || (most && number > *most)) return std::nullopt;
+  return number + 0.0;  // -0 is 0
+}
+
+/// Kindly: what would be a number, and nothing typed is lost.
+void KeyboardRespondent::refuse_number(std::optional<double> least, std::optional<double> most) {
+  const auto& texts = protocol_.texts;
+  reply_with((page_.typed.empty() ? texts.answer_first : texts.other_number) +
+             range_text(least, most));
+}
+
+std::optional<Answer> KeyboardRespondent::typed_answer(const std::string& key) {
+  const protocols::TaskBlock& asked = *task();
+  if (key != "enter") {
+    if (!type(key)) reply();
+    return std::nullopt;
+  }
+  const auto number = number_in(page_.typed, asked.least, asked.most);
+  if (!number) {
+    refuse_number(asked.least, asked.most);
+    return std::nullopt;
+  }
+  Answer answer;
+  answer.number = *number;
+  return answer;
+}
+
+std::optional<Answer> KeyboardRespondent::meaning_in_interval(const std::string& key) {
+  Answer answer;
+  if (!view_.answers) {
+    answer.goes_on = true;
+    if (key == "space" || key == "enter") return answer;
+    reply();
+    return std::nullopt;
+  }
+  const protocols::TaskBlock& asked = *task();
+  if (asked.answers.empty()) return typed_answer(key);
+  const bool adjusts = asked.task == TaskKind::adjust;
+  const char* const wheel = key == "wheel up" ? "up" : key == "wheel down" ? "down" : "";
+  for (std::size_t i = 0; i < asked.answers.size() && by_ != AnswerBy::buttons; ++i) {
+    const bool turned = adjusts && asked.answers[i].name == wheel;
+    if (protocols::one_key(asked.answers[i].key) != protocols::one_key(key) && !turned) continue;
+    answer.stimulus = static_cast<int>(i);
+    if (view_.interval == 2 && is_turn(asked, answer)) break;  // the standard is not turned
+    return answer;
+  }
+  reply();
+  return std::nullopt;
+}
+
+/// Any button goes on; button n stands for the n-th answer.
+void KeyboardRespondent::listen_to_buttons(unsigned pressed, std::int64_t time_ns) {
+  if (pressed == 0) return;
+  Answer answer;
+  answer.time_ns = time_ns;
+  answer.goes_on = !view_.answers;
+  const std::size_t count = view_.answers ? task()->answers.size() : 8;
+  for (std::size_t i = 0; i < count && i < 8; ++i) {
+    if ((pressed >> i & 1U) == 0) continue;
+    answer.stimulus = static_cast<int>(i);
+    if (view_.answers && view_.interval == 2 && is_turn(*task(), answer)) return reply();
+    pending_ = answer;
+    return;
+  }
+}
+
+void KeyboardRespondent::look_at_buttons(const Sample& newest) {
+  const unsigned pressed = newest.buttons & ~static_cast<unsigned>(buttons_);
+  buttons_ = newest.buttons;
+  if (by_ != AnswerBy::buttons || pressed == 0 || page_.typing != Page::Typing::none) return;
+  const auto button = static_cast<std::size_t>(std::countr_zero(pressed));
+  if (page_.keys.empty()) {
+    spoken_.push_back({"space", newest.time_ns});
+  } else if (button < page_.keys.size()) {
+    spoken_.push_back({page_.keys[button].first, newest.time_ns});
+  } else {
+    reply();
+  }
+}
+
+bool KeyboardRespondent::spoken(const std::string& answer, std::int64_t time_ns) {
+  if (early_) return false;
+  if (answer.empty()) {
+    spoken_.push_back({"space", time_ns});
+    return true;
+  }
+  if (page_.typing == Page::Typing::number) {
+    std::string number = answer;
+    std::replace(number.begin(), number.end(), ',', '.');
+    if (!number_in(number, least_, most_)) return false;
+  }
+  if (page_.typing != Page::Typing::none) {
+    while (!page_.typed.empty()) type("backspace");
+    std::string character;
+    for (const char c : answer) {
+      const bool begins = (static_cast<unsigned char>(c) & 0xC0U) != 0x80U;
+      if (begins && !character.empty()) spoken_.push_back({std::exchange(character, {}), time_ns});
+      if (c == ' ') spoken_.push_back({"space", time_ns});
+      if (c != ' ') character += c;
+    }
+    if (!character.empty()) spoken_.push_back({character, time_ns});
+    spoken_.push_back({"enter", time_ns});
+    return true;
+  }
+  for (std::size_t i = 0; i < page_.keys.size(); ++i) {
+    const auto& [key, label] = page_.keys[i];
+    if (lower_case(answer) != lower_case(key) && lower_case(answer) != lower_case(label)) continue;
+    spoken_.push_back({key, time_ns});
+    return true;
+  }
+  return false;
+}
+
+KeyPress KeyboardRespondent::wait_for_key(std::int64_t since_ns) {
+  while (true) {
+    std::vector<KeyPress> keys = take_keys();
+    for (std::size_t i = 0; i < keys.size(); ++i) {
+      if (keys[i].time_ns < since_ns) continue;
+      // The others come next: somebody types faster than this looks.
+      spoken_.assign(keys.begin() + static_cast<std::ptrdiff_t>(i) + 1, keys.end());
+      return keys[i];
+    }
+    end_reply();
+    attendant_.attend();
+    clock_.wait_until(clock_.now_ns() + kAskPause_ns);
+  }
+}
+
+int KeyboardRespondent::page_through(const std::vector<ReadScreen>& screens, const Keys& keys,
+                                     Page::Kind kind, std::int64_t& time_ns) {
+  std::size_t at = 0;
+  while (true) {
+    const bool last = at + 1 == screens.size();
+    const std::int64_t since_ns = clock_.now_ns();
+    Page page = kind == Page::Kind::text ? between_trials(kind, screens[at].text) : Page{};
+    page.kind = kind;
+    page.text = screens[at].text;
+    page.picture = screens[at].picture;
+    page.part = static_cast<int>(at) + 1;
+    page.parts = static_cast<int>(screens.size());
+    if (last) page.keys = keys;
+    show(std::move(page));
+    for (const std::size_t shown = at; at == shown;) {
+      const KeyPress press = wait_for_key(since_ns);
+      time_ns = press.time_ns;
+      const auto key = std::find_if(keys.begin(), keys.end(), [&press](const auto& entry) {
+        return protocols::one_key(entry.first) == protocols::one_key(press.key);
+      });
+      const bool forward = press.key == "space" || press.key == "enter" || press.key == "right";
+      const bool back = press.key == "left" || press.key == "backspace";
+      if (last && key != keys.end()) return static_cast<int>(key - keys.begin());
+      if (last && forward && press.key != "right" && keys.empty()) return -1;
+      if (forward && !last) {
+        ++at;
+      } else if (back && at > 0) {
+        --at;
+      } else {
+        reply();
+      }
+    }
+  }
+}
+
+void KeyboardRespondent::read_screens(const std::vector<ReadScreen>& screens) {
+  std::vector<ReadScreen> shown;
+  for (const ReadScreen& screen : screens) {
+    if (!screen.text.empty() || screen.picture) shown.push_back(screen);
+  }
+  std::int64_t time_ns = 0;
+  if (!shown.empty()) page_through(shown, {}, Page::Kind::text, time_ns);
+}
+
+std::optional<Answer> KeyboardRespondent::confidence(const protocols::ConfidenceSpec& asked) {
+  std::vector<std::string> labels;
+  labels.reserve(asked.scale.size());
+  for (const protocols::ScaleStep& step : asked.scale) labels.push_back(step.label);
+  Answer answer;
+  answer.stimulus = page_through({{asked.question, nullptr}}, numbered(labels), Page::Kind::message,
+                                 answer.time_ns);
+  return answer;
+}
+
+std::string KeyboardRespondent::ask_typed(const protocols::PageItem& item) {
+  const std::int64_t since_ns = clock_.now_ns();
+  const bool text = item.kind == protocols::PageItem::Kind::text;
+  Page page = between_trials(Page::Kind::message, item.question);
+  page.typing = text ? Page::Typing::text : Page::Typing::number;
+  least_ = item.least;
+  most_ = item.most;
+  show(std::move(page));
+  while (true) {
+    const KeyPress press = wait_for_key(since_ns);
+    if (press.key != "enter") {
+      if (!type(press.key)) reply();
+      continue;
+    }
+    const std::string& typed = page_.typed;
+    const bool blank = typed.find_first_not_of(' ') == std::string::npos;
+    if (blank && !item.required) return "";
+    if (!text && number_in(typed, item.least, item.most)) return typed;
+    if (text && !blank) return typed;
+    if (text) {
+      reply_with(protocol_.texts.answer_first);
+    } else {
+      refuse_number(item.least, item.most);
+    }
+  }
+}
+
+std::string KeyboardRespondent::ask(const protocols::PageSpec& page,
+                                    const protocols::PageItem& item) {
+  std::int64_t time_ns = 0;
+  if (page.kind == protocols::PageSpec::Kind::consent) {
+    const Keys keys = numbered({protocol_.texts.agree, protocol_.texts.disagree});
+    const int at = page_through(screens_of_text(page.text), keys, Page::Kind::text, time_ns);
+    return at == 0 ? "agree" : "disagree";
+  }
+  if (item.kind != protocols::PageItem::Kind::choice &&
+      item.kind != protocols::PageItem::Kind::scale)
+    return ask_typed(item);
+  const int at =
+      page_through({{item.question, nullptr}}, numbered(item.shown), Page::Kind::text, time_ns);
+  return item.choices[static_cast<std::size_t>(at)];
 }
 
 }  // namespace palpate::runner

@@ -72,7 +72,7 @@ class KeyboardRespondent final : public Respondent {
   void wait_for_space(std::int64_t since_ns);
   void listen(const Sample& sample);
   std::optional<int> meaning(const std::string& key) const;
-  // Version 2 (keyboard_tasks.cpp)
+  // Version 2
   using Keys = std::vector<std::pair<std::string, std::string>>;
   const protocols::TaskBlock* task() const;  ///< of the trial under way; nullptr: version 1
   std::string interval_text() const;

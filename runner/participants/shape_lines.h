@@ -11,10 +11,14 @@
 //   world(i, v)     a vector of that frame in the world frame
 
 #include <cmath>
+#include <type_traits>
+#include <utility>
 
+#include "runner/participants/distance_field.h"
 #include "runner/participants/lane_math.h"
 #include "runner/participants/shape_hypotheses.h"
 #include "runner/participants/shape_profiles.h"
+#include "stimuli/shapes.h"
 #include "stimuli/vec.h"
 
 namespace palpate::runner {
@@ -248,5 +252,217 @@ class AxialLine {
   float linear_[ShapeHypotheses::kBlock];
   float square_[ShapeHypotheses::kBlock];
 };
+
+// The deepest point of the perceived tip or stylus in each hypothesis of a block.
+
+// The search along a line ends when the minimum is bracketed within this length. The distance
+// itself is within 30 micrometres: it is interpolated from the slopes at both ends.
+inline constexpr float kSearchedLength = 0.00012f;  // m
+inline constexpr int kMostHalvings = 20;
+
+/// The deepest point of the line, of every hypothesis of a block.
+struct Deepest {
+  float distance[ShapeHypotheses::kBlock];  // m
+  float cosine[ShapeHypotheses::kBlock];    // outward normal . perceived direction
+  float along[ShapeHypotheses::kBlock];     // m from the line's start
+  float x[ShapeHypotheses::kBlock];         // unit outward normal, in the shape's own frame
+  float y[ShapeHypotheses::kBlock];
+  float z[ShapeHypotheses::kBlock];
+};
+
+template <class ShapeLine>
+void find_at_tip(const ShapeLine& shape, Deepest& out) {
+  for (int i = 0; i < ShapeHypotheses::kBlock; ++i) {
+    const SurfacePoint p = shape.surface(i, 0.0f);
+    out.distance[i] = p.distance;
+    out.cosine[i] = shape.cosine(i, p.normal);
+    out.along[i] = 0.0f;
+    out.x[i] = p.normal.x;
+    out.y[i] = p.normal.y;
+    out.z[i] = p.normal.z;
+  }
+}
+
+/// Surface and slope at one point of the line, for every hypothesis of a block.
+struct SlopedSurface {
+  float distance[ShapeHypotheses::kBlock];  // m
+  float slope[ShapeHypotheses::kBlock];     // of the distance along the line
+  float x[ShapeHypotheses::kBlock];         // unit outward normal, in the shape's own frame
+  float y[ShapeHypotheses::kBlock];
+  float z[ShapeHypotheses::kBlock];
+};
+
+template <class ShapeLine>
+inline void store(const ShapeLine& shape, int i, float s, SlopedSurface& out) {
+  const SurfacePoint p = shape.surface(i, s);
+  out.distance[i] = p.distance;
+  out.slope[i] = dot(p.normal, shape.along(i));
+  out.x[i] = p.normal.x;
+  out.y[i] = p.normal.y;
+  out.z[i] = p.normal.z;
+}
+
+/// Bisection: the distance to a convex shape is convex along a line, so the sign of its slope tells
+/// on which side the minimum lies.
+template <class ShapeLine>
+void find_along_line(const ShapeLine& shape, float length, Deepest& out) {
+  // Half length and middle of the bracket.
+  float reach = 0.5f * length;
+  float middle[ShapeHypotheses::kBlock];
+  for (float& m : middle) m = reach;
+  for (int step = 0; step < kMostHalvings && 2.0f * reach > kSearchedLength; ++step) {
+    reach *= 0.5f;
+    for (int i = 0; i < ShapeHypotheses::kBlock; ++i) {
+      middle[i] -= std::copysign(reach, shape.slope(i, middle[i]));
+    }
+  }
+  // Separate loops: in a single one g++ 12 turns the selections into branches and does not
+  // vectorise.
+  SlopedSurface a;
+  SlopedSurface b;
+  for (int i = 0; i < ShapeHypotheses::kBlock; ++i) store(shape, i, middle[i] - reach, a);
+  for (int i = 0; i < ShapeHypotheses::kBlock; ++i) store(shape, i, middle[i] + reach, b);
+  const float width = 2.0f * reach;
+  for (int i = 0; i < ShapeHypotheses::kBlock; ++i) {
+    // The tangents at a and b intersect at the minimum of a kink and just below that of a smooth
+    // minimum. The combination of the two normals with slope zero is perpendicular to the line. If
+    // both slopes have one sign, the other is set to zero and an end of the line is the minimum.
+    const float falling = lane::min(a.slope[i], 0.0f);
+    const float rising = lane::max(b.slope[i], 0.0f);
+    const float bend = lane::max(rising - falling, 1e-6f);
+    const float meet =
+        lane::clamp((a.distance[i] - b.distance[i] + rising * width) / bend, 0.0f, width);
+    const float weight_b = -falling / bend;
+    const float weight_a = 1.0f - weight_b;
+    const FloatVec n{weight_a * a.x[i] + weight_b * b.x[i], weight_a * a.y[i] + weight_b * b.y[i],
+                     weight_a * a.z[i] + weight_b * b.z[i]};
+    const float size = std::sqrt(lane::max(dot(n, n), 1e-12f));
+    out.distance[i] = a.distance[i] + falling * meet;
+    out.cosine[i] = shape.cosine(i, n) / size;
+    out.along[i] = middle[i] - reach + meet;
+    out.x[i] = n.x / size;
+    out.y[i] = n.y / size;
+    out.z[i] = n.z / size;
+  }
+}
+
+// Signed distances of one block of hypotheses along one line, for stimuli without a formula. The
+// functions are those of shape_lines.h.
+
+/// Works in the stimulus' frame.
+class SolidLine : public RotatedLine {
+ public:
+  SolidLine(const ShapeHypotheses& hypotheses, const ShapeHypotheses::Shape& shape, int first,
+            const Line& line)
+      : RotatedLine(hypotheses, first, line), field_(shape.field.get()) {}
+
+  float distance(int i, float s) const {
+    const FloatVec p = at(i, s);
+    return field_->distance(p.x, p.y, p.z);
+  }
+  SurfacePoint surface(int i, float s) const {
+    const FloatVec p = at(i, s);
+    const DistanceField::Value v = field_->value(p.x, p.y, p.z);
+    return {v.distance, unit({v.slope_x, v.slope_y, v.slope_z})};
+  }
+
+  static FloatVec unit(const FloatVec& v) {
+    const float scale = 1.0f / std::sqrt(lane::max(dot(v, v), kTinyLength * kTinyLength));
+    return {v.x * scale, v.y * scale, v.z * scale};
+  }
+
+ private:
+  const DistanceField* field_;
+};
+
+/// A solid that is not convex may have several local minima along the line. Steps of at most
+/// `kPlaces` to its length, longer where the distance, which changes by a metre a metre at most,
+/// leaves nothing to be found; then closer around the least. Within 0.5 mm of the minimum. All
+/// hypotheses take a step at a time: one would wait for the grid's memory at each.
+inline void find_along_line(const SolidLine& shape, float length, Deepest& out) {
+  constexpr int kBlock = ShapeHypotheses::kBlock;
+  constexpr int kPlaces = 16;
+  constexpr int kHalvings = 5;
+  const float step = length / kPlaces;
+  const float end = length + 0.5f * step;
+  float best[kBlock], least[kBlock], next[kBlock];
+  for (int i = 0; i < kBlock; ++i) {
+    best[i] = 0;
+    next[i] = step;
+    least[i] = shape.distance(i, 0);
+  }
+  for (bool more = true; more;) {
+    int going_on = 0;
+    for (int i = 0; i < kBlock; ++i) {
+      const bool within = next[i] < end;
+      const float place = lane::min(next[i], length);
+      const float d = shape.distance(i, place);
+      const bool closer = within && d < least[i];
+      least[i] = closer ? d : least[i];
+      best[i] = closer ? place : best[i];
+      next[i] += lane::max(step, d - least[i]);
+      going_on += next[i] < end ? 1 : 0;
+    }
+    more = going_on > 0;
+  }
+  float reach = 0.5f * step;
+  for (int k = 0; k < kHalvings; ++k, reach *= 0.5f) {
+    for (int i = 0; i < kBlock; ++i) {
+      const float before = lane::max(best[i] - reach, 0.0f);
+      const float after = lane::min(best[i] + reach, length);
+      const float a = shape.distance(i, before), b = shape.distance(i, after);
+      const bool back = a < least[i] && a <= b;
+      const bool on = !back && b < least[i];
+      least[i] = back ? a : on ? b : least[i];
+      best[i] = back ? before : on ? after : best[i];
+    }
+  }
+  for (int i = 0; i < kBlock; ++i) {
+    const SurfacePoint p = shape.surface(i, best[i]);
+    // Between the ends a contact's normal is perpendicular to the line.
+    const bool between = best[i] > 0 && best[i] < length;
+    const FloatVec u = shape.along(i);
+    const float slope = dot(p.normal, u);
+    const FloatVec across = SolidLine::unit(
+        {p.normal.x - slope * u.x, p.normal.y - slope * u.y, p.normal.z - slope * u.z});
+    const FloatVec n{between ? across.x : p.normal.x, between ? across.y : p.normal.y,
+                     between ? across.z : p.normal.z};
+    out.distance[i] = p.distance;
+    out.cosine[i] = shape.cosine(i, n);
+    out.along[i] = best[i];
+    out.x[i] = n.x;
+    out.y[i] = n.y;
+    out.z[i] = n.z;
+  }
+}
+
+// Which class of lines (shape_lines.h, shape_lines.h) measures to which stimulus.
+
+/// Calls visit(std::type_identity<ShapeLine>()) with the class of the stimulus.
+template <class Visit>
+void visit_line_class(const ShapeHypotheses::Shape& shape, Visit&& visit) {
+  if (shape.field) {
+    std::forward<Visit>(visit)(std::type_identity<SolidLine>());
+    return;
+  }
+  switch (shape.kind) {
+    case stimuli::ShapeKind::cone:
+      std::forward<Visit>(visit)(std::type_identity<AxialLine<ConeProfile>>());
+      break;
+    case stimuli::ShapeKind::cylinder:
+      std::forward<Visit>(visit)(std::type_identity<AxialLine<CylinderProfile>>());
+      break;
+    case stimuli::ShapeKind::cube:
+      std::forward<Visit>(visit)(std::type_identity<CubeLine>());
+      break;
+    case stimuli::ShapeKind::sphere:
+      std::forward<Visit>(visit)(std::type_identity<SphereLine>());
+      break;
+    case stimuli::ShapeKind::box:
+    case stimuli::ShapeKind::mesh:
+    case stimuli::ShapeKind::compound:
+      break;  // have a field
+  }
+}
 
 }  // namespace palpate::runner

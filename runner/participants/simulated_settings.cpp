@@ -1,16 +1,292 @@
 #include "runner/participants/simulated_settings.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdio>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <numbers>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <vector>
 
 #include "data/base/json_text.h"
-#include "runner/participants/settings_document.h"
-#include "runner/participants/simulated_defaults.h"
+#include "protocols/json_document.h"
+#include "protocols/parse.h"
+#include "protocols/sha256.h"
 #include "stimuli/random.h"
 
 namespace palpate::runner {
+
+// What the numbers of the simulated participant can be: what a hand, a stylus and a device can be
+// at all, and what the model is defined for. Wide: plausible values are the study's affair.
+
+/// Why a setting cannot have that value, as "must be ..."; empty: it can, or has no range.
+/// \param pointer  JSON pointer into the complete settings, "/hand/mass_kg"
+std::string range_fault(const std::string& pointer, double value);
+
+namespace {
+
+enum class Kind { from_least, above_least, within, whole };
+
+struct Range {
+  std::string_view pointer;
+  Kind kind;
+  double least, most;
+};
+
+constexpr Kind kFrom = Kind::from_least;    // least <= x <= most
+constexpr Kind kAbove = Kind::above_least;  // least < x <= most
+constexpr Kind kWithin = Kind::within;      // least < x < most
+constexpr Kind kWhole = Kind::whole;        // from_least, without a fraction
+
+constexpr std::array kRanges = {
+    Range{"/percept/contact_sd_m", kFrom, 0, 1},
+    Range{"/percept/direction_sd_deg", kFrom, 0, 180},
+    Range{"/percept/along_sd_m", kAbove, 0, 1},
+    Range{"/percept/axis_sd_deg", kFrom, 0, 180},
+    Range{"/percept/centre_jitter_m", kFrom, 0, 1},
+    Range{"/percept/rate_hz", kAbove, 0, 1000},
+    Range{"/percept/force_low_pass_s", kFrom, 0, 10},
+    Range{"/percept/force_threshold_n", kFrom, 0, 100},
+    Range{"/observer/model_contact_sd_m", kFrom, 0, 1},
+    Range{"/observer/model_direction_sd_deg", kFrom, 0, 180},
+    Range{"/observer/soft_min_scale_m", kAbove, 0, 1},
+    Range{"/observer/places_along", kWhole, 2, 64},
+    Range{"/observer/torque_floor", kFrom, 1e-30, 1},
+    Range{"/observer/free_space_weight", kFrom, 0, 1000},
+    Range{"/observer/floor", kFrom, -1e6, 0},
+    Range{"/observer/beta", kFrom, 0, 1000},
+    Range{"/observer/movement_scale_m", kAbove, 0, 10},
+    Range{"/observer/turn_length_m_per_rad", kFrom, 0, 10},
+    Range{"/observer/memory_s", kAbove, 0, 1e9},
+    Range{"/observer/threshold", kWithin, 0, 1},
+    Range{"/observer/non_decision_s", kFrom, 0, 60},
+    Range{"/motor/reaction_delay_s", kFrom, 0, 10},
+    Range{"/motor/slide_speed_m_per_s", kAbove, 0, 10},
+    Range{"/motor/approach_speed_m_per_s", kAbove, 0, 10},
+    Range{"/motor/indentation_m", kAbove, 0, 0.1},
+    Range{"/motor/max_indentation_m", kAbove, 0, 0.1},
+    Range{"/motor/heading_time_constant_s", kAbove, 0, 1000},
+    Range{"/motor/mean_follow_s", kAbove, 0, 1e4},
+    Range{"/motor/approach_distance_m", kAbove, 0, 10},
+    Range{"/motor/approach_min_rise", kWithin, -1, 1},
+    Range{"/search/aim_sd_m", kFrom, 0, 1},
+    Range{"/search/pull_to_centre", kFrom, 0, 1000},
+    Range{"/search/pull_to_centre_per_s", kFrom, 0, 1e4},
+    Range{"/search/give_up_s", kAbove, 0, 1e4},
+    Range{"/heading/interval_s", kAbove, 0, 1000},
+    Range{"/heading/turning_time_s", kAbove, 0, 1000},
+    Range{"/heading/hypotheses", kWhole, 2, 32},
+    Range{"/heading/headings", kWhole, 2, 64},
+    Range{"/heading/places", kWhole, 1, 8},
+    Range{"/heading/look_ahead_m", kAbove, 0, 10},
+    Range{"/stylus/tilt_deg", kFrom, 0, 90},
+    Range{"/stylus/tilt_sd_deg", kFrom, 0, 90},
+    Range{"/stylus/turning_deg_per_s", kFrom, 0, 1e5},
+    Range{"/hand/stiffness_n_per_m", kAbove, 0, 1e5},
+    Range{"/hand/damping_ns_per_m", kFrom, 0, 1000},
+    Range{"/hand/mass_kg", kAbove, 0, 100},
+    Range{"/hand/turn_stiffness_nm_per_rad", kAbove, 0, 1000},
+    Range{"/hand/turn_damping_nms_per_rad", kFrom, 0, 100},
+    Range{"/device/end_mass_kg", kAbove, 0, 100},
+    Range{"/device/damping_ns_per_m", kFrom, 0, 1000},
+    Range{"/device/friction_n", kFrom, 0, 100},
+    Range{"/device/resolution_m", kFrom, 0, 0.01},
+    Range{"/device/max_force_n", kAbove, 0, 1000},
+    Range{"/device/max_stiffness_n_per_m", kAbove, 0, 1e6},
+    Range{"/device/workspace_radius_m", kAbove, 0, 10},
+    Range{"/between_participants/slide_speed_log_sd", kFrom, 0, 3},
+    Range{"/between_participants/percept_noise_log_sd", kFrom, 0, 3},
+    Range{"/between_participants/reaction_delay_log_sd", kFrom, 0, 3},
+    Range{"/between_participants/non_decision_log_sd", kFrom, 0, 3},
+    Range{"/between_participants/threshold_logit_sd", kFrom, 0, 10},
+};
+
+bool holds(const Range& range, double x) {
+  switch (range.kind) {
+    case Kind::from_least:
+      return x >= range.least && x <= range.most;
+    case Kind::above_least:
+      return x > range.least && x <= range.most;
+    case Kind::within:
+      return x > range.least && x < range.most;
+    case Kind::whole:
+      return x >= range.least && x <= range.most && x == std::floor(x);
+  }
+  return false;
+}
+
+const char* words_of(Kind kind) {
+  switch (kind) {
+    case Kind::from_least:
+      return "must be %g to %g";
+    case Kind::above_least:
+      return "must be above %g, at most %g";
+    case Kind::within:
+      return "must be above %g and below %g";
+    case Kind::whole:
+      return "must be a whole number, %g to %g";
+  }
+  return "";
+}
+
+}  // namespace
+
+std::string range_fault(const std::string& pointer, double value) {
+  const auto* const range = std::find_if(kRanges.begin(), kRanges.end(),
+                                         [&](const Range& one) { return one.pointer == pointer; });
+  if (range == kRanges.end() || holds(*range, value)) return "";
+  char text[80];
+  std::snprintf(text, sizeof text, words_of(range->kind), range->least, range->most);
+  return text;
+}
+
+namespace {
+
+using nlohmann::json;
+
+// Version 3 has every key; what earlier versions did, in its words.
+const char* const kBeforeVersion3 = R"({
+  "percept": {"place": "tip"},
+  "observer": {"evidence": "percept", "movement_scale_m": 0.03, "turn_length_m_per_rad": 0.03, "forgetting": true},
+  "search": {"after_loss": "turn-to-centre", "pull_to_centre": 0.15},
+  "heading": {"chosen": false, "interval_s": 0.3, "turning_time_s": 0.1, "hypotheses": 32, "headings": 8,
+              "places": 2, "look_ahead_m": 0.02}
+})";
+const char* const kBeforeVersion2 = R"({
+  "search": {"after_loss": "press-on", "pull_to_centre_per_s": 15}
+})";
+
+/// The words that a switch can be, by its place.
+const std::map<std::string, std::vector<std::string>>& words() {
+  static const std::map<std::string, std::vector<std::string>> kWords = {
+      {"/percept/place", {"tip", "surface"}},
+      {"/observer/evidence", {"percept", "movement"}},
+      {"/search/after_loss", {"press-on", "turn-to-centre"}}};
+  return kWords;
+}
+
+json frozen_settings(int version) {
+  for (const FrozenSettings* frozen = kFrozenSettings; frozen->version != 0; ++frozen) {
+    if (frozen->version == version) return data::read_json(frozen->text);
+  }
+  throw std::invalid_argument("no version " + std::to_string(version) +
+                              " of the simulated participant");
+}
+
+/// What a version did where its file has no key for it.
+json implied_settings(int version) {
+  json implied = json::object();
+  if (version < 3) implied = data::read_json(kBeforeVersion3);
+  if (version < 2) {
+    implied.merge_patch(data::read_json(kBeforeVersion2));
+    implied["search"].erase("pull_to_centre");  // its own
+  }
+  return implied;
+}
+
+}  // namespace
+
+std::string setting_fault(const std::string& pointer, const json& value, const json& now) {
+  if (now.is_number() && !(value.is_number() && std::isfinite(value.get<double>())))
+    return "must be a number";
+  if (now.is_number()) return range_fault(pointer, value.get<double>());
+  if (now.is_boolean() && !value.is_boolean()) return "must be true or false";
+  const auto known = words().find(pointer);
+  if (known != words().end()) {
+    std::string list;
+    for (const std::string& word : known->second) {
+      if (value == word) return "";
+      list += (list.empty() ? "" : " or ") + word;
+    }
+    return "must be " + list;
+  }
+  if (now.is_string() && !value.is_string()) return "must be a text";
+  return "";
+}
+
+namespace {
+
+struct Check {
+  std::string file;
+  bool whole;  ///< every key must be there, and the version stands
+  std::vector<protocols::Fault> faults = {};
+
+  /// \param known  an object with all keys
+  void compare(const json& given, const json& known, const std::string& pointer) {
+    if (!given.is_object()) {
+      faults.push_back({file, pointer, "must be an object"});
+      return;
+    }
+    for (const auto& [key, value] : given.items()) {
+      const std::string here = std::string(pointer).append("/").append(key);
+      if (!known.contains(key)) {
+        faults.push_back({file, here, "no such setting"});
+      } else if (known[key].is_object()) {
+        compare(value, known[key], here);
+      } else if (const std::string fault = setting_fault(here, value, known[key]); !fault.empty()) {
+        faults.push_back({file, here, fault});
+      } else if (key == "version" && !whole) {
+        faults.push_back({file, here, "a patch cannot change the version"});
+      }
+    }
+    if (!whole) return;
+    for (const auto& [key, value] : known.items()) {
+      if (!given.contains(key)) faults.push_back({file, pointer + "/" + key, "is missing"});
+    }
+  }
+  void throw_if_any() const {
+    if (!faults.empty()) throw protocols::InputError(faults);
+  }
+};
+
+/// Takes out of `settings` what is the same in `implied`, and groups that are empty then.
+void remove_implied(json& settings, const json& implied) {
+  for (const auto& [key, value] : implied.items()) {
+    if (!settings.contains(key)) continue;
+    json& own = settings[key];
+    if (value.is_object()) {
+      remove_implied(own, value);
+      if (own.empty()) settings.erase(key);
+    } else if (own == value) {
+      settings.erase(key);
+    }
+  }
+}
+
+}  // namespace
+
+json complete_settings(int version) {
+  const json frozen = frozen_settings(version);
+  json settings = implied_settings(version);
+  settings.merge_patch(frozen);
+  return settings;
+}
+
+void patch_settings(json& settings, const std::string& path) {
+  protocols::FaultList found(path);
+  const json patch = protocols::read_json(protocols::read_text_file(path), found);
+  found.throw_if_any();
+  Check check{path, false};
+  check.compare(patch, settings, "");
+  check.throw_if_any();
+  settings.merge_patch(patch);
+}
+
+void check_settings(const json& settings) {
+  Check check{"settings of the simulated participant", true};
+  check.compare(settings, complete_settings(3), "");
+  check.throw_if_any();
+}
+
+std::string settings_checksum(json settings) {
+  remove_implied(settings, implied_settings(settings.at("version")));
+  return protocols::sha256_hex(settings.dump());
+}
+
 namespace {
 
 using nlohmann::json;

@@ -7,7 +7,6 @@
 #include <string>
 
 #include "runner/safety/guard.h"
-#include "runner/safety/guard_channel.h"
 #include "runner/servo/device.h"
 
 namespace palpate::runner {

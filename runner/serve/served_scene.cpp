@@ -4,7 +4,7 @@
 #include <utility>
 
 #include "protocols/json_document.h"
-#include "runner/safety/fault_table.h"
+#include "runner/safety/fault_signals.h"
 #include "runner/scene_builder.h"
 #include "runner/session/device_check.h"
 

@@ -6,7 +6,7 @@
 #include <cstring>
 #include <utility>
 
-#include "runner/safety/fault_table.h"
+#include "runner/safety/fault_signals.h"
 #include "runner/session/level_scenes.h"
 #include "stimuli/shapes.h"
 

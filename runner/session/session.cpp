@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "data/files/utc.h"
-#include "runner/safety/fault_table.h"
+#include "runner/safety/fault_signals.h"
 #include "runner/session/body_record.h"
 
 namespace palpate::runner {

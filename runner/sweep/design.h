@@ -2,6 +2,7 @@
 // Where in the unit cube the points of a sweep lie. A point follows from the design, the seed and
 // its number alone, so that any machine can compute any of them.
 
+#include <cstddef>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -9,6 +10,14 @@
 #include "protocols/sweep_space.h"
 
 namespace palpate::runner {
+
+constexpr std::size_t kMostSobolDimensions = 3667;
+
+/// Point `index` (from 0: the origin) of Sobol's sequence in [0, 1)^dimensions, as 64 binary digits
+/// each, in the order of Antonov & Saleev (1979) with the direction numbers new-joe-kuo-6.21201
+/// (Joe & Kuo 2008), which Boost.Random brings. \throws std::invalid_argument: no dimension, or
+/// more than kMostSobolDimensions
+std::vector<std::uint64_t> sobol_digits(std::uint64_t index, std::size_t dimensions);
 
 enum class DesignKind {
   lhs,  ///< Latin hypercube (McKay, Beckman & Conover 1979): of every parameter, one point in each

@@ -12,8 +12,8 @@
 #include <utility>
 
 #include "protocols/parse.h"
+#include "runner/devices/falcon/boot.h"
 #include "runner/devices/falcon/driver.h"
-#include "runner/devices/falcon/image.h"
 #include "runner/devices/falcon/parameters.h"
 #include "runner/devices/falcon/serial.h"
 

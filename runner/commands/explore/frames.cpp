@@ -18,7 +18,7 @@
 #include "runner/commands/shared/scene_notes.h"
 #include "runner/display/scene/painter.h"
 #include "runner/display/scene/scene_drawing.h"
-#include "runner/safety/fault_table.h"
+#include "runner/safety/fault_signals.h"
 #include "runner/scene_builder.h"
 
 namespace palpate::runner {

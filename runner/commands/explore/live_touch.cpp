@@ -10,7 +10,7 @@
 
 #include "runner/commands/render/forces.h"
 #include "runner/display/timeline.h"
-#include "runner/servo/servo_fault.h"
+#include "runner/servo/sample.h"
 
 namespace palpate::runner {
 namespace {

@@ -14,7 +14,7 @@
 
 #include "protocols/parse.h"
 #include "rendering/renderer.h"
-#include "runner/display/touch_source.h"
+#include "runner/display/display.h"
 #include "runner/servo/servo_thread.h"
 
 namespace palpate::runner {

@@ -6,7 +6,7 @@
 #include "protocols/parse.h"
 #include "rendering/renderer.h"
 #include "runner/commands/render/trajectory_csv.h"
-#include "runner/display/touch_source.h"
+#include "runner/display/display.h"
 
 namespace palpate::runner {
 

@@ -10,7 +10,7 @@
 #include "protocols/protocol.h"
 #include "protocols/tasks/levels.h"
 #include "runner/commands/shared/command.h"
-#include "runner/safety/fault_table.h"
+#include "runner/safety/fault_signals.h"
 
 namespace palpate::runner {
 namespace {

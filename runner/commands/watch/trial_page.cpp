@@ -16,7 +16,7 @@
 #include "rendering/renderer.h"
 #include "runner/commands/watch/picture_mesh.h"
 #include "runner/commands/watch/whole_numbers.h"
-#include "runner/safety/fault_table.h"
+#include "runner/safety/fault_signals.h"
 #include "runner/scene_builder.h"
 #include "runner/session/replay.h"
 #include "stimuli/text.h"

@@ -4,11 +4,26 @@
 
 #include <cstdint>
 #include <functional>
+#include <string>
+#include <vector>
 
-#include "runner/devices/falcon/image.h"
 #include "runner/devices/falcon/transport.h"
 
 namespace palpate::runner::falcon {
+
+/// A firmware file named by the user; none is shipped. A stream for the boot ROM of TI's C28x
+/// processors: 16-bit little-endian words; key 0x08AA, 8 reserved words, entry point; blocks of a
+/// count, a destination and so many words; a count of 0 ends it.
+struct FirmwareImage {
+  std::vector<std::uint8_t> bytes;
+  std::uint32_t entry = 0;
+  int blocks = 0;
+};
+
+/// Checks the structure; the format has no checksum. \throws InputError naming `file` and the byte.
+FirmwareImage parse_image(std::vector<std::uint8_t> bytes, const std::string& file);
+/// \throws InputError.
+FirmwareImage read_image(const std::string& file);
 
 struct BootSettings {
   int monitor_probes = 100;                   ///< until the boot monitor answers

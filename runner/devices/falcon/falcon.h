@@ -6,6 +6,7 @@
 #include <string>
 
 #include "runner/devices/falcon/driver.h"
+#include "runner/devices/falcon/stylus_from_ends.h"
 #include "runner/servo/device.h"
 
 namespace palpate::runner::falcon {
@@ -28,6 +29,35 @@ class FalconDevice final : public Device {
  private:
   std::unique_ptr<FalconDriver> driver_;
   DeviceCapabilities capabilities_;
+};
+
+// Two Falcons that hold the ends of a stylus, like the two Phantoms of Ho, Basdogan & Srinivasan
+// (2000), section 2: five degrees of freedom, sensed and actuated. World frame: the tip's device.
+
+class Falcon2Device final : public Device {
+ public:
+  Falcon2Device(std::unique_ptr<FalconDriver> tip, std::unique_ptr<FalconDriver> tail,
+                const StylusFromEnds& stylus, const std::string& calibration = "");
+
+  const DeviceCapabilities& capabilities() const override { return capabilities_; }
+  /// Lost when either device is, or when the distance of the ends differs from the stylus' length.
+  /// Buttons of the tip's grip are bits 0 to 3, of the tail's 4 to 7.
+  DeviceReading read() noexcept override;
+  /// \param device1, device2  N, world frame: eq. (1)'s forces at tip and tail.
+  void write(const Vec3& device1, const Vec3& device2) noexcept override;
+
+  /// Both ends command zero force meanwhile.
+  void reopen() override;
+
+  FalconDriver& tip() { return *tip_; }
+  FalconDriver& tail() { return *tail_; }
+  const StylusFromEnds& stylus() const { return stylus_; }
+
+ private:
+  std::unique_ptr<FalconDriver> tip_, tail_;
+  StylusFromEnds stylus_;
+  DeviceCapabilities capabilities_;
+  bool lost_ = true;
 };
 
 }  // namespace palpate::runner::falcon

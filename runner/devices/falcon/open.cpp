@@ -10,9 +10,8 @@
 #include <utility>
 
 #include "protocols/parse.h"
+#include "runner/devices/falcon/boot.h"
 #include "runner/devices/falcon/falcon.h"
-#include "runner/devices/falcon/falcon2.h"
-#include "runner/devices/falcon/image.h"
 #include "runner/devices/falcon/parameters.h"
 #include "runner/devices/falcon/usb.h"
 #include "stimuli/text.h"

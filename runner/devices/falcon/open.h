@@ -10,7 +10,6 @@
 #include "runner/devices/falcon/calibration.h"
 #include "runner/devices/falcon/driver.h"
 #include "runner/servo/device.h"
-#include "runner/servo/device_config.h"
 
 namespace palpate::runner::falcon {
 

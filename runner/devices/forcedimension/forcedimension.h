@@ -10,7 +10,6 @@
 
 #include "runner/devices/forcedimension/library.h"
 #include "runner/servo/device.h"
-#include "runner/servo/device_config.h"
 
 namespace palpate::runner::forcedimension {
 

@@ -13,7 +13,6 @@
 #include "runner/devices/haply/link.h"
 #include "runner/devices/haply/messages.h"
 #include "runner/servo/device.h"
-#include "runner/servo/device_config.h"
 #include "runner/servo/shared_value.h"
 #include "runner/servo/triple_buffer.h"
 

@@ -9,7 +9,6 @@
 
 #include "runner/devices/touch/library.h"
 #include "runner/servo/device.h"
-#include "runner/servo/device_config.h"
 #include "runner/servo/shared_value.h"
 #include "runner/servo/triple_buffer.h"
 

@@ -6,9 +6,11 @@
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
+#include <map>
 #include <string>
 
 #include "runner/display/scene/drawn_mesh.h"
+#include "runner/display/scene/picture.h"
 
 namespace palpate::runner {
 
@@ -100,6 +102,41 @@ class GlDepthMap {
  private:
   int size_;
   unsigned frame_ = 0, texture_ = 0;
+};
+
+// Text over a picture.
+
+/// Where a point of the text lies: its left end at mid-height, its middle, its lower left corner.
+enum class TextAnchor { left, centre, lower_left };
+
+class GlText {
+ public:
+  GlText();
+  ~GlText();
+  GlText(const GlText&) = delete;
+  GlText& operator=(const GlText&) = delete;
+
+  /// Before the texts of a picture, into what is bound. \param size  px, of the font
+  void begin(const glm::vec2& picture, double size, const Theme& theme);
+  void draw(const std::string& text, const glm::vec2& at, TextAnchor anchor);
+  /// px, of the text as it would be drawn.
+  glm::vec2 size_of(const std::string& text) { return known(text).size; }
+  void end();
+
+ private:
+  struct Known {
+    unsigned texture = 0;
+    glm::vec2 size{0, 0};
+    bool used = false;
+  };
+  const Known& known(const std::string& text);
+
+  GlProgram program_;
+  unsigned nothing_ = 0;  ///< vertices: the shader makes them
+  std::map<std::string, Known> known_;
+  glm::vec2 picture_{1, 1};
+  double size_ = 0;
+  const Theme* theme_ = nullptr;
 };
 
 }  // namespace palpate::runner

@@ -1,12 +1,88 @@
 #include "runner/display/scene/painter.h"
 
+#include <dlfcn.h>
+#include <epoxy/egl.h>
+
+#include <cstdlib>
 #include <optional>
+#include <string>
 
 #include "runner/display/scene/image_file.h"
-#include "runner/display/scene/offscreen.h"
+#include "runner/display/scene/picture.h"
 #include "runner/display/scene/scene_renderer.h"
 
 namespace palpate::runner {
+
+// OpenGL without a display.
+
+/// A context of its own, current in the thread that made it, until it is destroyed there.
+class OffscreenContext {
+ public:
+  /// \throws DisplayError saying what is missing
+  OffscreenContext();
+  ~OffscreenContext();
+  OffscreenContext(const OffscreenContext&) = delete;
+  OffscreenContext& operator=(const OffscreenContext&) = delete;
+
+ private:
+  void* display_ = nullptr;
+  void* context_ = nullptr;
+};
+
+namespace {
+
+[[noreturn]] void refuse(const std::string& why) {
+  throw DisplayError("no pictures can be drawn without a display: " + why +
+                     "; Debian's packages libegl1 and libgl1-mesa-dri draw on any computer");
+}
+
+// EGL_MESA_platform_surfaceless: no window system at all. Drivers without it have a default
+// display.
+EGLDisplay surfaceless_display() {
+  if (epoxy_has_egl_extension(EGL_NO_DISPLAY, "EGL_MESA_platform_surfaceless") &&
+      epoxy_has_egl_extension(EGL_NO_DISPLAY, "EGL_EXT_platform_base"))
+    return eglGetPlatformDisplayEXT(EGL_PLATFORM_SURFACELESS_MESA,
+                                    static_cast<void*>(EGL_DEFAULT_DISPLAY), nullptr);
+  return eglGetDisplay(EGL_DEFAULT_DISPLAY);
+}
+
+}  // namespace
+
+OffscreenContext::OffscreenContext() {
+  // libepoxy ends the program where it does not find the library.
+  void* const library = dlopen("libEGL.so.1", RTLD_LAZY | RTLD_LOCAL);
+  if (library == nullptr) refuse("the library libEGL is not installed");
+  display_ = surfaceless_display();
+  if (display_ == EGL_NO_DISPLAY) refuse("EGL gives no display");
+  if (eglInitialize(display_, nullptr, nullptr) == EGL_FALSE)
+    refuse("EGL cannot start (error " + std::to_string(eglGetError()) + ")");
+  const auto give_up = [this](const std::string& why) {
+    eglTerminate(display_);
+    refuse(why);
+  };
+  if (!epoxy_has_egl_extension(display_, "EGL_KHR_surfaceless_context") ||
+      !epoxy_has_egl_extension(display_, "EGL_KHR_no_config_context"))
+    give_up("this EGL draws into windows only");
+  if (eglBindAPI(EGL_OPENGL_API) == EGL_FALSE) give_up("this EGL has no OpenGL");
+  constexpr EGLint kWanted[] = {EGL_CONTEXT_MAJOR_VERSION,
+                                3,
+                                EGL_CONTEXT_MINOR_VERSION,
+                                3,
+                                EGL_CONTEXT_OPENGL_PROFILE_MASK,
+                                EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT,
+                                EGL_NONE};
+  context_ = eglCreateContext(display_, EGL_NO_CONFIG_KHR, EGL_NO_CONTEXT, kWanted);
+  if (context_ == EGL_NO_CONTEXT) give_up("this driver has no OpenGL 3.3");
+  if (eglMakeCurrent(display_, EGL_NO_SURFACE, EGL_NO_SURFACE, context_) == EGL_FALSE)
+    give_up("the context cannot be used (error " + std::to_string(eglGetError()) + ")");
+}
+
+OffscreenContext::~OffscreenContext() {
+  eglMakeCurrent(display_, EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);
+  eglDestroyContext(display_, context_);
+  eglTerminate(display_);
+}
+
 namespace {
 
 class OffscreenPainter final : public ScenePainter {

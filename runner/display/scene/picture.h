@@ -6,12 +6,19 @@
 #include <glm/vec4.hpp>
 #include <memory>
 #include <optional>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
 #include "runner/display/scene/drawn_mesh.h"
 
 namespace palpate::runner {
+
+/// No window can be opened or no picture drawn: not built in, no display, or an unsuitable one;
+/// what() says which.
+class DisplayError : public std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
 
 struct DrawnObject {
   /// Kept by the renderer as long as it is drawn: pass the same one again where nothing has

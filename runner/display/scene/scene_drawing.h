@@ -3,6 +3,8 @@
 
 #include <array>
 #include <cstddef>
+#include <glm/mat4x4.hpp>
+#include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 #include <memory>
 #include <optional>
@@ -13,12 +15,57 @@
 #include "rendering/bodies/soft/soft_scene.h"
 #include "rendering/scene.h"
 #include "rendering/tool.h"
+#include "runner/display/scene/camera.h"
 #include "runner/display/scene/picture.h"
 #include "runner/servo/sample.h"
 #include "runner/servo/touched_places.h"
 #include "stimuli/shapes.h"
 
 namespace palpate::runner {
+
+/// A label in a picture. Pixels from the upper left corner.
+struct LabelBox {
+  glm::vec2 centre{0, 0}, size{0, 0};
+  float distance = 0;  ///< of what it names, from the viewer, m
+  const std::string* text = nullptr;
+  bool shown = true;
+};
+
+/// Moves labels so that they lie in the picture and on none of the others, the nearest things'
+/// first. Not shown is what names things outside of the picture, and what finds no room.
+void place_labels(std::vector<LabelBox>& boxes, const glm::vec2& picture);
+
+// Where the unit cylinder, cone and sphere go to be rods, arrows and balls.
+
+/// Takes the unit z axis from `from` to `to`, x and y to `radius`.
+glm::mat4 rod_place(const glm::vec3& from, const glm::vec3& to, float radius);
+/// The radius with which the rod is drawn.
+float radius_seen(const DrawnRod& rod, const Camera& camera);
+glm::mat4 ball_place(const glm::vec3& centre, float radius);
+
+struct ArrowPlaces {
+  glm::mat4 shaft, head;
+};
+/// The head ends at `to`; of a short arrow it is half.
+ArrowPlaces arrow_places(const glm::vec3& from, const glm::vec3& to, float radius);
+
+/// Points along the arc; the last three steps are its head.
+std::vector<glm::vec3> points_of(const DrawnTurn& turn);
+
+// What the stylus carries, as the console's view draws it. Virtual frame, m.
+
+/// The segments of the tool, as one of them is drawn: in the hand or as the ideal tool.
+struct DrawnTool {
+  rendering::LineProbe stylus;
+  std::vector<rendering::LineProbe> segments;  ///< without a tool the stylus alone
+};
+
+/// The tool in the hand: where the stylus is, with the roll of the ideal tool (they differ by its
+/// lag alone).
+DrawnTool tool_in_hand(const rendering::Tool& tool, const Sample& sample);
+
+/// The ideal tool of the deepest contact; in free space where the hand is.
+DrawnTool ideal_tool(const rendering::Tool& tool, const Sample& sample);
 
 /// All places of a tick; of a scene in which something rigid moves the deepest alone, with all of
 /// the force. \param state  after it

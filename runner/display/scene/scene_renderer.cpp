@@ -8,10 +8,8 @@
 #include <glm/ext/matrix_transform.hpp>
 #include <glm/geometric.hpp>
 
-#include "runner/display/scene/display_error.h"
-#include "runner/display/scene/label_places.h"
-#include "runner/display/scene/rod_places.h"
-#include "runner/display/scene/shaders.h"
+#include "runner/display/scene/picture.h"
+#include "runner/display/scene/scene_drawing.h"
 
 namespace palpate::runner {
 namespace {

@@ -13,7 +13,7 @@
 #include <thread>
 #include <utility>
 
-#include "runner/servo/servo_fault.h"
+#include "runner/servo/sample.h"
 #include "tests/runner/fake_device.h"
 
 namespace palpate::runner {

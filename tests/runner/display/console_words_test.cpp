@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "runner/servo/servo_fault.h"
+#include "runner/servo/sample.h"
 
 namespace palpate::runner {
 namespace {

@@ -1,10 +1,10 @@
-#include "runner/display/scene/label_places.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <random>
 #include <vector>
+
+#include "runner/display/scene/scene_drawing.h"
 
 namespace palpate::runner {
 namespace {

@@ -8,8 +8,8 @@
 #include <memory>
 #include <optional>
 
-#include "runner/display/scene/display_error.h"
 #include "runner/display/scene/painter.h"
+#include "runner/display/scene/picture.h"
 #include "runner/display/scene/scene_drawing.h"
 #include "tests/runner/display/kept_fonts.h"
 

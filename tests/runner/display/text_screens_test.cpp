@@ -1,12 +1,12 @@
 // What a session writes on a terminal, for participant and experimenter.
 
-#include "runner/display/text_screens.h"
-
 #include <gtest/gtest.h>
 
 #include <string>
 #include <utility>
 #include <vector>
+
+#include "runner/display/text_display.h"
 
 namespace palpate::runner {
 namespace {

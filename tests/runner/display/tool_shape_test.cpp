@@ -1,12 +1,11 @@
 // The tool that the console draws is the one that is felt.
 
-#include "runner/display/scene/tool_shape.h"
-
 #include <gtest/gtest.h>
 
 #include <glm/geometric.hpp>
 
 #include "rendering/tool.h"
+#include "runner/display/scene/scene_drawing.h"
 #include "stimuli/primitives.h"
 
 namespace palpate::runner {

@@ -1,11 +1,10 @@
-#include "runner/participants/deepest_point.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
 #include <vector>
 
+#include "runner/participants/shape_lines.h"
 #include "stimuli/random.h"
 #include "tests/runner/participants/ideal_touches.h"
 #include "tests/runner/participants/observer_reference.h"

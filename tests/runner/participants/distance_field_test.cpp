@@ -8,7 +8,7 @@
 #include <limits>
 
 #include "runner/participants/felt_parts.h"
-#include "runner/participants/solid_line.h"
+#include "runner/participants/shape_lines.h"
 #include "stimuli/primitives.h"
 #include "stimuli/random.h"
 #include "stimuli/signed_distance.h"

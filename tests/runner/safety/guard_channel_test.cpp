@@ -1,10 +1,10 @@
 // What passes through the memory that the runner and its guard process share.
 
-#include "runner/safety/guard_channel.h"
-
 #include <gtest/gtest.h>
 
 #include <string>
+
+#include "runner/safety/guard.h"
 
 namespace palpate::runner {
 namespace {

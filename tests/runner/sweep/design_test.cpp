@@ -5,8 +5,6 @@
 #include <cmath>
 #include <set>
 
-#include "runner/sweep/sobol_sequence.h"
-
 namespace palpate::runner {
 namespace {
 

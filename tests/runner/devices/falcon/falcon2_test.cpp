@@ -1,5 +1,3 @@
-#include "runner/devices/falcon/falcon2.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -9,7 +7,7 @@
 #include <string>
 
 #include "runner/devices/falcon/falcon.h"
-#include "runner/devices/falcon/registration.h"
+#include "runner/devices/falcon/stylus_from_ends.h"
 #include "tests/runner/devices/falcon/emulator.h"
 #include "tests/runner/devices/falcon/fake_transport.h"
 #include "tests/runner/devices/falcon/scripted_guide.h"

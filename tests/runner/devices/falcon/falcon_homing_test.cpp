@@ -3,8 +3,8 @@
 #include <cmath>
 #include <memory>
 
+#include "runner/devices/falcon/calibration.h"
 #include "runner/devices/falcon/falcon.h"
-#include "runner/devices/falcon/homing.h"
 #include "tests/runner/devices/falcon/emulator.h"
 #include "tests/runner/devices/falcon/fake_transport.h"
 #include "tests/runner/devices/falcon/line_clock.h"

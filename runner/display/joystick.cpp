@@ -1,9 +1,9 @@
+#include "runner/display/joystick.h"
+
 #include <array>
 #include <cstdlib>
 #include <string_view>
 #include <utility>
-
-#include "runner/display/joystick.h"
 
 namespace palpate::runner {
 namespace {
