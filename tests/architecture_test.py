@@ -89,8 +89,8 @@ PUBLIC = {
                "vec",
     "rendering": "first_contact probe reach render_fault renderer scene tool",
     "rendering/bodies": "moving_scene",
-    "rendering/verification": "explain extreme_cases random_draws random_solids reference search "
-                              "union_cases union_search",
+    "rendering/verification": "explain extreme_cases random_solids reference search union_cases "
+                              "union_search",
     "rendering/accuracy": "body_study paper_first_contact peers soft_study study union_study",
     "rendering/bodies/soft": "soft_scene",
     "protocols": "answer_keys difference json_document parse protocol schedule sha256 sweep_space "

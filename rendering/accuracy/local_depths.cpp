@@ -1,17 +1,304 @@
-// Local penetration depths in the analytic shapes; sphere, cube and box.
-
 #include "rendering/accuracy/local_depths.h"
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <glm/vec2.hpp>
+#include <numbers>
 #include <stdexcept>
+#include <utility>
+#include <vector>
 
-#include "rendering/accuracy/local_depths_collector.h"
-#include "rendering/accuracy/local_depths_round.h"
+namespace palpate::rendering::depths {
+
+// What the local penetration depths of all shapes share. Included by local_depths*.cpp alone.
+
+inline constexpr double kRightAngle = std::numbers::pi / 2;
+
+/// rad, 0 to pi/2; both unit.
+inline double angle_to_plane(const Vec3& u, const Vec3& normal) {
+  return std::asin(std::min(1.0, std::abs(glm::dot(u, normal))));
+}
+
+/// rad, 0 to pi/2.
+inline double angle_to_line(const Vec3& u, const Vec3& line) {
+  return std::atan2(glm::length(glm::cross(u, line)), std::abs(glm::dot(u, line)));
+}
+
+/// Least first.
+inline void sort_by_depth(std::vector<LocalDepth>& found) {
+  std::sort(found.begin(), found.end(),
+            [](const LocalDepth& a, const LocalDepth& b) { return a.depth < b.depth; });
+}
+
+/// Collects the local depths of one pose.
+class Collector {
+ public:
+  Collector(const stimuli::ObjectSpec& object, const LineProbe& pose)
+      : shape(object), probe(pose), d(pose.tail - pose.tip), length(glm::length(d)) {
+    if (length > 0) u = d / length;
+  }
+
+  bool is_point() const { return length == 0; }
+
+  /// Adds an end of the probe against a facet or smooth point with this normal, if it is the deeper
+  /// end. On a tie (the probe lies flat) the tip is taken.
+  void add_end(bool tail, const Vec3& normal, double depth, double flat_angle) {
+    const double slope = glm::dot(normal, d);
+    if (tail ? slope >= 0 : slope < 0) return;
+    add(normal, depth, tail ? 1 : 0, flat_angle);
+  }
+
+  /// Adds the side of the probe, if the contact point is between its ends; normal at right angles
+  /// to it.
+  void add_side(const Vec3& normal, double depth, double probe_fraction, double flat_angle) {
+    if (probe_fraction >= 0 && probe_fraction <= 1) add(normal, depth, probe_fraction, flat_angle);
+  }
+
+  std::vector<LocalDepth> sorted() {
+    sort_by_depth(found_);
+    return std::move(found_);
+  }
+
+  const stimuli::ObjectSpec& shape;
+  const LineProbe& probe;
+  Vec3 d, u;
+  double length;
+
+ private:
+  void add(const Vec3& normal, double depth, double probe_fraction, double flat_angle) {
+    found_.push_back({normal, depth, probe_fraction, is_point() ? kRightAngle : flat_angle});
+  }
+  std::vector<LocalDepth> found_;
+};
+
+// Local penetration depths in the analytic shapes with rims, cylinder and cone. Included by
+// local_depths*.cpp alone.
+
+/// Outward normal of the cone's side in the half plane of the horizontal unit vector `out`.
+Vec3 cone_normal(const stimuli::ObjectSpec& cone, const Vec3& out);
+
+void depths_in_cylinder(Collector& collector);
+void depths_in_cone(Collector& collector);
+
+}  // namespace palpate::rendering::depths
 
 namespace palpate::rendering {
+
+// Local penetration depths in a polyhedron, by visiting all its facets and edges.
+
+std::vector<LocalDepth> local_depths(const stimuli::ConvexMesh& mesh, const LineProbe& probe,
+                                     const Vec3& towards, double angle) {
+  const double least_cosine = angle < std::numbers::pi ? std::cos(angle) : -2;
+  const double slack = 1e-12 * mesh.size();
+  const Vec3 d = probe.tail - probe.tip;
+  const double length = glm::length(d);
+  const Vec3 u = length > 0 ? d / length : Vec3();
+  const auto flatness = [&](const stimuli::Facet& facet) {
+    return length > 0 ? depths::angle_to_plane(u, facet.normal) : depths::kRightAngle;
+  };
+  std::vector<LocalDepth> found;
+  for (const stimuli::Facet& facet : mesh.facets()) {
+    if (glm::dot(facet.normal, towards) < least_cosine) continue;
+    const bool tail = glm::dot(facet.normal, d) < 0;
+    const Vec3& end = tail ? probe.tail : probe.tip;
+    const double depth = facet.offset - glm::dot(facet.normal, end);
+    if (depth < 0) return {};  // a plane between them
+    const Vec3 foot = end + depth * facet.normal;
+    bool over = true;
+    for (std::uint32_t i = 0; over && i < facet.side_count; ++i) {
+      const stimuli::Side& side = mesh.sides()[facet.first_side + i];
+      over = glm::dot(side.inward, foot) >= side.offset - slack;
+    }
+    if (over) found.push_back({facet.normal, depth, tail ? 1.0 : 0.0, flatness(facet)});
+  }
+  for (const stimuli::Edge& edge : mesh.edges()) {
+    const stimuli::Facet &left = mesh.facets()[edge.left], &right = mesh.facets()[edge.right];
+    const double left_slope = glm::dot(left.normal, d), right_slope = glm::dot(right.normal, d);
+    if ((left_slope >= 0) == (right_slope >= 0)) continue;
+    // At right angles to the probe, between the normals of the edge's two faces.
+    const Vec3 n =
+        glm::normalize(std::abs(right_slope) * left.normal + std::abs(left_slope) * right.normal);
+    if (glm::dot(n, towards) < least_cosine) continue;
+    const Vec3& v0 = edge.from;
+    const Vec3 line = edge.to - v0;
+    const Vec3 c = glm::cross(line, d);
+    const double c2 = glm::dot(c, c);
+    if (c2 <= 1e-18 * glm::dot(line, line) * length * length) continue;  // no width
+    const double depth = glm::dot(n, v0 - probe.tip);
+    if (depth < 0) return {};
+    const Vec3 w = probe.tip + depth * n - v0;
+    const double along = glm::dot(glm::cross(w, d), c) / c2;
+    const double fraction = glm::dot(glm::cross(w, line), c) / c2;
+    const double beyond_edge = slack / glm::length(line), beyond_end = slack / length;
+    if (along < -beyond_edge || along > 1 + beyond_edge) continue;
+    if (fraction < -beyond_end || fraction > 1 + beyond_end) continue;
+    found.push_back(
+        {n, depth, std::clamp(fraction, 0.0, 1.0), std::min(flatness(left), flatness(right))});
+  }
+  depths::sort_by_depth(found);
+  return found;
+}
+
+}  // namespace palpate::rendering
+
+namespace palpate::rendering::depths {
+namespace {
+
+Vec3 radial(const Vec3& p) {
+  const double out = std::sqrt(p.x * p.x + p.y * p.y);
+  return out > 0 ? Vec3(p.x / out, p.y / out, 0) : Vec3(1, 0, 0);
+}
+
+/// Down the cone's side from the apex to the rim; not normalised.
+Vec3 cone_generator(const stimuli::ObjectSpec& cone, const Vec3& out) {
+  return {cone.radius * out.x, cone.radius * out.y, -cone.height};
+}
+
+/// The probe, moved out to the plane with this normal through `start`, crosses the straight line
+/// start..start + line of the surface.
+void cross_line(Collector& collector, const Vec3& normal, const Vec3& start, const Vec3& line) {
+  const double depth = glm::dot(normal, start - collector.probe.tip);
+  const Vec3 w = collector.probe.tip + depth * normal - start;  // w + fraction d = along line
+  const Vec3 c = glm::cross(line, collector.d);
+  const double c2 = glm::dot(c, c);
+  if (c2 == 0) return;  // parallel: the ends and rims have it
+  const double along = glm::dot(glm::cross(w, collector.d), c) / c2;
+  if (along < 0 || along > 1) return;
+  collector.add_side(normal, depth, glm::dot(glm::cross(w, line), c) / c2,
+                     angle_to_line(collector.u, line));
+}
+
+/// Directions around a circle; not on the axes, where a rate may be exactly zero.
+class Turns {
+ public:
+  static constexpr int kParts = 360;
+  static double angle(int i) { return 2 * std::numbers::pi * (i + 0.123) / kParts; }
+  Turns() {
+    for (int i = 0; i <= kParts; ++i) all_.push_back({std::cos(angle(i)), std::sin(angle(i))});
+  }
+  glm::dvec2 at(int i) const { return all_[static_cast<std::size_t>(i)]; }
+
+ private:
+  std::vector<glm::dvec2> all_;
+};
+
+/// The probe's side against a rim, the circle of the shape's radius at height z: n at right angles
+/// to the probe, within `belongs` (the normals that the rim has). Along the circle of those n,
+/// phi' = (x - tip).n' with x the rim's point farthest along n: its roots from below, each bisected
+/// to rounding, are the minima.
+template <class Belongs>
+void cross_rim(Collector& collector, double z, Belongs belongs) {
+  static const Turns turns;
+  const Vec3 across = std::abs(collector.u.z) < 0.9 ? Vec3(0, 0, 1) : Vec3(1, 0, 0);
+  const Vec3 e1 = glm::normalize(glm::cross(collector.u, across)), e2 = glm::cross(collector.u, e1);
+  const auto normal = [&](const glm::dvec2& turn) { return turn.x * e1 + turn.y * e2; };
+  const auto touched = [&](const Vec3& n) {
+    return collector.shape.radius * radial(n) + Vec3(0, 0, z);
+  };
+  const auto rate = [&](const glm::dvec2& turn) {  // n' is e2 cos - e1 sin
+    return glm::dot(touched(normal(turn)) - collector.probe.tip, turn.x * e2 - turn.y * e1);
+  };
+  double last = rate(turns.at(0));
+  for (int i = 0; i < Turns::kParts; ++i) {
+    const double next = rate(turns.at(i + 1));
+    if (last < 0 && next >= 0) {
+      double low = Turns::angle(i), high = Turns::angle(i + 1);
+      for (double middle = (low + high) / 2; middle > low && middle < high;
+           middle = (low + high) / 2) {
+        (rate({std::cos(middle), std::sin(middle)}) < 0 ? low : high) = middle;
+      }
+      const Vec3 n = normal({std::cos(high), std::sin(high)});
+      if (belongs(n)) {
+        const Vec3 x = touched(n);
+        const double fraction =
+            glm::dot(x - collector.probe.tip, collector.d) / (collector.length * collector.length);
+        const Vec3 line = collector.shape.shape == stimuli::ShapeKind::cone
+                              ? cone_generator(collector.shape, radial(n))
+                              : Vec3(0, 0, 1);
+        collector.add_side(
+            n, glm::dot(n, x - collector.probe.tip), fraction,
+            std::min(angle_to_plane(collector.u, Vec3(0, 0, 1)), angle_to_line(collector.u, line)));
+      }
+    }
+    last = next;
+  }
+}
+
+}  // namespace
+
+Vec3 cone_normal(const stimuli::ObjectSpec& cone, const Vec3& out) {
+  return glm::normalize(Vec3(cone.height * out.x, cone.height * out.y, cone.radius));
+}
+
+void depths_in_cylinder(Collector& collector) {
+  const double radius = collector.shape.radius, h = collector.shape.height / 2;
+  const Vec3 up(0, 0, 1);
+  for (const bool tail : {false, true}) {
+    const Vec3& p = tail ? collector.probe.tail : collector.probe.tip;
+    if (tail && collector.is_point()) break;
+    for (const double sign : {-1.0, 1.0}) {
+      const Vec3 n(0, 0, sign);
+      // Out past an end: on the disc only where the end of the probe is above it.
+      if (std::hypot(p.x, p.y) <= radius)
+        collector.add_end(tail, n, h - sign * p.z, angle_to_plane(collector.u, n));
+    }
+    if (std::abs(p.z) <= h)
+      collector.add_end(tail, radial(p), radius - std::hypot(p.x, p.y),
+                        angle_to_line(collector.u, up));
+  }
+  if (collector.is_point()) return;
+  const Vec3 c = glm::cross(up, collector.u);
+  const double width = glm::length(c);
+  for (const double sign : {-1.0, 1.0}) {
+    if (width > 0) {
+      const Vec3 n = sign * c / width;
+      cross_line(collector, n, radius * n - h * up, 2 * h * up);
+    }
+    cross_rim(collector, sign * h, [&](const Vec3& n) { return n.z * sign > 0; });
+  }
+}
+
+void depths_in_cone(Collector& collector) {
+  const double radius = collector.shape.radius, height = collector.shape.height;
+  const Vec3 apex(0, 0, height / 2), down(0, 0, -1);
+  for (const bool tail : {false, true}) {
+    const Vec3& p = tail ? collector.probe.tail : collector.probe.tip;
+    if (tail && collector.is_point()) break;
+    if (std::hypot(p.x, p.y) <= radius)
+      collector.add_end(tail, down, p.z + height / 2, angle_to_plane(collector.u, down));
+    const Vec3 out = radial(p), n = cone_normal(collector.shape, out),
+               line = cone_generator(collector.shape, out);
+    const double along = glm::dot(p - apex, line) / glm::dot(line, line);
+    if (along >= 0 && along <= 1)
+      collector.add_end(tail, n, glm::dot(n, apex - p), angle_to_line(collector.u, line));
+  }
+  if (collector.is_point()) return;
+  // Normals of the side at right angles to the probe: height (u.out) + radius u.z = 0.
+  const double across = std::hypot(collector.u.x, collector.u.y);
+  const double cosine = across > 0 ? -radius * collector.u.z / (height * across) : 2;
+  if (std::abs(cosine) <= 1) {
+    const double about = std::atan2(collector.u.y, collector.u.x), turn = std::acos(cosine);
+    for (const double angle : {about - turn, about + turn}) {
+      const Vec3 out(std::cos(angle), std::sin(angle), 0);
+      cross_line(collector, cone_normal(collector.shape, out), apex,
+                 cone_generator(collector.shape, out));
+    }
+  }
+  cross_rim(collector, -height / 2, [&](const Vec3& n) {
+    return radius * std::hypot(n.x, n.y) > height * n.z;  // farther out than the apex
+  });
+}
+
+}  // namespace palpate::rendering::depths
+
+namespace palpate::rendering {
+
+// Local penetration depths in the analytic shapes; sphere, cube and box.
+
 namespace depths {
 namespace {
 

@@ -5,7 +5,6 @@
 #include <utility>
 
 #include "rendering/accuracy/peers.h"
-#include "rendering/accuracy/plain_walk.h"
 #include "rendering/facet_walk.h"
 #include "rendering/first_contact.h"
 #include "rendering/renderer.h"

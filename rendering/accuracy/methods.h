@@ -3,15 +3,190 @@
 // behind one interface: the renderers, variants of their walk, and other libraries. Each is defined
 // once, in contact_methods().
 
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <glm/geometric.hpp>
+#include <limits>
 #include <memory>
 #include <string>
 #include <vector>
 
+#include "rendering/facet_walk.h"
 #include "rendering/probe.h"
 #include "stimuli/convex_mesh.h"
 #include "stimuli/shapes.h"
 
 namespace palpate::rendering {
+
+// The walk of facet_walk.h written again, as plainly as possible, in any floating-point precision:
+// what single precision would cost and save. Not for the servo.
+
+template <class Real>
+class PlainWalk {
+ public:
+  using Vector = glm::vec<3, Real>;
+
+  explicit PlainWalk(const stimuli::ConvexMesh& mesh) : size_(static_cast<Real>(mesh.size())) {
+    for (const Vec3& v : mesh.vertices()) vertices_.push_back(Vector(v));
+    for (const stimuli::Facet& f : mesh.facets()) {
+      facets_.push_back(
+          {Vector(f.normal), static_cast<Real>(f.offset), f.first_side, f.side_count});
+    }
+    for (std::uint32_t f = 0; f < mesh.facets().size(); ++f) {
+      const stimuli::Facet& facet = mesh.facets()[f];
+      for (std::uint32_t i = facet.first_side; i < facet.first_side + facet.side_count; ++i) {
+        const stimuli::Side& s = mesh.sides()[i];
+        const stimuli::Edge& edge = mesh.edges()[s.edge];
+        sides_.resize(mesh.sides().size());
+        sides_[i] = {Vector(s.inward), static_cast<Real>(s.offset), s.edge, s.across,
+                     edge.left == f ? edge.v0 : edge.v1};
+      }
+    }
+    edges_.assign(mesh.edges().begin(), mesh.edges().end());
+    fan_first_.assign(mesh.fan_first().begin(), mesh.fan_first().end());
+    fan_edges_.assign(mesh.fan_edges().begin(), mesh.fan_edges().end());
+  }
+
+  /// As walk_segment; the result is widened to double.
+  WalkResult walk(ContactFeature start, const Vec3& tip, const Vec3& d) const {
+    const Vector t(tip), v(d);
+    // As many last places as the walk in double precision allows for.
+    const Real gain = Real(4.5) * std::numeric_limits<Real>::epsilon() * size_;
+    At at = resume(start, t, v);
+    for (std::size_t steps = 0; at.depth >= 0 && steps < facets_.size() + edges_.size(); ++steps) {
+      At next;
+      if (!step(at, t, v, next) || !(next.depth < at.depth - gain)) break;
+      at = next;
+    }
+    WalkResult result;
+    result.normal = Vec3(at.normal);
+    result.depth = static_cast<double>(at.depth);
+    result.probe_fraction = std::clamp(static_cast<double>(at.probe_fraction), 0.0, 1.0);
+    if (at.depth >= 0) result.feature = at.feature;
+    return result;
+  }
+
+ private:
+  using Kind = ContactFeature::Kind;
+  struct PlainFacet {
+    Vector normal;
+    Real offset;
+    std::uint32_t first_side, side_count;
+  };
+  struct PlainSide {
+    Vector inward;
+    Real offset;
+    std::uint32_t edge, across, corner;
+  };
+  struct At {
+    ContactFeature feature;
+    Vector normal;
+    Real depth = 0, probe_fraction = 0, edge_fraction = 0;
+  };
+
+  At face(std::uint32_t index, const Vector& tip, const Vector& d) const {
+    const PlainFacet& f = facets_[index];
+    const Real slope = glm::dot(f.normal, d), height = f.offset - glm::dot(f.normal, tip);
+    At at;
+    at.feature = {Kind::facet, false, index};
+    at.normal = f.normal;
+    at.probe_fraction = slope >= 0 ? Real(0) : Real(1);
+    at.depth = slope >= 0 ? height : height - slope;
+    return at;
+  }
+
+  bool ahead(std::uint32_t index, const Vector& d) const {
+    return glm::dot(facets_[index].normal, d) >= 0;
+  }
+
+  bool edge(std::uint32_t index, const Vector& tip, const Vector& d, At& at) const {
+    const stimuli::Edge& e = edges_[index];
+    const bool left = ahead(e.left, d);
+    if (left == ahead(e.right, d)) return false;
+    const Vector line = vertices_[e.v1] - vertices_[e.v0], w = tip - vertices_[e.v0];
+    const Vector c = glm::cross(line, d);
+    const Real c2 = glm::dot(c, c);
+    constexpr Real kParallel = sizeof(Real) == 8 ? Real(1e-9) : Real(1e-5);
+    if (c2 <= kParallel * kParallel * glm::dot(line, line) * glm::dot(d, d)) return false;
+    at.feature = {Kind::edge, left, index};
+    at.normal = (left ? c : -c) / std::sqrt(c2);
+    at.depth = -glm::dot(at.normal, w);
+    at.probe_fraction = glm::dot(glm::cross(w, line), c) / c2;
+    at.edge_fraction = glm::dot(glm::cross(w, d), c) / c2;
+    return true;
+  }
+
+  At resume(ContactFeature start, const Vector& tip, const Vector& d) const {
+    if (start.kind != Kind::edge) return face(start.index, tip, d);
+    At at;
+    if (edge(start.index, tip, d, at)) return at;
+    const stimuli::Edge& e = edges_[start.index];
+    const bool both = ahead(e.left, d) && ahead(e.right, d);
+    return face(start.left_ahead != both ? e.left : e.right, tip, d);
+  }
+
+  const PlainSide* beyond(const PlainFacet& f, const Vector& p) const {
+    const PlainSide* sides = &sides_[f.first_side];
+    const auto outside = [&](std::uint32_t i) {
+      return glm::dot(sides[i].inward, p) < sides[i].offset;
+    };
+    if (f.side_count <= 12) {
+      const PlainSide* worst = nullptr;
+      Real most = 0;
+      for (std::uint32_t i = 0; i < f.side_count; ++i) {
+        const Real distance = sides[i].offset - glm::dot(sides[i].inward, p);
+        if (distance > most) {
+          most = distance;
+          worst = &sides[i];
+        }
+      }
+      return worst;
+    }
+    if (outside(0)) return &sides[0];
+    if (outside(f.side_count - 1)) return &sides[f.side_count - 1];
+    const Vector apex = vertices_[sides[0].corner];
+    const Vector turn = glm::cross(f.normal, p - apex);
+    std::uint32_t low = 1, high = f.side_count - 1;
+    while (high - low > 1) {
+      const std::uint32_t middle = (low + high) / 2;
+      (glm::dot(vertices_[sides[middle].corner] - apex, turn) <= 0 ? low : high) = middle;
+    }
+    return outside(low) ? &sides[low] : nullptr;
+  }
+
+  bool step(const At& at, const Vector& tip, const Vector& d, At& next) const {
+    if (at.feature.kind == Kind::facet) {
+      const PlainFacet& f = facets_[at.feature.index];
+      const PlainSide* side = beyond(f, tip + at.probe_fraction * d + at.depth * at.normal);
+      if (!side) return false;
+      if (!edge(side->edge, tip, d, next)) next = face(side->across, tip, d);
+      return true;
+    }
+    const stimuli::Edge& e = edges_[at.feature.index];
+    if (at.probe_fraction < 0 || at.probe_fraction > 1) {
+      next = face((at.probe_fraction < 0) == at.feature.left_ahead ? e.left : e.right, tip, d);
+      return true;
+    }
+    if (at.edge_fraction >= 0 && at.edge_fraction <= 1) return false;
+    const std::uint32_t vertex = at.edge_fraction > 1 ? e.v1 : e.v0;
+    for (std::uint32_t i = fan_first_[vertex]; i < fan_first_[vertex + 1]; ++i) {
+      const std::uint32_t other = fan_edges_[i];
+      if (other == at.feature.index) continue;
+      if (ahead(edges_[other].left, d) == ahead(edges_[other].right, d)) continue;
+      if (!edge(other, tip, d, next)) next = face(edges_[other].left, tip, d);
+      return true;
+    }
+    return false;
+  }
+
+  Real size_;
+  std::vector<Vector> vertices_;
+  std::vector<PlainFacet> facets_;
+  std::vector<PlainSide> sides_;
+  std::vector<stimuli::Edge> edges_;
+  std::vector<std::uint32_t> fan_first_, fan_edges_;
+};
 
 /// The result of one method for one pose. Frame of the object.
 struct ContactEstimate {

@@ -5,7 +5,7 @@
 #include <optional>
 
 #include "rendering/first_contact.h"
-#include "rendering/verification/random_draws.h"
+#include "rendering/verification/random_solids.h"
 #include "rendering/verification/reference.h"
 #include "stimuli/random.h"
 

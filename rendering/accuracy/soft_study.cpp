@@ -7,7 +7,7 @@
 #include <memory>
 #include <utility>
 
-#include "rendering/accuracy/line_contact.h"
+#include "rendering/accuracy/analytic_stroke.h"
 #include "rendering/bodies/soft/soft_scene.h"
 #include "stimuli/random.h"
 

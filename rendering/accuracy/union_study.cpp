@@ -1,14 +1,207 @@
 #include "rendering/accuracy/union_study.h"
 
 #include <algorithm>
+#include <cmath>
 #include <glm/geometric.hpp>
 #include <memory>
+#include <numbers>
 #include <utility>
 
 #include "rendering/renderer.h"
+#include "rendering/verification/random_solids.h"
 #include "rendering/verification/reference.h"
+#include "stimuli/orientation.h"
 
 namespace palpate::rendering {
+namespace {
+
+constexpr double kDegree = std::numbers::pi / 180;
+const OracleTool kPoint{{Vec3(0), Vec3(0)}};
+const OracleTool kStylus{{Vec3(0), Vec3(0, 0, 0.12)}};
+
+/// A coordinate of a hand: two slow sines of random frequency and phase; -1 to 1.
+class Sway {
+ public:
+  explicit Sway(stimuli::Random& random) {
+    for (Wave& wave : waves_) wave = {2e-3 + 6e-3 * random.unit(), 7 * random.unit()};
+  }
+  double operator()(std::size_t tick) const {
+    double sum = 0;
+    for (const Wave& wave : waves_) {
+      sum += 0.5 * std::sin(wave.rate * static_cast<double>(tick) + wave.phase);
+    }
+    return sum;
+  }
+
+ private:
+  struct Wave {
+    double rate, phase;  // rad a tick, rad
+  };
+  Wave waves_[2];
+};
+
+/// Down from above to where the path begins, 0.5 mm a tick.
+void come_down(std::vector<OraclePose>& path, const Vec3& from, const OraclePose& to) {
+  const double steps = std::ceil(glm::length(from - to.tip) / 5e-4);
+  for (double step = 0; step < steps; ++step) {
+    path.push_back({from + step / steps * (to.tip - from), to.axes});
+  }
+}
+
+void by_closed_form(UnionCase& one, const std::function<Vec3(const Vec3&)>& displacement) {
+  for (const OraclePose& pose : one.path) one.displacement.push_back(displacement(pose.tip));
+}
+
+/// By the oracle over these parts, which may be others that make the same body.
+void by_oracle(UnionCase& one, const OracleParts& parts) {
+  const UnionOracle oracle(parts, one.tool);
+  OraclePose ideal = one.path[0];
+  for (const OraclePose& pose : one.path) {
+    ideal = oracle.tick(ideal, pose).ideal;
+    one.displacement.push_back(ideal.tip - pose.tip);
+  }
+}
+
+/// Over both walls and the valley, up to 3 mm below it.
+UnionCase groove_case(double opening, std::uint64_t seed, std::size_t ticks) {
+  stimuli::Random random(seed, {1});
+  const Sway x(random), y(random), z(random);
+  UnionCase one{groove(opening), kPoint, {}, {}};
+  const auto tip = [&](std::size_t i) {
+    return Vec3(2e-3 * x(i), 0.02 * y(i), -1e-3 + 2e-3 * z(i));
+  };
+  // The way in leads down the middle of the groove and then to the first place.
+  come_down(one.path, {0, 0, 0.058}, {{0, 0, 1e-4}, Mat3(1)});
+  come_down(one.path, {0, 0, 1e-4}, {tip(0), Mat3(1)});
+  for (std::size_t i = 0; one.path.size() < ticks; ++i) one.path.push_back({tip(i), Mat3(1)});
+  by_closed_form(one, [&](const Vec3& at) { return groove_displacement(opening, at); });
+  return one;
+}
+
+/// 16 boxes side by side under one plane; the stylus stands on it, tilted.
+UnionCase seam_case(double overlap, std::uint64_t seed, std::size_t ticks) {
+  stimuli::Random random(seed, {2});
+  const Sway x(random), y(random), z(random);
+  UnionCase one{{}, kStylus, {}, {}};
+  for (int i = 0; i < 16; ++i) {
+    one.parts.push_back(
+        box_part({0.006 * i - 0.048, -0.05, -0.04}, {0.006 * (i + 1) - 0.048 + overlap, 0.05, 0}));
+  }
+  const Vec3 up = glm::normalize(Vec3(0.4 * random.unit(), 0.4 * random.unit(), 1));
+  const Vec3 side = glm::normalize(glm::cross(Vec3(0, 1, 0), up));
+  const Mat3 axes(side, glm::cross(up, side), up);
+  const auto tip = [&](std::size_t i) {
+    return Vec3(0.04 * x(i), 0.04 * y(i), -2e-3 + 2e-3 * z(i));
+  };
+  come_down(one.path, tip(0) + Vec3(0, 0, 0.02), {tip(0), axes});
+  for (std::size_t i = 0; one.path.size() < ticks; ++i) one.path.push_back({tip(i), axes});
+  by_closed_form(one, [](const Vec3& at) { return Vec3(0, 0, std::max(0.0, -at.z)); });
+  return one;
+}
+
+/// In the corner of a step, riser and tread.
+UnionCase stair_case(std::uint64_t seed, std::size_t ticks) {
+  stimuli::Random random(seed, {3});
+  const Sway x(random), y(random), z(random);
+  UnionCase one{stairs(4, 0.03, 0.02), kPoint, {}, {}};
+  const auto tip = [&](std::size_t i) {
+    return Vec3(3e-3 * x(i), 0.02 * y(i), -0.02 + 3e-3 * z(i));
+  };
+  come_down(one.path, {0.01, 0, 0.02}, {{0.01, 0, -0.015}, Mat3(1)});
+  come_down(one.path, {0.01, 0, -0.015}, {tip(0), Mat3(1)});
+  for (std::size_t i = 0; one.path.size() < ticks; ++i) one.path.push_back({tip(i), Mat3(1)});
+  by_closed_form(one, [](const Vec3& at) {
+    return Vec3(std::max(0.0, -at.x), 0, std::max(0.0, -0.02 - at.z));
+  });
+  return one;
+}
+
+UnionCase cut_case(std::uint64_t seed, std::size_t ticks) {
+  stimuli::Random random(seed, {4});
+  const stimuli::PolygonSoup solid =
+      turned_and_moved(cut_cube(random, 4), stimuli::uniform_rotation(random), 0.05, Vec3(0));
+  UnionCase one{cut_to_pieces(solid, 2, random), random_tool(random, 1), {}, {}};
+  const OracleParts whole{part_of(solid)};
+  one.path = random_tool_path(random, whole, one.tool, 2e-4, ticks);
+  by_oracle(one, whole);
+  return one;
+}
+
+UnionCase cluster_case(int segments, std::uint64_t seed, std::size_t ticks) {
+  stimuli::Random random(seed, {5, static_cast<std::uint64_t>(segments)});
+  UnionCase one{random_cluster(random, 3 + static_cast<int>(random.below(6))),
+                random_tool(random, segments),
+                {},
+                {}};
+  one.path = random_tool_path(random, one.parts, one.tool, 2e-4, ticks);
+  by_oracle(one, one.parts);
+  return one;
+}
+
+/// A hook of three segments is lowered behind a beam, pulled up against it, rocked and let down.
+UnionCase hook_case(std::uint64_t seed, std::size_t ticks) {
+  stimuli::Random random(seed, {6});
+  const Sway x(random), z(random), turn(random);
+  // Below the beam runs the short arm; the long one stands beside it.
+  UnionCase one{{box_part({-0.01, -0.05, -0.01}, {0.01, 0.05, 0.01})},
+                {{Vec3(0), Vec3(0, 0, 0.08)},
+                 {Vec3(0), Vec3(-0.03, 0, 0)},
+                 {Vec3(-0.03, 0, 0), Vec3(-0.03, 0, 0.015)}},
+                {},
+                {}};
+  const auto pose = [&](std::size_t i) {
+    const double angle = 0.15 * turn(i);
+    const Vec3 up(std::sin(angle), 0, std::cos(angle)), y(0, 1, 0);
+    return OraclePose{{0.011 + 3e-3 * x(i), 0.01, -0.012 + 4e-3 * z(i)},
+                      Mat3(glm::cross(y, up), y, up)};
+  };
+  // From beyond the end of the beam.
+  OraclePose start = pose(0);
+  start.tip.y = -0.09;
+  come_down(one.path, start.tip - Vec3(0, 0, 0.01), {start.tip, start.axes});
+  come_down(one.path, start.tip, pose(0));
+  for (std::size_t i = 0; one.path.size() < ticks; ++i) one.path.push_back(pose(i));
+  by_oracle(one, one.parts);
+  return one;
+}
+
+}  // namespace
+
+std::vector<UnionCaseKind> union_case_kinds() {
+  constexpr const char* kClosed = "closed form";
+  constexpr const char* kOracle = "oracle";
+  std::vector<UnionCaseKind> kinds;
+  const auto add_groove = [&](const char* name, double degrees) {
+    kinds.push_back({name, kClosed, [degrees](std::uint64_t seed, std::size_t ticks) {
+                       return groove_case(degrees * kDegree, seed, ticks);
+                     }});
+  };
+  add_groove("groove of 2 degrees", 2);
+  add_groove("groove of 10 degrees", 10);
+  add_groove("groove of 45 degrees", 45);
+  add_groove("groove of 90 degrees", 90);
+  add_groove("groove of 150 degrees", 150);
+  add_groove("groove of 178 degrees", 178);
+  kinds.push_back({"16 boxes that abut", kClosed, [](std::uint64_t seed, std::size_t ticks) {
+                     return seam_case(0, seed, ticks);
+                   }});
+  kinds.push_back({"16 boxes that overlap", kClosed, [](std::uint64_t seed, std::size_t ticks) {
+                     return seam_case(0.004, seed, ticks);
+                   }});
+  kinds.push_back({"corner of a stair", kClosed, stair_case});
+  kinds.push_back({"solid cut in four", "oracle on the whole", cut_case});
+  const auto add_cluster = [&](const char* name, int segments) {
+    kinds.push_back({name, kOracle, [segments](std::uint64_t seed, std::size_t ticks) {
+                       return cluster_case(segments, seed, ticks);
+                     }});
+  };
+  add_cluster("cluster, one segment", 1);
+  add_cluster("cluster, two segments", 2);
+  add_cluster("cluster, three segments", 3);
+  kinds.push_back({"hook behind a beam", kOracle, hook_case});
+  return kinds;
+}
+
 namespace {
 
 constexpr double kCarrier = 0.12;  // m, length of a stylus that carries a tool

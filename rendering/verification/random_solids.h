@@ -1,10 +1,47 @@
 #pragma once
 // Random convex solids of many kinds, proportions and sizes, for searches and extreme cases.
 
+#include <vector>
+
+#include "rendering/probe.h"
 #include "stimuli/convex_mesh.h"
+#include "stimuli/orientation.h"
 #include "stimuli/random.h"
 
 namespace palpate::rendering {
+
+// Random numbers as the searches and cases draw them.
+
+/// Uniform from low to high.
+inline double between(stimuli::Random& random, double low, double high) {
+  return low + (high - low) * random.unit();
+}
+
+/// Uniform on the unit sphere.
+inline Vec3 random_direction(stimuli::Random& random) {
+  return stimuli::uniform_rotation(random) * Vec3(0, 0, 1);
+}
+
+// Random paths of a probe over one convex mesh, meant to be hard for a renderer. For searches and
+// extreme cases. Mesh frame, m.
+
+enum class PathKind {
+  smooth,   ///< a hand that wanders in and out, 1e-4 to 0.03 sizes a tick
+  sliding,  ///< near the surface all the time, from just outside to beyond the middle
+  fast,     ///< straight past and through, 5 m/s or 0.01 to 3 sizes a tick, turning on the way
+  plunges,  ///< from outside, by 1e-16 to 1 sizes, straight in and out again
+  jumps,    ///< an unrelated pose at every tick
+  aligned,  ///< along edges, in planes of facets, through corners: exactly or nearly
+};
+inline constexpr int kPathKinds = 6;
+const char* to_string(PathKind kind);
+
+/// Starts far outside (its first pose); 1 kHz.
+/// \param length  m, of the probe
+/// \param side    false: the tip is led over the surface, not the side
+std::vector<LineProbe> random_path(stimuli::Random& random, PathKind kind,
+                                   const stimuli::ConvexMesh& mesh, double length, bool side,
+                                   std::size_t ticks);
 
 /// A cube of edge 1 about the origin, cut by `cuts` random planes: corners of three facets, facets
 /// of any number of sides.

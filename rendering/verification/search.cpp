@@ -1,8 +1,317 @@
 #include "rendering/verification/search.h"
 
 #include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <glm/geometric.hpp>
+#include <limits>
+#include <memory>
+#include <numbers>
+#include <sstream>
+#include <utility>
+#include <vector>
+
+#include "rendering/first_contact.h"
+#include "rendering/verification/nearest_point.h"
+#include "rendering/verification/random_solids.h"
+#include "rendering/verification/reference.h"
+#include "stimuli/orientation.h"
 
 namespace palpate::rendering {
+namespace {
+
+bool finite(const Vec3& v) {
+  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+}
+
+bool all_finite(const Rendering& r) {
+  return finite(r.force) && finite(r.torque) && finite(r.device1) && finite(r.device2) &&
+         finite(r.deepest.point) && finite(r.deepest.normal) && std::isfinite(r.deepest.depth) &&
+         std::isfinite(r.deepest.along) && finite(r.ideal.tip) && finite(r.ideal.tail);
+}
+
+/// Relative to the contact's force; levers relative to the lengths that they were computed from.
+double force_error(const Renderer& renderer, const LineProbe& probe, const Rendering& r,
+                   double stiffness, double size) {
+  const double full = stiffness * r.deepest.depth;
+  if (full == 0) return glm::length(r.force) + glm::length(r.torque);
+  const double lever = size + glm::length(probe.tip) + glm::length(probe.tail);
+  const Vec3 moment =
+      renderer.side_contact() ? glm::cross(r.deepest.point - probe.tip, r.force) : Vec3(0);
+  const Vec3 by_devices = glm::cross(probe.tail - probe.tip, r.device2);
+  return std::max({glm::length(r.force - full * r.deepest.normal) / full,
+                   std::abs(glm::length(r.deepest.normal) - 1),
+                   glm::length(r.device1 + r.device2 - r.force) / full,
+                   glm::length(r.torque - moment) / (full * lever),
+                   glm::length(r.torque - by_devices) / (full * lever)});
+}
+
+}  // namespace
+
+LineProbe felt_probe(const Scene& scene, const Renderer& renderer, const LineProbe& probe) {
+  const ScenePart& part = scene.parts()[0];
+  const Vec3 tip = part.local_point(probe.tip);
+  return {tip, renderer.side_contact() ? part.local_point(probe.tail) : tip};
+}
+
+TickAudit audit_tick(const Scene& scene, const Renderer& renderer, const LineProbe& probe,
+                     const Rendering& r, double rounding) {
+  const ScenePart& part = scene.parts()[0];
+  const stimuli::ConvexMesh& mesh = *part.mesh;
+  TickAudit audit;
+  audit.tolerance =
+      rounding * mesh.size() + 1e-15 * (mesh.size() + glm::length(part.position) +
+                                        glm::length(probe.tip) + glm::length(probe.tail));
+  audit.finite = all_finite(r);
+  if (!audit.finite) return audit;
+  audit.depth = reference_depth(mesh, felt_probe(scene, renderer, probe)).depth;
+  if (r.contacts == 0) {
+    audit.missed = std::max(0.0, audit.depth);
+    audit.force = glm::length(r.force) + glm::length(r.torque) + glm::length(r.device1) +
+                  glm::length(r.device2);
+    return audit;
+  }
+  const LineProbe ideal = felt_probe(scene, renderer, r.ideal);
+  audit.penetrates = std::max(0.0, reference_depth(mesh, ideal).depth);
+  audit.floats = reference_gap(mesh, ideal);
+  audit.shallow = std::max(0.0, audit.depth - r.deepest.depth);
+  audit.force = force_error(renderer, probe, r, part.material.stiffness, mesh.size());
+  return audit;
+}
+
+// One walk of the search: its ticks, and the errors in them.
+
+namespace {
+
+constexpr int kFineSteps = 100;       // of a tick, by brute force
+constexpr double kFastestTurn = 0.1;  // rad a tick: 100 rad/s, faster than any hand
+constexpr double kAtSurface = 1e-6;   // sizes
+
+LineProbe interpolated(const LineProbe& a, const LineProbe& b, double t) {
+  return {a.tip + t * (b.tip - a.tip), a.tail + t * (b.tail - a.tail)};
+}
+
+/// One walk in progress.
+class Walk {
+ public:
+  Walk(const Renderer& renderer, std::uint64_t seed, std::uint64_t walk)
+      : renderer_(renderer),
+        random_(seed, {walk}),
+        mesh_(std::make_shared<const stimuli::ConvexMesh>(random_solid(random_))),
+        pose_(random_pose()),
+        length_(random_length()),
+        kind_(static_cast<PathKind>(random_.below(kPathKinds))),
+        scene_({{mesh_, pose_, stimuli::Material{}, 0, nullptr}}, renderer.side_contact()),
+        state_(scene_.initial_state()) {
+    counts_.walks = 1;
+    fault_.seed = seed;
+    fault_.walk = walk;
+  }
+
+  SearchCounts run() {
+    const auto path =
+        random_path(random_, kind_, *mesh_, length_, renderer_.side_contact(), kTicksPerWalk);
+    for (const LineProbe& local : path) tick({to_world(local.tip), to_world(local.tail)});
+    return std::move(counts_);
+  }
+
+ private:
+  Pose random_pose() {
+    if (random_.below(2)) return {};
+    const double reach = random_.below(2) ? 1 : 10 * mesh_->size();
+    return {reach * (stimuli::uniform_rotation(random_) * Vec3(0, 0, 1)),
+            stimuli::uniform_rotation(random_)};
+  }
+
+  double random_length() {
+    if (random_.below(8) == 0) return 0.12;
+    const double shares[] = {0, 1e-6, 0.05, 0.5, 1, 3, 10};
+    return shares[random_.below(7)] * (0.7 + 0.6 * random_.unit()) * mesh_->size();
+  }
+
+  Vec3 to_world(const Vec3& local) const { return pose_.orientation * local + pose_.position; }
+
+  void tick(const LineProbe& probe) {
+    const bool was_free = has_last_ && !last_held_;
+    const Rendering r = renderer_.tick(scene_, state_, probe, 1e-3);
+    const LineProbe local = felt_probe(scene_, renderer_, probe);
+    const TickAudit audit = audit_tick(scene_, renderer_, probe, r);
+    fault_.tick = counts_.ticks++;
+    depth_ = r.deepest.depth;
+    const bool held = audit.finite && r.contacts > 0;
+    counts_.in_contact += held;
+    counts_.worst_penetration =
+        std::max(counts_.worst_penetration, audit.penetrates / mesh_->size());
+    const auto wrong = [&](bool is, std::uint64_t& count, const char* what, double value) {
+      if (!is) return;
+      ++count;
+      report(what, value, local);
+    };
+    wrong(!audit.finite, counts_.not_finite, "not finite", 0);
+    wrong(audit.missed > audit.tolerance, counts_.missed, "missed, depth", audit.missed);
+    wrong(audit.penetrates > audit.tolerance, counts_.penetrating, "ideal probe inside by",
+          audit.penetrates);
+    wrong(audit.floats > audit.tolerance + 1e-9 * length_, counts_.floating, "ideal probe off by",
+          audit.floats);
+    wrong(audit.shallow > audit.tolerance, counts_.shallow, "too shallow by", audit.shallow);
+    wrong(audit.force > 1e-9, counts_.wrong_force, "force wrong by", audit.force);
+    wrong((r.faults & render_fault::kWalkCapped) != 0, counts_.endless,
+          "walk stopped at its limit of steps", 0);
+    wrong((r.faults & ~render_fault::kWalkCapped) != 0, counts_.faulted, "fault bits", r.faults);
+    if (was_free && audit.finite) from_free_space(local, r, held, audit.tolerance);
+    last_ = local;
+    has_last_ = true;
+    last_held_ = held;
+  }
+
+  /// The tick began in free space: what a hundredth of it shows, by brute force.
+  void from_free_space(const LineProbe& local, const Rendering& r, bool held, double tolerance) {
+    counts_.entries += held;
+    if (held) count_fallback(local);
+    if (!held && separated_by_facet_plane(*mesh_, last_, local)) return;
+    ++counts_.walked_finely;
+    const auto time = reference_first_contact(*mesh_, last_, local, kFineSteps);
+    if (!time) {
+      if (held) expect_touch(local, tolerance);
+      return;
+    }
+    // A start at the surface is within rounding of any facet there.
+    if (reference_gap(*mesh_, last_) < kAtSurface * mesh_->size()) return;
+    // It entered. Where its feature of entry holds it at every step, the contact must be there.
+    const auto entry = entry_feature(*mesh_, interpolated(last_, local, *time));
+    if (!entry) return;
+    ReferenceDepth at_end;
+    for (int step = static_cast<int>(std::ceil(*time * kFineSteps)); step <= kFineSteps; ++step) {
+      const LineProbe there = interpolated(last_, local, step / double{kFineSteps});
+      const auto on = measure_feature(*mesh_, entry->is_edge, entry->index, there);
+      if (!on || on->depth <= (step < kFineSteps ? -tolerance : tolerance)) return;
+      const LineProbe ideal = translated(there, on->depth * on->normal);
+      if (reference_depth(*mesh_, ideal).depth > tolerance) return;
+      if (step < kFineSteps ? reference_gap(*mesh_, ideal) > tolerance
+                            : !firmly_on(ideal, on->normal, tolerance)) {
+        return;
+      }
+      at_end = *on;
+    }
+    const bool elsewhere = !held || std::abs(r.deepest.depth - at_end.depth) >
+                                        kNeighbouringDepths * (mesh_->size() + at_end.depth);
+    if (turned(local) > kFastestTurn) {
+      counts_.turned_elsewhere += elsewhere;
+      return;
+    }
+    // A step may have led through a thin part and past it: then another feature holds the probe.
+    if (elsewhere && !is_outside_until(local, *time)) return;
+    ++counts_.passages;
+    if (elsewhere) {
+      ++counts_.passed_through;
+      report(held ? "held elsewhere, depth off by" : "passed through, depth",
+             held ? r.deepest.depth - at_end.depth : at_end.depth, local);
+    }
+  }
+
+  /// Whether the probe is outside until it enters, at a fraction of the tick: at all times it is
+  /// farther away than it moves until one at which its distance was measured. False also where
+  /// that would take too many looks.
+  bool is_outside_until(const LineProbe& local, double entry) const {
+    constexpr int kMostLooks = 100'000;
+    constexpr double kAtEntry = 1e-6;  // of the tick; so long before it nothing is told
+    const double motion =
+        std::max(glm::length(local.tip - last_.tip), glm::length(local.tail - last_.tail));
+    std::vector<std::pair<double, double>> left{{0, entry}};
+    for (int look = 0; look < kMostLooks && !left.empty(); ++look) {
+      const auto [from, to] = left.back();
+      left.pop_back();
+      const double middle = 0.5 * (from + to);
+      if (from > entry - kAtEntry ||
+          reference_gap(*mesh_, interpolated(last_, local, middle)) > 0.5 * (to - from) * motion)
+        continue;
+      left.emplace_back(from, middle);
+      left.emplace_back(middle, to);
+    }
+    return left.empty();
+  }
+
+  /// Whether the ideal probe lies well inside a facet of M: at its rim rounding decides which facet
+  /// holds it.
+  bool firmly_on(const LineProbe& ideal, const Vec3& normal, double tolerance) const {
+    constexpr int kWays = 8;
+    const Vec3 u = glm::normalize(std::abs(normal.x) < 0.5 ? glm::cross(normal, Vec3(1, 0, 0))
+                                                           : glm::cross(normal, Vec3(0, 1, 0)));
+    const Vec3 v = glm::cross(normal, u);
+    for (int i = 0; i < kWays; ++i) {
+      const double turn = 2 * std::numbers::pi * i / kWays;
+      const Vec3 aside = kAtSurface * mesh_->size() * (std::cos(turn) * u + std::sin(turn) * v);
+      if (reference_gap(*mesh_, translated(ideal, aside)) > tolerance) return false;
+    }
+    return true;
+  }
+
+  /// A contact that began although no step shows the probe inside: it must at least come as near as
+  /// it moves in one step.
+  void expect_touch(const LineProbe& local, double tolerance) {
+    const double step =
+        std::max(glm::length(local.tip - last_.tip), glm::length(local.tail - last_.tail)) /
+        kFineSteps;
+    double gap = std::numeric_limits<double>::infinity();
+    for (int i = 0; i <= kFineSteps && gap > step; ++i) {
+      gap =
+          std::min(gap, reference_gap(*mesh_, interpolated(last_, local, i / double{kFineSteps})));
+    }
+    if (gap <= step + tolerance) return;
+    ++counts_.phantom;
+    report("phantom contact, gap", gap, local);
+  }
+
+  void count_fallback(const LineProbe& local) {
+    const ScenePart& part = scene_.parts()[0];
+    const FirstContact first =
+        renderer_.side_contact()
+            ? first_contact_segment(*mesh_, *part.trees, last_, local, part.tolerance)
+            : first_contact_point(*mesh_, *part.trees, last_.tip, local.tip, part.tolerance);
+    counts_.fallbacks += first.feature.kind == ContactFeature::Kind::none;
+  }
+
+  /// How far the probe has turned in the tick, rad.
+  double turned(const LineProbe& local) const {
+    const Vec3 a = last_.tail - last_.tip, b = local.tail - local.tip;
+    return std::atan2(glm::length(glm::cross(a, b)), glm::dot(a, b));
+  }
+
+  void report(const char* what, double value, const LineProbe& local) {
+    if (counts_.faults.size() >= SearchCounts::kFaultsKept) return;
+    std::ostringstream out;
+    out.precision(17);
+    out << renderer_.name() << ", " << to_string(kind_) << " path, " << mesh_->facets().size()
+        << " facets, size " << mesh_->size() << " m, probe " << length_ << " m: " << what << " "
+        << value << " (" << value / mesh_->size() << " sizes), contact depth " << depth_
+        << " m, at (" << local.tip.x << " " << local.tip.y << " " << local.tip.z << ") ("
+        << local.tail.x << " " << local.tail.y << " " << local.tail.z << "), from (" << last_.tip.x
+        << " " << last_.tip.y << " " << last_.tip.z << ") (" << last_.tail.x << " " << last_.tail.y
+        << " " << last_.tail.z << "), turned by " << turned(local) << " rad";
+    fault_.what = out.str();
+    counts_.faults.push_back(fault_);
+  }
+
+  const Renderer& renderer_;
+  stimuli::Random random_;
+  std::shared_ptr<const stimuli::ConvexMesh> mesh_;
+  Pose pose_;
+  double length_;
+  PathKind kind_;
+  Scene scene_;
+  RenderState state_;
+  LineProbe last_;  // at the last tick, as it can touch; mesh frame
+  bool has_last_ = false, last_held_ = false;
+  double depth_ = 0;  // m, of the contact under audit
+  SearchFault fault_;
+  SearchCounts counts_;
+};
+
+}  // namespace
+
+SearchCounts search_walk(const Renderer& renderer, std::uint64_t seed, std::uint64_t walk) {
+  return Walk(renderer, seed, walk).run();
+}
 
 SearchCounts& SearchCounts::operator+=(const SearchCounts& other) {
   walks += other.walks;

@@ -7,7 +7,6 @@
 #include <numbers>
 #include <utility>
 
-#include "rendering/verification/random_draws.h"
 #include "rendering/verification/random_solids.h"
 #include "stimuli/orientation.h"
 #include "stimuli/primitives.h"

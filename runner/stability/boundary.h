@@ -1,12 +1,104 @@
 #pragma once
 // The stability boundary of a haptic loop: by simulation, and the passivity condition of theory.
 
+#include <cstdint>
+#include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
-#include "runner/stability/closed_loop.h"
+#include "protocols/protocol.h"
+#include "rendering/reach.h"
+#include "rendering/renderer.h"
+#include "rendering/scene.h"
 
 namespace palpate::runner {
+
+// Simulation of the sampled closed loop of hand, two devices at the ends of a stylus and renderer:
+// does a contact come to rest or oscillate? For studies, not for the servo.
+
+/// The hand's impedance at each end of the stylus.
+struct EndImpedance {
+  double stiffness = 0;  ///< N/m
+  double damping = 0;    ///< N s/m
+  double mass = 0;       ///< kg
+};
+
+struct LoopSettings {
+  double rate = 1000;     ///< Hz
+  double mass = 0.1;      ///< kg, of each end
+  double damping = 0.25;  ///< N s/m, viscous, of each end
+  double friction = 0;    ///< N, Coulomb, of each end
+  double resolution = 0;  ///< m, of each end's reading; 0: exact
+  int delay = 0;          ///< ticks from a reading to its force; 0: within the same tick
+  EndImpedance hand;
+  bool passivity_controller = false;
+  std::optional<rendering::Reach> reach = std::nullopt;  ///< of the virtual stylus
+
+  /// Forces are linear in the motion while the contact lasts: a swing grows or shrinks for ever.
+  bool linear() const { return friction == 0 && resolution == 0 && !passivity_controller; }
+};
+
+/// The contact that is pressed along -z; each end of the stylus moves along z only.
+enum class ContactCase {
+  wall,         ///< a plane, met by the tip
+  edge,         ///< a cube's edge: the ray lies across it, the point touches a face near it
+  sphere,       ///< met by the tip (point), by the side (ray)
+  two_objects,  ///< the ray lies across two edges; the point is in a groove between two walls
+  body,         ///< a body of 10 g that can move and lies on a plane, met by the tip
+};
+inline constexpr ContactCase kContactCases[] = {ContactCase::wall, ContactCase::edge,
+                                                ContactCase::sphere, ContactCase::two_objects,
+                                                ContactCase::body};
+const char* to_string(ContactCase contact_case);
+
+/// A scene and the equilibrium of the stylus in it.
+class LoopScene {
+ public:
+  LoopScene(ContactCase contact_case, protocols::RendererKind renderer,
+            const stimuli::Material& material);
+
+  const rendering::Scene& scene() const { return scene_; }
+  const rendering::Renderer& renderer() const { return *renderer_; }
+  const rendering::LineProbe& rest() const { return rest_; }  ///< 1 mm deep, m
+  /// N along z on each end at rest, and the number of objects touched.
+  double force_tip() const { return force_tip_; }
+  double force_tail() const { return force_tail_; }
+  int contacts() const { return contacts_; }
+
+ private:
+  const rendering::Renderer* renderer_;
+  rendering::Scene scene_;
+  rendering::LineProbe rest_;
+  double force_tip_ = 0, force_tail_ = 0;
+  int contacts_ = 0;
+};
+
+/// Swings are of the contact (its force over its stiffness), peak to peak, m.
+struct LoopOutcome {
+  bool stable = false;
+  double initial_swing = 0;  ///< when it is released
+  double early_swing = 0;    ///< in the second quarter of the run
+  double late_swing = 0;     ///< in the last quarter; infinite where it diverged
+  double floor = 0;          ///< a smaller swing counts as rest
+  std::uint64_t ticks = 0;
+};
+
+/// Whether a swing has come to rest, by what remains of it. A limit cycle does not grow any more,
+/// and is no rest: unstable.
+enum class Verdict {
+  stable,
+  unstable,
+  open,  ///< it shrinks, and has to be watched for longer
+};
+Verdict verdict_on(const LoopOutcome& so_far, bool linear);
+
+/// Released 0.1 mm (tip) and 0.06 mm (tail) from equilibrium, under the constant force that holds
+/// it there. Each end is integrated exactly (matrix exponential) under a force that is held over
+/// the tick. Stable: what swings in the end is within three steps of the resolution, or within a
+/// hundredth of the initial swing, or still shrinks. It runs 40 periods, and where that does not
+/// tell, up to 64 times as long.
+LoopOutcome run_loop(const LoopSettings& settings, const LoopScene& scene);
 
 /// A loop without the two quantities that span the boundary: stiffness and physical damping.
 struct LoopCase {

@@ -10,7 +10,7 @@
 
 #include "rendering/accuracy/analytic_stroke.h"
 #include "rendering/accuracy/error_summary.h"
-#include "rendering/accuracy/plain_walk.h"
+#include "rendering/accuracy/methods.h"
 #include "stimuli/primitives.h"
 #include "tests/shared/probe_paths.h"
 

@@ -14,7 +14,7 @@
 #include <string>
 #include <vector>
 
-#include "rendering/accuracy/line_contact.h"
+#include "rendering/accuracy/analytic_stroke.h"
 
 namespace palpate::rendering {
 namespace {

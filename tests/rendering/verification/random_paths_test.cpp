@@ -1,8 +1,6 @@
 // Random paths keep what their kinds promise: length of the probe, number of ticks, a start
 // outside, steps.
 
-#include "rendering/verification/random_paths.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -12,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "rendering/verification/random_solids.h"
 #include "stimuli/primitives.h"
 
 namespace palpate::rendering {

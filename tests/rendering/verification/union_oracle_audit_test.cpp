@@ -11,7 +11,7 @@
 
 #include "rendering/verification/union_cases.h"
 #include "rendering/verification/union_oracle.h"
-#include "rendering/verification/union_walk.h"
+#include "rendering/verification/union_search.h"
 #include "stimuli/random.h"
 
 namespace palpate::rendering {

@@ -10,11 +10,10 @@
 #include <numbers>
 
 #include "rendering/renderer.h"
-#include "rendering/verification/random_paths.h"
 #include "rendering/verification/random_solids.h"
 #include "rendering/verification/reference.h"
 #include "rendering/verification/union_cases.h"
-#include "rendering/verification/union_walk.h"
+#include "rendering/verification/union_search.h"
 #include "stimuli/orientation.h"
 #include "stimuli/primitives.h"
 
