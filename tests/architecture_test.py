@@ -98,19 +98,18 @@ PUBLIC = {
     "protocols/procedures": "procedure procedure_spec psychometric recovery",
     "data/base": "json_text",
     "data": "column_table record sweep_record",
-    "data/files": "atomic_file atomic_folder checksum file_identity file_permissions formula_guard "
-                  "output_check temporary_names text_sink trusted_links utc",
-    "data/store": "export_log protocol_rows schema sqlite_errors statement_values station_database "
-                  "store sweep_file tombstones torque_notes",
+    "data/files": "atomic_file atomic_folder checksum file_permissions text_sink output_check utc",
+    "data/store": "export_log protocol_rows schema connection station_database store sweep_file "
+                  "forget task_text",
     "data/export": "bids csv psychds sample_slots settings study_about sweep_csv trial_table",
     "data/merge": "merge sweep_merge",
     "analysis": "text",
-    "analysis/input": "csv_reader renderers study_record sweep_table task_trials trials",
+    "analysis/input": "csv_reader trials study_record sweep_table task_trials",
     "analysis/statistics": "analysis comparison conclusions describe interval_coverage mixed_model "
-                           "model_study paired paper_effects pattern pilot plan power quantiles "
+                           "model_study paired paper_effects pattern power plan quantiles "
                            "sensitivity sweep_analysis task_analysis threshold_plan",
     "analysis/movement": "adjusted_gain comparison measures pictures",
-    "analysis/figures": "axes figure_svg figures marks movement_figures palette sweep_figures "
+    "analysis/figures": "panel_drawing figure_svg figures movement_figures svg sweep_figures "
                         "task_figures",
     "analysis/report": "html_elements html_page hypotheses movement_report plan_report report_html "
                        "report_json report_text sweep_report tables task_report",

@@ -4,7 +4,7 @@
 #include <string>
 
 #include "analysis/figures/figures.h"
-#include "analysis/figures/palette.h"
+#include "analysis/figures/svg.h"
 
 namespace palpate::analysis {
 

@@ -7,7 +7,7 @@
 #include <optional>
 #include <utility>
 
-#include "analysis/figures/figure_skeleton.h"
+#include "analysis/figures/panel_drawing.h"
 #include "analysis/statistics/conclusions.h"
 #include "analysis/text.h"
 

@@ -7,8 +7,7 @@
 #include <optional>
 #include <utility>
 
-#include "analysis/figures/axes.h"
-#include "analysis/figures/marks.h"
+#include "analysis/figures/panel_drawing.h"
 #include "analysis/statistics/analysis.h"
 #include "analysis/text.h"
 

@@ -1,17 +1,419 @@
 #include "analysis/figures/panel_drawing.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
-#include "analysis/figures/label_placement.h"
-#include "analysis/figures/marks.h"
+#include "analysis/figures/svg.h"
+#include "analysis/statistics/conclusions.h"
 #include "analysis/text.h"
 
 namespace palpate::analysis {
+
+namespace {
+
+/// Distance of ticks: 1, 2 or 5 times a power of ten, near a fifth of `span`.
+double round_step(double span) {
+  const double power = std::pow(10.0, std::floor(std::log10(span / 5)));
+  const double factor = span / 5 / power;
+  return power * (factor < 1.5 ? 1 : factor < 3.5 ? 2 : factor < 7.5 ? 5 : 10);
+}
+
+/// "0.02", "500", "10⁻⁶", "2·10⁻⁶". \param factor 1, 2 or 5, times 10 to the `exponent`
+std::string log_tick_text(int factor, int exponent) {
+  constexpr int kFewDecimals = 3, kFewZeros = 4;
+  if (exponent >= -kFewDecimals && exponent <= kFewZeros) {
+    return fixed(factor * std::pow(10.0, exponent), std::max(0, -exponent));
+  }
+  constexpr const char* kRaised[] = {"⁰", "¹", "²", "³", "⁴", "⁵", "⁶", "⁷", "⁸", "⁹"};
+  std::string text = factor == 1 ? "" : std::to_string(factor) + "·";
+  text += exponent < 0 ? "10⁻" : "10";
+  for (const char digit : std::to_string(std::abs(exponent))) text += kRaised[digit - '0'];
+  return text;
+}
+
+}  // namespace
+
+FigureAxis names_axis(const std::vector<std::string>& names, std::size_t shown, std::string title) {
+  FigureAxis axis;
+  axis.title = std::move(title);
+  axis.high = static_cast<double>(std::max<std::size_t>(shown, 1));
+  axis.grid = false;
+  axis.names = true;
+  for (std::size_t i = 0; i < shown; ++i) {
+    axis.ticks.push_back({static_cast<double>(i) + 0.5, stimuli::printable(names[i], 160)});
+  }
+  return axis;
+}
+
+FigureAxis linear_axis(double low, double high, std::string title) {
+  if (!(high > low)) high = low + 1;
+  const double step = round_step(high - low);
+  FigureAxis axis;
+  axis.title = std::move(title);
+  axis.low = step * std::floor(low / step + 1e-9);
+  axis.high = step * std::ceil(high / step - 1e-9);
+  const int decimals = step < 1 ? static_cast<int>(std::ceil(-std::log10(step) - 1e-9)) : 0;
+  const auto count = std::lround((axis.high - axis.low) / step);
+  for (long i = 0; i <= count; ++i) {
+    const double at = axis.low + static_cast<double>(i) * step;
+    axis.ticks.push_back({at, fixed(at, decimals)});
+  }
+  return axis;
+}
+
+FigureAxis log_axis(double low, double high, std::string title) {
+  constexpr double kMostWithFactors = 3.5;  // decades; beyond, no ticks at 2 and 5
+  constexpr double kMostTicks = 9;          // beyond, every second, third ... power of ten
+  if (!(high > low)) {
+    low -= 0.1;
+    high += 0.1;
+  }
+  FigureAxis axis;
+  axis.title = std::move(title);
+  axis.low = low;
+  axis.high = high;
+  const int last = static_cast<int>(std::ceil(high));
+  const int step = std::max(1, static_cast<int>(std::ceil((high - low) / kMostTicks)));
+  for (int exponent = static_cast<int>(std::floor(low)); exponent <= last; ++exponent) {
+    if (exponent % step != 0) continue;
+    for (const int factor : {1, 2, 5}) {
+      const double at = exponent + std::log10(factor);
+      if (factor > 1 && high - low > kMostWithFactors) continue;
+      if (at < low - 1e-9 || at > high + 1e-9) continue;
+      axis.ticks.push_back({at, log_tick_text(factor, exponent)});
+    }
+  }
+  return axis;
+}
+
+FigureAxis decades_axis(double low, double high, std::string title) {
+  const double first = std::floor(std::log10(low) + 1e-9);
+  const double last = std::ceil(std::log10(high) - 1e-9);
+  return log_axis(first, std::max(last, first + 1), std::move(title));
+}
+
+std::vector<std::pair<double, double>> outline_of(MarkerShape shape) {
+  constexpr double kArm = 0.36;  // half the width of an arm of the cross
+  std::vector<std::pair<double, double>> corners;
+  if (shape == MarkerShape::right || shape == MarkerShape::left) {
+    corners = {{1, 0}, {-0.8, -1}, {-0.8, 1}};
+    if (shape == MarkerShape::left) {
+      for (auto& corner : corners) corner.first = -corner.first;
+    }
+  } else if (shape == MarkerShape::cross || shape == MarkerShape::saltire) {
+    corners = {{kArm, -1}, {kArm, -kArm}, {1, -kArm}, {1, kArm},   {kArm, kArm},   {kArm, 1},
+               {-kArm, 1}, {-kArm, kArm}, {-1, kArm}, {-1, -kArm}, {-kArm, -kArm}, {-kArm, -1}};
+    if (shape == MarkerShape::saltire) {
+      const double turn = std::sqrt(0.5);
+      for (auto& [x, y] : corners) {
+        const double turned = turn * (x - y);
+        y = turn * (x + y);
+        x = turned;
+      }
+    }
+  }
+  return corners;
+}
+
+Mark symbol(Role role, MarkerShape shape, double x, double y, double size, std::string text) {
+  Mark mark;
+  mark.role = role;
+  mark.shape = shape;
+  mark.x = {x};
+  mark.y = {y};
+  mark.size = size;
+  mark.text = std::move(text);
+  return mark;
+}
+
+Mark text_mark(Role role, double x, double y, std::string text, double size) {
+  Mark mark = symbol(role, MarkerShape::circle, x, y, size, std::move(text));
+  mark.kind = Mark::Kind::text;
+  return mark;
+}
+
+Mark line_mark(Role role, std::vector<double> x, std::vector<double> y, double width) {
+  Mark mark;
+  mark.kind = Mark::Kind::line;
+  mark.role = role;
+  mark.x = std::move(x);
+  mark.y = std::move(y);
+  mark.size = width;
+  return mark;
+}
+
+Mark rect_mark(Role role, double x0, double y0, double x1, double y1, double opacity,
+               std::string text) {
+  Mark mark;
+  mark.kind = Mark::Kind::rect;
+  mark.role = role;
+  mark.x = {x0, x1};
+  mark.y = {y0, y1};
+  mark.opacity = opacity;
+  mark.text = std::move(text);
+  return mark;
+}
+
+void add_interval(Panel& panel, Role role, double x, double low, double high, std::string text) {
+  Mark bar;
+  bar.kind = Mark::Kind::interval;
+  bar.role = role;
+  bar.x = {x};
+  bar.y = {std::clamp(low, panel.y.low, panel.y.high), std::clamp(high, panel.y.low, panel.y.high)};
+  bar.size = 2;
+  bar.text = std::move(text);
+  panel.marks.push_back(bar);
+  const auto end = [&](double y, MarkerShape shape, double half) {
+    panel.marks.push_back(symbol(role, shape, x, y, half, bar.text));
+  };
+  if (high <= panel.y.high) {
+    end(bar.y[1], MarkerShape::dash, 5);
+  } else {
+    end(bar.y[1], MarkerShape::up, 5);
+    panel.marks.back().dy = 4;
+  }
+  if (low >= panel.y.low) {
+    end(bar.y[0], MarkerShape::dash, 5);
+  } else {
+    end(bar.y[0], MarkerShape::down, 5);
+    panel.marks.back().dy = -4;
+  }
+}
+
+void add_interval_across(Panel& panel, Role role, double y, double low, double high,
+                         const std::string& text) {
+  const double left = std::clamp(low, panel.x.low, panel.x.high);
+  const double right = std::clamp(high, panel.x.low, panel.x.high);
+  Mark bar = line_mark(role, {left, right}, {y, y}, 2);
+  bar.text = text;
+  panel.marks.push_back(std::move(bar));
+  const double half = 5 * (panel.y.high - panel.y.low) / panel.height;
+  const auto end = [&](double x, bool inside, MarkerShape arrow, double dx) {
+    if (inside) {
+      Mark cap = line_mark(role, {x, x}, {y - half, y + half}, 2);
+      cap.text = text;
+      panel.marks.push_back(std::move(cap));
+    } else {
+      panel.marks.push_back(symbol(role, arrow, x, y, 5, text));
+      panel.marks.back().dx = dx;
+    }
+  };
+  end(left, low >= panel.x.low, MarkerShape::left, 4);
+  end(right, high <= panel.x.high, MarkerShape::right, -4);
+}
+
+namespace {
+
+constexpr double kPoint = 7;               // px: half the width of a point and its margin
+constexpr double kBeside = 11;             // px from the point to its label
+constexpr double kLeft = 12, kRight = 12;  // px beside the panel that a label may take
+
+/// Axis-aligned rectangle in px from the panel's upper left corner, y down.
+struct Box {
+  double left, right, top, bottom;
+
+  bool meets(const Box& other) const {
+    return left < other.right && other.left < right && top < other.bottom && other.top < bottom;
+  }
+};
+
+class Placement {
+ public:
+  Placement(const Panel& panel, double width) : panel_(panel), width_(width) {
+    for (const Mark& mark : panel.marks) {
+      if (mark.kind == Mark::Kind::line) {
+        for (std::size_t i = 1; i < mark.x.size(); ++i) {
+          take_segment(mark.x[i - 1], mark.y[i - 1], mark.x[i], mark.y[i]);
+        }
+      } else if (mark.kind == Mark::Kind::interval) {
+        take_segment(mark.x[0], mark.y[0], mark.x[0], mark.y[1]);
+      } else if (mark.kind == Mark::Kind::label) {
+        const double px = x(mark.x[0]), py = y(mark.y[0]);
+        taken_.push_back({px - kPoint, px + kPoint, py - kPoint, py + kPoint});
+      }
+    }
+  }
+
+  /// Chooses the candidate position with the fewest overlaps and marks it as taken.
+  Mark put(const Mark& label) {
+    Mark best;
+    Box best_box{};
+    std::ptrdiff_t fewest = std::ssize(taken_) + 4;
+    for (const double dy : {4.0, -10.0, 19.0, -26.0, 35.0, -44.0, 53.0, -62.0, 71.0}) {
+      for (const int anchor : {-1, 1}) {
+        Mark text = label;
+        text.kind = Mark::Kind::text;
+        text.anchor = anchor;
+        text.dx = -kBeside * anchor;
+        text.dy = dy;
+        const Box box = box_of(text);
+        const std::ptrdiff_t hidden = n_hidden(box);
+        if (hidden >= fewest) continue;
+        fewest = hidden;
+        best = std::move(text);
+        best_box = box;
+      }
+    }
+    taken_.push_back(best_box);
+    return best;
+  }
+
+ private:
+  void take_segment(double x0, double y0, double x1, double y1) {
+    constexpr int kPieces = 4;  // of an oblique segment: one bounding box would cover too much
+    const int pieces = x0 == x1 || y0 == y1 ? 1 : kPieces;
+    for (int i = 0; i < pieces; ++i) {
+      const double from = static_cast<double>(i) / pieces, to = static_cast<double>(i + 1) / pieces;
+      const auto [left, right] =
+          std::minmax({x(std::lerp(x0, x1, from)), x(std::lerp(x0, x1, to))});
+      const auto [top, bottom] =
+          std::minmax({y(std::lerp(y0, y1, from)), y(std::lerp(y0, y1, to))});
+      taken_.push_back({left - 2, right + 2, top - 2, bottom + 2});
+    }
+  }
+
+  double x(double value) const {
+    return (value - panel_.x.low) / (panel_.x.high - panel_.x.low) * width_;
+  }
+  double y(double value) const {
+    return (panel_.y.high - value) / (panel_.y.high - panel_.y.low) * panel_.height;
+  }
+
+  Box box_of(const Mark& text) const {
+    const double wide = text_width(text.text, text.size, text.bold);
+    const double left = x(text.x[0]) + text.dx - (text.anchor > 0 ? wide : 0);
+    const double base = y(text.y[0]) + text.dy;
+    return {left, left + wide, base - text.size, base + 3};
+  }
+
+  /// Overlaps of a box; extending beyond the panel counts as three.
+  std::ptrdiff_t n_hidden(const Box& box) const {
+    const bool outside = box.left < -kLeft || box.right > width_ + kRight;
+    return std::ranges::count_if(taken_, [&](const Box& other) { return box.meets(other); }) +
+           (outside ? 3 : 0);
+  }
+
+  const Panel& panel_;
+  double width_;
+  std::vector<Box> taken_;  ///< points, intervals, lines, then labels placed so far
+};
+
+}  // namespace
+
+std::vector<Mark> placed_labels(const Panel& panel, double width) {
+  Placement placement(panel, width);
+  std::vector<Mark> texts;
+  for (const Mark& mark : panel.marks) {
+    if (mark.kind == Mark::Kind::label) texts.push_back(placement.put(mark));
+  }
+  return texts;
+}
+
+Figure new_figure(const Analysis& analysis, std::string id, std::string title) {
+  Figure figure;
+  figure.id = std::move(id);
+  figure.title = std::move(title);
+  figure.label = simulated_label(analysis.table.simulated);
+  const Counts& counts = analysis.description.counts;
+  figure.subtitle = counted(counts.n_participants, "participant", "participants") + ", " +
+                    counted(counts.n_trials, "trial", "trials");
+  return figure;
+}
+
+RendererStyle style_of(const Analysis& analysis, std::string_view renderer) {
+  constexpr std::array<RendererStyle, kShownRenderers> kStyles{
+      {{Role::point, MarkerShape::circle},
+       {Role::ray, MarkerShape::square},
+       {Role::third, MarkerShape::right},
+       {Role::fourth, MarkerShape::cross},
+       {Role::fifth, MarkerShape::left},
+       {Role::sixth, MarkerShape::saltire}}};
+  const auto own = [](std::string_view name) {
+    return name == "point" ? 0U : name == "ray" ? 1U : kShownRenderers;
+  };
+  if (own(renderer) < kShownRenderers) return kStyles[own(renderer)];
+  std::array<bool, kShownRenderers> taken{};
+  std::size_t before = 0;  // renderers without a fixed style that precede this one
+  for (const std::string& name : analysis.table.renderers) {
+    if (name == renderer) break;
+    if (own(name) < kShownRenderers) {
+      taken[own(name)] = true;
+    } else {
+      ++before;
+    }
+  }
+  for (std::size_t i = 0; i < kShownRenderers; ++i) {
+    if (!taken[i] && before-- == 0) return kStyles[i];
+  }
+  return kStyles.back();
+}
+
+std::string short_name(const std::string& renderer) { return stimuli::printable(renderer, 40); }
+
+void add_renderers(Figure& figure, const Analysis& analysis, std::size_t shown) {
+  for (std::size_t r = 0; r < shown; ++r) {
+    const std::string& renderer = analysis.table.renderers[r];
+    const RendererStyle style = style_of(analysis, renderer);
+    figure.legend.push_back({stimuli::printable(renderer, 200), style.role, style.shape});
+  }
+}
+
+std::size_t shown_shapes(const Analysis& analysis, Figure& figure) {
+  const std::size_t n = analysis.table.shapes.size();
+  if (n <= kShownShapes) return n;
+  figure.notes.push_back("The first " + std::to_string(kShownShapes) + " of " + std::to_string(n) +
+                         " shapes; the tables and the JSON file have all.");
+  return kShownShapes;
+}
+
+std::size_t shown_renderers(const Analysis& analysis, Figure& figure) {
+  const std::size_t n = analysis.table.renderers.size();
+  if (n <= kShownRenderers) return n;
+  figure.notes.push_back("The first " + std::to_string(kShownRenderers) + " of " +
+                         std::to_string(n) + " renderers; the tables and the JSON file have all.");
+  return kShownRenderers;
+}
+
+std::size_t shown_comparisons(const Analysis& analysis, Figure& figure) {
+  return std::min(analysis.comparisons.size(),
+                  std::max<std::size_t>(shown_renderers(analysis, figure), 2) - 1);
+}
+
+Panel comparison_panel(const Analysis& analysis, const RendererPair& pair, std::size_t shapes,
+                       double slot) {
+  const bool alone = analysis.comparisons.size() == 1;
+  Panel panel;
+  constexpr std::size_t kLongest = 24;  // bytes of each name, so that two fit above a narrow panel
+  if (!alone) {
+    panel.title = stimuli::printable(pair.renderer, kLongest) + " − " +
+                  stimuli::printable(pair.reference, kLongest);
+  }
+  panel.width =
+      std::max(alone ? kFullPanelWidth : kComparisonPanelWidth, slot * static_cast<double>(shapes));
+  return panel;
+}
+
+std::string gain_title(const Analysis& analysis, const std::string& what,
+                       const std::string& joint) {
+  return shortened(what + " " + with_renderer(analysis, joint), 58) + " (%)";
+}
+
+std::string seconds_text(double seconds) { return fixed(seconds, seconds < 10 ? 2 : 1) + " s"; }
+
+std::vector<Figure> figures_of(const Analysis& analysis, const StudyRecord& record) {
+  std::vector<Figure> figures{
+      figure15_of(analysis),  speedup_of(analysis),        times_of(analysis),
+      confusion_of(analysis), speed_accuracy_of(analysis), learning_of(analysis),
+      order_of(analysis),     servo_of(analysis, record),  exclusions_of(analysis)};
+  std::erase_if(figures, [](const Figure& figure) { return figure.panels.empty(); });
+  return figures;
+}
 
 namespace {
 

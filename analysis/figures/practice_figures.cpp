@@ -6,7 +6,7 @@
 #include <optional>
 #include <utility>
 
-#include "analysis/figures/figure_skeleton.h"
+#include "analysis/figures/panel_drawing.h"
 #include "analysis/text.h"
 
 namespace palpate::analysis {

@@ -1,13 +1,31 @@
 #pragma once
 // Writes SVG 1.1 text: the elements that figures need.
 
+#include <array>
 #include <cstddef>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "analysis/figures/figures.h"
+
 namespace palpate::analysis {
+
+// Colours of figures and pages by role.
+
+/// CSS colours, indexed by Role.
+using Palette = std::array<std::string, kRoles>;
+
+/// For print and light pages: the colours of Okabe & Ito (2008), distinguishable with colour vision
+/// deficiency, some darker for contrast on white.
+Palette light_palette();
+Palette dark_palette();
+/// CSS variables "var(--point)" ..., whose values are in the style of the page.
+Palette page_palette();
+
+/// Colour of line number `line` (from 0) of a figure; repeats after eight.
+Role line_role(std::size_t line);
 
 /// An SVG document under construction. Lengths in px, y down. Texts are escaped here.
 class Svg {

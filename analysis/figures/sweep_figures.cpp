@@ -6,8 +6,7 @@
 #include <string>
 #include <utility>
 
-#include "analysis/figures/axes.h"
-#include "analysis/figures/marks.h"
+#include "analysis/figures/panel_drawing.h"
 #include "analysis/statistics/paper_effects.h"
 #include "analysis/text.h"
 #include "stimuli/random.h"

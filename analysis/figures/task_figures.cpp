@@ -8,8 +8,7 @@
 #include <string>
 #include <utility>
 
-#include "analysis/figures/axes.h"
-#include "analysis/figures/marks.h"
+#include "analysis/figures/panel_drawing.h"
 #include "analysis/text.h"
 
 namespace palpate::analysis {

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <utility>
 
-#include "analysis/figures/figure_skeleton.h"
+#include "analysis/figures/panel_drawing.h"
 #include "analysis/statistics/quantiles.h"
 #include "analysis/text.h"
 

@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "analysis/figures/figure_svg.h"
-#include "analysis/figures/palette.h"
+#include "analysis/figures/svg.h"
 #include "analysis/report/html_elements.h"
 #include "analysis/report/report_assets.h"
 #include "analysis/text.h"

@@ -4,9 +4,8 @@
 #include <string>
 #include <utility>
 
-#include "analysis/figures/axes.h"
-#include "analysis/figures/marks.h"
-#include "analysis/figures/palette.h"
+#include "analysis/figures/panel_drawing.h"
+#include "analysis/figures/svg.h"
 #include "analysis/report/plan_report.h"
 #include "analysis/text.h"
 

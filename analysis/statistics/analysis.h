@@ -8,11 +8,11 @@
 
 #include "analysis/input/trials.h"
 #include "analysis/statistics/anova.h"
+#include "analysis/statistics/censored.h"
 #include "analysis/statistics/comparison.h"
 #include "analysis/statistics/describe.h"
 #include "analysis/statistics/mixed_model.h"
 #include "analysis/statistics/practice.h"
-#include "analysis/statistics/time_outs.h"
 
 namespace palpate::analysis {
 

@@ -4,13 +4,11 @@
 #include <cstdint>
 #include <vector>
 
-#include "analysis/input/renderers.h"
 #include "analysis/input/trials.h"
 #include "analysis/statistics/censored.h"
 #include "analysis/statistics/describe.h"
 #include "analysis/statistics/paired.h"
 #include "analysis/statistics/speed_accuracy.h"
-#include "analysis/statistics/time_outs.h"
 
 namespace palpate::analysis {
 

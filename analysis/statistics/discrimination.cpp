@@ -1,7 +1,11 @@
 #include "analysis/statistics/discrimination.h"
 
+#include <algorithm>
+#include <boost/math/distributions/normal.hpp>
 #include <cmath>
 #include <limits>
+
+#include "analysis/statistics/quantiles.h"
 
 namespace palpate::analysis {
 namespace {
@@ -52,6 +56,171 @@ Discrimination discrimination(const PsychometricFit& fit,
   result.jnd = *result.weber_fraction * base;
   result.jnd_ci95 = {result.weber_fraction_ci95->low * base,
                      result.weber_fraction_ci95->high * base};
+  return result;
+}
+
+namespace {
+
+const double kZ975 = 1.959963984540054;
+const double kSqrt2 = 1.4142135623730951;
+
+double cumulative(double z) { return cdf(boost::math::normal(), z); }
+double normal_density(double z) { return pdf(boost::math::normal(), z); }
+
+Interval around(double centre, double se) { return {centre - kZ975 * se, centre + kZ975 * se}; }
+
+/// Variance of the normal quantile of a rate.
+double quantile_variance(double rate, double trials) {
+  const double density = normal_density(normal_quantile(rate));
+  return rate * (1 - rate) / (trials * density * density);
+}
+
+/// Rates of "different" by the difference of two observations, N(+-d', 2) or N(0, 2): with the
+/// criterion k on its absolute value (Macmillan & Creelman 2005, 9).
+double different_rate(double d, double k) {
+  return cumulative((d - k) / kSqrt2) + cumulative((-d - k) / kSqrt2);
+}
+
+double same_different_d_prime(double hit, double k) {
+  double low = 0, high = 20;
+  for (int i = 0; i < 100; ++i) {
+    const double middle = 0.5 * (low + high);
+    (different_rate(middle, k) < hit ? low : high) = middle;
+  }
+  return 0.5 * (low + high);
+}
+
+void add_same_different(Detectability& result, double signal, double noise) {
+  const double h = result.hit_rate, f = result.false_alarm_rate;
+  const double k = -kSqrt2 * normal_quantile(f / 2);
+  result.criterion = k;
+  const double slope_k = 2 * normal_density(k / kSqrt2) / kSqrt2;  // -df/dk
+  const double variance_f = f * (1 - f) / noise, variance_h = h * (1 - h) / signal;
+  result.criterion_ci95 = around(k, std::sqrt(variance_f) / slope_k);
+  if (!(h > f)) {
+    result.d_prime = 0;  // d' is not below 0 here, and its variance has no normal form at 0
+    return;
+  }
+  const double d = same_different_d_prime(h, k);
+  const double near = normal_density((d - k) / kSqrt2), far = normal_density((d + k) / kSqrt2);
+  const double by_d = (near - far) / kSqrt2, by_k = (near + far) / kSqrt2;  // dh/dd, -dh/dk
+  // h(d, k) is fixed: dd = (dh + by_k dk) / by_d, dk = -df / slope_k.
+  const double from_f = by_k / slope_k;
+  result.d_prime = d;
+  result.d_prime_se = std::sqrt(variance_h + from_f * from_f * variance_f) / by_d;
+  result.d_prime_ci95 = around(d, *result.d_prime_se);
+}
+
+}  // namespace
+
+Detectability detectability(const DetectionCounts& counts, DetectionTask task) {
+  Detectability result;
+  if (counts.signal_trials == 0 || counts.noise_trials == 0) {
+    result.undefined =
+        counts.signal_trials == 0 ? "no trials with a signal" : "no trials without a signal";
+    return result;
+  }
+  const double signal = counts.signal_trials + 1.0, noise = counts.noise_trials + 1.0;
+  result.hit_rate = (counts.hits + 0.5) / signal;
+  result.false_alarm_rate = (counts.false_alarms + 0.5) / noise;
+  if (task == DetectionTask::same_different) {
+    add_same_different(result, signal, noise);
+    return result;
+  }
+  const double zh = normal_quantile(result.hit_rate);
+  const double zf = normal_quantile(result.false_alarm_rate);
+  const double unit = task == DetectionTask::two_interval ? kSqrt2 : 1;
+  const double spread = std::sqrt(quantile_variance(result.hit_rate, signal) +
+                                  quantile_variance(result.false_alarm_rate, noise));
+  result.d_prime = (zh - zf) / unit;
+  result.d_prime_se = spread / unit;
+  result.d_prime_ci95 = around(*result.d_prime, *result.d_prime_se);
+  result.criterion = -0.5 * (zh + zf) * (task == DetectionTask::two_interval ? kSqrt2 : 1);
+  result.criterion_ci95 =
+      around(*result.criterion, 0.5 * spread * (task == DetectionTask::two_interval ? kSqrt2 : 1));
+  return result;
+}
+
+std::optional<double> forced_choice_d_prime(double share, int alternatives) {
+  if (!(share > 1.0 / alternatives) || !(share < 1)) return std::nullopt;
+  const auto correct = [&](double d) {
+    constexpr int kSteps = 2000;
+    double sum = 0;
+    for (int i = 0; i <= kSteps; ++i) {  // trapezoids over all that counts: error below 1e-12
+      const double x = -9 + d + 18.0 * i / kSteps;
+      sum += normal_density(x - d) * std::pow(cumulative(x), alternatives - 1);
+    }
+    return sum * 18.0 / kSteps;
+  };
+  double low = 0, high = 20;
+  for (int i = 0; i < 50; ++i) {
+    const double middle = 0.5 * (low + high);
+    (correct(middle) < share ? low : high) = middle;
+  }
+  return 0.5 * (low + high);
+}
+
+namespace {
+
+std::vector<Type2Roc::Point> type2_curve(std::vector<ConfidenceTrial> trials, double correct,
+                                         double wrong) {
+  std::sort(trials.begin(), trials.end(),
+            [](const auto& a, const auto& b) { return a.confidence > b.confidence; });
+  std::vector<Type2Roc::Point> curve{{0, 0}};
+  Type2Roc::Point at{0, 0};
+  for (std::size_t i = 0; i < trials.size(); ++i) {
+    (trials[i].correct ? at.correct : at.wrong) += 1 / (trials[i].correct ? correct : wrong);
+    if (i + 1 == trials.size() || trials[i + 1].confidence != trials[i].confidence)
+      curve.push_back(at);
+  }
+  return curve;
+}
+
+double variance_of_mean(const std::vector<double>& values, double mean_value) {
+  double sum = 0;
+  for (const double value : values) sum += (value - mean_value) * (value - mean_value);
+  const auto n = static_cast<double>(values.size());
+  return sum / (n - 1) / n;
+}
+
+}  // namespace
+
+Type2Roc type2_roc(const std::vector<ConfidenceTrial>& trials) {
+  Type2Roc result;
+  std::vector<double> correct, wrong;
+  for (const ConfidenceTrial& trial : trials)
+    (trial.correct ? correct : wrong).push_back(trial.confidence);
+  result.correct = static_cast<int>(correct.size());
+  result.wrong = static_cast<int>(wrong.size());
+  if (correct.empty() || wrong.empty()) {
+    result.undefined = correct.empty() ? "no correct answer" : "no wrong answer";
+    return result;
+  }
+  const auto m = static_cast<double>(correct.size()), n = static_cast<double>(wrong.size());
+  result.curve = type2_curve(trials, m, n);
+  // DeLong's placements: for each correct answer the share of wrong ones below, and the reverse.
+  const auto shares_below = [](const std::vector<double>& of, std::vector<double> among) {
+    std::sort(among.begin(), among.end());
+    std::vector<double> shares;
+    for (const double value : of) {
+      const auto [first, last] = std::equal_range(among.begin(), among.end(), value);
+      shares.push_back(
+          (static_cast<double>(first - among.begin()) + 0.5 * static_cast<double>(last - first)) /
+          static_cast<double>(among.size()));
+    }
+    return shares;
+  };
+  const std::vector<double> below = shares_below(correct, wrong);
+  const std::vector<double> above = shares_below(wrong, correct);
+  double area = 0;
+  for (const double share : below) area += share / m;
+  result.area = area;
+  if (correct.size() < 2 || wrong.size() < 2) return result;
+  result.se = std::sqrt(variance_of_mean(below, area) + variance_of_mean(above, 1 - area));
+  if (!(area > 0) || !(area < 1)) return result;
+  const double logit = std::log(area / (1 - area)), spread = *result.se / (area * (1 - area));
+  const auto share_at = [](double x) { return 1 / (1 + std::exp(-x)); };
+  result.area_ci95 = {share_at(logit - kZ975 * spread), share_at(logit + kZ975 * spread)};
   return result;
 }
 

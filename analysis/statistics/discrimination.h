@@ -1,7 +1,10 @@
 #pragma once
 
 #include <optional>
+#include <string>
+#include <vector>
 
+#include "analysis/statistics/paired.h"
 #include "analysis/statistics/psychometric_fit.h"
 
 namespace palpate::analysis {
@@ -22,5 +25,65 @@ struct Discrimination {
 Discrimination discrimination(const PsychometricFit& fit,
                               const protocols::PsychometricFunction& function,
                               std::optional<double> standard);
+
+// Sensitivity and criterion of yes/no, two-interval and same/different tasks, and confidence.
+
+/// Answers "yes" (or "different", or "the second") by what was there.
+struct DetectionCounts {
+  int signal_trials = 0, hits = 0;
+  int noise_trials = 0, false_alarms = 0;
+};
+
+/// Model of the observer.
+enum class DetectionTask {
+  yes_no,
+  two_interval,   ///< signal: it was the second; noise: it was the first
+  same_different  ///< signal: they differ; by the difference of the two (not by classes)
+};
+
+/// Rates are of the counts with 0.5 added to hits and false alarms and 1 to trials, always
+/// (log-linear correction, Hautus 1995). Intervals are normal ones, with the variance of Gourevitch
+/// & Galanter 1967 (same/different: by the delta method).
+struct Detectability {
+  std::string undefined;
+  double hit_rate = 0, false_alarm_rate = 0;  ///< corrected
+  std::optional<double> d_prime, d_prime_se;
+  std::optional<Interval> d_prime_ci95;
+  /// yes/no: distance of the criterion from the unbiased one, in d' units, positive: rather "no"
+  /// (two_interval: rather the first; in units of one interval's d'). same_different: the smallest
+  /// difference that is called one.
+  std::optional<double> criterion;
+  std::optional<Interval> criterion_ci95;
+};
+
+Detectability detectability(const DetectionCounts& counts, DetectionTask task);
+
+/// d' of m-alternative forced choice without bias from the share correct: the d' with
+/// integral phi(x - d') Phi(x)^(m - 1) dx = share (Green & Swets 1966). nullopt: at most chance,
+/// or 1.
+std::optional<double> forced_choice_d_prime(double share, int alternatives);
+
+/// Whether an answer was correct, and how sure the participant was of it.
+struct ConfidenceTrial {
+  bool correct = false;
+  double confidence = 0;  ///< any numbers, more is surer
+};
+
+/// Area under the type 2 ROC: how often a correct answer has more confidence than a wrong one, ties
+/// half. Interval by DeLong et al. 1988 on the logit scale.
+struct Type2Roc {
+  std::string undefined;
+  int correct = 0, wrong = 0;
+  std::optional<double> area, se;
+  std::optional<Interval> area_ci95;
+  /// Points (share of wrong, share of correct answers with at least so much confidence), from (0,
+  /// 0) to (1, 1).
+  struct Point {
+    double wrong = 0, correct = 0;
+  };
+  std::vector<Point> curve;
+};
+
+Type2Roc type2_roc(const std::vector<ConfidenceTrial>& trials);
 
 }  // namespace palpate::analysis

@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "analysis/statistics/reml.h"
-#include "analysis/statistics/reml_reduction.h"
 
 namespace palpate::analysis {
 

@@ -8,6 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "analysis/statistics/analysis.h"
+
 namespace palpate::analysis {
 
 /// The model that studies are drawn from. Natural logs of s; standard deviations >= 0.
@@ -61,5 +63,24 @@ struct Power {
 /// Study i is drawn from random stream i of the seed, so the result does not depend on `jobs`.
 Power simulate_power(const StudyModel& model, const StudyDesign& design,
                      const PowerSettings& settings);
+
+// Estimates the model that studies are simulated from, for sample size planning, from a pilot
+// study.
+
+/// Estimates from a pilot.
+struct Pilot {
+  RendererPair pair;      ///< the first comparison of the pilot
+  std::string undefined;  ///< why there is no model; empty: there is
+  StudyModel model;       ///< effects as estimated in the pilot
+  std::string label;      ///< as of simulated_label(); empty: human participants
+  std::vector<std::string> notes;
+};
+
+/// The parameters of the fitted mixed model, and the participant x shape standard deviation of
+/// gains, which that model does not have: by moments from the mean differences of participants with
+/// all cells (0 if residual variance explains them). If it is above 0 it is subtracted from the
+/// variance of the random slope, which contains a part of it, and the residual is that within
+/// cells.
+Pilot read_pilot(const Analysis& analysis);
 
 }  // namespace palpate::analysis

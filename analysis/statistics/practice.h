@@ -7,7 +7,6 @@
 #include <string>
 #include <vector>
 
-#include "analysis/input/renderers.h"
 #include "analysis/input/trials.h"
 #include "analysis/statistics/describe.h"
 #include "analysis/statistics/paired.h"

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <cstddef>
 
-#include "analysis/statistics/psychometric_likelihood.h"
+#include "analysis/statistics/psychometric_fit.h"
 
 namespace palpate::analysis {
 namespace {

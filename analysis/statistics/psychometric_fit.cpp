@@ -3,13 +3,331 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <limits>
+#include <optional>
 #include <utility>
+#include <vector>
 
-#include "analysis/statistics/psychometric_intervals.h"
-#include "analysis/statistics/psychometric_objective.h"
+#include "analysis/statistics/simplex.h"
 #include "stimuli/random.h"
 
 namespace palpate::analysis {
+
+// Intervals of 95 % by the profile likelihood: what is held in them, twice the loss of log
+// likelihood stays below the 0.95 quantile of chi squared with one degree of freedom.
+
+/// Of the threshold, levels. \param best  the fit, as PsychometricObjective::best finds it
+Interval threshold_interval(const PlacedData& data, const PsychometricModel& model,
+                            const SimplexMinimum& best);
+/// Of the slope. \param log_slope  of the fit
+Interval slope_interval(const PlacedData& data, const PsychometricModel& model,
+                        const SimplexMinimum& best, double log_slope);
+/// Of the guess or lapse rate, within 0 and its most; of a constant, the constant twice. One rate
+/// at both ends is the lapse rate.
+Interval rate_interval(const PlacedData& data, const PsychometricModel& model,
+                       const SimplexMinimum& best, PsychometricRate rate);
+
+double PlacedData::least_log_slope() const { return std::log(0.1 / (high - low)); }
+double PlacedData::most_log_slope() const { return std::log(40 / spacing); }
+
+PlacedData place_counts(const std::vector<LevelCount>& counts,
+                        const protocols::PsychometricFunction& function) {
+  PlacedData data;
+  std::vector<double>& places = data.places;
+  for (const LevelCount& count : counts) {
+    const double place = protocols::scale_position(function.scale, count.level);
+    data.counts.push_back(
+        {place, static_cast<double>(count.trials), static_cast<double>(count.successes)});
+    if (std::isfinite(place)) places.push_back(place);
+  }
+  std::sort(places.begin(), places.end());
+  places.erase(std::unique(places.begin(), places.end()), places.end());
+  if (places.empty()) return data;
+  data.low = places.front();
+  data.high = places.back();
+  if (function.scale == protocols::LevelScale::linear && data.low > 0) data.least = 0;
+  for (std::size_t i = 1; i < places.size(); ++i) {
+    const double distance = places[i] - places[i - 1];
+    if (data.spacing == 0 || distance < data.spacing) data.spacing = distance;
+  }
+  // Levels that differ by rounding alone are no finer spacing.
+  data.spacing = std::max(data.spacing, 1e-3 * (data.high - data.low));
+  return data;
+}
+
+double psychometric_log_likelihood(const PlacedData& data,
+                                   const protocols::PsychometricFunction& function,
+                                   double threshold, double slope, double guess, double lapse) {
+  constexpr double kLeast = 1e-15;
+  double sum = 0;
+  for (const PlacedCount& count : data.counts) {
+    const double above = count.place - threshold;
+    const double distance = function.easier == protocols::Easier::higher ? above : -above;
+    const double share = protocols::psychometric_share(function, distance, slope);
+    const double p = std::clamp(guess + (1 - guess - lapse) * share, kLeast, 1 - kLeast);
+    if (count.successes > 0) sum += count.successes * std::log(p);
+    if (count.successes < count.trials) sum += (count.trials - count.successes) * std::log1p(-p);
+  }
+  return sum;
+}
+
+namespace {
+
+constexpr double kWorst = std::numeric_limits<double>::infinity();
+constexpr PsychometricSearch kOneStart{21, 19, 1};
+
+double rate_of(const RateModel& rate, double x) {
+  const double s = std::sin(x);
+  return rate.most * s * s;
+}
+
+bool searched(const RateModel& rate, const std::optional<double>& held) {
+  return rate.free && !held;
+}
+
+}  // namespace
+
+PsychometricObjective::Point PsychometricObjective::point(const std::vector<double>& x) const {
+  std::size_t i = 0;
+  Point p{};
+  p.threshold = std::max(threshold_ ? *threshold_ : x[i++], data_.least);
+  p.log_slope = std::clamp(log_slope_ ? *log_slope_ : x[i++], data_.least_log_slope(),
+                           data_.most_log_slope());
+  const auto rate = [&](const RateModel& model, const std::optional<double>& held) {
+    return searched(model, held) ? rate_of(model, x[i++]) : held.value_or(model.value);
+  };
+  if (!model_.guess_is_lapse) p.guess = rate(model_.guess, guess_);
+  p.lapse = rate(model_.lapse, lapse_);
+  if (model_.guess_is_lapse) p.guess = p.lapse;
+  return p;
+}
+
+double PsychometricObjective::operator()(const std::vector<double>& x) const {
+  const Point p = point(x);
+  return -psychometric_log_likelihood(data_, model_.function, p.threshold, std::exp(p.log_slope),
+                                      p.guess, p.lapse);
+}
+
+SimplexMinimum PsychometricObjective::best_from(const std::vector<double>& start, double step,
+                                                double tolerance) const {
+  std::vector<double> steps;
+  if (!threshold_) steps.push_back(step * (data_.high - data_.low));
+  while (steps.size() < start.size()) steps.push_back(3 * step);
+  return minimize([this](const std::vector<double>& x) { return (*this)(x); }, start, steps,
+                  tolerance);
+}
+
+SimplexMinimum PsychometricObjective::best(const PsychometricSearch& search,
+                                           double tolerance) const {
+  SimplexMinimum found;
+  found.value = kWorst;
+  std::vector<Start> starts = starts_of_grid(search);
+  // What a quick search finds is found by any other as well.
+  if (search.starts > kQuickSearch.starts) {
+    for (Start& start : starts_of_grid(kQuickSearch)) starts.push_back(std::move(start));
+  }
+  for (const Start& start : starts) {
+    SimplexMinimum one = best_from(start.place, 0.1, tolerance);
+    if (one.value < found.value) found = std::move(one);
+  }
+  return found;
+}
+
+std::optional<std::vector<double>> PsychometricObjective::other_start(
+    const std::vector<double>& place) const {
+  const std::vector<Start> starts = starts_of_grid(kOneStart);
+  if (starts.empty()) return std::nullopt;
+  const double cell =
+      threshold_ ? (data_.most_log_slope() - data_.least_log_slope()) / (kOneStart.slopes - 1)
+                 : (data_.high - data_.low) / (kOneStart.thresholds - 1);
+  const bool far = std::abs(starts.front().place[0] - place[0]) > 2 * cell;
+  return far ? std::optional(starts.front().place) : std::nullopt;
+}
+
+/// Rates of the grid, as best_from takes them: near 0 and near their most.
+std::vector<std::vector<double>> PsychometricObjective::rates_of_grid() const {
+  std::vector<std::vector<double>> all{{}};
+  const std::size_t rates =
+      (model_.guess_is_free() && !guess_ ? 1U : 0U) + (searched(model_.lapse, lapse_) ? 1U : 0U);
+  for (std::size_t i = 0; i < rates; ++i) {
+    std::vector<std::vector<double>> longer;
+    for (const std::vector<double>& one : all) {
+      for (const double x : {0.25, 1.3}) {
+        longer.push_back(one);
+        longer.back().push_back(x);
+      }
+    }
+    all = std::move(longer);
+  }
+  return all;
+}
+
+/// The best ones, each two cells from those that are better.
+std::vector<PsychometricObjective::Start> PsychometricObjective::starts_of_grid(
+    const PsychometricSearch& search) const {
+  constexpr int kApart = 2;
+  const double range = data_.high - data_.low;
+  const double flat = data_.least_log_slope(), steep = data_.most_log_slope();
+  std::vector<Start> all;
+  const std::vector<std::vector<double>> rates = rates_of_grid();
+  for (int t = 0; t < (threshold_ ? 1 : search.thresholds); ++t) {
+    for (int s = 0; s < (log_slope_ ? 1 : search.slopes); ++s) {
+      Start best;
+      best.value = kWorst;
+      for (const std::vector<double>& rate : rates) {
+        std::vector<double> place;
+        if (!threshold_) place.push_back(data_.low + range * t / (search.thresholds - 1));
+        if (!log_slope_) place.push_back(flat + (steep - flat) * s / (search.slopes - 1));
+        place.insert(place.end(), rate.begin(), rate.end());
+        const double value = (*this)(place);
+        if (value < best.value) best = {value, t, s, std::move(place)};
+      }
+      if (best.value < kWorst) all.push_back(std::move(best));
+    }
+  }
+  std::stable_sort(all.begin(), all.end(),
+                   [](const Start& a, const Start& b) { return a.value < b.value; });
+  std::vector<Start> chosen;
+  for (Start& one : all) {
+    const bool near = std::any_of(chosen.begin(), chosen.end(), [&](const Start& other) {
+      return std::abs(one.threshold - other.threshold) < kApart &&
+             std::abs(one.slope - other.slope) < kApart;
+    });
+    if (!near) chosen.push_back(std::move(one));
+    if (chosen.size() >= search.starts) break;
+  }
+  return chosen;
+}
+
+namespace {
+
+using protocols::LevelScale;
+
+constexpr double kHalfChiSquared95 = 0.5 * 3.841458820694124;
+constexpr double kOpenEnd = std::numeric_limits<double>::infinity();
+
+/// Where a profile that is above 0 at `inside` falls to 0, towards `limit`; nullopt where it does
+/// not, or `inside` is there already.
+template <class Profile>
+std::optional<double> profile_end(const Profile& profile, double inside, double step,
+                                  double limit) {
+  const auto beyond = [&](double place) { return step > 0 ? place >= limit : place <= limit; };
+  if (beyond(inside)) return std::nullopt;
+  double at_inside = kHalfChiSquared95, outside = beyond(inside + step) ? limit : inside + step;
+  double at_outside = profile(outside);
+  while (at_outside > 0) {
+    if (outside == limit) return std::nullopt;
+    inside = outside;
+    at_inside = at_outside;
+    step *= 1.7;
+    outside = beyond(outside + step) ? limit : outside + step;
+    at_outside = profile(outside);
+  }
+  // Regula falsi, halving the value of the end that stays (Illinois).
+  const double width = std::abs(outside - inside);
+  for (int i = 0; i < 40 && std::abs(outside - inside) > 1e-7 * width; ++i) {
+    const double place = inside + (outside - inside) * at_inside / (at_inside - at_outside);
+    const double value = profile(place);
+    if (std::abs(value) < 1e-6) return place;
+    if (value > 0) {
+      inside = place;
+      at_inside = value;
+      at_outside *= 0.5;
+    } else {
+      outside = place;
+      at_outside = value;
+      at_inside *= 0.5;
+    }
+  }
+  return 0.5 * (inside + outside);
+}
+
+/// Loss allowed less the smallest loss with a parameter held. Each search begins where the one
+/// before ended, and at the best place of a grid: there may be another valley.
+template <class Hold>
+class Profile {
+ public:
+  /// \param hold  holds a parameter of an objective at a value
+  Profile(const PsychometricObjective& objective, Hold hold, std::vector<double> start,
+          double allowed)
+      : objective_(objective), hold_(hold), place_(std::move(start)), allowed_(allowed) {}
+
+  double operator()(double held) {
+    hold_(objective_, held);
+    SimplexMinimum best = objective_.best_from(place_, 0.02, 1e-8);
+    if (const auto start = objective_.other_start(best.place)) {
+      SimplexMinimum other = objective_.best_from(*start, 0.1, 1e-8);
+      if (other.value < best.value) best = std::move(other);
+    }
+    place_ = std::move(best.place);
+    return allowed_ - best.value;
+  }
+
+ private:
+  PsychometricObjective objective_;
+  Hold hold_;
+  std::vector<double> place_;
+  double allowed_;
+};
+
+}  // namespace
+
+Interval threshold_interval(const PlacedData& data, const PsychometricModel& model,
+                            const SimplexMinimum& best) {
+  const PsychometricObjective objective(data, model);
+  const std::vector<double> others(best.place.begin() + 1, best.place.end());
+  const double allowed = best.value + kHalfChiSquared95;
+  const double range = data.high - data.low, step = 0.05 * range;
+  Profile falling(
+      objective, [](auto&held, double x) { held.hold_threshold(x); }, others, allowed),
+      rising(falling);
+  // Twenty ranges away from all levels: that is nowhere.
+  const double at = objective.point(best.place).threshold;
+  const auto low = profile_end([&](double x) { return falling(x); }, at, -step,
+                               std::max(data.low - 20 * range, data.least));
+  const auto high =
+      profile_end([&](double x) { return rising(x); }, at, step, data.high + 20 * range);
+  const LevelScale scale = model.function.scale;
+  const double nowhere = scale == LevelScale::linear ? data.least : 0;
+  return {low ? protocols::level_at(scale, *low) : nowhere,
+          high ? protocols::level_at(scale, *high) : kOpenEnd};
+}
+
+Interval slope_interval(const PlacedData& data, const PsychometricModel& model,
+                        const SimplexMinimum& best, double log_slope) {
+  const PsychometricObjective objective(data, model);
+  std::vector<double> others = best.place;
+  others.erase(others.begin() + 1);
+  const double allowed = best.value + kHalfChiSquared95;
+  Profile falling(
+      objective, [](auto&held, double x) { held.hold_log_slope(x); }, others, allowed),
+      rising(falling);
+  const auto low =
+      profile_end([&](double x) { return falling(x); }, log_slope, -0.2, data.least_log_slope());
+  const auto high =
+      profile_end([&](double x) { return rising(x); }, log_slope, 0.2, data.most_log_slope());
+  return {low ? std::exp(*low) : 0, high ? std::exp(*high) : kOpenEnd};
+}
+
+Interval rate_interval(const PlacedData& data, const PsychometricModel& model,
+                       const SimplexMinimum& best, PsychometricRate rate) {
+  const PsychometricObjective objective(data, model);
+  const RateModel& of = rate == PsychometricRate::guess ? model.guess : model.lapse;
+  if (!of.free) return {of.value, of.value};
+  const auto point = objective.point(best.place);
+  const double at = rate == PsychometricRate::guess ? point.guess : point.lapse;
+  std::vector<double> others = best.place;
+  const bool after_guess = rate == PsychometricRate::lapse && model.guess_is_free();
+  others.erase(others.begin() + (after_guess ? 3 : 2));
+  const double allowed = best.value + kHalfChiSquared95, step = 0.1 * of.most;
+  Profile falling(
+      objective, [rate](auto&held, double x) { held.hold_rate(rate, x); }, others, allowed),
+      rising(falling);
+  const auto low = profile_end([&](double x) { return falling(x); }, at, -step, 0);
+  const auto high = profile_end([&](double x) { return rising(x); }, at, step, of.most);
+  return {low.value_or(0), high.value_or(of.most)};
+}
+
 namespace {
 
 std::string reason_not_to_fit(const std::vector<LevelCount>& counts, const PlacedData& data) {

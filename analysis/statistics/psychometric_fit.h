@@ -2,12 +2,15 @@
 // Psychometric functions fitted by maximum likelihood, with intervals by the profile likelihood and
 // the deviance as goodness of fit.
 
+#include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "analysis/statistics/paired.h"
+#include "analysis/statistics/simplex.h"
 #include "protocols/procedures/psychometric.h"
 
 namespace palpate::analysis {
@@ -76,5 +79,90 @@ struct GoodnessOfFit {
 /// \param simulations  0: without p
 GoodnessOfFit goodness_of_fit(const std::vector<LevelCount>& counts, const PsychometricModel& model,
                               const PsychometricFit& fit, int simulations, std::uint64_t seed);
+
+// The likelihood that the fits of psychometric functions share.
+
+/// Counts with their levels' places on the scale.
+struct PlacedCount {
+  double place = 0;
+  double trials = 0, successes = 0;
+};
+
+struct PlacedData {
+  std::vector<PlacedCount> counts;
+  std::vector<double> places;  ///< finite ones, each once, in order
+  double low = 0, high = 0;    ///< the first and the last
+  double spacing = 0;          ///< smallest distance of two places; 0: one place only
+  /// No threshold is below: 0 on a linear scale of levels that are all above 0, as those of sizes
+  /// and stiffnesses are; else -infinity.
+  double least = -std::numeric_limits<double>::infinity();
+
+  /// Slopes beyond are flat or a step, as far as these levels can tell.
+  double least_log_slope() const;
+  double most_log_slope() const;
+};
+
+PlacedData place_counts(const std::vector<LevelCount>& counts,
+                        const protocols::PsychometricFunction& function);
+
+/// Natural logarithm. \param threshold on the scale
+double psychometric_log_likelihood(const PlacedData& data,
+                                   const protocols::PsychometricFunction& function,
+                                   double threshold, double slope, double guess, double lapse);
+
+// What a fit of a psychometric function makes as small as it can be, and how it looks for that.
+
+/// How a minimum is looked for: a grid, from whose best places searches begin.
+struct PsychometricSearch {
+  int thresholds = 21, slopes = 19;
+  std::size_t starts = 4;
+};
+/// Of a fit, and of the refits of simulations.
+inline constexpr PsychometricSearch kWholeSearch{}, kQuickSearch{11, 9, 1};
+
+enum class PsychometricRate { guess, lapse };
+
+/// Minus log likelihood over (threshold on the scale, log slope, free rates), one of them held or
+/// none. A free rate is most sin^2(x): never outside 0 .. most.
+class PsychometricObjective {
+ public:
+  /// Both must outlive it. One rate at both ends is the lapse rate: hold that.
+  PsychometricObjective(const PlacedData& data, const PsychometricModel& model)
+      : data_(data), model_(model) {}
+
+  struct Point {
+    double threshold, log_slope, guess, lapse;
+  };
+
+  void hold_threshold(std::optional<double> value) { threshold_ = value; }
+  void hold_log_slope(std::optional<double> value) { log_slope_ = value; }
+  void hold_rate(PsychometricRate rate, std::optional<double> value) {
+    (rate == PsychometricRate::guess ? guess_ : lapse_) = value;
+  }
+
+  Point point(const std::vector<double>& x) const;
+  double operator()(const std::vector<double>& x) const;
+
+  /// The best point from a start, whose places are those of point() that are not held.
+  SimplexMinimum best_from(const std::vector<double>& start, double step, double tolerance) const;
+  /// The best point from the best starts of a grid: the likelihood may have several maxima.
+  SimplexMinimum best(const PsychometricSearch& search, double tolerance) const;
+  /// With a parameter held: the best place of a grid, if that is far from `place`.
+  std::optional<std::vector<double>> other_start(const std::vector<double>& place) const;
+
+ private:
+  struct Start {
+    double value = 0;
+    int threshold = 0, slope = 0;  ///< cell of the grid
+    std::vector<double> place;
+  };
+
+  std::vector<std::vector<double>> rates_of_grid() const;
+  std::vector<Start> starts_of_grid(const PsychometricSearch& search) const;
+
+  const PlacedData& data_;
+  const PsychometricModel& model_;
+  std::optional<double> threshold_, log_slope_, guess_, lapse_;  ///< held
+};
 
 }  // namespace palpate::analysis

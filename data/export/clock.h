@@ -9,7 +9,7 @@
 
 #include "data/export/settings.h"
 #include "data/store/store.h"
-#include "data/store/torque_notes.h"
+#include "data/store/task_text.h"
 
 namespace palpate::data {
 

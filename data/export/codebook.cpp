@@ -4,7 +4,7 @@
 
 #include "data/export/delimited_row.h"
 #include "data/export/page_table.h"
-#include "data/files/formula_guard.h"
+#include "data/files/text_sink.h"
 
 namespace palpate::data {
 namespace {

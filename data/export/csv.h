@@ -11,7 +11,7 @@ namespace palpate::data {
 /// Writes every completed trial to `path` and, where attempts were cut off, those to attempts.csv
 /// in the same folder. UTF-8 without BOM, RFC 4180 (lines end in CRLF, fields quoted only where
 /// needed), numbers as the shortest text that reads back exactly; texts that a spreadsheet would
-/// evaluate are guarded (formula_guard.h). settings.codebook names a file for the meaning of the
+/// evaluate are guarded (text_sink.h). settings.codebook names a file for the meaning of the
 /// columns. Columns: column_definitions.h. Each file appears complete or not at all
 /// (atomic_file.h), and the database records the export.
 ///

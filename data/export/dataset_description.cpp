@@ -4,7 +4,6 @@
 #include <set>
 #include <string_view>
 
-#include "data/files/formula_guard.h"
 #include "data/files/text_sink.h"
 
 namespace palpate::data {

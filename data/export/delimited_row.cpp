@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "data/files/formula_guard.h"
+#include "data/files/text_sink.h"
 #include "data/store/store.h"
 
 namespace palpate::data {

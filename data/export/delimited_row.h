@@ -24,7 +24,7 @@ class DelimitedRow {
  public:
   explicit DelimitedRow(DelimitedFormat style) : style_(style) {}
 
-  /// "" is a missing value; texts that a spreadsheet would evaluate are guarded (formula_guard.h).
+  /// "" is a missing value; texts that a spreadsheet would evaluate are guarded (text_sink.h).
   /// \throws StoreRefused: a text that TSV cannot represent (tabs, line breaks, the text "n/a").
   DelimitedRow& operator<<(std::string_view text);
   DelimitedRow& operator<<(const char* text) { return *this << std::string_view(text); }

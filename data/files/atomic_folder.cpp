@@ -15,8 +15,8 @@
 
 #include "data/base/json_text.h"
 #include "data/errors.h"
-#include "data/files/temporary_names.h"
-#include "data/files/trusted_links.h"
+#include "data/files/atomic_file.h"
+#include "data/files/file_permissions.h"
 
 namespace palpate::data {
 namespace {

@@ -1,9 +1,35 @@
 #pragma once
 // Whether other users of the computer can read or replace a database, or have put files beside it.
 
+#include <sys/types.h>
+
 #include <string>
 
 namespace palpate::data {
+
+// Which file a path leads to, by device and inode: two paths with the same identity are one file.
+
+/// {0, 0}: there is no file.
+struct FileIdentity {
+  dev_t device = 0;
+  ino_t inode = 0;
+  bool operator==(const FileIdentity&) const = default;
+};
+
+/// Follows symbolic links.
+FileIdentity identity_of(const std::string& path);
+
+// Resolves symbolic links of a path that is to be written. In a shared folder another user could
+// lay a link that redirects the output: only links of this user and of root are followed.
+
+struct ResolvedPath {
+  std::string path;  ///< absolute, links resolved
+  std::string
+      fault;  ///< why it was not resolved, to be appended to the path in a message; "": resolved
+};
+
+/// The file that `path` leads to; the last component need not exist.
+ResolvedPath resolve_trusted_links(const std::string& path);
 
 /// The -wal, -shm and -journal of a database, where they exist, must be regular files of this user,
 /// root or the owner of the database, without hard links, and with no wider permissions than the

@@ -12,7 +12,7 @@
 #include <system_error>
 
 #include "data/errors.h"
-#include "data/files/trusted_links.h"
+#include "data/files/file_permissions.h"
 
 namespace palpate::data {
 namespace {

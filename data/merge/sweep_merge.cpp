@@ -7,7 +7,7 @@
 
 #include "data/files/atomic_file.h"
 #include "data/files/atomic_folder.h"
-#include "data/files/file_identity.h"
+#include "data/files/file_permissions.h"
 #include "data/files/output_check.h"
 
 namespace palpate::data {

@@ -1,16 +1,329 @@
+#include "data/store/attempts.h"
+
+#include <sqlite3.h>
+
+#include <cstddef>
+#include <map>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "data/files/utc.h"
+#include "data/store/connection.h"
+#include "data/store/protocol_rows.h"
+#include "data/store/record_columns.h"
+#include "data/store/samples_codec.h"
+#include "data/store/seals.h"
+#include "data/store/task_text.h"
+
+namespace palpate::data {
+namespace {
+
+constexpr int kSealsSince = 3;  // schema version
+
+AttemptState state_of(const std::string& text) {
+  if (text == "completed") return AttemptState::completed;
+  if (text == "cut_off") return AttemptState::cut_off;
+  if (text == "running") return AttemptState::running;
+  throw SQLite::Exception("state is '" + text + "'", SQLITE_CORRUPT);
+}
+
+std::optional<Link> read_link(RowReader& row) {
+  std::optional<Link> link;
+  std::optional<std::int64_t> position;
+  std::optional<Checksum> seal;
+  row >> position >> seal;
+  if (position && seal) link = {*position, *seal};
+  return link;
+}
+
+class AttemptReader {
+ public:
+  AttemptReader(SQLite::Database& db, const std::string& path, int version,
+                const AttemptFilter& filter, const std::function<void(const StoredTrial&)>& visit)
+      : db_(db),
+        path_(path),
+        version_(version),
+        filter_(filter),
+        visit_(visit),
+        find_(db, std::string("SELECT ") + kPlanColumns +
+                      ", a.run_id, a.state, a.cut_off_reason, " +
+                      (sealed() ? "a.link, a.seal, a.samples_sha256, " : "NULL, NULL, NULL, ") +
+                      task_column(version) + outcome_columns(version) +
+                      " FROM attempts a WHERE a.session_id = ? ORDER BY a.trial, a.attempt"),
+        find_samples_(db, "SELECT packing, count, data FROM samples WHERE attempt_id = ?") {}
+
+  void read();
+
+ private:
+  struct KnownRun {
+    RunInfo info;
+    std::int64_t link = 0;
+    bool running = false;
+  };
+  bool sealed() const { return version_ >= kSealsSince; }
+  bool checks_seals() const { return sealed() && !filter_.seals_verified; }
+  std::vector<std::int64_t> sessions();
+  void read_session(std::int64_t id);
+  void read_runs(const SessionHead& session, std::optional<ChainCheck>& chain);
+  void read_notes(std::int64_t session, ChainCheck& chain);
+  void read_page_answers(std::int64_t session, ChainCheck& chain);
+  void require_files(const RunInfo& run, std::int64_t protocol);
+  void read_attempt(std::optional<ChainCheck>& chain);
+  void read_samples(std::int64_t attempt, const std::optional<Checksum>& sum);
+  void require_no_hidden_rows();
+
+  SQLite::Database& db_;
+  const std::string path_;
+  const int version_;
+  const AttemptFilter filter_;
+  const std::function<void(const StoredTrial&)>& visit_;
+  SQLite::Statement find_, find_samples_;
+  std::vector<SQLite::Column> columns_;  // of find_
+  StoredTrial trial_;
+  SealedValues values_;
+  std::map<std::int64_t, KnownRun> runs_;      // of the session, by id
+  std::int64_t known_run_ = 0, run_link_ = 0;  // of the run that trial_.run holds
+  std::map<std::int64_t, std::string> files_;  // checksum of a protocol's
+  std::int64_t seen_ = 0;
+};
+
+std::vector<std::int64_t> AttemptReader::sessions() {
+  SQLite::Statement find(db_, std::string("SELECT s.id") + kFromProtocolDown +
+                                  (filter_.trial != nullptr ? "WHERE pa.code = ? AND s.number = ? "
+                                   : filter_.session        ? "WHERE pa.id = ? AND s.number = ? "
+                                                            : "") +
+                                  "ORDER BY pr.id, pa.number, s.number");
+  Binder which(find);
+  if (filter_.trial != nullptr) {
+    which << filter_.trial->code << filter_.trial->session;
+  } else if (filter_.session) {
+    which << filter_.session->first << filter_.session->second;
+  }
+  std::vector<std::int64_t> all;
+  while (find.executeStep()) all.push_back(find.getColumn(0).getInt64());
+  return all;
+}
+
+void AttemptReader::read_page_answers(std::int64_t session, ChainCheck& chain) {
+  if (version_ < 5) return;
+  SQLite::Statement find(
+      db_, std::string("SELECT r.link, ") + kPageAnswerColumns +
+               ", p.link, p.seal FROM page_answers p JOIN runs r ON r.id = p.run_id WHERE "
+               "r.session_id = ? ORDER BY p.run_id, p.id");
+  Binder(find) << session;
+  for (std::int64_t number = 1; find.executeStep(); ++number) {
+    std::int64_t run_link = 0;
+    PageAnswer answer;
+    RowReader row(find);
+    row >> run_link >> answer;
+    put_page_answer(values_, run_link, answer);
+    chain.add(read_link(row), values_, {.kind = "answer to a page", .number = number});
+  }
+}
+
+/// The stored files of the protocol are those that the run recorded as shown.
+void AttemptReader::require_files(const RunInfo& run, std::int64_t protocol) {
+  if (run.files_sha256.empty()) return;
+  auto known = files_.find(protocol);
+  if (known == files_.end()) known = files_.emplace(protocol, files_checksum(db_, protocol)).first;
+  if (known->second == run.files_sha256) return;
+  throw SQLite::Exception("participant " + trial_.participant.code + ", session " +
+                              std::to_string(run.session) +
+                              ": the files that the protocol names are not those that were shown",
+                          SQLITE_CORRUPT);
+}
+
+void AttemptReader::read_runs(const SessionHead& session, std::optional<ChainCheck>& chain) {
+  SQLite::Statement find(db_,
+                         "SELECT r.id, r.end_reason, r.ended_ns, " +
+                             std::string(sealed() ? "r.protocol_id, r.link, r.seal, r.end_link, "
+                                                    "r.end_seal, "
+                                                  : "NULL, NULL, NULL, NULL, NULL, ") +
+                             run_columns(version_) +
+                             " FROM runs r JOIN sessions s ON s.id = r.session_id WHERE "
+                             "r.session_id = ? ORDER BY r.id");
+  Binder(find) << session.id;
+  runs_.clear();
+  for (std::int64_t number = 1; find.executeStep(); ++number) {
+    std::int64_t id = 0;
+    std::string end_reason;
+    std::optional<std::int64_t> ended_ns, protocol;
+    RowReader row(find);
+    row >> id >> end_reason >> ended_ns >> protocol;
+    const auto link = read_link(row), end_link = read_link(row);
+    KnownRun& run = runs_[id];
+    row >> run.info;
+    run.link = link ? link->position : 0;
+    run.running = run_end_of(end_reason) == RunEnd::running;
+    trial_.run = run.info;
+    require_valid_run(trial_);
+    if (!chain) continue;
+    require_files(run.info, protocol.value_or(session.protocol_id));
+    put_run(values_, run.info);
+    chain->add(link, values_, {.kind = "run", .number = number});
+    if (run.running) continue;
+    put_end(values_, run.link, end_reason, ended_ns);
+    chain->add(end_link, values_, {.kind = "end of run", .number = number});
+  }
+}
+
+void AttemptReader::read_notes(std::int64_t session, ChainCheck& chain) {
+  SQLite::Statement find(db_,
+                         "SELECT r.link, n.at_ns, n.text, n.link, n.seal FROM notes n JOIN runs r "
+                         "ON r.id = n.run_id WHERE r.session_id = ? ORDER BY n.run_id, n.id");
+  Binder(find) << session;
+  for (std::int64_t number = 1; find.executeStep(); ++number) {
+    std::int64_t run_link = 0, at_ns = 0;
+    std::string text;
+    RowReader row(find);
+    row >> run_link >> at_ns >> text;
+    put_note(values_, run_link, at_ns, text);
+    chain.add(read_link(row), values_, {.kind = "note", .number = number});
+  }
+}
+
+void AttemptReader::read_samples(std::int64_t attempt, const std::optional<Checksum>& sum) {
+  find_samples_.reset();
+  find_samples_.bind(1, attempt);
+  if (!find_samples_.executeStep()) {
+    if (sum) throw SQLite::Exception("its samples are missing", SQLITE_CORRUPT);
+    return;
+  }
+  const int packing = find_samples_.getColumn(0).getInt();
+  const std::int64_t count = find_samples_.getColumn(1).getInt64();
+  const SQLite::Column data = find_samples_.getColumn(2);
+  const void* const bytes = data.getBlob();  // must precede getBytes()
+  const auto size = static_cast<std::size_t>(data.getBytes());
+  if (sealed() && sum != checksum_of_samples(packing, count, bytes, size)) {
+    throw SQLite::Exception("its samples were changed since they were recorded", SQLITE_CORRUPT);
+  }
+  if (filter_.samples != SampleReading::unpack) return;
+  if (packing < 1 || packing > kSamplesPacking) {
+    throw StoreRefused(
+        path_ + ": holds samples in a packing that this palpate does not know; use a newer one");
+  }
+  try {
+    RecordedSamples recorded = unpack_samples(bytes, size, count, packing);
+    trial_.record.samples = std::move(recorded.samples);
+    trial_.record.bodies = std::move(recorded.bodies);
+  } catch (const StoreError& error) {
+    throw SQLite::Exception(error.what(), SQLITE_CORRUPT);
+  }
+}
+
+void AttemptReader::read_attempt(std::optional<ChainCheck>& chain) {
+  TrialRecord& record = trial_.record;
+  record = {};
+  record.session = trial_.run.session;
+  AttemptSealed about;
+  std::int64_t run = 0;
+  std::string state_text;
+  RowReader row(columns_);
+  const std::int64_t id = read_plan(row, record);
+  about.began_ns = record.onset_ns;
+  row >> run >> state_text;
+  const AttemptState state = state_of(state_text);
+  if (state == AttemptState::running) return;
+  const bool wanted = (!filter_.state || *filter_.state == state) &&
+                      (filter_.trial == nullptr || filter_.trial->trial == record.trial);
+  if (!wanted && !chain) return;
+  row >> about.cut_off_reason;
+  const std::optional<Link> link = read_link(row);
+  row >> about.samples;
+  read_task(row, record);
+  const bool completed = state == AttemptState::completed;
+  if (completed) read_outcome(row, record);
+  if (about.cut_off_reason.has_value() == completed) {
+    throw SQLite::Exception(
+        "a completed attempt has a reason for being cut off, or one that was cut off has none",
+        SQLITE_CORRUPT);
+  }
+  if (run != known_run_) {
+    const auto known = runs_.find(run);
+    if (known == runs_.end()) throw SQLite::Exception("an attempt without a run", SQLITE_CORRUPT);
+    trial_.run = known->second.info;
+    run_link_ = known->second.link;
+    known_run_ = run;
+  }
+  trial_.cut_off_reason = about.cut_off_reason.value_or("");
+  require_valid_record(trial_);
+  if (chain) {
+    about.run_link = run_link_;
+    put_attempt(values_, about, record);
+    chain->add(link, values_, {.kind = "trial", .number = record.trial, .attempt = record.attempt});
+  }
+  if (!wanted) return;
+  if (filter_.samples != SampleReading::skip &&
+      (filter_.samples_wanted == nullptr || (*filter_.samples_wanted)(trial_))) {
+    read_samples(id, about.samples);
+  }
+  record.onset_utc = format_utc(to_unix_ns(trial_.run.clock, record.onset_ns));
+  visit_(trial_);
+}
+
+void AttemptReader::read_session(std::int64_t id) {
+  const SessionHead session = read_session_head(db_, id, version_);
+  trial_.participant = session.participant;
+  trial_.protocol_name = session.protocol_name;
+  trial_.protocol_sha256 = session.protocol_sha256;
+  known_run_ = 0;
+  std::optional<ChainCheck> chain;
+  if (checks_seals()) {
+    put_session(values_, session);
+    chain.emplace(path_ + ": participant " + session.participant.code + ", session " +
+                      std::to_string(session.number),
+                  values_.seal({}));
+  }
+  read_runs(session, chain);
+  if (chain) {
+    read_notes(id, *chain);
+    read_page_answers(id, *chain);
+  }
+  trial_.run.session = session.number;
+  find_.reset();
+  find_.bind(1, id);
+  while (find_.executeStep()) {
+    if (++seen_ == 1) columns_ = columns_of(find_);
+    try {
+      read_attempt(chain);
+    } catch (const SQLite::Exception& error) {
+      throw SQLite::Exception(
+          "row " + std::to_string(columns_[0].getInt64()) + " of attempts: " + error.what(),
+          error.getErrorCode());
+    }
+  }
+  if (chain) chain->finish();
+}
+
+/// A damaged index hides rows from queries: counts them without indexes.
+void AttemptReader::require_no_hidden_rows() {
+  SQLite::Statement count(db_, "SELECT count(*) FROM attempts NOT INDEXED");
+  count.executeStep();
+  const std::int64_t stored = count.getColumn(0).getInt64();
+  if (stored == seen_) return;
+  throw SQLite::Exception("of " + std::to_string(stored) + " attempts only " +
+                              std::to_string(seen_) + " can be found: an index is damaged",
+                          SQLITE_CORRUPT);
+}
+
+void AttemptReader::read() {
+  for (const std::int64_t id : sessions()) read_session(id);
+  if (filter_.trial == nullptr && !filter_.session) require_no_hidden_rows();
+}
+
+}  // namespace
+
+void read_attempts(SQLite::Database& db, const std::string& path, int version,
+                   const AttemptFilter& filter,
+                   const std::function<void(const StoredTrial&)>& visit) {
+  AttemptReader(db, path, version, filter, visit).read();
+}
+
 // Writes attempts: one by one as they are shown, or many simulated ones in one transaction.
 // begin_attempt commits before anything is shown, so that a crash leaves a trace of the attempt;
 // finish_attempt commits its record.
 
-#include "data/store/attempts.h"
-
-#include "data/store/connection.h"
-#include "data/store/samples_codec.h"
-#include "data/store/statement_values.h"
-#include "data/store/task_text.h"
-#include "data/store/validation.h"
-
-namespace palpate::data {
 namespace {
 
 std::string trial_name(const TrialRecord& record) {

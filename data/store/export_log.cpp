@@ -11,9 +11,8 @@
 #include <utility>
 
 #include "data/files/file_permissions.h"
+#include "data/store/connection.h"
 #include "data/store/schema.h"
-#include "data/store/sqlite_errors.h"
-#include "data/store/statement_values.h"
 #include "data/store/store.h"
 
 namespace palpate::data {

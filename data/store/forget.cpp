@@ -1,24 +1,329 @@
+#include "data/store/forget.h"
+
+#include <SQLiteCpp/Database.h>
+#include <SQLiteCpp/Statement.h>
+#include <crypt.h>
+#include <nettle/hmac.h>
+#include <sqlite3.h>
+#include <sys/random.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <memory>
+#include <optional>
+#include <set>
+#include <string_view>
+#include <utility>
+
+#include "data/errors.h"
+#include "data/files/atomic_file.h"
+#include "data/files/checksum.h"
+#include "data/files/file_permissions.h"
+#include "data/store/connection.h"
+#include "data/store/open.h"
+#include "data/store/record_columns.h"
+
+namespace palpate::data {
+namespace {
+
+// yescrypt with this cost takes some 5 ms. A hash with another cost is refused: a forged one could
+// take days to compute.
+constexpr const char* kPrefix = "$y$";
+constexpr unsigned long kCost = 3;
+
+std::string new_salt() {
+  std::array<char, CRYPT_GENSALT_OUTPUT_SIZE> text{};
+  if (::crypt_gensalt_rn(kPrefix, kCost, nullptr, 0, text.data(), text.size()) == nullptr) {
+    throw StoreError("cannot make a salt: the system gives no random numbers");
+  }
+  return text.data();
+}
+
+/// "$y$COST$SALT" of a salt or of a whole hash.
+std::string salt_of(const std::string& hash) {
+  std::size_t end = 0;
+  for (int dollars = 0; end < hash.size() && dollars < 4; ++end) dollars += hash[end] == '$';
+  return hash.substr(0, end < hash.size() ? end - 1 : hash.size());
+}
+
+std::string cost_of(const std::string& salt) { return salt.substr(0, salt.rfind('$')); }
+
+std::string hash_with(const std::string& code, const std::string& salt) {
+  const auto work = std::make_unique<crypt_data>();
+  const char* hash = ::crypt_r(code.c_str(), salt.c_str(), work.get());
+  if (hash == nullptr || hash[0] == '*') throw StoreError("cannot hash a participant code");
+  return hash;
+}
+
+std::string new_secret() {
+  std::string secret(32, '\0');
+  if (::getrandom(secret.data(), secret.size(), 0) != static_cast<ssize_t>(secret.size())) {
+    throw StoreError("cannot make a secret: the system gives no random numbers");
+  }
+  return secret;
+}
+
+/// The input of crypt(): HMAC-SHA256 as 64 digits.
+std::string keyed(const std::string& code, const std::string& secret) {
+  if (secret.empty()) return code;
+  hmac_sha256_ctx context;
+  hmac_sha256_set_key(&context, secret.size(),
+                      reinterpret_cast<const unsigned char*>(secret.data()));
+  hmac_sha256_update(&context, code.size(), reinterpret_cast<const unsigned char*>(code.data()));
+  Checksum sum;
+  hmac_sha256_digest(&context, sum.size(), sum.data());
+  return to_hex(sum);
+}
+
+}  // namespace
+
+Tombstones Tombstones::read(SQLite::Database& db, const std::string& path) {
+  Tombstones all;
+  const std::string cost = cost_of(new_salt());
+  SQLite::Statement find(db,
+                         "SELECT t.code_hash, s.secret FROM tombstones t LEFT JOIN "
+                         "tombstone_secrets s ON s.id = t.secret_id");
+  while (find.executeStep()) {
+    std::string hash;
+    std::optional<std::string> secret;
+    RowReader(find) >> hash >> secret;
+    const std::string salt = salt_of(hash);
+    const bool clean = std::all_of(hash.begin(), hash.end(), [](char c) {
+      return (c >= '0' && c <= '9') || (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') ||
+             c == '$' || c == '.' || c == '/';
+    });
+    if (!clean || cost_of(salt) != cost || salt.size() == hash.size() || hash.size() > 200) {
+      throw StoreRefused(path + ": holds a tombstone that palpate did not make; restore a backup");
+    }
+    all.by_key_[{secret.value_or(""), salt}].push_back(hash);
+  }
+  return all;
+}
+
+Tombstones::Tombstone Tombstones::find(const std::string& code) const {
+  for (const auto& [key, hashes] : by_key_) {
+    std::string hash = hash_with(keyed(code, key.secret), key.salt);
+    if (std::find(hashes.begin(), hashes.end(), hash) != hashes.end()) return {hash, key.secret};
+  }
+  return {};
+}
+
+Tombstones::Tombstone Tombstones::made_for(const std::string& code) const {
+  const auto known = std::find_if(by_key_.begin(), by_key_.end(),
+                                  [](const auto& one) { return !one.first.secret.empty(); });
+  const Key key = known != by_key_.end() ? known->first : Key{new_secret(), new_salt()};
+  return {hash_with(keyed(code, key.secret), key.salt), key.secret};
+}
+
+void Tombstones::put(SQLite::Database& db, const Tombstone& tombstone, bool cleared) {
+  std::optional<std::int64_t> secret;
+  if (!tombstone.secret.empty()) {
+    const auto bind = [&](SQLite::Statement& statement) {
+      statement.bind(1, static_cast<const void*>(tombstone.secret.data()),
+                     static_cast<int>(tombstone.secret.size()));
+    };
+    SQLite::Statement keep(
+        db, "INSERT INTO tombstone_secrets (secret) VALUES (?) ON CONFLICT DO NOTHING");
+    bind(keep);
+    keep.exec();
+    SQLite::Statement find(db, "SELECT id FROM tombstone_secrets WHERE secret = ?");
+    bind(find);
+    find.executeStep();
+    secret = find.getColumn(0).getInt64();
+  }
+  SQLite::Statement add(db,
+                        "INSERT INTO tombstones (code_hash, secret_id, cleared) VALUES (?, ?, ?) "
+                        "ON CONFLICT (code_hash) DO UPDATE SET cleared = excluded.cleared, "
+                        "secret_id = excluded.secret_id");
+  Binder(add) << tombstone.hash << secret << cleared;
+  add.exec();
+}
+
+void Tombstones::add(const Tombstones& others) {
+  for (const auto& [key, hashes] : others.by_key_) {
+    auto& mine = by_key_[key];
+    for (const auto& hash : hashes) {
+      if (std::find(mine.begin(), mine.end(), hash) == mine.end()) mine.push_back(hash);
+    }
+  }
+}
+
+std::vector<Tombstones::Tombstone> Tombstones::all() const {
+  std::vector<Tombstone> all;
+  for (const auto& [key, hashes] : by_key_) {
+    for (const auto& hash : hashes) all.push_back({hash, key.secret});
+  }
+  std::sort(all.begin(), all.end(), [](const auto& a, const auto& b) { return a.hash < b.hash; });
+  return all;
+}
+
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::uintmax_t kLargestText = std::uintmax_t{1} << 28U;  // bytes
+constexpr std::uintmax_t kMostBytes = std::uintmax_t{8} << 30U;    // of all texts
+constexpr int kMostEntries = 100'000;
+
+enum class Holds { no, yes, unknown };
+
+std::string contents_of(const fs::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+/// What the tables of a palpate database say.
+Holds table_holds(const std::string& file, const std::string& code) {
+  try {
+    SQLite::Database db(immutable_uri(file), SQLite::OPEN_READONLY | SQLite::OPEN_URI);
+    SQLite::Statement find(db, "SELECT 1 FROM participants WHERE code = ?");
+    find.bind(1, code);
+    return find.executeStep() ? Holds::yes : Holds::no;
+  } catch (const SQLite::Exception&) {
+    return Holds::unknown;  // of another program, or damaged
+  }
+}
+
+bool is_compressed(std::string_view begin) {
+  using namespace std::string_view_literals;
+  for (const std::string_view magic : {"\x1f\x8b"sv, "PK\x03\x04"sv,
+                                       "\xfd"
+                                       "7zXZ"sv,
+                                       "\x28\xb5\x2f\xfd"sv, "BZh"sv, "7z\xbc\xaf"sv}) {
+    if (begin.starts_with(magic)) return true;
+  }
+  return false;
+}
+
+/// Looks beside the database and into folders, for one code.
+class Search {
+ public:
+  /// \param database  its file name, after which copies are named
+  Search(std::string code, const fs::path& database, std::set<fs::path> leave_out)
+      : code_(std::move(code)), stem_(database.stem().string()), leave_out_(std::move(leave_out)) {}
+
+  void beside(const fs::path& folder) {
+    std::error_code error;
+    for (fs::directory_iterator at(folder, error), end; !error && at != end && goes_on();
+         at.increment(error)) {
+      const fs::path& path = at->path();
+      if (leave_out_.contains(path)) continue;
+      const fs::file_status status = at->symlink_status(error);
+      if (mentions(path.filename().string(), code_)) {
+        found_.insert(path.string());
+      } else if (fs::is_directory(status)) {
+        within(path);
+      } else if (fs::is_regular_file(status)) {
+        look_into(path);
+      }
+    }
+    if (left_ == 0 || bytes_ >= kMostBytes) found_.insert(folder.string());
+  }
+
+  std::vector<std::string> found() const { return {found_.begin(), found_.end()}; }
+
+ private:
+  bool goes_on() { return left_ > 0 && left_-- > 0 && bytes_ < kMostBytes; }
+
+  /// A folder with the code in a name: datasets name files and folders after participants.
+  bool names_in(const fs::path& folder) {
+    std::error_code error;
+    int left = kMostEntries;
+    for (fs::recursive_directory_iterator at(folder, error), end; !error && at != end && left-- > 0;
+         at.increment(error)) {
+      if (mentions(at->path().filename().string(), code_)) return true;
+    }
+    return false;
+  }
+
+  void within(const fs::path& folder) {
+    if (names_in(folder)) {
+      found_.insert(folder.string());
+      return;
+    }
+    std::error_code error;
+    for (fs::recursive_directory_iterator at(folder, error), end; !error && at != end && goes_on();
+         at.increment(error)) {
+      if (leave_out_.contains(at->path())) {
+        at.disable_recursion_pending();
+      } else if (fs::is_regular_file(at->symlink_status(error))) {
+        look_into(at->path());
+      }
+    }
+  }
+
+  void look_into(const fs::path& file) {
+    const Holds holds = held_by(file);
+    const bool of_the_study = file.filename().string().find(stem_) != std::string::npos;
+    if (holds == Holds::yes || (holds == Holds::unknown && of_the_study))
+      found_.insert(file.string());
+  }
+
+  Holds held_by(const fs::path& file) {
+    std::error_code error;
+    const std::uintmax_t size = fs::file_size(file, error);
+    std::ifstream in(file, std::ios::binary);
+    if (error || !in) return Holds::unknown;
+    std::string begin(15, '\0');
+    in.read(begin.data(), static_cast<std::streamsize>(begin.size()));
+    begin.resize(static_cast<std::size_t>(in.gcount()));
+    if (is_compressed(begin)) return Holds::unknown;
+    const bool database = begin == "SQLite format 3";
+    if (database) {
+      const Holds holds = table_holds(file.string(), code_);
+      if (holds != Holds::unknown) return holds;
+    }
+    if (size > kLargestText) return Holds::unknown;
+    bytes_ += size;
+    const std::string text = contents_of(file);
+    // In a damaged database and in a log, a value stands beside others without a gap.
+    const bool log = begin.starts_with("\x37\x7f\x06") || begin.starts_with("\xd9\xd5\x05\xf9");
+    const bool holds =
+        database || log ? text.find(code_) != std::string::npos : mentions(text, code_);
+    return holds ? Holds::yes : Holds::no;
+  }
+
+  std::string code_, stem_;
+  std::set<fs::path> leave_out_;
+  std::set<std::string> found_;
+  int left_ = kMostEntries;
+  std::uintmax_t bytes_ = 0;
+};
+
+}  // namespace
+
+bool mentions(const std::string& text, const std::string& code) {
+  for (std::size_t at = text.find(code); at != std::string::npos; at = text.find(code, at + 1)) {
+    const bool begins = at == 0 || !is_participant_code(text.substr(at - 1, 1));
+    const std::size_t end = at + code.size();
+    if (begins && (end == text.size() || !is_participant_code(text.substr(end, 1)))) return true;
+  }
+  return false;
+}
+
+std::vector<std::string> find_remaining_copies(const std::string& database, const std::string& code,
+                                               const std::vector<std::string>& known) {
+  std::set<fs::path> folders{fs::path(database).parent_path()};
+  std::set<fs::path> leave_out(known.begin(), known.end());
+  for (const char* end : {"", "-wal", "-shm", "-journal", ".palpate-lock"}) {
+    leave_out.insert(database + end);
+  }
+  for (const std::string& path : known) folders.insert(fs::path(path).parent_path());
+  Search search(code, database, std::move(leave_out));
+  for (const fs::path& folder : folders) search.beside(folder);
+  return search.found();
+}
+
 // Withdrawal: removes every byte of a participant from the database, its -wal and its backups, and
-// leaves a tombstone (tombstones.h). Order: one transaction deletes the rows (PRAGMA secure_delete
+// leaves a tombstone (forget.h). Order: one transaction deletes the rows (PRAGMA secure_delete
 // overwrites them with zeros) and inserts the tombstone; then a checkpoint truncates the -wal, and
 // VACUUM rebuilds the file; then backups are deleted; last, the tombstone is marked `cleared`.
 // After a crash at any point the same call finishes the rest.
 
-#include <sqlite3.h>
-#include <unistd.h>
-
-#include <algorithm>
-#include <filesystem>
-
-#include "data/files/file_permissions.h"
-#include "data/files/temporary_names.h"
-#include "data/store/connection.h"
-#include "data/store/remaining_copies.h"
-#include "data/store/statement_values.h"
-#include "data/store/tombstones.h"
-#include "data/store/validation.h"
-
-namespace palpate::data {
 namespace {
 
 namespace fs = std::filesystem;

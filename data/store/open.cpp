@@ -1,10 +1,6 @@
-// Store::open: checks the path, takes the writer's lock, creates or migrates the file, verifies its
-// integrity, and marks the runs that a crashed process left open.
-//
-// SQLite settings of a writer: WAL journal mode, synchronous=FULL (a commit is synced to disk
-// before it returns), foreign keys on. https://www.sqlite.org/wal.html,
-// https://www.sqlite.org/pragma.html
+#include "data/store/open.h"
 
+#include <SQLiteCpp/Statement.h>
 #include <SQLiteCpp/Transaction.h>
 #include <sqlite3.h>
 #include <sys/stat.h>
@@ -13,19 +9,92 @@
 #include <filesystem>
 #include <utility>
 
-#include "data/files/file_identity.h"
+#include "data/errors.h"
 #include "data/files/file_permissions.h"
 #include "data/files/output_check.h"
-#include "data/files/trusted_links.h"
 #include "data/store/attempts.h"
 #include "data/store/connection.h"
-#include "data/store/integrity_checks.h"
 #include "data/store/protocol_rows.h"
 #include "data/store/schema.h"
-#include "data/store/sqlite_errors.h"
-#include "data/store/statement_values.h"
 
 namespace palpate::data {
+
+void quick_check(SQLite::Database& db, const std::string& path, bool attempts_later) {
+  for (const char* table :
+       {"protocols", "participants", "sessions", "runs", "notes", "attempts", "exports",
+        "export_participants", "tombstones", "tombstone_exports", "files", "protocol_files",
+        "renumberings", "tombstone_secrets", "page_answers"}) {
+    if (!db.tableExists(table)) continue;  // of a later schema version
+    const bool skip_constraints = attempts_later && std::string_view(table) == "attempts";
+    db.exec(skip_constraints ? "PRAGMA ignore_check_constraints = ON"
+                             : "PRAGMA ignore_check_constraints = OFF");
+    SQLite::Statement check(db, std::string("PRAGMA quick_check(") + table + ")");
+    if (!check.executeStep()) continue;
+    const std::string found = check.getColumn(0).getString();
+    if (found != "ok") throw SQLite::Exception(table + (": " + found), SQLITE_CORRUPT);
+  }
+  db.exec("PRAGMA ignore_check_constraints = OFF");
+  if (SQLite::Statement(db, "PRAGMA foreign_key_check").executeStep()) {
+    throw StoreRefused(path +
+                       ": is damaged: rows refer to rows that are missing; restore a backup");
+  }
+  if (!db.tableExists("attempts") || !db.tableExists("runs")) return;
+  SQLite::Statement strays(db,
+                           "SELECT r.session_id <> a.session_id FROM attempts a JOIN runs r ON "
+                           "r.id = a.run_id WHERE r.session_id <> a.session_id OR a.state NOT IN "
+                           "('running', 'completed', 'cut_off') LIMIT 1");
+  if (strays.executeStep()) {
+    throw StoreRefused(path + ": is damaged: an attempt is " +
+                       (strays.getColumn(0).getInt() != 0
+                            ? "of a run of another session"
+                            : "neither running nor completed nor cut off") +
+                       "; restore a backup");
+  }
+}
+
+std::string immutable_uri(const std::string& file) {
+  std::string uri = "file:";
+  for (const char c : file) {
+    if (c == '?' || c == '#' || c == '%') {
+      constexpr const char* kDigits = "0123456789ABCDEF";
+      uri += {'%', kDigits[c >> 4], kDigits[c & 15]};
+    } else {
+      uri += c;
+    }
+  }
+  return uri + "?immutable=1";
+}
+
+void require_palpate_database(const std::string& file, const std::string& path) {
+  SQLite::Database probe(immutable_uri(file), SQLITE_OPEN_READONLY | SQLITE_OPEN_URI);
+  try {
+    require_application_id(probe, path);
+  } catch (const SQLite::Exception& error) {
+    // Beside a writer, the size in the header may exceed the file: left to the checks after
+    // opening.
+    if (error.getErrorCode() != SQLITE_CORRUPT) throw;
+  }
+}
+
+void require_complete_pages(const std::string& file) {
+  std::error_code error;
+  const auto log = std::filesystem::file_size(file + "-wal", error);
+  if (!error && log > 0) return;
+  const auto size = std::filesystem::file_size(file, error);
+  if (!error && size % kPageSize != 0) {
+    throw SQLite::Exception(
+        "it has " + std::to_string(size) + " bytes, which is not a whole number of pages",
+        SQLITE_CORRUPT);
+  }
+}
+
+// Store::open: checks the path, takes the writer's lock, creates or migrates the file, verifies its
+// integrity, and marks the runs that a crashed process left open.
+//
+// SQLite settings of a writer: WAL journal mode, synchronous=FULL (a commit is synced to disk
+// before it returns), foreign keys on. https://www.sqlite.org/wal.html,
+// https://www.sqlite.org/pragma.html
+
 namespace {
 
 constexpr const char* kInterrupted = "interrupted: the program or the machine stopped";

@@ -6,7 +6,7 @@
 #include "data/base/json_text.h"
 #include "data/errors.h"
 #include "data/files/checksum.h"
-#include "data/store/statement_values.h"
+#include "data/store/connection.h"
 
 namespace palpate::data {
 namespace {

@@ -1,13 +1,12 @@
-// The reading calls of Store. Trials are read and verified by attempt_reader.h.
+// The reading calls of Store. Trials are read and verified by attempts.h.
 
 #include <algorithm>
 
 #include "data/files/utc.h"
-#include "data/store/attempt_reader.h"
+#include "data/store/attempts.h"
 #include "data/store/connection.h"
 #include "data/store/protocol_rows.h"
 #include "data/store/record_columns.h"
-#include "data/store/statement_values.h"
 
 namespace palpate::data {
 

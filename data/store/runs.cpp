@@ -5,8 +5,6 @@
 #include "data/store/connection.h"
 #include "data/store/protocol_rows.h"
 #include "data/store/record_columns.h"
-#include "data/store/statement_values.h"
-#include "data/store/validation.h"
 
 namespace palpate::data {
 namespace {

@@ -6,11 +6,11 @@
 #include <filesystem>
 
 #include "data/files/file_permissions.h"
-#include "data/store/attempt_reader.h"
-#include "data/store/integrity_checks.h"
+#include "data/store/attempts.h"
+#include "data/store/connection.h"
+#include "data/store/open.h"
 #include "data/store/protocol_rows.h"
 #include "data/store/schema.h"
-#include "data/store/sqlite_errors.h"
 #include "data/store/store.h"
 
 namespace palpate::data {

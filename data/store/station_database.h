@@ -8,8 +8,8 @@
 #include <optional>
 #include <string>
 
-#include "data/files/file_identity.h"
-#include "data/store/lock.h"
+#include "data/files/file_permissions.h"
+#include "data/store/connection.h"
 
 namespace palpate::data {
 

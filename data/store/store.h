@@ -185,7 +185,7 @@ class Store {
 
   /// Withdrawal: removes all data of a participant, in all protocols. Deletes the rows with
   /// secure_delete, truncates the -wal, rebuilds the file (VACUUM) and deletes backups beside it
-  /// that hold the participant. A salted hash of the code stays (tombstones.h), with which enrol
+  /// that hold the participant. A salted hash of the code stays (forget.h), with which enrol
   /// and merge refuse it. After a crash the same call finishes what is left. \throws StoreRefused:
   /// no such participant; StoreError: another program reads (the rows are deleted, but the -wal
   /// still holds them), or the disk fails.

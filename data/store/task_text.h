@@ -2,14 +2,41 @@
 // Internal to data/store: a trial's task as the database keeps it, one line of JSON. Keys that have
 // no value are left out.
 
+#include <cstdint>
+#include <optional>
+#include <set>
 #include <string>
+#include <tuple>
 
 #include "data/record.h"
+#include "data/store/store.h"
 
 namespace palpate::data {
 
 std::string task_text(const TaskRecord& task);
 /// The inverse. \throws std::invalid_argument: damaged
 TaskRecord parse_task_text(const std::string& text);
+
+// Where the renderer's torque was left out: runs say so by a note.
+
+/// The note of a run whose device senses the stylus's axis and drives force alone.
+inline constexpr const char* kTorqueLeftOutNote = R"({"torque":"left out"})";
+
+class TorqueNotes {
+ public:
+  TorqueNotes() = default;
+  explicit TorqueNotes(Store& store);
+
+  /// Whether torque was left out in a run.
+  bool any() const { return !runs_.empty(); }
+  bool left_out(const Participant& participant, const RunInfo& run) const;
+  /// Whether the device drove the torque of the trial's renderer; missing where that gives none.
+  std::optional<bool> driven(const StoredTrial& trial) const;
+
+ private:
+  /// Participant, session, and when it began on both clocks.
+  using RunKey = std::tuple<std::int64_t, int, std::int64_t, std::int64_t>;
+  std::set<RunKey> runs_;
+};
 
 }  // namespace palpate::data

@@ -6,9 +6,8 @@
 #include <utility>
 #include <vector>
 
-#include "analysis/figures/axes.h"
 #include "analysis/figures/figures.h"
-#include "analysis/figures/marks.h"
+#include "analysis/figures/panel_drawing.h"
 #include "runner/commands/accuracy/report.h"
 
 namespace palpate::runner {

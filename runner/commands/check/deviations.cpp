@@ -11,7 +11,7 @@
 #include "analysis/statistics/analysis.h"
 #include "analysis/text.h"
 #include "data/files/utc.h"
-#include "data/store/torque_notes.h"
+#include "data/store/task_text.h"
 #include "protocols/difference.h"
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/sealed_folder.h"

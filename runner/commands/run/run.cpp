@@ -19,7 +19,7 @@
 #include <vector>
 
 #include "data/store/store.h"
-#include "data/store/torque_notes.h"
+#include "data/store/task_text.h"
 #include "protocols/answer_keys.h"
 #include "protocols/sha256.h"
 #include "protocols/tasks/task_plan.h"

@@ -8,9 +8,8 @@
 #include <utility>
 #include <vector>
 
-#include "analysis/figures/axes.h"
-#include "analysis/figures/marks.h"
-#include "analysis/figures/palette.h"
+#include "analysis/figures/panel_drawing.h"
+#include "analysis/figures/svg.h"
 #include "analysis/text.h"
 #include "runner/commands/accuracy/report.h"
 #include "runner/commands/stability/report.h"

@@ -1,7 +1,5 @@
 // Ranges, ticks and tick labels of axes, from their definitions.
 
-#include "analysis/figures/axes.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -9,6 +7,8 @@
 #include <string>
 #include <utility>
 #include <vector>
+
+#include "analysis/figures/panel_drawing.h"
 
 namespace palpate::analysis {
 namespace {

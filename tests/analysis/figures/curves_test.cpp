@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "analysis/figures/figures.h"
-#include "analysis/input/trial_table_builder.h"
+#include "analysis/input/trials.h"
 #include "analysis/report/plan_report.h"
 #include "analysis/statistics/analysis.h"
 

@@ -12,8 +12,8 @@
 #include <utility>
 #include <vector>
 
-#include "analysis/figures/palette.h"
-#include "analysis/input/trial_table_builder.h"
+#include "analysis/figures/svg.h"
+#include "analysis/input/trials.h"
 #include "analysis/statistics/analysis.h"
 
 namespace palpate::analysis {

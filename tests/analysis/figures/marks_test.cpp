@@ -1,7 +1,5 @@
 // Intervals, outlines of symbols, widths of texts and placement of labels.
 
-#include "analysis/figures/marks.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -10,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "analysis/figures/label_placement.h"
+#include "analysis/figures/panel_drawing.h"
 #include "analysis/figures/svg.h"
 #include "analysis/text.h"
 

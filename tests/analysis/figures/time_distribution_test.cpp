@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "analysis/figures/figures.h"
-#include "analysis/input/trial_table_builder.h"
+#include "analysis/input/trials.h"
 #include "analysis/statistics/analysis.h"
 #include "analysis/text.h"
 

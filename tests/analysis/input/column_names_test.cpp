@@ -1,6 +1,6 @@
-#include "analysis/input/column_names.h"
-
 #include <gtest/gtest.h>
+
+#include "analysis/input/csv_reader.h"
 
 namespace palpate::analysis {
 namespace {

@@ -1,11 +1,11 @@
 // Which renderers are compared, and how they are named.
 
-#include "analysis/input/renderers.h"
-
 #include <gtest/gtest.h>
 
 #include <string>
 #include <vector>
+
+#include "analysis/input/trials.h"
 
 namespace palpate::analysis {
 namespace {

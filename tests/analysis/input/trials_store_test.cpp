@@ -10,7 +10,7 @@
 #include "analysis/input/trials.h"
 #include "data/files/checksum.h"
 #include "data/store/store.h"
-#include "data/store/torque_notes.h"
+#include "data/store/task_text.h"
 #include "protocols/parse.h"
 #include "tests/shared/temporary_folder.h"
 

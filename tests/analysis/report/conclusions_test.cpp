@@ -10,9 +10,8 @@
 #include <string>
 #include <vector>
 
-#include "analysis/input/trial_table_builder.h"
+#include "analysis/input/trials.h"
 #include "analysis/statistics/analysis.h"
-#include "analysis/statistics/pilot.h"
 #include "analysis/statistics/plan.h"
 #include "analysis/statistics/power.h"
 

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "analysis/input/trial_table_builder.h"
+#include "analysis/input/trials.h"
 #include "analysis/report/report_text.h"
 #include "analysis/report/tables.h"
 #include "analysis/statistics/analysis.h"

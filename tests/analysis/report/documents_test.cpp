@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "analysis/figures/figures.h"
-#include "analysis/input/trial_table_builder.h"
+#include "analysis/input/trials.h"
 #include "analysis/report/reduction_cards.h"
 #include "analysis/report/report_json.h"
 #include "analysis/report/tables.h"

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "analysis/input/trial_table_builder.h"
+#include "analysis/input/trials.h"
 #include "analysis/report/html_elements.h"
 #include "analysis/report/html_page.h"
 #include "analysis/report/reduction_cards.h"

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "analysis/input/trial_table_builder.h"
+#include "analysis/input/trials.h"
 #include "analysis/report/tables.h"
 #include "analysis/statistics/analysis.h"
 #include "analysis/text.h"

@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "analysis/input/trial_table_builder.h"
+#include "analysis/input/trials.h"
 #include "analysis/report/report_html.h"
 #include "analysis/statistics/analysis.h"
 

@@ -11,7 +11,7 @@
 
 #include "analysis/figures/figure_svg.h"
 #include "analysis/figures/figures.h"
-#include "analysis/input/trial_table_builder.h"
+#include "analysis/input/trials.h"
 #include "analysis/report/report_html.h"
 #include "analysis/report/report_json.h"
 #include "analysis/report/report_text.h"

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <vector>
 
-#include "analysis/input/trial_table_builder.h"
+#include "analysis/input/trials.h"
 
 namespace palpate::analysis {
 namespace {

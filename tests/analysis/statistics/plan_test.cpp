@@ -12,10 +12,9 @@
 #include <vector>
 
 #include "analysis/figures/figure_svg.h"
-#include "analysis/input/trial_table_builder.h"
+#include "analysis/input/trials.h"
 #include "analysis/report/plan_report.h"
 #include "analysis/statistics/analysis.h"
-#include "analysis/statistics/pilot.h"
 #include "analysis/statistics/power.h"
 #include "stimuli/random.h"
 

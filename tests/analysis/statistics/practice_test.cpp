@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "analysis/input/trial_table_builder.h"
+#include "analysis/input/trials.h"
 #include "analysis/report/report_text.h"
 #include "analysis/statistics/analysis.h"
 #include "analysis/statistics/speed_accuracy.h"

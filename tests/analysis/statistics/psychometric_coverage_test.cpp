@@ -9,7 +9,6 @@
 
 #include "analysis/statistics/psychometric_bayes.h"
 #include "analysis/statistics/psychometric_fit.h"
-#include "analysis/statistics/psychometric_objective.h"
 #include "stimuli/random.h"
 #include "tests/shared/rounds.h"
 

@@ -15,7 +15,6 @@
 
 #include "analysis/statistics/discrimination.h"
 #include "analysis/statistics/psychometric_bayes.h"
-#include "analysis/statistics/psychometric_objective.h"
 
 namespace palpate::analysis {
 namespace {

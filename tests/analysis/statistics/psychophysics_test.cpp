@@ -6,11 +6,11 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "analysis/statistics/discrimination.h"
 #include "analysis/statistics/information.h"
 #include "analysis/statistics/mixed_logistic.h"
 #include "analysis/statistics/scaling.h"
-#include "analysis/statistics/signal_detection.h"
-#include "analysis/statistics/threshold_comparison.h"
+#include "analysis/statistics/task_comparisons.h"
 #include "stimuli/random.h"
 
 namespace palpate::analysis {

@@ -1,7 +1,5 @@
 // What the REML criterion is reduced to, against dense matrices of all trials.
 
-#include "analysis/statistics/reml_reduction.h"
-
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
@@ -9,6 +7,7 @@
 #include <cmath>
 #include <vector>
 
+#include "analysis/statistics/reml.h"
 #include "stimuli/random.h"
 
 namespace palpate::analysis {

@@ -6,8 +6,8 @@
 #include <algorithm>
 #include <charconv>
 
-#include "data/files/formula_guard.h"
-#include "data/store/torque_notes.h"
+#include "data/files/text_sink.h"
+#include "data/store/task_text.h"
 #include "tests/data/export/csv_fixture.h"
 
 namespace palpate::data {

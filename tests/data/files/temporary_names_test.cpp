@@ -1,7 +1,5 @@
 // What is cleared of files that killed processes left, and what stays.
 
-#include "data/files/temporary_names.h"
-
 #include <fcntl.h>
 #include <gtest/gtest.h>
 #include <sys/file.h>
@@ -11,6 +9,7 @@
 #include <set>
 #include <string>
 
+#include "data/files/atomic_file.h"
 #include "tests/data/store/store_fixture.h"
 
 namespace palpate::data {

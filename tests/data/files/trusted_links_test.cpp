@@ -1,7 +1,5 @@
 // Where the links of a path lead, held against the C library's realpath.
 
-#include "data/files/trusted_links.h"
-
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -10,6 +8,7 @@
 #include <memory>
 #include <string>
 
+#include "data/files/file_permissions.h"
 #include "tests/data/store/store_fixture.h"
 
 namespace palpate::data {

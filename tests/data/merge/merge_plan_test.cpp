@@ -1,9 +1,8 @@
 // Conflicts between stations.
 
-#include "data/merge/merge_plan.h"
-
 #include <gtest/gtest.h>
 
+#include "data/merge/merge.h"
 #include "tests/data/merge/merge_fixture.h"
 
 namespace palpate::data {

@@ -13,7 +13,7 @@
 
 #include "data/errors.h"
 #include "data/export/csv.h"
-#include "data/store/validation.h"
+#include "data/store/record_columns.h"
 #include "tests/data/store/store_fixture.h"
 
 namespace palpate::data {

@@ -1,7 +1,6 @@
-#include "data/store/remaining_copies.h"
-
 #include <gtest/gtest.h>
 
+#include "data/store/forget.h"
 #include "tests/data/store/forget_fixture.h"
 
 namespace palpate::data {

@@ -2,7 +2,7 @@
 
 #include <SQLiteCpp/Database.h>
 
-#include "data/store/seal_writer.h"
+#include "data/store/seals.h"
 
 namespace palpate::data::testing {
 

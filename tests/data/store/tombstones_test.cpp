@@ -1,11 +1,10 @@
-#include "data/store/tombstones.h"
-
 #include <SQLiteCpp/Database.h>
 #include <SQLiteCpp/Statement.h>
 #include <crypt.h>
 #include <gtest/gtest.h>
 
 #include "data/merge/merge.h"
+#include "data/store/forget.h"
 #include "data/store/schema.h"
 #include "tests/data/store/forget_fixture.h"
 

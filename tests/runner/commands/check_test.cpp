@@ -14,7 +14,7 @@
 #include "analysis/report/report_json.h"
 #include "analysis/statistics/analysis.h"
 #include "data/files/checksum.h"
-#include "data/store/torque_notes.h"
+#include "data/store/task_text.h"
 #include "protocols/parse.h"
 #include "runner/build_info.h"
 #include "runner/commands/check/deviations.h"

@@ -1,0 +1,608 @@
+#include "analysis/input/trials.h"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <numeric>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include "analysis/input/csv_reader.h"
+#include "analysis/input/study_record.h"
+#include "analysis/text.h"
+#include "data/base/json_text.h"
+#include "data/files/text_sink.h"
+#include "data/store/store.h"
+#include "data/store/task_text.h"
+#include "protocols/parse.h"
+
+namespace palpate::analysis {
+
+std::vector<RendererPair> renderer_pairs(const std::vector<std::string>& renderers) {
+  if (renderers.empty()) return {};
+  const std::string& first = renderers.front();
+  if (renderers.size() == 1) {
+    if (first == "ray") return {{"point", "ray", std::nullopt, 0}};
+    return {{first, first == "point" ? "ray" : "another renderer", 0, std::nullopt}};
+  }
+  std::vector<RendererPair> pairs;
+  pairs.reserve(renderers.size() - 1);
+  for (std::size_t r = 1; r < renderers.size(); ++r) pairs.push_back({first, renderers[r], 0, r});
+  return pairs;
+}
+
+std::string with_article(const std::string& renderer) {
+  return renderer == "point" || renderer == "ray" ? "the " + renderer : renderer;
+}
+
+std::string difference_name(const RendererPair& pair) {
+  return pair.renderer + " − " + pair.reference;
+}
+
+namespace {
+
+constexpr std::array<std::string_view, 4> kShapes{"sphere", "cone", "cylinder", "cube"};
+
+/// Rank of a shape among the levels: those of Ho, Basdogan & Srinivasan (2000), then as the
+/// protocol lists them.
+std::size_t rank(const std::string& name, const std::vector<std::string>& listed) {
+  const auto known = std::find(kShapes.begin(), kShapes.end(), name);
+  if (known != kShapes.end()) return static_cast<std::size_t>(known - kShapes.begin());
+  const auto found = std::find(listed.begin(), listed.end(), name);
+  return kShapes.size() + static_cast<std::size_t>(found - listed.begin());
+}
+
+/// Point first, then ray, then all others.
+std::size_t renderer_rank(const std::string& name) {
+  return name == "point" ? 0 : name == "ray" ? 1 : 2;
+}
+
+}  // namespace
+
+std::uint32_t Interner::number(std::string_view name) {
+  if (!names_.empty() && names_[last_] == name) return last_;
+  const auto found = numbers_.find(name);
+  if (found != numbers_.end()) return last_ = found->second;
+  last_ = static_cast<std::uint32_t>(names_.size());
+  numbers_.emplace(names_.emplace_back(name), last_);
+  return last_;
+}
+
+void TrialTableBuilder::add(const RawTrial& raw) {
+  if (raw.practice) {
+    ++n_practice_;
+    return;
+  }
+  TrialRow row;
+  row.participant = participants_.number(raw.participant);
+  row.renderer = static_cast<std::uint16_t>(renderers_.number(raw.renderer));
+  row.shape = static_cast<std::uint16_t>(stimuli_.number(raw.shape));
+  if (!raw.response.empty()) row.answer = static_cast<std::int32_t>(stimuli_.number(raw.response));
+  row.timed_out = raw.timed_out;
+  row.correct = raw.correct && !raw.timed_out;
+  row.response_time = raw.response_time;
+  shown_.resize(stimuli_.names().size());
+  if (shown_[row.shape] == 0) shown_[row.shape] = ++n_shown_;
+  n_simulated_ += raw.simulated;
+  n_contradicting_ += raw.correct != (raw.response == raw.shape) && !raw.timed_out;
+  n_late_answers_ += raw.timed_out && (raw.correct || !raw.response.empty());
+  keys_.push_back({row.participant, raw.session, raw.block, raw.trial,
+                   static_cast<std::uint32_t>(rows_.size())});
+  rows_.push_back(row);
+  if (raw.line > 0) lines_.push_back(static_cast<std::uint32_t>(raw.line));
+}
+
+void TrialTableBuilder::number_trials() {
+  std::sort(keys_.begin(), keys_.end());
+  std::uint32_t position = 0;
+  std::vector<std::uint32_t> exposures(renderers_.names().size());
+  for (std::size_t i = 0; i < keys_.size(); ++i) {
+    if (i == 0 || keys_[i].participant != keys_[i - 1].participant) {
+      position = 0;
+      std::fill(exposures.begin(), exposures.end(), 0U);
+    }
+    TrialRow& row = rows_[keys_[i].row];
+    row.position = ++position;
+    row.exposure = ++exposures[row.renderer];
+  }
+}
+
+std::string TrialTableBuilder::lines_of(
+    const std::vector<std::pair<std::uint32_t, std::uint32_t>>& rows) const {
+  constexpr std::size_t kShown = 10;
+  if (lines_.size() != rows_.size()) return "";
+  std::string text;
+  for (std::size_t i = 0; i < std::min(rows.size(), kShown); ++i) {
+    text += (i == 0 ? " (lines " : ", ") + std::to_string(lines_[rows[i].first]) + " and " +
+            std::to_string(lines_[rows[i].second]);
+  }
+  if (rows.size() > kShown) text += ", and " + std::to_string(rows.size() - kShown) + " more";
+  return text + ")";
+}
+
+void TrialTableBuilder::check_repeated_trials(TrialTable& table) {
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> repeated, identical;
+  const auto same_time = [](double x, double y) {
+    return x == y || (std::isnan(x) && std::isnan(y));
+  };
+  for (std::size_t i = 1; i < keys_.size(); ++i) {
+    const TrialKey &a = keys_[i - 1], &b = keys_[i];
+    if (a.participant != b.participant || a.session != b.session || a.block != b.block ||
+        a.trial != b.trial) {
+      continue;
+    }
+    repeated.emplace_back(a.row, b.row);
+    const TrialRow &x = rows_[a.row], &y = rows_[b.row];
+    if (x.renderer == y.renderer && x.shape == y.shape && x.answer == y.answer &&
+        same_time(x.response_time, y.response_time)) {
+      identical.emplace_back(a.row, b.row);
+    }
+  }
+  if (!identical.empty()) {
+    throw std::runtime_error(
+        counted(identical.size(), "row appears", "rows appear") + " twice" + lines_of(identical) +
+        ": the same participant, session, block, trial, answer and time; expected each trial once");
+  }
+  if (!repeated.empty()) {
+    table.warnings.push_back(counted(repeated.size(), "row repeats", "rows repeat") +
+                             " the participant, session, block and trial of another row" +
+                             lines_of(repeated) + ".");
+  }
+}
+
+void TrialTableBuilder::fill_times(TrialTable& table) {
+  std::size_t unknown = 0;
+  double limit = 0, longest = 0;
+  for (const TrialRow& row : rows_) {
+    if (std::isnan(row.response_time)) {
+      ++unknown;
+    } else {
+      longest = std::max(longest, row.response_time);
+      if (row.timed_out) limit = std::max(limit, row.response_time);
+    }
+  }
+  if (unknown == 0) return;
+  if (!(longest > 0)) throw std::runtime_error("expected the time of one trial at least, above 0");
+  const double taken = limit > 0 ? limit : longest;
+  for (TrialRow& row : rows_) {
+    if (std::isnan(row.response_time)) row.response_time = taken;
+  }
+  table.warnings.push_back(counted(unknown, "time-out has", "time-outs have") +
+                           " no time; their limit was assumed to be " + fixed(taken, 3) +
+                           " s, the " +
+                           (limit > 0 ? "longest of the other time-outs."
+                                      : "longest time of all trials, a lower bound."));
+}
+
+TrialTable TrialTableBuilder::finish(Provenance provenance,
+                                     const std::vector<std::string>& listed) {
+  if (rows_.empty()) throw std::runtime_error("expected at least one trial that is not practice");
+  TrialTable table;
+  number_trials();
+  check_repeated_trials(table);
+  fill_times(table);
+  table.provenance = std::move(provenance);
+  table.participants.assign(participants_.names().begin(), participants_.names().end());
+  table.n_practice = n_practice_;
+  table.simulated = n_simulated_ == 0              ? Simulated::no
+                    : n_simulated_ == rows_.size() ? Simulated::yes
+                                                   : Simulated::mixed;
+
+  // Orders the levels: order[new index] = old index, new_index[old index] = new index.
+  const auto& names = stimuli_.names();
+  std::vector<std::uint32_t> order(names.size()), new_index(names.size());
+  std::iota(order.begin(), order.end(), 0U);
+  const auto level = [&](std::uint32_t i) {
+    return std::tuple(shown_[i] == 0, rank(names[i], listed), shown_[i], i);
+  };
+  std::sort(order.begin(), order.end(),
+            [&](std::uint32_t a, std::uint32_t b) { return level(a) < level(b); });
+  for (std::uint32_t i = 0; i < order.size(); ++i) {
+    new_index[order[i]] = i;
+    table.answers.push_back(names[order[i]]);
+    if (shown_[order[i]] > 0) table.shapes.push_back(names[order[i]]);
+  }
+  std::vector<std::uint32_t> renderers(renderers_.names().size()),
+      new_renderer_index(renderers.size());
+  std::iota(renderers.begin(), renderers.end(), 0U);
+  std::ranges::stable_sort(renderers, {},
+                           [&](std::uint32_t i) { return renderer_rank(renderers_.names()[i]); });
+  for (std::uint32_t i = 0; i < renderers.size(); ++i) {
+    new_renderer_index[renderers[i]] = i;
+    table.renderers.push_back(renderers_.names()[renderers[i]]);
+  }
+  for (TrialRow& row : rows_) {
+    row.shape = static_cast<std::uint16_t>(new_index[row.shape]);
+    if (row.answer >= 0) {
+      row.answer = static_cast<std::int32_t>(new_index[static_cast<std::size_t>(row.answer)]);
+    }
+    row.renderer = static_cast<std::uint16_t>(new_renderer_index[row.renderer]);
+  }
+  table.rows = std::move(rows_);
+
+  if (n_contradicting_ > 0) {
+    table.warnings.push_back("In " + counted(n_contradicting_, "row", "rows") +
+                             " `correct` contradicts shape and response; `correct` was used.");
+  }
+  if (n_late_answers_ > 0) {
+    table.warnings.push_back(counted(n_late_answers_, "time-out has", "time-outs have") +
+                             " an answer or is marked correct; time-outs count as wrong.");
+  }
+  return table;
+}
+
+namespace {
+
+enum Column {
+  participant_id,
+  session,
+  block,
+  trial,
+  renderer,
+  shape,
+  response,
+  correct,
+  response_time,
+  practice,
+  timed_out,
+  simulated,
+  protocol_sha256,
+  program_version,
+  torque_driven,
+  n_columns
+};
+constexpr std::array<std::string_view, n_columns> kColumns{
+    "participant_id", "session",   "block",           "trial",           "renderer",
+    "shape",          "response",  "correct",         "response_time",   "practice",
+    "timed_out",      "simulated", "protocol_sha256", "program_version", "torque_driven"};
+constexpr int kNeeded = response_time + 1;
+constexpr std::size_t kAbsent = static_cast<std::size_t>(-1);
+
+constexpr std::size_t kMaxName = 200;     // bytes; codes of our own participants have at most 32
+constexpr std::size_t kMaxStimuli = 200;  // the confusion matrix has the square of it
+constexpr std::size_t kMaxParticipants = 10000;
+constexpr std::size_t kMaxRenderers = 20;
+constexpr std::size_t kMaxCells = 4'000'000;  // participants x renderers x stimuli: some 500 MB
+constexpr std::string_view kNoResponse = "no_response";  // a key in the JSON results
+constexpr double kMaxTime = 1e6;                         // s, 11 days; bounds every sum of squares
+
+/// Collects faults: the first kMaxFaults in full, further ones as a number.
+class Faults {
+ public:
+  explicit Faults(std::string file) : file_(std::move(file)) {}
+  void add(const std::string& location, const std::string& expected) {
+    if (++count_ <= kMaxFaults) faults_.push_back({file_, location, expected});
+  }
+  std::size_t count() const { return count_; }
+  void throw_if_any() {
+    if (count_ == 0) return;
+    if (count_ > kMaxFaults) {
+      faults_.push_back(
+          {file_, "further lines",
+           "and " + std::to_string(count_ - kMaxFaults) + " more faults of these kinds"});
+    }
+    throw protocols::InputError(std::move(faults_));
+  }
+
+ private:
+  std::string file_;
+  std::vector<protocols::Fault> faults_;
+  std::size_t count_ = 0;
+};
+
+/// Parses one file into a TrialTable.
+class CsvTrials {
+ public:
+  explicit CsvTrials(const std::string& path) : path_(path), faults_(path) {}
+
+  TrialTable read() {
+    std::optional<CsvReader> reader;
+    try {
+      reader.emplace(path_);
+    } catch (const std::runtime_error& error) {
+      faults_.add("file", std::string("expected a CSV file that can be read; ") + error.what());
+      faults_.throw_if_any();
+    }
+    if (reader->next() && reader->fault().empty()) {
+      read_header(*reader);
+      faults_.throw_if_any();  // rows cannot be read without their columns
+      while (reader->next()) read_row(*reader);
+    }
+    if (!reader->fault().empty()) faults_.add(line(*reader), reader->fault());
+    if (faults_.count() == 0 && n_rows_ == 0) {
+      faults_.add("file", "expected a header and at least one trial");
+    }
+    faults_.throw_if_any();
+    return finish();
+  }
+
+ private:
+  static std::string line(const CsvReader& reader) {
+    return reader.line() == 0 ? "file" : "line " + std::to_string(reader.line());
+  }
+
+  void read_header(const CsvReader& reader) {
+    const auto& names = reader.fields();
+    n_fields_ = names.size();
+    at_.fill(kAbsent);
+    for (std::size_t i = 0; i < names.size(); ++i) {
+      const auto found = std::find(kColumns.begin(), kColumns.end(), names[i]);
+      if (found == kColumns.end()) continue;
+      auto& at = at_[static_cast<std::size_t>(found - kColumns.begin())];
+      if (at != kAbsent) {
+        faults_.add(line(reader) + ", column " + std::string(names[i]),
+                    "expected each column once; found as columns " + std::to_string(at + 1) +
+                        " and " + std::to_string(i + 1));
+      } else {
+        at = i;
+      }
+    }
+    std::vector<std::string_view> known(kColumns.begin(), kColumns.end());
+    known.emplace_back("task");  // a table with it is one of tasks
+    const std::vector<AlikeColumn> alike =
+        alike_columns(std::vector<std::string>(names.begin(), names.end()), known);
+    for (const AlikeColumn& one : alike) warnings_.push_back(sentence(one));
+    std::string hint;
+    if (names.size() == 1) hint = " (one column only: are the fields separated by commas?)";
+    for (std::size_t i = 0; i < kNeeded; ++i) {
+      if (at_[i] == kAbsent) {
+        faults_.add(line(reader), "expected a column '" + std::string(kColumns[i]) + "'" + hint +
+                                      hint_for(kColumns[i], alike));
+      }
+    }
+  }
+
+  std::string_view field(Column column) const { return (*fields_)[at_[column]]; }
+
+  void fault(Column column, std::string_view expected) {
+    ok_ = false;
+    // Only faults that are listed are formatted: a file may have millions of bad rows.
+    if (faults_.count() >= kMaxFaults) return faults_.add({}, {});
+    faults_.add(line(*reader_) + ", column " + std::string(kColumns[column]),
+                "expected " + std::string(expected) + "; found '" +
+                    stimuli::printable(field(column), 40) + "'");
+  }
+
+  /// A name; an apostrophe that an export put before it against spreadsheet formulas is removed.
+  std::string_view name(Column column, const Interner& known) {
+    const std::string_view text = data::unguarded(field(column));
+    if (known.contains(text)) return text;
+    if (text.empty() || text.size() > kMaxName || !stimuli::is_plain_utf8(text)) {
+      fault(column, "a name of 1 to 200 bytes of UTF-8 without control characters");
+    }
+    if (text == kNoResponse) {
+      fault(column, column == renderer ? "a renderer; this name is taken"
+                                       : "a stimulus; empty where there was no response");
+    }
+    return text;
+  }
+
+  int number(Column column) {
+    const std::string_view text = field(column);
+    int value = 0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+    if (error != std::errc() || end != text.data() + text.size() || value < 1) {
+      fault(column, "a whole number from 1");
+    }
+    return value;
+  }
+
+  /// How R, pandas, BIDS and spreadsheets write a missing value.
+  static bool missing(std::string_view text) {
+    for (const std::string_view nothing : {"", "NA", "n/a", "N/A", "NaN", "nan"}) {
+      if (text == nothing) return true;
+    }
+    return false;
+  }
+
+  bool truth(Column column) {
+    if (at_[column] == kAbsent) return false;
+    const std::string_view text = field(column);
+    if (text != "0" && text != "1") fault(column, "0 or 1");
+    return text == "1";
+  }
+
+  double time(Column column) {
+    const std::string_view text = field(column);
+    double value = 0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+    // from_chars reports underflow and overflow alike: both are faults.
+    if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(value) ||
+        value < 0 || value > kMaxTime) {
+      fault(column,
+            "a time in s, 0 to 1000000, with a decimal point (empty or NA for a time-out alone)");
+    }
+    return value;
+  }
+
+  void read_row(const CsvReader& reader) {
+    ++n_rows_;
+    if (!reader.fault().empty()) return faults_.add(line(reader), reader.fault());
+    if (reader.fields().size() != n_fields_) {
+      return faults_.add(line(reader), "expected " + std::to_string(n_fields_) +
+                                           " fields, as in the header; found " +
+                                           std::to_string(reader.fields().size()));
+    }
+    reader_ = &reader;
+    fields_ = &reader.fields();
+    ok_ = true;
+    RawTrial raw;
+    raw.participant = name(participant_id, names_);
+    raw.session = number(session);
+    raw.block = number(block);
+    raw.trial = number(trial);
+    raw.renderer = name(renderer, renderers_);
+    raw.shape = name(shape, stimuli_);
+    if (!missing(field(response)) || stimuli_.contains(field(response)))
+      raw.response = name(response, stimuli_);
+    raw.timed_out = at_[timed_out] == kAbsent ? raw.response.empty() : truth(timed_out);
+    // Time and correctness of a time-out may be missing.
+    raw.correct = !(raw.timed_out && missing(field(correct))) && truth(correct);
+    raw.response_time =
+        raw.timed_out && missing(field(response_time)) ? kNoTime : time(response_time);
+    raw.practice = truth(practice);
+    raw.simulated = truth(simulated);
+    std::optional<bool> driven;
+    if (at_[torque_driven] != kAbsent && !missing(field(torque_driven)))
+      driven = truth(torque_driven);
+    raw.line = reader.line();
+    if (!ok_ || too_many_) return;
+    names_.number(raw.participant);
+    renderers_.number(raw.renderer);
+    stimuli_.number(raw.shape);
+    if (!raw.response.empty()) stimuli_.number(raw.response);
+    if (!within_limits()) return;
+    if (at_[protocol_sha256] != kAbsent) remember(field(protocol_sha256), protocols_);
+    if (at_[program_version] != kAbsent) remember(field(program_version), versions_);
+    if (faults_.count() == 0) builder_.add(raw);
+    if (!raw.practice) torque_.add(raw.renderer, driven);
+  }
+
+  /// Whether the numbers of names are within the limits; exceeding them is one fault, after which
+  /// rows are ignored.
+  bool within_limits() {
+    const std::size_t participants = names_.names().size(), renderers = renderers_.names().size(),
+                      stimuli = stimuli_.names().size();
+    if (participants > kMaxParticipants || stimuli > kMaxStimuli) {
+      fault(participants > kMaxParticipants ? participant_id : shape,
+            "at most 10000 different participants and 200 different stimuli");
+    } else if (renderers > kMaxRenderers) {
+      fault(renderer, "at most 20 different renderers");
+    } else if (participants * renderers * stimuli > kMaxCells) {
+      fault(participant_id, "at most 4000000 cells (participants x renderers x stimuli)");
+    } else {
+      return true;
+    }
+    too_many_ = true;
+    return false;
+  }
+
+  /// Values of provenance are displayed only: made printable, at most eight are kept.
+  static void remember(std::string_view text, std::vector<std::string>& known) {
+    if (text.empty() || (!known.empty() && known.back() == text)) return;
+    const std::string shown = stimuli::printable(text, 80);
+    if (known.size() < 8 && std::find(known.begin(), known.end(), shown) == known.end()) {
+      known.push_back(shown);
+    }
+  }
+
+  TrialTable finish() {
+    Provenance provenance;
+    provenance.source = path_;
+    provenance.protocol_sha256 = protocols_;
+    provenance.program_versions = versions_;
+    try {
+      TrialTable table = builder_.finish(std::move(provenance));
+      table.warnings.insert(table.warnings.begin(), warnings_.begin(), warnings_.end());
+      torque_.warn(table.warnings);
+      return table;
+    } catch (const std::runtime_error& error) {
+      faults_.add("file", error.what());
+    }
+    faults_.throw_if_any();
+    return {};
+  }
+
+  std::string path_;
+  Faults faults_;
+  const CsvReader* reader_ = nullptr;
+  const std::vector<std::string_view>* fields_ = nullptr;
+  std::array<std::size_t, n_columns> at_{};
+  std::size_t n_fields_ = 0, n_rows_ = 0;
+  bool ok_ = true, too_many_ = false;
+  /// Names of valid rows, practice included: each is checked once.
+  Interner names_, renderers_, stimuli_;
+  std::vector<std::string> protocols_, versions_, warnings_;
+  TrialTableBuilder builder_;
+  TorqueCounts torque_;
+};
+
+}  // namespace
+
+TrialTable read_trials_csv(const std::string& path) { return CsvTrials(path).read(); }
+
+namespace {
+
+/// Names of the stimuli in the order of a stored protocol. Not validated again: it was when it was
+/// stored, and mesh files that it names may be missing now.
+std::vector<std::string> stimuli_of(const std::string& protocol_text) {
+  std::vector<std::string> names;
+  const auto json = data::json_or_discarded(protocol_text);
+  if (!json.is_object() || !json.contains("stimuli") || !json["stimuli"].is_array()) return names;
+  for (const auto& stimulus : json["stimuli"]) {
+    if (stimulus.is_object() && stimulus.contains("name") && stimulus["name"].is_string()) {
+      names.push_back(stimulus["name"].get<std::string>());
+    }
+  }
+  return names;
+}
+
+void note(const std::string& value, std::vector<std::string>& known) {
+  if (!value.empty() && std::find(known.begin(), known.end(), value) == known.end()) {
+    known.push_back(value);
+  }
+}
+
+}  // namespace
+
+TrialTable read_trials_store(const std::string& path) {
+  data::Store store = data::Store::open(path, data::Store::Mode::read_only);
+  Provenance provenance;
+  provenance.source = path;
+  std::vector<std::string> listed, protocol_names, observers;
+  for (const data::ProtocolInfo& protocol : store.protocols()) {
+    for (const std::string& name : stimuli_of(protocol.text)) note(name, listed);
+  }
+  TrialTableBuilder builder;
+  const data::TorqueNotes notes(store);
+  TorqueCounts torque;
+  store.for_each_trial([&](const data::StoredTrial& trial) {
+    const data::TrialRecord& record = trial.record;
+    if (record.renderer != "point" && record.renderer != "ray") {
+      throw protocols::InputError({{path, "participant " + trial.participant.code,
+                                    "expected the renderer 'point' or 'ray'; found '" +
+                                        stimuli::printable(record.renderer, 40) + "'"}});
+    }
+    RawTrial raw;
+    raw.participant = trial.participant.code;
+    raw.renderer = record.renderer;
+    raw.shape = record.shape;
+    raw.response = record.response;
+    raw.session = record.session;
+    raw.block = record.block;
+    raw.trial = record.trial;
+    raw.correct = record.correct;
+    raw.practice = record.practice;
+    raw.timed_out = record.timed_out;
+    raw.simulated = trial.participant.simulated;
+    raw.response_time = record.response_time;
+    builder.add(raw);
+    if (!record.practice) torque.add(record.renderer, notes.driven(trial));
+    note(trial.protocol_name, protocol_names);
+    note(trial.protocol_sha256, provenance.protocol_sha256);
+    note(trial.run.program_version, provenance.program_versions);
+    note(trial.run.observer_sha256, observers);
+  });
+  const auto join = [](const std::vector<std::string>& parts) {
+    std::string all;
+    for (const auto& part : parts) all += (all.empty() ? "" : ", ") + part;
+    return all;
+  };
+  provenance.protocol_name = join(protocol_names);
+  provenance.observer_sha256 = join(observers);
+  try {
+    TrialTable table = builder.finish(std::move(provenance), listed);
+    torque.warn(table.warnings);
+    return table;
+  } catch (const std::runtime_error& error) {
+    throw protocols::InputError({{path, "trials", error.what()}});
+  }
+}
+
+}  // namespace palpate::analysis
