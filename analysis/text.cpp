@@ -6,6 +6,8 @@
 #include <cstdint>
 #include <utility>
 
+#include "data/base/text.h"
+
 namespace palpate::analysis {
 
 namespace {
@@ -14,7 +16,7 @@ std::size_t bytes_of(std::string_view text, std::size_t characters) {
   std::size_t at = 0;
   while (at < text.size() && characters-- > 0) {
     ++at;
-    while (at < text.size() && (static_cast<std::uint8_t>(text[at]) & 0xC0U) == 0x80) ++at;
+    while (at < text.size() && continues_character(text[at])) ++at;
   }
   return at;
 }
@@ -23,7 +25,7 @@ std::size_t bytes_of(std::string_view text, std::size_t characters) {
 
 std::string escaped(std::string_view text) {
   std::string out;
-  for (const char c : stimuli::printable(text)) {
+  for (const char c : printable(text)) {
     switch (c) {
       case '&':
         out += "&amp;";
@@ -47,11 +49,7 @@ std::string escaped(std::string_view text) {
   return out;
 }
 
-std::size_t width(std::string_view text) {
-  std::size_t columns = 0;
-  for (const char c : text) columns += (static_cast<std::uint8_t>(c) & 0xC0U) != 0x80;
-  return columns;
-}
+std::size_t width(std::string_view text) { return count_characters(text); }
 
 std::string pad_right(std::string_view text, std::size_t columns) {
   std::string out(text);

@@ -1,6 +1,6 @@
 #pragma once
 // Formatting of text and numbers for terminals, SVG and HTML. Text from files passes
-// stimuli::printable() or escaped().
+// printable() or escaped().
 
 #include <cstddef>
 #include <functional>
@@ -8,7 +8,7 @@
 #include <string_view>
 #include <vector>
 
-#include "stimuli/text.h"
+#include "data/base/text.h"
 
 namespace palpate::analysis {
 

@@ -7,8 +7,8 @@
 #include <utility>
 #include <vector>
 
+#include "data/base/text.h"
 #include "protocols/json_document.h"
-#include "stimuli/text.h"
 
 namespace palpate::protocols {
 namespace {
@@ -49,14 +49,10 @@ constexpr std::array<std::pair<char32_t, char32_t>, 15> kWritten = {{{U'!', U'9'
 
 /// The only character of a text in UTF-8; none: it has more, or none.
 std::optional<char32_t> only_character(const std::string& text) {
-  if (text.empty() || text.size() > 4) return std::nullopt;
-  const auto first = static_cast<unsigned char>(text[0]);
-  const std::size_t length = first < 0x80 ? 1 : first < 0xE0 ? 2 : first < 0xF0 ? 3 : 4;
-  if (text.size() != length) return std::nullopt;
-  char32_t code = length == 1 ? first : first & (0xFFU >> (length + 1));
-  for (std::size_t i = 1; i < length; ++i)
-    code = code << 6U | (static_cast<unsigned char>(text[i]) & 0x3FU);
-  return code;
+  if (text.empty()) return std::nullopt;
+  const Character first = first_character(text);
+  if (!first.well_formed || first.size != text.size()) return std::nullopt;
+  return first.code;
 }
 
 /// Of Latin, Greek and Cyrillic letters, those that keyboards have.
@@ -73,13 +69,6 @@ char32_t lower_case(char32_t c) {
   const bool odd_first = within(0x139, 0x148) || within(0x179, 0x17E) || within(0x4C1, 0x4CE);
   if ((even_first && c % 2 == 0) || (odd_first && c % 2 == 1)) return c + 1;
   return c;
-}
-
-std::string utf8(char32_t c) {
-  if (c < 0x80) return {static_cast<char>(c)};
-  const auto tail = [c](unsigned shift) { return static_cast<char>(0x80U | (c >> shift & 0x3FU)); };
-  if (c < 0x800) return {static_cast<char>(0xC0U | c >> 6U), tail(0)};
-  return {static_cast<char>(0xE0U | c >> 12U), tail(6), tail(0)};
 }
 
 /// The name that was meant, perhaps: "num_1" is '1', "Return" is 'enter'.
@@ -101,7 +90,7 @@ std::string meant_by(const std::string& name) {
   std::string nearest;
   std::size_t distance = 3;
   for (const std::string_view known : kNamed) {
-    const std::size_t edits = stimuli::edit_distance(lower, std::string(known));
+    const std::size_t edits = edit_distance(lower, std::string(known));
     if (edits >= distance || edits > known.size() / 2) continue;
     distance = edits;
     nearest = known;

@@ -10,9 +10,9 @@
 #include <utility>
 #include <vector>
 
+#include "data/base/input_file.h"
 #include "data/base/json_text.h"
-#include "stimuli/input_file.h"
-#include "stimuli/text.h"
+#include "data/base/text.h"
 
 namespace palpate::protocols {
 namespace {
@@ -70,7 +70,7 @@ bool read_numbers(const json& value, const std::string& pointer, std::array<doub
 
 }  // namespace
 
-std::string found_text(const json& value) { return ", found " + data::json_excerpt(value); }
+std::string found_text(const json& value) { return ", found " + json_excerpt(value); }
 
 bool read_number(const json& value, const std::string& pointer, double& out,
                  const NumberRange& range, FaultList& faults) {
@@ -230,7 +230,7 @@ void ObjectReader::refuse_unknown_keys() {
     }
     std::string all;
     for (const std::string& known : known_) all += (all.empty() ? "" : ", ") + known;
-    const std::string nearest = stimuli::nearest_word(key, {known_.begin(), known_.end()});
+    const std::string nearest = nearest_word(key, {known_.begin(), known_.end()});
     faults_.add(pointer(key), nearest.empty() ? "unknown key; known here: " + all
                                               : "unknown key; did you mean '" + nearest + "'?");
   }
@@ -330,7 +330,7 @@ class Builder : public nlohmann::json_sax<json> {
     } else {
       what = "number out of range: '" + last_token + "'";
     }
-    if (stimuli::is_utf16(text_)) what = "it is in UTF-16; save it as UTF-8";
+    if (is_utf16(text_)) what = "it is in UTF-16; save it as UTF-8";
     faults_.add_syntax_error(static_cast<int>(newlines) + 1, static_cast<int>(end - line_start) + 1,
                              "expected JSON in UTF-8: " + what + comma_at(end));
     return false;
@@ -344,7 +344,7 @@ class Builder : public nlohmann::json_sax<json> {
     std::size_t first = std::min(end, text.size()), last = first;
     while (first > 0 && end - first < 40 && in_number(text[first - 1])) --first;
     while (last < text.size() && last - end < 40 && in_number(text[last])) ++last;
-    return stimuli::point_meant(text.substr(first, last - first));
+    return point_meant(text.substr(first, last - first));
   }
 
   struct Open {
@@ -400,8 +400,8 @@ class Builder : public nlohmann::json_sax<json> {
   }
 
   bool open(json value) {
-    if (open_.size() == data::kDeepestJson) {
-      faults_.add(here(), "objects and arrays at most " + std::to_string(data::kDeepestJson) +
+    if (open_.size() == kDeepestJson) {
+      faults_.add(here(), "objects and arrays at most " + std::to_string(kDeepestJson) +
                               " deep within each other");
       return false;
     }
@@ -506,7 +506,7 @@ json read_json(const std::string& text, FaultList& faults) { return Builder(text
 
 std::string read_text_file(const std::string& path) {
   try {
-    return stimuli::read_whole(path, kMaxBytes);
+    return read_whole(path, kMaxBytes);
   } catch (const std::runtime_error& error) {
     throw InputError({{path, "(file)", std::string("a readable JSON file: ") + error.what(), 0}});
   }

@@ -112,7 +112,7 @@ class Arrangement {
 
 /// A stimulus among those that are not ruled out, with a probability proportional to what remains.
 std::size_t draw(const Arrangement& arrangement, const std::vector<bool>& ruled_out,
-                 stimuli::Random& random) {
+                 Random& random) {
   std::uint64_t weight = 0;
   for (std::size_t i = 0; i < ruled_out.size(); ++i) {
     if (!ruled_out[i]) weight += static_cast<std::uint64_t>(arrangement.remaining(i));
@@ -129,7 +129,7 @@ std::size_t draw(const Arrangement& arrangement, const std::vector<bool>& ruled_
 
 /// The first unconstrained random order that satisfies the limits, while the budget lasts.
 std::optional<std::vector<int>> try_uniform(const Arrangement& start, std::size_t budget,
-                                            stimuli::Random& random) {
+                                            Random& random) {
   const std::vector<bool> none(start.stimuli(), false);
   while (budget >= static_cast<std::size_t>(start.total())) {
     Arrangement arrangement = start;
@@ -146,7 +146,7 @@ std::optional<std::vector<int>> try_uniform(const Arrangement& start, std::size_
   return std::nullopt;
 }
 
-std::vector<int> construct(Arrangement arrangement, stimuli::Random& random) {
+std::vector<int> construct(Arrangement arrangement, Random& random) {
   std::vector<int> order;
   while (arrangement.total() > 0) {
     std::vector<bool> ruled_out(arrangement.stimuli());
@@ -182,7 +182,7 @@ bool fits(const std::vector<int>& order, std::size_t i, const Protocol::Order& l
 
 /// Swaps pairs of trials at random where the limits allow it. Either direction of a swap is equally
 /// likely, so in the long run all orders that swaps connect are too.
-void mix(std::vector<int>& order, const Protocol::Order& limits, stimuli::Random& random) {
+void mix(std::vector<int>& order, const Protocol::Order& limits, Random& random) {
   constexpr std::size_t kSwaps = 30;  // a trial; measured: order_test.cpp
   for (std::size_t n = kSwaps * order.size(); n > 0; --n) {
     const std::size_t i = random.below(order.size());
@@ -253,14 +253,14 @@ bool can_order(const std::vector<int>& counts, const Protocol::Order& order) {
 }
 
 std::vector<int> order_block(const std::vector<int>& counts, const Protocol::Order& order,
-                             const std::vector<std::string>& names, stimuli::Random& random) {
+                             const std::vector<std::string>& names, Random& random) {
   std::size_t trials = 0;
   for (const int count : counts) trials += static_cast<std::size_t>(count);
   return order_block(counts, order, names, random, uniform_draw_budget(trials));
 }
 
 std::vector<int> order_block(const std::vector<int>& counts, const Protocol::Order& order,
-                             const std::vector<std::string>& names, stimuli::Random& random,
+                             const std::vector<std::string>& names, Random& random,
                              std::size_t draw_budget) {
   const Arrangement start(counts, order);
   if (!start.completable()) throw ScheduleError(reason(counts, order, names));

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "data/base/random.h"
 #include "protocols/protocol.h"
-#include "stimuli/random.h"
 
 namespace palpate::protocols {
 
@@ -41,11 +41,11 @@ std::size_t uniform_draw_budget(std::size_t trials);
 ///
 /// \throws ScheduleError naming the stimulus (by `names`) and what can be changed.
 std::vector<int> order_block(const std::vector<int>& counts, const Protocol::Order& order,
-                             const std::vector<std::string>& names, stimuli::Random& random);
+                             const std::vector<std::string>& names, Random& random);
 
 /// The same with another budget; 0 always constructs.
 std::vector<int> order_block(const std::vector<int>& counts, const Protocol::Order& order,
-                             const std::vector<std::string>& names, stimuli::Random& random,
+                             const std::vector<std::string>& names, Random& random,
                              std::size_t draw_budget);
 
 /// Whether any order of these counts satisfies the limits. Exact.

@@ -8,14 +8,14 @@
 #include <string>
 #include <utility>
 
+#include "data/base/checksum.h"
+#include "data/base/text.h"
 #include "protocols/answer_keys.h"
 #include "protocols/json_document.h"
 #include "protocols/parse_scene.h"
 #include "protocols/protocol.h"
 #include "protocols/schedule.h"
-#include "protocols/sha256.h"
 #include "protocols/tasks/parse_blocks.h"
-#include "stimuli/text.h"
 
 namespace palpate::protocols {
 
@@ -114,11 +114,11 @@ namespace {
 std::string list(const std::vector<Fault>& faults) {
   std::string text;
   for (const Fault& fault : faults) {
-    text += (text.empty() ? "" : "\n") + stimuli::printable(fault.file);
+    text += (text.empty() ? "" : "\n") + printable(fault.file);
     // A location that is a line says it itself.
     if (fault.line > 0 && fault.location.front() == '/')
       (text += ':') += std::to_string(fault.line);
-    text += ": " + stimuli::printable(fault.location) + ": " + stimuli::printable(fault.expected);
+    text += ": " + printable(fault.location) + ": " + printable(fault.expected);
   }
   return text;
 }
@@ -430,7 +430,7 @@ Protocol parse_protocol_text(const std::string& text, const std::string& file_na
   faults.throw_if_any();
 
   protocol.source_text = text;
-  protocol.sha256 = sha256_hex(text);
+  protocol.sha256 = checksum_hex(text);
   return protocol;
 }
 

@@ -5,9 +5,9 @@
 #include <iterator>
 #include <numeric>
 
+#include "data/base/random.h"
 #include "protocols/order.h"
 #include "stimuli/orientation.h"
-#include "stimuli/random.h"
 
 namespace palpate::protocols {
 namespace {
@@ -62,7 +62,7 @@ std::vector<Group> groups_in_order(const Protocol& protocol, int participant_num
 /// Assigns renderers to trials: each stimulus is shown with each renderer of the group equally
 /// often. With a uniform order of the stimuli, every mixed order is equally likely.
 void mix_renderers(const Protocol& protocol, const Group& group, std::vector<Trial>& trials,
-                   stimuli::Random& random) {
+                   Random& random) {
   for (int stimulus = 0; stimulus < static_cast<int>(protocol.stimuli.size()); ++stimulus) {
     std::vector<Trial*> shown;
     for (Trial& trial : trials) {
@@ -78,7 +78,7 @@ void mix_renderers(const Protocol& protocol, const Group& group, std::vector<Tri
 
 /// A block without orientations: counts[i] trials of stimulus i.
 std::vector<Trial> ordered_trials(const Protocol& protocol, const Group& group,
-                                  const std::vector<int>& counts, stimuli::Random& random) {
+                                  const std::vector<int>& counts, Random& random) {
   std::vector<Trial> trials;
   for (const int stimulus : order_block(counts, protocol.order, names_of(protocol), random)) {
     Trial trial;
@@ -96,8 +96,7 @@ std::vector<int> equal_counts(const Protocol& protocol, const Group& group, int 
 }
 
 /// Listed orientations: for each stimulus and renderer the list as evenly as possible, shuffled.
-void orient_from_list(const Protocol& protocol, const std::vector<Trial*>& trials,
-                      stimuli::Random& random) {
+void orient_from_list(const Protocol& protocol, const std::vector<Trial*>& trials, Random& random) {
   if (protocol.orientations.empty()) throw ScheduleError("the list of orientations is empty");
   for (const RendererKind renderer : protocol.renderers) {
     for (int stimulus = 0; stimulus < static_cast<int>(protocol.stimuli.size()); ++stimulus) {
@@ -118,7 +117,7 @@ void orient_from_list(const Protocol& protocol, const std::vector<Trial*>& trial
   }
 }
 
-void orient(const Protocol& protocol, const std::vector<Trial*>& trials, stimuli::Random& random) {
+void orient(const Protocol& protocol, const std::vector<Trial*>& trials, Random& random) {
   switch (protocol.orientation) {
     case OrientationKind::uniform:
       for (Trial* trial : trials) trial->orientation = stimuli::uniform_rotation(random);
@@ -132,7 +131,7 @@ void orient(const Protocol& protocol, const std::vector<Trial*>& trials, stimuli
   }
 }
 
-void finish_practice(const Protocol& protocol, std::vector<Trial>& trials, stimuli::Random random) {
+void finish_practice(const Protocol& protocol, std::vector<Trial>& trials, Random random) {
   std::vector<Trial*> all;
   int number = 0;
   for (Trial& trial : trials) {
@@ -147,12 +146,12 @@ std::vector<Trial> practice_trials(const Protocol& protocol, int participant_num
                                    const Group& group, int round) {
   const auto participant = static_cast<std::uint64_t>(participant_number);
   const auto number = static_cast<std::uint64_t>(round);
-  stimuli::Random random(protocol.seed, {participant, kPractice, kOrder, code(group), number});
+  Random random(protocol.seed, {participant, kPractice, kOrder, code(group), number});
   std::vector<Trial> trials = ordered_trials(
       protocol, group, equal_counts(protocol, group, protocol.practice.repetitions), random);
   finish_practice(
       protocol, trials,
-      stimuli::Random(protocol.seed, {participant, kPractice, kOrientation, code(group), number}));
+      Random(protocol.seed, {participant, kPractice, kOrientation, code(group), number}));
   return trials;
 }
 
@@ -160,7 +159,7 @@ std::vector<Trial> warm_up_trials(const Protocol& protocol, int participant_numb
                                   const Group& group, int session) {
   const auto participant = static_cast<std::uint64_t>(participant_number);
   const auto number = static_cast<std::uint64_t>(session);
-  stimuli::Random random(protocol.seed, {participant, kWarmUp, kOrder, number});
+  Random random(protocol.seed, {participant, kWarmUp, kOrder, number});
   const int stimuli = static_cast<int>(protocol.stimuli.size());
   std::vector<int> counts;
   counts.reserve(protocol.stimuli.size());
@@ -170,7 +169,7 @@ std::vector<Trial> warm_up_trials(const Protocol& protocol, int participant_numb
   if (protocol.order.kind == OrderKind::random) random.shuffle(counts);
   std::vector<Trial> trials = ordered_trials(protocol, group, counts, random);
   finish_practice(protocol, trials,
-                  stimuli::Random(protocol.seed, {participant, kWarmUp, kOrientation, number}));
+                  Random(protocol.seed, {participant, kWarmUp, kOrientation, number}));
   return trials;
 }
 
@@ -227,15 +226,14 @@ std::vector<Block> into_sessions(const Protocol& protocol, std::vector<Block> bl
 
 std::vector<Trial> block_of_trials(const Protocol& protocol, int participant_number,
                                    const Group& group, int number, int repetitions) {
-  stimuli::Random random(protocol.seed, {static_cast<std::uint64_t>(participant_number), kOrder,
-                                         code(group), static_cast<std::uint64_t>(number)});
+  Random random(protocol.seed, {static_cast<std::uint64_t>(participant_number), kOrder, code(group),
+                                static_cast<std::uint64_t>(number)});
   return ordered_trials(protocol, group, equal_counts(protocol, group, repetitions), random);
 }
 
 void draw_orientations(const Protocol& protocol, int participant_number,
                        const std::vector<Trial*>& trials) {
-  stimuli::Random random(protocol.seed,
-                         {static_cast<std::uint64_t>(participant_number), kOrientation});
+  Random random(protocol.seed, {static_cast<std::uint64_t>(participant_number), kOrientation});
   orient(protocol, trials, random);
 }
 

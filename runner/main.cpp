@@ -18,11 +18,11 @@
 #include <string>
 #include <vector>
 
+#include "data/base/text.h"
 #include "data/store/store.h"
 #include "protocols/parse.h"
 #include "runner/commands/shared/command.h"
 #include "stimuli/convex_mesh.h"
-#include "stimuli/text.h"
 
 namespace {
 
@@ -97,8 +97,7 @@ const Command& command_named(const std::string& name) {
     names.emplace_back(command.name);
   }
   constexpr std::size_t kLongest = 40;  // of what may be a misspelt command
-  const std::string meant =
-      name.size() > kLongest ? "" : palpate::stimuli::nearest_word(name, names);
+  const std::string meant = name.size() > kLongest ? "" : palpate::nearest_word(name, names);
   throw palpate::runner::UsageError("no command '" + name + "'; " +
                                     (meant.empty() ? "" : "did you mean '" + meant + "'? ") +
                                     "'palpate --help' lists them");
@@ -135,19 +134,19 @@ int main(int argc, char** argv) {
       throw std::runtime_error("standard output could not be written (disk full or pipe closed)");
     return status;
   } catch (const palpate::runner::UsageError& error) {
-    std::cerr << "palpate: " << palpate::stimuli::printable_lines(error.what()) << "\n";
+    std::cerr << "palpate: " << palpate::printable_lines(error.what()) << "\n";
     return 2;
   } catch (const palpate::protocols::InputError& error) {
-    std::cerr << palpate::stimuli::printable_lines(error.what()) << "\n";
+    std::cerr << palpate::printable_lines(error.what()) << "\n";
     return 2;
   } catch (const palpate::stimuli::MeshError& error) {
-    std::cerr << palpate::stimuli::printable_lines(error.what()) << "\n";
+    std::cerr << palpate::printable_lines(error.what()) << "\n";
     return 2;
   } catch (const palpate::data::StoreRefused& error) {
-    std::cerr << "palpate: " << palpate::stimuli::printable_lines(error.what()) << "\n";
+    std::cerr << "palpate: " << palpate::printable_lines(error.what()) << "\n";
     return 2;
   } catch (const std::exception& error) {
-    std::cerr << "palpate: " << palpate::stimuli::printable_lines(error.what()) << "\n";
+    std::cerr << "palpate: " << palpate::printable_lines(error.what()) << "\n";
     return 1;
   }
 }

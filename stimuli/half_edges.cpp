@@ -15,8 +15,8 @@ namespace {
 
 using Index = HalfEdges::Index;
 
-bool finite(const Vec3& v) {
-  // Far larger numbers overflow when they are multiplied, and no object is that far away.
+bool is_usable(const Vec3& v) {
+  // NaN is not. Far larger numbers overflow when they are multiplied, and no object is that far away.
   constexpr double kLargest = 1e30;
   return std::abs(v.x) <= kLargest && std::abs(v.y) <= kLargest && std::abs(v.z) <= kLargest;
 }
@@ -181,7 +181,7 @@ void check_numbers(const PolygonSoup& soup) {
   MeshFaults faults;
   if (soup.faces.empty()) faults.add("empty", [] { return "expected faces, found none"; });
   for (Index v = 0; v < soup.vertices.size(); ++v) {
-    if (finite(soup.vertices[v])) continue;
+    if (is_usable(soup.vertices[v])) continue;
     faults.add("not finite", [&] {
       return MeshNaming(soup.names).vertex(v, soup.vertices[v]) +
              ": expected three finite coordinates (up to 1e30 m)";

@@ -10,8 +10,8 @@
 #include <system_error>
 #include <utility>
 
+#include "data/base/text.h"
 #include "stimuli/mesh_formats.h"
-#include "stimuli/text.h"
 
 namespace palpate::stimuli {
 namespace {

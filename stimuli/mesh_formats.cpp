@@ -12,8 +12,8 @@
 #include <utility>
 #include <vector>
 
-#include "stimuli/input_file.h"
-#include "stimuli/text.h"
+#include "data/base/input_file.h"
+#include "data/base/text.h"
 
 namespace palpate::stimuli {
 namespace {

@@ -15,10 +15,10 @@
 #include <string_view>
 #include <vector>
 
+#include "data/base/input_file.h"
 #include "data/base/json_text.h"
-#include "stimuli/input_file.h"
+#include "data/base/text.h"
 #include "stimuli/mesh_formats.h"
-#include "stimuli/text.h"
 #include "stimuli/vec.h"
 
 namespace palpate::stimuli {
@@ -133,8 +133,8 @@ std::string found_text(const json* value) {
 
 json parsed(std::string_view text) {
   try {
-    return data::read_json(text);
-  } catch (const data::JsonError& error) {
+    return read_json(text);
+  } catch (const JsonError& error) {
     if (!error.byte) throw GltfRefused{"", error.expected, error.found};
     const std::size_t at = *error.byte;
     const auto line =
@@ -634,7 +634,7 @@ PolygonSoup read_gltf(std::string_view bytes, FileFaults& faults) {
 
 std::string with_buffers(const std::string& bytes, const ContentsOf& contents_of) {
   using nlohmann::json;
-  json root = data::json_or_discarded(bytes);
+  json root = json_or_discarded(bytes);
   if (!root.is_object() || !root.contains("buffers") || !root["buffers"].is_array()) return bytes;
   bool changed = false;
   for (std::size_t i = 0; i < root["buffers"].size(); ++i) {

@@ -1,7 +1,7 @@
 #pragma once
 // Random rotations.
 
-#include "stimuli/random.h"
+#include "data/base/random.h"
 #include "stimuli/vec.h"
 
 namespace palpate::stimuli {

@@ -44,7 +44,7 @@ Figure servo_of(const Analysis& analysis, const StudyRecord& record) {
   const double highest_shown = std::max(highest, 1.0);
   for (const ServoQuality& servo : record.servo) {
     Panel panel;
-    panel.title = stimuli::printable(servo.renderer, 40);
+    panel.title = printable(servo.renderer, 40);
     panel.x = log_axis(edge(first), edge(last + 1), "longest period (ms, logarithmic)");
     panel.x.grid = false;
     panel.y = linear_axis(0, highest_shown, "trials (%)");
@@ -59,7 +59,7 @@ Figure servo_of(const Analysis& analysis, const StudyRecord& record) {
           fixed(std::pow(10, edge(b)), 2) + " to " + fixed(std::pow(10, edge(b + 1)), 2) +
               " ms: " + counted(n, "trial", "trials") + " (" + fixed(percent, 1) + " %)"));
     }
-    figure.description += stimuli::printable(servo.renderer, 40) + ": " +
+    figure.description += printable(servo.renderer, 40) + ": " +
                           std::to_string(servo.missed_ticks) + " of " +
                           std::to_string(servo.ticks) + " ticks missed, longest period " +
                           fixed(1000 * servo.longest_period, 3) + " ms. ";
@@ -117,10 +117,9 @@ Panel confusion_panel(const Analysis& analysis, std::size_t renderer, std::size_
       const std::size_t n = a + 1 == answers.size() ? row.back() : row[a];
       const double proportion = total ? static_cast<double>(n) / static_cast<double>(total) : 0;
       const double x = static_cast<double>(a), y = panel.y.high - static_cast<double>(s) - 1;
-      const std::string text = name + ": " + stimuli::printable(table.shapes[s], 40) +
-                               " answered as " + stimuli::printable(answers[a], 40) + " " +
-                               counted(n, "time", "times") + " of " + std::to_string(total) + " (" +
-                               percent_text(n, total) + ")";
+      const std::string text = name + ": " + printable(table.shapes[s], 40) + " answered as " +
+                               printable(answers[a], 40) + " " + counted(n, "time", "times") +
+                               " of " + std::to_string(total) + " (" + percent_text(n, total) + ")";
       panel.marks.push_back(rect_mark(Role::heat, x + 0.02, y + 0.03, x + 0.98, y + 0.97,
                                       n ? 0.08 + 0.9 * proportion : 0.03, text));
       if (n == 0) continue;
@@ -156,7 +155,7 @@ bool add_changes(Panel& panel, const Comparison& comparison, const std::vector<s
   for (std::size_t s = 0; s < shapes; ++s) {
     const SpeedAccuracy& both = comparison.speed_accuracy[s];
     if (!both.percent_change_time || !both.accuracy_change) continue;
-    const std::string name = stimuli::printable(names[s], 40);
+    const std::string name = printable(names[s], 40);
     const double x = *both.percent_change_time, y = 100 * *both.accuracy_change;
     std::string text =
         (panel.title.empty() ? "" : panel.title + ", ") + name + ": time " + fixed(x, 1) + " %";
@@ -194,7 +193,7 @@ Figure confusion_of(const Analysis& analysis) {
     for (std::size_t s = 0; s < shapes; ++s) {
       const AccuracyCell& cell = analysis.description.accuracy[r][s];
       figure.description += short_name(analysis.table.renderers[r]) + ", " +
-                            stimuli::printable(analysis.table.shapes[s], 40) + ": " +
+                            printable(analysis.table.shapes[s], 40) + ": " +
                             percent_text(cell.n_correct, cell.n_trials) + " correct. ";
     }
   }
@@ -282,7 +281,7 @@ Figure exclusions_of(const Analysis& analysis) {
     const std::string renderer = short_name(analysis.table.renderers[r]);
     const Role role = style_of(analysis, analysis.table.renderers[r]).role;
     figure.legend.push_back(
-        {stimuli::printable(analysis.table.renderers[r], 200), role, MarkerShape::square});
+        {printable(analysis.table.renderers[r], 200), role, MarkerShape::square});
     for (std::size_t g = 0; g < kGroups; ++g) {
       const std::size_t count =
           kReasons[g].count ? lost.*kReasons[g].count : lost.n_trials - lost.n_used;

@@ -49,11 +49,11 @@ void add_participants(Panel& panel, const Analysis& analysis, std::size_t render
   const std::size_t n = std::min(table.participants.size(), kShownParticipants);
   const double opacity = n <= 10 ? 0.6 : n <= 40 ? 0.4 : 0.2;
   for (std::size_t p = 0; p < n; ++p) {
-    const std::string participant = stimuli::printable(table.participants[p], 40);
+    const std::string participant = printable(table.participants[p], 40);
     Mark line = line_mark(Role::soft, {}, {}, 1);
     line.opacity = opacity;
     line.participant = participant;
-    line.text = participant + ", " + stimuli::printable(table.shapes[shape], 40) + ":";
+    line.text = participant + ", " + printable(table.shapes[shape], 40) + ":";
     std::vector<Mark> dots;
     for (std::size_t r = 0; r < renderers; ++r) {
       const ParticipantCell& cell = analysis.description.participant_cells[r][shape][p];
@@ -169,7 +169,7 @@ bool add_reductions(Panel& panel, const Comparison& comparison,
     const double left = static_cast<double>(s) + (censored ? 0.36 : 0.42),
                  right = static_cast<double>(s) + (censored ? 0.72 : 0.62);
     std::string text =
-        (panel.title.empty() ? "" : panel.title + ", ") + stimuli::printable(names[s], 40) + ": ";
+        (panel.title.empty() ? "" : panel.title + ", ") + printable(names[s], 40) + ": ";
     text += shape.percent_reduction_geometric ? fixed(*shape.percent_reduction_geometric, 1) + " %"
                                               : std::string("undefined");
     if (shape.t_test.log_ratio_ci95) {
@@ -220,9 +220,8 @@ Figure figure15_of(const Analysis& analysis) {
       if (!cell.mean_of_participant_means) continue;
       const RendererStyle style = style_of(analysis, table.renderers[r]);
       const double x = static_cast<double>(s) + mean_position(r, renderers);
-      std::string text = stimuli::printable(table.shapes[s], 40) + ", " +
-                         short_name(table.renderers[r]) + ": mean " +
-                         seconds_text(*cell.mean_of_participant_means);
+      std::string text = printable(table.shapes[s], 40) + ", " + short_name(table.renderers[r]) +
+                         ": mean " + seconds_text(*cell.mean_of_participant_means);
       if (const auto ends = interval_of(cell)) {
         text += ", 95 % interval " + fixed(ends->low, 2) + " to " + fixed(ends->high, 2) + " s";
         add_interval(panel, style.role, x, ends->low, ends->high, text);

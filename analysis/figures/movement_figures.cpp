@@ -49,9 +49,9 @@ class Drawer {
     return role_of(table_.trials.renderers[renderer], renderer);
   }
   std::string name(std::size_t renderer) const {
-    return stimuli::printable(table_.trials.renderers[renderer], 40);
+    return printable(table_.trials.renderers[renderer], 40);
   }
-  std::string shape(std::size_t s) const { return stimuli::printable(table_.trials.shapes[s], 40); }
+  std::string shape(std::size_t s) const { return printable(table_.trials.shapes[s], 40); }
 
   const MovementTable& table_;
   const MovementPictures& pictures_;

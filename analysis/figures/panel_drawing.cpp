@@ -46,7 +46,7 @@ FigureAxis names_axis(const std::vector<std::string>& names, std::size_t shown, 
   axis.grid = false;
   axis.names = true;
   for (std::size_t i = 0; i < shown; ++i) {
-    axis.ticks.push_back({static_cast<double>(i) + 0.5, stimuli::printable(names[i], 160)});
+    axis.ticks.push_back({static_cast<double>(i) + 0.5, printable(names[i], 160)});
   }
   return axis;
 }
@@ -354,13 +354,13 @@ RendererStyle style_of(const Analysis& analysis, std::string_view renderer) {
   return kStyles.back();
 }
 
-std::string short_name(const std::string& renderer) { return stimuli::printable(renderer, 40); }
+std::string short_name(const std::string& renderer) { return printable(renderer, 40); }
 
 void add_renderers(Figure& figure, const Analysis& analysis, std::size_t shown) {
   for (std::size_t r = 0; r < shown; ++r) {
     const std::string& renderer = analysis.table.renderers[r];
     const RendererStyle style = style_of(analysis, renderer);
-    figure.legend.push_back({stimuli::printable(renderer, 200), style.role, style.shape});
+    figure.legend.push_back({printable(renderer, 200), style.role, style.shape});
   }
 }
 
@@ -391,8 +391,7 @@ Panel comparison_panel(const Analysis& analysis, const RendererPair& pair, std::
   Panel panel;
   constexpr std::size_t kLongest = 24;  // bytes of each name, so that two fit above a narrow panel
   if (!alone) {
-    panel.title = stimuli::printable(pair.renderer, kLongest) + " − " +
-                  stimuli::printable(pair.reference, kLongest);
+    panel.title = printable(pair.renderer, kLongest) + " − " + printable(pair.reference, kLongest);
   }
   panel.width =
       std::max(alone ? kFullPanelWidth : kComparisonPanelWidth, slot * static_cast<double>(shapes));

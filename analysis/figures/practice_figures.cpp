@@ -32,7 +32,7 @@ bool add_orders(Panel& panel, const Analysis& analysis, std::size_t comparison, 
   panel.marks.push_back(line_mark(Role::soft, {0, panel.x.high}, {0, 0}, 1.4));
   for (std::size_t s = 0; s < shapes; ++s) {
     const OrderEffect& order = analysis.practice.pairs[comparison].shapes[s];
-    const std::string name = before + stimuli::printable(analysis.table.shapes[s], 40);
+    const std::string name = before + printable(analysis.table.shapes[s], 40);
     const double x = static_cast<double>(s) + 0.5;
     const auto add_group = [&](const OrderGroup& group, const std::string& renderer, double at) {
       if (!group.mean_log_ratio) return;
@@ -168,8 +168,7 @@ Figure order_of(const Analysis& analysis) {
   const RendererPair& first = analysis.comparisons.front().pair;
   const auto add_entry = [&](const std::string& renderer) {
     const RendererStyle style = style_of(analysis, renderer);
-    figure.legend.push_back(
-        {stimuli::printable(renderer, 200) + " first", style.role, style.shape});
+    figure.legend.push_back({printable(renderer, 200) + " first", style.role, style.shape});
   };
   for (std::size_t c = 0; c < comparisons; ++c) {
     const RendererPair& pair = analysis.comparisons[c].pair;

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "analysis/text.h"
+#include "data/base/text.h"
 
 namespace palpate::analysis {
 
@@ -205,8 +206,7 @@ double text_width(std::string_view text, double size, bool bold) {
     const auto byte = static_cast<std::uint8_t>(c);
     if (byte >= 0x20 && byte < 0x7F) {
       thousandths += kWidths[byte - 0x20];
-    } else if ((byte & 0xC0U) !=
-               0x80) {  // first byte of a character; from 0xE3 on: East Asian, full width
+    } else if (!continues_character(c)) {  // from 0xE3 on: East Asian, full width
       thousandths += byte >= 0xE3 ? kWide : kOther;
     }
   }

@@ -9,7 +9,7 @@
 #include "analysis/figures/panel_drawing.h"
 #include "analysis/statistics/paper_effects.h"
 #include "analysis/text.h"
-#include "stimuli/random.h"
+#include "data/base/random.h"
 
 namespace palpate::analysis {
 
@@ -80,7 +80,7 @@ std::vector<std::size_t> shown_rows(const SweepAnalysis& analysis,
     if (!std::isnan(values[row])) rows.push_back(row);
   }
   if (rows.size() <= kShownPoints) return rows;
-  stimuli::Random random(analysis.seed, {2});
+  Random random(analysis.seed, {2});
   random.shuffle(rows);
   rows.resize(kShownPoints);
   std::sort(rows.begin(), rows.end());

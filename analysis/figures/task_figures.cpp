@@ -44,12 +44,12 @@ void add_curve_of(Panel& panel, const ParticipantFunction& one) {
 
 /// "level (N/m)"
 std::string level_title(const std::string& unit) {
-  return unit.empty() ? "level" : "level (" + stimuli::printable(unit) + ")";
+  return unit.empty() ? "level" : "level (" + printable(unit) + ")";
 }
 
 Panel function_panel(const ParticipantFunction& one, const std::string& unit) {
   Panel panel;
-  panel.title = stimuli::printable(one.participant);
+  panel.title = printable(one.participant);
   const Interval range = levels_of(one);
   panel.x = linear_axis(range.low, range.high, level_title(unit));
   panel.y = linear_axis(0, 100, "success (%)");
@@ -72,8 +72,8 @@ Panel function_panel(const ParticipantFunction& one, const std::string& unit) {
 /// turned.
 Panel track_panel(const ParticipantFunction& one, const Track& track, const std::string& unit) {
   Panel panel;
-  panel.title = stimuli::printable(one.participant);
-  if (one.tracks.size() > 1) panel.title += ", track " + stimuli::printable(track.name);
+  panel.title = printable(one.participant);
+  if (one.tracks.size() > 1) panel.title += ", track " + printable(track.name);
   const auto [low, high] = std::minmax_element(track.levels.begin(), track.levels.end());
   const double margin = *low < *high ? 0.06 * (*high - *low) : 0.5;
   panel.x = linear_axis(0, static_cast<double>(track.levels.size() + 1), "trial of the track");
@@ -106,7 +106,7 @@ Panel track_panel(const ParticipantFunction& one, const Track& track, const std:
 std::string measure_title(const TaskGroup& group) {
   std::string name = measure_plural(group.measure);
   name.pop_back();
-  return group.unit.empty() ? name : name + " (" + stimuli::printable(group.unit) + ")";
+  return group.unit.empty() ? name : name + " (" + printable(group.unit) + ")";
 }
 
 /// Of the n-th renderer of a group.
@@ -151,10 +151,10 @@ void add_participants_of(Panel& panel, const TaskGroup& group) {
           lines.try_emplace(figure.participant, line_mark(Role::soft, {}, {}, 1)).first->second;
       line.x.push_back(static_cast<double>(r) + 0.62);
       line.y.push_back(figure.value);
-      Mark dot = symbol(role, shape, line.x.back(), figure.value, 2.6,
-                        stimuli::printable(figure.participant) + ", " +
-                            stimuli::printable(group.renderers[r].renderer) + ": " +
-                            short_number(figure.value));
+      Mark dot =
+          symbol(role, shape, line.x.back(), figure.value, 2.6,
+                 printable(figure.participant) + ", " + printable(group.renderers[r].renderer) +
+                     ": " + short_number(figure.value));
       dot.opacity = 0.7;
       panel.marks.push_back(std::move(dot));
     }
@@ -162,7 +162,7 @@ void add_participants_of(Panel& panel, const TaskGroup& group) {
   for (auto& [participant, line] : lines) {
     if (line.x.size() < 2) continue;
     line.opacity = 0.5;
-    line.text = stimuli::printable(participant);
+    line.text = printable(participant);
     panel.marks.push_back(std::move(line));
   }
 }
@@ -182,7 +182,7 @@ Panel group_panel(const TaskGroup& group) {
     if (!one.mean) continue;
     const auto [role, shape] = group_style(one.renderer, r);
     const double x = static_cast<double>(r) + 0.38;
-    std::string text = stimuli::printable(one.renderer) + ": mean " + short_number(*one.mean);
+    std::string text = printable(one.renderer) + ": mean " + short_number(*one.mean);
     if (one.ci95) {
       text +=
           ", 95 % interval " + short_number(one.ci95->low) + " to " + short_number(one.ci95->high);
@@ -201,9 +201,8 @@ std::string difference_sentence(const TaskComparison& one) {
     const auto shown = [&](double value) {
       return short_number(one.logarithms ? std::exp(value) : value);
     };
-    text += measure_plural(one.measure) + ", " +
-            stimuli::printable(one.conditions[difference.condition]) +
-            (one.logarithms ? " / " : " - ") + stimuli::printable(one.conditions[0]) + ": " +
+    text += measure_plural(one.measure) + ", " + printable(one.conditions[difference.condition]) +
+            (one.logarithms ? " / " : " - ") + printable(one.conditions[0]) + ": " +
             shown(difference.mean);
     if (const auto& ends = difference.t_test.log_ratio_ci95)
       text += " [" + shown(ends->low) + ", " + shown(ends->high) + "]";
@@ -223,7 +222,7 @@ void add_group_figures(const TaskAnalysis& analysis, std::vector<Figure>& figure
     Figure figure;
     figure.title = "Over participants: " + first.task;
     for (const std::string* name : {&first.block_name, &first.shape}) {
-      if (!name->empty()) figure.title += ", " + stimuli::printable(*name);
+      if (!name->empty()) figure.title += ", " + printable(*name);
     }
     if (analysis.table.simulated) figure.label = "SIMULATED PARTICIPANTS";
     figure.notes.push_back(
@@ -236,8 +235,8 @@ void add_group_figures(const TaskAnalysis& analysis, std::vector<Figure>& figure
       figure.description += measure_plural(group.measure) + ": ";
       for (const GroupMean& one : group.renderers) {
         shown = std::max(shown, one.participants.size());
-        figure.description += stimuli::printable(one.renderer) + " " +
-                              (one.mean ? short_number(*one.mean) : "no mean") + ". ";
+        figure.description +=
+            printable(one.renderer) + " " + (one.mean ? short_number(*one.mean) : "no mean") + ". ";
       }
       if (shown > 0) figure.panels.push_back(group_panel(group));
       most = std::max(most, shown);
@@ -260,7 +259,7 @@ Figure figure_of(const TaskAnalysis& analysis, const TaskCell& cell, std::string
   figure.id = std::move(id);
   figure.title = what + ": " + cell.task;
   for (const std::string* name : {&cell.block_name, &cell.shape, &cell.renderer}) {
-    if (!name->empty()) figure.title += ", " + stimuli::printable(*name);
+    if (!name->empty()) figure.title += ", " + printable(*name);
   }
   figure.subtitle = counted(cell.participants.size(), "participant", "participants") + ", " +
                     counted(cell.trials, "trial", "trials");
@@ -294,7 +293,7 @@ std::vector<Figure> task_figures(const TaskAnalysis& analysis) {
       for (std::size_t t = 0; t < std::min(one.tracks.size(), kDrawnTracks); ++t)
         tracks.panels.push_back(track_panel(one, one.tracks[t], cell.level_unit));
       functions.description +=
-          stimuli::printable(one.participant) + ": " +
+          printable(one.participant) + ": " +
           (one.fit.undefined.empty() ? "threshold " + fixed(one.fit.parameters.threshold, 4)
                                      : one.fit.undefined) +
           ". ";

@@ -233,7 +233,7 @@ Figure times_of(const Analysis& analysis) {
     for (std::size_t r = 0; r < times.size(); ++r) {
       const TimeOutCell& outs = analysis.time_outs.cells[r][s];
       const std::string name =
-          stimuli::printable(table.shapes[s], 40) + ", " + short_name(table.renderers[r]);
+          printable(table.shapes[s], 40) + ", " + short_name(table.renderers[r]);
       const RendererStyle style = style_of(analysis, table.renderers[r]);
       const ViolinPosition position = violin_position(analysis, r, renderers, s, widest);
       if (outs.highest_limit) add_time_outs(panel, outs, style, position, max_width, name);

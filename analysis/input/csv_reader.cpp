@@ -6,7 +6,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "stimuli/text.h"
+#include "data/base/text.h"
 
 namespace palpate::analysis {
 namespace {
@@ -40,7 +40,7 @@ std::vector<AlikeColumn> alike_columns(const std::vector<std::string>& found,
     std::size_t least = own.size() <= 5 ? 2 : 3;  // beyond, it is another word
     for (const std::string_view one : known) {
       if (std::ranges::find(found, one) != found.end()) continue;
-      const std::size_t distance = stimuli::edit_distance(own, plain(one));
+      const std::size_t distance = edit_distance(own, plain(one));
       if (distance < least) {
         least = distance;
         nearest = one;
@@ -52,14 +52,14 @@ std::vector<AlikeColumn> alike_columns(const std::vector<std::string>& found,
 }
 
 std::string sentence(const AlikeColumn& column) {
-  return "Column '" + stimuli::printable(column.found, kMostShown) +
+  return "Column '" + printable(column.found, kMostShown) +
          "' is not known and was not read; is '" + column.meant + "' meant?";
 }
 
 std::string hint_for(std::string_view missing, const std::vector<AlikeColumn>& alike) {
   const auto found = std::ranges::find(alike, missing, &AlikeColumn::meant);
   if (found == alike.end()) return "";
-  return " (is '" + stimuli::printable(found->found, kMostShown) + "' meant?)";
+  return " (is '" + printable(found->found, kMostShown) + "' meant?)";
 }
 
 namespace {
@@ -78,8 +78,7 @@ const char* find(const char* from, const char* to, char what) {
 
 }  // namespace
 
-CsvReader::CsvReader(const std::string& path)
-    : file_(std::make_unique<stimuli::InputFile>(path, kMaxFile)) {
+CsvReader::CsvReader(const std::string& path) : file_(std::make_unique<InputFile>(path, kMaxFile)) {
   buffer_.resize(CsvReader::kMaxRecord + kBlock);
   fill();
   if (end_ >= 3 && std::memcmp(buffer_.data(), "\xEF\xBB\xBF", 3) == 0) begin_ = 3;

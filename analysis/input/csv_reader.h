@@ -8,7 +8,7 @@
 #include <string_view>
 #include <vector>
 
-#include "stimuli/input_file.h"
+#include "data/base/input_file.h"
 
 namespace palpate::analysis {
 
@@ -61,7 +61,7 @@ class CsvReader {
   Quoted split_quoted();
   bool end_with(std::string fault);
 
-  std::unique_ptr<stimuli::InputFile> file_;
+  std::unique_ptr<InputFile> file_;
   std::vector<char> buffer_;
   std::size_t begin_ = 0, end_ = 0;  ///< unread bytes of buffer_
   bool at_end_ = false, stopped_ = false;

@@ -6,8 +6,8 @@
 
 #include "analysis/text.h"
 #include "data/base/json_text.h"
+#include "data/base/text.h"
 #include "data/store/store.h"
-#include "stimuli/text.h"
 
 namespace palpate::analysis {
 
@@ -24,7 +24,7 @@ void TorqueCounts::warn(std::vector<std::string>& warnings) const {
     if (count.left_out == 0) continue;
     warnings.push_back("In " + std::to_string(count.left_out) + " of " +
                        counted(count.trials, "trial", "trials") + " with " +
-                       stimuli::printable(renderer, 40) +
+                       printable(renderer, 40) +
                        " torque was left out: the device drives force alone.");
   }
 }
@@ -38,7 +38,7 @@ void remember(const std::string& value, std::vector<std::string>& known) {
 ProtocolText protocol_text(const data::ProtocolInfo& info) {
   ProtocolText protocol{info.name, info.sha256, info.text, {}, {}};
   protocol.title = title_of_protocol(info.text);
-  const auto json = data::json_or_discarded(info.text);
+  const auto json = json_or_discarded(info.text);
   if (!json.is_object()) return protocol;
   if (json.contains("seed") && json["seed"].is_number_integer()) {
     protocol.seed = json["seed"].dump();
@@ -65,7 +65,7 @@ void add_trial(const data::TrialRecord& record, ServoQuality& servo) {
 }  // namespace
 
 std::string title_of_protocol(const std::string& text) {
-  const auto json = data::json_or_discarded(text);
+  const auto json = json_or_discarded(text);
   if (!json.is_object() || !json.contains("title") || !json["title"].is_string()) return "";
   return json["title"].get<std::string>();
 }

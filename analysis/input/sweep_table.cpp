@@ -25,7 +25,7 @@ double coded(const data::SweepValue& value, std::vector<std::string>& words) {
 /// Words in the order of the space, so that their codes do not depend on the points.
 std::vector<std::vector<std::string>> words_of(const data::SweepPlan& plan) {
   std::vector<std::vector<std::string>> out(plan.parameters.size());
-  const auto space = data::json_or_discarded(plan.space);
+  const auto space = json_or_discarded(plan.space);
   if (!space.is_object() || !space.contains("parameters") || !space["parameters"].is_array())
     return out;
   std::size_t p = 0;
@@ -42,7 +42,7 @@ std::vector<std::vector<std::string>> words_of(const data::SweepPlan& plan) {
 }
 
 void read_protocol(const std::string& text, SweepTable& table) {
-  const auto json = data::json_or_discarded(text);
+  const auto json = json_or_discarded(text);
   if (!json.is_object()) return;
   if (json.contains("name") && json["name"].is_string()) table.protocol_name = json["name"];
   if (json.contains("repetitions") && json["repetitions"].is_number())

@@ -15,11 +15,11 @@
 #include "analysis/input/trials.h"
 #include "analysis/text.h"
 #include "data/base/json_text.h"
+#include "data/base/text.h"
 #include "data/files/text_sink.h"
 #include "data/store/store.h"
 #include "data/store/task_text.h"
 #include "protocols/parse.h"
-#include "stimuli/text.h"
 
 namespace palpate::analysis {
 namespace {
@@ -102,9 +102,8 @@ class TaskRow {
 
   void add_fault(std::string_view column, const std::string& expected) {
     if (faults_.size() >= kMostTaskFaults) return;
-    faults_.push_back(
-        {file_, "line " + std::to_string(reader_.line()) + ", " + std::string(column),
-         expected + ", found '" + shortened(stimuli::printable(text(column)), 40) + "'"});
+    faults_.push_back({file_, "line " + std::to_string(reader_.line()) + ", " + std::string(column),
+                       expected + ", found '" + shortened(printable(text(column)), 40) + "'"});
   }
 
  private:
@@ -296,7 +295,7 @@ void note_once(const std::string& value, std::vector<std::string>& known) {
 bool has_tasks(const std::string& database) {
   data::Store store = data::Store::open(database, data::Store::Mode::read_only);
   for (const data::ProtocolInfo& protocol : store.protocols()) {
-    const auto json = data::json_or_discarded(protocol.text);
+    const auto json = json_or_discarded(protocol.text);
     if (json.is_object() && json.contains("version") && json["version"] == 2) return true;
   }
   return false;
@@ -371,7 +370,7 @@ TaskTable read_task_trials_store(const std::string& path, const std::string& pro
     throw protocols::InputError(
         {{path, "trials",
           "expected at least one completed trial that is not practice" +
-              (protocol.empty() ? "" : " of the protocol " + stimuli::printable(protocol))}});
+              (protocol.empty() ? "" : " of the protocol " + printable(protocol))}});
   torque.warn(table.warnings);
   return table;
 }

@@ -364,16 +364,16 @@ class CsvTrials {
     ok_ = false;
     // Only faults that are listed are formatted: a file may have millions of bad rows.
     if (faults_.count() >= kMaxFaults) return faults_.add({}, {});
-    faults_.add(line(*reader_) + ", column " + std::string(kColumns[column]),
-                "expected " + std::string(expected) + "; found '" +
-                    stimuli::printable(field(column), 40) + "'");
+    faults_.add(
+        line(*reader_) + ", column " + std::string(kColumns[column]),
+        "expected " + std::string(expected) + "; found '" + printable(field(column), 40) + "'");
   }
 
   /// A name; an apostrophe that an export put before it against spreadsheet formulas is removed.
   std::string_view name(Column column, const Interner& known) {
     const std::string_view text = data::unguarded(field(column));
     if (known.contains(text)) return text;
-    if (text.empty() || text.size() > kMaxName || !stimuli::is_plain_utf8(text)) {
+    if (text.empty() || text.size() > kMaxName || !is_plain_utf8(text)) {
       fault(column, "a name of 1 to 200 bytes of UTF-8 without control characters");
     }
     if (text == kNoResponse) {
@@ -486,7 +486,7 @@ class CsvTrials {
   /// Values of provenance are displayed only: made printable, at most eight are kept.
   static void remember(std::string_view text, std::vector<std::string>& known) {
     if (text.empty() || (!known.empty() && known.back() == text)) return;
-    const std::string shown = stimuli::printable(text, 80);
+    const std::string shown = printable(text, 80);
     if (known.size() < 8 && std::find(known.begin(), known.end(), shown) == known.end()) {
       known.push_back(shown);
     }
@@ -533,7 +533,7 @@ namespace {
 /// stored, and mesh files that it names may be missing now.
 std::vector<std::string> stimuli_of(const std::string& protocol_text) {
   std::vector<std::string> names;
-  const auto json = data::json_or_discarded(protocol_text);
+  const auto json = json_or_discarded(protocol_text);
   if (!json.is_object() || !json.contains("stimuli") || !json["stimuli"].is_array()) return names;
   for (const auto& stimulus : json["stimuli"]) {
     if (stimulus.is_object() && stimulus.contains("name") && stimulus["name"].is_string()) {
@@ -567,7 +567,7 @@ TrialTable read_trials_store(const std::string& path) {
     if (record.renderer != "point" && record.renderer != "ray") {
       throw protocols::InputError({{path, "participant " + trial.participant.code,
                                     "expected the renderer 'point' or 'ray'; found '" +
-                                        stimuli::printable(record.renderer, 40) + "'"}});
+                                        printable(record.renderer, 40) + "'"}});
     }
     RawTrial raw;
     raw.participant = trial.participant.code;

@@ -7,7 +7,7 @@
 #include <numbers>
 #include <stdexcept>
 
-#include "stimuli/random.h"
+#include "data/base/random.h"
 
 namespace palpate::analysis {
 
@@ -20,7 +20,7 @@ std::vector<Vec3> draw_places(const std::vector<SurfaceTriangle>& surface, std::
     until.push_back(area);
   }
   if (!(area > 0)) throw std::invalid_argument("a surface without area has no places");
-  stimuli::Random random(kSeed);
+  Random random(kSeed);
   std::vector<Vec3> places;
   places.reserve(count);
   while (places.size() < count) {

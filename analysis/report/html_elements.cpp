@@ -5,7 +5,7 @@
 #include <cstdint>
 
 #include "analysis/text.h"
-#include "protocols/sha256.h"
+#include "data/base/checksum.h"
 
 namespace palpate::analysis {
 
@@ -28,7 +28,7 @@ void put_row(std::string& out, const std::vector<std::string>& cells, std::size_
     }
     if (c < n_names) out += " class=\"name\"";
     out += '>';
-    out += escaped(stimuli::printable(cells[c], 2000));
+    out += escaped(printable(cells[c], 2000));
     out += "</";
     out += tag;
     out += '>';
@@ -73,7 +73,7 @@ void put_table(std::string& out, const Table& table) {
   for (std::size_t r = 0; r < n; ++r) put_row(out, table.rows[r], table.n_names, false);
   out += "</tbody>\n</table>\n</div>\n";
   const auto note = [&](std::string_view text) {
-    out += "<p class=\"note\">" + escaped_sentence(stimuli::printable(text, 4000)) + "</p>\n";
+    out += "<p class=\"note\">" + escaped_sentence(printable(text, 4000)) + "</p>\n";
   };
   if (n < table.rows.size() || table.header.size() > kMostColumns) {
     note("Cut to " + std::to_string(kMostRows) + " rows and " + std::to_string(kMostColumns) +
@@ -91,7 +91,7 @@ void put_collapsible_tables(std::string& out, std::string_view summary,
 
 std::string script_hash(std::string_view script) {
   constexpr char kDigits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  const std::string hex = protocols::sha256_hex(script);
+  const std::string hex = checksum_hex(script);
   std::string out = "sha256-";
   for (std::size_t at = 0; at < hex.size(); at += 6) {  // 3 bytes are 4 base64 digits
     std::uint32_t bits = 0;

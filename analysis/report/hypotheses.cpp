@@ -118,7 +118,7 @@ const char* to_string(Verdict verdict) {
 
 NamedResults named_results(const std::string& analysis, double alpha) {
   NamedResults out;
-  put_numbers("", data::read_json(analysis), out);
+  put_numbers("", read_json(analysis), out);
   put_short_names(out);
   out["alpha"] = alpha;
   return out;
@@ -143,8 +143,8 @@ std::vector<Hypothesis> read_hypotheses(const std::string& text, const std::stri
     Hypothesis one;
     one.id = read_text("id", 40, reader);
     if (!one.id.empty() && !is_id(one.id)) {
-      faults.add(reader.pointer("id"), "expected letters, digits and '-', found '" +
-                                           stimuli::printable(one.id, 60) + "'");
+      faults.add(reader.pointer("id"),
+                 "expected letters, digits and '-', found '" + printable(one.id, 60) + "'");
     } else if (!one.id.empty() && !ids.insert(one.id).second) {
       faults.add(reader.pointer("id"), "expected each id once, found '" + one.id + "' again");
     }

@@ -131,10 +131,10 @@ std::vector<std::string> gain_sentences(const MovementAnalysis& analysis) {
     }
     const RendererPair& pair = analysis.measures.front().comparisons[gain.comparison].pair;
     const double change = percent(*gain.time_difference);
-    sentences.push_back(stimuli::printable(analysis.table.trials.shapes[gain.shape], 40) + ": " +
+    sentences.push_back(printable(analysis.table.trials.shapes[gain.shape], 40) + ": " +
                         fixed(std::abs(change), 1) + " % " + (change < 0 ? "less" : "more") +
-                        " time with " + stimuli::printable(pair.renderer, 40) + " than with " +
-                        stimuli::printable(pair.reference, 40) + "; at equal coverage a second, " +
+                        " time with " + printable(pair.renderer, 40) + " than with " +
+                        printable(pair.reference, 40) + "; at equal coverage a second, " +
                         fixed(std::abs(percent(*gain.time_difference_at_equal_measure)), 1) +
                         " % " + (*gain.time_difference_at_equal_measure < 0 ? "less" : "more") +
                         ".");
@@ -234,8 +234,7 @@ std::string movement_html(const MovementAnalysis& analysis, const MovementPictur
   const TrialTable& trials = analysis.table.trials;
   const std::string label = simulated_label(trials.simulated);
   const std::string study = trials.provenance.protocol_name;
-  HtmlPage page("What the hand did" + (study.empty() ? "" : ": " + stimuli::printable(study, 200)),
-                label);
+  HtmlPage page("What the hand did" + (study.empty() ? "" : ": " + printable(study, 200)), label);
   if (!label.empty()) page.put_banner(label + ": the movements here are a model's, not of humans.");
   std::size_t missing = 0;
   for (const auto& [reason, count] : analysis.table.missing) missing += count;
@@ -261,7 +260,7 @@ std::string movement_html(const MovementAnalysis& analysis, const MovementPictur
     page.put_note(
         "A trial can be seen as it was felt, here the first of the paths: palpate watch "
         "--db " +
-        stimuli::printable(trials.provenance.source, 400) + trial_options + " --out trial.html");
+        printable(trials.provenance.source, 400) + trial_options + " --out trial.html");
   }
   if (!analysis.gains.empty()) {
     page.begin_section("gain", "Gain in time beside differences of movement", "Gain");
@@ -286,7 +285,7 @@ std::string movement_html(const MovementAnalysis& analysis, const MovementPictur
   source.header = {"what", "value"};
   source.n_names = 2;
   const auto add = [&](const char* what, const std::string& value) {
-    if (!value.empty()) source.rows.push_back({what, stimuli::printable(value, 400)});
+    if (!value.empty()) source.rows.push_back({what, printable(value, 400)});
   };
   add("database", trials.provenance.source);
   add("protocol", trials.provenance.protocol_name);

@@ -82,10 +82,9 @@ std::size_t count_of(const Json& proportion, std::size_t studies) {
 void require_same(const std::string& what, const Json& found, const Json& expected) {
   for (const auto& [key, value] : expected.items()) {
     if (found.contains(key) && found.at(key) == value) continue;
-    throw std::invalid_argument(
-        "is of another " + what + ": " + key + " is " +
-        (found.contains(key) ? data::json_excerpt(found.at(key)) : "missing") + ", expected " +
-        data::json_excerpt(value));
+    throw std::invalid_argument("is of another " + what + ": " + key + " is " +
+                                (found.contains(key) ? json_excerpt(found.at(key)) : "missing") +
+                                ", expected " + json_excerpt(value));
   }
 }
 
@@ -94,7 +93,7 @@ void require_same(const std::string& what, const Json& found, const Json& expect
 std::vector<PlanPoint> read_plan_points(const std::string& json, const StudyModel& model,
                                         const PlanSettings& settings) {
   try {
-    const Json in = data::read_ordered_json(json);
+    const Json in = read_ordered_json(json);
     Json simulation = settings_json(settings);
     for (const char* other : {"power", "goal", "participants"}) simulation.erase(other);
     require_same("plan", in, {{"version", 1}});
@@ -115,7 +114,7 @@ std::vector<PlanPoint> read_plan_points(const std::string& json, const StudyMode
       }
     }
     return points;
-  } catch (const data::JsonError& error) {
+  } catch (const JsonError& error) {
     throw std::invalid_argument(std::string("is not what 'palpate plan --json' writes: ") +
                                 error.what());
   } catch (const Json::exception& error) {
@@ -157,7 +156,7 @@ bool is_first(const Json& value, const char* first, const char* second) {
   const auto word = value.get<std::string>();
   if (word != first && word != second)
     throw std::invalid_argument("expected " + std::string(first) + " or " + second + ", found " +
-                                data::json_excerpt(value));
+                                json_excerpt(value));
   return word == first;
 }
 
@@ -165,7 +164,7 @@ bool is_first(const Json& value, const char* first, const char* second) {
 
 PlanRecord read_plan(const std::string& json) {
   try {
-    const Json in = data::read_ordered_json(json);
+    const Json in = read_ordered_json(json);
     if (in.is_object() && !in.contains("model"))
       throw std::invalid_argument(
           "expected a plan of times (palpate plan --effect); this is another one");
@@ -197,7 +196,7 @@ PlanRecord read_plan(const std::string& json) {
       }
     }
     return plan;
-  } catch (const data::JsonError& error) {
+  } catch (const JsonError& error) {
     throw std::invalid_argument(std::string("is not what 'palpate plan --json' writes: ") +
                                 error.what());
   } catch (const Json::exception& error) {

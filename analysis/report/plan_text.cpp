@@ -20,7 +20,7 @@ std::string test_name(StudyTest test) {
 
 void put_line(std::string& out, const std::string& text, const std::string& indent = "") {
   const auto fits = [&](std::string_view line) { return indent.size() + width(line) <= 100; };
-  for (const std::string& line : wrapped(stimuli::printable(text), fits)) {
+  for (const std::string& line : wrapped(printable(text), fits)) {
     out += indent;
     out += shortened(line, 100 - indent.size());
     out += "\n";
@@ -30,8 +30,8 @@ void put_line(std::string& out, const std::string& text, const std::string& inde
 constexpr std::size_t kNameColumns = 14, kNumberColumns = 12, kWidestShape = 24;
 
 std::string column_name(const Plan& plan, std::size_t shape) {
-  return "  " + pad_left(shortened(stimuli::printable(plan.model.shapes[shape]), kWidestShape),
-                         kNumberColumns - 2);
+  return "  " +
+         pad_left(shortened(printable(plan.model.shapes[shape]), kWidestShape), kNumberColumns - 2);
 }
 
 /// Appends the table of a curve, restricted to the columns of these shapes.

@@ -33,7 +33,7 @@ void put_card(std::string& out, const PairedShape& shape, const CensoredEstimate
   const bool slower = shape.mean_log_ratio && *shape.mean_log_ratio > 0;
   out += "<li";
   if (clear) out += slower ? " class=\"slower\"" : " class=\"clear\"";
-  out += "><b>" + escaped(stimuli::printable(name, 80)) + "</b><span class=\"value\">";
+  out += "><b>" + escaped(printable(name, 80)) + "</b><span class=\"value\">";
   if (const auto& reduction = shape.percent_reduction_geometric) {
     out += fixed(*reduction < 0 ? -*reduction : *reduction, 1) + "\u00a0%</span> " +
            (slower ? "slower" : "faster");
@@ -74,8 +74,7 @@ void put_reduction_cards(std::string& out, const Analysis& analysis) {
   for (std::size_t c = 0; c < rows; ++c) {
     std::string compared = with_renderer(analysis, "against");
     if (all.size() > 1) {
-      compared =
-          "with " + with_article(stimuli::printable(all[c].pair.renderer, 80)) + " " + compared;
+      compared = "with " + with_article(printable(all[c].pair.renderer, 80)) + " " + compared;
       out += "<p class=\"study\">" + escaped(compared) + "</p>\n";
     }
     out += "<ul class=\"cards\" aria-label=\"Reduction of the time " + escaped(compared) +

@@ -51,8 +51,7 @@ class Report {
   void put_header() {
     const std::string study = study_name();
     if (!study.empty()) {
-      page_.above_title() +=
-          "<p class=\"study\">" + escaped(stimuli::printable(study, 400)) + "</p>\n";
+      page_.above_title() += "<p class=\"study\">" + escaped(printable(study, 400)) + "</p>\n";
     }
     std::string& out = page_.below_title();
     const Counts& counts = analysis_.description.counts;
@@ -70,7 +69,7 @@ class Report {
     constexpr std::size_t kMost = 100;
     const std::size_t n = std::min(analysis_.warnings.size(), kMost);
     for (std::size_t i = 0; i < n; ++i) {
-      out += "<li>" + escaped_sentence(stimuli::printable(analysis_.warnings[i], 4000)) + "</li>\n";
+      out += "<li>" + escaped_sentence(printable(analysis_.warnings[i], 4000)) + "</li>\n";
     }
     if (n < analysis_.warnings.size()) {
       out += "<li>and " + std::to_string(analysis_.warnings.size() - n) + " more</li>\n";
@@ -104,7 +103,7 @@ class Report {
     std::vector<std::string> names;
     for (const std::string& name : analysis_.table.participants) {
       if (names.size() == kShownParticipants) break;
-      names.push_back(stimuli::printable(name, 40));
+      names.push_back(printable(name, 40));
     }
     return names;
   }
@@ -172,7 +171,7 @@ class Report {
     page_.end_section();
     if (!record_.checked.empty()) {
       begin({"registration", "Held against its registration", "Registration"});
-      page_.body() += "<p>" + escaped_sentence(stimuli::printable(record_.checked, 4000)) +
+      page_.body() += "<p>" + escaped_sentence(printable(record_.checked, 4000)) +
                       "</p>\n<p><a href=\"" + escaped(record_.check_page) +
                       "\">The check, point by point</a></p>\n";
       page_.end_section();
@@ -237,7 +236,7 @@ class Report {
     }
     for (const ProtocolText& protocol : record_.protocols) {
       page_.body() += "<details class=\"long\">\n<summary>Protocol “" +
-                      escaped(stimuli::printable(protocol.name, 200)) +
+                      escaped(printable(protocol.name, 200)) +
                       "” as it was used</summary>\n<pre tabindex=\"0\">" +
                       protocol_lines(protocol.text) + "</pre>\n</details>\n";
     }

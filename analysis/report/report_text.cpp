@@ -27,7 +27,7 @@ std::string repeated(const char* what, std::size_t times) {
 void put_wrapped(std::string& out, const std::string& text, const std::string& indent) {
   const std::size_t room = kPageWidth - indent.size();
   const auto fits = [&](std::string_view line) { return width(line) <= room; };
-  for (const std::string& line : wrapped(stimuli::printable(text), fits)) {
+  for (const std::string& line : wrapped(printable(text), fits)) {
     out += indent + shortened(line, room) + "\n";
   }
 }
@@ -57,8 +57,7 @@ void put_text_table(std::string& out, const Table& table) {
   std::vector<std::size_t> widths(table.header.size());
   for (auto& row : rows) {
     for (std::size_t c = 0; c < row.size(); ++c) {
-      row[c] =
-          shortened(stimuli::printable(row[c]), text_only && c == 1 ? kValueColumns : kNameColumns);
+      row[c] = shortened(printable(row[c]), text_only && c == 1 ? kValueColumns : kNameColumns);
       widths[c] = std::max(widths[c], width(row[c]));
     }
   }

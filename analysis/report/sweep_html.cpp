@@ -14,8 +14,8 @@ std::string link_of(const std::string& figure) {
 
 void put_pattern(HtmlPage& page, const SweepAnalysis& analysis) {
   page.begin_section("pattern", "The pattern", "Pattern");
-  page.body() += "<pre tabindex=\"0\">" +
-                 escaped(stimuli::printable(analysis.pattern->expression, 2000)) + "</pre>\n";
+  page.body() +=
+      "<pre tabindex=\"0\">" + escaped(printable(analysis.pattern->expression, 2000)) + "</pre>\n";
   page.put_note("A shape's name stands for its gain in percent. " + pattern_note(analysis));
   page.end_section();
 }

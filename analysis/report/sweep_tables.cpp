@@ -188,7 +188,7 @@ std::string sweep_text(const SweepAnalysis& analysis) {
   out += paragraph_text(sweep_answer(analysis) + ".");
   if (analysis.pattern) {
     const PatternShare& pattern = *analysis.pattern;
-    out += "  " + stimuli::printable(pattern.expression, 400) + "\n";
+    out += "  " + printable(pattern.expression, 400) + "\n";
     out += paragraph_text(pattern_note(analysis));
   }
   for (const std::string& note : analysis.notes) out += paragraph_text("Note: " + note);

@@ -96,14 +96,14 @@ std::string study_of(const TaskTable& table) {
 std::string task_report_html(const TaskAnalysis& analysis, const std::string& program_version) {
   const TaskTable& source = analysis.table;
   const std::string label = source.simulated ? "SIMULATED PARTICIPANTS" : "";
-  HtmlPage page(stimuli::printable(study_of(source), 400), label);
+  HtmlPage page(printable(study_of(source), 400), label);
   if (source.simulated)
     page.put_banner(
         "SIMULATED PARTICIPANTS: numbers below are from a model of a participant, not from "
         "humans.");
   page.below_title() += "<p class=\"lead\">Thresholds and other results of tasks, " +
                         counted(source.trials.size(), "trial", "trials") + " of " +
-                        escaped(stimuli::printable(source.source, 400)) + "</p>\n";
+                        escaped(printable(source.source, 400)) + "</p>\n";
   if (!source.warnings.empty()) {
     page.below_title() += "<div class=\"warnings\" aria-label=\"Warnings\">\n";
     put_list(page.below_title(), source.warnings);

@@ -299,7 +299,7 @@ std::string task_report_json(const TaskAnalysis& analysis, const std::string& pr
     out["condition_comparisons"].push_back(comparison_json(one, false));
   if (analysis.accuracy) out["accuracy_model"] = accuracy_json(*analysis.accuracy);
   if (analysis.identification)
-    out["identification"] = data::read_ordered_json(report_json(*analysis.identification));
+    out["identification"] = read_ordered_json(report_json(*analysis.identification));
   return out.dump(1, ' ', false, TaskJson::error_handler_t::replace) + "\n";
 }
 

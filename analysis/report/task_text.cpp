@@ -35,7 +35,7 @@ std::string detection_text(const ParticipantFunction& one) {
 
 std::string procedure_text(const Track& track) {
   const auto& [spec, estimate, target, fitted] = *track.procedure;
-  std::string text = "    track " + stimuli::printable(track.name) + ", ";
+  std::string text = "    track " + printable(track.name) + ", ";
   const auto* quest = std::get_if<protocols::QuestPlus>(&spec);
   text += quest != nullptr ? "QUEST+" : kind_of(spec);
   text += ": ";
@@ -73,7 +73,7 @@ std::string reversal_text(protocols::Easier easier,
 
 std::string function_line(const ParticipantFunction& one,
                           const std::optional<protocols::Easier>& expected) {
-  std::string text = "  " + pad_right(stimuli::printable(one.participant), 12);
+  std::string text = "  " + pad_right(printable(one.participant), 12);
   const std::string detected = detection_text(one);
   if (!one.fit.undefined.empty())
     return text + "no function: " + one.fit.undefined + detected + "\n";
@@ -144,7 +144,7 @@ std::string magnitude_text(const TaskCell& cell) {
   std::string text;
   const MagnitudeEstimation& magnitude = *cell.magnitude;
   for (const StevensLine& line : magnitude.lines) {
-    text += "  " + pad_right(stimuli::printable(cell.participants[line.participant]), 12);
+    text += "  " + pad_right(printable(cell.participants[line.participant]), 12);
     text += line.exponent ? "exponent " + short_number(*line.exponent) : line.undefined;
     if (line.r_squared) text += ", r2 " + short_number(*line.r_squared);
     if (line.exponent.value_or(0) < 0) text += ", the numbers FALL as the level rises";
@@ -165,7 +165,7 @@ std::string magnitude_text(const TaskCell& cell) {
 std::string adjustment_text(const TaskCell& cell) {
   std::string text;
   for (const Adjustment& one : cell.adjustments) {
-    text += "  " + pad_right(stimuli::printable(cell.participants[one.participant]), 12) + "PSE " +
+    text += "  " + pad_right(printable(cell.participants[one.participant]), 12) + "PSE " +
             optional_interval(one.pse, one.pse_ci95) + ", constant error " +
             short_number(one.constant_error);
     if (one.jnd) text += ", JND " + short_number(*one.jnd);
@@ -178,7 +178,7 @@ std::string adjustment_text(const TaskCell& cell) {
 std::string cell_text(const TaskCell& cell) {
   std::string text = cell.task;
   for (const std::string* name : {&cell.block_name, &cell.shape, &cell.renderer}) {
-    if (!name->empty()) text += ", " + stimuli::printable(*name);
+    if (!name->empty()) text += ", " + printable(*name);
   }
   text += ": " + counted(cell.trials, "trial", "trials") + " of " +
           counted(cell.participants.size(), "participant", "participants") + ", " +
@@ -214,12 +214,12 @@ std::string cell_text(const TaskCell& cell) {
 std::string group_text(const TaskGroup& group) {
   std::string text = measure_plural(group.measure) + " over participants";
   for (const std::string* name : {&group.task, &group.block_name, &group.shape}) {
-    if (!name->empty()) text += ", " + stimuli::printable(*name);
+    if (!name->empty()) text += ", " + printable(*name);
   }
   text += group.geometric ? " (geometric means" : " (means";
   text += (group.unit.empty() ? "" : ", " + group.unit) + ")\n";
   for (const GroupMean& one : group.renderers) {
-    text += "  " + pad_right(stimuli::printable(one.renderer), 12) +
+    text += "  " + pad_right(printable(one.renderer), 12) +
             (one.mean ? optional_interval(one.mean, one.ci95) : "no mean") + " (" +
             counted(one.participants.size(), "participant", "participants");
     if (one.n_undetermined > 0)
@@ -233,7 +233,7 @@ std::string comparison_text(const TaskComparison& one, bool of_renderers) {
   std::string text =
       measure_plural(one.measure) + " by " + (of_renderers ? "renderer" : "block and stimulus");
   const auto add = [&](const std::string& name) {
-    if (!name.empty()) text += ", " + stimuli::printable(name);
+    if (!name.empty()) text += ", " + printable(name);
   };
   add(one.task);
   add(one.block_name);
@@ -248,8 +248,8 @@ std::string comparison_text(const TaskComparison& one, bool of_renderers) {
     const auto shown = [&](double value) {
       return short_number(one.logarithms ? std::exp(value) : value);
     };
-    text += "  " + stimuli::printable(one.conditions[difference.condition]) +
-            (one.logarithms ? " / " : " - ") + stimuli::printable(one.conditions[0]) + ": ";
+    text += "  " + printable(one.conditions[difference.condition]) +
+            (one.logarithms ? " / " : " - ") + printable(one.conditions[0]) + ": ";
     if (difference.n_pairs == 0) {
       text += "no participant has both\n";
       continue;
@@ -274,7 +274,7 @@ std::string accuracy_text(const MixedLogistic& model) {
   for (const LogisticCoefficient& one : model.coefficients) {
     const bool intercept = one.name == "(Intercept)";
     text +=
-        "  " + pad_right(stimuli::printable(one.name), 18) + (intercept ? "odds " : "odds ratio ") +
+        "  " + pad_right(printable(one.name), 18) + (intercept ? "odds " : "odds ratio ") +
         with_interval(std::exp(one.estimate), {std::exp(one.ci95.low), std::exp(one.ci95.high)}) +
         ", p " + p_text(one.p) + "\n";
   }
@@ -289,8 +289,7 @@ std::string accuracy_text(const MixedLogistic& model) {
 std::string task_report_text(const TaskAnalysis& analysis) {
   std::string text;
   if (analysis.table.simulated) text += "SIMULATED PARTICIPANTS\n\n";
-  for (const std::string& warning : analysis.table.warnings)
-    text += stimuli::printable(warning, 400) + "\n";
+  for (const std::string& warning : analysis.table.warnings) text += printable(warning, 400) + "\n";
   if (!analysis.table.warnings.empty()) text += "\n";
   for (const TaskCell& cell : analysis.cells) text += cell_text(cell);
   for (const TaskGroup& group : analysis.groups) text += group_text(group);

@@ -91,10 +91,9 @@ std::string conclusion(const Analysis& analysis) {
 
 std::string with_renderer(const Analysis& analysis, const std::string& joint) {
   const RendererPair& pair = analysis.comparisons.front().pair;
-  const std::string reference = with_article(stimuli::printable(pair.reference, kLongestInPhrase));
+  const std::string reference = with_article(printable(pair.reference, kLongestInPhrase));
   if (analysis.comparisons.size() > 1) return joint + " " + reference;
-  const std::string with =
-      "with " + with_article(stimuli::printable(pair.renderer, kLongestInPhrase));
+  const std::string with = "with " + with_article(printable(pair.renderer, kLongestInPhrase));
   return pair.is_ray_minus_point() ? with : with + " " + joint + " " + reference;
 }
 

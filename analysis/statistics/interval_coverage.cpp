@@ -9,8 +9,8 @@
 
 #include "analysis/statistics/psychometric_bayes.h"
 #include "analysis/statistics/sensitivity.h"
+#include "data/base/random.h"
 #include "protocols/procedures/procedure.h"
-#include "stimuli/random.h"
 
 namespace palpate::analysis {
 namespace {
@@ -142,8 +142,8 @@ void add_yes_no(std::vector<CoverageDesign>& designs, double lapse) {
 }
 
 std::vector<LevelCount> answers_to(const CoverageDesign& design,
-                                   const protocols::InterleavedTracks& first,
-                                   stimuli::Random& random, int& trials) {
+                                   const protocols::InterleavedTracks& first, Random& random,
+                                   int& trials) {
   protocols::InterleavedTracks tracks = first;
   std::vector<LevelCount> counts;
   while (const auto asked = tracks.next()) {
@@ -178,7 +178,7 @@ std::size_t holds(const Interval& interval, double value) {
 
 CoverageStudy one_study(const CoverageDesign& design, std::uint64_t seed, std::size_t design_number,
                         std::size_t study, int simulations) {
-  stimuli::Random random(seed, {0xc7, design_number, study});
+  Random random(seed, {0xc7, design_number, study});
   CoverageStudy result;
   const protocols::InterleavedTracks tracks(design.tracks, random.next());
   const auto counts = answers_to(design, tracks, random, result.trials);

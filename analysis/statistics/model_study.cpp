@@ -6,8 +6,7 @@
 namespace palpate::analysis {
 
 std::vector<ModelAnswer> draw_answers(const StudyModel& model, double typical_time,
-                                      const std::vector<ModelTrial>& trials,
-                                      stimuli::Random& random) {
+                                      const std::vector<ModelTrial>& trials, Random& random) {
   const double first = random.normal(), second = random.normal();
   const double other = std::sqrt(std::max(0.0, 1 - model.correlation * model.correlation));
   const double intercept = std::log(typical_time) + model.intercept_sd * first;

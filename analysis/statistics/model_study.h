@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "analysis/statistics/power.h"
-#include "stimuli/random.h"
+#include "data/base/random.h"
 
 namespace palpate::analysis {
 
@@ -24,8 +24,7 @@ struct ModelAnswer {
 /// The trials of one participant, whose intercept and gains are drawn first.
 /// \param typical_time  s, geometric mean over participants with the reference; the model has none
 std::vector<ModelAnswer> draw_answers(const StudyModel& model, double typical_time,
-                                      const std::vector<ModelTrial>& trials,
-                                      stimuli::Random& random);
+                                      const std::vector<ModelTrial>& trials, Random& random);
 
 /// The same model with no effect of any shape.
 StudyModel without_effect(StudyModel model);

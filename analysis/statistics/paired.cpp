@@ -13,7 +13,7 @@
 #include <thread>
 
 #include "analysis/statistics/quantiles.h"
-#include "stimuli/random.h"
+#include "data/base/random.h"
 
 namespace palpate::analysis {
 
@@ -165,7 +165,7 @@ std::optional<double> bca_coverage(std::size_t pairs) {
   return kCoverage[pairs - 2];
 }
 
-Bootstrap bootstrap_mean(const std::vector<double>& differences, stimuli::Random& random,
+Bootstrap bootstrap_mean(const std::vector<double>& differences, Random& random,
                          std::size_t resamples) {
   Bootstrap out;
   const TTest spread = t_test(differences);  // undefined in the same cases
@@ -313,7 +313,7 @@ void bootstrap_all(const std::vector<PairedShape*>& tests, std::uint64_t seed) {
   // A random stream for each: the result does not depend on the number of threads.
   const auto work = [&] {
     for (std::size_t i = next++; i < tests.size(); i = next++) {
-      stimuli::Random random(seed, {i});
+      Random random(seed, {i});
       tests[i]->bootstrap = bootstrap_mean(tests[i]->differences, random);
       tests[i]->bootstrap.seed = seed;
     }

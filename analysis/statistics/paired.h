@@ -13,7 +13,7 @@
 #include "analysis/input/trials.h"
 #include "analysis/statistics/describe.h"
 
-namespace palpate::stimuli {
+namespace palpate {
 class Random;
 }
 
@@ -75,7 +75,7 @@ constexpr std::size_t kResamples = 9999;
 /// where it is near 0.95, and below 2.
 std::optional<double> bca_coverage(std::size_t pairs);
 /// BCa interval of the mean (Efron 1987) from `resamples` resamples of the participants.
-Bootstrap bootstrap_mean(const std::vector<double>& differences, stimuli::Random& random,
+Bootstrap bootstrap_mean(const std::vector<double>& differences, Random& random,
                          std::size_t resamples = kResamples);
 /// The interval from the resamples' means. \param means reordered
 Bootstrap bca_interval(const std::vector<double>& differences, std::vector<double>& means);

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "analysis/text.h"
-#include "stimuli/text.h"
+#include "data/base/text.h"
 
 namespace palpate::analysis {
 
@@ -274,7 +274,7 @@ class Parser {
     const std::string* nearest = nullptr;
     std::size_t least = name.size() / 2 + 2;
     for (const std::string& one : known_) {
-      const std::size_t edits = stimuli::edit_distance(name, one);
+      const std::size_t edits = edit_distance(name, one);
       if (edits < least) {
         least = edits;
         nearest = &one;

@@ -11,7 +11,7 @@
 #include "analysis/statistics/mixed_model.h"
 #include "analysis/statistics/paired.h"
 #include "analysis/text.h"
-#include "stimuli/random.h"
+#include "data/base/random.h"
 
 namespace palpate::analysis {
 
@@ -152,7 +152,7 @@ class UsedTrials {
       up_to_.push_back(sum);
     }
   }
-  std::size_t operator()(stimuli::Random& random) const {
+  std::size_t operator()(Random& random) const {
     if (up_to_.empty()) return n_;
     const auto found = std::upper_bound(up_to_.begin(), up_to_.end(), random.unit());
     return std::min(n_, static_cast<std::size_t>(found - up_to_.begin()));
@@ -164,7 +164,7 @@ class UsedTrials {
 };
 
 /// Gamma of the given shape >= 0.5 and scale 1 (Marsaglia & Tsang 2000).
-double gamma_draw(double shape, stimuli::Random& random) {
+double gamma_draw(double shape, Random& random) {
   if (shape < 1) return gamma_draw(shape + 1, random) * std::pow(1 - random.unit(), 1 / shape);
   const double d = shape - 1.0 / 3, c = 1 / std::sqrt(9 * d);
   for (;;) {
@@ -177,7 +177,7 @@ double gamma_draw(double shape, stimuli::Random& random) {
 
 /// Draws the sufficient statistics of a study: cells' numbers of trials, means and sums of squares.
 void draw_study(const StudyModel& model, const UsedTrials& used_trials, bool squares,
-                stimuli::Random& random, ParticipantCells& participant_cells) {
+                Random& random, ParticipantCells& participant_cells) {
   const std::size_t n_participants = participant_cells[0][0].size();
   const double other = std::sqrt(std::max(0.0, 1 - model.correlation * model.correlation));
   for (std::size_t p = 0; p < n_participants; ++p) {
@@ -273,7 +273,7 @@ Power simulate_power(const StudyModel& model, const StudyDesign& design,
       if (begin >= settings.studies) return;
       const std::size_t end = std::min(begin + kChunk, settings.studies);
       for (std::size_t study = begin; study < end; ++study) {
-        stimuli::Random random(settings.seed, {design.participants, design.trials, study});
+        Random random(settings.seed, {design.participants, design.trials, study});
         draw_study(model, used_trials, settings.test == StudyTest::model, random,
                    participant_cells);
         if (settings.test == StudyTest::model) {

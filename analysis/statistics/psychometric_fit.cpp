@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "analysis/statistics/simplex.h"
-#include "stimuli/random.h"
+#include "data/base/random.h"
 
 namespace palpate::analysis {
 
@@ -435,7 +435,7 @@ GoodnessOfFit goodness_of_fit(const std::vector<LevelCount>& counts, const Psych
   if (!fit.undefined.empty()) return result;
   result.deviance = deviance_of(sums, fit);
   if (simulations == 0) return result;
-  stimuli::Random random(seed, {0xd0});
+  Random random(seed, {0xd0});
   int as_large = 1;
   for (int i = 0; i < simulations; ++i) {
     std::vector<LevelCount> simulated = sums;

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "analysis/statistics/quantiles.h"
-#include "stimuli/random.h"
+#include "data/base/random.h"
 
 namespace palpate::analysis {
 
@@ -144,7 +144,7 @@ SobolIndices sobol_indices(const std::vector<double>& outputs, const std::vector
                   [](double n) { return n > 0; }))
     out.noise_share = all.noise / all.variance;
   std::vector<std::vector<double>> first(parameters), total(parameters);
-  stimuli::Random random(seed, {1});
+  Random random(seed, {1});
   std::vector<std::size_t> drawn(samples.size());
   for (std::size_t r = 0; r < resamples; ++r) {
     for (std::size_t& one : drawn) one = random.below(samples.size());

@@ -8,7 +8,7 @@
 #include "analysis/statistics/discrimination.h"
 #include "analysis/statistics/psychometric_fit.h"
 #include "analysis/statistics/sensitivity.h"
-#include "stimuli/random.h"
+#include "data/base/random.h"
 
 namespace palpate::analysis {
 namespace {
@@ -18,7 +18,7 @@ constexpr double kStandard = 1;  // levels are shares of it
 
 /// The JND of a participant with a condition, as a study finds it.
 std::optional<double> measured_jnd(const ThresholdStudy& study, double jnd, double assumed,
-                                   double pse, std::size_t trials, stimuli::Random& random) {
+                                   double pse, std::size_t trials, Random& random) {
   PsychometricModel model;
   model.lapse = {0, true, kMostLapse};
   model.guess_is_lapse = true;
@@ -42,8 +42,7 @@ std::optional<double> measured_jnd(const ThresholdStudy& study, double jnd, doub
 }
 
 /// Log ratio of a participant's JNDs; nullopt: one is not determined.
-std::optional<double> log_ratio_of(const ThresholdStudy& study, std::size_t trials,
-                                   stimuli::Random random) {
+std::optional<double> log_ratio_of(const ThresholdStudy& study, std::size_t trials, Random random) {
   const double first =
       study.weber_fraction * std::exp(study.participant_sd * random.normal()) * kStandard;
   const double ratio = study.ratio * std::exp(study.effect_sd * random.normal());
@@ -89,7 +88,7 @@ ThresholdPlan plan_thresholds(const ThresholdStudy& study, ThresholdPlanSettings
       std::vector<std::optional<double>> ratios;
       for (std::size_t i = 0; i < most; ++i)
         ratios.push_back(log_ratio_of(study, asked.trials[t],
-                                      stimuli::Random(asked.seed, {0x7a, asked.trials[t], s, i})));
+                                      Random(asked.seed, {0x7a, asked.trials[t], s, i})));
       for (std::size_t n = 0; n < powers.size(); ++n) {
         powers[n].trials = asked.trials[t];
         powers[n].participants = asked.participants[n];

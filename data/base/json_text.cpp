@@ -4,7 +4,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-namespace palpate::data {
+namespace palpate {
 namespace {
 
 template <class Json>
@@ -81,4 +81,4 @@ std::string json_excerpt(const nlohmann::json& value, std::size_t most) {
   return text.size() > most ? text.substr(0, most - 3) + "..." : text;
 }
 
-}  // namespace palpate::data
+}  // namespace palpate

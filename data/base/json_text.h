@@ -12,7 +12,7 @@
 #include <string>
 #include <string_view>
 
-namespace palpate::data {
+namespace palpate {
 
 /// Objects and arrays within each other. Protocols need 12.
 constexpr std::size_t kDeepestJson = 64;
@@ -38,4 +38,4 @@ nlohmann::json json_or_discarded(std::string_view text);
 /// written out in full.
 std::string json_excerpt(const nlohmann::json& value, std::size_t most = 60);
 
-}  // namespace palpate::data
+}  // namespace palpate

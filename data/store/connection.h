@@ -15,7 +15,7 @@
 #include <utility>
 #include <vector>
 
-#include "data/files/checksum.h"
+#include "data/base/checksum.h"
 #include "data/files/file_permissions.h"
 #include "data/store/forget.h"
 #include "data/store/seals.h"

@@ -19,9 +19,9 @@
 #include <string_view>
 #include <utility>
 
+#include "data/base/checksum.h"
 #include "data/errors.h"
 #include "data/files/atomic_file.h"
-#include "data/files/checksum.h"
 #include "data/files/file_permissions.h"
 #include "data/store/connection.h"
 #include "data/store/open.h"

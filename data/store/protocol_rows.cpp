@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "data/base/checksum.h"
 #include "data/base/json_text.h"
 #include "data/errors.h"
-#include "data/files/checksum.h"
 #include "data/store/connection.h"
 
 namespace palpate::data {

@@ -12,8 +12,9 @@
 #include <stdexcept>
 #include <string>
 
+#include "data/base/checksum.h"
+#include "data/base/text.h"
 #include "data/errors.h"
-#include "data/files/checksum.h"
 #include "data/store/task_text.h"
 
 namespace palpate::data {
@@ -185,27 +186,11 @@ void read_outcome(RowReader& row, TrialRecord& record) {
       record.started_inside >> record.max_force >> record.contact_share >> record.edge_dwell;
 }
 
-// Well-formed byte sequences: The Unicode Standard, table 3-7.
 bool is_clean_utf8(std::string_view text) {
-  for (std::size_t i = 0; i < text.size();) {
-    const auto lead = static_cast<unsigned char>(text[i++]);
-    if (lead == 0) return false;
-    if (lead < 0x80) continue;
-    const int more = lead >= 0xC2 && lead <= 0xDF   ? 1
-                     : lead >= 0xE0 && lead <= 0xEF ? 2
-                     : lead >= 0xF0 && lead <= 0xF4 ? 3
-                                                    : 0;
-    if (more == 0) return false;
-    for (int k = 0; k < more; ++k, ++i) {
-      if (i >= text.size()) return false;
-      const auto next = static_cast<unsigned char>(text[i]);
-      unsigned low = 0x80, high = 0xBF;
-      if (k == 0 && lead == 0xE0) low = 0xA0;   // overlong
-      if (k == 0 && lead == 0xED) high = 0x9F;  // surrogates
-      if (k == 0 && lead == 0xF0) low = 0x90;   // overlong
-      if (k == 0 && lead == 0xF4) high = 0x8F;  // past U+10FFFF
-      if (next < low || next > high) return false;
-    }
+  while (!text.empty()) {
+    const Character c = first_character(text);
+    if (!c.well_formed || c.code == 0) return false;
+    text.remove_prefix(c.size);
   }
   return true;
 }

@@ -34,7 +34,7 @@
 #include <utility>
 #include <vector>
 
-#include "data/files/checksum.h"
+#include "data/base/checksum.h"
 #include "data/record.h"
 
 namespace palpate::data {

@@ -22,10 +22,10 @@
 #include <system_error>
 #include <vector>
 
+#include "data/base/checksum.h"
 #include "data/base/json_text.h"
 #include "data/errors.h"
 #include "data/files/atomic_folder.h"
-#include "data/files/checksum.h"
 #include "data/files/file_permissions.h"
 #include "data/files/output_check.h"
 #include "data/store/connection.h"

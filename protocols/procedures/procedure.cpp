@@ -5,14 +5,14 @@
 #include <cstddef>
 #include <utility>
 
+#include "data/base/random.h"
 #include "protocols/procedures/portable_math.h"
 #include "protocols/procedures/procedure_spec.h"
-#include "stimuli/random.h"
 
 namespace palpate::protocols {
 
 ConstantStimuliRun::ConstantStimuliRun(const ConstantStimuli& spec, std::uint64_t seed) {
-  stimuli::Random random(seed, {0xc0});
+  Random random(seed, {0xc0});
   for (int round = 0; round < spec.repetitions; ++round) {
     std::vector<double> levels = spec.levels;
     random.shuffle(levels);
@@ -46,7 +46,7 @@ std::vector<double> series_levels(const Limits& spec, bool ascending, int inside
 }
 
 LimitsRun::LimitsRun(const Limits& spec, std::uint64_t seed) : spec_(spec) {
-  stimuli::Random random(seed, {0x71});
+  Random random(seed, {0x71});
   for (int i = 0; i < spec.series; ++i) {
     const bool ascending = spec.ascending_first == (i % 2 == 0);
     const auto choices = static_cast<std::uint64_t>(spec.jitter_steps) + 1;
@@ -416,7 +416,7 @@ void InterleavedTracks::begin_round() {
   for (std::size_t i = 0; i < tracks_.size(); ++i) {
     if (tracks_[i].next_level()) round_.push_back(i);
   }
-  stimuli::Random(seed_, {0x18, rounds_++}).shuffle(round_);
+  Random(seed_, {0x18, rounds_++}).shuffle(round_);
 }
 
 std::optional<TrackLevel> InterleavedTracks::next() const {

@@ -7,14 +7,14 @@
 #include <variant>
 #include <vector>
 
+#include "data/base/random.h"
 #include "protocols/procedures/psychometric.h"
-#include "stimuli/random.h"
 
 namespace palpate::protocols {
 
 /// Of a track among several that are mixed. \param seed  of InterleavedTracks
 inline std::uint64_t track_seed(std::uint64_t seed, std::size_t track) {
-  return stimuli::Random(seed, {0x17, track}).next();
+  return Random(seed, {0x17, track}).next();
 }
 
 /// Method of constant stimuli: every level equally often. Each round of all levels has an order of

@@ -1,7 +1,7 @@
 #pragma once
 // Psychometric functions: the probability of a success over the level of a stimulus.
 
-#include "stimuli/random.h"
+#include "data/base/random.h"
 
 namespace palpate::protocols {
 
@@ -51,7 +51,7 @@ struct PsychometricParticipant {
   PsychometricFunction function;
   PsychometricParameters parameters;
 
-  bool succeeds(double level, stimuli::Random& random) const {
+  bool succeeds(double level, Random& random) const {
     return random.unit() < psychometric_probability(function, parameters, level);
   }
 };

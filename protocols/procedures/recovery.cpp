@@ -40,7 +40,7 @@ Recovery simulate_recovery(const ProcedureSpec& spec, const PsychometricParticip
   std::vector<double> errors;
   double trials = 0;
   for (int i = 0; i < participants; ++i) {
-    stimuli::Random random(seed, {0x4e, static_cast<std::uint64_t>(i)});
+    Random random(seed, {0x4e, static_cast<std::uint64_t>(i)});
     Procedure procedure(spec, random.next());
     while (const auto level = procedure.next_level())
       procedure.record({*level, participant.succeeds(*level, random)});

@@ -73,7 +73,7 @@ StimulusSpec at_level(const Protocol& protocol, const TaskBlock& block, int stim
     varied.object.pose.orientation = turn * varied.object.pose.orientation;
     return varied;
   }
-  json value = data::read_json(protocol.stimulus_texts[static_cast<std::size_t>(stimulus)]);
+  json value = palpate::read_json(protocol.stimulus_texts[static_cast<std::size_t>(stimulus)]);
   try {
     value[json::json_pointer(block.level->pointer)] = number_of(level);
   } catch (const json::exception&) {
@@ -87,7 +87,7 @@ StimulusSpec at_level(const Protocol& protocol, const TaskBlock& block, int stim
 std::optional<double> own_level(const Protocol& protocol, const TaskBlock& block, int stimulus) {
   if (!block.level) return std::nullopt;
   if (block.level->orientation) return 0;
-  const json value = data::read_json(protocol.stimulus_texts[static_cast<std::size_t>(stimulus)]);
+  const json value = palpate::read_json(protocol.stimulus_texts[static_cast<std::size_t>(stimulus)]);
   try {
     const json& number = value.at(json::json_pointer(block.level->pointer));
     if (number.is_number()) return number.get<double>();

@@ -8,9 +8,9 @@
 #include <string_view>
 #include <utility>
 
+#include "data/base/input_file.h"
 #include "protocols/answer_keys.h"
 #include "protocols/tasks/parse_blocks.h"
-#include "stimuli/input_file.h"
 
 namespace palpate::protocols {
 namespace {
@@ -239,7 +239,7 @@ std::shared_ptr<const std::string> read_picture(const std::string& name, const s
   } else {
     const std::string path = files.folder.empty() ? name : files.folder + "/" + name;
     try {
-      bytes = stimuli::read_whole(path, kMostPictureBytes);
+      bytes = read_whole(path, kMostPictureBytes);
     } catch (const std::runtime_error& error) {
       faults.add(pointer, "expected a PNG file of at most 8 MiB; " + path + ": " + error.what());
       return nullptr;

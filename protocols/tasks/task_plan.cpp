@@ -8,13 +8,13 @@
 #include <utility>
 #include <vector>
 
+#include "data/base/random.h"
 #include "protocols/order.h"
 #include "protocols/procedures/procedure_spec.h"
 #include "protocols/schedule.h"
 #include "protocols/tasks/levels.h"
 #include "protocols/tasks/parse_blocks.h"
 #include "stimuli/orientation.h"
-#include "stimuli/random.h"
 
 namespace palpate::protocols {
 
@@ -46,8 +46,8 @@ enum TaskUse : std::uint64_t {
   kTaskTracks = 5
 };
 /// \param seed  of the protocol. \param block  its index
-stimuli::Random task_stream(std::uint64_t seed, int participant, std::uint64_t block, TaskUse use,
-                            std::uint64_t number = 0);
+Random task_stream(std::uint64_t seed, int participant, std::uint64_t block, TaskUse use,
+                   std::uint64_t number = 0);
 
 /// What a track varies the level of.
 struct BlockTrack {
@@ -123,7 +123,7 @@ std::vector<Category> categories_of(const Protocol& protocol, const TaskBlock& b
 }
 
 std::vector<int> ordered_categories(const std::vector<Category>& categories, const TaskBlock& block,
-                                    stimuli::Random random) {
+                                    Random random) {
   Protocol::Order order;
   order.max_run = block.max_run;
   order.min_distance = block.min_distance;
@@ -139,7 +139,7 @@ std::vector<int> ordered_categories(const std::vector<Category>& categories, con
 }
 
 /// Where the comparison stands in each of `count` trials: everywhere equally often, by chance.
-std::vector<int> positions(int count, int intervals, stimuli::Random& random) {
+std::vector<int> positions(int count, int intervals, Random& random) {
   std::vector<int> all, places;
   for (int i = 0; i < intervals; ++i) places.push_back(i);
   while (static_cast<int>(all.size()) < count) {
@@ -166,7 +166,7 @@ std::vector<Trial> fixed_trials(const Protocol& protocol, int participant, int i
   }
   const auto number = static_cast<std::uint64_t>(index);
   std::vector<Category> categories = categories_of(protocol, block);
-  stimuli::Random places = task_stream(protocol.seed, participant, number, kTaskPosition, round);
+  Random places = task_stream(protocol.seed, participant, number, kTaskPosition, round);
   std::vector<std::vector<int>> left;
   left.reserve(categories.size());
   for (const Category& category : categories)
@@ -249,10 +249,9 @@ constexpr std::uint64_t kTaskStream = 5;
 
 }  // namespace
 
-stimuli::Random task_stream(std::uint64_t seed, int participant, std::uint64_t block, TaskUse use,
-                            std::uint64_t number) {
-  return stimuli::Random(
-      seed, {static_cast<std::uint64_t>(participant), kTaskStream, block, use, number});
+Random task_stream(std::uint64_t seed, int participant, std::uint64_t block, TaskUse use,
+                   std::uint64_t number) {
+  return Random(seed, {static_cast<std::uint64_t>(participant), kTaskStream, block, use, number});
 }
 
 std::vector<BlockTrack> tracks_of(const TaskBlock& block) {
@@ -360,7 +359,7 @@ namespace {
 constexpr std::size_t kCatchWindow = 20;    // trials
 constexpr long long kLeastUnanswered = 10;  // trials
 
-Quat drawn_orientation(const Protocol& protocol, stimuli::Random random) {
+Quat drawn_orientation(const Protocol& protocol, Random random) {
   switch (protocol.orientation) {
     case OrientationKind::uniform:
       return stimuli::uniform_rotation(random);
@@ -398,8 +397,7 @@ bool is_catch_trial(const Protocol& protocol, int participant, std::uint64_t blo
       std::size_t{1}, static_cast<std::size_t>(std::lround(share * static_cast<double>(window))));
   std::vector<int> marks(window, 0);
   std::fill(marks.begin(), marks.begin() + static_cast<std::ptrdiff_t>(count), 1);
-  stimuli::Random random =
-      task_stream(protocol.seed, participant, block, kTaskCatch, shown / window);
+  Random random = task_stream(protocol.seed, participant, block, kTaskCatch, shown / window);
   random.shuffle(marks);
   return marks[shown % window] == 1;
 }
@@ -532,7 +530,7 @@ Trial TaskPlan::adaptive_trial() const {
   trial.track = static_cast<int>(wanted.track) + 1;
   trial.level = wanted.level;
   trial.catch_trial = is_catch_trial(*protocol_, participant_number_, block_index(), shown_);
-  stimuli::Random random =
+  Random random =
       task_stream(protocol_->seed, participant_number_, block_index(), kTaskPosition, shown_ + 1);
   set_intervals(block(),
                 static_cast<int>(random.below(static_cast<std::uint64_t>(block().intervals))),

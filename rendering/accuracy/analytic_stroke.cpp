@@ -4,9 +4,9 @@
 #include <glm/geometric.hpp>
 #include <numbers>
 
+#include "data/base/random.h"
 #include "rendering/accuracy/local_depths.h"
 #include "stimuli/orientation.h"
-#include "stimuli/random.h"
 
 namespace palpate::rendering {
 namespace {
@@ -120,7 +120,7 @@ class StrokingHand {
 
   const stimuli::ObjectSpec& shape_;
   const AnalyticStrokeSettings& settings_;
-  stimuli::Random random_;
+  Random random_;
   Vec3 out_, heading_;
   Vec3 level_;  // carried along without turning about out_
   double phase_[4] = {};

@@ -4,10 +4,10 @@
 #include <glm/geometric.hpp>
 #include <optional>
 
+#include "data/base/random.h"
 #include "rendering/first_contact.h"
 #include "rendering/verification/random_solids.h"
 #include "rendering/verification/reference.h"
-#include "stimuli/random.h"
 
 namespace palpate::rendering {
 namespace {
@@ -120,7 +120,7 @@ FirstContactLoss first_contact_loss(const stimuli::ConvexMesh& mesh, double spee
   FirstContactLoss loss;
   loss.speed = speed;
   loss.turning = turning;
-  stimuli::Random random(seed);
+  Random random(seed);
   const ContactTrees trees(mesh, true);
   const double step = speed * kPaperTick, tolerance = 1e-12 * mesh.size();
   constexpr int kBefore = 5;  // ticks in free space, about

@@ -7,9 +7,9 @@
 #include <memory>
 #include <utility>
 
+#include "data/base/random.h"
 #include "rendering/accuracy/analytic_stroke.h"
 #include "rendering/bodies/soft/soft_scene.h"
-#include "stimuli/random.h"
 
 namespace palpate::rendering {
 namespace {
@@ -35,7 +35,7 @@ SoftRow row_of(std::string name, std::string truth, const stimuli::SolidMesh& me
 }
 
 SoftRow patch_test() {
-  stimuli::Random random(7);
+  Random random(7);
   stimuli::SolidMesh mesh = stimuli::mesh_of_box(Vec3(0.03), {4, 4, 4});
   const auto inside = nodes_where(mesh, [](const Vec3& p) {
     return std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}) < 0.0149;

@@ -22,7 +22,7 @@ const OracleTool kStylus{{Vec3(0), Vec3(0, 0, 0.12)}};
 /// A coordinate of a hand: two slow sines of random frequency and phase; -1 to 1.
 class Sway {
  public:
-  explicit Sway(stimuli::Random& random) {
+  explicit Sway(Random& random) {
     for (Wave& wave : waves_) wave = {2e-3 + 6e-3 * random.unit(), 7 * random.unit()};
   }
   double operator()(std::size_t tick) const {
@@ -64,7 +64,7 @@ void by_oracle(UnionCase& one, const OracleParts& parts) {
 
 /// Over both walls and the valley, up to 3 mm below it.
 UnionCase groove_case(double opening, std::uint64_t seed, std::size_t ticks) {
-  stimuli::Random random(seed, {1});
+  Random random(seed, {1});
   const Sway x(random), y(random), z(random);
   UnionCase one{groove(opening), kPoint, {}, {}};
   const auto tip = [&](std::size_t i) {
@@ -80,7 +80,7 @@ UnionCase groove_case(double opening, std::uint64_t seed, std::size_t ticks) {
 
 /// 16 boxes side by side under one plane; the stylus stands on it, tilted.
 UnionCase seam_case(double overlap, std::uint64_t seed, std::size_t ticks) {
-  stimuli::Random random(seed, {2});
+  Random random(seed, {2});
   const Sway x(random), y(random), z(random);
   UnionCase one{{}, kStylus, {}, {}};
   for (int i = 0; i < 16; ++i) {
@@ -101,7 +101,7 @@ UnionCase seam_case(double overlap, std::uint64_t seed, std::size_t ticks) {
 
 /// In the corner of a step, riser and tread.
 UnionCase stair_case(std::uint64_t seed, std::size_t ticks) {
-  stimuli::Random random(seed, {3});
+  Random random(seed, {3});
   const Sway x(random), y(random), z(random);
   UnionCase one{stairs(4, 0.03, 0.02), kPoint, {}, {}};
   const auto tip = [&](std::size_t i) {
@@ -117,7 +117,7 @@ UnionCase stair_case(std::uint64_t seed, std::size_t ticks) {
 }
 
 UnionCase cut_case(std::uint64_t seed, std::size_t ticks) {
-  stimuli::Random random(seed, {4});
+  Random random(seed, {4});
   const stimuli::PolygonSoup solid =
       turned_and_moved(cut_cube(random, 4), stimuli::uniform_rotation(random), 0.05, Vec3(0));
   UnionCase one{cut_to_pieces(solid, 2, random), random_tool(random, 1), {}, {}};
@@ -128,7 +128,7 @@ UnionCase cut_case(std::uint64_t seed, std::size_t ticks) {
 }
 
 UnionCase cluster_case(int segments, std::uint64_t seed, std::size_t ticks) {
-  stimuli::Random random(seed, {5, static_cast<std::uint64_t>(segments)});
+  Random random(seed, {5, static_cast<std::uint64_t>(segments)});
   UnionCase one{random_cluster(random, 3 + static_cast<int>(random.below(6))),
                 random_tool(random, segments),
                 {},
@@ -140,7 +140,7 @@ UnionCase cluster_case(int segments, std::uint64_t seed, std::size_t ticks) {
 
 /// A hook of three segments is lowered behind a beam, pulled up against it, rocked and let down.
 UnionCase hook_case(std::uint64_t seed, std::size_t ticks) {
-  stimuli::Random random(seed, {6});
+  Random random(seed, {6});
   const Sway x(random), z(random), turn(random);
   // Below the beam runs the short arm; the long one stands beside it.
   UnionCase one{{box_part({-0.01, -0.05, -0.01}, {0.01, 0.05, 0.01})},

@@ -257,11 +257,9 @@ class ClosedPathBench {
   double power_ = 0;  ///< J for each radian of the cycle, at the last tick
 };
 
-Vec3 direction(stimuli::Random& random) {
-  return stimuli::uniform_rotation(random) * Vec3(0, 0, 1);
-}
+Vec3 direction(Random& random) { return stimuli::uniform_rotation(random) * Vec3(0, 0, 1); }
 
-LineProbe small(stimuli::Random& random, double most) {
+LineProbe small(Random& random, double most) {
   return {most * random.unit() * direction(random), most * random.unit() * direction(random)};
 }
 
@@ -275,7 +273,7 @@ const std::shared_ptr<const stimuli::ConvexMesh>& shape(std::uint64_t index) {
 }
 
 /// A stylus in any pose pressed into a shape, on a small closed path.
-Cycle cycle_anywhere(stimuli::Random& random, ClosedPathBench& bench) {
+Cycle cycle_anywhere(Random& random, ClosedPathBench& bench) {
   const Vec3 out = direction(random), d = kStylus * direction(random);
   const double fraction = random.unit();
   Cycle cycle;
@@ -286,7 +284,7 @@ Cycle cycle_anywhere(stimuli::Random& random, ClosedPathBench& bench) {
 }
 
 /// A stylus nearly flat on the top of the cube, rocking through the blend of equation (2).
-Cycle cycle_over_a_flat(stimuli::Random& random, ClosedPathBench& bench) {
+Cycle cycle_over_a_flat(Random& random, ClosedPathBench& bench) {
   const double turn = 2 * std::numbers::pi * random.unit();
   // The ends of the full length are past the face; those of a short one over it.
   const double length = random.unit() < 0.5 ? kStylus : 0.3 * kStylus;
@@ -327,7 +325,7 @@ void count(ExtremeResult& result, const Lap& lap) {
 ExtremeResult closed_paths(const Renderer& renderer) {
   CombinedResult all;
   for (std::uint64_t round = 0; round < 400; ++round) {
-    stimuli::Random random(round, {21});
+    Random random(round, {21});
     ClosedPathBench bench(renderer, shape(round), springy());
     const Cycle cycle = cycle_anywhere(random, bench);
     bench.lap(cycle, 400);  // the first begins with a jump
@@ -348,7 +346,7 @@ namespace {
 
 /// The second lap of a cycle over a material with friction, damping or both.
 Lap lossy_lap(const Renderer& renderer, std::uint64_t round, int ticks) {
-  stimuli::Random random(round, {22});
+  Random random(round, {22});
   stimuli::Material material = springy();
   if (round % 3 != 0) material.damping = 3 * random.unit();
   if (round % 3 != 1) {
@@ -387,7 +385,7 @@ ExtremeResult closed_paths_in_the_blend(const Renderer& renderer) {
   CombinedResult all;
   const auto block = shape(3);
   for (std::uint64_t round = 0; round < 400; ++round) {
-    stimuli::Random random(round, {23});
+    Random random(round, {23});
     ClosedPathBench bench(renderer, block, springy());
     const Cycle cycle = cycle_over_a_flat(random, bench);
     bench.lap(cycle, 4000);  // the first begins with a jump
@@ -421,7 +419,7 @@ ExtremeResult thin_plate(const Renderer& renderer) {
   const MeshPointer plate = solid(stretched(stimuli::cube(kEdge), {1, 1, kThickness / kEdge}));
   CombinedResult all;
   for (std::uint64_t round = 0; round < 2000; ++round) {
-    stimuli::Random random(round, {1});
+    Random random(round, {1});
     AuditedScene scene(renderer, plate);
     const double side = round % 2 ? 1 : -1;
     Vec3 direction = random_direction(random);
@@ -452,7 +450,7 @@ ExtremeResult thin_plate(const Renderer& renderer) {
 ExtremeResult parallel_edge(const Renderer& renderer) {
   const MeshPointer box = solid(stimuli::cube(0.06));
   CombinedResult all;
-  stimuli::Random random(2);
+  Random random(2);
   for (const double tilt : kTiny) {
     for (const double beside : kTiny) {
       for (int round = 0; round < 12; ++round) {
@@ -482,7 +480,7 @@ ExtremeResult through_vertices(const Renderer& renderer) {
   const MeshPointer shapes[] = {solid(stimuli::cube(0.06)), solid(stimuli::icosphere(0.03, 1)),
                                 solid(stimuli::cone(0.03, 0.06, 16))};
   CombinedResult all;
-  stimuli::Random random(4);
+  Random random(4);
   for (const MeshPointer& mesh : shapes) {
     for (const Vec3& vertex : mesh->vertices()) {
       for (const double beside : {0.0, 1e-16, 1e-12, 1e-9}) {
@@ -506,7 +504,7 @@ ExtremeResult zero_length(const Renderer& renderer) {
   // A probe without length is a point: force as of the point renderer, none of it on device 2.
   const MeshPointer mesh = solid(stimuli::icosphere(0.03, 2));
   AuditedScene scene(renderer, mesh), point(point_renderer(), mesh);
-  stimuli::Random random(6);
+  Random random(6);
   double worst = 0;
   for (const LineProbe& probe : random_path(random, PathKind::smooth, *mesh, 0, false, 3000)) {
     const Rendering r = scene.audited_tick(probe), p = point.audited_tick(probe);
@@ -528,7 +526,7 @@ ExtremeResult tiny_length(const Renderer& renderer) {
   CombinedResult all;
   for (const stimuli::PolygonSoup& shape : shapes) {
     for (int i = 0; i < 8; ++i) {
-      stimuli::Random random(static_cast<std::uint64_t>(i), {8});
+      Random random(static_cast<std::uint64_t>(i), {8});
       // The origin is at a corner, or somewhere inside.
       const Vec3 corner = shape.vertices[random.below(shape.vertices.size())];
       const Vec3 to = i < 2 ? -corner : -between(random, 0, 0.9) * corner;
@@ -556,7 +554,7 @@ ExtremeResult starts_inside(const Renderer& renderer) {
   const MeshPointer mesh = solid(stimuli::cone(0.03, 0.06, 32));
   CombinedResult all;
   for (std::uint64_t seed = 0; seed < 200; ++seed) {
-    stimuli::Random random(seed, {9});
+    Random random(seed, {9});
     AuditedScene scene(renderer, mesh);
     const Vec3 inside = Vec3(0, 0, -0.01) + 0.005 * random.unit() * random_direction(random);
     const Vec3 u = random_direction(random);
@@ -592,7 +590,7 @@ ExtremeResult teleports(const Renderer& renderer) {
                                 solid(stretched(stimuli::cube(0.1), {1, 1, 1e-3}))};
   for (const MeshPointer& mesh : shapes) {
     for (std::uint64_t seed = 0; seed < 10; ++seed) {
-      stimuli::Random random(seed, {10});
+      Random random(seed, {10});
       AuditedScene scene(renderer, mesh);
       scene.audited_tick({Vec3(0, 0, 1), Vec3(0, 0, 1 + kStylus)});
       for (int i = 0; i < 200; ++i) {
@@ -649,7 +647,7 @@ namespace {
 constexpr std::size_t kTicks = 300;  // a path
 
 Pose some_pose(const Vec3& position) {
-  stimuli::Random random(3);
+  Random random(3);
   return {position, stimuli::uniform_rotation(random)};
 }
 
@@ -700,7 +698,7 @@ ExtremeResult paths_over(const Renderer& renderer, const MeshPointer& mesh, cons
   std::uint64_t stream = 0;
   for (const double length : lengths) {
     for (int kind = 0; kind < kPathKinds; ++kind) {
-      stimuli::Random random(17, {++stream});
+      Random random(17, {++stream});
       AuditedScene scene(renderer, mesh, pose);
       for (const LineProbe& probe : random_path(random, static_cast<PathKind>(kind), *mesh, length,
                                                 renderer.side_contact(), ticks)) {
@@ -765,7 +763,7 @@ ExtremeResult million_triangles(const Renderer& renderer) {
   // 1,310,720 triangles; their edges are 0.1 mm long in the mean.
   const MeshPointer mesh = solid(stimuli::icosphere(0.0216, 8));
   AuditedScene scene(renderer, mesh);
-  stimuli::Random random(5);
+  Random random(5);
   // The reference looks at every triangle: few ticks, from free space to sliding at 0.1 m/s.
   const Vec3 axis = stimuli::uniform_rotation(random) * Vec3(0, 0, 1);
   const Vec3 across = glm::normalize(glm::cross(axis, Vec3(1, 0, 0)));

@@ -16,7 +16,7 @@ namespace palpate::rendering {
 namespace {
 
 /// 10 to a random power.
-double magnitude(stimuli::Random& random, double low_power, double high_power) {
+double magnitude(Random& random, double low_power, double high_power) {
   return std::pow(10, between(random, low_power, high_power));
 }
 
@@ -28,7 +28,7 @@ Vec3 unit_or_x(const Vec3& v) {
 /// A smooth random function within [-1, 1].
 class Wave {
  public:
-  explicit Wave(stimuli::Random& random) {
+  explicit Wave(Random& random) {
     for (std::size_t i = 0; i < rates_.size(); ++i) {
       rates_[i] = between(random, 0.3, 1) * static_cast<double>(i + 1);
       phases_[i] = between(random, 0, 2 * std::numbers::pi);
@@ -45,14 +45,14 @@ class Wave {
 };
 
 struct Wave3 {
-  explicit Wave3(stimuli::Random& random) : x(random), y(random), z(random) {}
+  explicit Wave3(Random& random) : x(random), y(random), z(random) {}
   Vec3 operator()(double at) const { return {x(at), y(at), z(at)}; }
   Wave x, y, z;
 };
 
 /// Builds a path pose by pose.
 struct PathBuilder {
-  stimuli::Random& random;
+  Random& random;
   const stimuli::ConvexMesh& mesh;
   double length;
   bool side;
@@ -209,9 +209,8 @@ const char* to_string(PathKind kind) {
   return kNames[static_cast<int>(kind)];
 }
 
-std::vector<LineProbe> random_path(stimuli::Random& random, PathKind kind,
-                                   const stimuli::ConvexMesh& mesh, double length, bool side,
-                                   std::size_t ticks) {
+std::vector<LineProbe> random_path(Random& random, PathKind kind, const stimuli::ConvexMesh& mesh,
+                                   double length, bool side, std::size_t ticks) {
   PathBuilder builder{random, mesh, length, side, ticks, {}};
   builder.path.reserve(ticks + 1);
   const double far = 3 * mesh.size() + length;
@@ -317,7 +316,7 @@ struct Block {
   }
 };
 
-Block random_block(stimuli::Random& random, int cuts) {
+Block random_block(Random& random, int cuts) {
   Block block{stimuli::cube(1), {}};
   for (const auto& face : block.soup.faces) {
     Vec3 middle;
@@ -330,7 +329,7 @@ Block random_block(stimuli::Random& random, int cuts) {
   return block;
 }
 
-stimuli::PolygonSoup some_soup(stimuli::Random& random) {
+stimuli::PolygonSoup some_soup(Random& random) {
   const auto count = [&](std::uint64_t low, std::uint64_t high) {
     return static_cast<int>(low + random.below(high - low + 1));
   };
@@ -354,11 +353,11 @@ stimuli::PolygonSoup some_soup(stimuli::Random& random) {
 
 }  // namespace
 
-stimuli::PolygonSoup cut_cube(stimuli::Random& random, int cuts) {
+stimuli::PolygonSoup cut_cube(Random& random, int cuts) {
   return random_block(random, cuts).tidy();
 }
 
-stimuli::PolygonSoup polar_of_cut_cube(stimuli::Random& random, int cuts) {
+stimuli::PolygonSoup polar_of_cut_cube(Random& random, int cuts) {
   const Block block = random_block(random, cuts);
   stimuli::PolygonSoup polar;
   std::map<Index, std::vector<Index>> faces_at;
@@ -396,7 +395,7 @@ stimuli::PolygonSoup turned_and_moved(stimuli::PolygonSoup soup, const Quat& tur
   return soup;
 }
 
-stimuli::ConvexMesh random_solid(stimuli::Random& random) {
+stimuli::ConvexMesh random_solid(Random& random) {
   for (;;) {
     stimuli::PolygonSoup soup = some_soup(random);
     if (random.below(2) == 0) {

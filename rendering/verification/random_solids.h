@@ -3,22 +3,22 @@
 
 #include <vector>
 
+#include "data/base/random.h"
 #include "rendering/probe.h"
 #include "stimuli/convex_mesh.h"
 #include "stimuli/orientation.h"
-#include "stimuli/random.h"
 
 namespace palpate::rendering {
 
 // Random numbers as the searches and cases draw them.
 
 /// Uniform from low to high.
-inline double between(stimuli::Random& random, double low, double high) {
+inline double between(Random& random, double low, double high) {
   return low + (high - low) * random.unit();
 }
 
 /// Uniform on the unit sphere.
-inline Vec3 random_direction(stimuli::Random& random) {
+inline Vec3 random_direction(Random& random) {
   return stimuli::uniform_rotation(random) * Vec3(0, 0, 1);
 }
 
@@ -39,16 +39,15 @@ const char* to_string(PathKind kind);
 /// Starts far outside (its first pose); 1 kHz.
 /// \param length  m, of the probe
 /// \param side    false: the tip is led over the surface, not the side
-std::vector<LineProbe> random_path(stimuli::Random& random, PathKind kind,
-                                   const stimuli::ConvexMesh& mesh, double length, bool side,
-                                   std::size_t ticks);
+std::vector<LineProbe> random_path(Random& random, PathKind kind, const stimuli::ConvexMesh& mesh,
+                                   double length, bool side, std::size_t ticks);
 
 /// A cube of edge 1 about the origin, cut by `cuts` random planes: corners of three facets, facets
 /// of any number of sides.
-stimuli::PolygonSoup cut_cube(stimuli::Random& random, int cuts);
+stimuli::PolygonSoup cut_cube(Random& random, int cuts);
 
 /// The polar dual of cut_cube: triangles, corners of any number of facets.
-stimuli::PolygonSoup polar_of_cut_cube(stimuli::Random& random, int cuts);
+stimuli::PolygonSoup polar_of_cut_cube(Random& random, int cuts);
 
 /// Every corner's coordinates times these factors; convexity is kept.
 stimuli::PolygonSoup stretched(stimuli::PolygonSoup soup, const Vec3& factors);
@@ -65,6 +64,6 @@ stimuli::PolygonSoup turned_and_moved(stimuli::PolygonSoup soup, const Quat& tur
 /// A cut cube, its polar dual, a sphere, cone, cylinder or cube; half of them stretched into plates
 /// and needles of proportions down to 1e-4; turned at random or along the axes; 0.1 mm to 100 m
 /// across, up to a size away from the origin.
-stimuli::ConvexMesh random_solid(stimuli::Random& random);
+stimuli::ConvexMesh random_solid(Random& random);
 
 }  // namespace palpate::rendering

@@ -20,10 +20,6 @@
 namespace palpate::rendering {
 namespace {
 
-bool finite(const Vec3& v) {
-  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
-}
-
 bool all_finite(const Rendering& r) {
   return finite(r.force) && finite(r.torque) && finite(r.device1) && finite(r.device2) &&
          finite(r.deepest.point) && finite(r.deepest.normal) && std::isfinite(r.deepest.depth) &&
@@ -293,7 +289,7 @@ class Walk {
   }
 
   const Renderer& renderer_;
-  stimuli::Random random_;
+  Random random_;
   std::shared_ptr<const stimuli::ConvexMesh> mesh_;
   Pose pose_;
   double length_;

@@ -7,8 +7,8 @@
 #include <glm/geometric.hpp>
 #include <numbers>
 
+#include "data/base/random.h"
 #include "rendering/probe.h"
-#include "stimuli/random.h"
 
 namespace palpate::rendering {
 
@@ -60,7 +60,7 @@ class SurfaceStroke {
   double wave(double period) const { return std::sin(2 * std::numbers::pi * tick_ / period); }
 
   SurfaceStrokeSettings settings_;
-  stimuli::Random random_;
+  Random random_;
   Vec3 normal_{0, 0, 1}, heading_{1, 0, 0};
   double radius_;
   double touched_radius_ = 0;

@@ -17,7 +17,7 @@ namespace {
 // Compilers choose the order of a call's arguments: every draw is a statement of its own, or a walk
 // would not be the same everywhere.
 
-Vec3 vector_between(stimuli::Random& random, double low, double high) {
+Vec3 vector_between(Random& random, double low, double high) {
   Vec3 drawn;
   for (int k = 2; k >= 0; --k) drawn[k] = between(random, low, high);
   return drawn;
@@ -50,7 +50,7 @@ stimuli::PolygonSoup prism(const std::vector<Corner>& outline, double low_y, dou
 
 Vec3 right_wall(double opening) { return {-std::cos(opening / 2), 0, std::sin(opening / 2)}; }
 
-stimuli::PolygonSoup random_convex(stimuli::Random& random) {
+stimuli::PolygonSoup random_convex(Random& random) {
   switch (random.below(6)) {
     case 0:
       return stimuli::icosphere(0.5, static_cast<int>(random.below(2)));
@@ -114,7 +114,7 @@ OracleParts stairs(int steps, double width, double height) {
   return parts;
 }
 
-OracleParts cut_to_pieces(const stimuli::PolygonSoup& solid, int cuts, stimuli::Random& random) {
+OracleParts cut_to_pieces(const stimuli::PolygonSoup& solid, int cuts, Random& random) {
   std::vector<stimuli::PolygonSoup> pieces{solid};
   for (int i = 0; i < cuts; ++i) {
     std::vector<stimuli::PolygonSoup> smaller;
@@ -134,7 +134,7 @@ OracleParts cut_to_pieces(const stimuli::PolygonSoup& solid, int cuts, stimuli::
   return parts;
 }
 
-OracleParts random_cluster(stimuli::Random& random, int parts) {
+OracleParts random_cluster(Random& random, int parts) {
   OracleParts cluster;
   Vec3 corner(-0.02);  // of the next box that abuts the one before
   while (static_cast<int>(cluster.size()) < parts) {
@@ -156,7 +156,7 @@ OracleParts random_cluster(stimuli::Random& random, int parts) {
   return cluster;
 }
 
-OracleTool random_tool(stimuli::Random& random, int segments) {
+OracleTool random_tool(Random& random, int segments) {
   OracleTool tool{{Vec3(0), Vec3(0, 0, between(random, 0.02, 0.12))}};
   while (static_cast<int>(tool.size()) < segments) {
     const OracleSegment& at = tool[random.below(tool.size())];
@@ -167,7 +167,7 @@ OracleTool random_tool(stimuli::Random& random, int segments) {
   return tool;
 }
 
-std::vector<OraclePose> random_tool_path(stimuli::Random& random, const OracleParts& parts,
+std::vector<OraclePose> random_tool_path(Random& random, const OracleParts& parts,
                                          const OracleTool& tool, double speed, std::size_t ticks) {
   double radius = 0;
   for (const OraclePart& part : parts) {

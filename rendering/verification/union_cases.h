@@ -4,8 +4,8 @@
 
 #include <vector>
 
+#include "data/base/random.h"
 #include "rendering/verification/union_oracle.h"
-#include "stimuli/random.h"
 
 namespace palpate::rendering {
 
@@ -27,19 +27,19 @@ Vec3 groove_displacement(double opening, const Vec3& virtual_tip);
 OracleParts stairs(int steps, double width, double height);
 
 /// The pieces of a solid cut by random planes near its middle; they abut exactly up to rounding.
-OracleParts cut_to_pieces(const stimuli::PolygonSoup& solid, int cuts, stimuli::Random& random);
+OracleParts cut_to_pieces(const stimuli::PolygonSoup& solid, int cuts, Random& random);
 
 /// Boxes, prisms, icospheres, cones and cylinders of 10 to 50 mm that overlap; some turned at
 /// random, some along the axes and abutting exactly.
-OracleParts random_cluster(stimuli::Random& random, int parts);
+OracleParts random_cluster(Random& random, int parts);
 
 /// The first segment runs from the tip along +z, 20 to 120 mm, each other from an end of one before
 /// in any direction, 10 to 50 mm.
-OracleTool random_tool(stimuli::Random& random, int segments);
+OracleTool random_tool(Random& random, int segments);
 
 /// A hand that leads some point of the tool from place to place about and through the object, at
 /// `speed` (m per tick) and turning as well; starts outside, 2 mm or more off.
-std::vector<OraclePose> random_tool_path(stimuli::Random& random, const OracleParts& parts,
+std::vector<OraclePose> random_tool_path(Random& random, const OracleParts& parts,
                                          const OracleTool& tool, double speed, std::size_t ticks);
 
 }  // namespace palpate::rendering

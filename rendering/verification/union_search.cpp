@@ -19,8 +19,7 @@ constexpr double kStylus = 0.12;  // m, of a stylus that carries a tool
 constexpr double kGrid = 0.01;    // m
 
 /// Along the axes, exactly in the planes of boxes: no turning.
-std::vector<OraclePose> aligned_path(stimuli::Random& random, const OracleParts& parts,
-                                     std::size_t ticks) {
+std::vector<OraclePose> aligned_path(Random& random, const OracleParts& parts, std::size_t ticks) {
   const Mat3 turns[] = {Mat3(1), Mat3(Vec3(0, 1, 0), Vec3(0, 0, 1), Vec3(1, 0, 0)),
                         Mat3(Vec3(0, 0, -1), Vec3(0, 1, 0), Vec3(1, 0, 0)),
                         Mat3(Vec3(1, 0, 0), Vec3(0, -1, 0), Vec3(0, 0, -1))};
@@ -76,7 +75,7 @@ OraclePart grid_part(Bytes& bytes) {
 }  // namespace
 
 UnionWalk random_union_walk(std::uint64_t seed, std::uint64_t walk, std::size_t ticks) {
-  stimuli::Random random(seed, {walk, 0x756e});
+  Random random(seed, {walk, 0x756e});
   const auto kind = random.below(8);
   if (kind == 0) {
     std::vector<std::uint8_t> bytes(400);

@@ -12,11 +12,11 @@
 #include <utility>
 #include <vector>
 
+#include "data/base/random.h"
 #include "rendering/renderer.h"
 #include "runner/bench/allocation_count.h"
 #include "runner/servo/tick_clock.h"
 #include "stimuli/primitives.h"
-#include "stimuli/random.h"
 
 namespace palpate::runner {
 
@@ -268,7 +268,7 @@ class ScriptedHand {
   }
 
  private:
-  stimuli::Random random_{1};
+  Random random_{1};
   bool side_contact_;
   double sign_;
   Vec3 normal_{0, 0, 1}, heading_{1, 0, 0};
@@ -327,7 +327,7 @@ TickCost time_free_space(TickTimer& timer, const rendering::Renderer& renderer, 
 /// time the side first.
 TickCost time_first_contact(TickTimer& timer, const rendering::Renderer& renderer,
                             const Bench& bench, std::size_t approaches) {
-  stimuli::Random random(2);
+  Random random(2);
   const auto any = [&] {
     return glm::normalize(Vec3(random.normal(), random.normal(), random.normal()));
   };

@@ -23,12 +23,12 @@
 #include "analysis/report/task_report.h"
 #include "analysis/statistics/analysis.h"
 #include "analysis/statistics/task_analysis.h"
+#include "data/base/text.h"
 #include "data/store/store.h"
 #include "runner/commands/movement/movement_study.h"
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/outputs.h"
 #include "runner/commands/shared/study_trials.h"
-#include "stimuli/text.h"
 
 namespace palpate::runner {
 
@@ -75,11 +75,11 @@ analysis::FunctionSettings function_settings(const boost::program_options::varia
     settings.shape = PsychometricShape::weibull;
   } else if (function != "logistic") {
     throw UsageError("--function: expected logistic, normal or weibull, found '" +
-                     stimuli::printable(function) + "'");
+                     printable(function) + "'");
   }
   if (values.count("scale") == 0) return settings;
   if (scale != "linear" && scale != "log")
-    throw UsageError("--scale: expected linear or log, found '" + stimuli::printable(scale) + "'");
+    throw UsageError("--scale: expected linear or log, found '" + printable(scale) + "'");
   if (scale == "linear" && settings.shape == PsychometricShape::weibull)
     throw UsageError("--scale: expected log with --function weibull, whose slope is an exponent");
   settings.scale = scale == "log" ? LevelScale::log10 : LevelScale::linear;
@@ -92,13 +92,12 @@ void require_one_protocol(const analysis::TaskTable& table, const std::string& w
   std::string names;
   bool one_name = true;
   for (const auto& [name, sha256] : table.protocols) {
-    names +=
-        (names.empty() ? "" : ", ") + stimuli::printable(name) + " (" + sha256.substr(0, 12) + ")";
+    names += (names.empty() ? "" : ", ") + printable(name) + " (" + sha256.substr(0, 12) + ")";
     one_name &= name == table.protocols.front().first;
   }
   if (one_name && !wanted.empty()) return;  // of one name, as was asked for
-  throw UsageError(stimuli::printable(table.source) + ": has trials of several protocols (" +
-                   names + "); say which with --protocol NAME, or with the begin of its checksum");
+  throw UsageError(printable(table.source) + ": has trials of several protocols (" + names +
+                   "); say which with --protocol NAME, or with the begin of its checksum");
 }
 
 /// A study of version 2, or its export.

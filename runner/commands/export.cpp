@@ -5,6 +5,7 @@
 #include <string>
 #include <thread>
 
+#include "data/base/text.h"
 #include "data/export/bids.h"
 #include "data/export/csv.h"
 #include "data/export/psychds.h"
@@ -17,7 +18,6 @@
 #include "runner/commands/shared/progress_line.h"
 #include "runner/commands/shared/protocol_facts.h"
 #include "runner/commands/shared/stop_signal.h"
-#include "stimuli/text.h"
 
 namespace palpate::runner {
 namespace {
@@ -184,22 +184,22 @@ data::ExportResult write_export(const Request& request) {
 }
 
 void print(const Request& request, const data::ExportResult& done) {
-  std::cerr << stimuli::printable(request.out) << ": " << done.trials << " trials";
+  std::cerr << printable(request.out) << ": " << done.trials << " trials";
   if (done.samples > 0) std::cerr << ", " << done.samples << " samples";
   std::cerr << (done.simulated ? ", of SIMULATED participants among them\n" : "\n");
   if (!done.attempts_path.empty()) {
-    std::cerr << stimuli::printable(done.attempts_path) << ": " << done.attempts
+    std::cerr << printable(done.attempts_path) << ": " << done.attempts
               << " attempts that were cut off\n";
   }
   if (request.pages) {
-    std::cerr << stimuli::printable(done.pages_path.empty() ? request.out : done.pages_path) << ": "
+    std::cerr << printable(done.pages_path.empty() ? request.out : done.pages_path) << ": "
               << done.answers << " answers to pages: personal data\n";
   }
   if (!request.codebook.empty())
-    std::cerr << stimuli::printable(request.codebook) << ": what the columns mean\n";
+    std::cerr << printable(request.codebook) << ": what the columns mean\n";
   if (!done.not_recorded.empty()) {
     std::cerr << "warning: 'palpate forget' will not list this export: "
-              << stimuli::printable(done.not_recorded) << "\n";
+              << printable(done.not_recorded) << "\n";
   }
 }
 
@@ -223,7 +223,7 @@ void export_sweep(const Request& request, bool times_given) {
         line.show(static_cast<double>(done) / all);
       });
   line.clear();
-  std::cerr << stimuli::printable(request.out) << ": " << points << " of " << sweep.plan().points
+  std::cerr << printable(request.out) << ": " << points << " of " << sweep.plan().points
             << " points, of SIMULATED participants\n";
 }
 

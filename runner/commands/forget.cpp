@@ -4,11 +4,11 @@
 #include <iostream>
 #include <string>
 
+#include "data/base/text.h"
 #include "data/files/utc.h"
 #include "data/store/store.h"
 #include "runner/commands/shared/ask.h"
 #include "runner/commands/shared/command.h"
-#include "stimuli/text.h"
 
 namespace palpate::runner {
 namespace {
@@ -24,7 +24,7 @@ void list_exports(const data::ParticipantSummary& holdings, const std::string& d
     std::error_code error;
     const std::string place = data::export_location(database, one.path);
     const std::string path = place.empty() ? one.path : place;
-    out << "  " << stimuli::printable(path) << " (" << one.format << ", "
+    out << "  " << printable(path) << " (" << one.format << ", "
         << data::format_utc(one.made_utc_ns)
         << (place.empty() || std::filesystem::exists(path, error) ? ")" : "; no longer there)")
         << "\n";
@@ -35,11 +35,10 @@ void list_exports(const data::ParticipantSummary& holdings, const std::string& d
 void print(const data::ParticipantSummary& holdings, const std::string& code,
            const std::string& database) {
   if (holdings.protocols > 0) {
-    std::cout << stimuli::printable(code) << ": " << holdings.sessions << " sessions, "
-              << holdings.trials << " trials and " << holdings.cut_off
-              << " attempts that were cut off\n";
+    std::cout << printable(code) << ": " << holdings.sessions << " sessions, " << holdings.trials
+              << " trials and " << holdings.cut_off << " attempts that were cut off\n";
   } else {
-    std::cout << stimuli::printable(code) << " has withdrawn before; what may be left is cleared\n";
+    std::cout << printable(code) << " has withdrawn before; what may be left is cleared\n";
   }
   list_exports(holdings, database, std::cout);
   if (!holdings.remaining_copies.empty()) {
@@ -47,11 +46,11 @@ void print(const data::ParticipantSummary& holdings, const std::string& code,
               << ", or may; they are not changed: delete them, or give the command for each "
                  "database:\n";
     for (const std::string& path : holdings.remaining_copies) {
-      std::cout << "  " << stimuli::printable(path) << "\n";
+      std::cout << "  " << printable(path) << "\n";
     }
   }
   if (holdings.mentions > 0) {
-    std::cout << "Notes on other participants that say " << stimuli::printable(code) << ": "
+    std::cout << "Notes on other participants that say " << printable(code) << ": "
               << holdings.mentions << "; they are left as they are\n";
   }
 }
@@ -68,13 +67,12 @@ bool confirmed(const std::string& code) {
 /// \return false where a backup could not be deleted
 bool remove(data::Store& store, const std::string& code, const std::string& database) {
   const data::Withdrawal done = store.forget(code);
-  std::cout << "Removed from " << stimuli::printable(database) << "\n";
+  std::cout << "Removed from " << printable(database) << "\n";
   for (const std::string& backup : done.backups_removed)
-    std::cout << "Deleted " << stimuli::printable(backup) << "\n";
+    std::cout << "Deleted " << printable(backup) << "\n";
   for (const std::string& backup : done.backups_left) {
-    std::cerr << stimuli::printable(backup)
-              << ": could not be read or deleted; delete it, it may hold "
-              << stimuli::printable(code) << "\n";
+    std::cerr << printable(backup) << ": could not be read or deleted; delete it, it may hold "
+              << printable(code) << "\n";
   }
   return done.backups_left.empty();
 }

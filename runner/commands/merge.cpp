@@ -8,11 +8,11 @@
 #include <string>
 #include <vector>
 
+#include "data/base/text.h"
 #include "data/merge/sweep_merge.h"
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/progress_line.h"
 #include "runner/commands/shared/stop_signal.h"
-#include "stimuli/text.h"
 
 namespace palpate::runner {
 namespace {
@@ -29,19 +29,18 @@ void refuse_folders(const std::vector<std::string>& inputs) {
 }
 
 void print(const std::string& out, const data::MergeResult& done) {
-  std::cout << stimuli::printable(out) << ": " << done.counts.participants << " participants, "
+  std::cout << printable(out) << ": " << done.counts.participants << " participants, "
             << done.counts.sessions << " sessions, " << done.counts.completed << " trials, "
             << done.counts.cut_off << " attempts that were cut off\n";
   for (const data::RenumberedParticipant& one : done.renumbered) {
-    std::cout << one.code << " (" << stimuli::printable(one.path) << ") has number " << one.to
+    std::cout << one.code << " (" << printable(one.path) << ") has number " << one.to
               << " from now on: " << one.from << " is also " << one.other << "'s. The trials of "
               << one.code << " keep the order of number " << one.from << "\n";
   }
   for (const data::ExcludedParticipant& one : done.excluded) {
-    std::cerr << stimuli::printable(one.code) << " has withdrawn and is left out, but is still in "
-              << stimuli::printable(one.path) << "; remove with: palpate forget --db '"
-              << stimuli::printable(one.path) << "' --participant " << stimuli::printable(one.code)
-              << "\n";
+    std::cerr << printable(one.code) << " has withdrawn and is left out, but is still in "
+              << printable(one.path) << "; remove with: palpate forget --db '"
+              << printable(one.path) << "' --participant " << printable(one.code) << "\n";
   }
 }
 
@@ -70,13 +69,13 @@ void merge_shards(const std::string& out, const std::vector<std::string>& inputs
   });
   progress.clear();
   warn_of_exposure(out);
-  std::cout << stimuli::printable(out) << ": " << done.points << " of " << done.plan.points
+  std::cout << printable(out) << ": " << done.points << " of " << done.plan.points
             << " points of a sweep, SIMULATED participants";
   if (done.failed > 0) std::cout << ", " << done.failed << " of them failed";
   std::cout << "\n";
   if (done.points < done.plan.points)
-    std::cerr << "the others are in none of the files; 'palpate sweep' with --db "
-              << stimuli::printable(out) << " goes on with them\n";
+    std::cerr << "the others are in none of the files; 'palpate sweep' with --db " << printable(out)
+              << " goes on with them\n";
 }
 
 }  // namespace

@@ -15,6 +15,7 @@
 #include <thread>
 #include <vector>
 
+#include "data/base/text.h"
 #include "protocols/parse.h"
 #include "protocols/tasks/levels.h"
 #include "runner/commands/shared/command.h"
@@ -24,7 +25,6 @@
 #include "runner/commands/shared/stop_signal.h"
 #include "runner/commands/shared/study_options.h"
 #include "runner/session/simulated_study.h"
-#include "stimuli/text.h"
 
 namespace palpate::runner {
 namespace {
@@ -121,7 +121,7 @@ void print_summary(const protocols::Protocol& protocol, const std::string& datab
                    const StudyProgress& progress, double seconds) {
   std::printf("%s, SIMULATED participants: %lld of %lld trials in %s\n", protocol.name.c_str(),
               static_cast<long long>(progress.recorded), static_cast<long long>(progress.expected),
-              stimuli::printable(database).c_str());
+              printable(database).c_str());
   std::printf("settings version %d, sha256 %.12s...; seed %llu\n", simulated.version,
               simulated.sha256.c_str(), static_cast<unsigned long long>(seed));
   if (progress.this_run == 0) return;
@@ -138,7 +138,7 @@ void print_unanswered(const protocols::Protocol& protocol, const StudyProgress& 
     const auto& [trials, unanswered] = found->second;
     if (unanswered * 10 < trials || unanswered == 0) continue;
     std::fprintf(stderr, "block '%s': %lld of %lld trials had no answer within time_out_s = %g s",
-                 stimuli::printable(block.name).c_str(), static_cast<long long>(unanswered),
+                 printable(block.name).c_str(), static_cast<long long>(unanswered),
                  static_cast<long long>(trials), block.time_out);
     const auto standard =
         block.standard ? protocols::own_level(protocol, block, *block.standard) : std::nullopt;
@@ -180,7 +180,7 @@ int simulate_command(const std::vector<std::string>& args) {
   // Before a database is created: what is refused leaves none behind.
   const LimitedForSimulation limited = fit_to_simulation(protocol, simulated);
   for (const std::string& text : limited.texts)
-    std::fprintf(stderr, "%s\n", stimuli::printable(text).c_str());
+    std::fprintf(stderr, "%s\n", printable(text).c_str());
   plan.event = limited.event;
   if (!store) store.emplace(open());
   warn_of_exposure(store->path());

@@ -4,6 +4,7 @@
 #include <iostream>
 #include <sstream>
 
+#include "data/base/text.h"
 #include "protocols/parse.h"
 #include "protocols/schedule.h"
 #include "protocols/tasks/texts.h"
@@ -18,7 +19,6 @@
 #include "stimuli/parts/convex_parts.h"
 #include "stimuli/parts/overlaps.h"
 #include "stimuli/primitives.h"
-#include "stimuli/text.h"
 
 namespace palpate::runner {
 namespace {
@@ -49,8 +49,8 @@ void check_meshes(const stimuli::ObjectSpec& object, const std::string& pointer,
 void print_overlaps(const stimuli::ObjectSpec& object, const std::string& name, std::ostream& out) {
   for (const stimuli::ObjectSpec& part : object.parts) print_overlaps(part, name, out);
   for (const std::string& overlap : stimuli::group_overlaps(object))
-    out << "  note        stimulus " << name << " (" << stimuli::printable(object.file_name)
-        << "): " << stimuli::printable(overlap) << "\n";
+    out << "  note        stimulus " << name << " (" << printable(object.file_name)
+        << "): " << printable(overlap) << "\n";
 }
 
 std::string list(const std::vector<std::string>& words) {
@@ -86,7 +86,7 @@ void print_task_summary(const protocols::Protocol& protocol, std::ostream& out) 
     renderers.emplace_back(protocols::to_string(kind));
   for (const protocols::StimulusSpec& stimulus : protocol.stimuli) stimuli.push_back(stimulus.name);
   long long trials = 0;
-  out << protocol.name << (protocol.title.empty() ? "" : ": " + stimuli::printable(protocol.title))
+  out << protocol.name << (protocol.title.empty() ? "" : ": " + printable(protocol.title))
       << "\n  renderers   " << list(renderers) << "\n  stimuli     " << list(stimuli)
       << "\n  blocks      " << protocol.blocks.size() << ", in " << protocol.sessions.count
       << (protocol.sessions.count == 1 ? " session" : " sessions")
@@ -122,8 +122,7 @@ void print_summary(const protocols::Protocol& protocol, std::ostream& out) {
   const double rest = protocol.home.rest;
   const auto n = static_cast<double>(trials.size());
 
-  out << protocol.name << (protocol.title.empty() ? "" : ": " + stimuli::printable(protocol.title))
-      << "\n"
+  out << protocol.name << (protocol.title.empty() ? "" : ": " + printable(protocol.title)) << "\n"
       << "  renderers   " << list(renderers) << " ("
       << kOrders[static_cast<std::size_t>(protocol.renderer_order)] << ")\n"
       << "  stimuli     " << list(stimuli) << "\n"
@@ -142,10 +141,9 @@ void print_verdict(const std::string& what, const std::vector<std::string>& reas
                    const std::vector<LimitedMaterial>& limited, std::ostream& out) {
   out << "    " << std::left << std::setw(15) << what
       << (reasons.empty() ? limited.empty() ? "yes" : "yes, with limits:" : "no:") << "\n";
-  for (const std::string& reason : reasons) out << "      " << stimuli::printable(reason) << "\n";
+  for (const std::string& reason : reasons) out << "      " << printable(reason) << "\n";
   if (!reasons.empty()) return;
-  for (const LimitedMaterial& one : limited)
-    out << "      " << stimuli::printable(one.text) << "\n";
+  for (const LimitedMaterial& one : limited) out << "      " << printable(one.text) << "\n";
 }
 
 /// Whether each kind of device and simulated participants can show the protocol; if not, why.

@@ -169,7 +169,7 @@ std::vector<ConnectedDevice> list_connected(const DeviceKind& kind, const Device
   waitpid(lister, nullptr, 0);
   if (!said)
     throw std::runtime_error("listing these devices took longer than 3 s: is one of them stuck?");
-  const Json listing = data::json_or_discarded(*said);
+  const Json listing = json_or_discarded(*said);
   if (!listing.is_object())
     throw std::runtime_error("the program that lists these devices crashed");
   if (listing.contains("error")) throw std::runtime_error(listing["error"].get<std::string>());

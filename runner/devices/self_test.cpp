@@ -20,10 +20,6 @@ struct Readings {
   std::uint8_t buttons = 0;  ///< pressed at any time
 };
 
-bool finite(const Vec3& v) {
-  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
-}
-
 Readings read_for_a_second(Device& device, double rate) {
   RealClock clock;
   Readings out;

@@ -58,16 +58,6 @@ std::string keypad_character(int key) {
   return key == GLFW_KEY_KP_SUBTRACT ? "-" : "";
 }
 
-std::string utf8_of(unsigned character) {
-  const auto tail = [character](unsigned shift) {
-    return static_cast<char>(0x80U | (character >> shift & 0x3FU));
-  };
-  if (character < 0x80) return {static_cast<char>(character)};
-  if (character < 0x800) return {static_cast<char>(0xC0U | character >> 6), tail(0)};
-  if (character < 0x10000) return {static_cast<char>(0xE0U | character >> 12), tail(6), tail(0)};
-  return {static_cast<char>(0xF0U | (character >> 18 & 7U)), tail(12), tail(6), tail(0)};
-}
-
 bool on_keypad(int key) { return key >= GLFW_KEY_KP_0 && key <= GLFW_KEY_KP_EQUAL; }
 
 std::vector<std::string> key_names(int key, int scancode) {

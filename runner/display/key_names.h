@@ -22,9 +22,6 @@ const char* emergency_key_name(int key);
 /// What a key of the numeric pad writes, whatever NumLock is: a digit, "." or "-"; empty: nothing.
 std::string keypad_character(int key);
 
-/// A character of Unicode in UTF-8.
-std::string utf8_of(unsigned character);
-
 /// Whether a key is on the numeric pad, which is the participant's.
 bool on_keypad(int key);
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstring>
 
+#include "data/base/text.h"
 #include "runner/display/display.h"
 #include "runner/display/pango_text.h"
 
@@ -235,8 +236,7 @@ void draw_typed(cairo_t* canvas, const std::string& typed, double middle, double
   std::string shown = typed;
   while (words.size().width > width - unit && shown.size() > 1) {
     shown.erase(0, 1);
-    while (!shown.empty() && (static_cast<unsigned char>(shown[0]) & 0xC0U) == 0x80U)
-      shown.erase(0, 1);
+    while (!shown.empty() && continues_character(shown[0])) shown.erase(0, 1);
     words = TextBlock(canvas, "\u2026" + shown + "_", 1.6 * unit);
   }
   const double field = std::max(words.size().width + unit, std::min(10 * unit, width));

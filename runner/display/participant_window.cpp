@@ -1,6 +1,8 @@
 #include "runner/display/participant_window.h"
 
 #include <epoxy/gl.h>
+
+#include "data/base/text.h"
 // After epoxy, which replaces the GL headers.
 #include <GLFW/glfw3.h>
 
@@ -61,7 +63,7 @@ bool ParticipantWindow::handle_typing(int key, int scancode) {
 void ParticipantWindow::handle_character(unsigned character) {
   if (page_.typing == Page::Typing::none) return;
   if (std::exchange(ignore_character_, false) || character < ' ' || character == 0x7f) return;
-  keys_.add({character == ' ' ? "space" : utf8_of(character), settings_.clock->now_ns()});
+  keys_.add({character == ' ' ? "space" : utf8(character), settings_.clock->now_ns()});
 }
 
 void ParticipantWindow::handle_wheel(double up) {

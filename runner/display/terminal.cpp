@@ -2,6 +2,8 @@
 
 #include <sys/ioctl.h>
 
+#include "data/base/text.h"
+
 namespace palpate::runner {
 
 std::string wrapped(const std::string& text, std::size_t columns) {
@@ -9,7 +11,7 @@ std::string wrapped(const std::string& text, std::size_t columns) {
   std::string out = text;
   std::size_t start = 0, space = 0, column = 0;  // of the line; the last space; letters so far
   for (std::size_t i = 0; i < out.size(); ++i) {
-    if ((static_cast<unsigned char>(out[i]) & 0xC0U) == 0x80U) continue;  // within a letter
+    if (continues_character(out[i])) continue;
     if (out[i] == '\n') {
       start = i + 1;
       column = 0;

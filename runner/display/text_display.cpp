@@ -12,9 +12,9 @@
 #include <string_view>
 #include <utility>
 
+#include "data/base/text.h"
 #include "runner/display/terminal.h"
 #include "runner/display/text_input.h"
-#include "stimuli/text.h"
 
 namespace palpate::runner {
 namespace {
@@ -22,7 +22,7 @@ namespace {
 constexpr Page::Kind kText = Page::Kind::text;
 
 std::string text_of(const Page& page) {
-  std::string text = stimuli::printable_lines(page.text);
+  std::string text = printable_lines(page.text);
   if (page.kind == Page::Kind::neutral && !page.go) return text;
   if (page.seconds_left > 0) text += "\n[" + std::to_string(page.seconds_left) + " s]";
   if (page.done > 0 && page.kind != Page::Kind::feedback)
@@ -34,12 +34,12 @@ std::string text_of(const Page& page) {
   if (page.kind == Page::Kind::message && page.parts == 0 && page.typing == Page::Typing::none)
     return text;  // nothing to answer now
   if (!page.keys.empty() && page.kind != Page::Kind::neutral) text += "\n";
-  if (page.typing != Page::Typing::none) text += "\n> " + stimuli::printable(page.typed);
+  if (page.typing != Page::Typing::none) text += "\n> " + printable(page.typed);
   for (const auto& [key, answer] : page.keys) {
     text += text.empty() ? "" : "   ";
-    text += stimuli::printable(key);
+    text += printable(key);
     text += ' ';
-    text += stimuli::printable(answer);
+    text += printable(answer);
   }
   return text;
 }
@@ -48,8 +48,7 @@ std::string checklist_text(const Checklist& list) {
   std::size_t due = 0;
   while (due < list.steps.size() && list.steps[due].state != Checklist::Step::State::now) ++due;
   std::string text = "* step " + std::to_string(due + 1) + " of " +
-                     std::to_string(list.steps.size()) + ": " +
-                     stimuli::printable(list.instruction);
+                     std::to_string(list.steps.size()) + ": " + printable(list.instruction);
   std::string choices;
   for (const auto& [kind, meaning] : list.choices) {
     choices += choices.empty() ? " (" : "; ";
@@ -68,7 +67,7 @@ std::string status(const ConsoleState& state) {
   if (state.remaining > 60)
     text += ", " + std::to_string(static_cast<int>(state.remaining / 60)) + " min left";
   if (state.missed_ticks > 0) text += ", " + std::to_string(state.missed_ticks) + " ticks missed";
-  if (!state.held_by.empty()) text += ": " + stimuli::printable(state.held_by);
+  if (!state.held_by.empty()) text += ": " + printable(state.held_by);
   return text + "]\n";
 }
 
@@ -82,10 +81,10 @@ void TextScreen::show(const Page& page) {
       (page.keys.empty() && page.seconds_left > before.seconds_left) || page.kind == kText) {
     text = text_of(page);
   } else if (page.typed != before.typed) {
-    text = "> " + stimuli::printable(page.typed);
+    text = "> " + printable(page.typed);
   }
   if (page.reply != before.reply && !page.reply.empty())
-    text += (text.empty() ? "" : "\n") + stimuli::printable(page.reply);
+    text += (text.empty() ? "" : "\n") + printable(page.reply);
   if (text.empty()) return;
   out_.add({STDOUT_FILENO, text + "\n"});
   wake_.signal();
@@ -95,7 +94,7 @@ void TextConsole::show(const ConsoleState& state) {
   for (messages_shown_ = std::max(messages_shown_, state.older_messages);
        messages_shown_ < state.older_messages + state.messages.size(); ++messages_shown_) {
     text += "* ";
-    text += stimuli::printable_lines(state.messages[messages_shown_ - state.older_messages]);
+    text += printable_lines(state.messages[messages_shown_ - state.older_messages]);
     text += '\n';
   }
   if (state.checklist.instruction != instruction_) {
@@ -159,7 +158,7 @@ class TextDisplay final : public DisplayLoop {
         output.text = wrapped(output.text, columns_of(output.file));
         // A command that is being typed is written again below the new text.
         if (terminal_.on() && !input_.line().empty())
-          output.text = "\r\x1b[K" + output.text + stimuli::printable(input_.line());
+          output.text = "\r\x1b[K" + output.text + printable(input_.line());
       }
       pending_.push_back(std::move(output));
     }
@@ -193,7 +192,7 @@ class TextDisplay final : public DisplayLoop {
       dispatch(event);
     }
     if (terminal_.on() && input_.line() != before) {
-      print("\r\x1b[K" + stimuli::printable(input_.line()) + (input_.line().empty() ? "\n" : ""));
+      print("\r\x1b[K" + printable(input_.line()) + (input_.line().empty() ? "\n" : ""));
     }
   }
 

@@ -4,6 +4,8 @@
 #include <array>
 #include <utility>
 
+#include "data/base/text.h"
+
 namespace palpate::runner {
 namespace {
 
@@ -42,17 +44,6 @@ std::string lower(std::string_view text) {
   std::string out(text);
   for (char& c : out) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c + ('a' - 'A')) : c;
   return out;
-}
-
-bool continues(char byte) { return (static_cast<unsigned char>(byte) & 0xC0U) == 0x80U; }
-
-/// Length of the UTF-8 sequence that begins with this byte; 0: none does.
-std::size_t sequence_length(char lead) {
-  const auto byte = static_cast<unsigned char>(lead);
-  if (byte < 0x80) return 1;
-  if (byte >= 0xC2 && byte <= 0xDF) return 2;
-  if (byte >= 0xE0 && byte <= 0xEF) return 3;
-  return byte >= 0xF0 && byte <= 0xF4 ? 4 : 0;
 }
 
 }  // namespace
@@ -107,7 +98,7 @@ void TextInput::letter(const std::string& text, std::int64_t time_ns, std::vecto
     if (enter) {
       end_line(time_ns, out);
     } else if (text[0] == kDelete || text[0] == '\b') {
-      while (continues(line_.back())) line_.pop_back();
+      while (continues_character(line_.back())) line_.pop_back();
       line_.pop_back();
     } else if (text[0] == kClearLine) {
       line_.clear();
@@ -155,7 +146,7 @@ std::size_t TextInput::escape(std::string_view rest, std::int64_t time_ns,
   // alone without waiting, so it is an emergency too.
   const std::string_view key = rest.substr(1);
   if (!key.empty() && static_cast<unsigned char>(key[0]) > ' ' && key[0] != kDelete &&
-      sequence_length(key[0]) == key.size()) {
+      utf8_size(key[0]) == key.size()) {
     out.emplace_back(emergency("Alt+" + std::string(key)));
     return rest.size();  // the key is not an answer
   }
@@ -172,13 +163,14 @@ std::vector<TextInput::Event> TextInput::feed(std::string_view bytes, std::int64
       at += escape(rest.substr(at), time_ns, out);
       continue;
     }
-    const std::size_t length = sequence_length(rest[at]);
+    const std::size_t length = utf8_size(rest[at]);
     if (length == 0) {  // no UTF-8
       ++at;
       continue;
     }
     std::size_t whole = 1;
-    while (whole < length && at + whole < rest.size() && continues(rest[at + whole])) ++whole;
+    while (whole < length && at + whole < rest.size() && continues_character(rest[at + whole]))
+      ++whole;
     if (whole < length && at + whole == rest.size()) {
       partial_ = rest.substr(at);
       break;

@@ -17,15 +17,13 @@ Vec3 any_perpendicular(const Vec3& n) {
   return glm::normalize(glm::cross(n, std::abs(n.x) < 0.7 ? Vec3(1, 0, 0) : Vec3(0, 1, 0)));
 }
 
-Vec3 random_perpendicular(stimuli::Random& random, const Vec3& n) {
+Vec3 random_perpendicular(Random& random, const Vec3& n) {
   const double angle = 2 * std::numbers::pi * random.unit();
   const Vec3 a = any_perpendicular(n);
   return std::cos(angle) * a + std::sin(angle) * glm::cross(n, a);
 }
 
-Vec3 normal_vector(stimuli::Random& random) {
-  return {random.normal(), random.normal(), random.normal()};
-}
+Vec3 normal_vector(Random& random) { return {random.normal(), random.normal(), random.normal()}; }
 
 }  // namespace
 
@@ -42,7 +40,7 @@ Explorer::Explorer(const SimulatedSettings& settings, double grip, double wall_s
       past_(static_cast<std::size_t>(
           std::max(1.0, std::round(settings.motor.reaction_delay / tick)))) {}
 
-HandTarget Explorer::begin(stimuli::Random random) {
+HandTarget Explorer::begin(Random random) {
   random_ = random;
   std::fill(past_.begin(), past_.end(), TouchState{});
   now_ = 0;

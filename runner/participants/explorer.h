@@ -7,8 +7,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "data/base/random.h"
 #include "runner/participants/simulated_settings.h"
-#include "stimuli/random.h"
 
 namespace palpate::runner {
 
@@ -27,7 +27,7 @@ class Explorer {
   Explorer(const SimulatedSettings& settings, double grip, double wall_stiffness, double tick);
 
   /// Starts a trial with a random approach. \return its start pose
-  HandTarget begin(stimuli::Random random);
+  HandTarget begin(Random random);
   /// One tick. `now` and the stylus are those of this tick; contact in `now` has an effect only
   /// after the reaction delay. \param stylus_axis  unit, tip to tail
   HandTarget step(const TouchState& now, const Vec3& stylus_tip, const Vec3& stylus_axis);
@@ -59,7 +59,7 @@ class Explorer {
       max_offset_;  ///< m; largest distance of the target from the stylus, which limits the force
   double wander_;   ///< rad; of the heading in a tick, standard deviation
   double turn_cosine_, turn_sine_;  ///< of the angle by which the stylus turns in a tick
-  stimuli::Random random_{0};
+  Random random_{0};
   std::vector<TouchState> past_;  ///< ring buffer over the reaction delay
   std::size_t now_ = 0;
   Motion motion_ = Motion::approach;

@@ -52,8 +52,7 @@ HeadingChoice::HeadingChoice(const ShapeHypotheses& all, const ObserverSettings&
   seen_.resize(static_cast<std::size_t>(settings.places));
 }
 
-Vec3 HeadingChoice::choose(ShapeObserver& posterior, const SlidingStylus& stylus,
-                           stimuli::Random& random) {
+Vec3 HeadingChoice::choose(ShapeObserver& posterior, const SlidingStylus& stylus, Random& random) {
   if (!draw(posterior, random)) return stylus.heading;
   const Vec3 side = glm::cross(stylus.normal, stylus.heading);
   Vec3 best = stylus.heading;
@@ -72,7 +71,7 @@ Vec3 HeadingChoice::choose(ShapeObserver& posterior, const SlidingStylus& stylus
 }
 
 /// Fills drawn_ and few_. \return whether there is more than one shape among them
-bool HeadingChoice::draw(ShapeObserver& posterior, stimuli::Random& random) {
+bool HeadingChoice::draw(ShapeObserver& posterior, Random& random) {
   posterior.draw(random, drawn_);
   std::size_t next = 0;
   int shapes = 0;

@@ -18,9 +18,9 @@
 #include <span>
 #include <vector>
 
+#include "data/base/random.h"
 #include "runner/participants/shape_lines.h"
 #include "runner/participants/shape_observer.h"
-#include "stimuli/random.h"
 
 namespace palpate::runner {
 
@@ -51,7 +51,7 @@ class HeadingChoice {
                 const HeadingSettings& settings);
 
   /// Unit, across the normal. \param random  for the draw
-  Vec3 choose(ShapeObserver& posterior, const SlidingStylus& stylus, stimuli::Random& random);
+  Vec3 choose(ShapeObserver& posterior, const SlidingStylus& stylus, Random& random);
 
  private:
   static constexpr int kRoom = ShapeHypotheses::kBlock;
@@ -69,7 +69,7 @@ class HeadingChoice {
     float floor;
   };
 
-  bool draw(ShapeObserver& posterior, stimuli::Random& random);
+  bool draw(ShapeObserver& posterior, Random& random);
   double expected_entropy(const SlidingStylus& stylus, const Vec3& heading);
   void predict(const SlidingStylus& stylus, const Vec3& shift, Prediction& out) const;
   void add_log_likelihood(int i, const Prediction& seen, const FloatVec& normal_before, bool ray,

@@ -9,6 +9,7 @@
 #include <iterator>
 #include <utility>
 
+#include "data/base/text.h"
 #include "protocols/answer_keys.h"
 #include "protocols/tasks/levels.h"
 
@@ -371,10 +372,7 @@ bool KeyboardRespondent::type(const std::string& key) {
   const bool text = page_.typing == Page::Typing::text;
   std::string& typed = page_.typed;
   if (key == "backspace") {
-    // A character of UTF-8 goes as a whole.
-    while (!typed.empty() && (static_cast<unsigned char>(typed.back()) & 0xC0U) == 0x80U)
-      typed.pop_back();
-    if (!typed.empty()) typed.pop_back();
+    remove_last_character(typed);
     screen_.show(page_);
     return true;
   }
@@ -490,7 +488,7 @@ bool KeyboardRespondent::spoken(const std::string& answer, std::int64_t time_ns)
     while (!page_.typed.empty()) type("backspace");
     std::string character;
     for (const char c : answer) {
-      const bool begins = (static_cast<unsigned char>(c) & 0xC0U) != 0x80U;
+      const bool begins = !continues_character(c);
       if (begins && !character.empty()) spoken_.push_back({std::exchange(character, {}), time_ns});
       if (c == ' ') spoken_.push_back({"space", time_ns});
       if (c != ' ') character += c;

@@ -5,8 +5,8 @@
 #include <glm/geometric.hpp>
 #include <numbers>
 
+#include "data/base/random.h"
 #include "stimuli/grid_hull.h"
-#include "stimuli/random.h"
 
 namespace palpate::runner {
 namespace {
@@ -58,7 +58,7 @@ float distance_at(const DistanceField& field, const Vec3& p) {
 
 // Points near the surface, where the field is best.
 std::vector<Vec3> samples(const DistanceField& field) {
-  stimuli::Random random(1);
+  Random random(1);
   std::vector<Vec3> points;
   for (int tries = 0; tries < 100000 && points.size() < kSamples; ++tries) {
     Vec3 point;

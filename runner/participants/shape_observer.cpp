@@ -297,7 +297,7 @@ void ShapeObserver::find_posterior() {
                            probabilities_.begin());
 }
 
-void ShapeObserver::draw(stimuli::Random& random, std::span<int> hypotheses) {
+void ShapeObserver::draw(Random& random, std::span<int> hypotheses) {
   const float reference = *std::max_element(log_posterior_.begin(), log_posterior_.end());
   for (std::size_t h = 0; h < masses_.size(); ++h) {
     masses_[h] = lane::exp(log_posterior_[h] - reference);

@@ -27,8 +27,8 @@
 #include <span>
 #include <vector>
 
+#include "data/base/random.h"
 #include "runner/participants/shape_hypotheses.h"
-#include "stimuli/random.h"
 #include "stimuli/vec.h"
 
 namespace palpate::runner {
@@ -90,7 +90,7 @@ class ShapeObserver {
   double probability(int shape) const { return probabilities_[static_cast<std::size_t>(shape)]; }
   /// Draws hypotheses from the posterior, in ascending order: one from each of so many equal parts
   /// of its mass (stratified). Does not allocate.
-  void draw(stimuli::Random& random, std::span<int> hypotheses);
+  void draw(Random& random, std::span<int> hypotheses);
   bool decided() const { return probability(best_) > settings_.threshold; }
 
  private:

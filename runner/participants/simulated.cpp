@@ -74,9 +74,9 @@ SimulatedParticipant::SimulatedParticipant(const SimulatedSettings& own,
 
 void SimulatedParticipant::begin_trial(const protocols::Trial& trial) {
   const auto stream = [&](std::uint64_t use) {
-    return stimuli::Random(
-        seed_, {static_cast<std::uint64_t>(number_), static_cast<std::uint64_t>(trial.session),
-                static_cast<std::uint64_t>(trial.trial), use});
+    return Random(seed_,
+                  {static_cast<std::uint64_t>(number_), static_cast<std::uint64_t>(trial.session),
+                   static_cast<std::uint64_t>(trial.trial), use});
   };
   trial_ = trial;
   ticks_before_ = 0;

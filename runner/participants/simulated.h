@@ -71,7 +71,7 @@ class SimulatedParticipant final : public Respondent {
   Explorer explorer_;
   ShapeObserver observer_;
   HeadingChoice heading_choice_;
-  stimuli::Random random_{0}, heading_random_{0};
+  Random random_{0}, heading_random_{0};
   bool ray_ = false;
   protocols::Trial trial_;
   std::int64_t ticks_before_ = 0;  ///< of this trial, before time zero

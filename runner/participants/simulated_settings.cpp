@@ -12,11 +12,11 @@
 #include <string_view>
 #include <vector>
 
+#include "data/base/checksum.h"
 #include "data/base/json_text.h"
+#include "data/base/random.h"
 #include "protocols/json_document.h"
 #include "protocols/parse.h"
-#include "protocols/sha256.h"
-#include "stimuli/random.h"
 
 namespace palpate::runner {
 
@@ -171,7 +171,7 @@ const std::map<std::string, std::vector<std::string>>& words() {
 
 json frozen_settings(int version) {
   for (const FrozenSettings* frozen = kFrozenSettings; frozen->version != 0; ++frozen) {
-    if (frozen->version == version) return data::read_json(frozen->text);
+    if (frozen->version == version) return read_json(frozen->text);
   }
   throw std::invalid_argument("no version " + std::to_string(version) +
                               " of the simulated participant");
@@ -180,9 +180,9 @@ json frozen_settings(int version) {
 /// What a version did where its file has no key for it.
 json implied_settings(int version) {
   json implied = json::object();
-  if (version < 3) implied = data::read_json(kBeforeVersion3);
+  if (version < 3) implied = read_json(kBeforeVersion3);
   if (version < 2) {
-    implied.merge_patch(data::read_json(kBeforeVersion2));
+    implied.merge_patch(read_json(kBeforeVersion2));
     implied["search"].erase("pull_to_centre");  // its own
   }
   return implied;
@@ -284,7 +284,7 @@ void check_settings(const json& settings) {
 
 std::string settings_checksum(json settings) {
   remove_implied(settings, implied_settings(settings.at("version")));
-  return protocols::sha256_hex(settings.dump());
+  return checksum_hex(settings.dump());
 }
 
 namespace {
@@ -395,13 +395,13 @@ std::optional<int> participant_version_of(const std::string& sha256,
 }
 
 SimulatedSettings read_simulated_settings(const std::string& text) {
-  const json settings = data::read_json(text);
+  const json settings = read_json(text);
   check_settings(settings);
   return read(settings);
 }
 
 SimulatedSettings individual(const SimulatedSettings& settings, std::uint64_t seed, int number) {
-  stimuli::Random random(seed, {static_cast<std::uint64_t>(number)});
+  Random random(seed, {static_cast<std::uint64_t>(number)});
   const auto factor = [&random](double log_sd) { return std::exp(log_sd * random.normal()); };
   SimulatedSettings own = settings;
   own.motor.slide_speed *= factor(settings.between.slide_speed);

@@ -12,7 +12,7 @@ namespace palpate::runner {
 using protocols::TaskBlock;
 using protocols::TaskKind;
 
-void TaskJudgement::begin(const protocols::Trial& trial, const stimuli::Random& random) {
+void TaskJudgement::begin(const protocols::Trial& trial, const Random& random) {
   trial_ = trial;
   random_ = random;
   estimates_.clear();

@@ -20,9 +20,9 @@
 #include <optional>
 #include <vector>
 
+#include "data/base/random.h"
 #include "protocols/protocol.h"
 #include "protocols/schedule.h"
-#include "stimuli/random.h"
 
 namespace palpate::runner {
 
@@ -45,7 +45,7 @@ class TaskJudgement {
       : protocol_(protocol), settings_(settings) {}
 
   /// Before the first interval of a trial.
-  void begin(const protocols::Trial& trial, const stimuli::Random& random);
+  void begin(const protocols::Trial& trial, const Random& random);
   /// What an interval is felt as.
   struct Felt {
     std::optional<double>
@@ -74,7 +74,7 @@ class TaskJudgement {
   const protocols::Protocol& protocol_;
   JudgementSettings settings_;
   protocols::Trial trial_;
-  stimuli::Random random_{0};
+  Random random_{0};
   std::vector<double> estimates_;         ///< of the intervals so far
   std::optional<double> own_, standard_;  ///< adjust: as felt last
   double shown_ = 0;                      ///< adjust: level that own_ is of

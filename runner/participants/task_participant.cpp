@@ -84,10 +84,9 @@ void TaskParticipant::begin_trial(const protocols::Trial& trial) {
   felt_ = 0;
   const auto& told_apart = of_blocks_[static_cast<std::size_t>(trial.task_block)];
   identifier_ = told_apart ? &identifiers_.at(told_apart.get()) : nullptr;
-  judgement_.begin(trial,
-                   stimuli::Random(seed_, {static_cast<std::uint64_t>(number_),
-                                           static_cast<std::uint64_t>(trial.session),
-                                           static_cast<std::uint64_t>(trial.trial), kJudgement}));
+  judgement_.begin(trial, Random(seed_, {static_cast<std::uint64_t>(number_),
+                                         static_cast<std::uint64_t>(trial.session),
+                                         static_cast<std::uint64_t>(trial.trial), kJudgement}));
 }
 
 void TaskParticipant::begin_interval(const protocols::Trial& trial, const IntervalView& view) {
@@ -166,8 +165,8 @@ std::optional<Answer> TaskParticipant::confidence(const protocols::ConfidenceSpe
 std::string TaskParticipant::ask(const protocols::PageSpec& page, const protocols::PageItem& item) {
   if (page.kind == protocols::PageSpec::Kind::consent) return "agree";
   // Of the question itself: the same whatever was asked before.
-  stimuli::Random random(seed_, {static_cast<std::uint64_t>(number_), kPages, number_of(page.name),
-                                 number_of(item.name)});
+  Random random(seed_, {static_cast<std::uint64_t>(number_), kPages, number_of(page.name),
+                        number_of(item.name)});
   switch (item.kind) {
     case protocols::PageItem::Kind::number: {
       const double least = item.least.value_or(std::min(0.0, item.most.value_or(0)));

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "data/base/text.h"
 #include "data/export/trial_table.h"
 #include "data/store/store.h"
 #include "protocols/json_document.h"
@@ -21,7 +22,6 @@
 #include "runner/python/arrays.h"
 #include "runner/session/simulated_session.h"
 #include "stimuli/convex_mesh.h"
-#include "stimuli/text.h"
 
 namespace palpate::runner {
 namespace {
@@ -134,7 +134,7 @@ PYBIND11_MODULE(_palpate, module) {
       if (thrown) std::rethrow_exception(thrown);
     } catch (const std::exception& error) {
       if (!is_bad_input(error)) throw;  // pybind11 knows what becomes of it
-      PyErr_SetString(input_error.ptr(), stimuli::printable_lines(error.what()).c_str());
+      PyErr_SetString(input_error.ptr(), printable_lines(error.what()).c_str());
     }
   });
   py::class_<Document>(module, "Document")

@@ -309,7 +309,7 @@ std::string to_json_text(const std::vector<LimitedMaterial>& limited,
 }
 
 bool limit_as_recorded(protocols::Protocol& protocol, const std::string& event) {
-  const nlohmann::json json = data::json_or_discarded(event);
+  const nlohmann::json json = json_or_discarded(event);
   if (!json.is_object() || !json.contains(kLimitedEvent)) return false;
   try {
     for (const nlohmann::json& one : json.at(kLimitedEvent)) {

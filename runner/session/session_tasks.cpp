@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "protocols/sha256.h"
+#include "data/base/checksum.h"
 #include "protocols/tasks/levels.h"
 #include "protocols/tasks/task_plan.h"
 #include "runner/session/session.h"
@@ -329,8 +329,8 @@ void Session::show_page(const PageSpec& page) {
     std::string answer = participant_.ask(page, item);
     if (consent && answer != "agree")
       throw EndOfSession(data::RunEnd::aborted, "consent was not given");
-    answers.push_back({page.name, item.name, page.version, protocols::sha256_hex(shown),
-                       std::move(answer), station_.clock.now_ns()});
+    answers.push_back({page.name, item.name, page.version, checksum_hex(shown), std::move(answer),
+                       station_.clock.now_ns()});
   }
   if (!answers.empty()) station_.log.answered(answers);
 }

@@ -15,9 +15,9 @@
 #include <utility>
 
 #include "data/base/json_text.h"
+#include "data/base/text.h"
 #include "protocols/tasks/levels.h"
 #include "protocols/tasks/task_plan.h"
-#include "stimuli/text.h"
 
 namespace palpate::runner {
 namespace {
@@ -174,8 +174,8 @@ std::string SocketAdvisor::refusal(const std::string& message, int trial) const 
 /// nullopt with trouble_: nonsense; without: of an earlier question.
 std::optional<double> SocketAdvisor::level_in(const std::string& line,
                                               const protocols::Trial& next) {
-  const std::string found = "; found " + stimuli::printable(line, kMostShown);
-  const auto message = data::json_or_discarded(line);
+  const std::string found = "; found " + printable(line, kMostShown);
+  const auto message = json_or_discarded(line);
   if (!message.is_object() || !message.contains("trial") || !message["trial"].is_number_integer() ||
       message.value("type", nlohmann::json()) != "level") {
     trouble_ = R"(expected {"type": "level", "trial": )" + std::to_string(next.trial) +

@@ -5,8 +5,8 @@
 #include <span>
 #include <vector>
 
+#include "data/base/random.h"
 #include "protocols/protocol.h"
-#include "stimuli/random.h"
 
 namespace palpate::runner {
 
@@ -33,7 +33,7 @@ class NoiseSignal {
   };
   double filtered(double white);
 
-  stimuli::Random random_;
+  Random random_;
   std::vector<Slope> slopes_;  ///< none: white
   double gain_ = 1;
   double fade_step_;

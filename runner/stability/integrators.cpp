@@ -4,8 +4,8 @@
 #include <cmath>
 #include <complex>
 
+#include "data/base/random.h"
 #include "runner/devices/simulated.h"
-#include "stimuli/random.h"
 
 namespace palpate::runner {
 namespace {
@@ -73,7 +73,7 @@ class Reference {
 };
 
 std::vector<double> forces() {
-  stimuli::Random random(1);
+  Random random(1);
   std::vector<double> out;
   out.reserve(kTicks);
   for (int i = 0; i < kTicks; ++i) out.push_back(4 * random.unit() - 2);

@@ -7,8 +7,8 @@
 #include <limits>
 #include <memory>
 
+#include "data/base/random.h"
 #include "rendering/bodies/soft/soft_scene.h"
-#include "stimuli/random.h"
 #include "stimuli/solids/solid_mesh.h"
 
 namespace palpate::runner {
@@ -113,7 +113,7 @@ std::vector<SoftCase> soft_cases() {
 }
 
 std::vector<SoftCase> soft_cases_elsewhere(std::uint64_t seed) {
-  stimuli::Random random(seed);
+  Random random(seed);
   std::vector<SoftCase> out = soft_cases();
   for (SoftCase& one : out) {
     one.x = 0.04 * (random.unit() - 0.5);

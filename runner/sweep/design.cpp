@@ -5,7 +5,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "stimuli/random.h"
+#include "data/base/random.h"
 
 namespace palpate::runner {
 
@@ -109,7 +109,7 @@ std::vector<double> Design::sobol(std::uint64_t index, std::size_t dimensions) c
   std::vector<double> out;
   const std::vector<std::uint64_t> digits = sobol_digits(index, dimensions);
   for (std::size_t d = 0; d < dimensions; ++d) {
-    const std::uint64_t shift = stimuli::Random(seed_, {kShift, d}).next();
+    const std::uint64_t shift = Random(seed_, {kShift, d}).next();
     out.push_back(share_of_digits(digits[d] ^ shift));
   }
   return out;
@@ -123,8 +123,8 @@ std::vector<double> Design::at(std::int64_t point) const {
     case DesignKind::lhs:
       for (std::size_t d = 0; d < dimensions_; ++d) {
         const auto count = static_cast<std::uint64_t>(size_);
-        const std::uint64_t key = stimuli::Random(seed_, {kPermutation, d}).next();
-        const double within = stimuli::Random(seed_, {kPlaceWithin, d, index}).unit();
+        const std::uint64_t key = Random(seed_, {kPermutation, d}).next();
+        const double within = Random(seed_, {kPlaceWithin, d, index}).unit();
         const auto part = static_cast<double>(permuted(index, count, key));
         out.push_back((part + within) / static_cast<double>(count));
       }
@@ -162,7 +162,7 @@ std::uint64_t permuted(std::uint64_t value, std::uint64_t count, std::uint64_t k
     std::uint64_t low = value & ((std::uint64_t{1} << low_bits) - 1), high = value >> low_bits;
     unsigned l = low_bits, h = high_bits;
     for (std::uint64_t round = 0; round < 8; ++round) {
-      const std::uint64_t mixed = stimuli::Random(key, {round, low}).next();
+      const std::uint64_t mixed = Random(key, {round, low}).next();
       const std::uint64_t next = (high ^ mixed) & ((std::uint64_t{1} << h) - 1);
       high = low;
       low = next;

@@ -9,10 +9,10 @@
 #include <vector>
 
 #include "data/base/json_text.h"
+#include "data/base/random.h"
+#include "data/base/text.h"
 #include "protocols/json_document.h"
 #include "runner/participants/simulated_settings.h"
-#include "stimuli/random.h"
-#include "stimuli/text.h"
 
 namespace palpate::runner {
 
@@ -92,9 +92,8 @@ std::vector<std::string> near_pointers(const json& document, const std::string& 
   const json flat = document.flatten();
   for (const auto& [place, value] : flat.items()) {
     // One that only stands elsewhere is as near as one that is misspelt by two letters.
-    const std::size_t elsewhere =
-        2 + stimuli::edit_distance(last, place.substr(place.rfind('/') + 1));
-    const std::size_t edits = std::min(stimuli::edit_distance(pointer, place), elsewhere);
+    const std::size_t elsewhere = 2 + edit_distance(last, place.substr(place.rfind('/') + 1));
+    const std::size_t edits = std::min(edit_distance(pointer, place), elsewhere);
     if (edits <= 2 + last.size() / 2) found.emplace_back(edits, place);
   }
   std::stable_sort(found.begin(), found.end(),
@@ -117,9 +116,7 @@ using protocols::SweptDocument;
 /// 53 bits: every reader of JSON takes them exactly.
 std::uint64_t short_seed(std::uint64_t sweep_seed, std::int64_t point, std::uint64_t use) {
   constexpr std::uint64_t kPointSeeds = 4;  // other streams of the sweep's seed: design.cpp
-  return stimuli::Random(sweep_seed, {kPointSeeds, static_cast<std::uint64_t>(point), use})
-             .next() >>
-         11U;
+  return Random(sweep_seed, {kPointSeeds, static_cast<std::uint64_t>(point), use}).next() >> 11U;
 }
 
 std::string place_of(std::size_t parameter, const SweepParameter& one, std::size_t path) {
@@ -221,7 +218,7 @@ void SweptStudy::check_participant(const SweepParameter& one, std::size_t number
     // All words of a choice must be known; of numbers the space may hold some that fail.
     if (!refusals.empty() && (values.front().is_string() || refusals.size() == values.size())) {
       faults.add(place, "expected what " + path + " can be: it " + refusals.front() + "; " +
-                            data::json_excerpt(*now) + " stands there now");
+                            json_excerpt(*now) + " stands there now");
     }
   }
 }
@@ -241,7 +238,7 @@ std::string SweptStudy::refusal_of(const std::string& path, const json& value) c
       const std::string& at = fault.location;
       if (at != path && !path.starts_with(at + "/") && !at.starts_with(path + "/")) continue;
       const bool unknown = fault.expected.starts_with("unknown key");
-      return "expected what the protocol can have; with " + data::json_excerpt(value) +
+      return "expected what the protocol can have; with " + json_excerpt(value) +
              " it says: " + at + ": " + fault.expected +
              (unknown ? near_text(protocol_, path) : "");
     }

@@ -11,6 +11,7 @@
 #include <string>
 #include <utility>
 
+#include "data/base/random.h"
 #include "stimuli/closed_surface.h"
 #include "stimuli/half_edges.h"
 #include "stimuli/mesh_names.h"
@@ -18,7 +19,6 @@
 #include "stimuli/parts/convex_sets.h"
 #include "stimuli/parts/cutting.h"
 #include "stimuli/primitives.h"
-#include "stimuli/random.h"
 
 namespace palpate::stimuli {
 namespace {

@@ -14,8 +14,8 @@
 #include <string>
 #include <utility>
 
+#include "data/base/random.h"
 #include "stimuli/parts/convex_sets.h"
-#include "stimuli/random.h"
 
 namespace palpate::stimuli {
 namespace {

@@ -13,8 +13,8 @@
 #include <utility>
 #include <vector>
 
+#include "data/base/text.h"
 #include "stimuli/mesh_formats.h"
-#include "stimuli/text.h"
 
 namespace palpate::stimuli {
 namespace {

@@ -5,8 +5,8 @@
 #include <glm/geometric.hpp>
 #include <vector>
 
+#include "data/base/random.h"
 #include "runner/participants/shape_observer.h"
-#include "stimuli/random.h"
 
 namespace palpate {
 namespace {
@@ -22,7 +22,7 @@ std::vector<stimuli::ObjectSpec> four_shapes() {
 
 /// Touches all over a sphere of the size of the stimuli, the stylus leaning on it.
 std::vector<runner::Percept> percepts(bool ray, bool contact) {
-  stimuli::Random random(1);
+  Random random(1);
   const auto direction = [&random] {
     return glm::normalize(Vec3(random.normal(), random.normal(), random.normal()));
   };

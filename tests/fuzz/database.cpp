@@ -7,7 +7,7 @@
 #include <iterator>
 #include <string>
 
-#include "data/files/checksum.h"
+#include "data/base/checksum.h"
 #include "data/store/store.h"
 #include "tests/fuzz/input_file.h"
 
@@ -44,7 +44,7 @@ std::string sound_database() {
   {
     data::Store store = data::Store::open(path, data::Store::Mode::write_or_create);
     const data::Participant participant =
-        store.enrol({"quick", kText, data::checksum_hex(kText), {}}, "P01");
+        store.enrol({"quick", kText, checksum_hex(kText), {}}, "P01");
     data::RunInfo info;
     info.clock = {1'700'000'000'000'000'000, 5'000'000'000};
     info.program_version = "0.1.0";

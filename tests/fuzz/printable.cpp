@@ -4,7 +4,7 @@
 #include <cstdlib>
 #include <string>
 
-#include "stimuli/text.h"
+#include "data/base/text.h"
 
 namespace {
 
@@ -36,11 +36,11 @@ void require_harmless(const std::string& text, bool lines) {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const std::string text(reinterpret_cast<const char*>(data), size);
-  const std::string once = palpate::stimuli::printable(text);
+  const std::string once = palpate::printable(text);
   require_harmless(once, false);
-  if (palpate::stimuli::printable(once) != once) std::abort();
-  require_harmless(palpate::stimuli::printable_lines(text), true);
-  if (palpate::stimuli::printable(text, 40).size() > 40 + 3) std::abort();
-  require_harmless(palpate::stimuli::printable(text, 40), false);
+  if (palpate::printable(once) != once) std::abort();
+  require_harmless(palpate::printable_lines(text), true);
+  if (palpate::printable(text, 40).size() > 40 + 3) std::abort();
+  require_harmless(palpate::printable(text, 40), false);
   return 0;
 }

@@ -87,7 +87,7 @@ std::vector<Protocol::Order> all_limits() {
 // Feasibility, and that both ways of drawing find a valid order whenever there is one.
 TEST(Order, AgreesWithBruteForceOnEverySmallCase) {
   int solvable = 0, unsolvable = 0;
-  stimuli::Random random(1);
+  Random random(1);
   for (const Protocol::Order& order : all_limits()) {
     for (int stimuli = 1; stimuli <= 4; ++stimuli) {
       for_each_counts(stimuli, 8, [&](const Counts& counts) {
@@ -113,7 +113,7 @@ TEST(Order, AgreesWithBruteForceOnEverySmallCase) {
 
 // Every valid order can come up when it is constructed: nothing is cut off besides the invalid.
 TEST(Order, ConstructionReachesEveryValidOrder) {
-  stimuli::Random random(2);
+  Random random(2);
   for (const auto& order : {limits(1), limits(2), limits({}, 3)}) {
     for (const Counts& counts : {Counts{2, 2, 2}, Counts{3, 2, 2}, Counts{4, 2, 1}}) {
       const std::vector<Sequence> expected = all_valid(counts, order);
@@ -126,7 +126,7 @@ TEST(Order, ConstructionReachesEveryValidOrder) {
 }
 
 TEST(Order, HoldsTightLimits) {
-  stimuli::Random random(3);
+  Random random(3);
   for (int i = 0; i < 50; ++i) {
     // One valid order only.
     EXPECT_EQ(order_block({5, 4}, limits(1), kNames, random),
@@ -140,7 +140,7 @@ TEST(Order, HoldsTightLimits) {
 }
 
 TEST(Order, HoldsLimitsInBigBlocks) {
-  stimuli::Random random(4);
+  Random random(4);
   const Counts counts = {2500, 2500, 2500, 2500};
   for (const auto& order :
        {limits(1), limits(2), limits(3), limits({}, 2), limits({}, 3), limits({}, 4)}) {
@@ -156,7 +156,7 @@ TEST(Order, HoldsLimitsInBigBlocks) {
 }
 
 TEST(Order, RefusalSaysWhyAndWhatWouldHelp) {
-  stimuli::Random random(5);
+  Random random(5);
   const auto refusal = [&](const Counts& counts, const Protocol::Order& order) {
     try {
       order_block(counts, order, kNames, random);
@@ -185,7 +185,7 @@ TEST(Order, TheBudgetOfDrawsGrowsWithTheBlock) {
 }
 
 TEST(Order, SequentialGoesRound) {
-  stimuli::Random random(6);
+  Random random(6);
   Protocol::Order order = limits(1);
   order.kind = OrderKind::sequential;
   EXPECT_EQ(order_block({2, 2, 2}, order, kNames, random), (Sequence{0, 1, 2, 0, 1, 2}));
@@ -214,7 +214,7 @@ struct Case {
 };
 
 void expect_equally_likely(const Case& c, std::uint64_t seed, std::size_t budget) {
-  stimuli::Random random(seed);
+  Random random(seed);
   const std::vector<Sequence> orders = all_valid(c.counts, c.order);
   const int draws = 200 * static_cast<int>(orders.size());
   std::map<Sequence, int> seen;
@@ -225,7 +225,7 @@ void expect_equally_likely(const Case& c, std::uint64_t seed, std::size_t budget
 
 // A session that goes on with a newer program must meet the order that it began with.
 TEST(Order, StaysTheSameFromOneVersionOfTheProgramToTheNext) {
-  stimuli::Random one(5), two(5), three(5);
+  Random one(5), two(5), three(5);
   EXPECT_EQ(order_block({6, 6, 6}, limits(1), kNames, one, 0),
             (Sequence{0, 2, 1, 2, 0, 1, 0, 1, 2, 1, 2, 0, 1, 0, 2, 1, 0, 2}));
   EXPECT_EQ(order_block({4, 4, 4, 4}, limits({}, 3), kNames, two, 0),

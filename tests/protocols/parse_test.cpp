@@ -9,8 +9,8 @@
 #include <sstream>
 #include <string>
 
-#include "protocols/sha256.h"
-#include "stimuli/random.h"
+#include "data/base/checksum.h"
+#include "data/base/random.h"
 #include "tests/protocols/parsed_faults.h"
 #include "tests/shared/peak_memory.h"
 
@@ -175,7 +175,7 @@ TEST(Parse, ReadsEveryKey) {
   EXPECT_TRUE(p.samples);
   EXPECT_EQ(p.seed, 18446744073709551615u);
   EXPECT_EQ(p.source_text, text_of(file));
-  EXPECT_EQ(p.sha256, sha256_hex(text_of(file)));
+  EXPECT_EQ(p.sha256, checksum_hex(text_of(file)));
 }
 
 TEST(Parse, LeavesDefaultsAlone) {
@@ -337,7 +337,7 @@ TEST(Parse, UnreadableFilesAreInputErrors) {
 TEST(Parse, SurvivesDamage) {
   const std::string good = text_of(kFolder + "good/everything.json");
   const std::string pieces = "{}[]\",:0-1e9.\\\xff\n truenull";
-  stimuli::Random random(11);
+  Random random(11);
   int refused = 0;
   for (int i = 0; i < 3000; ++i) {
     std::string text = good;

@@ -11,8 +11,8 @@
 #include <string>
 #include <tuple>
 
+#include "data/base/checksum.h"
 #include "protocols/parse.h"
-#include "protocols/sha256.h"
 
 namespace palpate::protocols {
 namespace {
@@ -54,7 +54,7 @@ TEST(Schedule, GoldenHo2000) {
   for (int participant = 1; participant <= 7; ++participant) {
     text += text_of(schedule(ho2000(), participant));
   }
-  EXPECT_EQ(sha256_hex(text), "1863b585016ce244cb648500535f4f0ac29d22032bd8879f6bb464414a41184b");
+  EXPECT_EQ(checksum_hex(text), "1863b585016ce244cb648500535f4f0ac29d22032bd8879f6bb464414a41184b");
 }
 
 TEST(Schedule, Ho2000IsThePapersDesign) {

@@ -23,8 +23,8 @@ struct Counts {
 };
 
 /// One random motion near the mesh, from wherever a walk finds the probe outside. `turn`: rad.
-void check_motion(const stimuli::ConvexMesh& mesh, const ContactTrees& trees,
-                  stimuli::Random& random, bool segment, double way, double turn, Counts& counts) {
+void check_motion(const stimuli::ConvexMesh& mesh, const ContactTrees& trees, Random& random,
+                  bool segment, double way, double turn, Counts& counts) {
   const double size = mesh.size();
   const double length = segment ? size * uniform(random, 0.01, 3) : 0;
   const Vec3 near = testing::middle_of(mesh) + 0.6 * size * testing::random_direction(random);
@@ -71,7 +71,7 @@ void check_motion(const stimuli::ConvexMesh& mesh, const ContactTrees& trees,
 Counts check_motions(bool segment, double way, double turn, std::uint64_t stream) {
   Counts counts;
   for (std::uint64_t seed = 0; seed < 1500; ++seed) {
-    stimuli::Random random(seed, {77, stream});
+    Random random(seed, {77, stream});
     const stimuli::ConvexMesh mesh = testing::random_convex_mesh(random);
     const ContactTrees trees(mesh, true);
     for (int i = 0; i < 10; ++i) check_motion(mesh, trees, random, segment, way, turn, counts);
@@ -108,7 +108,7 @@ TEST(SupportMap, LeadsToTheFarthestVertexInFewSteps) {
   const stimuli::ConvexMesh mesh(stimuli::icosphere(0.03, 6));
   const SupportMap map(mesh);
   ASSERT_FALSE(map.empty());
-  stimuli::Random random(5);
+  Random random(5);
   for (int i = 0; i < 2000; ++i) {
     const Vec3 direction = 3.0 * testing::random_direction(random);
     const Vec3& near = mesh.vertices()[map.near_support(direction)];

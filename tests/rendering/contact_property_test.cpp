@@ -15,7 +15,7 @@ using testing::ProbePath;
 class EveryTick : public ::testing::TestWithParam<const Renderer*> {
  protected:
   /// Probes shorter than, about as long as, and much longer than the object.
-  static double random_length(stimuli::Random& random, const stimuli::ConvexMesh& mesh) {
+  static double random_length(Random& random, const stimuli::ConvexMesh& mesh) {
     const double shares[] = {0, 0.05, 0.5, 1, 3, 10};
     return shares[random.below(6)] * testing::uniform(random, 0.7, 1.3) * mesh.size();
   }
@@ -24,7 +24,7 @@ class EveryTick : public ::testing::TestWithParam<const Renderer*> {
   PathCheck follow(std::uint64_t kind, std::uint64_t seeds, MakePath&& make_path) {
     PathCheck check;
     for (std::uint64_t seed = 0; seed < seeds && !HasFailure(); ++seed) {
-      stimuli::Random random(seed, {kind});
+      Random random(seed, {kind});
       const auto mesh =
           std::make_shared<const stimuli::ConvexMesh>(testing::random_convex_mesh(random));
       const double length = random_length(random, *mesh);
@@ -40,8 +40,8 @@ class EveryTick : public ::testing::TestWithParam<const Renderer*> {
 
 TEST_P(EveryTick, SlidingSlowly) {
   const bool side = GetParam()->side_contact();
-  const PathCheck check = follow(
-      1, 300, [side](stimuli::Random& random, const stimuli::ConvexMesh& mesh, double length) {
+  const PathCheck check =
+      follow(1, 300, [side](Random& random, const stimuli::ConvexMesh& mesh, double length) {
         return testing::sliding_path(random, mesh, length, 300, 0.005, 0.3, side);
       });
   EXPECT_GT(check.in_contact, check.ticks / 3);
@@ -50,8 +50,8 @@ TEST_P(EveryTick, SlidingSlowly) {
 
 TEST_P(EveryTick, SlidingFastAndDeep) {
   const bool side = GetParam()->side_contact();
-  const PathCheck check = follow(
-      2, 300, [side](stimuli::Random& random, const stimuli::ConvexMesh& mesh, double length) {
+  const PathCheck check =
+      follow(2, 300, [side](Random& random, const stimuli::ConvexMesh& mesh, double length) {
         return testing::sliding_path(random, mesh, length, 200, 0.05, 1.5, side);
       });
   EXPECT_GT(check.in_contact, check.ticks / 3);
@@ -59,7 +59,7 @@ TEST_P(EveryTick, SlidingFastAndDeep) {
 
 TEST_P(EveryTick, Wandering) {
   const PathCheck check =
-      follow(3, 600, [](stimuli::Random& random, const stimuli::ConvexMesh& mesh, double length) {
+      follow(3, 600, [](Random& random, const stimuli::ConvexMesh& mesh, double length) {
         return testing::wandering_path(random, mesh, length, 400, 0.01);
       });
   EXPECT_GT(check.in_contact, check.ticks / 50);
@@ -68,7 +68,7 @@ TEST_P(EveryTick, Wandering) {
 
 TEST_P(EveryTick, PassingFast) {
   const PathCheck check =
-      follow(4, 600, [](stimuli::Random& random, const stimuli::ConvexMesh& mesh, double length) {
+      follow(4, 600, [](Random& random, const stimuli::ConvexMesh& mesh, double length) {
         const double step = 0.02 * std::pow(1000, random.unit());
         return testing::fast_passes(random, mesh, length, 300, step);
       });
@@ -77,7 +77,7 @@ TEST_P(EveryTick, PassingFast) {
 
 TEST_P(EveryTick, Jumping) {
   const PathCheck check =
-      follow(5, 600, [](stimuli::Random& random, const stimuli::ConvexMesh& mesh, double length) {
+      follow(5, 600, [](Random& random, const stimuli::ConvexMesh& mesh, double length) {
         return testing::jumping_path(random, mesh, length, 200);
       });
   EXPECT_GT(check.in_contact, check.ticks / 10);
@@ -88,7 +88,7 @@ TEST_P(EveryTick, Jumping) {
 TEST_P(EveryTick, JumpingOverRims) {
   PathCheck check;
   for (std::uint64_t seed = 0; seed < 120; ++seed) {
-    stimuli::Random random(seed, {6});
+    Random random(seed, {6});
     const int corners = 64 << (seed % 4);
     const stimuli::PolygonSoup soup =
         seed % 3 ? stimuli::cone(0.05, testing::uniform(random, 0.005, 0.1), corners)

@@ -217,7 +217,7 @@ std::pair<double, double> over_triangle(const stimuli::ConvexMesh& mesh,
 }
 
 /// The side slides over a sphere of 30 mm, now and then parallel to it within the blend's angle.
-testing::ProbePath along_sphere(stimuli::Random& random, int ticks) {
+testing::ProbePath along_sphere(Random& random, int ticks) {
   const testing::Wave3 place(random), turn(random);
   testing::ProbePath path;
   for (int tick = 0; tick < ticks; ++tick) {
@@ -232,7 +232,7 @@ testing::ProbePath along_sphere(stimuli::Random& random, int ticks) {
 
 // Along edges and faces of fine meshes, in every direction.
 TEST(SegmentFace, EquationTwoHoldsOverTriangles) {
-  stimuli::Random random(5);
+  Random random(5);
   int from_edges = 0, from_faces = 0;
   for (const int subdivisions : {2, 3, 4, 5}) {
     const auto mesh =

@@ -111,7 +111,7 @@ class Continuity : public ::testing::TestWithParam<const Renderer*> {};
 TEST_P(Continuity, OfForceOverFacets) {
   Seen seen;
   for (std::uint64_t seed = 0; seed < 60 && !HasFatalFailure(); ++seed) {
-    stimuli::Random random(seed, {81});
+    Random random(seed, {81});
     const stimuli::PolygonSoup soups[] = {stimuli::cube(0.06), stimuli::icosphere(0.03, 3),
                                           stimuli::cone(0.03, 0.06, 64),
                                           stimuli::cylinder(0.03, 0.06, 64)};

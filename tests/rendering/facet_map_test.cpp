@@ -74,7 +74,7 @@ TEST(FacetMap, IsAsNearToWhereARayLeavesOnAnyShapeAndFineness) {
     for (const int subdivisions : {3, 5}) {
       const Mesh mesh = stretched_ball(by, subdivisions);
       const FacetMap map(*mesh, 0);
-      stimuli::Random random(7);
+      Random random(7);
       double sum = 0;
       constexpr int kRays = 200;
       for (int i = 0; i < kRays; ++i) {
@@ -93,7 +93,7 @@ TEST(FacetMap, IsAsNearToWhereARayLeavesOnAnyShapeAndFineness) {
 TEST(FacetMap, IsUnderThePointOfASegmentThatIsNearest) {
   const Mesh mesh = stretched_ball(Vec3(1), 5);
   const FacetMap map(*mesh, 0);
-  stimuli::Random random(8);
+  Random random(8);
   for (int i = 0; i < 300; ++i) {
     const Vec3 out = testing::random_direction(random);
     const Vec3 along = glm::normalize(glm::cross(out, testing::random_direction(random)));
@@ -126,11 +126,11 @@ TEST(SupportMap, AClimbFromItEndsOnTheExtremeVertex) {
   meshes.push_back(std::make_shared<const stimuli::ConvexMesh>(
       stimuli::cylinder(kRadius, 0.06, 700)));  // caps of coplanar faces
   for (std::uint64_t seed = 0; seed < 60; ++seed) {
-    stimuli::Random random(seed, {21});
+    Random random(seed, {21});
     meshes.push_back(
         std::make_shared<const stimuli::ConvexMesh>(testing::random_convex_mesh(random)));
   }
-  stimuli::Random random(9);
+  Random random(9);
   for (const Mesh& mesh : meshes) {
     const SupportMap map(*mesh, 0);
     for (int i = 0; i < 50; ++i) {
@@ -150,7 +150,7 @@ TEST(PairCast, LocatedWithoutAStartIsInsideWhereNoPlaneSeparates) {
     const ContactTrees trees(*mesh, true);
     std::uint64_t scans = 0;
     const CastMesh part{*mesh, trees, testing::middle_of(*mesh), scans};
-    stimuli::Random random(10);
+    Random random(10);
     for (int i = 0; i < 60; ++i) {
       const Vec3 at =
           uniform(random, 0.95, 1.05) * kRadius * by * testing::random_direction(random);
@@ -216,7 +216,7 @@ TEST_P(Maps, ChangeNoBitOfAFirstContactOnALargeMesh) {
   for (const Vec3& by : kStretches) {
     WithAndWithoutMaps both(*GetParam(), stretched_ball(by, 5));
     for (std::uint64_t seed = 0; seed < 60; ++seed) {
-      stimuli::Random random(seed, {22});
+      Random random(seed, {22});
       both.begin();
       const Vec3 to = uniform(random, 0, 0.9) * kRadius * by * testing::random_direction(random);
       const Vec3 out = testing::random_direction(random), drift = testing::random_direction(random);
@@ -239,7 +239,7 @@ TEST_P(Maps, ChangeNoBitOfAFirstContactOnALargeMesh) {
 TEST_P(Maps, ChangeNoBitOnAnySolid) {
   int contacts = 0;
   for (std::uint64_t seed = 0; seed < 300; ++seed) {
-    stimuli::Random random(seed, {23});
+    Random random(seed, {23});
     const auto mesh =
         std::make_shared<const stimuli::ConvexMesh>(testing::random_convex_mesh(random));
     WithAndWithoutMaps both(*GetParam(), mesh);

@@ -35,7 +35,7 @@ TEST_P(FirstContact, FasterThanAPlateIsThickHoldsOnTheSideOfEntry) {
 
 TEST_P(FirstContact, APlateIsNotPassedWhateverTheWay) {
   for (std::uint64_t seed = 0; seed < 3000; ++seed) {
-    stimuli::Random random(seed, {11});
+    Random random(seed, {11});
     const double size = 2e-4 * std::pow(1e5, random.unit());
     const double thickness = size * std::pow(10, uniform(random, -4, -1));
     const double length = size * uniform(random, 0, 4) * static_cast<double>(random.below(3));
@@ -69,7 +69,7 @@ TEST_P(FirstContact, APlateIsNotPassedWhateverTheWay) {
 
 TEST(FirstContactOfTheSide, AStickIsNotWhippedThroughANeedle) {
   for (std::uint64_t seed = 0; seed < 3000; ++seed) {
-    stimuli::Random random(seed, {12});
+    Random random(seed, {12});
     const double size = 2e-4 * std::pow(1e5, random.unit());
     const double width = size * std::pow(10, uniform(random, -4, -1));
     Bench bench(ray_renderer(), shared(testing::needle(size, width)),
@@ -140,7 +140,7 @@ void check_against_fine_steps(Bench& bench, const testing::ProbePath& local_path
 TEST_P(FirstContact, AgreesWithTheMotionInAHundredSteps) {
   Tally tally;
   for (std::uint64_t seed = 0; seed < 150 && !HasFatalFailure(); ++seed) {
-    stimuli::Random random(seed, {13});
+    Random random(seed, {13});
     const auto mesh =
         std::make_shared<const stimuli::ConvexMesh>(testing::random_convex_mesh(random));
     const double length = mesh->size() * uniform(random, 0, 3) * static_cast<double>(seed % 4);
@@ -159,7 +159,7 @@ TEST_P(FirstContact, AgreesWithTheMotionInAHundredSteps) {
 TEST_P(FirstContact, ByTheNearestSideIsAsDeepAsTheReference) {
   int plunges = 0;
   for (std::uint64_t seed = 0; seed < 250; ++seed) {
-    stimuli::Random random(seed, {14});
+    Random random(seed, {14});
     const auto mesh =
         std::make_shared<const stimuli::ConvexMesh>(testing::random_convex_mesh(random));
     const double length = mesh->size() * uniform(random, 0, 3);

@@ -43,7 +43,7 @@ class Frames : public ::testing::TestWithParam<const Renderer*> {};
 TEST_P(Frames, NearTheOrigin) {
   int in_contact = 0;
   for (std::uint64_t seed = 0; seed < 100 && !HasFatalFailure(); ++seed) {
-    stimuli::Random random(seed, {31});
+    Random random(seed, {31});
     const auto mesh =
         std::make_shared<const stimuli::ConvexMesh>(testing::random_convex_mesh(random));
     const double length = mesh->size() * testing::uniform(random, 0.2, 3);
@@ -60,7 +60,7 @@ TEST_P(Frames, NearTheOrigin) {
 TEST_P(Frames, AKilometreAway) {
   int in_contact = 0;
   for (std::uint64_t seed = 0; seed < 50 && !HasFatalFailure(); ++seed) {
-    stimuli::Random random(seed, {32});
+    Random random(seed, {32});
     const auto mesh = std::make_shared<const stimuli::ConvexMesh>(
         testing::placed(testing::random_polyhedron(random, 20, Vec3(0.05, 0.04, 0.03)),
                         Quat(1, 0, 0, 0), 1, Vec3()));

@@ -7,9 +7,9 @@
 #include <memory>
 #include <vector>
 
+#include "data/base/random.h"
 #include "rendering/renderer.h"
 #include "stimuli/primitives.h"
-#include "stimuli/random.h"
 #include "tests/shared/render_checks.h"
 
 namespace palpate::rendering {
@@ -134,7 +134,7 @@ TEST(Friction, OfTheSideOfTheStylusTurnsIt) {
 }
 
 TEST(Friction, NeverGivesEnergyOverClosedPathsOnAFace) {
-  stimuli::Random random(11);
+  Random random(11);
   const auto between = [&](double low, double high) { return low + (high - low) * random.unit(); };
   for (int round = 0; round < 50; ++round) {
     stimuli::Material material = frictional(between(0.1, 1), 0);

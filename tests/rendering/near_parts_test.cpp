@@ -9,15 +9,15 @@
 #include <memory>
 #include <vector>
 
+#include "data/base/random.h"
 #include "rendering/renderer.h"
 #include "rendering/scene.h"
 #include "stimuli/primitives.h"
-#include "stimuli/random.h"
 
 namespace palpate::rendering {
 namespace {
 
-Vec3 any_within(stimuli::Random& random, double radius) {
+Vec3 any_within(Random& random, double radius) {
   return radius * Vec3(2 * random.unit() - 1, 2 * random.unit() - 1, 2 * random.unit() - 1);
 }
 
@@ -26,7 +26,7 @@ Vec3 any_within(stimuli::Random& random, double radius) {
 /// \param floor  a ball of 3 m below them
 Scene crowd(std::uint64_t seed, std::size_t count, double half, Tool tool = {},
             bool floor = false) {
-  stimuli::Random random(seed, {});
+  Random random(seed, {});
   const auto ball = std::make_shared<const stimuli::ConvexMesh>(stimuli::icosphere(0.01, 1));
   const auto box = std::make_shared<const stimuli::ConvexMesh>(stimuli::cube(0.03));
   std::vector<SceneObject> objects;
@@ -62,7 +62,7 @@ class Hand {
   }
 
  private:
-  stimuli::Random random_;
+  Random random_;
   Vec3 tip_{0.1, 0, 0}, heading_{0, 1, 0}, axis_{0, 0, 1};
 };
 

@@ -29,7 +29,7 @@ struct DrawnScene {
 
 /// One to three clusters, of which some have a second surface within.
 DrawnScene random_scene(std::uint64_t seed) {
-  stimuli::Random random(seed, {71});
+  Random random(seed, {71});
   DrawnScene out;
   out.seed = seed;
   out.scale = std::pow(10, testing::uniform(random, -3, 3));
@@ -77,7 +77,7 @@ class RandomScene : public ::testing::Test {
       ASSERT_EQ(r.faults & ~kMayBe, 0u);
       capped_ += (r.faults & render_fault::kContactCapped) != 0;
       for (const Vec3& v : {r.force, r.torque, r.device1, r.device2, r.ideal.tip, r.ideal.tail})
-        ASSERT_TRUE(testing::finite(v));
+        ASSERT_TRUE(finite(v));
       expect_sums(state, probe, r, drawn.scale);
       for (std::uint32_t group = 0; group < scene.groups().size(); ++group)
         expect_ideal(scene, state, probe, group, sides, drawn.scale);

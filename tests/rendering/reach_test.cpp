@@ -9,16 +9,16 @@
 #include <memory>
 #include <vector>
 
+#include "data/base/random.h"
 #include "rendering/renderer.h"
 #include "stimuli/primitives.h"
-#include "stimuli/random.h"
 
 namespace palpate::rendering {
 namespace {
 
-Vec3 vector(stimuli::Random& random) { return {random.normal(), random.normal(), random.normal()}; }
+Vec3 vector(Random& random) { return {random.normal(), random.normal(), random.normal()}; }
 
-Reach some_reach(stimuli::Random& random) {
+Reach some_reach(Random& random) {
   Reach reach{.factor = 0.2 + 10 * random.unit(), .fraction = random.unit()};
   if (random.unit() < 0.3) reach.fraction = std::round(reach.fraction);
   reach.in_world = random.unit() < 0.3;
@@ -40,7 +40,7 @@ TEST(Reach, StretchesAboutThePivot) {
 }
 
 TEST(Reach, IsUndoneByItsInverse) {
-  stimuli::Random random(5);
+  Random random(5);
   for (int i = 0; i < 1000; ++i) {
     const Reach reach = some_reach(random);
     const LineProbe real{vector(random), vector(random)};
@@ -61,7 +61,7 @@ LineProbe virtual_motion(Reach reach, const LineProbe& motion) {
 }
 
 TEST(Reach, ForcesDoTheSameWorkForEveryMotionOfTheEnds) {
-  stimuli::Random random(6);
+  Random random(6);
   for (int i = 0; i < 20000; ++i) {
     const Reach reach = some_reach(random);
     const LineProbe motion{vector(random), vector(random)};
@@ -83,7 +83,7 @@ TEST(Reach, AContactsForceDoesTheSameWorkAtItsPlaceAndAtTheHand) {
   std::vector<SceneObject> objects(1);
   objects[0].mesh = std::make_shared<const stimuli::ConvexMesh>(stimuli::cube(0.05));
   const Scene scene(std::move(objects));
-  stimuli::Random random(7);
+  Random random(7);
   int contacts = 0;
   for (int i = 0; i < 300; ++i) {
     Reach reach{.factor = 5, .fraction = i % 2 == 0 ? 1 : 0.5};
@@ -119,7 +119,7 @@ TEST(Reach, TheGainIsTheSquareOfTheLever) {
   EXPECT_NEAR(stiffness_gain({.factor = 3, .in_world = true}, 0), 9, 1e-15);
   // Stretched five times about the tail, the tip moves by 5 of the real tip less 4 of the tail.
   EXPECT_NEAR(stiffness_gain({.factor = 5, .fraction = 1}, 0), 25 + 16, 1e-13);
-  stimuli::Random random(8);
+  Random random(8);
   for (int i = 0; i < 1000; ++i) {
     const Reach reach = some_reach(random);
     const double along = random.unit(), k = 700;

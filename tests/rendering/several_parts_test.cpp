@@ -69,7 +69,7 @@ TEST_P(SeveralParts, ManySeamsFeelLikeNone) {
   const Scene whole = slab_cut_at({});
   int in_contact = 0;
   for (std::uint64_t seed = 0; seed < 40; ++seed) {
-    stimuli::Random random(seed, {41});
+    Random random(seed, {41});
     const testing::Wave x(random), y(random), z(random);
     RenderState cut_state = cut.initial_state();
     RenderState whole_state = whole.initial_state();
@@ -98,7 +98,7 @@ TEST_P(SeveralParts, ForcesOfSeparateObjectsAdd) {
   const Scene together(both), only_left({both[0]}), only_right({placed_object(right, {}, 900, 0)});
   int both_touched = 0;
   for (std::uint64_t seed = 0; seed < 60; ++seed) {
-    stimuli::Random random(seed, {42});
+    Random random(seed, {42});
     const testing::Wave3 place(random), turn(random);
     RenderState state = together.initial_state();
     RenderState left_state = only_left.initial_state();
@@ -164,7 +164,7 @@ TEST_P(SeveralParts, ACompoundBesideOthersFeelsAsAlone) {
     std::vector<RenderState> states;
     for (const Scene& scene : alone) states.push_back(scene.initial_state());
     int all_touched = 0;
-    stimuli::Random random(which, {43});
+    Random random(which, {43});
     const testing::Wave x(random), y(random), z(random);
     for (int i = 0; i < 1500; ++i) {
       const double travelled = 0.02 * i;
@@ -194,7 +194,7 @@ TEST_P(SeveralParts, ACompoundBesideOthersFeelsAsAlone) {
 // same.
 TEST_P(SeveralParts, WhatWasTouchedExactlyIsFeltOnceItIsPushed) {
   constexpr double kPressed = 1e-3;  // m
-  stimuli::Random random(9);
+  Random random(9);
   for (int i = 0; i < 2000; ++i) {
     const Pose pose{0.1 * Vec3(random.normal(), random.normal(), random.normal()),
                     stimuli::uniform_rotation(random)};
@@ -258,7 +258,7 @@ TEST_P(SeveralParts, InnerCornerPushesOutOfBothWalls) {
 TEST_P(SeveralParts, NoPartOfAClusterIsEnteredUnfelt) {
   int in_contact = 0, released = 0;
   for (std::uint64_t seed = 0; seed < 100; ++seed) {
-    stimuli::Random random(seed, {43});
+    Random random(seed, {43});
     std::vector<SceneObject> parts;
     for (std::uint64_t i = 0; i < 2 + seed % 3; ++i) {
       parts.push_back(

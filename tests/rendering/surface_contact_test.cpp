@@ -9,9 +9,9 @@
 #include <numbers>
 #include <span>
 
+#include "data/base/random.h"
 #include "runner/bench/allocation_count.h"
 #include "stimuli/closed_surface.h"
-#include "stimuli/random.h"
 #include "tests/shared/union_scenes.h"
 
 namespace palpate::rendering {
@@ -68,7 +68,7 @@ stimuli::PolygonSoup bent_block(double angle) {
 }
 
 /// A height field of cells: flat faces in many triangles, edges of 90 degrees of both kinds.
-stimuli::PolygonSoup stairs(stimuli::Random& random, int cells, double edge) {
+stimuli::PolygonSoup stairs(Random& random, int cells, double edge) {
   stimuli::PolygonSoup soup;
   std::vector<int> heights;
   for (int i = 0; i < cells * cells; ++i)
@@ -122,7 +122,7 @@ stimuli::PolygonSoup torus(int around, int across, double large, double small) {
   return soup;
 }
 
-Vec3 direction(stimuli::Random& random) {
+Vec3 direction(Random& random) {
   for (;;) {
     const Vec3 v(random.unit() * 2 - 1, random.unit() * 2 - 1, random.unit() * 2 - 1);
     const double length = glm::length(v);
@@ -131,7 +131,7 @@ Vec3 direction(stimuli::Random& random) {
 }
 
 /// Turned, then rounded as a binary STL file has it.
-stimuli::PolygonSoup as_in_a_file(stimuli::PolygonSoup soup, stimuli::Random& random) {
+stimuli::PolygonSoup as_in_a_file(stimuli::PolygonSoup soup, Random& random) {
   const Quat turn = glm::angleAxis(3 * random.unit(), direction(random));
   for (Vec3& v : soup.vertices) {
     v = turn * v;
@@ -174,7 +174,7 @@ double distance(const Surface& surface, const Vec3& p) {
 /// A hand that presses at random places, slides on and turns.
 class Hand {
  public:
-  Hand(const Surface& surface, stimuli::Random& random) : surface_(surface), random_(random) {}
+  Hand(const Surface& surface, Random& random) : surface_(surface), random_(random) {}
   LineProbe next() {
     if (ticks_++ % 50 == 0) {
       const auto pick = static_cast<std::size_t>(random_.unit() *
@@ -195,7 +195,7 @@ class Hand {
 
  private:
   const Surface& surface_;
-  stimuli::Random& random_;
+  Random& random_;
   Vec3 tip_{0, 0, 0.15}, along_{0, 0, 1}, goal_, turn_{0, 0, 1};
   double step_ = 0;
   int ticks_ = 0;
@@ -217,7 +217,7 @@ class SurfaceContact : public ::testing::TestWithParam<const Renderer*> {
 };
 
 TEST_P(SurfaceContact, TheIdealToolIsNeverInside) {
-  stimuli::Random random(11);
+  Random random(11);
   for (int round = 0; round < 6; ++round) {
     const stimuli::PolygonSoup soup = as_in_a_file(
         round % 2 == 0 ? torus(12 + round, 8, 0.03, 0.01) : stairs(random, 2 + round % 3, 0.05),
@@ -251,7 +251,7 @@ TEST_P(SurfaceContact, TheIdealToolIsNeverInside) {
 }
 
 TEST_P(SurfaceContact, AConvexMeshGivesTheForcesOfTheWalk) {
-  stimuli::Random random(5);
+  Random random(5);
   const stimuli::PolygonSoup soup = stimuli::icosphere(0.03, 2);
   const SceneSurface placed = surface_of({soup});
   const Scene surface({}, true, {}, nullptr, {placed});
@@ -317,7 +317,7 @@ TEST_P(SurfaceContact, SidesThatRoundingBentBackDoNotTakeTurnsForEver) {
 }
 
 TEST_P(SurfaceContact, AFlatFaceInManyTrianglesHoldsNothingAlongIt) {
-  stimuli::Random random(3);
+  Random random(3);
   for (int round = 0; round < 4; ++round) {
     // A plate of 20 x 20 cells, turned, in single precision.
     stimuli::PolygonSoup soup;

@@ -34,7 +34,7 @@ bool same_bits(const Rendering& a, const Rendering& b) {
 
 class Tick : public ::testing::TestWithParam<const Renderer*> {
  protected:
-  static std::vector<SceneObject> two_objects(stimuli::Random& random) {
+  static std::vector<SceneObject> two_objects(Random& random) {
     std::vector<SceneObject> objects;
     for (int i = 0; i < 2; ++i) {
       objects.push_back(
@@ -46,7 +46,7 @@ class Tick : public ::testing::TestWithParam<const Renderer*> {
     return objects;
   }
 
-  static testing::ProbePath some_path(stimuli::Random& random, const stimuli::ConvexMesh& mesh) {
+  static testing::ProbePath some_path(Random& random, const stimuli::ConvexMesh& mesh) {
     auto path = testing::wandering_path(random, mesh, 0.12, 300, 0.02);
     const auto jumps = testing::jumping_path(random, mesh, 0.12, 100);
     path.insert(path.end(), jumps.begin(), jumps.end());
@@ -62,7 +62,7 @@ TEST_P(Tick, AllocatesNothing) {
   ASSERT_EQ(runner::allocations(), probe_count + 1) << "the counter does not count";
   int in_contact = 0;
   for (std::uint64_t seed = 0; seed < 20; ++seed) {
-    stimuli::Random random(seed, {21});
+    Random random(seed, {21});
     const auto objects = two_objects(random);
     const auto path = some_path(random, *objects[0].mesh);
     const Scene scene(objects);
@@ -78,7 +78,7 @@ TEST_P(Tick, AllocatesNothing) {
 
 TEST_P(Tick, SamePathSameBits) {
   for (std::uint64_t seed = 0; seed < 10; ++seed) {
-    stimuli::Random random(seed, {22});
+    Random random(seed, {22});
     const auto objects = two_objects(random);
     const auto path = some_path(random, *objects[0].mesh);
     const Scene scene(objects);
@@ -192,7 +192,7 @@ TEST_P(Tick, HugeAndTinyPosesStayFiniteAndAreForgotten) {
   const double values[] = {0, 1e-320, 1e-160, 1e-5, 1e5, 1e100, 1e160, 1e308, -1e308};
   const LineProbe above{{0.002, 0.003, kHalf + 0.01}, {0.003, 0.004, kHalf + 0.02}};
   for (std::uint64_t seed = 0; seed < 2000; ++seed) {
-    stimuli::Random random(seed, {23});
+    Random random(seed, {23});
     Bench bench(*GetParam(), small_cube());
     for (int i = 0; i < 8; ++i) {
       LineProbe probe;
@@ -202,7 +202,7 @@ TEST_P(Tick, HugeAndTinyPosesStayFiniteAndAreForgotten) {
       }
       const Rendering r = bench.tick(probe);
       for (const Vec3& v : {r.force, r.torque, r.device1, r.device2}) {
-        ASSERT_TRUE(testing::finite(v)) << "seed " << seed << " tick " << i;
+        ASSERT_TRUE(finite(v)) << "seed " << seed << " tick " << i;
       }
     }
     const LineProbe pressed = testing::moved(above, {0, 0, -0.011});

@@ -15,7 +15,7 @@ using testing::kTick;
 using testing::random_tool;
 
 TEST(ToolForces, AreSplitOnTwoDevicesAndTurnTheHand) {
-  stimuli::Random random(11);
+  Random random(11);
   int off_axis = 0;
   for (int i = 0; i < 300; ++i) {
     const std::size_t segments = 1 + random.below(Tool::kMostSegments);
@@ -54,7 +54,7 @@ TEST(ToolForces, AreSplitOnTwoDevicesAndTurnTheHand) {
 
 // One segment from tip to tail is the plain stylus, and so are its pieces.
 TEST(ToolForces, AToolThatIsTheStylusFeelsAsTheStylus) {
-  stimuli::Random random(12);
+  Random random(12);
   int in_contact = 0, same = 0;
   for (const std::size_t pieces : {1u, 2u, 5u, 16u}) {
     const auto mesh =

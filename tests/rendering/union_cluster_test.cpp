@@ -44,7 +44,7 @@ TEST_P(UnionCluster, TheIdealToolIsNeverInsideOfAPart) {
   const bool sides = GetParam()->side_contact();
   std::size_t ticks = 0, in_contact = 0, lagging = 0;
   for (std::uint64_t seed = 0; seed < 160; ++seed) {
-    stimuli::Random random(seed, {52});
+    Random random(seed, {52});
     const std::size_t segments = sides ? seed % 4 : 0;  // 0: the plain stylus
     const Scene scene(cluster(random), sides, random_tool(random, segments));
     RenderState state = scene.initial_state();
@@ -55,7 +55,7 @@ TEST_P(UnionCluster, TheIdealToolIsNeverInsideOfAPart) {
       in_contact += r.contacts > 0;
       lagging += r.contacts > 0 && state.unions.groups[0].lag > kMostLag;
       ASSERT_LE(deepest_inside(scene, state, sides), 1e-12) << "seed " << seed << " tick " << ticks;
-      ASSERT_TRUE(testing::finite(r.force) && testing::finite(r.torque));
+      ASSERT_TRUE(finite(r.force) && finite(r.torque));
     }
   }
   EXPECT_GT(in_contact, ticks / 10);
@@ -67,21 +67,21 @@ TEST_P(UnionCluster, ThePartsOrderPlaceAndSizeDoNotMatter) {
   std::size_t ticks = 0, same_order = 0, same_place = 0, same_size = 0;
   for (std::uint64_t seed = 0; seed < 24; ++seed) {
     const std::size_t segments = sides ? seed % 3 : 0;
-    stimuli::Random pose_random(seed, {54});
+    Random pose_random(seed, {54});
     const Pose pose = testing::random_pose(pose_random, 0.3);
     const double scale = 10;
     const auto made = [&](const Pose& at, double size, bool reversed) {
-      stimuli::Random random(seed, {53});
+      Random random(seed, {53});
       std::vector<SceneObject> parts = cluster(random, at, size);
       if (reversed) std::reverse(parts.begin(), parts.end());
-      stimuli::Random tool_random(seed, {55});
+      Random tool_random(seed, {55});
       return Scene(parts, sides, random_tool(tool_random, segments, size));
     };
     const Scene plain = made({}, 1, false), reversed = made({}, 1, true),
                 moved = made(pose, 1, false), large = made({}, scale, false);
     RenderState a = plain.initial_state(), b = reversed.initial_state(), c = moved.initial_state(),
                 d = large.initial_state();
-    stimuli::Random random(seed, {56});
+    Random random(seed, {56});
     for (const LineProbe& probe : cluster_path(random, 300, 0.2)) {
       // The tool's side is measured, or a turned world would choose another.
       a.measured_side = b.measured_side = d.measured_side = Vec3(1, 0.2, 0.1);
@@ -103,7 +103,7 @@ TEST_P(UnionCluster, ThePartsOrderPlaceAndSizeDoNotMatter) {
 
 TEST_P(UnionCluster, AFastToolIsStoppedByAThinPlate) {
   const bool sides = GetParam()->side_contact();
-  stimuli::Random random(7);
+  Random random(7);
   for (int i = 0; i < 400; ++i) {
     const double thickness = 1e-3 * std::pow(0.01, random.unit());
     const std::size_t segments = sides ? static_cast<std::size_t>(i) % 4 : 0;
@@ -132,7 +132,7 @@ TEST_P(UnionCluster, AFastToolIsStoppedByAThinPlate) {
 
 TEST_P(UnionCluster, NothingIsAllocatedAndNoNaNGetsThrough) {
   const bool sides = GetParam()->side_contact();
-  stimuli::Random random(8);
+  Random random(8);
   for (std::size_t segments = 0; segments <= (sides ? 16u : 0u); segments += 4) {
     const Scene scene(cluster(random), sides, random_tool(random, segments));
     RenderState state = scene.initial_state();
@@ -151,8 +151,8 @@ TEST_P(UnionCluster, NothingIsAllocatedAndNoNaNGetsThrough) {
     for (std::size_t i = 0; i < path.size(); ++i) {
       const bool broken = i == 100 || i == 200 || (i == 150 && segments > 0);
       EXPECT_EQ((out[i].faults & render_fault::kNonFinite) != 0, broken) << i;
-      EXPECT_TRUE(testing::finite(out[i].force) && testing::finite(out[i].torque) &&
-                  testing::finite(out[i].device2) && testing::finite(out[i].ideal.tip));
+      EXPECT_TRUE(finite(out[i].force) && finite(out[i].torque) && finite(out[i].device2) &&
+                  finite(out[i].ideal.tip));
       if (broken) {
         EXPECT_EQ(out[i].force, Vec3(0));
       }

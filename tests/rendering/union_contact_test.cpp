@@ -58,7 +58,7 @@ std::vector<stimuli::PolygonSoup> valley() {
 }
 
 TEST_P(UnionContact, AValleyOverASeamHoldsTheTipFromBothSides) {
-  stimuli::Random random(3);
+  Random random(3);
   for (int i = 0; i < 50; ++i) {
     const Pose pose = i == 0 ? Pose{} : testing::random_pose(random, 0.2);
     const Scene scene(object_of(valley(), pose, kStiffness));
@@ -108,7 +108,7 @@ TEST_P(UnionContact, AStickInThePlaneOfAWallIsHeldByTheFloorAlone) {
 
 TEST_P(UnionContact, ACrackAsWideAsRoundingLetsNothingIn) {
   constexpr double kPressed = 1e-3;
-  stimuli::Random random(5);
+  Random random(5);
   for (int i = 0; i < 300; ++i) {
     const Pose pose = testing::random_pose(random, 0.1);
     const Scene scene(object_of({box_soup({-0.05, -0.05, -0.04}, {0, 0.05, 0}),
@@ -130,7 +130,7 @@ TEST_P(UnionContact, CuttingAPartInTwoChangesNothing) {
   const bool sides = GetParam()->side_contact();
   int in_contact = 0, compared = 0;
   for (std::uint64_t seed = 0; seed < 60; ++seed) {
-    stimuli::Random random(seed, {51});
+    Random random(seed, {51});
     const stimuli::PolygonSoup solid =
         seed % 2 == 0 ? box_soup({-0.03, -0.025, -0.02}, {0.03, 0.025, 0.02})
                       : testing::random_polyhedron(random, 14, Vec3(0.03, 0.025, 0.02));

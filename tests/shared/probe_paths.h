@@ -8,25 +8,25 @@
 #include <glm/geometric.hpp>
 #include <vector>
 
+#include "data/base/random.h"
 #include "rendering/probe.h"
 #include "rendering/verification/reference.h"
 #include "stimuli/convex_mesh.h"
 #include "stimuli/orientation.h"
-#include "stimuli/random.h"
 
 namespace palpate::testing {
 
 using ProbePath = std::vector<rendering::LineProbe>;
 
-inline double uniform(stimuli::Random& random, double low, double high) {
+inline double uniform(Random& random, double low, double high) {
   return low + (high - low) * random.unit();
 }
 
-inline Vec3 random_direction(stimuli::Random& random) {
+inline Vec3 random_direction(Random& random) {
   return stimuli::uniform_rotation(random) * Vec3(0, 0, 1);
 }
 
-inline Pose random_pose(stimuli::Random& random, double reach) {
+inline Pose random_pose(Random& random, double reach) {
   return {reach * random_direction(random), stimuli::uniform_rotation(random)};
 }
 
@@ -65,7 +65,7 @@ inline double half_thickness(const stimuli::ConvexMesh& mesh) {
 /// A smooth random function of the distance travelled, within [-1, 1].
 class Wave {
  public:
-  explicit Wave(stimuli::Random& random) {
+  explicit Wave(Random& random) {
     for (std::size_t i = 0; i < 3; ++i) {
       rate_[i] = uniform(random, 0.3, 1.0) * static_cast<double>(i + 1);
       phase_[i] = uniform(random, 0, 6.28318530717958648);
@@ -83,7 +83,7 @@ class Wave {
 
 class Wave3 {
  public:
-  explicit Wave3(stimuli::Random& random) : x_(random), y_(random), z_(random) {}
+  explicit Wave3(Random& random) : x_(random), y_(random), z_(random) {}
   Vec3 operator()(double travelled) const { return {x_(travelled), y_(travelled), z_(travelled)}; }
 
  private:
@@ -102,8 +102,8 @@ inline rendering::LineProbe probe_at(const Vec3& at, const Vec3& direction, doub
 }
 
 /// Smooth, in and out at any depth; about `step` sizes a tick.
-inline ProbePath wandering_path(stimuli::Random& random, const stimuli::ConvexMesh& mesh,
-                                double length, int ticks, double step) {
+inline ProbePath wandering_path(Random& random, const stimuli::ConvexMesh& mesh, double length,
+                                int ticks, double step) {
   const Wave3 place(random), turn(random);
   const Wave share(random);
   ProbePath path;
@@ -118,9 +118,8 @@ inline ProbePath wandering_path(stimuli::Random& random, const stimuli::ConvexMe
 /// Starts well outside; then smooth and near the surface all the time: from a little outside to
 /// `press` half thicknesses of depth along the ray from the middle. About `step` sizes a tick.
 /// \param side  false: it is the tip that slides, wherever the rest of the probe is
-inline ProbePath sliding_path(stimuli::Random& random, const stimuli::ConvexMesh& mesh,
-                              double length, int ticks, double step, double press = 0.3,
-                              bool side = true) {
+inline ProbePath sliding_path(Random& random, const stimuli::ConvexMesh& mesh, double length,
+                              int ticks, double step, double press = 0.3, bool side = true) {
   const Vec3 middle = middle_of(mesh);
   const double thickness = half_thickness(mesh);
   const double far = 2 * mesh.size() + length;
@@ -148,8 +147,8 @@ inline ProbePath sliding_path(stimuli::Random& random, const stimuli::ConvexMesh
 
 /// Straight passes through a point near the object, `step` sizes a tick, turning slowly; then a
 /// jump to the start of the next one.
-inline ProbePath fast_passes(stimuli::Random& random, const stimuli::ConvexMesh& mesh,
-                             double length, int ticks, double step) {
+inline ProbePath fast_passes(Random& random, const stimuli::ConvexMesh& mesh, double length,
+                             int ticks, double step) {
   ProbePath path;
   while (static_cast<int>(path.size()) < ticks) {
     const Vec3 aim = mesh.centre() + 0.6 * mesh.size() * random.unit() * random_direction(random);
@@ -171,8 +170,8 @@ inline ProbePath fast_passes(stimuli::Random& random, const stimuli::ConvexMesh&
 }
 
 /// Every tick somewhere else, often inside.
-inline ProbePath jumping_path(stimuli::Random& random, const stimuli::ConvexMesh& mesh,
-                              double length, int ticks) {
+inline ProbePath jumping_path(Random& random, const stimuli::ConvexMesh& mesh, double length,
+                              int ticks) {
   ProbePath path;
   for (int tick = 0; tick < ticks; ++tick) {
     const double reach = random.unit() < 0.5 ? mesh.radius() : 2 * mesh.size() + length;

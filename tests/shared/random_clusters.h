@@ -5,8 +5,8 @@
 #include <glm/geometric.hpp>
 #include <vector>
 
+#include "data/base/random.h"
 #include "rendering/scene.h"
-#include "stimuli/random.h"
 #include "tests/shared/probe_paths.h"
 #include "tests/shared/random_polyhedron.h"
 #include "tests/shared/union_scenes.h"
@@ -16,7 +16,7 @@ namespace palpate::testing {
 inline constexpr double kClusterStiffness = 1000;  // N/m
 
 /// Boxes, slabs and hulls that overlap at random.
-inline std::vector<rendering::SceneObject> cluster(stimuli::Random& random, const Pose& pose = {},
+inline std::vector<rendering::SceneObject> cluster(Random& random, const Pose& pose = {},
                                                    double scale = 1) {
   std::vector<rendering::SceneObject> parts;
   const std::uint64_t count = 2 + random.below(7);
@@ -38,8 +38,7 @@ inline std::vector<rendering::SceneObject> cluster(stimuli::Random& random, cons
   return parts;
 }
 
-inline rendering::Tool random_tool(stimuli::Random& random, std::size_t segments,
-                                   double scale = 1) {
+inline rendering::Tool random_tool(Random& random, std::size_t segments, double scale = 1) {
   rendering::Tool tool;
   for (std::size_t j = 0; j < segments; ++j) {
     const Vec3 from = j == 0 ? Vec3(0) : tool.segments.back().to;
@@ -51,8 +50,7 @@ inline rendering::Tool random_tool(stimuli::Random& random, std::size_t segments
 }
 
 /// Through and round a cluster; about `speed` m/s.
-inline ProbePath cluster_path(stimuli::Random& random, std::size_t ticks, double speed,
-                              double scale = 1) {
+inline ProbePath cluster_path(Random& random, std::size_t ticks, double speed, double scale = 1) {
   const Wave3 place(random), turn(random);
   ProbePath path{{Vec3(scale, 0, 0), Vec3(scale, 0, 0.1 * scale)}};
   double travelled = 0;

@@ -4,9 +4,9 @@
 #include <cmath>
 #include <memory>
 
+#include "data/base/random.h"
 #include "stimuli/convex_mesh.h"
 #include "stimuli/primitives.h"
-#include "stimuli/random.h"
 #include "tests/shared/probe_paths.h"
 #include "tests/shared/random_polyhedron.h"
 
@@ -14,7 +14,7 @@ namespace palpate::testing {
 
 /// Round, long or flat hulls, prisms, needles, plates and the four stimuli, turned at random, from
 /// 0.2 mm to 20 m across, and up to a size away from the mesh frame's origin.
-inline stimuli::ConvexMesh random_convex_mesh(stimuli::Random& random) {
+inline stimuli::ConvexMesh random_convex_mesh(Random& random) {
   const auto turned = [&](const stimuli::PolygonSoup& soup) {
     const double scale = 2e-4 * std::pow(1e5, random.unit());
     return stimuli::ConvexMesh(placed(soup, stimuli::uniform_rotation(random), scale,

@@ -11,9 +11,9 @@
 #include <utility>
 #include <vector>
 
+#include "data/base/random.h"
 #include "stimuli/convex_mesh.h"
 #include "stimuli/orientation.h"
-#include "stimuli/random.h"
 
 namespace palpate::testing {
 
@@ -51,8 +51,7 @@ inline stimuli::PolygonSoup hull_of(const std::vector<Vec3>& points) {
 }
 
 /// The hull of `points` random points on an ellipsoid (every point is a corner).
-inline stimuli::PolygonSoup random_polyhedron(stimuli::Random& random, int points,
-                                              const Vec3& semi_axes) {
+inline stimuli::PolygonSoup random_polyhedron(Random& random, int points, const Vec3& semi_axes) {
   std::vector<Vec3> corners;
   for (int i = 0; i < points; ++i) {
     corners.push_back(semi_axes * (stimuli::uniform_rotation(random) * Vec3(0, 0, 1)));

@@ -74,10 +74,6 @@ class Bench {
   rendering::RenderState state_;
 };
 
-inline bool finite(const Vec3& v) {
-  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
-}
-
 /// Distance of a point from the surface of the solid, m.
 inline double off_surface(const stimuli::ConvexMesh& mesh, const Vec3& point) {
   return std::max(rendering::reference_gap(mesh, {point, point}),

@@ -14,7 +14,7 @@
 #include <utility>
 #include <vector>
 
-#include "stimuli/random.h"
+#include "data/base/random.h"
 #include "tests/shared/rounds.h"
 
 namespace palpate::stimuli {

@@ -11,11 +11,11 @@
 #include <tuple>
 #include <utility>
 
+#include "data/base/random.h"
 #include "stimuli/mesh_file.h"
 #include "stimuli/orientation.h"
 #include "stimuli/parts/cell.h"
 #include "stimuli/primitives.h"
-#include "stimuli/random.h"
 #include "tests/shared/random_polyhedron.h"
 #include "tests/stimuli/concave_solids.h"
 

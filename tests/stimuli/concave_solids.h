@@ -12,9 +12,9 @@
 #include <utility>
 #include <vector>
 
+#include "data/base/random.h"
 #include "stimuli/convex_mesh.h"
 #include "stimuli/orientation.h"
-#include "stimuli/random.h"
 
 namespace palpate::stimuli::solids {
 

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <string>
 
-#include "stimuli/text.h"
+#include "data/base/text.h"
 
 namespace palpate::stimuli::gltf {
 

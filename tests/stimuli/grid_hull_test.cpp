@@ -7,8 +7,8 @@
 #include <limits>
 #include <vector>
 
+#include "data/base/random.h"
 #include "stimuli/orientation.h"
-#include "stimuli/random.h"
 #include "tests/shared/random_polyhedron.h"
 
 namespace palpate::stimuli {

@@ -10,11 +10,11 @@
 #include <limits>
 #include <vector>
 
+#include "data/base/random.h"
 #include "stimuli/inset.h"
 #include "stimuli/parts/convex_parts.h"
 #include "stimuli/parts/facets.h"
 #include "stimuli/primitives.h"
-#include "stimuli/random.h"
 #include "tests/stimuli/concave_solids.h"
 
 namespace palpate::stimuli {

@@ -15,10 +15,10 @@
 #include <limits>
 #include <vector>
 
+#include "data/base/random.h"
 #include "stimuli/grid_hull.h"
 #include "stimuli/orientation.h"
 #include "stimuli/primitives.h"
-#include "stimuli/random.h"
 
 namespace palpate::stimuli {
 namespace {

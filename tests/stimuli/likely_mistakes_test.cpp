@@ -1,8 +1,8 @@
 #include <gtest/gtest.h>
 
+#include "data/base/text.h"
 #include "stimuli/convex_mesh.h"
 #include "stimuli/mesh_file.h"
-#include "stimuli/text.h"
 
 namespace palpate::stimuli {
 namespace {

@@ -2,11 +2,11 @@
 
 #include <string>
 
+#include "data/base/random.h"
+#include "data/base/text.h"
 #include "stimuli/mesh_file.h"
 #include "stimuli/mesh_formats.h"
 #include "stimuli/parts/convex_parts.h"
-#include "stimuli/random.h"
-#include "stimuli/text.h"
 #include "tests/stimuli/gltf_box.h"
 
 namespace palpate::stimuli {

@@ -9,9 +9,9 @@
 #include <string>
 #include <vector>
 
+#include "data/base/random.h"
 #include "stimuli/orientation.h"
 #include "stimuli/primitives.h"
-#include "stimuli/random.h"
 #include "tests/shared/temporary_folder.h"
 #include "tests/stimuli/part_checks.h"
 

@@ -9,8 +9,8 @@
 #include <numbers>
 #include <vector>
 
+#include "data/base/random.h"
 #include "stimuli/face_triangles.h"
-#include "stimuli/random.h"
 
 namespace palpate::stimuli {
 namespace {

@@ -9,8 +9,8 @@
 #include <glm/geometric.hpp>
 #include <vector>
 
+#include "data/base/random.h"
 #include "stimuli/closed_surface.h"
-#include "stimuli/random.h"
 #include "tests/shared/rounds.h"
 
 namespace palpate::stimuli {

@@ -13,9 +13,9 @@
 #include <string>
 #include <utility>
 
+#include "data/base/input_file.h"
 #include "rendering/probe.h"
 #include "rendering/renderer.h"
-#include "stimuli/input_file.h"
 #include "stimuli/solids/gmsh_file.h"
 #include "stimuli/solids/solid_mesh.h"
 
@@ -162,8 +162,8 @@ constexpr int kPlainResolution = 10;               // where a description gives 
 
 stimuli::SolidMesh mesh_of(const stimuli::ObjectSpec& spec, int resolution) {
   if (spec.shape != stimuli::ShapeKind::mesh) return stimuli::mesh_of_primitive(spec, resolution);
-  return stimuli::read_gmsh(
-      spec.file, spec.file_bytes ? *spec.file_bytes : stimuli::read_whole(spec.file, 1U << 31));
+  return stimuli::read_gmsh(spec.file,
+                            spec.file_bytes ? *spec.file_bytes : read_whole(spec.file, 1U << 31));
 }
 
 [[noreturn]] void refuse(const std::string& fault) { throw stimuli::MeshError({fault}); }

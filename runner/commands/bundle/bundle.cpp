@@ -19,6 +19,7 @@
 #include "analysis/statistics/analysis.h"
 #include "analysis/text.h"
 #include "data/base/json_text.h"
+#include "data/base/text.h"
 #include "data/export/bids.h"
 #include "data/export/csv.h"
 #include "data/export/psychds.h"
@@ -32,7 +33,6 @@
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/protocol_facts.h"
 #include "runner/commands/shared/sealed_folder.h"
-#include "stimuli/text.h"
 
 namespace palpate::runner {
 namespace {
@@ -169,8 +169,8 @@ void put_data(const BundleOptions& options, data::Store& store, const data::Stud
                                   : data::export_psychds(store, dataset, settings);
   if (not_recorded.empty()) not_recorded = done.not_recorded;
   if (!not_recorded.empty())
-    std::cerr << "warning: 'palpate forget' will not list this bundle: "
-              << stimuli::printable(not_recorded) << "\n";
+    std::cerr << "warning: 'palpate forget' will not list this bundle: " << printable(not_recorded)
+              << "\n";
 }
 
 void put_registration(const std::string& folder, const data::AtomicFolder& draft) {
@@ -251,7 +251,7 @@ int make_bundle(const BundleOptions& options) {
   put_crate(registered, check, about, draft);
   write_checksums(draft);
   draft.commit(options.force);
-  std::cout << stimuli::printable(options.out) << ": " << registered.protocol.name << ", "
+  std::cout << printable(options.out) << ": " << registered.protocol.name << ", "
             << analysis::counted(check.participants, "participant", "participants")
             << (check.label.empty() ? "" : ", " + check.label) << "\n"
             << conclusion_of(check) << "\n";
@@ -270,8 +270,7 @@ std::size_t first_different_line(const std::string& a, const std::string& b) {
 
 int verify_bundle(const std::string& folder) {
   const std::vector<std::string> faults = checksum_faults(folder);
-  for (const std::string& fault : faults)
-    std::cout << "DIFFERS  " << stimuli::printable(fault) << "\n";
+  for (const std::string& fault : faults) std::cout << "DIFFERS  " << printable(fault) << "\n";
   if (faults.empty()) std::cout << "same     every file, by its checksum\n";
   const Registration registered = read_registration((fs::path(folder) / "registration").string());
   const std::string stored = read_member(folder, "analysis.json");
@@ -282,11 +281,11 @@ int verify_bundle(const std::string& folder) {
   }
   std::cout << "DIFFERS  analysis.json, made again from " << kTrials << ", from line "
             << first_different_line(stored, made);
-  const auto json = data::json_or_discarded(stored);
+  const auto json = json_or_discarded(stored);
   const auto version =
       json.is_object() ? json.value("program_version", nlohmann::json()) : nlohmann::json();
   if (version != PALPATE_VERSION)
-    std::cout << "; it was made with palpate " << data::json_excerpt(version)
+    std::cout << "; it was made with palpate " << json_excerpt(version)
               << ", this is " PALPATE_VERSION;
   std::cout << "\n";
   return 1;
@@ -341,7 +340,7 @@ int bundle_command(const std::vector<std::string>& args) {
   if (verify) return verify_bundle(options.verify);
   if (options.format != "psych-ds" && options.format != "bids")
     throw UsageError("--format: expected psych-ds or bids, found '" +
-                     stimuli::printable(options.format, 60) + "'");
+                     printable(options.format, 60) + "'");
   return make_bundle(options);
 }
 

@@ -7,11 +7,11 @@
 #include <vector>
 
 #include "data/base/json_text.h"
+#include "data/base/text.h"
 #include "protocols/json_document.h"
 #include "runner/commands/check/deviations.h"
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/outputs.h"
-#include "stimuli/text.h"
 
 namespace palpate::runner {
 namespace {
@@ -35,11 +35,11 @@ ReportedAnalysis read_reported(const std::string& path) {
   if (path.empty()) return reported;
   reported.json = protocols::read_text_file(path);
   try {
-    const auto json = data::read_json(reported.json);
+    const auto json = read_json(reported.json);
     reported.too_fast = json.at("settings").at("too_fast_s").get<double>();
     if (!(*reported.too_fast > 0) || !json.contains("paired_by_shape"))
       throw UsageError(path + ": expected what 'palpate analyze --json' wrote for this study");
-  } catch (const data::JsonError&) {
+  } catch (const JsonError&) {
     throw UsageError(path + ": expected what 'palpate analyze --json' wrote for this study");
   } catch (const nlohmann::json::exception&) {
     throw UsageError(path + ": expected what 'palpate analyze --json' wrote for this study");

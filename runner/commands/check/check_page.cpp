@@ -6,10 +6,10 @@
 #include "analysis/report/html_elements.h"
 #include "analysis/report/html_page.h"
 #include "analysis/text.h"
+#include "data/base/text.h"
 #include "data/files/utc.h"
 #include "runner/commands/check/deviations.h"
 #include "runner/commands/shared/command.h"
-#include "stimuli/text.h"
 
 namespace palpate::runner {
 namespace {
@@ -56,7 +56,7 @@ void put_hypothesis(const analysis::Hypothesis& one, const analysis::Judgement& 
   const bool refuted = judgement.verdict == analysis::Verdict::refuted;
   out += clear ? "<li class=\"clear\">" : refuted ? "<li class=\"slower\">" : "<li>";
   out += "<b>" + escaped(one.id) + "</b><span class=\"value\">" + verdict + "</span><small>" +
-         escaped_sentence(stimuli::printable(one.text, 5000)) + "</small></li>\n";
+         escaped_sentence(printable(one.text, 5000)) + "</small></li>\n";
 }
 
 /// The conditions of a hypothesis with its numbers.
@@ -91,7 +91,7 @@ void put_evidence(const CheckPoint& point, std::string& out) {
   if (point.evidence.empty()) return;
   out += "<h3>" + escaped(point.title) + ": evidence</h3>\n";
   std::vector<std::string> lines;
-  for (const std::string& line : point.evidence) lines.push_back(stimuli::printable(line));
+  for (const std::string& line : point.evidence) lines.push_back(printable(line));
   analysis::put_list(out, lines);
 }
 
@@ -105,14 +105,14 @@ std::string check_text(const StudyCheck& check, const Registration& registered) 
   out += "\n";
   for (const CheckPoint& point : check.points) {
     out += analysis::pad_right(word_of(point.finding), 15) + analysis::pad_right(point.id, 14) +
-           stimuli::printable(point.sentence) + "\n";
+           printable(point.sentence) + "\n";
     for (const std::string& line : point.evidence)
-      out += std::string(31, ' ') + stimuli::printable(line) + "\n";
+      out += std::string(31, ' ') + printable(line) + "\n";
   }
   out += "\nHypotheses" + (check.label.empty() ? "" : " (" + check.label + ")") + "\n";
   for (const auto& [one, judgement] : check.hypotheses) {
     out += "  " + one.id + "  " + analysis::to_string(judgement.verdict) + ": " +
-           stimuli::printable(one.text) + "\n";
+           printable(one.text) + "\n";
     out +=
         "      corroborated if " + one.corroborated + ": " + word_of(judgement.corroborated) + "\n";
     out += "      refuted if " + one.refuted + ": " + word_of(judgement.refuted) + "\n";
@@ -166,8 +166,7 @@ std::string check_html(const StudyCheck& check, const Registration& registered) 
   const protocols::Protocol& protocol = registered.protocol;
   page.above_title() +=
       "<p class=\"study\">" +
-      escaped(stimuli::printable(protocol.title.empty() ? protocol.name : protocol.title, 400)) +
-      "</p>\n";
+      escaped(printable(protocol.title.empty() ? protocol.name : protocol.title, 400)) + "</p>\n";
   std::string& lead = page.below_title();
   lead += "<p class=\"lead\">" +
           escaped(analysis::counted(check.participants, "participant", "participants") +
@@ -176,7 +175,7 @@ std::string check_html(const StudyCheck& check, const Registration& registered) 
   std::vector<std::string> deviations;
   for (const CheckPoint& point : check.points) {
     if (point.finding == Finding::deviation)
-      deviations.push_back(stimuli::printable(point.title + ": " + point.sentence, 4000));
+      deviations.push_back(printable(point.title + ": " + point.sentence, 4000));
   }
   if (!deviations.empty()) {
     lead += "<div class=\"warnings\" role=\"note\" aria-label=\"Deviations\">\n";

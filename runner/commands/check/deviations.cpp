@@ -10,13 +10,13 @@
 #include "analysis/report/report_json.h"
 #include "analysis/statistics/analysis.h"
 #include "analysis/text.h"
+#include "data/base/text.h"
 #include "data/files/utc.h"
 #include "data/store/task_text.h"
 #include "protocols/difference.h"
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/sealed_folder.h"
 #include "runner/participants/simulated_settings.h"
-#include "stimuli/text.h"
 
 namespace palpate::runner {
 namespace {
@@ -121,15 +121,15 @@ CheckPoint of_protocol(const Registration& registered, const StudyData& study) {
     }
     if (began.empty() && shown.empty()) continue;
     began.merge(shown);
-    std::string line = names(began) + ": shown with protocol " + stimuli::printable(info.name) +
+    std::string line = names(began) + ": shown with protocol " + printable(info.name) +
                        ", SHA-256 " + short_sum(info.sha256);
     if (info.name == registered.protocol.name) {
       line += "; the texts differ from byte " +
               std::to_string(first_difference(registered.protocol.source_text, info.text) + 1);
       const protocols::ProtocolDifference differs =
           protocols::difference(registered.protocol.source_text, info.text);
-      line += differs.nothing() ? ", in layout only"
-                                : ", " + stimuli::printable(protocols::in_words(differs));
+      line +=
+          differs.nothing() ? ", in layout only" : ", " + printable(protocols::in_words(differs));
     }
     out.evidence.push_back(std::move(line));
   }
@@ -138,9 +138,9 @@ CheckPoint of_protocol(const Registration& registered, const StudyData& study) {
     for (const data::ProtocolFile& file : registered.files) {
       const auto found = std::ranges::find(stored->second, file.name, &data::ProtocolFile::name);
       if (found == stored->second.end() || found->bytes != file.bytes)
-        out.evidence.push_back(stimuli::printable(file.name) + (found == stored->second.end()
-                                                                    ? ": is not in the database"
-                                                                    : ": other bytes were shown"));
+        out.evidence.push_back(printable(file.name) + (found == stored->second.end()
+                                                           ? ": is not in the database"
+                                                           : ": other bytes were shown"));
     }
   }
   if (out.evidence.empty()) return out;
@@ -166,9 +166,9 @@ std::string order_difference(const std::vector<OrderRow>& expected,
       const std::string where = "session " + std::to_string(session) + ", trial " +
                                 std::to_string(i + 1) + " of those that count: ";
       if (found == planned.end() || i >= found->second.size())
-        return where + "shown " + stimuli::printable(to_line(rows[i])) + ", none registered";
+        return where + "shown " + printable(to_line(rows[i])) + ", none registered";
       if (!(rows[i] == found->second[i]))
-        return where + "shown " + stimuli::printable(to_line(rows[i])) + ", registered " +
+        return where + "shown " + printable(to_line(rows[i])) + ", registered " +
                to_line(found->second[i]);
     }
   }
@@ -348,17 +348,16 @@ CheckPoint of_versions(const Registration& registered, const StudyData& study) {
     if (run.info.build != registered.build) builds.insert(run.info.build);
   }
   for (const auto& [version, who] : codes)
-    out.evidence.push_back(names(who) + ": recorded with palpate " + stimuli::printable(version) +
-                           ", registered " + stimuli::printable(registered.program_version));
+    out.evidence.push_back(names(who) + ": recorded with palpate " + printable(version) +
+                           ", registered " + printable(registered.program_version));
   if (registered.program_version != PALPATE_VERSION)
     out.evidence.push_back("this check analyses with palpate " PALPATE_VERSION ", registered " +
-                           stimuli::printable(registered.program_version));
+                           printable(registered.program_version));
   if (!out.evidence.empty()) {
     out.finding = Finding::deviation;
     out.sentence = "Other versions of palpate were used than the registered one.";
   }
-  if (!builds.empty())
-    out.sentence += " Other builds of it: " + stimuli::printable(names(builds)) + ".";
+  if (!builds.empty()) out.sentence += " Other builds of it: " + printable(names(builds)) + ".";
   return out;
 }
 
@@ -368,7 +367,7 @@ std::vector<std::string> noted(const StudyData& study, bool (*says)(const std::s
   for (const data::StoredNote& note : study.notes) {
     if (says(note.text))
       out.push_back(note.participant.code + ", session " + std::to_string(note.session) + ": " +
-                    stimuli::printable(note.text, 300));
+                    printable(note.text, 300));
   }
   return out;
 }
@@ -421,7 +420,7 @@ CheckPoint of_reported(const analysis::TrialTable& table, const ReportedAnalysis
   both.insert(theirs.begin(), theirs.end());
   for (const auto& [name, value] : both) {
     if (text(ours, name) != text(theirs, name))
-      out.evidence.push_back(stimuli::printable(name, 120) + ": reported " + text(theirs, name) +
+      out.evidence.push_back(printable(name, 120) + ": reported " + text(theirs, name) +
                              ", of these data " + text(ours, name));
   }
   if (out.evidence.empty()) return out;
@@ -450,7 +449,7 @@ StudyCheck check_study(const Registration& registered, const std::string& folder
   data::Store store = data::Store::open(database, data::Store::Mode::read_only);
   const StudyData study = read_study(store);
   if (const auto codes = withdrawn(study.runs); !codes.empty())
-    throw UsageError(stimuli::printable(database) + ": " + analysis::joined(codes) +
+    throw UsageError(printable(database) + ": " + analysis::joined(codes) +
                      (codes.size() == 1 ? " has" : " have") +
                      " withdrawn and must not be used; remove with 'palpate forget' first");
   const analysis::TrialTable table = analysis::read_trials_store(database);

@@ -12,6 +12,7 @@
 #include <map>
 #include <stdexcept>
 
+#include "data/base/text.h"
 #include "protocols/parse.h"
 #include "protocols/tasks/task_plan.h"
 #include "runner/commands/cluster/job.h"
@@ -21,7 +22,6 @@
 #include "runner/commands/shared/simulation.h"
 #include "runner/commands/shared/study_options.h"
 #include "runner/commands/sweep/planned.h"
-#include "stimuli/text.h"
 
 namespace palpate::runner {
 namespace {
@@ -69,9 +69,8 @@ int submit_or_say(const ClusterSettings& settings, const fs::path& folder, Clust
   if (!settings.partition.empty()) job.options.push_back("--partition=" + settings.partition);
   write_job(folder, job);
   if (settings.no_submit) {
-    std::cout << stimuli::printable(folder.string())
-              << ": ready; submit with: palpate cluster submit "
-              << stimuli::printable(settings.folder) << "\n";
+    std::cout << printable(folder.string()) << ": ready; submit with: palpate cluster submit "
+              << printable(settings.folder) << "\n";
     return 0;
   }
   submit_shards(folder, job);
@@ -210,7 +209,7 @@ int cluster_status(const std::string& given) {
   if (!stopped.empty() && !job.array_job.empty()) {
     std::cout << "not done: shards " << array_text(stopped)
               << "; logs/shard-K.log says why; they go on with: palpate cluster submit "
-              << stimuli::printable(given) << "\n";
+              << printable(given) << "\n";
   }
   if (done == job.shards) {
     const bool plan = job.work == "plan";

@@ -69,11 +69,10 @@ void write_job(const fs::path& folder, const ClusterJob& job) {
 ClusterJob read_job(const fs::path& folder) {
   const std::string path = (folder / "cluster.json").string();
   try {
-    const json in = data::read_json(protocols::read_text_file(path));
+    const json in = read_json(protocols::read_text_file(path));
     if (in.at("version") != kVersion) {
       throw UsageError(path + ": expected version " + std::to_string(kVersion) + ", found " +
-                       data::json_excerpt(in.at("version")) +
-                       "; go on with the program that wrote it");
+                       json_excerpt(in.at("version")) + "; go on with the program that wrote it");
     }
     ClusterJob job;
     job.work = in.at("work");
@@ -89,7 +88,7 @@ ClusterJob read_job(const fs::path& folder) {
       throw UsageError(path + ": expected 1 or more shards of at least one item each, found " +
                        std::to_string(job.shards) + " shards of " + std::to_string(job.items));
     return job;
-  } catch (const data::JsonError& error) {
+  } catch (const JsonError& error) {
     throw UsageError(path + ": is not what 'palpate cluster' wrote: " + error.what());
   } catch (const json::exception& error) {
     throw UsageError(path + ": is not what 'palpate cluster' wrote: " + error.what());

@@ -11,6 +11,7 @@
 #include <string_view>
 #include <vector>
 
+#include "data/base/text.h"
 #include "data/files/utc.h"
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/outputs.h"
@@ -22,7 +23,6 @@
 #include "runner/safety/fault_signals.h"
 #include "runner/safety/guarded_device.h"
 #include "runner/servo/realtime.h"
-#include "stimuli/text.h"
 
 namespace palpate::runner {
 namespace {
@@ -35,11 +35,9 @@ class TerminalGuide final : public Guide {
  public:
   explicit TerminalGuide(const FaultSignals& signals) : signals_(signals) {}
 
-  void say(const std::string& text) override {
-    std::cerr << stimuli::printable_lines(text) << "\n";
-  }
+  void say(const std::string& text) override { std::cerr << printable_lines(text) << "\n"; }
   void ask(const std::string& text) override {
-    std::cerr << stimuli::printable_lines(text) << "  [ENTER; q and ENTER stops] " << std::flush;
+    std::cerr << printable_lines(text) << "  [ENTER; q and ENTER stops] " << std::flush;
   }
   Answer answer() override {
     if (signals_.end_requested() != 0) return Answer::stop;
@@ -138,7 +136,7 @@ constexpr double kWeighingRate = 200, kRegistrationRate = 50;  // Hz; registrati
 
 void store(const std::string& path, const Calibration& calibration) {
   write_whole(path, to_json(calibration));
-  std::cerr << "Stored in " << stimuli::printable(path) << "\n";
+  std::cerr << "Stored in " << printable(path) << "\n";
 }
 
 int calibrate_force(const DeviceConfig& config, const po::variables_map& values) {
@@ -158,7 +156,7 @@ int calibrate_force(const DeviceConfig& config, const po::variables_map& values)
   force.made_utc = now_utc();
   calibration.put(force);
   store(config.calibration, calibration);
-  std::cout << "serial                   " << stimuli::printable(force.serial) << "\n"
+  std::cout << "serial                   " << printable(force.serial) << "\n"
             << "counts per newton metre  " << force.counts_per_torque << " (nominal "
             << kCountsPerTorque << ")\n"
             << "residual                 " << force.residual << " N\n"
@@ -195,8 +193,8 @@ int calibrate_pair(const DeviceKind& kind, const DeviceConfig& config,
   calibration.put(pair);
   store(config.calibration, calibration);
   const Vec3& p = pair.tail_in_tip.position;
-  std::cout << "tip, tail      " << stimuli::printable(pair.tip_serial) << ", "
-            << stimuli::printable(pair.tail_serial) << "\n"
+  std::cout << "tip, tail      " << printable(pair.tip_serial) << ", "
+            << printable(pair.tail_serial) << "\n"
             << "tail's centre  " << p.x << ", " << p.y << ", " << p.z << " m from the tip's\n"
             << "residual       " << pair.residual * 1e3 << " mm over " << pair.points
             << " points\n";

@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
+#include "data/base/text.h"
 #include "runner/bench/servo_timing.h"
 #include "runner/commands/devices/calibrate.h"
 #include "runner/commands/shared/command.h"
@@ -19,7 +20,6 @@
 #include "runner/safety/guarded_device.h"
 #include "runner/servo/realtime.h"
 #include "runner/session/markers.h"
-#include "stimuli/text.h"
 
 namespace palpate::runner {
 namespace {
@@ -60,10 +60,9 @@ void print_limits(const DeviceCapabilities& c) {
   }
   std::printf("    reaches %g mm about its centre, resolves %g um\n", c.workspace_radius * 1e3,
               c.resolution * 1e6);
-  if (!c.serial.empty())
-    std::printf("    serial number %s\n", stimuli::printable(c.serial).c_str());
+  if (!c.serial.empty()) std::printf("    serial number %s\n", printable(c.serial).c_str());
   if (!c.calibration.empty())
-    std::printf("    calibration: %s\n", stimuli::printable(c.calibration).c_str());
+    std::printf("    calibration: %s\n", printable(c.calibration).c_str());
 }
 
 /// Opens a device, prints its limits and self-test. \return whether the test was passed
@@ -82,7 +81,7 @@ bool open_and_test(const DeviceKind& kind, const DeviceConfig& config, Json& row
     row["self_test"].push_back(
         {{"what", result.what}, {"passed", result.passed}, {"found", result.found}});
     std::printf("    %-8s%s: %s\n", result.passed ? "passed" : "FAILED", result.what.c_str(),
-                stimuli::printable(result.found).c_str());
+                printable(result.found).c_str());
   }
   return passed;
 }
@@ -101,9 +100,9 @@ bool list_kind(const DeviceKind& kind, const DeviceConfig& config, bool named, J
       row["connected"].push_back({{"serial", found.serial}, {"trouble", found.trouble}});
       usable = usable || found.trouble.empty();
       if (!found.serial.empty())
-        std::printf("    connected: %s\n", stimuli::printable(found.serial).c_str());
+        std::printf("    connected: %s\n", printable(found.serial).c_str());
       if (!found.trouble.empty())
-        std::printf("    cannot be used: %s\n", stimuli::printable(found.trouble).c_str());
+        std::printf("    cannot be used: %s\n", printable(found.trouble).c_str());
     }
     if (connected.empty()) std::printf("    none connected\n");
     if (kind.has_force_feedback && !named) {
@@ -115,7 +114,7 @@ bool list_kind(const DeviceKind& kind, const DeviceConfig& config, bool named, J
     }
   } catch (const std::runtime_error& error) {
     row["trouble"] = error.what();
-    std::printf("    %s\n", stimuli::printable(error.what()).c_str());
+    std::printf("    %s\n", printable(error.what()).c_str());
     good = !named;
   }
   rows.push_back(std::move(row));
@@ -297,7 +296,7 @@ int try_markers(const std::vector<std::string>& names) {
       marker.time_ns = clock.now_ns();
       const bool taken = sinks[i]->send(marker);
       if (!taken) status = 1;
-      std::cout << (taken ? "  sent to " : "  NOT TAKEN by ") << stimuli::printable(names[i]);
+      std::cout << (taken ? "  sent to " : "  NOT TAKEN by ") << printable(names[i]);
     }
     std::cout << std::endl;  // each as it is sent: somebody watches the recorder
     std::this_thread::sleep_for(kApart);

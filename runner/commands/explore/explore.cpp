@@ -1,5 +1,6 @@
 #include <iostream>
 
+#include "data/base/text.h"
 #include "protocols/parse.h"
 #include "runner/commands/explore/frames.h"
 #include "runner/commands/explore/hands_on.h"
@@ -7,7 +8,6 @@
 #include "runner/commands/render/forces.h"
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/outputs.h"
-#include "stimuli/text.h"
 
 namespace palpate::runner {
 namespace {
@@ -73,7 +73,7 @@ int draw_pictures(const po::variables_map& values, const rendering::Renderer& re
   const std::vector<TimedPose> poses = read_trajectory(text_of(values, "trajectory"));
   DrawnFrames drawn = draw_frames(scene_path, spec, renderer, poses, settings);
   for (const std::string& note : drawn.notes)
-    std::cerr << stimuli::printable(scene_path) << ": " << note << '\n';
+    std::cerr << printable(scene_path) << ": " << note << '\n';
   outputs.put("animation", std::move(drawn.animation));
   outputs.write();
   std::cout << drawn.pictures << " pictures of " << settings.size.width << " x "

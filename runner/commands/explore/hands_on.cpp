@@ -6,6 +6,7 @@
 #include <memory>
 #include <utility>
 
+#include "data/base/text.h"
 #include "runner/commands/explore/live_touch.h"
 #include "runner/commands/explore/recorded_touch.h"
 #include "runner/commands/render/forces.h"
@@ -18,7 +19,6 @@
 #include "runner/safety/fault_signals.h"
 #include "runner/serve/served_scene.h"
 #include "runner/session/device_check.h"
-#include "stimuli/text.h"
 
 namespace palpate::runner {
 namespace {
@@ -46,7 +46,7 @@ ExploreSettings window_settings(const protocols::SceneSpec& spec,
   SceneDrawing drawing(spec.objects, tool_of(spec.tool));
   const rendering::Scene scene = build_scene(settings.scene_path, spec, renderer);
   for (const std::string& note : scene_notes(spec, scene))
-    std::cerr << stimuli::printable(settings.scene_path) << ": " << note << '\n';
+    std::cerr << printable(settings.scene_path) << ": " << note << '\n';
   drawing.add_compiled(scene);
   ExploreSettings out{.title = fs::path(settings.scene_path).filename().string(),
                       .objects = spec.objects,
@@ -102,7 +102,7 @@ int explore_live(const protocols::SceneSpec& spec, const rendering::Renderer& re
     protocols::Protocol limited = protocol;
     for (std::size_t i = 0; i < objects.size(); ++i) limited.stimuli[i].object = objects[i];
     for (const LimitedMaterial& what : limit_materials(limited, device))
-      std::fprintf(stderr, "%s\n", stimuli::printable(what.text).c_str());
+      std::fprintf(stderr, "%s\n", printable(what.text).c_str());
     for (std::size_t i = 0; i < objects.size(); ++i) objects[i] = limited.stimuli[i].object;
   };
   LiveTouch touch(*open.device, clock,

@@ -6,9 +6,9 @@
 #include <string_view>
 #include <vector>
 
+#include "data/base/text.h"
 #include "runner/commands/shared/command.h"
 #include "runner/display/scene/painter.h"
-#include "stimuli/text.h"
 
 namespace palpate::runner {
 namespace {
@@ -41,7 +41,7 @@ std::vector<std::string_view> split(std::string_view text, char at) {
 [[noreturn]] void refuse_value(const char* option, const std::string& expected,
                                const std::string& text) {
   throw UsageError("--" + std::string(option) + ": expected " + expected + ", found '" +
-                   stimuli::printable(text, 60) + "'");
+                   printable(text, 60) + "'");
 }
 
 }  // namespace

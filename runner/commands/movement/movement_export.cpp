@@ -3,8 +3,8 @@
 #include <utility>
 
 #include "analysis/text.h"
+#include "data/base/text.h"
 #include "runner/commands/shared/command.h"
-#include "stimuli/text.h"
 
 namespace palpate::runner {
 

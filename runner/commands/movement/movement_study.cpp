@@ -10,13 +10,13 @@
 #include <utility>
 #include <vector>
 
+#include "data/base/text.h"
 #include "runner/commands/movement/touched_trial.h"
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/csv_text.h"
 #include "runner/commands/shared/progress_line.h"
 #include "runner/commands/shared/study_trials.h"
 #include "runner/session/recorded_trial.h"
-#include "stimuli/text.h"
 
 namespace palpate::runner {
 namespace {
@@ -174,7 +174,7 @@ MovementStudy::TrialKey key_of(const data::StoredTrial& trial) {
 void require_samples(const MovementStudy& study, const std::string& database) {
   const auto without = study.table.missing.find("no samples");
   if (without == study.table.missing.end() || without->second < study.table.values.size()) return;
-  throw UsageError(stimuli::printable(database) +
+  throw UsageError(printable(database) +
                    ": has no servo samples; a protocol with \"samples\": true keeps them");
 }
 

@@ -43,8 +43,7 @@ std::size_t whole_number(const std::string& option, const std::string& text, std
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
   if (error != std::errc() || end != text.data() + text.size() || value < least || value > most) {
     throw UsageError("--" + option + ": expected a whole number from " + std::to_string(least) +
-                     " to " + std::to_string(most) + ", found '" + stimuli::printable(text, 60) +
-                     "'");
+                     " to " + std::to_string(most) + ", found '" + printable(text, 60) + "'");
   }
   return value;
 }
@@ -53,8 +52,7 @@ double real_number(const std::string& option, const std::string& text) {
   double value = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
   if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(value)) {
-    throw UsageError("--" + option + ": expected a number, found '" + stimuli::printable(text, 60) +
-                     "'");
+    throw UsageError("--" + option + ": expected a number, found '" + printable(text, 60) + "'");
   }
   return value;
 }
@@ -68,7 +66,7 @@ void check_within(const std::string& option, double value, double low, double hi
 std::string shapes_of(const analysis::StudyModel& model) {
   std::string known;
   for (const std::string& each : model.shapes)
-    known += (known.empty() ? "" : ", ") + stimuli::printable(each, 60);
+    known += (known.empty() ? "" : ", ") + printable(each, 60);
   return known;
 }
 
@@ -78,7 +76,7 @@ void put_effects(const std::string& text, analysis::StudyModel& model) {
     const double value = real_number("effect", percent);
     if (!(value < 100) || value < -1000) {
       throw UsageError("--effect: expected a percent reduction of time below 100, found '" +
-                       stimuli::printable(percent, 60) + "'");
+                       printable(percent, 60) + "'");
     }
     return std::log1p(-value / 100);
   };
@@ -94,11 +92,11 @@ void put_effects(const std::string& text, analysis::StudyModel& model) {
     const auto shape = std::ranges::find(model.shapes, name);
     if (at == std::string::npos || shape == model.shapes.end()) {
       throw UsageError("--effect: expected SHAPE=PERCENT with a shape of " + shapes_of(model) +
-                       ", found '" + stimuli::printable(part, 60) + "'");
+                       ", found '" + printable(part, 60) + "'");
     }
     if (!named.insert(name).second) {
-      throw UsageError("--effect: expected each shape once, found '" +
-                       stimuli::printable(name, 60) + "' again");
+      throw UsageError("--effect: expected each shape once, found '" + printable(name, 60) +
+                       "' again");
     }
     model.log_ratios[static_cast<std::size_t>(shape - model.shapes.begin())] =
         log_ratio(part.substr(at + 1));
@@ -194,7 +192,7 @@ analysis::Pilot starting_point(const PlanOptions& options, const po::variables_m
   }
   pilot.notes.insert(pilot.notes.begin(),
                      "Standard deviations and proportion of used trials are from " +
-                         stimuli::printable(source, 200) + "; the effects to find are not.");
+                         printable(source, 200) + "; the effects to find are not.");
   return pilot;
 }
 
@@ -224,8 +222,8 @@ analysis::StudyModel model_of(analysis::Pilot& pilot, const PlanOptions& options
     throw UsageError(
         "expected --effect SHAPE=PERCENT,...: the paper's effects are of ray against "
         "point, this pilot is of " +
-        stimuli::printable(pilot.pair.renderer, 60) + " against " +
-        stimuli::printable(pilot.pair.reference, 60) + "; its shapes: " + shapes_of(model));
+        printable(pilot.pair.renderer, 60) + " against " + printable(pilot.pair.reference, 60) +
+        "; its shapes: " + shapes_of(model));
   }
   if (std::ranges::all_of(model.log_ratios, [](double effect) { return effect == 0; })) {
     throw UsageError(

@@ -17,6 +17,7 @@
 #include "analysis/statistics/sensitivity.h"
 #include "analysis/text.h"
 #include "data/base/json_text.h"
+#include "data/base/text.h"
 #include "data/files/atomic_folder.h"
 #include "data/store/store.h"
 #include "protocols/json_document.h"
@@ -30,7 +31,6 @@
 #include "runner/commands/shared/sealed_folder.h"
 #include "runner/participants/simulated_settings.h"
 #include "runner/session/protocol_info.h"
-#include "stimuli/text.h"
 
 namespace palpate::runner {
 namespace {
@@ -109,7 +109,7 @@ void require_replaceable(const RegisterOptions& options) {
   require_replaceable_folder(options.out, options.force, kMark, files_to_fill_in());
   if (!options.force || !fs::exists(fs::path(options.out) / kMark)) return;
   for (const std::string& file : filled_in(options.out))
-    throw UsageError(stimuli::printable(options.out) + ": " + file +
+    throw UsageError(printable(options.out) + ": " + file +
                      " has been filled in and would be lost; name another folder");
 }
 
@@ -139,8 +139,8 @@ analysis::PlanRecord read_fitting_plan(const std::string& path, const std::strin
   std::ranges::sort(shown);
   if (planned != shown)
     throw UsageError(path + ": expected a plan for the protocol's shapes (" +
-                     stimuli::printable(analysis::joined(shown)) + "); this one is for " +
-                     stimuli::printable(analysis::joined(planned)));
+                     printable(analysis::joined(shown)) + "); this one is for " +
+                     printable(analysis::joined(planned)));
   const auto trials = static_cast<std::size_t>(protocol.repetitions);
   std::string others;
   for (const auto& curve : plan.curves) {
@@ -268,8 +268,8 @@ void put_simulated(const RegisterOptions& options, const data::AtomicFolder& dra
   const std::string with = analyzed(first, made.too_fast);
   const std::string none = analyzed(read_table(draft, kNone), made.too_fast);
   write_member(draft, "analysis-simulated.json",
-               nlohmann::ordered_json{{"planned_effect", data::read_ordered_json(with)},
-                                      {"no_effect", data::read_ordered_json(none)}}
+               nlohmann::ordered_json{{"planned_effect", read_ordered_json(with)},
+                                      {"no_effect", read_ordered_json(none)}}
                        .dump(2) +
                    "\n");
   made.hypotheses = analysis::read_hypotheses(made.hypotheses_text, options.hypotheses,
@@ -334,9 +334,9 @@ int register_command(const std::vector<std::string>& args) {
   write_registration(draft, made);
   draft.commit(options.force);
   for (const std::string& warning : made.warnings)
-    std::cerr << "warning: " << stimuli::printable(warning) << "\n";
-  std::cout << stimuli::printable(options.out) << ": " << made.protocol.name << ", "
-            << made.participants << " participants, "
+    std::cerr << "warning: " << printable(warning) << "\n";
+  std::cout << printable(options.out) << ": " << made.protocol.name << ", " << made.participants
+            << " participants, "
             << analysis::counted(made.hypotheses.size(), "hypothesis", "hypotheses") << "\n"
             << "Answer what is marked FILL IN in registration.md and osf.json, then deposit the "
                "folder.\n";

@@ -8,13 +8,13 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
+#include "data/base/checksum.h"
 #include "data/base/json_text.h"
-#include "data/files/checksum.h"
+#include "data/base/text.h"
 #include "data/files/utc.h"
 #include "protocols/parse.h"
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/sealed_folder.h"
-#include "stimuli/text.h"
 
 namespace palpate::runner {
 namespace {
@@ -68,7 +68,7 @@ std::vector<OrderRow> order_of(const protocols::Protocol& protocol, int particip
 std::string order_checksum(const std::vector<OrderRow>& rows) {
   std::string lines;
   for (const OrderRow& row : rows) lines += to_line(row) + "\n";
-  return data::checksum_hex(lines);
+  return checksum_hex(lines);
 }
 
 void VerdictCounts::add(analysis::Verdict verdict) {
@@ -95,9 +95,8 @@ std::string registration_json(const Registration& registration,
                      {"sha256", protocol.sha256},
                      {"files", Json::array()}};
   for (const data::ProtocolFile& file : registration.files)
-    out["protocol"]["files"].push_back(
-        {{"file", file.name}, {"sha256", data::checksum_hex(file.bytes)}});
-  out["plan"] = {{"file", "plan.json"}, {"sha256", data::checksum_hex(registration.plan_text)}};
+    out["protocol"]["files"].push_back({{"file", file.name}, {"sha256", checksum_hex(file.bytes)}});
+  out["plan"] = {{"file", "plan.json"}, {"sha256", checksum_hex(registration.plan_text)}};
   out["participants"] = registration.participants;
   out["trials_per_participant"] = protocols::main_trials(protocol);
   out["analysis"] = {{"too_fast_s", registration.too_fast}, {"alpha", registration.alpha}};
@@ -123,21 +122,21 @@ std::string registration_json(const Registration& registration,
   out["warnings"] = registration.warnings;
   for (std::size_t i = 0; i < texts.size(); ++i)
     out["to_fill_in"].push_back(
-        {{"file", files_to_fill_in()[i]}, {"sha256_when_made", data::checksum_hex(texts[i])}});
+        {{"file", files_to_fill_in()[i]}, {"sha256_when_made", checksum_hex(texts[i])}});
   return out.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
 std::vector<std::string> filled_in(const std::string& folder) {
   std::vector<std::string> out;
   try {
-    const Json in = data::read_ordered_json(read_member(folder, "registration.json"));
+    const Json in = read_ordered_json(read_member(folder, "registration.json"));
     for (const Json& one : in.at("to_fill_in")) {
       const std::string name = one.at("file");
       if (std::ranges::find(files_to_fill_in(), name) == files_to_fill_in().end()) continue;
       if (checksum_of_member(folder, name) != one.at("sha256_when_made").get<std::string>())
         out.push_back(name);
     }
-  } catch (const data::JsonError& error) {
+  } catch (const JsonError& error) {
     throw UsageError((std::filesystem::path(folder) / "registration.json").string() +
                      ": is not what 'palpate register' writes: " + error.what());
   } catch (const Json::exception& error) {
@@ -151,10 +150,9 @@ Registration read_registration(const std::string& folder) {
   const std::string where = (std::filesystem::path(folder) / "registration.json").string();
   Registration out;
   try {
-    const Json in = data::read_ordered_json(read_member(folder, "registration.json"));
+    const Json in = read_ordered_json(read_member(folder, "registration.json"));
     if (in.at("version") != 1)
-      throw std::invalid_argument("expected version 1, found " +
-                                  data::json_excerpt(in.at("version")));
+      throw std::invalid_argument("expected version 1, found " + json_excerpt(in.at("version")));
     out.made_utc_ns = utc_ns_of(in.at("made_utc"));
     out.program_version = in.at("program_version");
     out.build = in.at("build");
@@ -168,7 +166,7 @@ Registration read_registration(const std::string& folder) {
     out.participant_sha256 = in.at("simulated_participant").at("settings_sha256");
     for (const Json& file : in.at("protocol").at("files"))
       out.files.push_back({file.at("file"), ""});
-  } catch (const data::JsonError& error) {
+  } catch (const JsonError& error) {
     throw UsageError(where + ": is not what 'palpate register' writes: " + error.what());
   } catch (const Json::exception& error) {
     throw UsageError(where + ": is not what 'palpate register' writes: " + error.what());
@@ -201,11 +199,10 @@ void require_files_below(const std::vector<data::ProtocolFile>& files) {
     const std::filesystem::path path(file.name);
     const std::filesystem::path plain = path.lexically_normal();
     const bool below = path.is_relative() && !plain.empty() && *plain.begin() != ".." &&
-                       plain.has_filename() && stimuli::is_plain_utf8(file.name) &&
+                       plain.has_filename() && is_plain_utf8(file.name) &&
                        file.name.find('\\') == std::string::npos;
     if (!below)
-      faults += (faults.empty() ? "" : "\n") +
-                ("the protocol names " + stimuli::printable(file.name)) +
+      faults += (faults.empty() ? "" : "\n") + ("the protocol names " + printable(file.name)) +
                 ": expected a file in the protocol's folder or below, with a plain name, so that a "
                 "registration can hold it; move the file there";
   }

@@ -9,9 +9,9 @@
 #include "analysis/statistics/paired.h"
 #include "analysis/statistics/sensitivity.h"
 #include "analysis/text.h"
+#include "data/base/text.h"
 #include "data/files/utc.h"
 #include "runner/commands/shared/command.h"
-#include "stimuli/text.h"
 
 namespace palpate::runner {
 namespace {
@@ -408,7 +408,7 @@ std::string one_line(std::string_view words) {
   std::string out(words);
   std::ranges::replace_if(
       out, [](char c) { return c == '\n' || c == '\r' || c == '\t'; }, ' ');
-  return stimuli::printable(out);
+  return printable(out);
 }
 
 std::string outcome_row(const std::string& id, const char* studies, const VerdictCounts& counts) {
@@ -565,7 +565,7 @@ std::string registration_osf(const std::vector<Question>& questions) {
                : in_list ? "\n"
                          : "\n\n") +
               std::string(paragraph.kind == Kind::item ? "- " : "") +
-              stimuli::printable_lines(paragraph.text);
+              printable_lines(paragraph.text);
     }
     out[question.id] = text;
   }

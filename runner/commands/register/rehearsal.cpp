@@ -12,15 +12,15 @@
 #include "analysis/report/report_json.h"
 #include "analysis/statistics/analysis.h"
 #include "analysis/statistics/model_study.h"
+#include "data/base/checksum.h"
+#include "data/base/random.h"
 #include "data/export/csv.h"
-#include "data/files/checksum.h"
 #include "data/store/store.h"
 #include "runner/build_info.h"
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/protocol_facts.h"
 #include "runner/session/protocol_info.h"
 #include "runner/session/simulated_study.h"
-#include "stimuli/random.h"
 
 namespace palpate::runner {
 namespace {
@@ -53,7 +53,7 @@ std::vector<PlannedStudies::Outcome> PlannedStudies::outcomes(std::size_t partic
   for (const protocols::Trial& trial : schedules_[participant])
     trials.push_back({shape_of_stimulus_[static_cast<std::size_t>(trial.stimulus)],
                       trial.renderer == protocols::RendererKind::ray});
-  stimuli::Random random(seed_, {with_effect ? 1U : 0U, study, participant});
+  Random random(seed_, {with_effect ? 1U : 0U, study, participant});
   const auto answers =
       analysis::draw_answers(with_effect ? model_ : no_effect_, typical_time, trials, random);
   std::vector<Outcome> out;

@@ -1,5 +1,6 @@
 #include <iostream>
 
+#include "data/base/text.h"
 #include "protocols/parse.h"
 #include "runner/commands/render/explain.h"
 #include "runner/commands/render/forces.h"
@@ -7,7 +8,6 @@
 #include "runner/commands/shared/outputs.h"
 #include "runner/commands/shared/scene_notes.h"
 #include "stimuli/parts/overlaps.h"
-#include "stimuli/text.h"
 
 namespace palpate::runner {
 namespace {
@@ -27,8 +27,7 @@ void add_overlaps(const stimuli::ObjectSpec& object, const std::string& pointer,
   for (std::size_t i = 0; i < object.parts.size(); ++i)
     add_overlaps(object.parts[i], pointer + "/parts/" + std::to_string(i), notes);
   for (const std::string& overlap : stimuli::group_overlaps(object))
-    notes.push_back(pointer + " (" + stimuli::printable(object.file_name) +
-                    "): " + stimuli::printable(overlap));
+    notes.push_back(pointer + " (" + printable(object.file_name) + "): " + printable(overlap));
 }
 
 void explain_scene(Outputs& outputs, const rendering::Scene& scene,
@@ -109,8 +108,8 @@ int render_command(const std::vector<std::string>& args) {
   outputs.put("bodies", bodies.text());
   outputs.write();
   for (const std::string& note : scene_notes(spec, scene))
-    std::cerr << stimuli::printable(scene_path) << ": " << note << '\n';
-  std::cerr << stimuli::printable_lines(table.warnings(trajectory));
+    std::cerr << printable(scene_path) << ": " << note << '\n';
+  std::cerr << printable_lines(table.warnings(trajectory));
   return 0;
 }
 

@@ -5,13 +5,12 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
-#include "stimuli/text.h"
+#include "data/base/text.h"
 
 namespace palpate::runner {
 namespace {
 
 using Json = nlohmann::ordered_json;
-using stimuli::printable;
 
 template <class... Values>
 std::string formatted(const char* format, Values... values) {

@@ -9,6 +9,7 @@
 #include <set>
 #include <utility>
 
+#include "data/base/text.h"
 #include "data/record.h"
 #include "data/store/store.h"
 #include "protocols/difference.h"
@@ -21,16 +22,13 @@
 #include "runner/session/clock_check.h"
 #include "runner/session/near_codes.h"
 #include "runner/session/protocol_info.h"
-#include "stimuli/text.h"
 
 namespace palpate::runner {
 namespace {
 
 namespace fs = std::filesystem;
 
-void say(const std::string& text) {
-  std::fprintf(stderr, "%s\n", stimuli::printable_lines(text).c_str());
-}
+void say(const std::string& text) { std::fprintf(stderr, "%s\n", printable_lines(text).c_str()); }
 
 /// What the database holds already.
 struct Known {
@@ -116,8 +114,7 @@ void confirm_new(const RunSettings& settings, const std::string& code,
                                        : settings.database + " does not hold " + code +
                                              ", but others (" + latest(codes) + ").\n";
   if (!near.empty()) question += alike + " there: a typing error?\n";
-  const auto answer =
-      ask(stimuli::printable_lines(question) + "Is " + code + " a new participant? [y/N] ");
+  const auto answer = ask(printable_lines(question) + "Is " + code + " a new participant? [y/N] ");
   if (answer != "y" && answer != "Y" && answer != "yes")
     throw UsageError("nobody was enrolled, no session was started; the same command asks again");
 }

@@ -6,11 +6,11 @@
 #include <optional>
 #include <stdexcept>
 
+#include "data/base/text.h"
 #include "protocols/tasks/texts.h"
 #include "runner/commands/shared/command.h"
 #include "runner/display/text_display.h"
 #include "runner/session/device_check.h"
-#include "stimuli/text.h"
 
 namespace palpate::runner {
 const DeviceKind& find_device_kind(const std::string& name) {
@@ -149,14 +149,13 @@ std::unique_ptr<DisplayLoop> open_display(const RunSettings& settings,
     try {
       auto windows = make_windows(window);
       const std::string missing = windows->unreadable();
-      if (!missing.empty()) std::fprintf(stderr, "%s\n", stimuli::printable_lines(missing).c_str());
+      if (!missing.empty()) std::fprintf(stderr, "%s\n", printable_lines(missing).c_str());
       const std::string warning = windows->warning();
       if (!warning.empty()) std::fprintf(stderr, "%s\n", warning.c_str());
       return windows;
     } catch (const DisplayError& error) {
       if (window.mouse != nullptr) throw;
-      std::fprintf(stderr, "%s; a text display instead\n",
-                   stimuli::printable(error.what()).c_str());
+      std::fprintf(stderr, "%s; a text display instead\n", printable(error.what()).c_str());
     }
   }
   return make_text_display({&clock, emergency});

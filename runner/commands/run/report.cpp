@@ -3,7 +3,7 @@
 #include <cstdio>
 #include <string>
 
-#include "stimuli/text.h"
+#include "data/base/text.h"
 
 namespace palpate::runner {
 
@@ -41,9 +41,9 @@ void print_outcome(const LiveStation& station, const data::Participant& who,
               data::to_string(outcome.end));
   for (const std::string& note : outcome.unkept)
     std::fprintf(stderr, "not on record, as nobody was enrolled: %s\n",
-                 stimuli::printable_lines(note).c_str());
+                 printable_lines(note).c_str());
   if (!outcome.reason.empty())
-    std::fprintf(stderr, "%s\n", stimuli::printable_lines(outcome.reason).c_str());
+    std::fprintf(stderr, "%s\n", printable_lines(outcome.reason).c_str());
   if (outcome.end == data::RunEnd::paused || outcome.end == data::RunEnd::aborted)
     std::fprintf(stderr, "the same command resumes from here\n");
   if (station.markers.dropped() > 0)

@@ -18,10 +18,10 @@
 #include <utility>
 #include <vector>
 
+#include "data/base/checksum.h"
 #include "data/store/store.h"
 #include "data/store/task_text.h"
 #include "protocols/answer_keys.h"
-#include "protocols/sha256.h"
 #include "protocols/tasks/task_plan.h"
 #include "protocols/tasks/texts.h"
 #include "runner/commands/run/admission.h"
@@ -226,7 +226,7 @@ void translate_texts(const RunSettings& settings, Admission& admission) {
   protocols::translate(protocol, settings.protocol, settings.language);
   admission.notes.push_back(nlohmann::ordered_json{
       {"language", settings.language},
-      {"texts_sha256", protocols::sha256_hex(protocol.translation)},
+      {"texts_sha256", checksum_hex(protocol.translation)},
       {"texts",
        protocol.translation}}.dump());
 }

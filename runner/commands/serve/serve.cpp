@@ -7,6 +7,7 @@
 #include <sstream>
 #include <thread>
 
+#include "data/base/text.h"
 #include "data/files/atomic_file.h"
 #include "data/store/store.h"
 #include "runner/commands/render/forces.h"
@@ -23,7 +24,6 @@
 #include "runner/serve/served_session.h"
 #include "runner/servo/realtime.h"
 #include "runner/session/device_check.h"
-#include "stimuli/text.h"
 
 namespace palpate::runner {
 namespace {

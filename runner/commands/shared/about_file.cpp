@@ -5,6 +5,7 @@
 #include <optional>
 #include <regex>
 
+#include "data/base/text.h"
 #include "protocols/json_document.h"
 
 namespace palpate::runner {
@@ -25,11 +26,6 @@ constexpr std::array kLicenses = {
     "CC0-1.0",      "CC-BY-4.0",       "CC-BY-SA-4.0", "CC-BY-NC-4.0", "CC-BY-NC-SA-4.0",
     "CC-BY-ND-4.0", "CC-BY-NC-ND-4.0", "PDDL-1.0",     "ODC-By-1.0",   "ODbL-1.0"};
 
-std::size_t characters(const std::string& text) {
-  return static_cast<std::size_t>(std::count_if(
-      text.begin(), text.end(), [](unsigned char c) { return (c & 0xC0U) != 0x80U; }));
-}
-
 /// A line that says something.
 std::optional<std::string> read_line(const json& value, const std::string& place,
                                      FaultList& faults) {
@@ -38,7 +34,7 @@ std::optional<std::string> read_line(const json& value, const std::string& place
     const bool controls =
         std::any_of(text.begin(), text.end(), [](unsigned char c) { return c < ' ' || c == 0x7F; });
     if (!controls && text.find_first_not_of(' ') != std::string::npos &&
-        characters(text) <= kLongest) {
+        count_characters(text) <= kLongest) {
       return text;
     }
   }

@@ -6,8 +6,8 @@
 #include <optional>
 #include <typeinfo>
 
+#include "data/base/text.h"
 #include "data/files/file_permissions.h"
-#include "stimuli/text.h"
 
 namespace palpate::runner {
 
@@ -18,8 +18,8 @@ namespace {
 /// Refuses what Boost accepts: "-1" for an unsigned number (2^64 - 1), "nan" and "inf".
 void check_number(const std::string& option, const std::string& text, const boost::any& value) {
   const auto refuse = [&](const char* expected) {
-    throw UsageError("--" + option + ": expected " + expected + ", found '" +
-                     stimuli::printable(text, 60) + "'");
+    throw UsageError("--" + option + ": expected " + expected + ", found '" + printable(text, 60) +
+                     "'");
   };
   const auto is = [&](const auto& example) { return value.type() == typeid(example); };
   const bool no_sign = is(0U) || is(0UL) || is(0ULL);
@@ -35,7 +35,7 @@ std::string option_meant(const std::string& given, const po::options_description
   if (word.size() > kLongest) return "";
   std::vector<std::string> names;
   for (const auto& option : options.options()) names.push_back(option->long_name());
-  const std::string meant = stimuli::nearest_word(word, names);
+  const std::string meant = nearest_word(word, names);
   return meant.empty() ? "" : "; did you mean '--" + meant + "'?";
 }
 
@@ -90,7 +90,7 @@ std::optional<po::variables_map> CommandLine::parse(const std::vector<std::strin
 
 void warn_of_exposure(const std::string& database) {
   const std::string exposure = data::access_warning(database);
-  if (!exposure.empty()) std::cerr << "warning: " << stimuli::printable(exposure) << "\n";
+  if (!exposure.empty()) std::cerr << "warning: " << printable(exposure) << "\n";
 }
 
 }  // namespace palpate::runner

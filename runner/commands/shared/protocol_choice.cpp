@@ -4,10 +4,10 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "data/base/text.h"
 #include "data/files/utc.h"
 #include "runner/commands/shared/ask.h"
 #include "runner/commands/shared/command.h"
-#include "stimuli/text.h"
 
 namespace palpate::runner {
 namespace {
@@ -30,9 +30,7 @@ const char* to_string(ProtocolChoice choice) {
   return "";
 }
 
-void say(const std::string& text) {
-  std::fprintf(stderr, "%s\n", stimuli::printable_lines(text).c_str());
-}
+void say(const std::string& text) { std::fprintf(stderr, "%s\n", printable_lines(text).c_str()); }
 
 std::string what_happened(const ChangedProtocol& changed,
                           const protocols::ProtocolDifference& difference) {

@@ -57,9 +57,9 @@ std::vector<std::pair<std::string, std::string>> questions_of(const nlohmann::or
 nlohmann::ordered_json document_of(const data::ProtocolInfo& info) {
   const std::string place = "the text of protocol " + info.name + " is damaged: expected ";
   try {
-    nlohmann::ordered_json json = data::read_ordered_json(info.text);
+    nlohmann::ordered_json json = read_ordered_json(info.text);
     if (json.is_object()) return json;
-  } catch (const data::JsonError& error) {
+  } catch (const JsonError& error) {
     throw data::StoreRefused(place + error.expected + ", found " + error.found);
   }
   throw data::StoreRefused(place + "an object");

@@ -8,9 +8,9 @@
 #include <limits>
 #include <utility>
 
+#include "data/base/text.h"
 #include "stimuli/closed_surface.h"
 #include "stimuli/primitives.h"
-#include "stimuli/text.h"
 
 namespace palpate::runner {
 
@@ -63,7 +63,7 @@ std::vector<std::string> mesh_notes(const stimuli::ObjectSpec& object) {
   char text[160];
   std::snprintf(text, sizeof text, "%.4g x %.4g x %.4g mm, %zu faces", size.x, size.y, size.z,
                 soup.faces.size());
-  std::string note = stimuli::printable(object.file_name) + ": " + text;
+  std::string note = printable(object.file_name) + ": " + text;
   try {
     for (const std::string& done : stimuli::closed_surface(soup).notes) note += "; " + done;
   } catch (const stimuli::MeshError&) {

@@ -13,10 +13,10 @@
 #include <string_view>
 #include <system_error>
 
-#include "data/files/checksum.h"
+#include "data/base/checksum.h"
+#include "data/base/text.h"
 #include "data/files/text_sink.h"
 #include "runner/commands/shared/command.h"
-#include "stimuli/text.h"
 
 namespace palpate::runner {
 namespace {
@@ -33,7 +33,7 @@ class MappedFile {
     if (file < 0 || ::fstat(file, &found) != 0 || !S_ISREG(found.st_mode)) {
       const int error = errno;
       if (file >= 0) ::close(file);
-      throw UsageError(stimuli::printable(path) + ": expected a file that can be read: " +
+      throw UsageError(printable(path) + ": expected a file that can be read: " +
                        (file < 0 ? std::generic_category().message(error) : "it is another thing"));
     }
     size_ = static_cast<std::size_t>(found.st_size);
@@ -58,7 +58,7 @@ bool contains(const std::vector<std::string>& names, const std::string& name) {
 }
 
 bool is_listable(const std::string& name) {
-  return stimuli::is_plain_utf8(name) && name.find('\\') == std::string::npos;
+  return is_plain_utf8(name) && name.find('\\') == std::string::npos;
 }
 
 std::map<std::string, std::string> listed_checksums(const std::string& folder) {
@@ -71,9 +71,8 @@ std::map<std::string, std::string> listed_checksums(const std::string& folder) {
     const bool good = line.size() > 66 && hex.find_first_not_of("0123456789abcdef") == hex.npos &&
                       line.compare(64, 2, "  ") == 0;
     if (!good)
-      throw UsageError(stimuli::printable((fs::path(folder) / kChecksums).string()) +
-                       ": expected lines of sha256sum, found '" + stimuli::printable(line, 80) +
-                       "'");
+      throw UsageError(printable((fs::path(folder) / kChecksums).string()) +
+                       ": expected lines of sha256sum, found '" + printable(line, 80) + "'");
     out[line.substr(66)] = std::string(hex);
   }
   return out;
@@ -83,15 +82,14 @@ std::map<std::string, std::string> listed_checksums(const std::string& folder) {
 
 std::vector<std::string> files_below(const std::string& folder) {
   std::error_code error;
-  if (!fs::is_directory(folder, error))
-    throw UsageError(stimuli::printable(folder) + ": expected a folder");
+  if (!fs::is_directory(folder, error)) throw UsageError(printable(folder) + ": expected a folder");
   std::vector<std::string> names;
   for (const auto& entry : fs::recursive_directory_iterator(folder)) {
     const fs::file_status status = entry.symlink_status();
     if (fs::is_directory(status)) continue;
     const std::string name = entry.path().lexically_relative(folder).generic_string();
     if (!fs::is_regular_file(status) || !is_listable(name))
-      throw UsageError(stimuli::printable((fs::path(folder) / name).string()) +
+      throw UsageError(printable((fs::path(folder) / name).string()) +
                        ": expected files with plain names and folders only; this is a link or "
                        "another thing");
     names.push_back(name);
@@ -105,7 +103,7 @@ std::string read_member(const std::string& folder, const std::string& name) {
 }
 
 std::string checksum_of_member(const std::string& folder, const std::string& name) {
-  return data::checksum_hex(MappedFile(folder, name).text());
+  return checksum_hex(MappedFile(folder, name).text());
 }
 
 std::uint64_t size_of_member(const std::string& folder, const std::string& name) {
@@ -157,19 +155,17 @@ void require_replaceable_folder(const std::string& folder, bool force, const std
   const fs::file_status status = fs::symlink_status(fs::path(folder));
   if (!fs::exists(status)) return;
   if (!fs::is_directory(status))
-    throw UsageError(stimuli::printable(folder) +
-                     ": exists and is no folder; name a folder to be made");
+    throw UsageError(printable(folder) + ": exists and is no folder; name a folder to be made");
   if (fs::is_empty(folder)) return;
-  if (!force)
-    throw UsageError(stimuli::printable(folder) + ": exists already; --force replaces it");
+  if (!force) throw UsageError(printable(folder) + ": exists already; --force replaces it");
   const std::vector<std::string> there = files_below(folder);
   if (!std::ranges::binary_search(there, mark) || !std::ranges::binary_search(there, kChecksums))
-    throw UsageError(stimuli::printable(folder) +
+    throw UsageError(printable(folder) +
                      ": was not made by this command and is not replaced; name another folder");
   const std::map<std::string, std::string> listed = listed_checksums(folder);
   for (const std::string& name : there) {
     if (name != kChecksums && !contains(open, name) && !listed.contains(name))
-      throw UsageError(stimuli::printable(folder) + ": contains " + stimuli::printable(name) +
+      throw UsageError(printable(folder) + ": contains " + printable(name) +
                        ", which this command did not make and which would be lost; move it away, "
                        "or name another folder");
   }

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "stimuli/text.h"
+#include "data/base/text.h"
 
 namespace palpate::runner {
 
@@ -36,12 +36,12 @@ int version_to_go_on_with(const std::set<int>& begun, const std::string& file) {
     std::string versions;
     for (const int version : begun)
       versions += (versions.empty() ? "" : ", ") + std::to_string(version);
-    throw UsageError(stimuli::printable(file) + ": holds versions " + versions +
+    throw UsageError(printable(file) + ": holds versions " + versions +
                      " of the simulated participant; choose one with --participant-version");
   }
   if (*begun.begin() != kDefaultParticipantVersion) {
     std::fprintf(stderr, "%s: goes on with version %d of the simulated participant\n",
-                 stimuli::printable(file).c_str(), *begun.begin());
+                 printable(file).c_str(), *begun.begin());
   }
   return *begun.begin();
 }

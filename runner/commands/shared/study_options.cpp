@@ -1,8 +1,8 @@
 #include "runner/commands/shared/study_options.h"
 
+#include "data/base/text.h"
 #include "runner/commands/shared/simulation.h"
 #include "runner/session/socket_advisor.h"
-#include "stimuli/text.h"
 
 namespace palpate::runner {
 
@@ -34,7 +34,7 @@ void check_advisor(const std::string& path, double time_out) {
   if (path.empty()) return;
   if (const std::string fault = socket_fault(path); !fault.empty())
     throw UsageError("--ask: expected the Unix domain socket of a program that listens, found " +
-                     stimuli::printable(path) + ": " + fault);
+                     printable(path) + ": " + fault);
 }
 
 }  // namespace palpate::runner

@@ -5,8 +5,8 @@
 #include <iomanip>
 #include <sstream>
 
+#include "data/base/random.h"
 #include "protocols/tasks/levels.h"
-#include "stimuli/random.h"
 
 namespace palpate::runner {
 namespace {
@@ -59,7 +59,7 @@ std::string words(const protocols::Limits& spec) {
 
 /// With the threshold in the middle of the levels.
 bool succeeds(const protocols::Protocol& protocol, const protocols::TaskBlock& block,
-              const protocols::Trial& trial, stimuli::Random& random) {
+              const protocols::Trial& trial, Random& random) {
   const double draw = random.unit();
   if (!trial.level || protocols::levels_of(block).size() < 2) return draw < 0.75;
   const protocols::PsychometricParticipant typical =
@@ -97,7 +97,7 @@ std::vector<std::string> in_words(const protocols::Protocol& protocol,
 
 std::vector<protocols::Trial> example_trials(const protocols::Protocol& protocol, int participant) {
   std::vector<protocols::Trial> trials;
-  stimuli::Random random(protocol.seed, {static_cast<std::uint64_t>(participant), 0x5c});
+  Random random(protocol.seed, {static_cast<std::uint64_t>(participant), 0x5c});
   for (int session = 1; session <= protocol.sessions.count; ++session) {
     protocols::TaskPlan plan(protocol, participant, session);
     while (!plan.finished()) {

@@ -5,8 +5,8 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
+#include "data/base/checksum.h"
 #include "data/base/json_text.h"
-#include "protocols/sha256.h"
 #include "runner/commands/shared/simulation.h"
 #include "runner/session/protocol_info.h"
 
@@ -18,7 +18,7 @@ using nlohmann::json;
 
 /// The protocol with --repetitions; no more blocks than those.
 json base_protocol(const protocols::Protocol& protocol, const SweepSettings& settings) {
-  json out = data::read_json(protocol.source_text);
+  json out = read_json(protocol.source_text);
   if (settings.repetitions == 0) return out;
   if (protocol.version == 2)
     throw UsageError("--repetitions: the blocks of a protocol of version 2 have their own");
@@ -34,8 +34,8 @@ json base_protocol(const protocols::Protocol& protocol, const SweepSettings& set
 std::string sha256_of_files(const protocols::Protocol& protocol) {
   std::string all;
   for (const data::ProtocolFile& file : info_of(protocol).files)
-    all += file.name + '\n' + protocols::sha256_hex(file.bytes) + '\n';
-  return all.empty() ? "" : protocols::sha256_hex(all);
+    all += file.name + '\n' + checksum_hex(file.bytes) + '\n';
+  return all.empty() ? "" : checksum_hex(all);
 }
 
 /// \throws UsageError
@@ -53,7 +53,7 @@ data::SweepPlan plan_of_sweep(const SweepSettings& settings, const SweptStudy& s
   plan.protocol = study.protocol().dump();
   plan.files_sha256 = sha256_of_files(protocol);
   plan.settings = study.settings().dump();
-  plan.space = data::read_json(study.space().source_text).dump();
+  plan.space = read_json(study.space().source_text).dump();
   plan.design = settings.design;
   plan.points = design.size();
   plan.seed = settings.seed;
@@ -124,7 +124,7 @@ void check_sweep_options(const po::variables_map& values, SweepSettings& setting
 PlannedSweep::PlannedSweep(const SweepSettings& settings)
     : protocol(protocols::parse_protocol(settings.protocol)),
       study(base_protocol(protocol, settings), settings.protocol,
-            data::read_json(simulated_settings_text(settings.patch, settings.version)),
+            read_json(simulated_settings_text(settings.patch, settings.version)),
             protocols::parse_sweep_space(settings.space), settings.space),
       design(design_of(settings, study)),
       plan(plan_of_sweep(settings, study, design, protocol)) {

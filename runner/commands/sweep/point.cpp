@@ -12,9 +12,9 @@
 #include "analysis/statistics/describe.h"
 #include "analysis/statistics/paired.h"
 #include "analysis/statistics/task_analysis.h"
+#include "data/base/text.h"
 #include "runner/session/simulated_session.h"
 #include "runner/session/simulated_study.h"
-#include "stimuli/text.h"
 
 namespace palpate::runner {
 namespace {
@@ -213,7 +213,7 @@ std::string reason_of(const std::exception& error) {
     text = error.what();
   }
   std::replace(text.begin(), text.end(), '\n', ' ');
-  text = stimuli::printable(text, kMaxReason);
+  text = printable(text, kMaxReason);
   return text.empty() ? "unknown" : text;
 }
 

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "data/base/json_text.h"
+#include "data/base/text.h"
 #include "data/store/sweep_file.h"
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/progress_line.h"
@@ -23,7 +24,6 @@
 #include "runner/commands/shared/stop_signal.h"
 #include "runner/commands/sweep/planned.h"
 #include "runner/commands/sweep/point.h"
-#include "stimuli/text.h"
 
 namespace palpate::runner {
 namespace {
@@ -184,7 +184,7 @@ int version_begun_with(const std::string& database) {
   std::set<int> begun;
   std::error_code none;  // what cannot be seen is refused where it is opened
   if (std::filesystem::exists(database, none)) {
-    const json settings = data::json_or_discarded(data::SweepFile::open(database).plan().settings);
+    const json settings = json_or_discarded(data::SweepFile::open(database).plan().settings);
     for (const int version : participant_versions()) {
       if (settings.is_object() && settings.value("version", json()) == version)
         begun.insert(version);
@@ -196,7 +196,7 @@ int version_begun_with(const std::string& database) {
 void print_summary(data::SweepFile& file, const data::SweepPlan& plan, const std::string& name) {
   const std::int64_t count = file.count(), failed = file.failed();
   std::cout << name << ", SIMULATED participants: " << count << " of " << plan.points << " points ("
-            << plan.design << ", seed " << plan.seed << ") in " << stimuli::printable(file.path());
+            << plan.design << ", seed " << plan.seed << ") in " << printable(file.path());
   if (failed > 0) std::cout << ", " << failed << " of them failed";
   std::cout << "\n";
   if (failed == 0) return;

@@ -13,13 +13,13 @@
 
 #include "analysis/report/html_elements.h"
 #include "analysis/text.h"
+#include "data/base/text.h"
 #include "rendering/renderer.h"
 #include "runner/commands/watch/picture_mesh.h"
 #include "runner/commands/watch/whole_numbers.h"
 #include "runner/safety/fault_signals.h"
 #include "runner/scene_builder.h"
 #include "runner/session/replay.h"
-#include "stimuli/text.h"
 
 namespace palpate::runner {
 namespace {
@@ -28,7 +28,6 @@ using analysis::counted;
 using analysis::escaped;
 using analysis::fixed;
 using Json = nlohmann::ordered_json;
-using stimuli::printable;
 
 // Steps of what the page shows: finer than a device senses or shows.
 constexpr double kPerSecond = 1e6, kPerMetre = 1e8, kPerNewton = 1e5, kPerUnit = 1e7;

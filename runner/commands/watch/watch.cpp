@@ -3,12 +3,12 @@
 #include <algorithm>
 #include <iostream>
 
+#include "data/base/text.h"
 #include "data/store/store.h"
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/outputs.h"
 #include "runner/commands/shared/trial_option.h"
 #include "runner/commands/watch/trial_page.h"
-#include "stimuli/text.h"
 
 namespace palpate::runner {
 namespace {
@@ -20,7 +20,7 @@ std::vector<data::TrialName> names_of(const std::vector<std::string>& texts, boo
   for (const std::string& text : texts) {
     names.push_back(parse_trial_name(text));
     if (std::ranges::count(texts, text) > 1)
-      throw UsageError("--trial " + stimuli::printable(text, 60) + ": it is there twice");
+      throw UsageError("--trial " + printable(text, 60) + ": it is there twice");
   }
   if (names.size() * (compare ? 2 : 1) > kMostShown)
     throw UsageError(std::string("--trial: expected at most ") +
@@ -75,13 +75,11 @@ int watch_command(const std::vector<std::string>& args) {
       outputs.protect(stimulus.object);
   }
   TrialPage page = trial_page(watched, compare);
-  for (const std::string& note : page.notes)
-    std::cerr << "note: " << stimuli::printable(note) << "\n";
+  for (const std::string& note : page.notes) std::cerr << "note: " << printable(note) << "\n";
   const std::size_t size = page.html.size();
   outputs.put("out", std::move(page.html));
   outputs.write();
-  std::cout << stimuli::printable(out) << ": " << page.ticks << " ticks, " << (size + 999) / 1000
-            << " kB\n";
+  std::cout << printable(out) << ": " << page.ticks << " ticks, " << (size + 999) / 1000 << " kB\n";
   return 0;
 }
 

@@ -7,7 +7,7 @@
 #include <stdexcept>
 #include <vector>
 
-#include "stimuli/text.h"
+#include "data/base/text.h"
 
 namespace palpate::runner {
 namespace {
@@ -71,6 +71,6 @@ void WholeNumbers::add(const std::string& name, std::span<const double> values,
   bytes_ += best;
 }
 
-std::string WholeNumbers::text() const { return stimuli::base64_encoded(deflated(bytes_)); }
+std::string WholeNumbers::text() const { return base64_encoded(deflated(bytes_)); }
 
 }  // namespace palpate::runner

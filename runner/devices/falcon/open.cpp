@@ -9,12 +9,12 @@
 #include <stdexcept>
 #include <utility>
 
+#include "data/base/text.h"
 #include "protocols/parse.h"
 #include "runner/devices/falcon/boot.h"
 #include "runner/devices/falcon/falcon.h"
 #include "runner/devices/falcon/parameters.h"
 #include "runner/devices/falcon/usb.h"
-#include "stimuli/text.h"
 
 namespace palpate::runner::falcon {
 namespace {
@@ -82,11 +82,10 @@ void show_progress(const std::string& serial, const BootProgress& progress) {
   if (isatty(STDERR_FILENO) == 0) return;
   using Step = BootProgress::Step;
   if (progress.step == Step::monitor && progress.attempt > 1) {
-    std::cerr << "\n  " << stimuli::printable(progress.trouble) << "; attempt " << progress.attempt
-              << "\n";
+    std::cerr << "\n  " << printable(progress.trouble) << "; attempt " << progress.attempt << "\n";
   }
   if (progress.step != Step::uploading) return;
-  std::cerr << "\rFalcon " << stimuli::printable(serial) << ": firmware "
+  std::cerr << "\rFalcon " << printable(serial) << ": firmware "
             << 100 * progress.sent / progress.size << " %"
             << (progress.sent == progress.size ? "\n" : "") << std::flush;
 }

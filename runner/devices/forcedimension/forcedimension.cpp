@@ -7,8 +7,8 @@
 #include <glm/geometric.hpp>
 #include <stdexcept>
 
+#include "data/base/text.h"
 #include "runner/servo/realtime.h"
-#include "stimuli/text.h"
 
 namespace palpate::runner::forcedimension {
 namespace {
@@ -53,13 +53,9 @@ DeviceCapabilities capabilities_of(const Model& model, bool wrist, bool active_w
   return can;
 }
 
-bool finite(const Vec3& v) {
-  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
-}
-
 std::string error_text(const Library& library) {
   const char* const text = library.error_get_last_str();
-  return text != nullptr ? stimuli::printable(text) : "no reason is given";
+  return text != nullptr ? printable(text) : "no reason is given";
 }
 
 /// What opening one found.
@@ -79,7 +75,7 @@ Found open_one(const Library& library, int index) {
   const bool numbered = library.get_serial_number(&serial, static_cast<char>(id)) >= 0;
   const char* const name = library.get_system_name(static_cast<char>(id));
   return {static_cast<char>(id), numbered ? std::to_string(serial) : "",
-          name != nullptr ? stimuli::printable(name) : "a device without a name"};
+          name != nullptr ? printable(name) : "a device without a name"};
 }
 
 /// Ids that devices of this process hold, one at most each: the library has one list of devices for

@@ -6,8 +6,8 @@
 #include <glm/geometric.hpp>
 #include <stdexcept>
 
+#include "data/base/text.h"
 #include "runner/servo/realtime.h"
-#include "stimuli/text.h"
 
 namespace palpate::runner::haply {
 namespace {
@@ -23,10 +23,6 @@ constexpr auto kPatience = std::chrono::seconds(2);  // for the list of devices
 
 // A reseller's numbers; the arm's reach as the maker's tutorials clamp it.
 constexpr double kMaxForce = 4, kMaxStiffness = 1000, kReach = 0.1, kResolution = 1e-5;
-
-bool finite(const Vec3& v) {
-  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
-}
 
 std::string service_of(const DeviceConfig& config) {
   return config.service.empty() ? kService : config.service;
@@ -165,7 +161,7 @@ void Inverse3Device::open() {
     std::string ids;
     const Listed* arm = nullptr;
     for (const Listed& one : found.arms) {
-      ids += (ids.empty() ? "" : ", ") + stimuli::printable(one.id);
+      ids += (ids.empty() ? "" : ", ") + printable(one.id);
       if (arm == nullptr && (wanted.empty() || one.id == wanted)) arm = &one;
     }
     if (arm == nullptr)

@@ -20,7 +20,7 @@ constexpr std::array<const char*, 3> kGrips = {"verse_grip", "wireless_verse_gri
                                                "custom_verse_grip"};
 
 Json parsed(std::string_view text, const char* what) {
-  Json out = data::json_or_discarded(text);
+  Json out = json_or_discarded(text);
   if (!out.is_object())
     throw std::runtime_error(std::string("expected ") + what +
                              " as a JSON object from the service");

@@ -8,8 +8,8 @@
 #include <glm/geometric.hpp>
 #include <stdexcept>
 
+#include "data/base/text.h"
 #include "runner/servo/realtime.h"
-#include "stimuli/text.h"
 
 namespace palpate::runner::touch {
 namespace {
@@ -26,10 +26,6 @@ constexpr double kMaxSpeed = 5, kJump = 1e-3;       // m/s and m
 constexpr double kLeastForce = 0.88, kMostForce = 40, kLeastStiffness = 500, kMostStiffness = 5000;
 constexpr double kReach = 0.035;  // m; half the smallest side of a Touch's workspace
 
-bool finite(const Vec3& v) {
-  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
-}
-
 /// Devices of this process that the scheduler calls; it is stopped while another is opened. For the
 /// thread that opens and closes.
 int& running() {
@@ -38,7 +34,7 @@ int& running() {
 }
 
 std::string text_of(const char* text, const char* otherwise) {
-  return text != nullptr && *text != '\0' ? stimuli::printable(text) : otherwise;
+  return text != nullptr && *text != '\0' ? printable(text) : otherwise;
 }
 
 /// The newest error, or 0; all others are forgotten.

@@ -8,7 +8,7 @@
 #include <span>
 #include <utility>
 
-#include "stimuli/input_file.h"
+#include "data/base/input_file.h"
 #include "stimuli/parts/facets.h"
 #include "stimuli/primitives.h"
 #include "stimuli/shapes.h"
@@ -78,7 +78,7 @@ DrawnMesh triangles_of(const stimuli::ObjectSpec& object) {
   if (object.shape == stimuli::ShapeKind::mesh && stimuli::is_gmsh_file_name(object.file)) {
     const stimuli::SolidMesh solid = stimuli::read_gmsh(
         object.file,
-        object.file_bytes ? *object.file_bytes : stimuli::read_whole(object.file, kMostFileBytes));
+        object.file_bytes ? *object.file_bytes : read_whole(object.file, kMostFileBytes));
     return surface_mesh(solid.nodes, stimuli::surface_of(solid), {});
   }
   add_object(object, Pose(), out);

@@ -187,10 +187,6 @@ constexpr double kRedOfSize = 0.2;   // of the radius: so far has given way what
 constexpr float kFarthestFloor = 1;  // below the lowest, of the size
 constexpr float kSkinOpacity = 0.22F, kLayerOpacity = 0.42F;
 
-bool finite(const Vec3& v) {
-  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
-}
-
 glm::mat4 place_of(const Pose& pose) {
   glm::mat4 out(glm::mat4_cast(glm::quat(pose.orientation)));
   out[3] = glm::vec4(glm::vec3(pose.position), 1);

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <set>
 
-#include "stimuli/random.h"
+#include "data/base/random.h"
 #include "tests/analysis/figures/figure_form.h"
 #include "tests/analysis/sweep_table_fixture.h"
 
@@ -36,7 +36,7 @@ Outcome mostly_first(const std::vector<double>& x) {
 }
 
 TEST(SweepFigures, ShowAsManyPointsAsTheySay) {
-  stimuli::Random random(2);
+  Random random(2);
   for (const std::size_t n : {1U, 399U, 400U, 401U, 799U, 800U, 2500U}) {
     std::vector<std::vector<double>> points;
     for (std::size_t i = 0; i < n; ++i) points.push_back({random.unit(), random.unit()});
@@ -54,7 +54,7 @@ TEST(SweepFigures, ChosenPointsAreOfTheWholeDesign) {
   for (const Mark& dot : dots_of(grid, "scatter")) levels.insert(dot.x.at(0));
   EXPECT_EQ(levels.size(), 7u);
 
-  stimuli::Random random(3);
+  Random random(3);
   const SweepTable saltelli =
       table_of("saltelli", saltelli_points(3, 400, [&] { return random.unit(); }), mostly_first);
   std::vector<int> samples(5);
@@ -64,7 +64,7 @@ TEST(SweepFigures, ChosenPointsAreOfTheWholeDesign) {
 }
 
 TEST(SweepFigures, HaveTheirForm) {
-  stimuli::Random random(3);
+  Random random(3);
   const auto draw = [&] { return random.unit(); };
   for (const SweepTable& table :
        {table_of("grid", grid_points(2, 7), mostly_first),

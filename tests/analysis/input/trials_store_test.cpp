@@ -8,7 +8,7 @@
 #include "analysis/input/study_record.h"
 #include "analysis/input/task_trials.h"
 #include "analysis/input/trials.h"
-#include "data/files/checksum.h"
+#include "data/base/checksum.h"
 #include "data/store/store.h"
 #include "data/store/task_text.h"
 #include "protocols/parse.h"
@@ -39,7 +39,7 @@ class TrialsStore : public ::testing::Test {
                  R"({"stimuli": [{"name": "wedge"}, {"name": "cube"}, {"name": "torus"}]})",
              const std::string& note = "") {
     data::Store store = data::Store::open(path_, data::Store::Mode::write_or_create);
-    const data::ProtocolInfo protocol{"test", text, data::checksum_hex(text)};
+    const data::ProtocolInfo protocol{"test", text, checksum_hex(text)};
     const data::Participant participant = store.enrol(protocol, "S1", 1, true, 7);
     data::RunInfo info;
     info.program_version = "9.9.9";
@@ -78,7 +78,7 @@ TEST_F(TrialsStore, ReadsCompletedTrials) {
   EXPECT_EQ(table.rows[2].answer, 1);
   EXPECT_EQ(table.provenance.protocol_name, "test");
   EXPECT_EQ(table.provenance.protocol_sha256,
-            (std::vector<std::string>{data::checksum_hex(
+            (std::vector<std::string>{checksum_hex(
                 R"({"stimuli": [{"name": "wedge"}, {"name": "cube"}, {"name": "torus"}]})")}));
   EXPECT_EQ(table.provenance.observer_sha256, std::string(64, 'b'));
   EXPECT_EQ(table.provenance.program_versions, (std::vector<std::string>{"9.9.9"}));

@@ -14,7 +14,7 @@
 #include "analysis/movement/pictures.h"
 #include "analysis/movement/signal.h"
 #include "analysis/movement/smoothness.h"
-#include "stimuli/random.h"
+#include "data/base/random.h"
 
 namespace palpate::analysis {
 namespace {
@@ -155,7 +155,7 @@ TEST(Signal, TheFilterIsDownByThreeDecibelAtTheCutOff) {
 }
 
 TEST(Signal, NoiseAddsItsPathAndTheFilterTakesItAway) {
-  stimuli::Random random(7);
+  Random random(7);
   std::vector<Vec3> rest;
   for (int i = 0; i < 20000; ++i)
     rest.push_back(30e-6 * Vec3(random.normal(), random.normal(), random.normal()));
@@ -272,7 +272,7 @@ TEST(Measures, TwiceTheNoiseChangesFewOfThem) {
   const TouchedSurface surface(draw_places(sphere(0.03), TouchedSurface::kPlaces));
   const auto noisy = [&](double sd) {
     MovementTrial trial = still;
-    stimuli::Random random(5);
+    Random random(5);
     for (Vec3& tip : trial.tip) tip += sd * Vec3(random.normal(), random.normal(), random.normal());
     return measure(trial, &surface, {});
   };

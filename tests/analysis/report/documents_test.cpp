@@ -16,7 +16,7 @@
 #include "analysis/report/tables.h"
 #include "analysis/statistics/analysis.h"
 #include "analysis/text.h"
-#include "stimuli/random.h"
+#include "data/base/random.h"
 #include "tests/analysis/figures/figure_form.h"
 #include "tests/shared/prose.h"
 
@@ -29,7 +29,7 @@ using Json = nlohmann::ordered_json;
 /// Eight participants, four shapes; with `limit` above 0 some trials end there (s).
 Analysis study_with(const std::vector<std::string>& renderers, double limit = 0) {
   TrialTableBuilder builder;
-  stimuli::Random random(7);
+  Random random(7);
   for (int p = 0; p < 8; ++p) {
     const std::string participant = "P" + std::to_string(p);
     int trial = 0;

@@ -18,7 +18,7 @@
 #include "analysis/report/tables.h"
 #include "analysis/statistics/analysis.h"
 #include "analysis/text.h"
-#include "stimuli/random.h"
+#include "data/base/random.h"
 
 namespace palpate::analysis {
 namespace {
@@ -57,7 +57,7 @@ struct Study {
       : renderers(std::move(names)),
         log_times(renderers.size(), {kShapes, std::vector<Values>(kParticipants)}),
         wrong(renderers.size(), {kShapes, std::vector<std::size_t>(kParticipants)}) {
-    stimuli::Random random(71);
+    Random random(71);
     for (std::size_t p = 0; p < kParticipants; ++p) {
       const double intercept = 0.4 * random.normal();
       for (std::size_t r = 0; r < renderers.size(); ++r) {

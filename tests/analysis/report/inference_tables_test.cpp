@@ -11,7 +11,7 @@
 #include "analysis/report/tables.h"
 #include "analysis/statistics/analysis.h"
 #include "analysis/text.h"
-#include "stimuli/random.h"
+#include "data/base/random.h"
 
 namespace palpate::analysis {
 namespace {
@@ -20,7 +20,7 @@ namespace {
 /// index of the renderer.
 Analysis varied_study(const std::vector<std::string>& renderers) {
   TrialTableBuilder builder;
-  stimuli::Random random(23);
+  Random random(23);
   for (int p = 0; p < 12; ++p) {
     const std::string name = std::to_string(p);
     const double intercept = 0.4 * random.normal();

@@ -18,7 +18,7 @@
 #include "analysis/statistics/analysis.h"
 #include "analysis/statistics/conclusions.h"
 #include "analysis/text.h"
-#include "stimuli/random.h"
+#include "data/base/random.h"
 
 namespace palpate::analysis {
 namespace {
@@ -35,7 +35,7 @@ struct Study {
 
 Analysis analysis_of_study(const Study& study) {
   TrialTableBuilder builder;
-  stimuli::Random random(11);
+  Random random(11);
   for (std::size_t p = 0; p < study.participants.size(); ++p) {
     int number = 0;
     for (const auto& renderer : study.renderers) {
@@ -136,7 +136,7 @@ TEST(Text, StaysWithinAHundredColumns) {
   std::istringstream lines(report_text(analysis_of_study(study)));
   for (std::string line; std::getline(lines, line);) {
     EXPECT_LE(width(line), 100U) << line;
-    EXPECT_TRUE(stimuli::is_plain_utf8(line)) << line;
+    EXPECT_TRUE(is_plain_utf8(line)) << line;
   }
 }
 
@@ -342,11 +342,11 @@ TEST(TextHelpers, NumbersAndNames) {
   EXPECT_EQ(shortened("abcdef", 4), "abc…");
   EXPECT_EQ(shortened("äöüß", 4), "äöüß");
   EXPECT_EQ(joined(std::vector<std::string>{"a", "b", "c"}), "a, b and c");
-  EXPECT_FALSE(stimuli::is_plain_utf8("\xC0\xAF"));
-  EXPECT_FALSE(stimuli::is_plain_utf8("\xED\xA0\x80"));
-  EXPECT_FALSE(stimuli::is_plain_utf8("a\x1b[31m"));
-  EXPECT_FALSE(stimuli::is_plain_utf8("\xC2\x85"));
-  EXPECT_TRUE(stimuli::is_plain_utf8("näïve 形 🙂"));
+  EXPECT_FALSE(is_plain_utf8("\xC0\xAF"));
+  EXPECT_FALSE(is_plain_utf8("\xED\xA0\x80"));
+  EXPECT_FALSE(is_plain_utf8("a\x1b[31m"));
+  EXPECT_FALSE(is_plain_utf8("\xC2\x85"));
+  EXPECT_TRUE(is_plain_utf8("näïve 形 🙂"));
 }
 
 TEST(Cards, SayFasterOrSlowerBelowOnePercent) {

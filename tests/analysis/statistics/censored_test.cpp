@@ -16,7 +16,7 @@
 
 #include "analysis/input/trials.h"
 #include "analysis/statistics/analysis.h"
-#include "stimuli/random.h"
+#include "data/base/random.h"
 
 namespace palpate::analysis {
 namespace {
@@ -104,7 +104,7 @@ TrialTable table_of(const std::vector<Row>& rows) {
 }
 
 /// A simulated study with random gains; times beyond the limit are time-outs.
-std::vector<Row> simulated(stimuli::Random& random, int participants, int trials, double gain,
+std::vector<Row> simulated(Random& random, int participants, int trials, double gain,
                            double gain_sd, double limit, double residual_sd = 0.5) {
   std::vector<Row> rows;
   for (int p = 0; p < participants; ++p) {
@@ -123,7 +123,7 @@ std::vector<Row> simulated(stimuli::Random& random, int participants, int trials
 
 TEST(Censored, IsAtTheTopOfTheLikelihoodWrittenOut) {
   for (const std::uint64_t seed : {3, 4, 5}) {
-    stimuli::Random random(seed);
+    Random random(seed);
     const auto rows = simulated(random, 4, 9, -0.4, 0.1, 30);
     const CensoredEstimate found = estimate_all(table_of(rows));
     ASSERT_EQ(found.undefined, "");
@@ -178,7 +178,7 @@ TEST(Censored, IsAtTheTopOfTheLikelihoodWrittenOut) {
 }
 
 TEST(Censored, IsThePairedTTestWhereNobodyTimesOutAndAllHaveAsManyTrials) {
-  stimuli::Random random(8);
+  Random random(8);
   const TrialTable table = table_of(simulated(random, 6, 5, -0.3, 0.2, 1e9));
   const CensoredEstimate found = estimate_all(table);
   const Description description = describe(table, 0.2);
@@ -196,7 +196,7 @@ TEST(Censored, HoldsItsIntervalWhereThePrimaryOneLeavesTheTruth) {
   constexpr double kGain = -0.4;
   constexpr int kStudies = 1000;
   for (const std::uint64_t seed : {21, 22}) {
-    stimuli::Random random(seed);
+    Random random(seed);
     int held = 0, primary_held = 0;
     double bias = 0, primary_bias = 0;
     for (int i = 0; i < kStudies; ++i) {
@@ -220,7 +220,7 @@ TEST(Censored, HoldsItsIntervalWhereThePrimaryOneLeavesTheTruth) {
 }
 
 TEST(Censored, TakesTheParticipantWhoNeverAnswersInTimeWithOneRenderer) {
-  stimuli::Random random(12);
+  Random random(12);
   auto rows = simulated(random, 4, 6, -0.3, 0.1, 60);
   const double without = *estimate_all(table_of(rows)).log_ratio;
   for (int i = 0; i < 6; ++i) {

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "analysis/statistics/mixed_model.h"
-#include "stimuli/random.h"
+#include "data/base/random.h"
 
 namespace palpate::analysis {
 namespace {
@@ -36,7 +36,7 @@ DenseStudy dense_study(
     std::size_t n_participants, std::size_t n_shapes,
     const std::function<std::size_t(std::size_t, std::size_t, std::size_t)>& trials,
     std::uint64_t seed) {
-  stimuli::Random random(seed);
+  Random random(seed);
   DenseStudy out;
   for (std::size_t s = 0; s < n_shapes; ++s) out.shapes.push_back("s" + std::to_string(s));
   out.participants.assign(kRenderers, {n_shapes, std::vector<ParticipantCell>(n_participants)});

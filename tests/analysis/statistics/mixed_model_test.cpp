@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "analysis/statistics/anova.h"
-#include "stimuli/random.h"
+#include "data/base/random.h"
 
 namespace palpate::analysis {
 namespace {
@@ -34,7 +34,7 @@ ParticipantCell cell_of(const std::vector<double>& logs) {
 /// Log times of two renderers and two shapes with the sds given.
 ParticipantCells participant_cells_of(std::size_t n, std::size_t repetitions, double intercept,
                                       double slope, double residual, std::uint64_t seed) {
-  stimuli::Random random(seed);
+  Random random(seed);
   ParticipantCells participants(2, {2, std::vector<ParticipantCell>(n)});
   for (std::size_t p = 0; p < n; ++p) {
     const double a = intercept * random.normal(), b = slope * random.normal();
@@ -158,7 +158,7 @@ TEST(MixedModel, SaysOfEveryEstimateWithoutAnIntervalWhy) {
     }
   };
   for (std::uint64_t seed = 1; seed <= 60; ++seed) {
-    stimuli::Random random(seed, {7});
+    Random random(seed, {7});
     const auto drawn = [&random] { return std::pow(10.0, -4 + 5 * random.unit()); };
     const double intercept = drawn(), slope = drawn(), residual = drawn();
     ParticipantCells cells = participant_cells_of(2, 2, intercept, slope, residual, seed);

@@ -9,7 +9,7 @@
 
 #include "analysis/report/report_json.h"
 #include "analysis/statistics/analysis.h"
-#include "stimuli/random.h"
+#include "data/base/random.h"
 
 namespace palpate::analysis {
 namespace {
@@ -111,7 +111,7 @@ TEST(BootstrapOracle, SameResamplesGiveTheSameInterval) {
 
 TEST(BootstrapOracle, OwnResamplesComeCloseToMany) {
   for (const Json& set : load("bca")) {
-    stimuli::Random random(1);
+    Random random(1);
     const Bootstrap found = bootstrap_mean(set["differences"].get<std::vector<double>>(), random);
     ASSERT_EQ(found.undefined, "");
     EXPECT_EQ(found.resamples, 9999U);

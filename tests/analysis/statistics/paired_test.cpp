@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "stimuli/random.h"
+#include "data/base/random.h"
 
 namespace palpate::analysis {
 namespace {
@@ -19,7 +19,7 @@ namespace {
 const std::string kPairedFixtures = PALPATE_SOURCE_DIR "/tests/analysis/fixtures/";
 
 Bootstrap bootstrap(const std::vector<double>& differences) {
-  stimuli::Random random(5);
+  Random random(5);
   return bootstrap_mean(differences, random, 999);
 }
 
@@ -91,7 +91,7 @@ TEST(PercentReduction, PositiveWhenTheRayIsFasterAndEndsSwap) {
 }
 
 TEST(Properties, SignsFlipTogether) {
-  stimuli::Random random(9);
+  Random random(9);
   for (int round = 0; round < 50; ++round) {
     std::vector<double> d, flipped;
     for (std::size_t i = 0; i < 3 + random.below(30); ++i) {
@@ -110,7 +110,7 @@ TEST(Properties, SignsFlipTogether) {
 }
 
 TEST(Wilcoxon, TheApproximationBeyondTheLimitMeetsTheExactP) {
-  stimuli::Random random(4);
+  Random random(4);
   std::vector<double> d;
   while (d.size() < kExactWilcoxon) d.push_back(random.normal() + 0.1);
   const Wilcoxon exact = wilcoxon(d);
@@ -137,7 +137,7 @@ TEST(Bootstrap, HoldsTheMeanAsOftenAsIsSaid) {
   constexpr int kStudies = 2000;
   for (const std::uint64_t seed : {31, 32}) {
     for (const std::size_t n : {2U, 5U, 7U, 12U}) {
-      stimuli::Random random(seed, {n});
+      Random random(seed, {n});
       int held = 0;
       for (int i = 0; i < kStudies; ++i) {
         std::vector<double> d(n);
@@ -153,7 +153,7 @@ TEST(Bootstrap, HoldsTheMeanAsOftenAsIsSaid) {
 TEST(Bootstrap, RepeatsFromItsSeed) {
   const std::vector<double> d{-0.2, -0.1, 0.05, -0.4, -0.15};
   EXPECT_EQ(bootstrap(d).log_ratio_ci95->low, bootstrap(d).log_ratio_ci95->low);
-  stimuli::Random other(6);
+  Random other(6);
   EXPECT_NE(bootstrap(d).log_ratio_ci95->low, bootstrap_mean(d, other, 999).log_ratio_ci95->low);
 }
 

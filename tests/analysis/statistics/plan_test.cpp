@@ -16,7 +16,7 @@
 #include "analysis/report/plan_report.h"
 #include "analysis/statistics/analysis.h"
 #include "analysis/statistics/power.h"
-#include "stimuli/random.h"
+#include "data/base/random.h"
 
 namespace palpate::analysis {
 namespace {
@@ -171,7 +171,7 @@ TEST(Plan, SaysWhereTheRangeIsTooSmall) {
 /// A study of 60 participants with the sds given.
 Analysis pilot_study(double gain_sd, double shape_gain_sd, double residual_sd, std::uint64_t seed) {
   TrialTableBuilder builder;
-  stimuli::Random random(seed);
+  Random random(seed);
   for (int p = 0; p < 60; ++p) {
     const std::string name = std::to_string(p);
     const double intercept = 0.3 * random.normal(), gain = gain_sd * random.normal();
@@ -220,7 +220,7 @@ TEST(Pilot, GivesBackWhatItWasDrawnFrom) {
 /// `one_more` a ninth without times in one cell.
 Analysis uneven_pilot(bool one_more, const std::string& missing_with = "ray") {
   TrialTableBuilder builder;
-  stimuli::Random random(17);
+  Random random(17);
   for (int p = 0; p < (one_more ? 9 : 8); ++p) {
     int trial = 0;
     const std::string name = std::to_string(p);

@@ -11,7 +11,7 @@
 #include "analysis/report/report_text.h"
 #include "analysis/statistics/analysis.h"
 #include "analysis/statistics/speed_accuracy.h"
-#include "stimuli/random.h"
+#include "data/base/random.h"
 
 namespace palpate::analysis {
 namespace {
@@ -135,7 +135,7 @@ TEST(RendererOrder, IsTheTwoSampleTestOfTheGains) {
 }
 
 /// Participants without learning: noise only.
-Analysis study_without_learning(stimuli::Random& random) {
+Analysis study_without_learning(Random& random) {
   TrialTableBuilder builder;
   for (int p = 0; p < 7; ++p) {
     const std::string name(1, static_cast<char>('A' + p));
@@ -156,7 +156,7 @@ Analysis study_without_learning(stimuli::Random& random) {
 
 TEST(Learning, IsNoVerdictAndPracticeIsOneFamilyOfTests) {
   for (const std::uint64_t seed : {41, 42}) {
-    stimuli::Random random(seed);
+    Random random(seed);
     constexpr int kStudies = 400;
     int any_raw = 0, any_adjusted = 0, warned = 0;
     for (int i = 0; i < kStudies; ++i) {

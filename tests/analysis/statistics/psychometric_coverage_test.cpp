@@ -9,7 +9,7 @@
 
 #include "analysis/statistics/psychometric_bayes.h"
 #include "analysis/statistics/psychometric_fit.h"
-#include "stimuli/random.h"
+#include "data/base/random.h"
 #include "tests/shared/rounds.h"
 
 namespace palpate::analysis {
@@ -20,7 +20,7 @@ using protocols::PsychometricShape;
 /// A simulated study of constant stimuli.
 std::vector<LevelCount> simulate_counts(const PsychometricModel& truth,
                                         const protocols::PsychometricParameters& parameters,
-                                        stimuli::Random& random) {
+                                        Random& random) {
   std::vector<LevelCount> counts;
   for (int level = 0; level <= 8; ++level) {
     LevelCount count{static_cast<double>(level), 30, 0};
@@ -55,7 +55,7 @@ TEST(PsychometricFit, IntervalsCoverTheTruthIn200SimulatedStudies) {
     int thresholds = 0, slopes = 0, lapses = 0;
     int bayes_thresholds = 0, bayes_slopes = 0, bayes_lapses = 0;
     for (const std::uint64_t seed : {1U, 2U}) {
-      stimuli::Random random(seed, {0xc0});
+      Random random(seed, {0xc0});
       int threshold = 0, slope = 0, lapse = 0;
       int bayes_threshold = 0, bayes_slope = 0, bayes_lapse = 0;
       for (int study = 0; study < studies; ++study) {
@@ -95,7 +95,7 @@ TEST(PsychometricFit, IntervalsCoverTheTruthIn200SimulatedStudies) {
 // Where the lower end is held at 0, the fit is bad and the JND too large.
 TEST(PsychometricFit, LapsesAtBothEndsAreNoBadFit) {
   PsychometricModel both{{}, {}, {0, true, 0.06}, true}, upper_only{{}, {}, {0, true, 0.06}};
-  stimuli::Random random(11, {0xc2});
+  Random random(11, {0xc2});
   constexpr int kStudies = 40;
   int bad = 0, bad_upper = 0;
   double ratio = 0, ratio_upper = 0;
@@ -130,7 +130,7 @@ TEST(PsychometricFit, QuickRefitsGiveTheGoodnessOfWholeOnes) {
   const protocols::PsychometricParameters truth{4, 0.7, 0.5, 0.03};
   constexpr int kRefits = 2000;
   for (const std::uint64_t seed : {1U, 2U}) {
-    stimuli::Random random(seed, {0xc1});
+    Random random(seed, {0xc1});
     std::vector<double> quick, whole;  // deviances
     int missed = 0;                    // the whole search ends in a worse valley than the quick one
     for (int i = 0; i < kRefits; ++i) {
@@ -165,7 +165,7 @@ TEST(PsychometricFit, QuickRefitsGiveTheGoodnessOfWholeOnes) {
 }
 
 TEST(PsychometricFit, DevianceOfARightModelHasAnEvenPAndOfAWrongOneASmall) {
-  stimuli::Random random(4);
+  Random random(4);
   int below_fifth = 0;
   for (int study = 0; study < 60; ++study) {
     const auto counts = simulate_counts({}, {4, 1.2, 0, 0}, random);

@@ -11,7 +11,7 @@
 #include "analysis/statistics/mixed_logistic.h"
 #include "analysis/statistics/scaling.h"
 #include "analysis/statistics/task_comparisons.h"
-#include "stimuli/random.h"
+#include "data/base/random.h"
 
 namespace palpate::analysis {
 namespace {
@@ -57,7 +57,7 @@ TEST(SignalDetection, AgreesWithPsyphy) {
 
 TEST(SignalDetection, IntervalsCoverTheTruthIn200SimulatedStudies) {
   for (const std::uint64_t seed : {1U, 2U}) {
-    stimuli::Random random(seed, {0xd1});
+    Random random(seed, {0xd1});
     for (const DetectionTask task :
          {DetectionTask::yes_no, DetectionTask::two_interval, DetectionTask::same_different}) {
       int held = 0, criterion_held = 0;
@@ -112,7 +112,7 @@ TEST(Type2Area, CountsPairsOfACorrectAndAWrongAnswer) {
 
 TEST(Type2Area, IntervalCoversTheTruth) {
   for (const std::uint64_t seed : {1U, 2U}) {
-    stimuli::Random random(seed, {0xa2});
+    Random random(seed, {0xa2});
     const double truth = 0.5 * std::erfc(-0.8 / 2);  // Phi(0.8 / sqrt 2)
     int held = 0;
     for (int study = 0; study < 200; ++study) {
@@ -191,7 +191,7 @@ struct TransferMeans {
 };
 
 TransferMeans simulate_transfer(std::size_t trials, int studies, std::uint64_t seed) {
-  stimuli::Random random(seed, {0x1f});
+  Random random(seed, {0x1f});
   TransferMeans means;
   double squares = 0;
   for (int study = 0; study < studies; ++study) {

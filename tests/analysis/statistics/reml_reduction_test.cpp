@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "analysis/statistics/reml.h"
-#include "stimuli/random.h"
+#include "data/base/random.h"
 
 namespace palpate::analysis {
 namespace {
@@ -28,7 +28,7 @@ struct DenseTrials {
 /// \param most  trials of a cell; about a third of the cells have none
 DenseTrials draw_trials(std::size_t renderers, std::size_t shapes, std::size_t participants,
                         std::uint64_t most, std::uint64_t seed) {
-  stimuli::Random random(seed);
+  Random random(seed);
   DenseTrials out;
   out.cells.assign(renderers, {shapes, std::vector<ParticipantCell>(participants)});
   std::vector<std::array<Index, 2>> rows;

@@ -7,7 +7,7 @@
 #include <limits>
 
 #include "analysis/statistics/quantiles.h"
-#include "stimuli/random.h"
+#include "data/base/random.h"
 #include "tests/analysis/sweep_table_fixture.h"
 
 namespace palpate::analysis {
@@ -74,7 +74,7 @@ Eigen::VectorXd residual(const std::vector<std::vector<double>>& others,
 }
 
 TEST(RankCorrelations, PartialOnesAreThoseOfTheResiduals) {
-  stimuli::Random random(3);
+  Random random(3);
   std::vector<std::vector<double>> inputs(4, std::vector<double>(60));
   std::vector<double> output(60);
   for (std::size_t i = 0; i < 60; ++i) {
@@ -102,7 +102,7 @@ TEST(RankCorrelations, PartialOnesAreThoseOfTheResiduals) {
 
 // In 95 % of samples Fisher's interval holds the correlation that they were drawn from: none, here.
 TEST(RankCorrelations, IntervalsHoldTheTruthAsOftenAsTheySay) {
-  stimuli::Random random(11);
+  Random random(11);
   int spearman = 0, partial = 0;
   constexpr int kSamples = 1000;
   for (int s = 0; s < kSamples; ++s) {
@@ -126,7 +126,7 @@ double half_on_z(const Interval& ci) { return (std::atanh(ci.high) - std::atanh(
 // Fisher (1924): h variables that are held constant take h points away. Each of p parameters' rank
 // correlations holds p - 1 others constant; with one it is Spearman's, with the same interval.
 TEST(RankCorrelations, EachParameterHeldConstantTakesOnePointAway) {
-  stimuli::Random random(21);
+  Random random(21);
   for (const std::size_t parameters : {1U, 2U, 3U, 5U}) {
     constexpr std::size_t n = 10;
     std::vector<std::vector<double>> inputs(parameters, std::vector<double>(n));
@@ -152,7 +152,7 @@ TEST(RankCorrelations, EachParameterHeldConstantTakesOnePointAway) {
 
 // A strong correlation, few points.
 TEST(RankCorrelations, IntervalsOfStrongOnesHoldTheTruthAsOftenAsTheySay) {
-  stimuli::Random random(12);
+  Random random(12);
   const auto sample = [&](std::size_t n) {
     std::vector<std::vector<double>> inputs(3, std::vector<double>(n));
     std::vector<double> output(n);
@@ -189,7 +189,7 @@ struct NoisySweep {
 };
 
 /// 10 x1 and chance whose standard deviation, 1 + 4 x1, each study estimates from seven people.
-NoisySweep noisy_sweep(std::size_t base_points, stimuli::Random& random) {
+NoisySweep noisy_sweep(std::size_t base_points, Random& random) {
   NoisySweep out;
   for (const auto& x : testing::saltelli_points(3, base_points, [&] { return random.unit(); })) {
     const double sd = 1 + 4 * x[0];
@@ -205,7 +205,7 @@ constexpr double kFirstShare = kOfFirst / (kOfFirst + kOfChance);
 
 // The variance of x1's part is 100/12, that of chance the mean of (1 + 4 x1)^2.
 TEST(SobolIndices, ChanceWithinThePointsIsInNoTotalIndex) {
-  stimuli::Random random(8);
+  Random random(8);
   const NoisySweep sweep = noisy_sweep(4000, random);
   const SobolIndices found = sobol_indices(sweep.outputs, sweep.errors, 3, 1);
   EXPECT_NEAR(found.variance, kOfFirst + kOfChance, 0.6);
@@ -223,7 +223,7 @@ TEST(SobolIndices, ChanceWithinThePointsIsInNoTotalIndex) {
 }
 
 TEST(SobolIndices, IntervalsOfInertParametersHoldZeroAsOftenAsTheySay) {
-  stimuli::Random random(9);
+  Random random(9);
   int inert = 0, first = 0;
   constexpr int kSweeps = 150;
   for (int s = 0; s < kSweeps; ++s) {
@@ -239,7 +239,7 @@ TEST(SobolIndices, IntervalsOfInertParametersHoldZeroAsOftenAsTheySay) {
 
 // Some of the studies have one participant with times: no standard error.
 TEST(SobolIndices, StandardErrorsThatAreMissingAreTakenFromTheOthers) {
-  stimuli::Random random(10);
+  Random random(10);
   NoisySweep sweep = noisy_sweep(2000, random);
   const double all = *sobol_indices(sweep.outputs, sweep.errors, 3, 1).of[2].total;
   for (std::size_t i = 0; i < sweep.errors.size(); i += 3) sweep.errors[i] = kUndefined;
@@ -247,7 +247,7 @@ TEST(SobolIndices, StandardErrorsThatAreMissingAreTakenFromTheOthers) {
 }
 
 TEST(SobolIndices, BasePointsWithGapsAreLeftOut) {
-  stimuli::Random random(5);
+  Random random(5);
   std::vector<double> outputs;
   for (int base = 0; base < 50; ++base) {
     const double a = random.unit(), b = random.unit(), a2 = random.unit(), b2 = random.unit();

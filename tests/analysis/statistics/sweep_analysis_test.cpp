@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "analysis/report/sweep_report.h"
-#include "stimuli/random.h"
+#include "data/base/random.h"
 #include "tests/analysis/sweep_table_fixture.h"
 
 namespace palpate::analysis {
@@ -19,7 +19,7 @@ Outcome nothing(const std::vector<double>&) { return {}; }
 // The samples of a base point share coordinates: with 29 parameters 31 of them say little more than
 // two. The truth is one half, by symmetry.
 TEST(PatternShare, IntervalOfSaltellisSamplesHoldsTheTruthAsOftenAsItSays) {
-  stimuli::Random random(4);
+  Random random(4);
   constexpr int kSweeps = 400;
   for (const std::size_t parameters : {3U, 29U}) {
     int held = 0;
@@ -34,7 +34,7 @@ TEST(PatternShare, IntervalOfSaltellisSamplesHoldsTheTruthAsOftenAsItSays) {
 }
 
 TEST(PatternShare, OfSaltellisSamplesAAndBCount) {
-  stimuli::Random random(5);
+  Random random(5);
   SweepTable table =
       table_of("saltelli", saltelli_points(4, 10, [&] { return random.unit(); }), nothing);
   table.failed[7] = true;  // the B of the second base point
@@ -72,7 +72,7 @@ TEST(PatternShare, AGridHasNoInterval) {
 }
 
 TEST(SweepAnalysis, SaysOfEachTotalIndexWhetherChanceIsAPartOfIt) {
-  stimuli::Random random(6);
+  Random random(6);
   const auto points = saltelli_points(2, 200, [&] { return random.unit(); });
   const auto noisy = [&](const std::vector<double>& x) {
     return Outcome{10 * x[0] + 3 * random.normal(), 3};

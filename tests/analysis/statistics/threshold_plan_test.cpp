@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "stimuli/random.h"
+#include "data/base/random.h"
 
 namespace palpate::analysis {
 namespace {
@@ -30,7 +30,7 @@ ThresholdPlanSettings asked(std::size_t trials, std::vector<std::size_t> partici
 double power_of_six(double mean) {
   constexpr int kStudies = 20000, kPeople = 6;
   constexpr double kCritical = 2.570582;  // t, 5 degrees of freedom
-  stimuli::Random random(77);
+  Random random(77);
   int found = 0;
   for (int s = 0; s < kStudies; ++s) {
     double sum = 0, squares = 0;

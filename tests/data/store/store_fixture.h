@@ -7,7 +7,7 @@
 #include <iterator>
 #include <string>
 
-#include "data/files/checksum.h"
+#include "data/base/checksum.h"
 #include "data/store/store.h"
 #include "tests/shared/temporary_folder.h"
 

@@ -35,7 +35,7 @@ struct ShownTrial {
   bool success;
 };
 
-std::vector<ShownTrial> run_tracks(InterleavedTracks tracks, stimuli::Random& random) {
+std::vector<ShownTrial> run_tracks(InterleavedTracks tracks, Random& random) {
   std::vector<ShownTrial> shown;
   while (const auto next = tracks.next()) {
     const bool success = random.unit() < 0.5 + 0.05 * next->level;
@@ -46,7 +46,7 @@ std::vector<ShownTrial> run_tracks(InterleavedTracks tracks, stimuli::Random& ra
 }
 
 TEST(InterleavedProcedures, EveryRoundHasATrialOfEveryTrackThatGoesOn) {
-  stimuli::Random random(5);
+  Random random(5);
   const std::vector<ShownTrial> shown = run_tracks({one_of_each(), 3}, random);
   std::map<std::size_t, std::size_t> counts;
   for (std::size_t i = 0; i < shown.size(); ++i) {
@@ -61,7 +61,7 @@ TEST(InterleavedProcedures, EveryRoundHasATrialOfEveryTrackThatGoesOn) {
 
 TEST(InterleavedProcedures, ASessionThatGoesOnIsAsIfNothingHadHappened) {
   for (const std::uint64_t seed : {1U, 2U, 99U}) {
-    stimuli::Random random(seed);
+    Random random(seed);
     const std::vector<ShownTrial> shown = run_tracks({one_of_each(), seed}, random);
     ASSERT_GT(shown.size(), 60u);
     for (std::size_t killed = 0; killed <= shown.size(); ++killed) {
@@ -78,7 +78,7 @@ TEST(InterleavedProcedures, ASessionThatGoesOnIsAsIfNothingHadHappened) {
 }
 
 TEST(InterleavedProcedures, OrderIsByChance) {
-  stimuli::Random one(1), two(1);
+  Random one(1), two(1);
   const auto first = run_tracks({one_of_each(), 1}, one);
   const auto second = run_tracks({one_of_each(), 2}, two);
   int other = 0;
@@ -91,7 +91,7 @@ TEST(InterleavedProcedures, NoneIsLongerThanItsSpecSays) {
   for (const ProcedureSpec& spec : one_of_each()) {
     for (const double share : {0.0, 0.5, 1.0}) {
       Procedure procedure(spec, 4);
-      stimuli::Random random(8);
+      Random random(8);
       while (const auto level = procedure.next_level())
         procedure.record({*level, random.unit() < share});
       EXPECT_LE(procedure.history().size(), most_trials(spec));
@@ -124,7 +124,7 @@ TEST(InterleavedProcedures, TracksThatShareTablesLearnFromTheirOwnAnswers) {
   const ProcedureSpec quest = one_of_each()[2];
   InterleavedTracks two({quest, quest}, 9);
   Procedure alone[2]{{quest, 1}, {quest, 2}};
-  stimuli::Random random(3);
+  Random random(3);
   while (const auto next = two.next()) {
     EXPECT_EQ(alone[next->track].next_level(), next->level);
     const Response answer{next->level, random.unit() < (next->track == 0 ? 0.9 : 0.3)};

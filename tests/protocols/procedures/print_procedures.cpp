@@ -10,7 +10,7 @@ namespace {
 
 void print_run(const ProcedureSpec& spec, const PsychometricParticipant& participant) {
   for (const std::uint64_t seed : {1U, 2U, 3U}) {
-    palpate::stimuli::Random random(seed);
+    palpate::Random random(seed);
     Procedure procedure(spec, seed);
     while (const auto level = procedure.next_level()) {
       const bool success = participant.succeeds(*level, random);

@@ -88,7 +88,7 @@ TEST(Psychometric, LowerIsEasierMirrors) {
 
 TEST(Psychometric, ParticipantAnswersAsOftenAsTheFunctionSays) {
   const PsychometricParticipant participant{{}, {10, 1, 0.5, 0.1}};
-  stimuli::Random random(3);
+  Random random(3);
   int successes = 0;
   for (int i = 0; i < 100000; ++i) successes += participant.succeeds(11, random) ? 1 : 0;
   const double p = 0.5 + 0.4 / (1 + std::exp(-1.0));

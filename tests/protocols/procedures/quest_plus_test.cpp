@@ -2,8 +2,8 @@
 
 #include <cmath>
 
+#include "data/base/random.h"
 #include "protocols/procedures/procedure.h"
-#include "stimuli/random.h"
 
 namespace palpate::protocols {
 namespace {
@@ -113,7 +113,7 @@ QuestPlus small_quest(PsychometricShape shape, LevelScale scale, Easier easier) 
 void expect_as_plain(const QuestPlus& spec, std::uint64_t seed) {
   QuestPlusRun run(spec);
   PlainQuestPlus plain(spec);
-  stimuli::Random random(seed);
+  Random random(seed);
   while (const auto level = run.next_level()) {
     const double before = run.entropy_bits();
     const std::vector<double> information = run.expected_information();

@@ -135,7 +135,7 @@ TEST(Staircase, ConvergencePointsOfTheLiterature) {
 double share_of_successes(Staircase spec, std::uint64_t seed) {
   const PsychometricParticipant participant{{}, {10, 0.4}};
   spec.stop_trials = 200000;
-  stimuli::Random random(seed);
+  Random random(seed);
   StaircaseRun run(spec);
   double sum = 0;
   while (const auto level = run.next_level()) {

@@ -4,9 +4,9 @@
 #include <nlohmann/json.hpp>
 #include <vector>
 
+#include "data/base/random.h"
 #include "protocols/parse.h"
 #include "protocols/tasks/task_plan.h"
-#include "stimuli/random.h"
 
 namespace palpate::protocols {
 
@@ -41,7 +41,7 @@ inline Protocol parsed(const nlohmann::json& document) {
 
 /// Answers that depend on the trial alone.
 inline TrialOutcome answer_to(const Trial& trial) {
-  stimuli::Random random(99, {static_cast<std::uint64_t>(trial.trial)});
+  Random random(99, {static_cast<std::uint64_t>(trial.trial)});
   const bool success = random.unit() < (trial.level.value_or(400) > 380 ? 0.9 : 0.4);
   return {success, success, random.unit() > 0.05};
 }

@@ -147,7 +147,7 @@ TEST(ErrorTally, AnglesAreAngles) {
 }
 
 TEST(PlainWalk, InDoubleIsTheWalk) {
-  stimuli::Random random(1);
+  Random random(1);
   for (const stimuli::ShapeKind shape : kShapes) {
     const stimuli::ConvexMesh mesh(stimuli::polygons_of(primitive(shape, 2)));
     const PlainWalk<double> plain(mesh);

@@ -35,7 +35,7 @@ stimuli::ObjectSpec primitive(stimuli::ShapeKind shape) {
 /// Random poses that overlap the shape, tips and sides, also shallow ones.
 std::vector<LineProbe> inside_poses(const stimuli::ObjectSpec& spec, int count,
                                     std::uint64_t seed) {
-  stimuli::Random random(seed);
+  Random random(seed);
   std::vector<LineProbe> poses;
   while (static_cast<int>(poses.size()) < count) {
     const double length = poses.size() % 4 == 0 ? 0 : uniform(random, 0.01, 0.15);
@@ -71,7 +71,7 @@ TEST(LocalDepths, NoDirectionIsShorterThanTheLeast) {
 }
 
 TEST(LocalDepths, EachIsALocalMinimumWithTheDepthItSays) {
-  stimuli::Random random(2);
+  Random random(2);
   for (const stimuli::ShapeKind shape : kShapes) {
     const stimuli::ObjectSpec spec = primitive(shape);
     for (const LineProbe& probe : inside_poses(spec, 200, 3)) {
@@ -129,7 +129,7 @@ TEST(LocalDepths, AreThoseOfAFinePolyhedron) {
 }
 
 TEST(LocalDepths, OfAPointTheLeastIsTheSignedDistance) {
-  stimuli::Random random(6);
+  Random random(6);
   for (const stimuli::ShapeKind shape : kShapes) {
     const stimuli::ObjectSpec spec = primitive(shape);
     for (int i = 0; i < 500; ++i) {
@@ -146,7 +146,7 @@ TEST(LocalDepths, OfAPointTheLeastIsTheSignedDistance) {
 
 TEST(LocalDepths, SegmentsThatStayOutHaveNone) {
   // The reference on a fine mesh inside of the shape says who overlaps for certain.
-  stimuli::Random random(7);
+  Random random(7);
   for (const stimuli::ShapeKind shape : kShapes) {
     stimuli::ObjectSpec spec = primitive(shape);
     spec.subdivisions = 4;
@@ -172,7 +172,7 @@ TEST(LocalDepths, SegmentsThatStayOutHaveNone) {
 }
 
 TEST(LocalDepths, OfAPolyhedronTheLeastIsTheReference) {
-  stimuli::Random random(8);
+  Random random(8);
   for (const stimuli::ShapeKind shape : kShapes) {
     stimuli::ObjectSpec spec = primitive(shape);
     spec.subdivisions = 2;

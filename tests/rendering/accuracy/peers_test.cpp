@@ -52,7 +52,7 @@ bool right(const stimuli::ConvexMesh& mesh, const LineProbe& probe, const PeerCo
 
 void check(const PeerLibrary& library, const stimuli::ConvexMesh& mesh, const std::string& shape) {
   const auto peer = library.make(mesh);
-  stimuli::Random random(7);
+  Random random(7);
   Tally inside, outside;
   for (int i = 0; i < 500; ++i) {
     const Vec3 at =

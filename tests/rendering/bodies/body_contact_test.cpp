@@ -5,16 +5,16 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
+#include "data/base/random.h"
 #include "rendering/bodies/body_contacts.h"
 #include "rendering/probe.h"
 #include "runner/bench/allocation_count.h"
-#include "stimuli/random.h"
 #include "tests/rendering/bodies/body_fixtures.h"
 
 namespace palpate::rendering::test {
 namespace {
 
-double between(stimuli::Random& random, double low, double high) {
+double between(Random& random, double low, double high) {
   return low + (high - low) * random.unit();
 }
 
@@ -194,7 +194,7 @@ TEST(BodyContact, SlopeAndFriction) {
 
 /// Whatever happens among bodies, their momentum stays, and energy does not grow.
 TEST(BodyContact, MomentumStaysWhateverHappens) {
-  stimuli::Random random(11);
+  Random random(11);
   for (int trial = 0; trial < 12; ++trial) {
     BodyScene s;
     const double restitution = trial % 3 == 0 ? 1 : 0.4;
@@ -235,7 +235,7 @@ TEST(BodyContact, MomentumStaysWhateverHappens) {
 /// Distances that were looked at long ago, and where the search for them ended, hide nothing: what
 /// is found near is what a state that remembers nothing finds.
 TEST(BodyContact, WhatIsRememberedOfDistancesHidesNothing) {
-  stimuli::Random random(21);
+  Random random(21);
   const Mesh ball = mesh_of(stimuli::icosphere(0.015, 2)), bar = box_mesh({0.06, 0.01, 0.01});
   std::size_t found = 0;
   for (int trial = 0; trial < 4; ++trial) {

@@ -7,8 +7,8 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
+#include "data/base/random.h"
 #include "rendering/bodies/body_world.h"
-#include "stimuli/random.h"
 #include "tests/rendering/bodies/body_fixtures.h"
 
 namespace palpate::rendering::test {
@@ -16,11 +16,9 @@ namespace {
 
 constexpr Quat kAsItIs{1, 0, 0, 0};
 
-double drawn(stimuli::Random& random, double low, double high) {
-  return low + (high - low) * random.unit();
-}
+double drawn(Random& random, double low, double high) { return low + (high - low) * random.unit(); }
 
-Quat turned_anyhow(stimuli::Random& random) {
+Quat turned_anyhow(Random& random) {
   return glm::normalize(
       Quat(drawn(random, -1, 1), drawn(random, -1, 1), drawn(random, -1, 1), drawn(random, -1, 1)));
 }
@@ -106,7 +104,7 @@ TEST(Bounce, APlankOnItsEdgeFollowsNewtonAndCoulomb) {
 
 /// Boxes that turn meet a wall with one corner after another; each time the energy stays.
 void expect_energy_stays(std::uint64_t seed) {
-  stimuli::Random random(seed);
+  Random random(seed);
   for (int trial = 0; trial < 40; ++trial) {
     BodyScene s;
     s.stands(box_mesh({0.1, 2, 2}), {{0.2, 0, 0}, kAsItIs});
@@ -146,7 +144,7 @@ TEST(Bounce, WithoutFrictionAndWithRestitutionOneEnergyStays) {
 /// Friction turns sliding round where a body strikes with its mass behind the place: Newton's law
 /// would make energy there.
 TEST(Bounce, FrictionMakesNoEnergy) {
-  stimuli::Random random(9);
+  Random random(9);
   int struck = 0;
   for (int trial = 0; trial < 200; ++trial) {
     BodyScene s;
@@ -258,7 +256,7 @@ TEST(Bounce, FastOnTheTipItGetsNoEnergyAndTheHandItsMomentum) {
 /// A stylus that still comes between the balls of a dumbbell that turns: where both meet it, from
 /// opposite sides, the ideal stylus is centimetres away although nobody has pressed it so far.
 TEST(Bounce, DumbbellsThatTurnOnAStylusGetLittleEnergy) {
-  stimuli::Random random(105);
+  Random random(105);
   const Mesh ball = mesh_of(stimuli::icosphere(0.02, 3));
   const Mesh bar = mesh_of(stimuli::cylinder(0.008, 0.06, 24));
   int touched = 0;

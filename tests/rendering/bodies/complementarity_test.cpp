@@ -5,18 +5,17 @@
 #include <cmath>
 #include <vector>
 
-#include "stimuli/random.h"
+#include "data/base/random.h"
 
 namespace palpate::rendering::test {
 namespace {
 
-double uniform(stimuli::Random& random, double low, double high) {
+double uniform(Random& random, double low, double high) {
   return low + (high - low) * random.unit();
 }
 
 /// A = J J^T of rank at most `rank`, and its solution by definition.
-void fill_random(stimuli::Random& random, std::size_t n, std::size_t rank,
-                 ComplementarityProblem& p) {
+void fill_random(Random& random, std::size_t n, std::size_t rank, ComplementarityProblem& p) {
   std::vector<double> j(n * rank);
   for (double& value : j) value = uniform(random, -1, 1);
   p.clear();
@@ -30,7 +29,7 @@ void fill_random(stimuli::Random& random, std::size_t n, std::size_t rank,
 }
 
 TEST(Complementarity, HoldsByDefinition) {
-  stimuli::Random random(3);
+  Random random(3);
   ComplementarityProblem p;
   for (int trial = 0; trial < 300; ++trial) {
     const std::size_t n = 1 + static_cast<std::size_t>(uniform(random, 0, 30));

@@ -8,13 +8,13 @@
 #include <stdexcept>
 #include <string>
 
-#include "stimuli/random.h"
+#include "data/base/random.h"
 #include "tests/rendering/bodies/body_fixtures.h"
 
 namespace palpate::rendering::test {
 namespace {
 
-double picked(stimuli::Random& random, double low, double high) {
+double picked(Random& random, double low, double high) {
   return low + (high - low) * random.unit();
 }
 
@@ -34,7 +34,7 @@ struct RoughResult {
 /// A closed room of 0.3 m in which cubes of 1 g, 10 kg and masses between fly about and a tip goes
 /// to and fro at random, through what it meets.
 RoughResult go_rough(const Rough& of, std::uint64_t seed) {
-  stimuli::Random random(seed);
+  Random random(seed);
   BodyScene s;
   s.stiffness = of.stiffness;
   for (int axis = 0; axis < 3; ++axis) {

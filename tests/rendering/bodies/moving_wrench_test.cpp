@@ -7,8 +7,8 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
+#include "data/base/random.h"
 #include "rendering/contact.h"
-#include "stimuli/random.h"
 #include "tests/rendering/bodies/body_fixtures.h"
 
 namespace palpate::rendering::test {
@@ -65,7 +65,7 @@ TEST(MovingWrench, OfAHeavyBodyIsThatOfOneThatStandsStill) {
   }
 }
 
-Vec3 drawn_vector(stimuli::Random& random) {
+Vec3 drawn_vector(Random& random) {
   return {2 * random.unit() - 1, 2 * random.unit() - 1, 2 * random.unit() - 1};
 }
 
@@ -84,7 +84,7 @@ struct DrawnStroke {
   }
 };
 
-DrawnStroke drawn_stroke(stimuli::Random& random, const Vec3& half, bool corner) {
+DrawnStroke drawn_stroke(Random& random, const Vec3& half, bool corner) {
   Vec3 outward = glm::normalize(drawn_vector(random));
   const int along = static_cast<int>(random.below(3));
   if (!corner) outward[along] *= 0.1;
@@ -156,7 +156,7 @@ TEST(MovingWrench, OfAHeavyBodyIsThatOfOneThatStandsStillOverEdgesAndCorners) {
   for (const std::uint64_t seed : {3, 17}) {
     StrokeCounts counts;
     for (const Tool& tool : {Tool{}, prongs, fork()}) {
-      stimuli::Random random(seed);
+      Random random(seed);
       for (int trial = 0; trial < 40; ++trial) {
         const Quat turn = glm::normalize(Quat(random.unit() - 0.5, drawn_vector(random)));
         const DrawnStroke stroke = drawn_stroke(random, {0.03, 0.03, 0.02}, trial % 2 == 0);

@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
+#include "data/base/random.h"
 #include "rendering/bodies/soft/soft_body.h"
-#include "stimuli/random.h"
 #include "tests/rendering/bodies/soft_fixtures.h"
 
 namespace palpate::rendering {
@@ -94,7 +94,7 @@ TEST(SoftSolid, WhatIsScatteredAtRandomComesBack) {
       for (const std::uint64_t seed : {1, 2}) {
         SCOPED_TRACE(std::to_string(size) + " m, " + std::to_string(poisson) + ", seed " +
                      std::to_string(seed));
-        stimuli::Random random(seed);
+        Random random(seed);
         SoftState state = body.rest();
         for (std::size_t i = 0; i < state.x.size(); ++i) {
           if (body.is_fixed(static_cast<std::uint32_t>(i))) continue;

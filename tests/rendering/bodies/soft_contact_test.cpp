@@ -9,9 +9,9 @@
 #include <glm/geometric.hpp>
 #include <vector>
 
+#include "data/base/random.h"
 #include "rendering/bodies/soft/soft_scene.h"
 #include "runner/bench/allocation_count.h"
-#include "stimuli/random.h"
 
 namespace palpate::rendering {
 namespace {
@@ -64,7 +64,7 @@ class Press {
 };
 
 TEST(SegmentDistance, IsTheLeastOverAFineGrid) {
-  stimuli::Random random(11);
+  Random random(11);
   const auto place = [&] { return Vec3(random.unit(), random.unit(), random.unit()); };
   for (int n = 0; n < 200; ++n) {
     const Vec3 a = place(), b = place(), c = place();
@@ -233,7 +233,7 @@ TEST(SoftContact, ATickNeitherAllocatesNorGivesWhatIsNoNumber) {
   const SoftObject object = slab(5000, 250, {.most = 16});
   SoftObjectState state = initial_state(object);
   const PlacedTool tool = one_segment(Vec3(0.06, 0.01, 0.0));
-  stimuli::Random random(19);
+  Random random(19);
   Vec3 tip(-0.03, 0, 0.03);
   const std::uint64_t before = runner::allocations();
   for (int i = 0; i < 3000; ++i) {

@@ -9,8 +9,8 @@
 #include <utility>
 #include <vector>
 
+#include "data/base/random.h"
 #include "rendering/bodies/soft/soft_body.h"
-#include "stimuli/random.h"
 #include "tests/rendering/bodies/soft_fixtures.h"
 
 namespace palpate::rendering {
@@ -38,7 +38,7 @@ stimuli::SolidMesh one_tetrahedron() {
   return mesh;
 }
 
-Vec3 random_step(stimuli::Random& random, double size) {
+Vec3 random_step(Random& random, double size) {
   const auto one = [&] { return size * (2 * random.unit() - 1); };
   return {one(), one(), one()};
 }
@@ -69,7 +69,7 @@ TEST(SoftSolid, TheSurfaceIsClosedAndPointsOutwards) {
 }
 
 TEST(SoftSolid, TheGradientIsTheSlopeOfTheEnergy) {
-  stimuli::Random random(3);
+  Random random(3);
   for (const stimuli::SolidMesh& mesh :
        {soft_mesh(ShapeKind::sphere, 4), soft_mesh(ShapeKind::box, 3), one_tetrahedron()}) {
     const Solid solid(mesh, {.young = 30000, .poisson = 0.4});
@@ -100,7 +100,7 @@ TEST(SoftSolid, TheGradientIsTheSlopeOfTheEnergy) {
 TEST(SoftSolid, TheStiffnessIsTheSlopeOfTheGradientAtRest) {
   const stimuli::SolidMesh mesh = soft_mesh(ShapeKind::cylinder, 2);
   const Solid solid(mesh, {.young = 30000, .poisson = 0.4});
-  stimuli::Random random(5);
+  Random random(5);
   std::vector<Vec3> step, by_matrix(mesh.nodes.size(), Vec3(0));
   for (std::size_t i = 0; i < mesh.nodes.size(); ++i) step.push_back(random_step(random, 1));
   for (const Solid::Block& block : solid.stiffness()) {
@@ -123,7 +123,7 @@ TEST(SoftSolid, TheStiffnessIsTheSlopeOfTheGradientAtRest) {
 
 // Elements of any shape hold an even strain exactly: forces inside cancel.
 TEST(SoftSolid, PatchTest) {
-  stimuli::Random random(7);
+  Random random(7);
   stimuli::SolidMesh mesh = stimuli::mesh_of_box({0.03, 0.03, 0.03}, {4, 4, 4});
   const auto inside = [](const Vec3& p) {
     return std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}) < 0.0149;

@@ -10,8 +10,8 @@
 #include <glm/geometric.hpp>
 #include <vector>
 
+#include "data/base/random.h"
 #include "stimuli/orientation.h"
-#include "stimuli/random.h"
 
 namespace palpate::rendering {
 namespace {
@@ -21,7 +21,7 @@ namespace {
 TEST(NearestPoint, IsTheOneOfKuhnAndTucker) {
   int found = 0;
   for (std::uint64_t seed = 0; seed < 2000; ++seed) {
-    stimuli::Random random(seed);
+    Random random(seed);
     std::vector<HalfSpace> planes;
     const std::size_t count = random.below(7);
     for (std::size_t i = 0; i < count; ++i) {
@@ -61,7 +61,7 @@ TEST(DistanceToCone, IsThatOfTheNearestPoint) {
   EXPECT_EQ(distance_to_cone({-3, 0, -4}, {}), 5);
   // Moreau: what is left is the nearest point of the polar cone.
   for (std::uint64_t seed = 0; seed < 500; ++seed) {
-    stimuli::Random random(seed, {4});
+    Random random(seed, {4});
     std::vector<Vec3> normals;
     std::vector<HalfSpace> polar;
     for (std::size_t count = random.below(6); normals.size() < count;) {

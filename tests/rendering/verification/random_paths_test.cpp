@@ -22,7 +22,7 @@ constexpr std::size_t kTicks = 400;
 
 std::vector<LineProbe> path_of(PathKind kind, const stimuli::ConvexMesh& mesh, bool side,
                                std::uint64_t seed) {
-  stimuli::Random random(seed);
+  Random random(seed);
   return random_path(random, kind, mesh, kLength, side, kTicks);
 }
 

@@ -136,7 +136,7 @@ double gap_by_search(const stimuli::ConvexMesh& mesh, const LineProbe& probe) {
 TEST(ReferenceProperties, DepthIsTheShortestWayOut) {
   int inside = 0;
   for (std::uint64_t seed = 0; seed < 60; ++seed) {
-    stimuli::Random random(seed, {1});
+    Random random(seed, {1});
     const stimuli::ConvexMesh mesh = testing::random_convex_mesh(random);
     for (const LineProbe& probe :
          testing::jumping_path(random, mesh, mesh.size() * 2 * random.unit(), 40)) {
@@ -167,7 +167,7 @@ TEST(ReferenceProperties, DepthIsTheShortestWayOut) {
 TEST(ReferenceProperties, GapIsTheLeastDistanceOfAPointOfTheProbe) {
   int outside = 0;
   for (std::uint64_t seed = 0; seed < 20; ++seed) {
-    stimuli::Random random(seed, {2});
+    Random random(seed, {2});
     const stimuli::ConvexMesh mesh = testing::random_convex_mesh(random);
     for (const LineProbe& probe :
          testing::jumping_path(random, mesh, mesh.size() * 2 * random.unit(), 20)) {

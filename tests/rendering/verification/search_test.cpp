@@ -214,7 +214,7 @@ TEST(RandomSolids, AreOfEveryKindAndSize) {
   double smallest = 1e9, largest = 0, flattest = 1;
   std::size_t most_sides = 0, most_edges_at_a_corner = 0;
   for (std::uint64_t seed = 0; seed < 500; ++seed) {
-    stimuli::Random random(seed);
+    Random random(seed);
     const stimuli::ConvexMesh mesh = random_solid(random);
     smallest = std::min(smallest, mesh.size());
     largest = std::max(largest, mesh.size());

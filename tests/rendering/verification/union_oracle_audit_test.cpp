@@ -9,10 +9,10 @@
 #include <numbers>
 #include <vector>
 
+#include "data/base/random.h"
 #include "rendering/verification/union_cases.h"
 #include "rendering/verification/union_oracle.h"
 #include "rendering/verification/union_search.h"
-#include "stimuli/random.h"
 
 namespace palpate::rendering {
 namespace {
@@ -59,7 +59,7 @@ TEST(UnionOracleAudit, IsAtALocalMinimumOutsideOfRandomClusters) {
 TEST(UnionOracleAudit, IsAtALocalMinimumWhereWhatCanCoincideDoes) {
   Covered covered;
   for (std::uint64_t seed = 0; seed < 60; ++seed) {
-    stimuli::Random random(seed, {5});
+    Random random(seed, {5});
     std::vector<std::uint8_t> bytes(300);
     for (std::uint8_t& byte : bytes) byte = static_cast<std::uint8_t>(random.below(256));
     expect_ideal(grid_walk(bytes, 300), seed, covered);

@@ -68,7 +68,7 @@ void expect_near(const Vec3& found, const Vec3& expected, double tolerance, cons
 // The sums are those of the brute-force reference for one part.
 TEST(UnionOracle, DepthIsThatOfTheReference) {
   for (std::uint64_t seed = 0; seed < 300; ++seed) {
-    stimuli::Random random(seed, {1});
+    Random random(seed, {1});
     const auto mesh = std::make_shared<const stimuli::ConvexMesh>(random_solid(random));
     const double size = mesh->size(), length = size * random.unit();
     const UnionOracle oracle({{mesh, Pose{}}}, stylus(length));
@@ -87,7 +87,7 @@ TEST(UnionOracle, DepthIsThatOfTheReference) {
 TEST(UnionOracle, EqualsTheRenderersOnOneConvexPart) {
   long in_contact = 0, different = 0;
   for (std::uint64_t seed = 0; seed < 250; ++seed) {
-    stimuli::Random random(seed, {7});
+    Random random(seed, {7});
     const auto mesh = std::make_shared<const stimuli::ConvexMesh>(random_solid(random));
     const double length = random.below(3) == 0 ? 0 : (0.05 + random.unit()) * mesh->size();
     const Renderer& renderer = length > 0 ? ray_renderer() : point_renderer();
@@ -122,7 +122,7 @@ TEST(UnionOracle, GroovesOf2To178Degrees) {
     for (const OracleTool& tool : {kPoint, stylus(0.12)}) {
       // The stylus upright in the middle of the groove, where it touches at its tip alone.
       const UnionOracle oracle(groove(opening), tool);
-      stimuli::Random random(7);
+      Random random(7);
       for (int i = 0; i < 40; ++i) {
         const Vec3 bottom{0.002 * (random.unit() - 0.5), 0.02 * random.unit(),
                           -0.003 * random.unit()};
@@ -232,7 +232,7 @@ TEST(UnionOracle, AToolOfTwoSegmentsRestsOnBoth) {
 TEST(UnionOracle, CutSolidsEqualWholeOnes) {
   long in_contact = 0;
   for (std::uint64_t seed = 0; seed < 60; ++seed) {
-    stimuli::Random random(seed, {3});
+    Random random(seed, {3});
     const stimuli::PolygonSoup cut_once = cut_cube(random, static_cast<int>(random.below(8)));
     const Quat turn = stimuli::uniform_rotation(random);
     const stimuli::PolygonSoup solid = turned_and_moved(cut_once, turn, 0.05, Vec3(0));

@@ -13,7 +13,7 @@
 
 #include "analysis/report/report_json.h"
 #include "analysis/statistics/analysis.h"
-#include "data/files/checksum.h"
+#include "data/base/checksum.h"
 #include "data/store/task_text.h"
 #include "protocols/parse.h"
 #include "runner/build_info.h"
@@ -229,9 +229,8 @@ TEST_F(Check, SimulatedParticipantsAreLabelledAndHaveNoDates) {
 
 TEST_F(Check, AByteOfTheProtocol) {
   run({.protocol = std::string(kProtocol) + " "});
-  expect_alone(
-      check(), "protocol",
-      {"P01", "P04", "layout", data::checksum_hex(std::string(kProtocol) + " ").substr(0, 12)});
+  expect_alone(check(), "protocol",
+               {"P01", "P04", "layout", checksum_hex(std::string(kProtocol) + " ").substr(0, 12)});
 }
 
 TEST_F(Check, ATextOfTheProtocol) {

@@ -11,6 +11,8 @@
 #include <utility>
 #include <vector>
 
+#include "data/base/text.h"
+
 namespace palpate::runner {
 namespace {
 
@@ -33,7 +35,7 @@ TEST(KeyNames, CharactersAreUtf8) {
                                               {0xE4, "\xC3\xA4"},
                                               {0x20AC, "\xE2\x82\xAC"},
                                               {0x1F600, "\xF0\x9F\x98\x80"}};
-  for (const auto& [character, bytes] : known) EXPECT_EQ(utf8_of(character), bytes) << character;
+  for (const auto& [character, bytes] : known) EXPECT_EQ(utf8(character), bytes) << character;
 }
 
 TEST(KeyNames, KeysWithoutACharacterHaveWords) {

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <vector>
 
+#include "data/base/random.h"
 #include "runner/participants/shape_lines.h"
-#include "stimuli/random.h"
 #include "tests/runner/participants/ideal_touches.h"
 #include "tests/runner/participants/observer_reference.h"
 
@@ -44,7 +44,7 @@ struct Case {
 };
 
 /// A stylus of 12 cm that passes the centre at up to 6 cm.
-Case random_case(stimuli::Random& random) {
+Case random_case(Random& random) {
   Case made;
   made.direction = random_direction(random);
   const Vec3 along = random_direction(random);
@@ -63,7 +63,7 @@ class DeepestPoint : public ::testing::TestWithParam<stimuli::ShapeKind> {
 
 TEST_P(DeepestPoint, DistancesAreExactToAMicrometre) {
   const ShapeHypotheses hypotheses({object_});
-  stimuli::Random random(11);
+  Random random(11);
   for (int n = 0; n < 200; ++n) {
     const Case c = random_case(random);
     const double s = 0.12 * random.unit();
@@ -80,7 +80,7 @@ TEST_P(DeepestPoint, DistancesAreExactToAMicrometre) {
 
 TEST_P(DeepestPoint, TipIsDistanceAndNormalOfTheTip) {
   const ShapeHypotheses hypotheses({object_});
-  stimuli::Random random(12);
+  Random random(12);
   int far_normals = 0;
   for (int n = 0; n < 200; ++n) {
     const Case c = random_case(random);
@@ -102,7 +102,7 @@ TEST_P(DeepestPoint, TipIsDistanceAndNormalOfTheTip) {
 
 TEST_P(DeepestPoint, MinimumOverTheStylusIsExactToThirtyMicrometres) {
   const ShapeHypotheses hypotheses({object_});
-  stimuli::Random random(13);
+  Random random(13);
   double worst = 0;
   int turned_normals = 0;
   int checked = 0;
@@ -134,7 +134,7 @@ TEST_P(DeepestPoint, MinimumOverTheStylusIsExactToThirtyMicrometres) {
 TEST_P(DeepestPoint, EndsOfTheStylusAreFound) {
   // The stylus points at the centre from outside, so its tip is deepest; or its tail, turned round.
   const ShapeHypotheses hypotheses({object_});
-  stimuli::Random random(14);
+  Random random(14);
   for (int n = 0; n < 50; ++n) {
     const Vec3 out = random_direction(random);
     const Vec3 near = 0.06 * out;

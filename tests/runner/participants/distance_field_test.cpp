@@ -7,10 +7,10 @@
 #include <glm/geometric.hpp>
 #include <limits>
 
+#include "data/base/random.h"
 #include "runner/participants/felt_parts.h"
 #include "runner/participants/shape_lines.h"
 #include "stimuli/primitives.h"
-#include "stimuli/random.h"
 #include "stimuli/signed_distance.h"
 #include "tests/runner/participants/solids.h"
 
@@ -20,7 +20,7 @@ namespace {
 const stimuli::solids::Outline kEll{{0, 0},       {0.06, 0},    {0.06, 0.02},
                                     {0.02, 0.02}, {0.02, 0.06}, {0, 0.06}};
 
-Vec3 point_around(stimuli::Random& random, const Vec3& middle, double reach) {
+Vec3 point_around(Random& random, const Vec3& middle, double reach) {
   Vec3 point = middle;
   for (int axis = 0; axis < 3; ++axis) point[axis] += reach * (2 * random.unit() - 1);
   return point;
@@ -28,7 +28,7 @@ Vec3 point_around(stimuli::Random& random, const Vec3& middle, double reach) {
 
 TEST(DistanceField, OfAnEllIsExactToASpacing) {
   const DistanceField field(test::placed(stimuli::solids::prism(kEll, 0.03).soup));
-  stimuli::Random random(1);
+  Random random(1);
   double squares = 0, count = 0;
   for (int i = 0; i < 20000; ++i) {
     const Vec3 p = point_around(random, Vec3(0.03, 0.03, 0.015), 0.06);
@@ -54,7 +54,7 @@ TEST(DistanceField, ASeamIsNotASurface) {
     halves.push_back(
         test::placed(stimuli::box(Vec3(0.03 - at, 0.04, 0.04)), Vec3((at + 0.03) / 2, 0, 0))[0]);
     const DistanceField cut(halves);
-    stimuli::Random random(2);
+    Random random(2);
     for (int i = 0; i < 5000; ++i) {
       const Vec3 p = point_around(random, Vec3(0), 0.03);
       ASSERT_NEAR(test::distance_at(cut, p), test::distance_at(whole, p), 0.1 * whole.spacing())
@@ -85,7 +85,7 @@ TEST(DistanceField, ItsGradientIsTheNormal) {
   stimuli::ObjectSpec ball;
   ball.subdivisions = 3;
   const DistanceField field(felt_parts(ball));
-  stimuli::Random random(3);
+  Random random(3);
   for (int i = 0; i < 2000; ++i) {
     const Vec3 out = glm::normalize(Vec3(random.normal(), random.normal(), random.normal()));
     const Vec3 p = (0.026 + 0.008 * random.unit()) * out;
@@ -129,7 +129,7 @@ struct Touch {
   Line line;
   int first;
 
-  Touch(const ShapeHypotheses::Shape& shape, stimuli::Random& random)
+  Touch(const ShapeHypotheses::Shape& shape, Random& random)
       : tip(point_around(random, Vec3(0), 0.06)),
         along(glm::normalize(Vec3(random.normal(), random.normal(), random.normal()))),
         line{to_float(tip), to_float(along), 0.12F, to_float(along)},
@@ -140,7 +140,7 @@ struct Touch {
 TEST(SolidLine, HypothesesSearchAsIfEachWereAlone) {
   const ShapeHypotheses hypotheses({ell_of_boxes()});
   const ShapeHypotheses::Shape& shape = hypotheses.shapes()[0];
-  stimuli::Random random(5);
+  Random random(5);
   for (int trial = 0; trial < 200; ++trial) {
     const Touch touch(shape, random);
     const SolidLine line(hypotheses, shape, touch.first, touch.line);
@@ -181,7 +181,7 @@ TEST(SolidLine, FindsTheDeepestPlaceOfAConcaveShape) {
   const ShapeHypotheses hypotheses({ell_of_boxes()});
   const ShapeHypotheses::Shape& shape = hypotheses.shapes()[0];
   ASSERT_TRUE(shape.field);
-  stimuli::Random random(4);
+  Random random(4);
   for (int trial = 0; trial < 60; ++trial) {
     const Touch touch(shape, random);
     const SolidLine to_shape(hypotheses, shape, touch.first, touch.line);

@@ -34,8 +34,8 @@ TEST(Explorer, ActsOnContactAfterTheReactionDelay) {
     settings.motor.reaction_delay = ticks * kPeriod;
     Explorer touching(settings, kFromTip, kStiffness, kPeriod),
         free(settings, kFromTip, kStiffness, kPeriod);
-    HandTarget target = touching.begin(stimuli::Random(5));
-    ASSERT_TRUE(same(target, free.begin(stimuli::Random(5))));
+    HandTarget target = touching.begin(Random(5));
+    ASSERT_TRUE(same(target, free.begin(Random(5))));
     constexpr int kTouch = 20;
     for (int tick = 0; tick < kTouch + ticks; ++tick) {
       TouchState felt;
@@ -57,7 +57,7 @@ TouchState felt_below(const HandTarget& target) {
 /// A hand that has slid for 0.1 s with contact and has known for one tick that it lost it.
 struct AfterLossOfContact {
   explicit AfterLossOfContact(const SimulatedSettings& settings)
-      : hand(settings, kFromTip, kStiffness, kPeriod), target(hand.begin(stimuli::Random(6))) {
+      : hand(settings, kFromTip, kStiffness, kPeriod), target(hand.begin(Random(6))) {
     for (int tick = 0; tick < 100; ++tick) target = step(hand, felt_below(target), held_at(target));
     slid = hand.heading();
     before = held_at(target).tip;
@@ -99,7 +99,7 @@ TEST(Explorer, TurnsToTheChosenHeadingInItsTime) {
     SimulatedSettings settings = quick_hand(2);
     settings.heading.chosen = true;
     Explorer hand(settings, kFromTip, kStiffness, kPeriod);
-    HandTarget target = hand.begin(stimuli::Random(7));
+    HandTarget target = hand.begin(Random(7));
     int waited = 0;
     while (!hand.wants_heading()) {
       ASSERT_LT(++waited, 10) << "it slides from the second tick on";
@@ -124,7 +124,7 @@ TEST(Explorer, TurnsToTheChosenHeadingInItsTime) {
 
 TEST(Explorer, WantsNoHeadingWhereItWanders) {
   Explorer hand(quick_hand(2), kFromTip, kStiffness, kPeriod);
-  HandTarget target = hand.begin(stimuli::Random(7));
+  HandTarget target = hand.begin(Random(7));
   for (int tick = 0; tick < 1000; ++tick) {
     target = step(hand, felt_below(target), held_at(target));
     ASSERT_FALSE(hand.wants_heading());

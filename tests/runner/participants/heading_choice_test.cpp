@@ -90,7 +90,7 @@ Choice choose_on(std::size_t shape, bool ray, int touches, std::uint64_t seed,
   const ObserverSettings o = by_movement();
   ShapeObserver observer(hypotheses, o);
   HeadingChoice choice(hypotheses, o, settings);
-  stimuli::Random random(seed);
+  Random random(seed);
   Percept percept;
   for (int i = 0; i <= touches; ++i) {
     percept = test::touch(four_shapes()[shape], Mat3(1), ray, 0.003, 0.2, random);
@@ -101,7 +101,7 @@ Choice choose_on(std::size_t shape, bool ray, int touches, std::uint64_t seed,
   const Vec3 across = glm::cross(percept.direction, test::random_direction(random));
   Choice made;
   made.stylus = {ray, percept.tip, percept.tail, percept.direction, glm::normalize(across)};
-  stimuli::Random for_choice(seed + 1), for_reference(seed + 1);
+  Random for_choice(seed + 1), for_reference(seed + 1);
   made.chosen = choice.choose(observer, made.stylus, for_choice);
   std::vector<int> drawn(static_cast<std::size_t>(settings.hypotheses));
   observer.draw(for_reference, drawn);
@@ -166,7 +166,7 @@ TEST(HeadingChoice, AllocatesNothing) {
   const ShapeHypotheses hypotheses(four_shapes());
   ShapeObserver observer(hypotheses, by_movement());
   HeadingChoice choice(hypotheses, by_movement(), {});
-  stimuli::Random random(4);
+  Random random(4);
   for (const bool ray : {false, true}) {
     const SlidingStylus stylus{ray, {0, 0, 0.03}, {0, 0.05, 0.13}, {0, 0, 1}, {1, 0, 0}};
     const std::uint64_t before = allocations();

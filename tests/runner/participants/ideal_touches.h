@@ -4,19 +4,18 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
+#include "data/base/random.h"
 #include "runner/participants/shape_observer.h"
-#include "stimuli/random.h"
 #include "tests/runner/participants/observer_reference.h"
 
 namespace palpate::runner::test {
 
-inline Vec3 random_direction(stimuli::Random& random) {
+inline Vec3 random_direction(Random& random) {
   return glm::normalize(Vec3(random.normal(), random.normal(), random.normal()));
 }
 
 /// Where a straight way out of the object leaves it.
-inline Percept touch_with_tip(const stimuli::ObjectSpec& object, const Mat3& r,
-                              stimuli::Random& random) {
+inline Percept touch_with_tip(const stimuli::ObjectSpec& object, const Mat3& r, Random& random) {
   const Vec3 start = 0.01 * random.unit() * random_direction(random);
   const Vec3 out = random_direction(random);
   double low = 0;
@@ -34,8 +33,7 @@ inline Percept touch_with_tip(const stimuli::ObjectSpec& object, const Mat3& r,
 
 /// A stylus of 12 cm that comes sideways until it touches. Newton's steps: the distance is convex
 /// in the way, so they do not overshoot.
-inline Percept touch_with_stylus(const stimuli::ObjectSpec& object, const Mat3& r,
-                                 stimuli::Random& random) {
+inline Percept touch_with_stylus(const stimuli::ObjectSpec& object, const Mat3& r, Random& random) {
   const Vec3 along = random_direction(random);
   const Vec3 in = glm::normalize(glm::cross(along, random_direction(random)));
   Percept percept;
@@ -59,7 +57,7 @@ inline Percept touch_with_stylus(const stimuli::ObjectSpec& object, const Mat3& 
 
 /// A percept of a turned object with noise of so many m and rad.
 inline Percept touch(const stimuli::ObjectSpec& object, const Mat3& r, bool ray, double place_noise,
-                     double direction_noise, stimuli::Random& random) {
+                     double direction_noise, Random& random) {
   Percept percept = ray ? touch_with_stylus(object, r, random) : touch_with_tip(object, r, random);
   const auto noise = [&random](double sd) {
     return sd * Vec3(random.normal(), random.normal(), random.normal());

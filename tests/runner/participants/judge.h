@@ -62,7 +62,7 @@ class Judge {
 
   std::string answer(const std::vector<Interval>& intervals, const TaskJudgement::Felt& felt = {},
                      Trial trial = trial_of()) {
-    judgement_.begin(trial, stimuli::Random(7, {++draw_}));
+    judgement_.begin(trial, Random(7, {++draw_}));
     for (const Interval& interval : intervals) judgement_.feel(interval, felt);
     return named(judgement_.answer());
   }

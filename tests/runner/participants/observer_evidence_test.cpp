@@ -19,7 +19,7 @@ namespace {
 using test::by_movement;
 using test::four_shapes;
 
-Percept touch_of_a_cube(stimuli::Random& random) {
+Percept touch_of_a_cube(Random& random) {
   return test::touch(four_shapes()[3], Mat3(1), false, 0.003, 0.2, random);
 }
 
@@ -46,7 +46,7 @@ TEST(ObserverEvidence, OfAContactGrowsWithMovementAndTurn) {
                      {0.003, 0.1, 1 - std::exp(-0.2)},
                      {std::numeric_limits<double>::infinity(), 0, 1}};
   for (const auto& c : cases) {
-    stimuli::Random random(7);
+    Random random(7);
     Percept percept = touch_of_a_cube(random);
     percept.moved = c.moved;
     percept.turned = c.turned;
@@ -65,7 +65,7 @@ TEST(ObserverEvidence, OfAContactGrowsWithMovementAndTurn) {
 TEST(ObserverEvidence, IsNotNewWithoutMovement) {
   const ShapeHypotheses hypotheses(four_shapes());
   ShapeObserver observer(hypotheses, by_movement()), once(hypotheses, by_movement());
-  stimuli::Random random(8);
+  Random random(8);
   Percept percept = touch_of_a_cube(random);
   once.update(percept);
   observer.update(percept);
@@ -95,7 +95,7 @@ TEST(ObserverEvidence, DoesNotFadeWithoutForgetting) {
   ShapeObserver observer(hypotheses, settings);
   settings.beta = 0.5;
   ShapeObserver one(hypotheses, settings);
-  stimuli::Random random(9);
+  Random random(9);
   const Percept percept = touch_of_a_cube(random);
   one.update(percept);
   observer.update(percept);
@@ -108,7 +108,7 @@ TEST(ObserverEvidence, DoesNotFadeWithoutForgetting) {
 TEST(ObserverEvidence, DrawsFollowThePosterior) {
   const ShapeHypotheses hypotheses(four_shapes());
   ShapeObserver observer(hypotheses, by_movement());
-  stimuli::Random random(10);
+  Random random(10);
   for (int percepts = 0; percepts < 6; ++percepts) {
     for (const int n : {1, 32, 1000}) {
       std::vector<int> drawn(static_cast<std::size_t>(n));
@@ -131,7 +131,7 @@ TEST(ObserverEvidence, DrawsFollowThePosterior) {
 TEST(ObserverEvidence, DrawsFollowThePosteriorWithinAShape) {
   const ShapeHypotheses hypotheses(four_shapes());
   ShapeObserver observer(hypotheses, by_movement());
-  stimuli::Random random(11);
+  Random random(11);
   const ShapeHypotheses::Shape& cone = hypotheses.shapes()[1];
   for (int i = 0; i < 40; ++i) {
     observer.update(test::touch(four_shapes()[1], Mat3(1), false, 0.001, 0.05, random));

@@ -49,7 +49,7 @@ TEST(RotationGrid, EveryOrientationIsNearOneUpToSymmetry) {
                 0.05 * 9120 / static_cast<double>(group.size()) + 10);
     std::vector<Quat> turns;
     for (const Mat3& r : grid) turns.push_back(glm::quat_cast(r));
-    stimuli::Random random(1);
+    Random random(1);
     for (int i = 0; i < 100; ++i) {
       const Quat wanted = stimuli::uniform_rotation(random);
       double nearest = 180;

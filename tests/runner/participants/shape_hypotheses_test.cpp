@@ -12,8 +12,8 @@
 #include <string>
 #include <vector>
 
+#include "data/base/random.h"
 #include "stimuli/orientation.h"
-#include "stimuli/random.h"
 
 namespace palpate::runner {
 namespace {
@@ -88,7 +88,7 @@ TEST(ShapeHypotheses, NoOrientationIsFarFromTheGrid) {
   const std::vector<double> typical{0, 4.5, 5, 6.5};
   for (std::size_t k = 1; k < kKinds.size(); ++k) {
     const ShapeHypotheses hypotheses({spec(kKinds[k])});
-    stimuli::Random random(3);
+    Random random(3);
     double worst = 0;
     double sum = 0;
     constexpr int kDraws = 400;

@@ -11,8 +11,8 @@
 #include <thread>
 #include <vector>
 
+#include "data/base/random.h"
 #include "stimuli/orientation.h"
-#include "stimuli/random.h"
 #include "tests/runner/participants/ideal_touches.h"
 #include "tests/runner/participants/observer_reference.h"
 
@@ -127,7 +127,7 @@ TEST(ShapeObserver, StartsWithEqualShapes) {
 TEST(ShapeObserver, ForgetsBackToThePrior) {
   const ShapeHypotheses hypotheses(four_shapes());
   ShapeObserver observer(hypotheses);
-  stimuli::Random random(5);
+  Random random(5);
   for (int i = 0; i < 60; ++i) {
     observer.update(touch(four_shapes()[3], Mat3(1), true, 0, 0, random));
   }
@@ -140,7 +140,7 @@ TEST(ShapeObserver, ResetRestoresThePrior) {
   const ShapeHypotheses hypotheses(four_shapes());
   ShapeObserver observer(hypotheses);
   const ShapeObserver fresh(hypotheses);
-  stimuli::Random random(5);
+  Random random(5);
   observer.update(touch(four_shapes()[1], Mat3(1), false, 0, 0, random));
   EXPECT_NE(observer.probability(1), fresh.probability(1));
   observer.reset();
@@ -157,7 +157,7 @@ TEST(ShapeObserver, FeelingNothingAgreesWithTheFormulasFromNearToFar) {
   const ShapeHypotheses hypotheses(slender);
   ObserverSettings settings;
   settings.free_space_weight = 1;
-  stimuli::Random random(16);
+  Random random(16);
   double least = 1, most = 0;  // of the spheres' probabilities: near and far are both tried
   for (int n = 0; n < 80; ++n) {
     ShapeObserver observer(hypotheses, settings);
@@ -180,7 +180,7 @@ TEST(ShapeObserver, FeelingNothingAgreesWithTheFormulasFromNearToFar) {
 TEST(ShapeObserver, AgreesWithTheFormulasInDoublePrecision) {
   const ShapeHypotheses hypotheses(four_shapes());
   const ObserverSettings settings;
-  stimuli::Random random(6);
+  Random random(6);
   double worst = 0;
   for (int object = 0; object < 4; ++object) {
     ShapeObserver observer(hypotheses, settings);
@@ -210,7 +210,7 @@ TEST(ShapeObserver, AgreesWithTheFormulasInDoublePrecision) {
 /// Share of 20 objects of each shape that are named right after 60 percepts.
 double accuracy(bool ray, double place_noise, double direction_noise) {
   const ShapeHypotheses hypotheses(four_shapes());
-  stimuli::Random random(7);
+  Random random(7);
   int right = 0;
   for (int trial = 0; trial < 80; ++trial) {
     ShapeObserver observer(hypotheses);
@@ -239,7 +239,7 @@ TEST(ShapeObserver, DecidesAboveTheThreshold) {
   ObserverSettings settings;
   settings.threshold = 0.6;
   ShapeObserver observer(hypotheses, settings);
-  stimuli::Random random(8);
+  Random random(8);
   bool decided = false;
   for (int n = 0; n < 60; ++n) {
     observer.update(touch(four_shapes()[2], Mat3(1), false, 0, 0, random));
@@ -252,7 +252,7 @@ TEST(ShapeObserver, DecidesAboveTheThreshold) {
 TEST(ShapeObserver, FreeSpaceIsEvidenceAgainstAShapeThatWouldBeHit) {
   const ShapeHypotheses hypotheses(four_shapes());
   ShapeObserver observer(hypotheses);
-  stimuli::Random random(9);
+  Random random(9);
   // 4 mm inside the sphere, all round: a cone has room for that.
   for (int n = 0; n < 200; ++n) {
     Percept p;
@@ -293,7 +293,7 @@ TEST(ShapeObserver, ThreadsThatShareHypothesesAgreeToTheBit) {
   const ShapeHypotheses hypotheses(four_shapes());
   std::vector<ShapeObserver> observers(3, ShapeObserver(hypotheses));
   const auto watch = [](ShapeObserver& observer) {
-    stimuli::Random random(10);
+    Random random(10);
     for (int n = 0; n < 40; ++n) {
       observer.update(touch(four_shapes()[1], Mat3(1), n % 2 == 0, 0.002, 0.1, random));
     }
@@ -313,7 +313,7 @@ TEST(ShapeObserver, AStylusWithoutLengthIsAPoint) {
   const ShapeHypotheses hypotheses(four_shapes());
   ShapeObserver as_ray(hypotheses);
   ShapeObserver as_point(hypotheses);
-  stimuli::Random random(11);
+  Random random(11);
   Percept p = touch(four_shapes()[3], Mat3(1), false, 0.002, 0.1, random);
   as_point.update(p);
   p.ray = true;

@@ -10,9 +10,9 @@
 #include <glm/geometric.hpp>
 #include <limits>
 
+#include "data/base/random.h"
 #include "runner/servo/servo.h"
 #include "stimuli/primitives.h"
-#include "stimuli/random.h"
 #include "tests/runner/fake_device.h"
 
 namespace palpate::runner {
@@ -49,7 +49,7 @@ TEST(Passivity, ASampledSpringGrowsWithoutAndDoesNotWith) {
 
 TEST(Passivity, NeverPushesAlongTheMotion) {
   PassivityController control({}, kTick);
-  stimuli::Random random(7);
+  Random random(7);
   const auto any = [&random] {
     return Vec3(random.unit() - 0.5, random.unit() - 0.5, random.unit() - 0.5);
   };

@@ -15,11 +15,11 @@
 #include <utility>
 #include <vector>
 
+#include "data/base/random.h"
 #include "rendering/bodies/soft/soft_scene.h"
 #include "rendering/renderer.h"
 #include "runner/bench/allocation_count.h"
 #include "runner/servo/servo_thread.h"
-#include "stimuli/random.h"
 #include "tests/runner/fake_device.h"
 
 namespace palpate::runner {
@@ -51,7 +51,7 @@ struct PathTick {
 
 /// In and out of both cubes and across; periods that jitter, some of them long.
 std::vector<PathTick> rough_path(int ticks) {
-  stimuli::Random random(23);
+  Random random(23);
   std::vector<PathTick> path;
   for (int i = 0; i < ticks; ++i) {
     const double t = 0.001 * i;

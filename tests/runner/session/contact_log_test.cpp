@@ -13,10 +13,10 @@
 #include <string>
 #include <vector>
 
+#include "data/base/random.h"
 #include "protocols/parse.h"
 #include "runner/scene_builder.h"
 #include "runner/session/simulated_session.h"
-#include "stimuli/random.h"
 
 namespace palpate::runner {
 namespace {
@@ -63,7 +63,7 @@ SharpEdges edges_of(const stimuli::ObjectSpec& object) {
 }
 
 TEST(SharpEdges, AreThoseOfTheShapesFormulas) {
-  stimuli::Random random(41);
+  Random random(41);
   for (const auto shape : {stimuli::ShapeKind::sphere, stimuli::ShapeKind::cone,
                            stimuli::ShapeKind::cylinder, stimuli::ShapeKind::cube}) {
     stimuli::ObjectSpec object;
@@ -127,7 +127,7 @@ TEST(ContactLog, CountsEveryTickAsIfItLookedAtAllEdges) {
   cube.shape = stimuli::ShapeKind::cube;
   cube.edge = 0.04;
   const SharpEdges edges = edges_of(cube);
-  stimuli::Random random(5);
+  Random random(5);
   const Quat turned = glm::normalize(Quat(0.3, -0.2, 0.7, 0.4));
   ContactLog log;
   log.begin(edges, turned);

@@ -15,11 +15,11 @@
 #include <thread>
 #include <vector>
 
+#include "data/base/checksum.h"
+#include "data/base/random.h"
 #include "data/export/csv.h"
 #include "protocols/parse.h"
-#include "protocols/sha256.h"
 #include "runner/session/replay_comparison.h"
-#include "stimuli/random.h"
 #include "tests/shared/temporary_folder.h"
 
 namespace palpate::runner {
@@ -92,7 +92,7 @@ TEST_F(SimulatedStudy, IsTheSameHoweverOftenItIsStopped) {
   const protocols::Protocol p = protocol();
   simulate(p, folder_ / "whole.db", 2);
   const fs::path db = folder_ / "stopped.db";
-  stimuli::Random random(11);
+  Random random(11);
   int stops = 0;
   for (bool done = false; !done;) {
     ASSERT_LT(stops, 1000);
@@ -318,7 +318,7 @@ TEST_F(SimulatedStudy, ChecksumsAreThoseOfTheFrozenFiles) {
     std::ifstream file(PALPATE_SOURCE_DIR "/runner/participants/simulated_v" +
                        std::to_string(version) + ".json");
     EXPECT_EQ(load_simulated_settings("", version).sha256,
-              protocols::sha256_hex(nlohmann::json::parse(file).dump()))
+              checksum_hex(nlohmann::json::parse(file).dump()))
         << "version " << version;
   }
 }

@@ -5,10 +5,10 @@
 #include <glm/geometric.hpp>
 #include <initializer_list>
 
+#include "data/base/random.h"
 #include "runner/devices/falcon/kinematics.h"
 #include "runner/devices/falcon/packets.h"
 #include "runner/devices/falcon/parameters.h"
-#include "stimuli/random.h"
 
 namespace palpate::runner::falcon::testing {
 namespace {
@@ -291,7 +291,7 @@ std::vector<std::uint8_t> synthetic_image(std::size_t words) {
     }
   };
   put({0x08AA, 0, 0, 0, 0, 0, 0, 0, 0, 0x3F, 0x8002});
-  stimuli::Random random(words);
+  Random random(words);
   for (const std::size_t count : {words - words / 4, words / 4}) {
     put({count, 0x3F, 0x8002});
     for (std::size_t i = 0; i < count; ++i) put({random.next()});

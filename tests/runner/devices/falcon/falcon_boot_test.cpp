@@ -5,10 +5,10 @@
 #include <string>
 #include <vector>
 
+#include "data/base/random.h"
 #include "protocols/parse.h"
 #include "runner/devices/falcon/boot.h"
 #include "runner/devices/falcon/packets.h"
-#include "stimuli/random.h"
 #include "tests/runner/devices/falcon/emulator.h"
 #include "tests/runner/devices/falcon/fake_transport.h"
 #include "tests/shared/temporary_folder.h"
@@ -192,7 +192,7 @@ TEST(FalconImage, TruncatedAndCorruptedStreamsAreRefusedOrWellFormed) {
     EXPECT_FALSE(refusal({good.begin(), good.begin() + static_cast<std::ptrdiff_t>(size)}).empty())
         << size;
   }
-  stimuli::Random random(3);
+  Random random(3);
   for (int round = 0; round < 5000; ++round) {
     auto noise = good;
     noise[random.below(noise.size())] = static_cast<std::uint8_t>(random.next());

@@ -4,8 +4,8 @@
 #include <string_view>
 #include <vector>
 
+#include "data/base/random.h"
 #include "runner/devices/falcon/packets.h"
-#include "stimuli/random.h"
 
 namespace palpate::runner::falcon {
 namespace {
@@ -126,7 +126,7 @@ TEST(FalconPackets, ALongPacketIsDropped) {
 }
 
 TEST(FalconPackets, RandomBytesNeverBreakTheStream) {
-  stimuli::Random random(7);
+  Random random(7);
   PacketStream stream;
   const std::string whole = text(encode(Reply{{1, -2, 3}, 0, 7}));
   // Bytes near the alphabet, so that much looks like a packet.

@@ -8,8 +8,8 @@
 #include <limits>
 #include <vector>
 
+#include "data/base/random.h"
 #include "stimuli/orientation.h"
-#include "stimuli/random.h"
 
 namespace palpate::runner {
 namespace {
@@ -18,7 +18,7 @@ Vec3 apply(const Pose& pose, const Vec3& p) { return pose.orientation * p + pose
 
 std::vector<PairedPoint> paired(const Pose& truth, int count, double noise, std::uint64_t seed,
                                 const Vec3& spread = Vec3(0.03)) {
-  stimuli::Random random(seed);
+  Random random(seed);
   const auto normal = [&random](double size) {
     return size * Vec3(random.normal(), random.normal(), random.normal());
   };
@@ -31,7 +31,7 @@ std::vector<PairedPoint> paired(const Pose& truth, int count, double noise, std:
 }
 
 TEST(StylusFromEnds, TheFitIsExactWithoutNoise) {
-  stimuli::Random random(5);
+  Random random(5);
   for (int round = 0; round < 200; ++round) {
     const Pose truth{{0.3, -0.2, 0.1 * round}, stimuli::uniform_rotation(random)};
     const RigidFit fit = fit_rigid(paired(truth, 8 + round % 5, 0, 100 + round));
@@ -62,7 +62,7 @@ TEST(StylusFromEnds, CoplanarPointsGiveNoReflection) {
   const Pose truth{{0.1, 0, 0}, glm::normalize(Quat(0, 1, 1, 0))};
   for (std::uint64_t seed = 0; seed < 50; ++seed) {
     auto points = paired(truth, 8, 0, seed);
-    stimuli::Random random(seed, {1});
+    Random random(seed, {1});
     for (std::size_t i = 0; i < points.size(); ++i) {
       const Vec3 p = 0.03 * Vec3(std::cos(i), std::sin(i), 0);
       points[i] = {apply(truth, p) + 3e-4 * Vec3(random.normal(), random.normal(), random.normal()),

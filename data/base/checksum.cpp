@@ -1,8 +1,8 @@
-#include "data/files/checksum.h"
+#include "data/base/checksum.h"
 
 #include <nettle/sha2.h>
 
-namespace palpate::data {
+namespace palpate {
 
 Checksum checksum(const void* bytes, std::size_t size) {
   sha256_ctx context;
@@ -25,4 +25,4 @@ std::string checksum_hex(std::string_view bytes) {
   return to_hex(checksum(bytes.data(), bytes.size()));
 }
 
-}  // namespace palpate::data
+}  // namespace palpate

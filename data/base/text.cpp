@@ -1,4 +1,4 @@
-#include "stimuli/text.h"
+#include "data/base/text.h"
 
 #include <algorithm>
 #include <array>
@@ -6,7 +6,7 @@
 #include <cstdio>
 #include <vector>
 
-namespace palpate::stimuli {
+namespace palpate {
 namespace {
 
 constexpr std::string_view kDigits =
@@ -73,24 +73,14 @@ std::string nearest_word(std::string_view word, const std::vector<std::string>& 
   return nearest;
 }
 
-namespace {
-
-struct Character {
-  std::uint32_t code = 0;
-  std::size_t size = 1;  // bytes
-  bool well_formed = false;
-};
-
-/// The character at the start of a text that is not empty (RFC 3629).
-Character first_of(std::string_view text) {
+Character first_character(std::string_view text) {
   const auto byte = [&](std::size_t i) { return static_cast<std::uint8_t>(text[i]); };
   const std::uint32_t lead = byte(0);
-  if (lead < 0x80) return {lead, 1, true};
-  const std::size_t size = lead >= 0xF0 ? 4 : lead >= 0xE0 ? 3 : lead >= 0xC2 ? 2 : 0;
-  if (size == 0 || lead > 0xF4 || text.size() < size) return {};
-  std::uint32_t code = lead & (0xFFU >> (size + 1));
+  const std::size_t size = utf8_size(text[0]);
+  if (size == 0 || text.size() < size) return {};
+  std::uint32_t code = size == 1 ? lead : lead & (0xFFU >> (size + 1));
   for (std::size_t i = 1; i < size; ++i) {
-    if ((byte(i) & 0xC0U) != 0x80) return {};
+    if (!continues_character(text[i])) return {};
     code = code << 6 | (byte(i) & 0x3FU);
   }
   const bool overlong = (size == 3 && code < 0x800) || (size == 4 && code < 0x10000);
@@ -98,6 +88,35 @@ Character first_of(std::string_view text) {
   if (overlong || surrogate || code > 0x10FFFF) return {};
   return {code, size, true};
 }
+
+std::size_t utf8_size(char lead) {
+  const auto byte = static_cast<std::uint8_t>(lead);
+  if (byte < 0x80) return 1;
+  if (byte < 0xC2 || byte > 0xF4) return 0;
+  return byte >= 0xF0 ? 4 : byte >= 0xE0 ? 3 : 2;
+}
+
+std::size_t count_characters(std::string_view text) {
+  return static_cast<std::size_t>(
+      std::count_if(text.begin(), text.end(), [](char c) { return !continues_character(c); }));
+}
+
+void remove_last_character(std::string& text) {
+  while (!text.empty() && continues_character(text.back())) text.pop_back();
+  if (!text.empty()) text.pop_back();
+}
+
+std::string utf8(std::uint32_t code) {
+  const auto tail = [code](unsigned shift) {
+    return static_cast<char>(0x80U | (code >> shift & 0x3FU));
+  };
+  if (code < 0x80) return {static_cast<char>(code)};
+  if (code < 0x800) return {static_cast<char>(0xC0U | code >> 6U), tail(0)};
+  if (code < 0x10000) return {static_cast<char>(0xE0U | code >> 12U), tail(6), tail(0)};
+  return {static_cast<char>(0xF0U | (code >> 18U & 7U)), tail(12), tail(6), tail(0)};
+}
+
+namespace {
 
 bool is_plain(const Character& c) {
   const auto within = [&](std::uint32_t least, std::uint32_t most) {
@@ -128,7 +147,7 @@ void append(const Character& c, std::string_view bytes, std::string& out) {
 std::string shown(std::string_view text, std::size_t max_bytes, bool lines) {
   std::string out;
   while (!text.empty()) {
-    const Character c = first_of(text);
+    const Character c = first_character(text);
     const std::size_t before = out.size();
     if (lines && c.code == '\n' && c.well_formed) {
       out += '\n';
@@ -148,7 +167,7 @@ std::string shown(std::string_view text, std::size_t max_bytes, bool lines) {
 
 bool is_plain_utf8(std::string_view text) {
   while (!text.empty()) {
-    const Character c = first_of(text);
+    const Character c = first_character(text);
     if (!is_plain(c)) return false;
     text.remove_prefix(c.size);
   }
@@ -193,4 +212,4 @@ std::string point_meant(std::string_view word) {
   return "; decimals follow a point: " + meant;
 }
 
-}  // namespace palpate::stimuli
+}  // namespace palpate

@@ -6,7 +6,7 @@
 #include <string>
 #include <string_view>
 
-namespace palpate::data {
+namespace palpate {
 
 using Checksum = std::array<unsigned char, 32>;
 
@@ -14,4 +14,4 @@ Checksum checksum(const void* bytes, std::size_t size);
 std::string to_hex(const Checksum& checksum);      ///< 64 lower-case digits
 std::string checksum_hex(std::string_view bytes);  ///< of bytes
 
-}  // namespace palpate::data
+}  // namespace palpate

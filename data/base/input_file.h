@@ -7,7 +7,7 @@
 #include <string>
 #include <string_view>
 
-namespace palpate::stimuli {
+namespace palpate {
 
 class InputFile {
  public:
@@ -47,4 +47,4 @@ inline std::uint32_t little_endian(std::string_view bytes, std::size_t at, std::
   return word;
 }
 
-}  // namespace palpate::stimuli
+}  // namespace palpate

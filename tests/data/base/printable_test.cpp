@@ -3,9 +3,9 @@
 #include <random>
 #include <string>
 
-#include "stimuli/text.h"
+#include "data/base/text.h"
 
-namespace palpate::stimuli {
+namespace palpate {
 namespace {
 
 using namespace std::string_literals;
@@ -78,4 +78,4 @@ TEST(Printable, IsPlainWhateverCameIn) {
 }
 
 }  // namespace
-}  // namespace palpate::stimuli
+}  // namespace palpate

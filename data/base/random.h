@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-namespace palpate::stimuli {
+namespace palpate {
 
 /// xoshiro256++ 1.0 (Blackman & Vigna 2019), seeded through splitmix64.
 /// Same seed and stream, same numbers, on every compiler. Not for cryptography.
@@ -40,4 +40,4 @@ class Random {
   bool has_spare_ = false;
 };
 
-}  // namespace palpate::stimuli
+}  // namespace palpate

@@ -3,10 +3,10 @@
 #include <string>
 #include <vector>
 
-#include "stimuli/random.h"
-#include "stimuli/text.h"
+#include "data/base/random.h"
+#include "data/base/text.h"
 
-namespace palpate::stimuli {
+namespace palpate {
 namespace {
 
 TEST(EditDistance, CountsInsertedDeletedAndReplacedBytes) {
@@ -49,4 +49,4 @@ TEST(EditDistance, TheNearestWordIsWhatWasMeant) {
 }
 
 }  // namespace
-}  // namespace palpate::stimuli
+}  // namespace palpate

@@ -1,4 +1,4 @@
-#include "stimuli/input_file.h"
+#include "data/base/input_file.h"
 
 #include <fcntl.h>
 #include <poll.h>
@@ -10,7 +10,7 @@
 #include <cstring>
 #include <stdexcept>
 
-namespace palpate::stimuli {
+namespace palpate {
 namespace {
 
 [[noreturn]] void refuse(const std::string& why) { throw std::runtime_error(why); }
@@ -66,4 +66,4 @@ std::string read_whole(const std::string& path, std::uintmax_t most_bytes) {
   return text;
 }
 
-}  // namespace palpate::stimuli
+}  // namespace palpate

@@ -1,4 +1,4 @@
-#include "stimuli/random.h"
+#include "data/base/random.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <numeric>
 #include <set>
 
-namespace palpate::stimuli {
+namespace palpate {
 namespace {
 
 // Golden values: from a second implementation in another language, itself checked against the
@@ -132,4 +132,4 @@ TEST(Random, ShuffleGivesEveryOrderEquallyOften) {
 }
 
 }  // namespace
-}  // namespace palpate::stimuli
+}  // namespace palpate

@@ -2,18 +2,42 @@
 // Text: bytes in it, words that are alike, what is safe to print, what was probably meant.
 
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
-namespace palpate::stimuli {
+namespace palpate {
 
 /// Bytes in text (RFC 4648, section 4).
 std::string base64_encoded(std::string_view bytes);
 
 /// Nothing where the text is no base64. Padding may be missing.
 std::optional<std::string> base64_decoded(std::string_view text);
+
+// Characters in UTF-8 (RFC 3629).
+
+struct Character {
+  std::uint32_t code = 0;
+  std::size_t size = 1;  ///< bytes
+  bool well_formed = false;
+};
+
+/// \pre  text is not empty
+Character first_character(std::string_view text);
+
+/// Bytes of the character that begins with this byte; 0: none does.
+std::size_t utf8_size(char lead);
+
+/// Whether a byte is not the first of its character.
+constexpr bool continues_character(char byte) {
+  return (static_cast<unsigned char>(byte) & 0xC0U) == 0x80U;
+}
+
+std::size_t count_characters(std::string_view text);
+void remove_last_character(std::string& text);
+std::string utf8(std::uint32_t code);
 
 // How alike two words are: for "did you mean ...?".
 
@@ -50,4 +74,4 @@ bool is_utf16(std::string_view bytes);
 /// "; decimals follow a point: 0.5" for a number with a decimal comma; "" for other words.
 std::string point_meant(std::string_view word);
 
-}  // namespace palpate::stimuli
+}  // namespace palpate

@@ -1,10 +1,10 @@
-#include "stimuli/random.h"
+#include "data/base/random.h"
 
 #include <bit>
 #include <cmath>
 #include <stdexcept>
 
-namespace palpate::stimuli {
+namespace palpate {
 namespace {
 
 // Steele, Lea & Flood 2014, "Fast splittable pseudorandom number generators"; constants of
@@ -68,4 +68,4 @@ double Random::normal() {
   return x * scale;
 }
 
-}  // namespace palpate::stimuli
+}  // namespace palpate
