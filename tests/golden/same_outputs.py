@@ -68,7 +68,8 @@ def hidden(text, folder, program):
 
 
 def rows(database):
-    """All of a database but for the moments of exports and what is drawn by chance, in withdrawals."""
+    """All of a database but for the moments of exports, what is drawn by chance in withdrawals, and the places of attempts in
+    the chain of seals: the clock ends the batches in which a simulation's rows are sealed."""
     lines = []
     with contextlib.closing(sqlite3.connect(f"file:{database}?immutable=1", uri=True)) as opened:
         for kind, name, sql in opened.execute("SELECT type, name, sql FROM sqlite_master ORDER BY type, name").fetchall():
@@ -76,7 +77,8 @@ def rows(database):
             if kind == "table":
                 cursor = opened.execute(f'SELECT * FROM "{name}"')
                 kept = [i for i, (column, *_) in enumerate(cursor.description)
-                        if (name, column) not in (("exports", "made_utc_ns"), ("tombstones", "code_hash"), ("tombstone_secrets", "secret"))]
+                        if (name, column) not in (("exports", "made_utc_ns"), ("tombstones", "code_hash"), ("tombstone_secrets", "secret"),
+                                             ("attempts", "link"), ("attempts", "seal"))]
                 lines += [repr([row[i] if not isinstance(row[i], bytes) else hashlib.sha256(row[i]).hexdigest() for i in kept])
                           for row in cursor]
     return "\n".join(lines)
