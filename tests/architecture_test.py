@@ -83,10 +83,9 @@ def room_of(name):
 
 # The headers of a room that other rooms use; all others are the room's own business (and that of the rooms within).
 PUBLIC = {
-    "stimuli": "closed_surface shapes convex_mesh grid_hull inset large_array "
-               "mesh_file orientation parts/convex_parts parts/inset_parts parts/overlaps "
-               "parts/facets signed_distance primitives solids/gmsh_file solids/solid_mesh "
-               "vec",
+    "stimuli": "closed_surface shapes convex_mesh grid_hull inset large_array mesh_file orientation "
+               "parts/convex_parts parts/inset_parts parts/overlaps parts/facets signed_distance "
+               "primitives solids/gmsh_file solids/solid_mesh vec",
     "rendering": "first_contact probe reach render_fault renderer scene tool",
     "rendering/bodies": "moving_scene",
     "rendering/verification": "explain extreme_cases random_solids reference search union_cases "
@@ -101,7 +100,7 @@ PUBLIC = {
     "data/files": "atomic_file atomic_folder file_permissions text_sink output_check utc",
     "data/store": "export_log protocol_rows schema connection station_database store sweep_file "
                   "forget task_text",
-    "data/export": "bids csv psychds sample_slots settings study_about sweep_csv trial_table",
+    "data/export": "bids csv psychds sample_slots settings study_about sweep_csv delimited_row",
     "data/merge": "merge sweep_merge",
     "analysis": "text",
     "analysis/input": "csv_reader trials study_record sweep_table task_trials",
@@ -111,8 +110,8 @@ PUBLIC = {
     "analysis/movement": "adjusted_gain comparison measures pictures",
     "analysis/figures": "panel_drawing figure_svg figures movement_figures svg sweep_figures "
                         "task_figures",
-    "analysis/report": "html_elements html_page hypotheses movement_report plan_report report_html "
-                       "report_json report_text sweep_report tables task_report",
+    "analysis/report": "html_page hypotheses movement_report plan_report report_html report_json "
+                       "report_text sweep_report tables task_report",
     "runner": "",
     "runner/servo": "device force_limiter passivity realtime ring sample servo servo_thread "
                     "shared_value tick_clock tick_source touched_places triple_buffer",

@@ -7,11 +7,10 @@
 #include <utility>
 
 #include "analysis/figures/movement_figures.h"
-#include "analysis/report/html_elements.h"
 #include "analysis/report/html_page.h"
 #include "analysis/report/inference_json.h"
 #include "analysis/report/report_text.h"
-#include "analysis/report/table_cells.h"
+#include "analysis/report/tables.h"
 #include "analysis/statistics/analysis.h"
 #include "analysis/text.h"
 

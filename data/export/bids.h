@@ -22,7 +22,7 @@ namespace palpate::data {
 /// Where servo samples are stored, the session is split into BIDS runs: a new one with every start
 /// of the program and after more than a minute without a trial. Each has a table,
 /// ..._run-1_beh.tsv, and one recording, ..._run-1_recording-haptic_physio.tsv.gz, with one row a
-/// servo period (bids_recording.h); its sidecar has the trials' places, poses and renderers and the
+/// servo period (bids.h); its sidecar has the trials' places, poses and renderers and the
 /// objects. Memory holds the samples of one trial at a time.
 ///
 /// Experimenter's notes are not exported. The folder appears complete or not at all.

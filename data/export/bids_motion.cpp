@@ -5,7 +5,6 @@
 #include <map>
 #include <string_view>
 
-#include "data/export/column_values.h"
 #include "data/export/delimited_row.h"
 #include "data/export/sample_slots.h"
 

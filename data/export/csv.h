@@ -3,10 +3,19 @@
 
 #include <string>
 
+#include "data/export/clock.h"
 #include "data/export/settings.h"
+#include "data/files/text_sink.h"
+#include "data/store/export_log.h"
 #include "data/store/store.h"
 
 namespace palpate::data {
+
+// Internal to data/export: the table of attempts that were cut off, the same in every format.
+
+/// RFC 4180 with a header. \return rows
+std::int64_t write_attempts(Store& store, TextSink& out, const ExportClock& clock,
+                            ExportedParticipants& participants, ProgressCounter& counter);
 
 /// Writes every completed trial to `path` and, where attempts were cut off, those to attempts.csv
 /// in the same folder. UTF-8 without BOM, RFC 4180 (lines end in CRLF, fields quoted only where

@@ -5,9 +5,8 @@
 #include <set>
 #include <string_view>
 
-#include "data/export/column_values.h"
 #include "data/export/dataset_description.h"
-#include "data/export/dataset_writer.h"
+#include "data/export/delimited_row.h"
 #include "data/export/derived_table.h"
 #include "data/export/sample_slots.h"
 #include "data/files/text_sink.h"

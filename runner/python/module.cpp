@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "data/base/text.h"
-#include "data/export/trial_table.h"
+#include "data/export/delimited_row.h"
 #include "data/store/store.h"
 #include "protocols/json_document.h"
 #include "protocols/parse.h"

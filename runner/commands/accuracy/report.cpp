@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <sstream>
 
-#include "analysis/report/html_elements.h"
 #include "analysis/report/html_page.h"
 #include "analysis/text.h"
 #include "rendering/accuracy/peers.h"

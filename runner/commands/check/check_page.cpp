@@ -3,7 +3,6 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "analysis/report/html_elements.h"
 #include "analysis/report/html_page.h"
 #include "analysis/text.h"
 #include "data/base/text.h"

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <sstream>
 
-#include "analysis/report/html_elements.h"
 #include "analysis/report/html_page.h"
 #include "analysis/text.h"
 #include "runner/commands/accuracy/report.h"

@@ -11,7 +11,7 @@
 #include <span>
 #include <utility>
 
-#include "analysis/report/html_elements.h"
+#include "analysis/report/html_page.h"
 #include "analysis/text.h"
 #include "data/base/text.h"
 #include "rendering/renderer.h"

@@ -11,7 +11,7 @@
 
 #include "analysis/figures/figures.h"
 #include "analysis/input/trials.h"
-#include "analysis/report/reduction_cards.h"
+#include "analysis/report/report_html.h"
 #include "analysis/report/report_json.h"
 #include "analysis/report/tables.h"
 #include "analysis/statistics/analysis.h"

@@ -6,10 +6,9 @@
 #include <vector>
 
 #include "analysis/input/trials.h"
-#include "analysis/report/html_elements.h"
 #include "analysis/report/html_page.h"
-#include "analysis/report/reduction_cards.h"
 #include "analysis/report/report_assets.h"
+#include "analysis/report/report_html.h"
 #include "analysis/statistics/analysis.h"
 
 namespace palpate::analysis {

@@ -1,10 +1,9 @@
-#include "data/export/codebook.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <utility>
 
+#include "data/export/dataset_description.h"
 #include "tests/data/export/csv_fixture.h"
 
 namespace palpate::data {

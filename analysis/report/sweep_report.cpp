@@ -1,14 +1,195 @@
+#include "analysis/report/sweep_report.h"
+
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
+#include <nlohmann/json.hpp>
 #include <string>
 
+#include "analysis/figures/sweep_figures.h"
+#include "analysis/report/html_page.h"
 #include "analysis/report/report_text.h"
-#include "analysis/report/sweep_report.h"
-#include "analysis/report/table_cells.h"
+#include "analysis/report/tables.h"
 #include "analysis/statistics/paper_effects.h"
 #include "analysis/text.h"
 
 namespace palpate::analysis {
+
+namespace {
+
+std::string link_of(const std::string& figure) {
+  return figure == "gains" ? "Gains" : figure == "drivers" ? "Drivers" : "Scatter";
+}
+
+void put_pattern(HtmlPage& page, const SweepAnalysis& analysis) {
+  page.begin_section("pattern", "The pattern", "Pattern");
+  page.body() +=
+      "<pre tabindex=\"0\">" + escaped(printable(analysis.pattern->expression, 2000)) + "</pre>\n";
+  page.put_note("A shape's name stands for its gain in percent. " + pattern_note(analysis));
+  page.end_section();
+}
+
+Table sweep_source_table(const SweepAnalysis& analysis) {
+  const SweepTable& sweep = analysis.table;
+  Table table;
+  table.caption = "What was swept";
+  table.header = {"what", "value"};
+  table.n_names = 2;
+  table.rows = {
+      {"file", sweep.source},
+      {"protocol", sweep.protocol_name},
+      {"design", sweep.design},
+      {"points on record", std::to_string(sweep.rows()) + " of " + std::to_string(sweep.planned)},
+      {"failed", std::to_string(analysis.n_failed)},
+      {"seed", std::to_string(sweep.seed)},
+      {"participants at each point", std::to_string(sweep.participants)},
+      {"repetitions", std::to_string(sweep.repetitions)},
+      {"simulated with palpate", sweep.program_version},
+      {"analysed with palpate", analysis.program_version},
+      {"parameters", joined(sweep.parameters)}};
+  return table;
+}
+
+}  // namespace
+
+std::string sweep_html(const SweepAnalysis& analysis) {
+  HtmlPage page(sweep_answer(analysis), "SIMULATED PARTICIPANTS");
+  page.put_banner(
+      "SIMULATED PARTICIPANTS: all numbers below are from a model of a participant, not from "
+      "humans.");
+  put_list(page.below_title(), analysis.notes);
+  if (analysis.pattern) put_pattern(page, analysis);
+  for (const Figure& figure : sweep_figures(analysis))
+    page.put_figure_section(figure, link_of(figure.id));
+  page.begin_section("numbers", "Numbers", "Numbers");
+  for (const Table& table : sweep_tables(analysis)) put_table(page.body(), table);
+  page.end_section();
+  page.begin_section("source", "Source", "Source");
+  put_table(page.body(), sweep_source_table(analysis));
+  page.end_section();
+  return page.html("Made by palpate " + analysis.program_version + ".");
+}
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json json_of(const std::optional<double>& value) {
+  return value && std::isfinite(*value) ? Json(*value) : Json(nullptr);
+}
+Json json_of(const std::optional<Interval>& ends) {
+  return ends ? Json{ends->low, ends->high} : Json(nullptr);
+}
+
+Json sweep_source_json(const SweepAnalysis& analysis) {
+  const SweepTable& table = analysis.table;
+  Json out{{"file", table.source},
+           {"protocol", table.protocol_name},
+           {"design", table.design},
+           {"seed", table.seed},
+           {"points_planned", table.planned},
+           {"points", table.rows()},
+           {"failed", analysis.n_failed},
+           {"participants", table.participants},
+           {"repetitions", table.repetitions},
+           {"simulated_with", table.program_version}};
+  out["parameters"] = table.parameters;
+  out["shapes"] = table.shapes;
+  out["renderers"] = table.renderers;
+  out["reasons"] = Json::array();
+  for (const auto& [reason, points] : table.reasons)
+    out["reasons"].push_back({{"points", points}, {"reason", reason}});
+  return out;
+}
+
+Json pattern_json(const SweepAnalysis& analysis) {
+  const PatternShare& pattern = *analysis.pattern;
+  Json out{{"expression", pattern.expression},
+           {"of_the_paper", pattern.of_the_paper},
+           {"holds", pattern.holds},
+           {"n", pattern.n},
+           {"undefined", pattern.undefined}};
+  out["share"] = json_of(pattern.share);
+  out["wilson_ci95"] = json_of(pattern.ci95);
+  out["note"] = pattern_note(analysis);
+  if (!pattern.share) {
+    out["status"] = "undefined";
+    out["reason"] = "no setting in which it is defined";
+  }
+  return out;
+}
+
+Json spread_json(const Spread& spread) {
+  Json out{{"n", spread.n}};
+  out["mean"] = json_of(spread.mean);
+  out["sd"] = json_of(spread.sd);
+  out["least"] = json_of(spread.least);
+  out["q05"] = json_of(spread.q05);
+  out["q25"] = json_of(spread.q25);
+  out["q50"] = json_of(spread.q50);
+  out["q75"] = json_of(spread.q75);
+  out["q95"] = json_of(spread.q95);
+  out["greatest"] = json_of(spread.greatest);
+  out["share_positive"] = json_of(spread.share_positive);
+  out["noise_share"] = json_of(spread.noise_share);
+  return out;
+}
+
+void put_undefined(Json& out, const std::string& reason) {
+  if (reason.empty()) return;
+  out["status"] = "undefined";
+  out["reason"] = reason;
+}
+
+Json drivers_json(const SweepAnalysis& analysis, const Drivers& drivers) {
+  Json out;
+  if (drivers.sobol) {
+    out["base_points"] = drivers.sobol->base_points;
+    out["base_points_dropped"] = drivers.sobol->dropped;
+    out["variance"] = drivers.sobol->variance;
+    out["noise_share"] = json_of(drivers.sobol->noise_share);
+    if (const std::string note = chance_note(drivers); !note.empty()) out["note"] = note;
+    put_undefined(out, drivers.sobol->undefined);
+  }
+  Json& each = out["parameters"] = Json::object();
+  for (std::size_t p = 0; p < analysis.table.parameters.size(); ++p) {
+    Json one;
+    if (drivers.sobol) {
+      const SobolIndex& index = drivers.sobol->of[p];
+      one["first_order"] = json_of(index.first);
+      one["first_order_ci95"] = json_of(index.first_ci95);
+      one["total"] = json_of(index.total);
+      one["total_ci95"] = json_of(index.total_ci95);
+    } else {
+      const RankCorrelation& rank = drivers.ranks[p];
+      one["spearman"] = json_of(rank.spearman);
+      one["spearman_ci95"] = json_of(rank.spearman_ci95);
+      one["partial"] = json_of(rank.partial);
+      one["partial_ci95"] = json_of(rank.partial_ci95);
+      put_undefined(one, rank.undefined);
+    }
+    each[analysis.table.parameters[p]] = std::move(one);
+  }
+  return out;
+}
+
+}  // namespace
+
+std::string sweep_json(const SweepAnalysis& analysis) {
+  Json out;
+  out["version"] = 1;
+  out["simulated"] = true;
+  out["program_version"] = analysis.program_version;
+  out["sweep"] = sweep_source_json(analysis);
+  out["pattern"] = analysis.pattern ? pattern_json(analysis) : Json(nullptr);
+  for (std::size_t s = 0; s < analysis.table.shapes.size(); ++s)
+    out["gains"][analysis.table.shapes[s]] = spread_json(analysis.gains[s]);
+  for (const Drivers& drivers : analysis.drivers)
+    out["drivers"][drivers.output] = drivers_json(analysis, drivers);
+  out["bootstrap_seed"] = analysis.seed;
+  out["notes"] = analysis.notes;
+  return out.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
 
 namespace {
 

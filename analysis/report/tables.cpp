@@ -1,0 +1,650 @@
+#include "analysis/report/tables.h"
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <map>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "analysis/statistics/conclusions.h"
+#include "analysis/text.h"
+
+namespace palpate::analysis {
+
+namespace {
+
+constexpr std::ptrdiff_t kMostListed = 200;  // shapes in a note
+
+}  // namespace
+
+std::string number(const std::optional<double>& value, int decimals) {
+  return value && std::isfinite(*value) ? fixed(*value, decimals) : kMissing;
+}
+
+std::string percent(const std::optional<double>& value, int decimals) {
+  return value && std::isfinite(*value) ? fixed(*value, decimals) + " %" : kMissing;
+}
+
+std::optional<double> to_percent(const std::optional<double>& proportion) {
+  if (!proportion) return std::nullopt;
+  return 100 * *proportion;
+}
+
+std::string signed_fixed(double value, int decimals) {
+  if (!std::isfinite(value)) return kMissing;
+  const std::string text = fixed(value, decimals);
+  return (value > 0 && text.find_first_not_of("0.") != std::string::npos ? "+" : "") + text;
+}
+
+std::string p_or_missing(const std::optional<double>& p) { return p ? p_text(*p) : kMissing; }
+
+std::string reduction_interval(const std::optional<Interval>& log_ratio) {
+  if (!log_ratio) return kMissing;
+  const Interval ends = percent_reduction(*log_ratio);
+  return number(ends.low, 1) + " to " + number(ends.high, 1);
+}
+
+std::string caption(const Analysis& analysis, const std::string& what) {
+  const std::string label = simulated_label(analysis.table.simulated);
+  return label.empty() ? what : what + " (" + label + ")";
+}
+
+bool has_several_comparisons(const Analysis& analysis) { return analysis.comparisons.size() > 1; }
+
+Table comparison_table(const Analysis& analysis, const std::string& what,
+                       const std::vector<std::string>& header) {
+  Table table;
+  table.caption = caption(analysis, what);
+  if (has_several_comparisons(analysis)) table.header.emplace_back("renderer");
+  table.header.emplace_back("shape");
+  table.n_names = table.header.size();
+  table.header.insert(table.header.end(), header.begin(), header.end());
+  return table;
+}
+
+std::vector<std::string> row_names(const Analysis& analysis, const RendererPair& pair,
+                                   const std::string& shape) {
+  if (has_several_comparisons(analysis)) return {pair.renderer, shape};
+  return {shape};
+}
+
+std::string listed_shape(const Analysis& analysis, const RendererPair& pair,
+                         const std::string& shape) {
+  return has_several_comparisons(analysis) ? shape + " (" + pair.renderer + ")" : shape;
+}
+
+std::string narrow_bootstrap_note(const Analysis& analysis) {
+  std::map<std::size_t, double> by_pairs;
+  for (const Comparison& comparison : analysis.comparisons) {
+    for (const PairedShape& shape : comparison.shapes) {
+      const auto coverage = bca_coverage(shape.n_pairs);
+      if (shape.bootstrap.log_ratio_ci95 && coverage) by_pairs[shape.n_pairs] = *coverage;
+    }
+  }
+  if (by_pairs.empty()) return {};
+  std::string text;
+  for (const auto& [pairs, coverage] : by_pairs) {
+    text += (text.empty() ? "" : ", ") + fixed(100 * coverage, 0) + " % with " +
+            std::to_string(pairs) + " pairs";
+  }
+  return "BCa intervals are too short for few participants: instead of 95 % their coverage is " +
+         text +
+         " (simulated, normal differences; the t interval: 95 %). With skewed differences the "
+         "coverage of both is lower.";
+}
+
+void Reasons::add(const std::string& reason, const std::string& shape) {
+  if (reason.empty()) return;
+  for (auto& [known, shapes] : reasons_) {
+    if (known != reason) continue;
+    if (std::find(shapes.begin(), shapes.end(), shape) == shapes.end()) shapes.push_back(shape);
+    return;
+  }
+  reasons_.push_back({reason, {shape}});
+}
+
+void Reasons::put(std::vector<std::string>& notes) const {
+  for (const auto& [reason, shapes] : reasons_) {
+    std::vector<std::string> named(shapes.begin(),
+                                   shapes.begin() + std::min(std::ssize(shapes), kMostListed));
+    if (named.size() < shapes.size()) {
+      named.push_back(std::to_string(shapes.size() - named.size()) + " more");
+    }
+    notes.push_back("Undefined for " + joined(named) + ": " + reason + ".");
+  }
+}
+
+// Tables of reductions, times, accuracy, confusion, tests, exclusions and provenance.
+
+Table reduction_table(const Analysis& analysis) {
+  const bool paper_too = compares_as_paper(analysis);
+  std::vector<std::string> header{"geometric", "95 % interval", "arithmetic", "p (Holm)", "pairs"};
+  if (paper_too) header.emplace_back("paper");
+  Table table = comparison_table(
+      analysis,
+      "How much faster " + with_renderer(analysis, "than with") + ": reduction of response time",
+      header);
+  Reasons reasons;
+  for (const Comparison& comparison : analysis.comparisons) {
+    for (std::size_t s = 0; s < comparison.shapes.size(); ++s) {
+      const PairedShape& shape = comparison.shapes[s];
+      const std::string& name = analysis.table.shapes[s];
+      auto& row = table.rows.emplace_back(row_names(analysis, comparison.pair, name));
+      row.insert(row.end(), {percent(shape.percent_reduction_geometric),
+                             reduction_interval(shape.t_test.log_ratio_ci95),
+                             percent(shape.percent_reduction_arithmetic),
+                             p_or_missing(shape.t_test.p_holm), std::to_string(shape.n_pairs)});
+      if (paper_too) {
+        const std::string paper = paper_reduction(comparison.pair, name);
+        row.push_back(paper.empty() ? kMissing : paper);
+      }
+      reasons.add(shape.t_test.undefined, listed_shape(analysis, comparison.pair, name));
+    }
+  }
+  const RendererPair& first = analysis.comparisons.front().pair;
+  const std::string renderer = has_several_comparisons(analysis) ? "renderer" : first.renderer;
+  table.notes = {
+      "Geometric: 100 (1 − exp m), m the mean over participants of mean log " + renderer +
+      " − mean log " + first.reference +
+      "; interval (not adjusted) and p from the paired t-test on m, p adjusted over " +
+      (has_several_comparisons(analysis) ? "all shapes and comparisons" : "the shapes") +
+      " (Holm). Positive: " +
+      (has_several_comparisons(analysis) ? "faster than with " + with_article(first.reference)
+                                         : with_article(first.renderer) + " is faster") +
+      ". Arithmetic: from mean times" + (paper_too ? ", which the paper may have used." : ".")};
+  if (paper_too) {
+    table.notes.emplace_back(
+        "Paper: Ho, Basdogan & Srinivasan 2000, fig. 15; n.s.: no significant difference.");
+  }
+  reasons.put(table.notes);
+  return table;
+}
+
+Table times_table(const Analysis& analysis) {
+  Table table;
+  table.caption = caption(analysis, "Response times in s, correct trials");
+  table.n_names = 2;
+  table.header = {"shape",  "renderer",       "mean",         "sd",
+                  "median", "geometric mean", "participants", "trials"};
+  for (std::size_t s = 0; s < analysis.table.shapes.size(); ++s) {
+    for (std::size_t r = 0; r < analysis.table.renderers.size(); ++r) {
+      const TimesCell& cell = analysis.description.times[r][s];
+      table.rows.push_back({analysis.table.shapes[s], analysis.table.renderers[r],
+                            number(cell.mean_of_participant_means, 2),
+                            number(cell.sd_of_participant_means, 2),
+                            number(cell.mean_of_participant_medians, 2),
+                            number(cell.geomean_of_participant_geomeans, 2),
+                            std::to_string(cell.n_participants), std::to_string(cell.n_trials)});
+    }
+  }
+  table.notes = {
+      "Each is taken per participant first, then averaged over participants; sd is "
+      "between participants."};
+  return table;
+}
+
+Table accuracy_table(const Analysis& analysis) {
+  Table table;
+  table.caption = caption(analysis, "Accuracy, all trials");
+  table.n_names = 2;
+  table.header = {"shape",   "renderer",  "accuracy", "of answered", "mean of participants",
+                  "correct", "no answer", "trials"};
+  for (std::size_t s = 0; s < analysis.table.shapes.size(); ++s) {
+    for (std::size_t r = 0; r < analysis.table.renderers.size(); ++r) {
+      const AccuracyCell& cell = analysis.description.accuracy[r][s];
+      table.rows.push_back(
+          {analysis.table.shapes[s], analysis.table.renderers[r],
+           percent(to_percent(cell.accuracy)), percent(to_percent(cell.accuracy_answered)),
+           percent(to_percent(cell.mean_of_participant_accuracies)), std::to_string(cell.n_correct),
+           std::to_string(cell.n_timeouts), std::to_string(cell.n_trials)});
+    }
+  }
+  table.notes = {"A time-out counts as wrong; “of answered” leaves time-outs out."};
+  return table;
+}
+
+std::vector<Table> confusion_tables(const Analysis& analysis) {
+  std::vector<Table> tables;
+  for (std::size_t r = 0; r < analysis.table.renderers.size(); ++r) {
+    Table table;
+    table.caption = caption(analysis, "Confusion with " + analysis.table.renderers[r] +
+                                          ": shown (rows), answered (columns)");
+    table.header = {"shown"};
+    table.header.insert(table.header.end(), analysis.table.answers.begin(),
+                        analysis.table.answers.end());
+    table.header.emplace_back("no response");
+    for (std::size_t s = 0; s < analysis.table.shapes.size(); ++s) {
+      std::vector<std::string> row{analysis.table.shapes[s]};
+      for (const std::size_t n : analysis.description.confusion[r][s]) {
+        row.push_back(std::to_string(n));
+      }
+      table.rows.push_back(std::move(row));
+    }
+    tables.push_back(std::move(table));
+  }
+  return tables;
+}
+
+Table tests_table(const Analysis& analysis) {
+  const RendererPair& first = analysis.comparisons.front().pair;
+  Table table = comparison_table(
+      analysis,
+      "Tests of " +
+          (has_several_comparisons(analysis) ? "each renderer − " + first.reference
+                                             : difference_name(first)) +
+          " on log times, over participants",
+      {"t", "df", "p", "p (Holm)", "dz", "Hedges' gz", "V", "p (Wilcoxon)", "BCa 95 %"});
+  Reasons reasons;
+  for (const Comparison& comparison : analysis.comparisons) {
+    for (std::size_t s = 0; s < comparison.shapes.size(); ++s) {
+      const PairedShape& shape = comparison.shapes[s];
+      const std::string& name = analysis.table.shapes[s];
+      auto& row = table.rows.emplace_back(row_names(analysis, comparison.pair, name));
+      row.insert(
+          row.end(),
+          {number(shape.t_test.t, 2), number(shape.t_test.df, 0), p_or_missing(shape.t_test.p),
+           p_or_missing(shape.t_test.p_holm), number(shape.effect_size.dz, 2),
+           number(shape.effect_size.hedges_gz, 2), number(shape.wilcoxon.positive_rank_sum, 1),
+           p_or_missing(shape.wilcoxon.p), reduction_interval(shape.bootstrap.log_ratio_ci95)});
+      for (const std::string& reason : {shape.t_test.undefined, shape.effect_size.undefined,
+                                        shape.wilcoxon.undefined, shape.bootstrap.undefined}) {
+        reasons.add(reason, listed_shape(analysis, comparison.pair, name));
+      }
+    }
+  }
+  table.notes = {
+      "t, dz and gz are negative when " +
+      (has_several_comparisons(analysis) ? "it is faster than with " + with_article(first.reference)
+                                         : with_article(first.renderer) + " is faster") +
+      ". Primary: the paired t-test, Holm-adjusted" +
+      (has_several_comparisons(analysis) ? " over all shapes and comparisons" : "") +
+      ". Wilcoxon: exact, two-sided, V the positive rank sum. BCa: bootstrap interval of the "
+      "percent reduction, " +
+      std::to_string(kResamples) + " resamples, seed " + std::to_string(analysis.settings.seed) +
+      "."};
+  const std::string narrow = narrow_bootstrap_note(analysis);
+  if (!narrow.empty()) table.notes.push_back(narrow);
+  reasons.put(table.notes);
+  return table;
+}
+
+Table exclusions_table(const Analysis& analysis) {
+  Table table;
+  table.caption = caption(analysis, "Trials excluded from the times");
+  table.header = {"renderer", "trials", "wrong", "no response", "too fast", "used", "left out"};
+  for (std::size_t r = 0; r < analysis.table.renderers.size(); ++r) {
+    const Exclusions& lost = analysis.exclusions[r];
+    table.rows.push_back({analysis.table.renderers[r], std::to_string(lost.n_trials),
+                          std::to_string(lost.n_wrong), std::to_string(lost.n_timeouts),
+                          std::to_string(lost.n_too_fast), std::to_string(lost.n_used),
+                          percent(100 * lost.proportion_excluded())});
+  }
+  table.notes = {"Too fast: correct answers before " + fixed(analysis.settings.too_fast, 3) +
+                 " s. " + counted(analysis.table.n_practice, "practice trial", "practice trials") +
+                 " excluded beforehand."};
+  return table;
+}
+
+Table provenance_table(const Analysis& analysis) {
+  const Provenance& from = analysis.table.provenance;
+  Table table;
+  table.caption = "Provenance";
+  table.n_names = 2;
+  table.header = {"what", "value"};
+  const auto add = [&](const char* what, const std::string& value) {
+    if (!value.empty()) table.rows.push_back({what, value});
+  };
+  add("source", from.source);
+  add("participants", counted(analysis.table.participants.size(), "participant", "participants") +
+                          (analysis.table.simulated == Simulated::yes     ? ", simulated"
+                           : analysis.table.simulated == Simulated::mixed ? ", partly simulated"
+                                                                          : ""));
+  add("protocol", from.protocol_name);
+  for (const std::string& sha : from.protocol_sha256) add("protocol SHA-256", sha);
+  add("observer SHA-256", from.observer_sha256);
+  for (const std::string& version : from.program_versions) add("recorded with palpate", version);
+  add("analysed with palpate", analysis.program_version);
+  return table;
+}
+
+std::vector<Table> all_tables(const Analysis& analysis) {
+  std::vector<Table> tables{reduction_table(analysis)};
+  Table censored = censored_table(analysis);
+  if (!censored.rows.empty()) tables.push_back(std::move(censored));
+  tables.push_back(times_table(analysis));
+  tables.push_back(accuracy_table(analysis));
+  if (analysis.table.renderers.size() > 1) tables.push_back(speed_accuracy_table(analysis));
+  std::ranges::move(confusion_tables(analysis), std::back_inserter(tables));
+  tables.push_back(tests_table(analysis));
+  tables.push_back(anova_table(analysis));
+  tables.push_back(mixed_model_table(analysis));
+  tables.push_back(learning_table(analysis));
+  if (analysis.table.renderers.size() > 1) tables.push_back(renderer_order_table(analysis));
+  tables.push_back(exclusions_table(analysis));
+  if (analysis.time_outs.any) tables.push_back(time_outs_table(analysis));
+  tables.push_back(provenance_table(analysis));
+  return tables;
+}
+
+// Tables of inferential statistics: speed and accuracy, ANOVA, mixed model, practice.
+
+namespace {
+
+std::string sentence(const std::string& what, const std::string& reason) {
+  return what + ": " + reason + ".";
+}
+
+/// 100 (exp m - 1): percent change of time for a log ratio m.
+std::string percent_change(const std::optional<double>& log_ratio) {
+  if (!log_ratio) return kMissing;
+  return signed_fixed(100 * std::expm1(*log_ratio), 1) + " %";
+}
+
+std::string learning_note(const std::string& who, const TTest& test,
+                          const std::optional<double>& mean) {
+  if (!mean) return sentence(who, test.undefined);
+  std::string text = who + ": " + percent_change(mean) + " of time per 100 trials";
+  if (test.log_ratio_ci95) {
+    text += " (95 % interval " + percent_change(test.log_ratio_ci95->low) + " to " +
+            percent_change(test.log_ratio_ci95->high) + ")";
+  } else {
+    text += "; " + test.undefined;
+  }
+  return text + ".";
+}
+
+/// Standard deviations of the random effects and the residual; the correlation if there is only one
+/// (the JSON has all).
+std::string random_effects_note(const MixedModel& model,
+                                const std::vector<std::string>& renderers) {
+  std::vector<std::string> slopes;
+  for (std::size_t r = 1; r < renderers.size(); ++r) {
+    slopes.push_back(with_article(renderers[r]) + " " + number(model.random_sds[r], 3));
+  }
+  return "Standard deviations of log time: participants' intercepts " +
+         number(model.random_sds[0], 3) + ", their slopes for " + joined(slopes) +
+         (slopes.size() == 1 ? " (correlation " + number(model.random_correlations[0], 2) + ")"
+                             : "") +
+         ", residual " + number(model.residual_sd, 3) + "; log likelihood (REML) " +
+         number(model.log_likelihood_reml, 3) + ", " +
+         counted(model.n_observations, "trial", "trials") + ".";
+}
+
+}  // namespace
+
+Table speed_accuracy_table(const Analysis& analysis) {
+  const RendererPair& first = analysis.comparisons.front().pair;
+  const std::string who = has_several_comparisons(analysis) ? "each renderer" : first.renderer;
+  Table table = comparison_table(
+      analysis, "Speed and accuracy together, " + who + " against " + first.reference,
+      {"time", "accuracy " + first.reference,
+       has_several_comparisons(analysis) ? "own accuracy" : "accuracy " + first.renderer,
+       "accuracy", "95 % interval", "p", "reading"});
+  for (const Comparison& comparison : analysis.comparisons) {
+    for (std::size_t s = 0; s < comparison.speed_accuracy.size(); ++s) {
+      const SpeedAccuracy& shape = comparison.speed_accuracy[s];
+      const auto& interval = shape.test.log_ratio_ci95;
+      auto& row =
+          table.rows.emplace_back(row_names(analysis, comparison.pair, analysis.table.shapes[s]));
+      row.insert(row.end(),
+                 {shape.percent_change_time ? signed_fixed(*shape.percent_change_time, 1) + " %"
+                                            : kMissing,
+                  percent(to_percent(shape.accuracy_reference)),
+                  percent(to_percent(shape.accuracy_renderer)),
+                  shape.accuracy_change ? signed_fixed(100 * *shape.accuracy_change, 1) + " points"
+                                        : kMissing,
+                  interval ? signed_fixed(100 * interval->low, 1) + " to " +
+                                 signed_fixed(100 * interval->high, 1)
+                           : kMissing,
+                  p_or_missing(shape.test.p), shape.reading.empty() ? kMissing : shape.reading});
+    }
+  }
+  table.notes = {
+      "Trade-off possible: faster and less accurate, or slower and more accurate, by more than 1 % "
+      "of the time and 1 percentage point. Interval and p: of the change of accuracy in percentage "
+      "points, paired over participants, not adjusted."};
+  return table;
+}
+
+Table anova_table(const Analysis& analysis) {
+  const RmAnova& anova = analysis.rm_anova;
+  Table table;
+  table.caption =
+      caption(analysis, "Repeated-measures ANOVA on mean log times, " +
+                            counted(anova.n_participants_used, "participant", "participants"));
+  table.header = {"effect", "df",    "den. df", "F",      "p",    "η² gen.",
+                  "W",      "p (W)", "ε GG",    "p (GG)", "ε HF", "p (HF)"};
+  for (const AnovaEffect& effect : anova.effects) {
+    const Sphericity& sphericity = effect.sphericity;
+    table.rows.push_back({effect.name, number(effect.num_df, 0), number(effect.den_df, 0),
+                          number(effect.f, 2), p_or_missing(effect.p),
+                          number(effect.generalized_eta_squared, 3),
+                          number(sphericity.mauchly_w, 3), p_or_missing(sphericity.mauchly_p),
+                          number(sphericity.gg_epsilon, 3), p_or_missing(sphericity.gg_p),
+                          number(sphericity.hf_epsilon_used, 3), p_or_missing(sphericity.hf_p)});
+  }
+  table.notes = {
+      "On participants with a time in every cell. Generalised η²: SS / (SS + SS of "
+      "participants + all error SS). W: Mauchly; GG: Greenhouse and Geisser; HF: Huynh and Feldt."};
+  if (!anova.undefined.empty()) {
+    table.notes.push_back(sentence("Undefined", anova.undefined));
+    return table;
+  }
+  for (const AnovaEffect& effect : anova.effects) {
+    if (!effect.undefined.empty()) {
+      table.notes.push_back(sentence("Undefined for " + effect.name, effect.undefined));
+    } else if (!effect.sphericity.undefined.empty() && effect.num_df.value_or(0) > 1) {
+      table.notes.push_back(
+          sentence("Sphericity of " + effect.name + ", undefined", effect.sphericity.undefined));
+    }
+  }
+  if (!anova.dropped.empty()) {
+    std::vector<std::string> names;
+    for (const std::size_t p : anova.dropped) names.push_back(analysis.table.participants[p]);
+    table.notes.push_back("Left out, without a time in some cell: " + joined(names) + ".");
+  }
+  return table;
+}
+
+Table mixed_model_table(const Analysis& analysis) {
+  const MixedModel& model = analysis.mixed_model;
+  const std::vector<Comparison>& all = analysis.comparisons;
+  Table table = comparison_table(
+      analysis, "Mixed model: log time ~ renderer * shape + (1 + renderer | participant), REML",
+      {"reduction", "95 % interval",
+       has_several_comparisons(analysis) ? "− " + all.front().pair.reference
+                                         : difference_name(all.front().pair),
+       "se", "df", "t", "p", "p (Holm)"});
+  Reasons reasons;
+  for (std::size_t c = 0; c < all.size(); ++c) {
+    for (std::size_t s = 0; s < analysis.table.shapes.size(); ++s) {
+      const ModelEstimate& value = model.contrasts[c][s];
+      const std::string& name = analysis.table.shapes[s];
+      std::optional<double> reduction;
+      if (value.estimate) reduction = percent_reduction(*value.estimate);
+      auto& row = table.rows.emplace_back(row_names(analysis, all[c].pair, name));
+      row.insert(row.end(),
+                 {percent(reduction), reduction_interval(value.ci95), number(value.estimate, 4),
+                  number(value.se, 4), number(value.df_satterthwaite, 1), number(value.t, 2),
+                  p_or_missing(value.p), p_or_missing(value.p_holm)});
+      reasons.add(value.undefined, listed_shape(analysis, all[c].pair, name));
+    }
+  }
+  if (!model.undefined.empty()) {
+    table.notes.push_back(sentence("Undefined", model.undefined));
+    return table;
+  }
+  table.notes.push_back(
+      "Complements the paired t-tests: the model has no participant × shape variance, so its "
+      "intervals are too narrow and p too small where there is some. df: Satterthwaite.");
+  if (!model.singular.empty()) {
+    table.notes.push_back(
+        sentence("Singular fit, on the boundary of the parameter space", model.singular) +
+        " Interpret its intervals and p with caution.");
+  }
+  table.notes.push_back(random_effects_note(model, analysis.table.renderers));
+  reasons.put(table.notes);
+  return table;
+}
+
+Table learning_table(const Analysis& analysis) {
+  const Practice& practice = analysis.practice;
+  Table table;
+  table.caption = caption(analysis,
+                          "Learning: geometric mean time in s over the trials with a "
+                          "renderer, in order");
+  table.header = {"renderer"};
+  for (std::size_t b = 0; b < kLearningBins; ++b) {
+    std::string name = std::to_string(b + 1);
+    name += "/" + std::to_string(kLearningBins);
+    table.header.push_back(name);
+  }
+  for (std::size_t r = 0; r < practice.learning.size(); ++r) {
+    const Learning& learning = practice.learning[r];
+    std::vector<std::string> row{analysis.table.renderers[r]};
+    for (const LearningBin& bin : learning.bins) {
+      row.push_back(bin.mean_log ? number(std::exp(*bin.mean_log), 2) : kMissing);
+    }
+    table.rows.push_back(std::move(row));
+    table.notes.push_back(
+        learning_note(analysis.table.renderers[r], learning.slope, learning.mean_slope));
+  }
+  for (std::size_t c = 0; c < analysis.comparisons.size(); ++c) {
+    const RendererPair& pair = analysis.comparisons[c].pair;
+    if (!pair.in_data()) continue;
+    table.notes.push_back(
+        learning_note(pair.is_ray_minus_point() ? "Ray − point" : difference_name(pair),
+                      practice.pairs[c].slope_difference, practice.pairs[c].mean_slope_difference));
+  }
+  return table;
+}
+
+Table renderer_order_table(const Analysis& analysis) {
+  const RendererPair& first = analysis.comparisons.front().pair;
+  const std::string renderer = has_several_comparisons(analysis) ? "renderer" : first.renderer;
+  Table table = comparison_table(analysis, "Practice: reduction by the order of the renderers",
+                                 {first.reference + " first", "n", renderer + " first", "n",
+                                  "difference", "p (Holm)", "balanced", "95 % interval"});
+  Reasons reasons;
+  std::vector<std::string> interleaved;
+  const auto add = [&](const RendererPair& pair, const std::string& name,
+                       const OrderEffect& effect) {
+    const auto reduction = [](const std::optional<double>& log_ratio) {
+      return log_ratio ? percent(percent_reduction(*log_ratio)) : kMissing;
+    };
+    auto& row = table.rows.emplace_back(row_names(analysis, pair, name));
+    row.insert(row.end(),
+               {reduction(effect.reference_first.mean_log_ratio),
+                std::to_string(effect.reference_first.n_participants),
+                reduction(effect.renderer_first.mean_log_ratio),
+                std::to_string(effect.renderer_first.n_participants),
+                percent_change(effect.difference), p_or_missing(effect.test.p_holm),
+                reduction(effect.balanced_log_ratio), reduction_interval(effect.balanced_ci95)});
+    reasons.add(effect.test.undefined, listed_shape(analysis, pair, name));
+  };
+  for (std::size_t c = 0; c < analysis.comparisons.size(); ++c) {
+    const RendererPair& pair = analysis.comparisons[c].pair;
+    const PairPractice& practice = analysis.practice.pairs[c];
+    for (std::size_t s = 0; s < practice.shapes.size(); ++s) {
+      add(pair, analysis.table.shapes[s], practice.shapes[s]);
+    }
+    add(pair, "all shapes", practice.all_shapes);
+    if (practice.n_interleaved == 0) continue;
+    interleaved.push_back(
+        counted(practice.n_interleaved, "participant", "participants") + " did trials of " +
+        (has_several_comparisons(analysis)
+             ? with_article(first.reference) + " and " + with_article(pair.renderer)
+             : "both renderers") +
+        " mixed: no order, not counted here.");
+  }
+  table.notes = {
+      "Percent reductions by which renderer came first. Practice makes the second one look faster: "
+      "a gain is too large with " +
+      first.reference + " first and too small with " +
+      (has_several_comparisons(analysis) ? "the other" : first.renderer) +
+      " first. Difference: ratio of " + renderer + " to " + first.reference + " times, " +
+      first.reference + " first against " + renderer +
+      " first; below 0 where practice helps; p adjusted over all tests of practice (slopes over "
+      "the trials and orders, " +
+      std::to_string(analysis.practice.n_tests) +
+      " in all). Balanced: both orders with equal weight."};
+  table.notes.insert(table.notes.end(), interleaved.begin(), interleaved.end());
+  reasons.put(table.notes);
+  return table;
+}
+
+// Tables of time-outs and of the estimates with time-outs as censored times.
+
+namespace {
+
+std::string proportion_of(const TimeOutCell& cell) {
+  return cell.n_trials == 0 ? kMissing : percent(100 * cell.proportion());
+}
+
+std::string limit_of(const TimeOutCell& cell) {
+  if (!cell.lowest_limit) return kMissing;
+  const auto seconds = [](double s) { return fixed(s, s == std::floor(s) ? 0 : 2); };
+  if (*cell.lowest_limit == *cell.highest_limit) return seconds(*cell.lowest_limit) + " s";
+  return seconds(*cell.lowest_limit) + " to " + seconds(*cell.highest_limit) + " s";
+}
+
+}  // namespace
+
+Table censored_table(const Analysis& analysis) {
+  const RendererPair& first = analysis.comparisons.front().pair;
+  Table table = comparison_table(
+      analysis, "Time-outs as censored times: reduction of response time",
+      {"answered only", "with time-outs", "95 % interval", "time-outs " + first.reference,
+       has_several_comparisons(analysis) ? "own time-outs" : "time-outs " + first.renderer, "n"});
+  Reasons reasons;
+  for (const Comparison& comparison : analysis.comparisons) {
+    for (std::size_t s = 0; s < comparison.censored.size(); ++s) {
+      const CensoredEstimate& censored = comparison.censored[s];
+      const std::string& name = analysis.table.shapes[s];
+      std::optional<double> reduction;
+      if (censored.log_ratio) reduction = percent_reduction(*censored.log_ratio);
+      auto& row = table.rows.emplace_back(row_names(analysis, comparison.pair, name));
+      row.insert(row.end(),
+                 {percent(comparison.shapes[s].percent_reduction_geometric), percent(reduction),
+                  reduction_interval(censored.log_ratio_ci95),
+                  proportion_of(analysis.time_outs.cells[*comparison.pair.reference_at][s]),
+                  proportion_of(analysis.time_outs.cells[*comparison.pair.renderer_at][s]),
+                  std::to_string(censored.n_participants)});
+      reasons.add(censored.undefined, listed_shape(analysis, comparison.pair, name));
+    }
+  }
+  table.notes = {
+      "A trial that ends at the limit would have taken longer: leaving it out biases the times of "
+      "a slow condition downwards. Here log time ~ participant + renderer with normal residuals, "
+      "time-outs censored at their limit, by maximum likelihood; interval by t from scores summed "
+      "by "
+      "participant. It assumes log-normal times beyond the limit and complements the paired "
+      "t-test; without time-outs and with equally many trials in all cells both are equal."};
+  reasons.put(table.notes);
+  return table;
+}
+
+Table time_outs_table(const Analysis& analysis) {
+  Table table;
+  table.caption = caption(analysis, "Time-outs: trials that ended at the limit");
+  table.n_names = 2;
+  table.header = {
+      "shape", "renderer", "trials", "time-outs", "percent", "limit", "most in one participant"};
+  for (std::size_t s = 0; s < analysis.table.shapes.size(); ++s) {
+    for (std::size_t r = 0; r < analysis.table.renderers.size(); ++r) {
+      const TimeOutCell& cell = analysis.time_outs.cells[r][s];
+      table.rows.push_back(
+          {analysis.table.shapes[s], analysis.table.renderers[r], std::to_string(cell.n_trials),
+           std::to_string(cell.n_timeouts), proportion_of(cell), limit_of(cell),
+           cell.most_affected
+               ? percent(100 * cell.largest_proportion) + " (" +
+                     shortened(analysis.table.participants[*cell.most_affected], 12) + ")"
+               : kMissing});
+    }
+  }
+  return table;
+}
+
+}  // namespace palpate::analysis

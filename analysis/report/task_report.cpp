@@ -1,0 +1,733 @@
+#include "analysis/report/task_report.h"
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <variant>
+
+#include "analysis/figures/figures.h"
+#include "analysis/figures/task_figures.h"
+#include "analysis/report/html_page.h"
+#include "analysis/report/report_json.h"
+#include "analysis/report/report_text.h"
+#include "analysis/text.h"
+#include "data/base/json_text.h"
+#include "protocols/procedures/psychometric.h"
+
+namespace palpate::analysis {
+namespace {
+
+constexpr const char* kNoNumber = "–";
+
+/// "compare, stiffness, ball"
+std::string stimulus_of(const std::string& task, const std::string& block,
+                        const std::string& shape) {
+  std::string name = task;
+  for (const std::string* part : {&block, &shape}) {
+    if (!part->empty()) name += ", " + *part;
+  }
+  return name;
+}
+
+std::string interval_cell(const std::optional<Interval>& interval) {
+  if (!interval) return kNoNumber;
+  return short_number(interval->low) + " to " + short_number(interval->high);
+}
+
+Table group_table(const TaskAnalysis& analysis, const std::string& label) {
+  Table table;
+  table.caption = "Means over participants" + (label.empty() ? "" : " (" + label + ")");
+  table.header = {"measure",       "task, block, stimulus", "renderer", "mean",
+                  "95 % interval", "participants",          "left out"};
+  table.n_names = 3;
+  for (const TaskGroup& group : analysis.groups) {
+    std::string measure = measure_plural(group.measure);
+    if (!group.unit.empty()) measure += " (" + group.unit + ")";
+    for (const GroupMean& one : group.renderers)
+      table.rows.push_back({measure, stimulus_of(group.task, group.block_name, group.shape),
+                            one.renderer, one.mean ? short_number(*one.mean) : kNoNumber,
+                            interval_cell(one.ci95), std::to_string(one.participants.size()),
+                            std::to_string(one.n_undetermined)});
+  }
+  table.notes = {
+      "Geometric means where all values are positive and have a true zero, but of exponents; t "
+      "intervals, of one participant none. Left out: functions without a threshold among the "
+      "levels shown, or with answers the other way round."};
+  return table;
+}
+
+Table comparison_table(const TaskAnalysis& analysis, const std::string& label) {
+  Table table;
+  table.caption = "The same participants, by renderer" + (label.empty() ? "" : " (" + label + ")");
+  table.header = {"measure",       "task, block, stimulus",
+                  "compared",      "value",
+                  "95 % interval", "p",
+                  "p (Holm)",      "dz",
+                  "pairs"};
+  table.n_names = 3;
+  for (const TaskComparison& one : analysis.renderers) {
+    for (const ConditionDifference& difference : one.comparison.differences) {
+      const auto back = [&](double value) { return one.logarithms ? std::exp(value) : value; };
+      std::optional<Interval> ends = difference.t_test.log_ratio_ci95;
+      if (ends) ends = Interval{back(ends->low), back(ends->high)};
+      const auto& test = difference.t_test;
+      table.rows.push_back(
+          {measure_plural(one.measure), stimulus_of(one.task, one.block_name, one.shape),
+           one.conditions[difference.condition] + (one.logarithms ? " / " : " − ") +
+               one.conditions[0],
+           difference.n_pairs > 0 ? short_number(back(difference.mean)) : kNoNumber,
+           interval_cell(ends), test.p ? p_text(*test.p) : kNoNumber,
+           test.p_holm ? p_text(*test.p_holm) : kNoNumber,
+           difference.effect_size.dz ? short_number(*difference.effect_size.dz) : kNoNumber,
+           std::to_string(difference.n_pairs)});
+    }
+  }
+  table.notes = {
+      "Paired t-tests: of ratios (/) on natural logarithms where all values are positive and have "
+      "a "
+      "true zero, else of differences (−)."};
+  return table;
+}
+
+/// The study's title, or its name, or its file.
+std::string study_of(const TaskTable& table) {
+  if (!table.title.empty()) return table.title;
+  for (const auto& [name, sha256] : table.protocols) {
+    if (!name.empty()) return name;
+  }
+  return "Tasks of " + table.source;
+}
+
+}  // namespace
+
+std::string task_report_html(const TaskAnalysis& analysis, const std::string& program_version) {
+  const TaskTable& source = analysis.table;
+  const std::string label = source.simulated ? "SIMULATED PARTICIPANTS" : "";
+  HtmlPage page(printable(study_of(source), 400), label);
+  if (source.simulated)
+    page.put_banner(
+        "SIMULATED PARTICIPANTS: numbers below are from a model of a participant, not from "
+        "humans.");
+  page.below_title() += "<p class=\"lead\">Thresholds and other results of tasks, " +
+                        counted(source.trials.size(), "trial", "trials") + " of " +
+                        escaped(printable(source.source, 400)) + "</p>\n";
+  if (!source.warnings.empty()) {
+    page.below_title() += "<div class=\"warnings\" aria-label=\"Warnings\">\n";
+    put_list(page.below_title(), source.warnings);
+    page.below_title() += "</div>\n";
+  }
+  const std::vector<Figure> figures = task_figures(analysis);
+  const auto put_figures = [&](bool of_groups) {
+    for (const Figure& figure : figures) {
+      if (figure.id.starts_with("group") == of_groups)
+        page.put_figure_section(figure, figure.title);
+    }
+  };
+  if (!analysis.groups.empty()) {
+    page.begin_section("participants", "Results over participants", "Results over participants");
+    put_table(page.body(), group_table(analysis, label));
+    if (!analysis.renderers.empty()) put_table(page.body(), comparison_table(analysis, label));
+    page.end_section();
+  }
+  put_figures(true);
+  page.begin_section("numbers", "Numbers", "Numbers");
+  page.body() += "<pre tabindex=\"0\">" + escaped_lines(task_report_text(analysis)) + "</pre>\n";
+  page.end_section();
+  put_figures(false);
+  if (analysis.identification) {
+    for (const Figure& figure : figures_of(*analysis.identification, {}))
+      page.put_figure_section(figure, figure.title);
+  }
+  return page.html("Analysed with palpate " + program_version + ".");
+}
+
+namespace {
+
+using TaskJson = nlohmann::ordered_json;
+
+TaskJson finite(double value) { return std::isfinite(value) ? TaskJson(value) : TaskJson(nullptr); }
+
+TaskJson maybe(const std::optional<double>& value) {
+  return value ? finite(*value) : TaskJson(nullptr);
+}
+
+TaskJson ends_json(const std::optional<Interval>& interval) {
+  if (!interval) return nullptr;
+  return {finite(interval->low), finite(interval->high)};
+}
+
+/// As protocols say it.
+const char* easier_name(protocols::Easier easier) {
+  return easier == protocols::Easier::higher ? "higher" : "lower";
+}
+
+void put_status(TaskJson& out, const std::string& undefined) {
+  out["status"] = undefined.empty() ? "ok" : "undefined";
+  if (!undefined.empty()) out["reason"] = undefined;
+}
+
+TaskJson fit_json(const ParticipantFunction& one) {
+  TaskJson fit;
+  put_status(fit, one.fit.undefined);
+  if (!one.fit.undefined.empty()) return fit;
+  fit["function"] = to_string(one.model.function.shape);
+  fit["scale"] = to_string(one.model.function.scale);
+  fit["easier"] = easier_name(one.model.function.easier);
+  fit["reversed"] = one.reversed;
+  fit["threshold"] = one.fit.parameters.threshold;
+  fit["threshold_ci95"] = ends_json(one.fit.threshold_ci95);
+  fit["slope"] = one.fit.parameters.slope;
+  fit["slope_ci95"] = ends_json(one.fit.slope_ci95);
+  fit["determined"] = one.determined;
+  fit["slope_at_bound"] = one.fit.slope_at_bound;
+  fit["guess_is_lapse"] = one.model.guess_is_lapse;
+  fit["guess"] = one.fit.parameters.guess;
+  fit["guess_ci95"] = ends_json(one.fit.guess_ci95);
+  fit["lapse"] = one.fit.parameters.lapse;
+  fit["lapse_ci95"] = ends_json(one.fit.lapse_ci95);
+  fit["log_likelihood"] = one.fit.log_likelihood;
+  fit["deviance"] = one.goodness.deviance;
+  fit["deviance_p"] = maybe(one.goodness.p);
+  fit["pse"] = maybe(one.figures.pse);
+  fit["pse_ci95"] = ends_json(one.figures.pse_ci95);
+  fit["jnd"] = maybe(one.figures.jnd);
+  fit["jnd_ci95"] = ends_json(one.figures.jnd_ci95);
+  fit["weber_fraction"] = maybe(one.figures.weber_fraction);
+  fit["weber_fraction_ci95"] = ends_json(one.figures.weber_fraction_ci95);
+  return fit;
+}
+
+TaskJson posterior_json(const PsychometricPosterior& posterior) {
+  TaskJson out;
+  put_status(out, posterior.undefined);
+  if (!posterior.undefined.empty()) return out;
+  out["threshold"] = posterior.mean.threshold;
+  out["threshold_ci95"] = ends_json(posterior.threshold_ci95);
+  out["slope"] = posterior.mean.slope;
+  out["slope_ci95"] = ends_json(posterior.slope_ci95);
+  out["guess"] = posterior.mean.guess;
+  out["guess_ci95"] = ends_json(posterior.guess_ci95);
+  out["lapse"] = posterior.mean.lapse;
+  out["lapse_ci95"] = ends_json(posterior.lapse_ci95);
+  return out;
+}
+
+/// What an adaptive procedure makes of its answers itself.
+TaskJson procedure_json(const TrackProcedure& procedure) {
+  const protocols::Estimate& estimate = procedure.estimate;
+  TaskJson out{{"kind", kind_of(procedure.spec)},
+               {"threshold", maybe(estimate.threshold)},
+               {"threshold_scale_sd", maybe(estimate.threshold_scale_sd)},
+               {"slope", maybe(estimate.slope)},
+               {"guess", maybe(estimate.guess)},
+               {"lapse", maybe(estimate.lapse)},
+               {"n_trials", estimate.trials},
+               {"n_reversals", estimate.reversals},
+               {"n_at_limit", estimate.at_limit},
+               {"converges_at", maybe(procedure.target)},
+               {"fit_level_there", maybe(procedure.fitted_level)}};
+  if (const auto* quest = std::get_if<protocols::QuestPlus>(&procedure.spec)) {
+    out["function"] = to_string(quest->function.shape);
+    out["scale"] = to_string(quest->function.scale);
+  }
+  return out;
+}
+
+TaskJson function_json(const ParticipantFunction& one) {
+  TaskJson out{{"participant_id", one.participant}};
+  for (const LevelCount& count : one.counts)
+    out["levels"].push_back(
+        {{"level", count.level}, {"trials", count.trials}, {"successes", count.successes}});
+  out["fit"] = fit_json(one);
+  out["bayes"] = posterior_json(one.posterior);
+  for (const Track& track : one.tracks) {
+    out["tracks"].push_back({{"track", track.name},
+                             {"levels", track.levels},
+                             {"successes", track.successes},
+                             {"reversal_trials", TaskJson::array()}});
+    for (const std::size_t at : track.reversals)
+      out["tracks"].back()["reversal_trials"].push_back(at + 1);
+    if (track.procedure) out["tracks"].back()["procedure"] = procedure_json(*track.procedure);
+  }
+  TaskJson detection;
+  put_status(detection, one.detectability.undefined);
+  if (one.detectability.undefined.empty()) {
+    detection["d_prime"] = maybe(one.detectability.d_prime);
+    detection["d_prime_ci95"] = ends_json(one.detectability.d_prime_ci95);
+    detection["criterion"] = maybe(one.detectability.criterion);
+    detection["criterion_ci95"] = ends_json(one.detectability.criterion_ci95);
+  }
+  out["detectability"] = detection;
+  return out;
+}
+
+TaskJson magnitude_json(const TaskCell& cell) {
+  TaskJson out{{"exponent", maybe(cell.magnitude->exponent)},
+               {"exponent_ci95", ends_json(cell.magnitude->exponent_ci95)},
+               {"n_without_logarithm", cell.magnitude->without_logarithm}};
+  for (const StevensLine& line : cell.magnitude->lines)
+    out["participants"].push_back({{"participant_id", cell.participants[line.participant]},
+                                   {"exponent", maybe(line.exponent)},
+                                   {"exponent_se", maybe(line.exponent_se)},
+                                   {"log10_scale", maybe(line.log10_scale)},
+                                   {"r_squared", maybe(line.r_squared)}});
+  for (const MagnitudeMean& one : cell.magnitude->means)
+    out["levels"].push_back({{"level", one.level},
+                             {"geometric_mean", one.geometric_mean},
+                             {"ci95", ends_json(one.ci95)},
+                             {"n_participants", one.participants}});
+  return out;
+}
+
+TaskJson information_json(const InformationTransfer& transfer) {
+  return {{"bits", maybe(transfer.plain)},
+          {"bits_corrected", maybe(transfer.corrected)},
+          {"se", maybe(transfer.se)},
+          {"stimulus_entropy_bits", transfer.stimulus_entropy},
+          {"categories", maybe(transfer.categories)}};
+}
+
+TaskJson cell_json(const TaskCell& cell) {
+  TaskJson out{{"task", cell.task},
+               {"block_name", cell.block_name},
+               {"shape", cell.shape},
+               {"renderer", cell.renderer},
+               {"n_trials", cell.trials},
+               {"n_answered", cell.answered},
+               {"n_judged", cell.judged},
+               {"n_correct", cell.correct},
+               {"standard_level", maybe(cell.standard_level)},
+               {"level_unit", cell.level_unit.empty() ? TaskJson() : TaskJson(cell.level_unit)},
+               {"expected_easier",
+                cell.expected_easier ? TaskJson(easier_name(*cell.expected_easier)) : TaskJson()},
+               {"forced_choice", cell.forced_choice},
+               {"same_different", cell.same_different},
+               {"n_intervals", cell.task == "compare" ? TaskJson(cell.intervals) : TaskJson()}};
+  for (const ParticipantFunction& one : cell.functions)
+    out["psychometric_functions"].push_back(function_json(one));
+  if (cell.magnitude) out["magnitude_estimation"] = magnitude_json(cell);
+  for (const Adjustment& one : cell.adjustments)
+    out["adjustments"].push_back({{"participant_id", cell.participants[one.participant]},
+                                  {"n_settings", one.settings},
+                                  {"pse", one.pse},
+                                  {"pse_ci95", ends_json(one.pse_ci95)},
+                                  {"constant_error", one.constant_error},
+                                  {"sd", maybe(one.sd)},
+                                  {"jnd", maybe(one.jnd)},
+                                  {"start_effect", maybe(one.start_effect)}});
+  if (cell.information) {
+    TaskJson& bits = out["information_transfer"] = information_json(*cell.information);
+    bits["mean_of_participants_bits_corrected"] = maybe(cell.information_mean);
+    bits["mean_of_participants_ci95"] = ends_json(cell.information_ci95);
+    for (std::size_t i = 0; i < cell.informations.size(); ++i) {
+      TaskJson one{{"participant_id", cell.participants[i]}};
+      one.update(information_json(cell.informations[i]));
+      bits["participants"].push_back(std::move(one));
+    }
+  }
+  TaskJson confidence;
+  put_status(confidence, cell.confidence.undefined);
+  if (cell.confidence.area) {
+    confidence["type2_roc_area"] = *cell.confidence.area;
+    confidence["ci95"] = ends_json(cell.confidence.area_ci95);
+  }
+  out["confidence"] = confidence;
+  return out;
+}
+
+TaskJson group_json(const TaskGroup& group) {
+  TaskJson out{{"task", group.task},
+               {"block_name", group.block_name},
+               {"shape", group.shape},
+               {"measure", group.measure},
+               {"unit", group.unit.empty() ? TaskJson() : TaskJson(group.unit)},
+               {"mean_is", group.geometric ? "geometric" : "arithmetic"}};
+  for (const GroupMean& one : group.renderers) {
+    TaskJson renderer{{"renderer", one.renderer},
+                      {"n_participants", one.participants.size()},
+                      {"n_undetermined", one.n_undetermined},
+                      {"mean", maybe(one.mean)},
+                      {"ci95", ends_json(one.ci95)},
+                      {group.geometric ? "sd_of_natural_logs" : "sd", maybe(one.sd)},
+                      {"participants", TaskJson::array()}};
+    for (const NamedFigure& figure : one.participants)
+      renderer["participants"].push_back(
+          {{"participant_id", figure.participant}, {"value", finite(figure.value)}});
+    out["renderers"].push_back(std::move(renderer));
+  }
+  return out;
+}
+
+TaskJson comparison_json(const TaskComparison& one, bool of_renderers) {
+  const char* const condition = of_renderers ? "renderer" : "condition";
+  TaskJson out{{"task", one.task}, {"measure", one.measure}};
+  if (of_renderers) {
+    out["block_name"] = one.block_name;
+    out["shape"] = one.shape;
+  } else {
+    out["renderer"] = one.renderer;
+  }
+  out["reference"] = one.conditions[0];
+  out["natural_logarithms"] = one.logarithms;
+  out["n_undetermined"] = one.n_undetermined;
+  put_status(out, one.comparison.undefined);
+  out["participant_sd"] = maybe(one.comparison.participant_sd);
+  out["residual_sd"] = maybe(one.comparison.residual_sd);
+  for (const ConditionDifference& difference : one.comparison.differences)
+    out["differences"].push_back({{condition, one.conditions[difference.condition]},
+                                  {"n_pairs", difference.n_pairs},
+                                  {"mean", finite(difference.mean)},
+                                  {"ci95", ends_json(difference.t_test.log_ratio_ci95)},
+                                  {"t", maybe(difference.t_test.t)},
+                                  {"p", maybe(difference.t_test.p)},
+                                  {"p_holm", maybe(difference.t_test.p_holm)},
+                                  {"dz", maybe(difference.effect_size.dz)},
+                                  {"mixed_estimate", maybe(difference.mixed_estimate)},
+                                  {"mixed_se", maybe(difference.mixed_se)}});
+  return out;
+}
+
+/// As R's lme4 prints it: correct ~ renderer + shape + (1 | participant).
+TaskJson accuracy_json(const MixedLogistic& model) {
+  TaskJson out{{"model", "correct ~ renderer + shape + (1 | participant)"}};
+  out["status"] = !model.undefined.empty() ? "undefined" : model.singular ? "singular" : "ok";
+  if (!model.undefined.empty()) {
+    out["reason"] = model.undefined;
+    return out;
+  }
+  out["n_participants"] = model.participants;
+  out["n_trials"] = model.trials;
+  out["logLik"] = finite(model.log_likelihood);
+  out["participant_sd"] = model.random_sds.empty() ? TaskJson() : finite(model.random_sds[0]);
+  for (const LogisticCoefficient& one : model.coefficients)
+    out["fixed_effects"][one.name] = {{"log_odds", finite(one.estimate)},
+                                      {"se", finite(one.se)},
+                                      {"z", finite(one.z)},
+                                      {"p", finite(one.p)},
+                                      {"ci95", ends_json(one.ci95)},
+                                      {"odds_ratio", finite(std::exp(one.estimate))}};
+  return out;
+}
+
+}  // namespace
+
+std::string task_report_json(const TaskAnalysis& analysis, const std::string& program_version) {
+  TaskJson out{{"version", 1},
+               {"simulated", analysis.table.simulated},
+               {"title", analysis.table.title},
+               {"source", analysis.table.source},
+               {"warnings", analysis.table.warnings},
+               {"program_version", program_version},
+               {"n_trials", analysis.table.trials.size()},
+               {"n_practice", analysis.table.n_practice},
+               {"cells", TaskJson::array()},
+               {"group_results", TaskJson::array()},
+               {"renderer_comparisons", TaskJson::array()},
+               {"condition_comparisons", TaskJson::array()}};
+  for (const TaskCell& cell : analysis.cells) out["cells"].push_back(cell_json(cell));
+  for (const TaskGroup& group : analysis.groups) out["group_results"].push_back(group_json(group));
+  for (const TaskComparison& one : analysis.renderers)
+    out["renderer_comparisons"].push_back(comparison_json(one, true));
+  for (const TaskComparison& one : analysis.conditions)
+    out["condition_comparisons"].push_back(comparison_json(one, false));
+  if (analysis.accuracy) out["accuracy_model"] = accuracy_json(*analysis.accuracy);
+  if (analysis.identification)
+    out["identification"] = read_ordered_json(report_json(*analysis.identification));
+  return out.dump(1, ' ', false, TaskJson::error_handler_t::replace) + "\n";
+}
+
+namespace {
+
+std::string with_interval(double value, const Interval& interval) {
+  return short_number(value) + " [" + short_number(interval.low) + ", " +
+         short_number(interval.high) + "]";
+}
+
+/// To 0.01 %: searches end so near to 0.
+double rounded_rate(double rate) { return std::round(rate * 1e4) / 1e4; }
+
+std::string optional_interval(const std::optional<double>& value,
+                              const std::optional<Interval>& interval) {
+  if (!value) return "undefined";
+  return interval ? with_interval(*value, *interval) : short_number(*value);
+}
+
+std::string detection_text(const ParticipantFunction& one) {
+  if (!one.detectability.d_prime) return "";
+  const auto& ends = one.detectability.d_prime_ci95;
+  const std::string swapped = ends && ends->high < 0 ? " (BELOW 0: are keys swapped?)" : "";
+  return ", d' " + optional_interval(one.detectability.d_prime, one.detectability.d_prime_ci95) +
+         swapped + ", criterion " +
+         optional_interval(one.detectability.criterion, one.detectability.criterion_ci95);
+}
+
+std::string procedure_text(const Track& track) {
+  const auto& [spec, estimate, target, fitted] = *track.procedure;
+  std::string text = "    track " + printable(track.name) + ", ";
+  const auto* quest = std::get_if<protocols::QuestPlus>(&spec);
+  text += quest != nullptr ? "QUEST+" : kind_of(spec);
+  text += ": ";
+  if (!estimate.threshold) {
+    text += "no estimate";
+  } else if (target) {
+    text += short_number(*estimate.threshold) + ", its reversals' mean, where it converges at " +
+            fixed(100 * *target, 1) + " % successes";
+    if (fitted) text += "; the function is there at " + short_number(*fitted);
+  } else if (quest != nullptr) {
+    text += "threshold " + short_number(*estimate.threshold) + ", slope " +
+            short_number(*estimate.slope) + ", means of its posterior (" +
+            to_string(quest->function.shape) + ", " + to_string(quest->function.scale) + ")";
+  } else {
+    text += short_number(*estimate.threshold) + ", mean of where the answer changed";
+  }
+  text += "; " + counted(static_cast<std::size_t>(estimate.trials), "trial", "trials");
+  if (estimate.reversals > 0)
+    text += ", " + counted(static_cast<std::size_t>(estimate.reversals), "reversal", "reversals");
+  if (estimate.at_limit > 0)
+    text += ", " + std::to_string(estimate.at_limit) +
+            (target ? " at an end of its range" : " series without a change");
+  return text + "\n";
+}
+
+/// \param easier  of the answers
+std::string reversal_text(protocols::Easier easier,
+                          const std::optional<protocols::Easier>& expected) {
+  const bool falls = easier == protocols::Easier::lower;
+  std::string text =
+      falls ? "successes FALL as the level rises, where " : "successes RISE with the level, where ";
+  text += expected ? "the task has them " : "those of the others ";
+  return text + (falls ? "rise" : "fall") + " (are keys swapped?)";
+}
+
+std::string function_line(const ParticipantFunction& one,
+                          const std::optional<protocols::Easier>& expected) {
+  std::string text = "  " + pad_right(printable(one.participant), 12);
+  const std::string detected = detection_text(one);
+  if (!one.fit.undefined.empty())
+    return text + "no function: " + one.fit.undefined + detected + "\n";
+  if (one.figures.pse) {
+    text += "PSE " + optional_interval(one.figures.pse, one.figures.pse_ci95);
+  } else {
+    text += "threshold " + with_interval(one.fit.parameters.threshold, one.fit.threshold_ci95);
+  }
+  if (one.figures.jnd) text += ", JND " + optional_interval(one.figures.jnd, one.figures.jnd_ci95);
+  if (one.figures.weber_fraction)
+    text += ", Weber fraction " + short_number(*one.figures.weber_fraction);
+  text += one.fit.slope_at_bound
+              ? ", slope not determined"
+              : ", slope " + with_interval(one.fit.parameters.slope, one.fit.slope_ci95);
+  if (one.model.lapse.free)
+    text += ", lapses " + with_interval(rounded_rate(one.fit.parameters.lapse),
+                                        {rounded_rate(one.fit.lapse_ci95.low),
+                                         rounded_rate(one.fit.lapse_ci95.high)});
+  if (one.reversed) {
+    text += ", NOT COMPARED: " + reversal_text(one.model.function.easier, expected);
+  } else if (!one.determined) {
+    text += ", threshold NOT DETERMINED by these levels";
+  }
+  if (one.goodness.p) text += ", fit p " + p_text(*one.goodness.p);
+  if (one.posterior.undefined.empty())
+    text += "; Bayes " + with_interval(one.posterior.mean.threshold, one.posterior.threshold_ci95);
+  return text + detected + "\n";
+}
+
+std::string function_text(const ParticipantFunction& one,
+                          const std::optional<protocols::Easier>& expected) {
+  std::string text = function_line(one, expected);
+  for (const Track& track : one.tracks) {
+    if (track.procedure) text += procedure_text(track);
+  }
+  return text;
+}
+
+std::string explanation(const FunctionSettings& functions) {
+  std::string text = std::string("Intervals are of 95 %. Psychometric functions: ") +
+                     to_string(functions.shape) + ", lapses free up to " +
+                     short_number(kMostLapse) +
+                     "; compare with levels on\nboth sides of the standard: lapses as many at "
+                     "both ends; on one side: guesses 1 / intervals, the\n";
+  text += functions.shape == protocols::PsychometricShape::weibull
+              ? "JND is measured half-way from there to certainty (threshold: at 63 %)"
+              : "threshold is half-way from there to certainty";
+  return text +
+         "; detect, same/different: guesses free.\nd': log-linear correction. Bayes: posterior "
+         "mean of the threshold on a grid.\n";
+}
+
+/// Where levels are taken as they are because nothing is known of their procedure.
+std::string scale_note(const TaskAnalysis& analysis) {
+  const bool unknown =
+      analysis.table.procedures.empty() && !analysis.functions.scale &&
+      std::any_of(analysis.cells.begin(), analysis.cells.end(), [](const auto& cell) {
+        return !cell.functions.empty() && cell.no_function.empty() &&
+               cell.scale == protocols::LevelScale::linear;
+      });
+  return unknown
+             ? "A table does not say on which scale an adaptive procedure has its levels: where "
+               "that is\nlogarithmic, give --scale log.\n"
+             : "";
+}
+
+std::string magnitude_text(const TaskCell& cell) {
+  std::string text;
+  const MagnitudeEstimation& magnitude = *cell.magnitude;
+  for (const StevensLine& line : magnitude.lines) {
+    text += "  " + pad_right(printable(cell.participants[line.participant]), 12);
+    text += line.exponent ? "exponent " + short_number(*line.exponent) : line.undefined;
+    if (line.r_squared) text += ", r2 " + short_number(*line.r_squared);
+    if (line.exponent.value_or(0) < 0) text += ", the numbers FALL as the level rises";
+    text += "\n";
+  }
+  if (magnitude.exponent)
+    text += "  exponent over participants " +
+            optional_interval(magnitude.exponent, magnitude.exponent_ci95) + "\n";
+  for (const MagnitudeMean& one : magnitude.means)
+    text += "  level " + short_number(one.level) + ": geometric mean " +
+            optional_interval(one.geometric_mean, one.ci95) + "\n";
+  if (magnitude.without_logarithm > 0)
+    text += "  " + counted(magnitude.without_logarithm, "answer", "answers") +
+            " of 0 or below left out: they have no logarithm\n";
+  return text;
+}
+
+std::string adjustment_text(const TaskCell& cell) {
+  std::string text;
+  for (const Adjustment& one : cell.adjustments) {
+    text += "  " + pad_right(printable(cell.participants[one.participant]), 12) + "PSE " +
+            optional_interval(one.pse, one.pse_ci95) + ", constant error " +
+            short_number(one.constant_error);
+    if (one.jnd) text += ", JND " + short_number(*one.jnd);
+    if (one.start_effect) text += ", from above less from below " + short_number(*one.start_effect);
+    text += "\n";
+  }
+  return text;
+}
+
+std::string cell_text(const TaskCell& cell) {
+  std::string text = cell.task;
+  for (const std::string* name : {&cell.block_name, &cell.shape, &cell.renderer}) {
+    if (!name->empty()) text += ", " + printable(*name);
+  }
+  text += ": " + counted(cell.trials, "trial", "trials") + " of " +
+          counted(cell.participants.size(), "participant", "participants") + ", " +
+          std::to_string(cell.answered) + " answered\n";
+  if (!cell.functions.empty() && cell.no_function.empty())
+    text += cell.scale == protocols::LevelScale::linear
+                ? "  functions over the levels as they are\n"
+                : "  functions over the logarithm (base 10) of the levels\n";
+  for (const ParticipantFunction& one : cell.functions)
+    text += function_text(one, cell.expected_easier);
+  if (cell.magnitude) text += magnitude_text(cell);
+  text += adjustment_text(cell);
+  if (cell.information && cell.information->plain) {
+    text += "  information transfer " + short_number(*cell.information->plain) + " bit of " +
+            short_number(cell.information->stimulus_entropy) + "; less the bias of few trials " +
+            short_number(std::max(0.0, *cell.information->corrected)) + " bit, " +
+            short_number(*cell.information->categories) + " categories";
+    if (cell.information_mean)
+      text += "; mean of the participants' " +
+              optional_interval(cell.information_mean, cell.information_ci95);
+    text += "\n";
+  }
+  if (cell.confidence.area)
+    text += "  confidence: area under the type 2 ROC " +
+            optional_interval(cell.confidence.area, cell.confidence.area_ci95) +
+            (cell.confidence.area_ci95 && cell.confidence.area_ci95->high < 0.5
+                 ? " (BELOW 0.5: is the scale turned round?)"
+                 : "") +
+            "\n";
+  return text + "\n";
+}
+
+std::string group_text(const TaskGroup& group) {
+  std::string text = measure_plural(group.measure) + " over participants";
+  for (const std::string* name : {&group.task, &group.block_name, &group.shape}) {
+    if (!name->empty()) text += ", " + printable(*name);
+  }
+  text += group.geometric ? " (geometric means" : " (means";
+  text += (group.unit.empty() ? "" : ", " + group.unit) + ")\n";
+  for (const GroupMean& one : group.renderers) {
+    text += "  " + pad_right(printable(one.renderer), 12) +
+            (one.mean ? optional_interval(one.mean, one.ci95) : "no mean") + " (" +
+            counted(one.participants.size(), "participant", "participants");
+    if (one.n_undetermined > 0)
+      text += ", " + std::to_string(one.n_undetermined) + " not determined and left out";
+    text += ")\n";
+  }
+  return text + "\n";
+}
+
+std::string comparison_text(const TaskComparison& one, bool of_renderers) {
+  std::string text =
+      measure_plural(one.measure) + " by " + (of_renderers ? "renderer" : "block and stimulus");
+  const auto add = [&](const std::string& name) {
+    if (!name.empty()) text += ", " + printable(name);
+  };
+  add(one.task);
+  add(one.block_name);
+  add(one.shape);
+  add(one.renderer);
+  text += one.logarithms ? " (ratios)\n" : " (differences)\n";
+  if (!one.comparison.undefined.empty()) text += "  " + one.comparison.undefined + "\n";
+  if (one.n_undetermined > 0)
+    text += "  " + counted(one.n_undetermined, "function", "functions") +
+            " left out: no threshold among the levels shown, or answers the other way round\n";
+  for (const ConditionDifference& difference : one.comparison.differences) {
+    const auto shown = [&](double value) {
+      return short_number(one.logarithms ? std::exp(value) : value);
+    };
+    text += "  " + printable(one.conditions[difference.condition]) +
+            (one.logarithms ? " / " : " - ") + printable(one.conditions[0]) + ": ";
+    if (difference.n_pairs == 0) {
+      text += "no participant has both\n";
+      continue;
+    }
+    text += shown(difference.mean);
+    if (const auto& ends = difference.t_test.log_ratio_ci95)
+      text += " [" + shown(ends->low) + ", " + shown(ends->high) + "]";
+    if (difference.t_test.p) text += ", p " + p_text(*difference.t_test.p);
+    if (difference.t_test.p_holm && one.comparison.differences.size() > 1)
+      text += " (Holm " + p_text(*difference.t_test.p_holm) + ")";
+    if (difference.mixed_estimate) text += "; mixed model " + shown(*difference.mixed_estimate);
+    text += " (" + counted(difference.n_pairs, "pair", "pairs") + ")\n";
+  }
+  return text + "\n";
+}
+
+std::string accuracy_text(const MixedLogistic& model) {
+  std::string text =
+      "Accuracy of identification, mixed logistic model: correct ~ renderer + shape + (1 | "
+      "participant)\n";
+  if (!model.undefined.empty()) return text + "  undefined: " + model.undefined + "\n\n";
+  for (const LogisticCoefficient& one : model.coefficients) {
+    const bool intercept = one.name == "(Intercept)";
+    text +=
+        "  " + pad_right(printable(one.name), 18) + (intercept ? "odds " : "odds ratio ") +
+        with_interval(std::exp(one.estimate), {std::exp(one.ci95.low), std::exp(one.ci95.high)}) +
+        ", p " + p_text(one.p) + "\n";
+  }
+  if (!model.random_sds.empty())
+    text += "  standard deviation of the participants' log odds " +
+            short_number(model.random_sds[0]) + (model.singular ? " (singular)" : "") + "\n";
+  return text + "\n";
+}
+
+}  // namespace
+
+std::string task_report_text(const TaskAnalysis& analysis) {
+  std::string text;
+  if (analysis.table.simulated) text += "SIMULATED PARTICIPANTS\n\n";
+  for (const std::string& warning : analysis.table.warnings) text += printable(warning, 400) + "\n";
+  if (!analysis.table.warnings.empty()) text += "\n";
+  for (const TaskCell& cell : analysis.cells) text += cell_text(cell);
+  for (const TaskGroup& group : analysis.groups) text += group_text(group);
+  for (const TaskComparison& one : analysis.renderers) text += comparison_text(one, true);
+  for (const TaskComparison& one : analysis.conditions) text += comparison_text(one, false);
+  if (analysis.accuracy) text += accuracy_text(*analysis.accuracy);
+  text += explanation(analysis.functions) + scale_note(analysis);
+  if (analysis.identification)
+    text += "\nTimes and accuracy of identification\n\n" + report_text(*analysis.identification);
+  return text;
+}
+
+}  // namespace palpate::analysis
