@@ -16,7 +16,8 @@ namespace {
 using Index = HalfEdges::Index;
 
 bool is_usable(const Vec3& v) {
-  // NaN is not. Far larger numbers overflow when they are multiplied, and no object is that far away.
+  // NaN is not. Far larger numbers overflow when they are multiplied, and no object is that far
+  // away.
   constexpr double kLargest = 1e30;
   return std::abs(v.x) <= kLargest && std::abs(v.y) <= kLargest && std::abs(v.z) <= kLargest;
 }

@@ -87,7 +87,8 @@ StimulusSpec at_level(const Protocol& protocol, const TaskBlock& block, int stim
 std::optional<double> own_level(const Protocol& protocol, const TaskBlock& block, int stimulus) {
   if (!block.level) return std::nullopt;
   if (block.level->orientation) return 0;
-  const json value = palpate::read_json(protocol.stimulus_texts[static_cast<std::size_t>(stimulus)]);
+  const json value =
+      palpate::read_json(protocol.stimulus_texts[static_cast<std::size_t>(stimulus)]);
   try {
     const json& number = value.at(json::json_pointer(block.level->pointer));
     if (number.is_number()) return number.get<double>();
