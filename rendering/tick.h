@@ -143,10 +143,12 @@ struct SpreadPoint {
 
 /// Equation (2) over the faces of a part with shallow ridges. Takes copies: what is passed by
 /// reference stays in memory for the whole tick.
+// NOLINTBEGIN(performance-unnecessary-value-param)
 [[gnu::cold, gnu::noinline]] inline SpreadPoint spread_over_ridges(const ScenePart& part,
                                                                    WalkResult hit, Vec3 tip, Vec3 d,
                                                                    double probe_fraction,
                                                                    ContactType type) {
+  // NOLINTEND(performance-unnecessary-value-param)
   LoadedContact c;
   c.probe_fraction = probe_fraction;
   c.contact.type = type;

@@ -78,6 +78,7 @@ Wilcoxon wilcoxon(const std::vector<double>& differences) {
   std::sort(values.begin(), values.end(),
             [](const Signed& a, const Signed& b) { return a.size < b.size; });
   std::vector<double> sizes;
+  sizes.reserve(values.size());
   for (const Signed& value : values) sizes.push_back(value.size);
   const std::vector<double> ranks = midranks(sizes, tolerance);
   for (std::size_t i = 0; i < values.size(); ++i)

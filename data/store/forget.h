@@ -42,7 +42,7 @@ class Tombstones {
  private:
   struct Key {
     std::string secret, salt;
-    auto operator<=>(const Key&) const = default;
+    auto operator<=>(const Key&) const = default;  // NOLINT(modernize-use-nullptr): clang-tidy 14
   };
   std::map<Key, std::vector<std::string>> by_key_;
 };

@@ -235,7 +235,7 @@ SweepTables create_sweep_tables(SQLite::Database& db, const SweepPlan& plan) {
   // Sealed as it was stored.
   SQLite::Statement find(db, "SELECT * FROM sweep");
   find.executeStep();
-  const SweepTables tables{plan, kSweepVersion, seal_of_plan(find), value_count(plan)};
+  SweepTables tables{plan, kSweepVersion, seal_of_plan(find), value_count(plan)};
   find.reset();
   SQLite::Statement seal(db, "UPDATE sweep SET seal = ?");
   Binder(seal) << tables.seal;
