@@ -1,15 +1,16 @@
 #include <unistd.h>
 
 #include <chrono>
+#include <filesystem>
 #include <fstream>
 #include <iostream>
 #include <optional>
-#include <sstream>
 #include <thread>
 
 #include "data/base/text.h"
 #include "data/files/atomic_file.h"
 #include "data/store/store.h"
+#include "protocols/json_document.h"
 #include "runner/commands/render/forces.h"
 #include "runner/commands/run/admission.h"
 #include "runner/commands/run/opening.h"
@@ -34,13 +35,6 @@ std::string text_of(const po::variables_map& values, const char* option) {
   return values.count(option) > 0 ? values[option].as<std::string>() : std::string();
 }
 
-std::string contents(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  std::stringstream out;
-  out << file.rdbuf();
-  return out.str();
-}
-
 /// Surfaces in the world, for watchers.
 std::string picture_of(const std::vector<stimuli::ObjectSpec>& objects) {
   constexpr std::size_t kMostTriangles = 6000;  // of all
@@ -58,7 +52,8 @@ std::string picture_of(const std::vector<stimuli::ObjectSpec>& objects) {
   return "\"objects\":" + out.dump();
 }
 
-/// The file with the token while the server runs; only its owner can read it.
+/// The file with the token while the server runs; only its owner can read it. Replaces no file but
+/// one that a server left behind.
 class TokenFile {
  public:
   TokenFile(std::string path, const std::string& text) : path_(std::move(path)) {
@@ -66,16 +61,29 @@ class TokenFile {
     data::AtomicFile file(path_);
     file.write(text + "\n");
     file.sync();
-    file.commit(true);
+    const bool left_behind = is_token_file(path_);
+    if (!left_behind && std::filesystem::exists(path_))
+      throw UsageError("--token-file: " + printable(path_) +
+                       " exists and holds no token; name another file");
+    file.commit(left_behind);
+    written_ = true;
   }
   ~TokenFile() {
-    if (!path_.empty()) ::unlink(path_.c_str());
+    if (written_) ::unlink(path_.c_str());
   }
   TokenFile(const TokenFile&) = delete;
   TokenFile& operator=(const TokenFile&) = delete;
 
  private:
+  static bool is_token_file(const std::string& path) {
+    std::ifstream file(path, std::ios::binary);
+    std::string start(kStart.size(), '\0');
+    return file.read(start.data(), static_cast<std::streamsize>(start.size())) && start == kStart;
+  }
+
+  static constexpr std::string_view kStart = R"({"type":"serving")";
   const std::string path_;
+  bool written_ = false;
 };
 
 /// The scene's or session's thread beside the network's: what both kinds of server have.
@@ -148,7 +156,11 @@ int serve_scene(const po::variables_map& values, const RunSettings& run) {
   const DeviceKind& kind = find_device_kind(run.device);
   const std::string path = text_of(values, "scene");
   protocols::SceneSpec spec;
-  if (!path.empty()) spec = protocols::parse_scene(path);
+  std::string text;
+  if (!path.empty()) {
+    text = protocols::read_text_file(path);
+    spec = protocols::parse_scene_text(text, path);
+  }
   const double rate = values["rate"].as<double>();
   if (!(rate >= 100 && rate <= 4000))
     throw UsageError("--rate: expected a number from 100 to 4000");
@@ -165,7 +177,7 @@ int serve_scene(const po::variables_map& values, const RunSettings& run) {
   servo.workspace = workspace_of(protocol);
   ServedScene scene(*open.device, open.guard, clock,
                     {.scene_path = path.empty() ? "scene" : path,
-                     .scene = path.empty() ? "" : contents(path),
+                     .scene = text,
                      .servo = servo,
                      .picture = picture_of});
   Server server(values, signals);

@@ -137,9 +137,17 @@ class Serve(ServeCase):
         with self.client(role="watch") as eye:
             self.assertEqual(eye.server["scene"]["objects"][0]["stiffness_n_per_m"], 40)
 
+    def test_the_token_replaces_no_other_file(self):
+        study = self.dir / "study.db"
+        study.write_text("precious")
+        done = subprocess.run([PALPATE, "serve", "--device", "simulated", "--scene", self.scene, "--token-file", study],
+                              capture_output=True, text=True, timeout=PATIENCE)
+        self.assertEqual((done.returncode, study.read_text()), (2, "precious"))
+        self.assertIn("study.db exists and holds no token; name another file", done.stderr)
+
     def test_only_who_knows_the_token_comes_in(self):
         token = self.dir / "token.json"
-        token.write_text("old")
+        token.write_text('{"type":"serving","url":"of a server that was killed"}\n')
         token.chmod(0o644)
         process = self.serve("--token-file", token)
         self.assertNotIn("token", self.said)
