@@ -1,5 +1,5 @@
 #pragma once
-// The trials that are analysed, read from a CSV file (columns of data/export/columns.cpp) or a
+// The trials that are analysed, read from a CSV file (columns of data/export/column_definitions.cpp) or a
 // database.
 
 #include <cstddef>

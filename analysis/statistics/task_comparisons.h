@@ -1,7 +1,7 @@
 #pragma once
 // Thresholds, JNDs, exponents and settings over participants: their means, and what the same
 // participants have under several renderers, or in several blocks and with several stimuli of a
-// task. Paired and mixed (task_comparisons.h).
+// task. Paired and mixed.
 
 #include <cstddef>
 #include <optional>

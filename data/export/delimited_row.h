@@ -1,5 +1,5 @@
 #pragma once
-// Internal to data/export: formats one row of a CSV or TSV file.
+// Internal to data/export: rows of CSV and TSV files, and the tables that are made of them.
 
 #include <array>
 #include <charconv>

@@ -1,6 +1,6 @@
 #pragma once
-// Internal to data/store: ends the attempt that a run has left open. Called when a run ends, and by
-// the next writer for runs whose process died.
+// Internal to data/: attempts, read one at a time and verified, and ended where a run left one
+// open.
 
 #include <SQLiteCpp/Database.h>
 

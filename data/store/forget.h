@@ -1,6 +1,6 @@
 #pragma once
-// Tombstones: salted hashes of withdrawn participant codes. enrol and merge refuse or exclude a
-// code that has one.
+// What withdrawal leaves: copies that it does not remove, and tombstones, salted hashes of
+// withdrawn participant codes. enrol and merge refuse or exclude a code that has one.
 
 #include <SQLiteCpp/Database.h>
 
