@@ -580,13 +580,15 @@ PolygonSoup read_stl(std::string_view bytes, FileFaults& faults) {
   // The size decides: many binary files begin with "solid" as well.
   const bool has_header = bytes.size() >= kHeader;
   const std::size_t count = has_header ? little_endian(bytes, kHeader - 4) : 0;
+  const bool exact = has_header && bytes.size() == kHeader + kTriangle * count;
+  // Some programs write other data after the triangles.
+  const bool longer = has_header && bytes.size() > kHeader + kTriangle * count;
+  const bool text = is_text(bytes);
   PolygonSoup soup;
-  if (has_header && bytes.size() == kHeader + kTriangle * count) {
+  if (exact || (longer && !text)) {
     soup = read_binary(bytes, faults);
-  } else if (is_text(bytes)) {
+  } else if (text) {
     soup = AsciiReader(bytes, faults).read();
-  } else if (has_header && bytes.size() > kHeader + kTriangle * count) {
-    soup = read_binary(bytes, faults);  // what follows is no triangle, and some programs write it
   } else if (has_header) {
     faults.add("byte 80",
                std::to_string(kHeader + kTriangle * count) + " bytes for " + std::to_string(count) +

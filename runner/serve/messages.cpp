@@ -273,7 +273,7 @@ Message parse_message(const std::string& text) {
   return out;
 }
 
-std::string accepted(std::int64_t id, ordered_json more) {
+std::string accepted(std::int64_t id, const ordered_json& more) {
   ordered_json out = {{"re", id}, {"ok", true}};
   out.update(more);
   return out.dump(-1, ' ', false, json::error_handler_t::replace);

@@ -88,7 +88,7 @@ Message parse_message(const std::string& text);
 
 /// {"re":id,"ok":true,...}. \param more  an object
 std::string accepted(std::int64_t id,
-                     nlohmann::ordered_json more = nlohmann::ordered_json::object());
+                     const nlohmann::ordered_json& more = nlohmann::ordered_json::object());
 std::string refused(const std::optional<std::int64_t>& id, const std::vector<Refusal>& why);
 /// {"event":name,"t_ns":t,...}
 std::string event(const std::string& name, std::int64_t t_ns,
