@@ -92,7 +92,7 @@ struct TrialRecord {
   std::uint32_t faults = 0;     ///< bitwise or of all ticks' fault bits
   bool started_inside = false;  ///< the stylus was inside an object at time zero
   double max_force = 0;         ///< N
-  /// How the object was touched (runner/session/contact_log.h): share of the ticks with contact,
+  /// How the object was touched (runner/session/live_forces.h): share of the ticks with contact,
   /// and s with contact near an edge. None: recorded by a version without them; edge_dwell also
   /// where the stimulus has too many edges.
   std::optional<double> contact_share, edge_dwell;

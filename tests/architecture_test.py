@@ -100,18 +100,18 @@ PUBLIC = {
     "data/files": "atomic_file atomic_folder file_permissions text_sink output_check utc",
     "data/store": "export_log protocol_rows schema connection station_database store sweep_file "
                   "forget task_text",
-    "data/export": "bids csv psychds sample_slots settings study_about sweep_csv delimited_row",
-    "data/merge": "merge sweep_merge",
+    "data/export": "bids csv psychds sample_slots settings study_about delimited_row",
+    "data/merge": "merge",
     "analysis": "text",
     "analysis/input": "csv_reader trials study_record sweep_table task_trials",
     "analysis/statistics": "analysis comparison conclusions describe interval_coverage mixed_model "
-                           "model_study paired paper_effects pattern power plan quantiles "
-                           "sensitivity sweep_analysis task_analysis threshold_plan",
-    "analysis/movement": "adjusted_gain comparison measures pictures",
+                           "model_study paired pattern power plan quantiles sensitivity "
+                           "sweep_analysis task_analysis threshold_plan",
+    "analysis/movement": "comparison measures pictures",
     "analysis/figures": "panel_drawing figure_svg figures movement_figures svg sweep_figures "
                         "task_figures",
-    "analysis/report": "html_page hypotheses movement_report plan_report report_html report_json "
-                       "report_text sweep_report tables task_report",
+    "analysis/report": "html_page hypotheses movement_report plan_report report sweep_report tables "
+                       "task_report",
     "runner": "",
     "runner/servo": "device force_limiter passivity realtime ring sample servo servo_thread "
                     "shared_value tick_clock tick_source touched_places triple_buffer",
@@ -124,16 +124,14 @@ PUBLIC = {
                             "scene_renderer",
     "runner/participants": "keyboard respondent response_box simulated_settings simulated "
                            "task_participant",
-    "runner/session": "clock_check contact_log device_check level_scenes live_forces live_session "
-                      "markers near_codes preflight_dialogue protocol_info recorded_trial replay "
-                      "replay_comparison sample_stream session session_end session_plan "
-                      "simulated_session simulated_study socket_advisor station",
+    "runner/session": "device_check live_forces session_plan live_session markers near_codes "
+                      "preflight run_record replay sample_stream session simulated_study "
+                      "socket_advisor station",
     "runner/serve": "network served_scene served_session",
     "runner/sweep": "design swept_study",
     "runner/stability": "boundary integrators soft_map",
     "runner/bench": "servo_timing tick_cost",
-    "runner/commands": "render/forces render/trajectory_csv shared/command shared/schedule_rows "
-                       "shared/simulation",
+    "runner/commands": "render/forces shared/command shared/task_words shared/study_options",
 }
 
 

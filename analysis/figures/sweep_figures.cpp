@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "analysis/figures/panel_drawing.h"
-#include "analysis/statistics/paper_effects.h"
+#include "analysis/statistics/comparison.h"
 #include "analysis/text.h"
 #include "data/base/random.h"
 

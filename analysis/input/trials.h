@@ -1,6 +1,6 @@
 #pragma once
 // The trials that are analysed, read from a CSV file (columns of
-// data/export/column_definitions.cpp) or a database.
+// data/export/delimited_row.cpp) or a database.
 
 #include <cstddef>
 #include <cstdint>

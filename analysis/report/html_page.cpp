@@ -8,7 +8,6 @@
 
 #include "analysis/figures/figure_svg.h"
 #include "analysis/figures/svg.h"
-#include "analysis/report/report_assets.h"
 #include "analysis/text.h"
 #include "data/base/checksum.h"
 

@@ -9,7 +9,7 @@
 #include "analysis/figures/movement_figures.h"
 #include "analysis/report/html_page.h"
 #include "analysis/report/inference_json.h"
-#include "analysis/report/report_text.h"
+#include "analysis/report/report.h"
 #include "analysis/report/tables.h"
 #include "analysis/statistics/analysis.h"
 #include "analysis/text.h"

@@ -4,7 +4,6 @@
 #include <string>
 #include <vector>
 
-#include "analysis/movement/adjusted_gain.h"
 #include "analysis/movement/comparison.h"
 #include "analysis/movement/pictures.h"
 #include "analysis/report/tables.h"

@@ -11,7 +11,7 @@ endfunction()
 set(assets "${CMAKE_CURRENT_BINARY_DIR}/report_assets.cpp")
 set(draft "${assets}.draft")
 file(WRITE "${draft}" "// Made by report_assets.cmake when the build is configured.\n"
-     "#include \"analysis/report/report_assets.h\"\n\nnamespace palpate::analysis {\n\n")
+     "#include \"analysis/report/html_page.h\"\n\nnamespace palpate::analysis {\n\n")
 palpate_text_function("${draft}" report_style "${CMAKE_CURRENT_SOURCE_DIR}/report/report.css")
 palpate_text_function("${draft}" report_script "${CMAKE_CURRENT_SOURCE_DIR}/report/report.js")
 file(APPEND "${draft}" "}  // namespace palpate::analysis\n")

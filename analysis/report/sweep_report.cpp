@@ -8,9 +8,9 @@
 
 #include "analysis/figures/sweep_figures.h"
 #include "analysis/report/html_page.h"
-#include "analysis/report/report_text.h"
+#include "analysis/report/report.h"
 #include "analysis/report/tables.h"
-#include "analysis/statistics/paper_effects.h"
+#include "analysis/statistics/comparison.h"
 #include "analysis/text.h"
 
 namespace palpate::analysis {

@@ -1,8 +1,62 @@
 #include "analysis/statistics/comparison.h"
 
+#include <cmath>
 #include <utility>
 
 namespace palpate::analysis {
+
+namespace {
+
+constexpr double kNotableTime = 1;         // percent, smallest change of time that counts
+constexpr double kNotableAccuracy = 0.01;  // proportion, smallest change of accuracy that counts
+
+/// Compares the directions of the changes of time and accuracy; smaller changes than the thresholds
+/// have none.
+std::string read(double percent_change_time, double accuracy_change) {
+  const bool notable = std::fabs(percent_change_time) > kNotableTime &&
+                       std::fabs(accuracy_change) > kNotableAccuracy;
+  const bool faster = percent_change_time < 0, less_accurate = accuracy_change < 0;
+  return notable && faster == less_accurate ? "trade-off possible" : "no trade-off";
+}
+
+}  // namespace
+
+std::vector<SpeedAccuracy> speed_accuracy(const TrialTable& table, const Description& description,
+                                          const RendererPair& pair,
+                                          const std::vector<PairedShape>& shapes) {
+  std::vector<SpeedAccuracy> out(table.shapes.size());
+  for (std::size_t s = 0; s < out.size(); ++s) {
+    SpeedAccuracy& one = out[s];
+    if (!pair.in_data()) {
+      one.test.undefined = "only one renderer in the data";
+      continue;
+    }
+    const std::size_t reference = *pair.reference_at, renderer = *pair.renderer_at;
+    one.accuracy_reference = description.accuracy[reference][s].mean_of_participant_accuracies;
+    one.accuracy_renderer = description.accuracy[renderer][s].mean_of_participant_accuracies;
+    std::vector<double> changes;
+    for (std::size_t p = 0; p < table.participants.size(); ++p) {
+      const ParticipantCell& a = description.participant_cells[reference][s][p];
+      const ParticipantCell& b = description.participant_cells[renderer][s][p];
+      if (a.n_trials == 0 || b.n_trials == 0) continue;
+      changes.push_back(static_cast<double>(b.n_correct) / static_cast<double>(b.n_trials) -
+                        static_cast<double>(a.n_correct) / static_cast<double>(a.n_trials));
+    }
+    one.n_pairs = changes.size();
+    one.test = t_test(changes);
+    if (changes.empty()) {
+      one.test.undefined = "no participant has trials with both renderers";
+    } else {
+      one.accuracy_change = mean(changes);
+    }
+    if (shapes[s].mean_log_ratio)
+      one.percent_change_time = 100 * std::expm1(*shapes[s].mean_log_ratio);
+    if (one.percent_change_time && one.accuracy_change) {
+      one.reading = read(*one.percent_change_time, *one.accuracy_change);
+    }
+  }
+  return out;
+}
 
 std::vector<Comparison> compare_renderers(const TrialTable& table, const Description& description,
                                           const TimeOuts& time_outs, std::uint64_t seed) {

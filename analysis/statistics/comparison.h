@@ -1,16 +1,56 @@
 #pragma once
 // All comparisons of a renderer with the reference, shape by shape.
 
+#include <algorithm>
+#include <array>
+#include <cstddef>
 #include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
 #include <vector>
 
 #include "analysis/input/trials.h"
 #include "analysis/statistics/censored.h"
 #include "analysis/statistics/describe.h"
 #include "analysis/statistics/paired.h"
-#include "analysis/statistics/speed_accuracy.h"
 
 namespace palpate::analysis {
+
+// Results of Ho, Basdogan & Srinivasan (2000), fig. 15.
+
+/// Percent reduction of the mean time to identify a shape with the ray, compared with the point.
+struct PaperEffect {
+  std::string_view shape;
+  std::optional<double> percent_reduction;  ///< none: the difference was not significant
+};
+
+inline constexpr std::array<PaperEffect, 4> kPaperEffects{
+    {{"sphere", std::nullopt}, {"cone", 22.0}, {"cylinder", std::nullopt}, {"cube", 11.0}}};
+
+/// \return null for a shape that is not in the paper
+constexpr const PaperEffect* find_paper_effect(std::string_view shape) {
+  const auto* found = std::ranges::find(kPaperEffects, shape, &PaperEffect::shape);
+  return found == kPaperEffects.end() ? nullptr : found;
+}
+
+// Speed-accuracy trade-off: change of accuracy and change of time.
+
+/// Changes of one shape, renderer minus reference. Accuracies are proportions, 0 to 1.
+struct SpeedAccuracy {
+  std::optional<double> percent_change_time;  ///< of the geometric mean; negative: faster
+  std::optional<double> accuracy_reference, accuracy_renderer;  ///< means over participants
+  std::optional<double> accuracy_change;  ///< mean over participants with trials of both
+  std::size_t n_pairs = 0;                ///< participants with trials of both
+  TTest test;                             ///< of the changes; log_ratio_ci95 is of accuracy_change
+  /// "trade-off possible", "no trade-off", or empty: undefined.
+  std::string reading;
+};
+
+/// One for each of table.shapes. \param shapes comparison of times of the same pair
+std::vector<SpeedAccuracy> speed_accuracy(const TrialTable& table, const Description& description,
+                                          const RendererPair& pair,
+                                          const std::vector<PairedShape>& shapes);
 
 /// Results of one pair of renderers.
 struct Comparison {

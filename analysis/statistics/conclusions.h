@@ -5,7 +5,7 @@
 #include <string_view>
 
 #include "analysis/statistics/analysis.h"
-#include "analysis/statistics/paper_effects.h"
+#include "analysis/statistics/comparison.h"
 
 namespace palpate::analysis {
 

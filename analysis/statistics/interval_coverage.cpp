@@ -7,7 +7,7 @@
 #include <thread>
 #include <utility>
 
-#include "analysis/statistics/psychometric_bayes.h"
+#include "analysis/statistics/psychometric_fit.h"
 #include "analysis/statistics/sensitivity.h"
 #include "data/base/random.h"
 #include "protocols/procedures/procedure.h"

@@ -1,17 +1,101 @@
 #include "analysis/statistics/psychometric_fit.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstddef>
 #include <iterator>
 #include <limits>
 #include <optional>
 #include <utility>
 #include <vector>
 
-#include "analysis/statistics/simplex.h"
 #include "data/base/random.h"
 
 namespace palpate::analysis {
+namespace {
+
+using Function = std::function<double(const std::vector<double>&)>;
+
+constexpr int kMostMoves = 2000;
+constexpr int kMostRestarts = 20;
+
+/// centre + t (centre - from)
+std::vector<double> along(const std::vector<double>& centre, const std::vector<double>& from,
+                          double t) {
+  std::vector<double> place(centre.size());
+  for (std::size_t i = 0; i < place.size(); ++i) place[i] = centre[i] + t * (centre[i] - from[i]);
+  return place;
+}
+
+std::vector<double> centre_of_all_but_last(const std::vector<SimplexMinimum>& corners) {
+  std::vector<double> centre(corners.size() - 1, 0);
+  for (std::size_t c = 0; c + 1 < corners.size(); ++c) {
+    for (std::size_t i = 0; i < centre.size(); ++i)
+      centre[i] += corners[c].place[i] / static_cast<double>(centre.size());
+  }
+  return centre;
+}
+
+void sort_corners(std::vector<SimplexMinimum>& corners) {
+  std::sort(corners.begin(), corners.end(),
+            [](const auto& a, const auto& b) { return a.value < b.value; });
+}
+
+SimplexMinimum descend(const Function& function, const std::vector<double>& start,
+                       const std::vector<double>& steps, double tolerance) {
+  std::vector<SimplexMinimum> corners{{start, function(start)}};
+  for (std::size_t i = 0; i < start.size(); ++i) {
+    std::vector<double> place = start;
+    place[i] += steps[i];
+    corners.push_back({place, function(place)});
+  }
+  const auto at = [&](std::vector<double> place) {
+    const double value = function(place);
+    return SimplexMinimum{std::move(place), value};
+  };
+  for (int move = 0; move < kMostMoves; ++move) {
+    sort_corners(corners);
+    SimplexMinimum& worst = corners.back();
+    if (worst.value - corners.front().value <= tolerance) break;
+    const std::vector<double> centre = centre_of_all_but_last(corners);
+    SimplexMinimum reflected = at(along(centre, worst.place, 1));
+    if (reflected.value < corners.front().value) {
+      SimplexMinimum expanded = at(along(centre, worst.place, 2));
+      worst = expanded.value < reflected.value ? std::move(expanded) : std::move(reflected);
+    } else if (reflected.value < corners[corners.size() - 2].value) {
+      worst = std::move(reflected);
+    } else {
+      const bool outside = reflected.value < worst.value;
+      SimplexMinimum contracted = at(along(centre, worst.place, outside ? 0.5 : -0.5));
+      if (contracted.value < std::min(reflected.value, worst.value)) {
+        worst = std::move(contracted);
+      } else {
+        for (std::size_t c = 1; c < corners.size(); ++c)
+          corners[c] = at(along(corners.front().place, corners[c].place, -0.5));
+      }
+    }
+  }
+  sort_corners(corners);
+  return corners.front();
+}
+
+}  // namespace
+
+SimplexMinimum minimize(const Function& function, const std::vector<double>& start,
+                        const std::vector<double>& steps, double tolerance) {
+  if (start.empty()) return {{}, function({})};
+  SimplexMinimum best = descend(function, start, steps, tolerance);
+  for (int i = 0; i < kMostRestarts; ++i) {
+    std::vector<double> smaller = steps;
+    for (double& step : smaller) step *= i % 2 == 0 ? -0.1 : 0.1;
+    SimplexMinimum again = descend(function, best.place, smaller, tolerance);
+    const double gain = best.value - again.value;
+    if (gain > 0) best = std::move(again);
+    if (!(gain > 100 * tolerance)) break;
+  }
+  return best;
+}
 
 // Intervals of 95 % by the profile likelihood: what is held in them, twice the loss of log
 // likelihood stays below the 0.95 quantile of chi squared with one degree of freedom.
@@ -453,6 +537,145 @@ GoodnessOfFit goodness_of_fit(const std::vector<LevelCount>& counts, const Psych
   }
   result.simulations = simulations;
   result.p = static_cast<double>(as_large) / (simulations + 1);
+  return result;
+}
+
+namespace {
+
+constexpr std::size_t kCoarse = 25, kFine = 81, kRates = 10;
+
+/// Values of a parameter, each in the middle of its share of a range, and their marginal posterior.
+struct PosteriorAxis {
+  double low = 0, high = 0;
+  std::vector<double> values, marginal;
+
+  PosteriorAxis(double from, double to, std::size_t count) : low(from), high(to) {
+    for (std::size_t i = 0; i < count; ++i)
+      values.push_back(from +
+                       (to - from) * (static_cast<double>(i) + 0.5) / static_cast<double>(count));
+    marginal.assign(count, 0);
+  }
+
+  double width() const { return (high - low) / static_cast<double>(values.size()); }
+
+  double mean() const {
+    double sum = 0;
+    for (std::size_t i = 0; i < values.size(); ++i) sum += values[i] * marginal[i];
+    return sum;
+  }
+
+  double sd() const {
+    const double middle = mean();
+    double sum = 0;
+    for (std::size_t i = 0; i < values.size(); ++i)
+      sum += marginal[i] * (values[i] - middle) * (values[i] - middle);
+    return std::sqrt(sum);
+  }
+
+  /// The density is even within a share of the range.
+  double quantile(double share) const {
+    double below = 0;
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      if (below + marginal[i] >= share && marginal[i] > 0)
+        return values[i] + width() * ((share - below) / marginal[i] - 0.5);
+      below += marginal[i];
+    }
+    return high;
+  }
+
+  /// The part that has all but a millionth on either side, with a margin.
+  std::array<double, 2> core() const {
+    return {std::max(low, quantile(1e-6) - width()), std::min(high, quantile(1 - 1e-6) + width())};
+  }
+};
+
+PosteriorAxis rate_axis(const RateModel& rate) {
+  return rate.free ? PosteriorAxis(0, rate.most, kRates) : PosteriorAxis(rate.value, rate.value, 1);
+}
+
+double log_prior(const RateModel& rate, double value) {
+  return rate.free ? 9 * std::log1p(-value) : 0;
+}
+
+/// One rate at both ends stands on the axis of lapses alone: that of guesses has one value, unused.
+PosteriorAxis guess_axis(const PsychometricModel& model) {
+  return rate_axis(model.guess_is_lapse ? RateModel{} : model.guess);
+}
+
+struct PosteriorGrid {
+  PosteriorAxis threshold, log_slope, guess, lapse;
+};
+
+void add_marginals(PosteriorGrid& grid, const PlacedData& data, const PsychometricModel& model) {
+  std::vector<double> logs;
+  double largest = -1e300;
+  for (const double t : grid.threshold.values) {
+    for (const double s : grid.log_slope.values) {
+      for (const double g : grid.guess.values) {
+        for (const double l : grid.lapse.values) {
+          const double low = model.guess_is_lapse ? l : g;
+          double log_posterior =
+              psychometric_log_likelihood(data, model.function, t, std::exp(s), low, l) +
+              log_prior(model.lapse, l);
+          if (!model.guess_is_lapse) log_posterior += log_prior(model.guess, g);
+          logs.push_back(log_posterior);
+          largest = std::max(largest, logs.back());
+        }
+      }
+    }
+  }
+  double sum = 0;
+  for (double& value : logs) sum += value = std::exp(value - largest);
+  std::size_t i = 0;
+  for (double& t : grid.threshold.marginal) {
+    for (double& s : grid.log_slope.marginal) {
+      for (double& g : grid.guess.marginal) {
+        for (double& l : grid.lapse.marginal) {
+          const double share = logs[i++] / sum;
+          t += share;
+          s += share;
+          g += share;
+          l += share;
+        }
+      }
+    }
+  }
+}
+
+Interval central(const PosteriorAxis& axis) { return {axis.quantile(0.025), axis.quantile(0.975)}; }
+
+}  // namespace
+
+PsychometricPosterior psychometric_posterior(const std::vector<LevelCount>& counts,
+                                             const PsychometricModel& model) {
+  PsychometricPosterior result;
+  const PlacedData data = place_counts(counts, model.function);
+  if (!(data.high > data.low)) {
+    result.undefined = "fewer than two levels";
+    return result;
+  }
+  const double half = 0.5 * (data.high - data.low);
+  PosteriorGrid coarse{
+      PosteriorAxis(std::max(data.low - half, data.least), data.high + half, kCoarse),
+      PosteriorAxis(data.least_log_slope(), data.most_log_slope(), kCoarse), guess_axis(model),
+      rate_axis(model.lapse)};
+  add_marginals(coarse, data, model);
+  const auto [t_low, t_high] = coarse.threshold.core();
+  const auto [s_low, s_high] = coarse.log_slope.core();
+  PosteriorGrid fine{PosteriorAxis(t_low, t_high, kFine), PosteriorAxis(s_low, s_high, kFine),
+                     guess_axis(model), rate_axis(model.lapse)};
+  add_marginals(fine, data, model);
+
+  const auto level = [&](double place) { return protocols::level_at(model.function.scale, place); };
+  const double lapse = fine.lapse.mean();
+  result.mean = {level(fine.threshold.mean()), std::exp(fine.log_slope.mean()),
+                 model.guess_is_lapse ? lapse : fine.guess.mean(), lapse};
+  result.threshold_scale_sd = fine.threshold.sd();
+  const Interval threshold = central(fine.threshold), slope = central(fine.log_slope);
+  result.threshold_ci95 = {level(threshold.low), level(threshold.high)};
+  result.slope_ci95 = {std::exp(slope.low), std::exp(slope.high)};
+  result.lapse_ci95 = central(fine.lapse);
+  result.guess_ci95 = model.guess_is_lapse ? result.lapse_ci95 : central(fine.guess);
   return result;
 }
 

@@ -4,16 +4,27 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <limits>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "analysis/statistics/paired.h"
-#include "analysis/statistics/simplex.h"
 #include "protocols/procedures/psychometric.h"
 
 namespace palpate::analysis {
+
+struct SimplexMinimum {
+  std::vector<double> place;
+  double value = 0;
+};
+
+/// A local minimum by Nelder & Mead 1965, begun again from where it ends until that gains less than
+/// `tolerance`. \param steps  first steps, one a parameter; not 0
+SimplexMinimum minimize(const std::function<double(const std::vector<double>&)>& function,
+                        const std::vector<double>& start, const std::vector<double>& steps,
+                        double tolerance = 1e-11);
 
 /// Answers at one level.
 struct LevelCount {
@@ -164,5 +175,21 @@ class PsychometricObjective {
   const PsychometricModel& model_;
   std::optional<double> threshold_, log_slope_, guess_, lapse_;  ///< held
 };
+
+/// Posterior of a psychometric function on a grid. Priors: threshold uniform on the scale over the
+/// levels and half their range beyond on both sides, but not below 0 where all levels are above;
+/// log slope uniform over all that the levels can
+/// tell apart; free rates with density 10 (1 - rate)^9 up to their largest value (Schuett et al.
+/// 2016); one rate at both ends has that density once.
+struct PsychometricPosterior {
+  std::string undefined;
+  protocols::PsychometricParameters mean;  ///< threshold and slope: means on the scale, of the log
+  double threshold_scale_sd = 0;
+  Interval threshold_ci95, slope_ci95;  ///< central
+  Interval guess_ci95, lapse_ci95;      ///< of a constant: both ends are it
+};
+
+PsychometricPosterior psychometric_posterior(const std::vector<LevelCount>& counts,
+                                             const PsychometricModel& model);
 
 }  // namespace palpate::analysis

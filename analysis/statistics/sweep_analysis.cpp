@@ -5,8 +5,8 @@
 #include <limits>
 #include <utility>
 
+#include "analysis/statistics/comparison.h"
 #include "analysis/statistics/describe.h"
-#include "analysis/statistics/paper_effects.h"
 #include "analysis/statistics/quantiles.h"
 
 namespace palpate::analysis {

@@ -1,6 +1,8 @@
 #pragma once
 // Export as CSV: one row per trial.
 
+#include <cstdint>
+#include <functional>
 #include <string>
 
 #include "data/export/clock.h"
@@ -8,6 +10,7 @@
 #include "data/files/text_sink.h"
 #include "data/store/export_log.h"
 #include "data/store/store.h"
+#include "data/store/sweep_file.h"
 
 namespace palpate::data {
 
@@ -21,7 +24,7 @@ std::int64_t write_attempts(Store& store, TextSink& out, const ExportClock& cloc
 /// in the same folder. UTF-8 without BOM, RFC 4180 (lines end in CRLF, fields quoted only where
 /// needed), numbers as the shortest text that reads back exactly; texts that a spreadsheet would
 /// evaluate are guarded (text_sink.h). settings.codebook names a file for the meaning of the
-/// columns. Columns: column_definitions.h. Each file appears complete or not at all
+/// columns. Columns: delimited_row.h. Each file appears complete or not at all
 /// (atomic_file.h), and the database records the export.
 ///
 /// \throws StoreRefused: a file exists and `force` is not given, or `path` must not be written to;
@@ -30,5 +33,15 @@ ExportResult export_csv(Store& store, const std::string& path, const ExportSetti
 inline ExportResult export_csv(Store& store, const std::string& path, bool force) {
   return export_csv(store, path, ExportSettings{.force = force});
 }
+
+// Export of a sweep as CSV: one row a point.
+
+/// Writes the points on record, in order, with the columns of sweep_columns(). As export_csv()
+/// writes: RFC 4180, the shortest texts of numbers that read back exactly, texts guarded; complete
+/// or not at all. Undefined figures and those of failed points are empty. \param progress called
+/// with the points written; may throw to stop \return points. \throws StoreRefused: the file exists
+/// and `force` is not given, or must not be written to; StoreError
+std::int64_t export_sweep_csv(SweepFile& sweep, const std::string& path, bool force,
+                              const std::function<void(std::int64_t)>& progress = {});
 
 }  // namespace palpate::data

@@ -11,7 +11,6 @@
 #include <vector>
 
 #include "data/export/clock.h"
-#include "data/export/column_definitions.h"
 #include "data/export/csv.h"
 #include "data/export/delimited_row.h"
 #include "data/export/settings.h"

@@ -1,15 +1,337 @@
 #include "data/export/delimited_row.h"
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <nlohmann/json.hpp>
 
 #include "data/base/json_text.h"
-#include "data/export/column_definitions.h"
 #include "data/files/text_sink.h"
 #include "data/store/store.h"
 
 namespace palpate::data {
+namespace {
+
+const Column kParticipant{"participant_id", "Pseudonym of the participant"};
+const Column kSession{"session", "Session of the participant, from 1", "1"};
+const Column kBlock{"block", "Block, from 1 through all sessions of the participant", "1"};
+const Column kTrial{"trial", "Trial within the session, from 1", "1"};
+const Column kAttempt{
+    "attempt", "How often the trial had to be begun: 1, or more where attempts were cut off", "1"};
+const Column kRenderer{"renderer",
+                       "How the stylus was felt",
+                       "",
+                       {{"point", "only its tip"}, {"ray", "tip and side, as force and torque"}}};
+const Column kShape{"shape", "Name of the stimulus that was shown", "", {}, Column::Names::stimuli};
+const Column kPractice{
+    "practice",
+    "Practice or warm-up",
+    "",
+    {{"0", "a trial that counts"}, {"1", "practice or warm-up, not to be analysed"}}};
+const Column kDevice{"device", "Force-feedback device"};
+const Column kSimulated{"simulated",
+                        "Who took part",
+                        "",
+                        {{"0", "a person"}, {"1", "SIMULATED: no person, or no real device"}}};
+const Column kProtocol{"protocol_sha256", "SHA-256 of the protocol's text"};
+const Column kVersion{"program_version", "Version of palpate that recorded the trial"};
+const Column kNumber{"participant_number",
+                     "Orders the counterbalancing; two stations may have given the same one", "1"};
+const Column kOrientation[] = {
+    {"orientation_w", "Orientation of the stimulus, unit quaternion, w", "1"},
+    {"orientation_x", "Orientation of the stimulus, unit quaternion, x", "1"},
+    {"orientation_y", "Orientation of the stimulus, unit quaternion, y", "1"},
+    {"orientation_z", "Orientation of the stimulus, unit quaternion, z", "1"},
+};
+
+std::vector<Column> make_trials() {
+  return {
+      kParticipant,
+      kSession,
+      kBlock,
+      kTrial,
+      kRenderer,
+      kShape,
+      {"response",
+       "Name of the stimulus that was answered; missing where there was no answer",
+       "",
+       {},
+       Column::Names::stimuli},
+      {"correct",
+       "Whether response is shape",
+       "",
+       {{"0", "wrong, or no answer in time"}, {"1", "correct"}}},
+      {"response_time",
+       "From the first tick with forces on to the response; the limit for a time-out. The latency "
+       "of the response device is not subtracted",
+       "s"},
+      kOrientation[0],
+      kOrientation[1],
+      kOrientation[2],
+      kOrientation[3],
+      kPractice,
+      {"timed_out",
+       "Whether the time for an answer ran out",
+       "",
+       {{"0", "answered"}, {"1", "no answer in time"}}},
+      {"first_contact_time",
+       "From the first tick with forces on to the first contact; missing where there was none",
+       "s"},
+      {"onset_utc", "First tick with forces on, ISO 8601, UTC", "ISO 8601"},
+      kDevice,
+      kSimulated,
+      {"missed_ticks", "Servo ticks that came too late", "1"},
+      kAttempt,
+      kProtocol,
+      kVersion,
+      kNumber,
+      {"started_inside",
+       "Whether the stylus was inside an object when forces went on",
+       "",
+       {{"0", "outside"}, {"1", "inside: that object gave no force until it was left"}}},
+      {"ticks", "Servo ticks of the trial", "1"},
+      {"longest_period", "Longest time between two servo ticks", "s"},
+      {"faults", "Fault bits of all ticks, or-ed; 0 for none", "1"},
+      {"max_force", "Largest force on the hand", "N"},
+      {"observer_sha256",
+       "SHA-256 of the settings of a simulated participant; missing for a person"},
+      {"before_contact",
+       "Whether the answer came before the first contact",
+       "",
+       {{"0", "after it, or no answer"}, {"1", "before it: nothing had been felt"}}},
+      {"response_device",
+       "What the participant answered with; missing where it is not known",
+       "",
+       {{"keyboard", "keys, also of a numeric pad"},
+        {"device buttons", "buttons of the force-feedback device"},
+        {"simulated", "a SIMULATED participant"}}},
+      {"contact_share",
+       "Share of the servo ticks, from the first one with forces on to the answer, in which the "
+       "stylus touched the stimulus; missing where it was not measured",
+       "1"},
+      {"edge_dwell",
+       "Time in contact within 3 mm of an edge or vertex at which the surface turns by 30 degrees "
+       "or more; missing where it was not measured or the stimulus has more than 2000 of them",
+       "s"},
+  };
+}
+
+/// With what trials of version 2 of protocols have besides.
+std::vector<Column> with_tasks(std::vector<Column> columns) {
+  for (Column& column : columns) {
+    const std::string_view name = column.name;
+    if (name == "shape") {
+      column.description =
+          "Name of the stimulus that was shown; compare, adjust: of what was "
+          "compared with the standard or adjusted to it; detect: of what was to "
+          "be detected, also in catch trials";
+    } else if (name == "response") {
+      column.description =
+          "Answer: identify: a stimulus; compare: the interval, or same or different; detect: yes "
+          "or no; rate: a number; adjust: the level left; missing where there was none";
+      column.names = Column::Names::answers;
+    } else if (name == "correct") {
+      column.description =
+          "Whether the answer was right; rate and adjust: missing, no answer is right or wrong";
+    }
+  }
+  const std::vector<Column> more = {
+      {"task",
+       "What was asked; missing: a study of version 1, which identifies",
+       "",
+       {{"identify", "which stimulus it was"},
+        {"compare", "which interval held the comparison, or whether they were the same"},
+        {"detect", "whether there was anything"},
+        {"rate", "a number for it"},
+        {"adjust", "a level that equals the standard"}}},
+      {"block_name", "Name of the block in the protocol", "", {}, Column::Names::blocks},
+      {"track", "Stimulus, renderer and procedure within the block, from 1", "1"},
+      {"level",
+       "The varied number of the stimulus; adjust: where it started; missing in catch trials and "
+       "where nothing is varied",
+       Column::kLevelUnit},
+      {"standard_level", "The same number of the standard", Column::kLevelUnit},
+      {"catch_trial",
+       "Whether there was nothing to find",
+       "",
+       {{"0", "no"}, {"1", "yes: nothing to detect, or no difference"}}},
+      {"success",
+       "What procedures count",
+       "",
+       {{"0", "not, or no answer"},
+        {"1", "the comparison was chosen; different; yes; the right stimulus"}}},
+      {"number", "rate: the number answered; adjust: the level left"},
+      {"confidence", "How sure the participant was, a number of the protocol's scale"},
+      {"confidence_delay", "From the response to the answer about confidence", "s"},
+      {"comparison_interval", "compare: which interval held the comparison, from 1", "1"},
+      {"interval_onsets",
+       "First tick with forces on of each interval felt, from that of the first, s, separated by "
+       "semicolons; onset_utc, response_time and contact are those of the last one, adjust: "
+       "onset_utc and response_time of the first"},
+      {"interval_ends", "When its forces went off, likewise"},
+      {"interval_levels", "Level of each interval felt; empty: the stimulus as it is, or nothing"},
+  };
+  columns.insert(columns.end(), more.begin(), more.end());
+  return columns;
+}
+
+std::vector<Column> with_torque(std::vector<Column> columns) {
+  columns.push_back(
+      {"torque_driven",
+       "Whether the device drove the torque of the renderer; missing where the renderer gives none",
+       "",
+       {{"0", "it drives force alone: the force was felt at the grip, without torque"},
+        {"1", "driven, as the renderer gave it"}}});
+  return columns;
+}
+
+std::vector<Column> make_attempts() {
+  return {kParticipant,
+          kSession,
+          kBlock,
+          kTrial,
+          kAttempt,
+          kRenderer,
+          kShape,
+          kOrientation[0],
+          kOrientation[1],
+          kOrientation[2],
+          kOrientation[3],
+          kPractice,
+          {"began_utc", "When the attempt was begun, ISO 8601, UTC", "ISO 8601"},
+          {"reason", "Why the attempt was cut off; its trial was shown again"},
+          kDevice,
+          kSimulated,
+          kProtocol,
+          kVersion,
+          kNumber};
+}
+
+std::vector<Column> make_samples() {
+  return {
+      {"tick", "Servo tick, from the first one with forces on (0)", "1"},
+      {"tip_x", "Tip of the stylus, world frame, x", "m"},
+      {"tip_y", "Tip of the stylus, world frame, y", "m"},
+      {"tip_z", "Tip of the stylus, world frame, z", "m"},
+      {"tail_x", "Tail of the stylus, world frame, x", "m"},
+      {"tail_y", "Tail of the stylus, world frame, y", "m"},
+      {"tail_z", "Tail of the stylus, world frame, z", "m"},
+      {"force_x", "Force on the hand as rendered, world frame, x", "N"},
+      {"force_y", "Force on the hand as rendered, world frame, y", "N"},
+      {"force_z", "Force on the hand as rendered, world frame, z", "N"},
+      {"torque_x", "Torque about the virtual tip, world frame, x", "N m"},
+      {"torque_y", "Torque about the virtual tip, world frame, y", "N m"},
+      {"torque_z", "Torque about the virtual tip, world frame, z", "N m"},
+      {"device1_x", "Force commanded to the device at the tip, after the limits, x", "N"},
+      {"device1_y", "Force commanded to the device at the tip, after the limits, y", "N"},
+      {"device1_z", "Force commanded to the device at the tip, after the limits, z", "N"},
+      {"device2_x", "Force commanded to the device at the tail, after the limits, x", "N"},
+      {"device2_y", "Force commanded to the device at the tail, after the limits, y", "N"},
+      {"device2_z", "Force commanded to the device at the tail, after the limits, z", "N"},
+      {"depth", "Depth of the deepest contact, 0 in free space", "m"},
+      {"contacts", "Contacts of the stylus", "1"},
+      {"contact_type",
+       "Type of the deepest contact",
+       "",
+       {{"0", "none"}, {"1", "point-polygon"}, {"2", "segment-edge"}, {"3", "segment-face"}}},
+      {"buttons", "Buttons of the device, one bit each", "1"},
+      {"faults", "Fault bits of the tick; 0 for none", "1"},
+      {"period", "Time since the tick before; 0 where it is not known", "s"},
+      {"lateness", "Begin of the tick behind the time at which it was due", "s"},
+      {"compute", "From the device's reading to the command for it", "s"},
+  };
+}
+
+/// By the names of `palpate render --bodies`.
+std::vector<Column> make_bodies() {
+  return {
+      {"body_x", "Centre of mass of the stimulus after the tick, world frame, x", "m"},
+      {"body_y", "Centre of mass of the stimulus after the tick, world frame, y", "m"},
+      {"body_z", "Centre of mass of the stimulus after the tick, world frame, z", "m"},
+      {"body_qw", "Orientation of the stimulus's axes after the tick, unit quaternion, w", "1"},
+      {"body_qx", "Orientation of the stimulus's axes after the tick, unit quaternion, x", "1"},
+      {"body_qy", "Orientation of the stimulus's axes after the tick, unit quaternion, y", "1"},
+      {"body_qz", "Orientation of the stimulus's axes after the tick, unit quaternion, z", "1"},
+      {"body_vx", "Velocity of its centre of mass, world frame, x", "m/s"},
+      {"body_vy", "Velocity of its centre of mass, world frame, y", "m/s"},
+      {"body_vz", "Velocity of its centre of mass, world frame, z", "m/s"},
+      {"body_wx", "Its spin (angular velocity), world frame, x", "rad/s"},
+      {"body_wy", "Its spin (angular velocity), world frame, y", "rad/s"},
+      {"body_wz", "Its spin (angular velocity), world frame, z", "rad/s"},
+  };
+}
+
+/// By the names of `palpate render`.
+std::vector<Column> make_contacts() {
+  return {
+      {"contact_x", "Place of the deepest contact, by rendering the trial again, world frame, x",
+       "m"},
+      {"contact_y", "Place of the deepest contact, by rendering the trial again, world frame, y",
+       "m"},
+      {"contact_z", "Place of the deepest contact, by rendering the trial again, world frame, z",
+       "m"},
+      {"normal_x", "Direction of the surface there, out of the object, world frame, x", "1"},
+      {"normal_y", "Direction of the surface there, out of the object, world frame, y", "1"},
+      {"normal_z", "Direction of the surface there, out of the object, world frame, z", "1"},
+  };
+}
+
+/// With shifted dates, and the seconds between them in the column elapsed.
+std::vector<Column> made_relative(std::vector<Column> columns) {
+  for (Column& column : columns) {
+    const std::string_view name = column.name;
+    if (name == "onset_utc") {
+      column.description =
+          "First tick with forces on, ISO 8601, shifted: the participant's first trial is at "
+          "1900-01-01T00:00:00Z; intervals are true";
+    } else if (name == "began_utc") {
+      column.description =
+          "When the attempt was begun, ISO 8601, shifted: the participant's first trial is at "
+          "1900-01-01T00:00:00Z; intervals are true";
+    }
+  }
+  columns.push_back(
+      {"elapsed", "The moment of the row's date, from the participant's first trial", "s"});
+  return columns;
+}
+
+}  // namespace
+
+std::span<const Column> trial_columns(Times times, bool tasks, bool torque) {
+  using Tables = std::array<std::vector<Column>, 4>;  // with torque 1, with tasks 2
+  static const std::vector<Column> identified = make_trials(), asked = with_tasks(identified);
+  static const Tables absolute = {identified, with_torque(identified), asked, with_torque(asked)};
+  static const Tables relative = {made_relative(absolute[0]), made_relative(absolute[1]),
+                                  made_relative(absolute[2]), made_relative(absolute[3])};
+  return (times == Times::absolute ? absolute : relative)[(tasks ? 2U : 0U) + (torque ? 1U : 0U)];
+}
+
+std::span<const Column> attempt_columns(Times times) {
+  static const std::vector<Column> absolute = make_attempts(), relative = made_relative(absolute);
+  return times == Times::absolute ? absolute : relative;
+}
+
+const Column& interval_column() {
+  static const Column interval{"interval", "Interval of the trial that the tick is of, from 1",
+                               "1"};
+  return interval;
+}
+
+std::span<const Column> sample_columns() {
+  static const std::vector<Column> all = make_samples();
+  return all;
+}
+
+std::span<const Column> contact_columns() {
+  static const std::vector<Column> all = make_contacts();
+  return all;
+}
+
+std::span<const Column> body_columns() {
+  static const std::vector<Column> all = make_bodies();
+  return all;
+}
+
 namespace {
 
 void add_to_list(std::string& list, std::optional<double> value, bool first) {

@@ -1,5 +1,3 @@
-#include "runner/commands/sweep/analyze.h"
-
 #include <algorithm>
 #include <cmath>
 #include <iostream>
@@ -17,9 +15,7 @@
 #include "analysis/input/task_trials.h"
 #include "analysis/input/trials.h"
 #include "analysis/report/movement_report.h"
-#include "analysis/report/report_html.h"
-#include "analysis/report/report_json.h"
-#include "analysis/report/report_text.h"
+#include "analysis/report/report.h"
 #include "analysis/report/task_report.h"
 #include "analysis/statistics/analysis.h"
 #include "analysis/statistics/task_analysis.h"
@@ -28,7 +24,8 @@
 #include "runner/commands/movement/movement_study.h"
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/outputs.h"
-#include "runner/commands/shared/study_trials.h"
+#include "runner/commands/shared/study_options.h"
+#include "runner/commands/sweep/sweep.h"
 
 namespace palpate::runner {
 

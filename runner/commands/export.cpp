@@ -9,15 +9,13 @@
 #include "data/export/bids.h"
 #include "data/export/csv.h"
 #include "data/export/psychds.h"
-#include "data/export/sweep_csv.h"
 #include "data/store/store.h"
 #include "data/store/sweep_file.h"
 #include "runner/commands/movement/movement_export.h"
 #include "runner/commands/shared/about_file.h"
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/progress_line.h"
-#include "runner/commands/shared/protocol_facts.h"
-#include "runner/commands/shared/stop_signal.h"
+#include "runner/commands/shared/protocol_choice.h"
 
 namespace palpate::runner {
 namespace {

@@ -7,7 +7,6 @@
 #include "data/base/text.h"
 #include "data/files/utc.h"
 #include "data/store/store.h"
-#include "runner/commands/shared/ask.h"
 #include "runner/commands/shared/command.h"
 
 namespace palpate::runner {

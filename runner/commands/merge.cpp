@@ -9,10 +9,8 @@
 #include <vector>
 
 #include "data/base/text.h"
-#include "data/merge/sweep_merge.h"
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/progress_line.h"
-#include "runner/commands/shared/stop_signal.h"
 
 namespace palpate::runner {
 namespace {

@@ -9,10 +9,8 @@
 
 #include "protocols/parse.h"
 #include "runner/commands/shared/command.h"
-#include "runner/commands/shared/csv_text.h"
-#include "runner/commands/shared/recovery_table.h"
-#include "runner/commands/shared/schedule_rows.h"
-#include "runner/commands/shared/task_schedule.h"
+#include "runner/commands/shared/outputs.h"
+#include "runner/commands/shared/task_words.h"
 
 namespace palpate::runner {
 namespace {

@@ -20,9 +20,6 @@
 #include "protocols/tasks/levels.h"
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/progress_line.h"
-#include "runner/commands/shared/shard.h"
-#include "runner/commands/shared/simulation.h"
-#include "runner/commands/shared/stop_signal.h"
 #include "runner/commands/shared/study_options.h"
 #include "runner/session/simulated_study.h"
 

@@ -9,7 +9,6 @@
 #include <string>
 #include <vector>
 
-#include "runner/display/pointer_control.h"
 #include "runner/display/scene_view.h"
 #include "runner/display/window.h"
 

@@ -1,21 +1,511 @@
 #include "runner/display/participant_window.h"
 
 #include <epoxy/gl.h>
-
-#include "data/base/text.h"
 // After epoxy, which replaces the GL headers.
 #include <GLFW/glfw3.h>
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "data/base/text.h"
+#include "runner/display/display.h"
 #include "runner/display/key_names.h"
+#include "runner/display/pango_text.h"
 #include "runner/display/x11_errors.h"
 
 namespace palpate::runner {
+
+// Elements of a participant's page: answer keys, progress bar, checklist, the sign for the space
+// bar. Sizes are in a unit (px) that grows with the page.
+
+inline constexpr double kTextSize = 1.4;  ///< units, of a text to read
+
+/// The answer keys with their labels: side by side, or, where a label would be cut off or there are
+/// too many, one below the other in up to three columns, smaller where they must be.
+class KeyMap {
+ public:
+  /// \param room  px, the height that it may have where that is possible at all
+  KeyMap(cairo_t* canvas, const Page& page, double unit, double width, double room);
+  double height() const { return height_; }
+  void draw(cairo_t* canvas, double middle, double top) const;
+
+ private:
+  struct Item {
+    TextBlock key, answer;
+    double cap_width, width;
+    double x, y;  ///< of the key's left upper edge, from the middle and the top
+    double answer_x, answer_y;
+  };
+  bool lay_side_by_side(cairo_t* canvas, const Page& page, double width);
+  bool lay_in_columns(cairo_t* canvas, const Page& page, double width, double room, int columns);
+
+  double unit_, height_ = 0;
+  std::vector<Item> items_;
+};
+
+/// A picture of the space bar with an arrow: "press to go on" without words.
+void draw_go_on(cairo_t* canvas, double middle, double top, double unit);
+/// Progress of the session, along the upper edge.
+void draw_progress(cairo_t* canvas, const Page& page, double unit, double width);
+/// The current step's instruction, then a line for each step.
+void draw_checklist(cairo_t* canvas, const Checklist& list, double unit, double width, double top,
+                    double room);
+/// A PNG file, as large as it fits, not enlarged beyond twice its size; a note where it is none.
+void draw_picture(cairo_t* canvas, const std::string& bytes, double middle, double top,
+                  double width, double room);
+/// What is being typed, in a field.
+void draw_typed(cairo_t* canvas, const std::string& typed, double middle, double top, double unit,
+                double width);
+double text_width(double width, double unit);
+std::string minutes_and_seconds(int seconds);  ///< "0:25"
+
+namespace {
+
+constexpr double kKeycapHeight = 2.3;   // units
+constexpr double kSmallestKeys = 0.45;  // of the normal size
+
+void draw_keycap(cairo_t* canvas, double x, double y, double width, double height) {
+  const double radius = 0.18 * height;
+  cairo_new_path(canvas);
+  cairo_arc(canvas, x + width - radius, y + radius, radius, -M_PI / 2, 0);
+  cairo_arc(canvas, x + width - radius, y + height - radius, radius, 0, M_PI / 2);
+  cairo_arc(canvas, x + radius, y + height - radius, radius, M_PI / 2, M_PI);
+  cairo_arc(canvas, x + radius, y + radius, radius, M_PI, 3 * M_PI / 2);
+  cairo_close_path(canvas);
+  set_colour(canvas, kKeycap);
+  cairo_fill_preserve(canvas);
+  set_colour(canvas, kKeycapEdge);
+  cairo_set_line_width(canvas, std::max(1.0, 0.035 * height));
+  cairo_stroke(canvas);
+}
+
+/// What cairo reads a PNG file from.
+struct PngBytes {
+  const std::string& all;
+  std::size_t at = 0;
+};
+
+cairo_status_t read_png(void* from, unsigned char* to, unsigned count) {
+  auto& bytes = *static_cast<PngBytes*>(from);
+  if (bytes.all.size() - bytes.at < count) return CAIRO_STATUS_READ_ERROR;
+  std::memcpy(to, bytes.all.data() + bytes.at, count);
+  bytes.at += count;
+  return CAIRO_STATUS_SUCCESS;
+}
+
+std::string keycap_label(const std::string& key) {
+  if (key.size() == 1 && key[0] >= 'a' && key[0] <= 'z') {
+    return {static_cast<char>(key[0] - 'a' + 'A')};
+  }
+  return key;
+}
+
+}  // namespace
+
+KeyMap::KeyMap(cairo_t* canvas, const Page& page, double unit, double width, double room)
+    : unit_(unit) {
+  if (page.keys.empty()) return;
+  if (lay_side_by_side(canvas, page, width) && height_ <= room) return;
+  for (const double share : {1.0, 0.85, 0.7, 0.55, kSmallestKeys}) {
+    unit_ = share * unit;
+    for (int columns = 1; columns <= 3; ++columns) {
+      if (lay_in_columns(canvas, page, 0.9 * width, room, columns)) return;
+    }
+  }
+  unit_ = unit;
+  lay_side_by_side(canvas, page, width);  // too much for any: cut off
+}
+
+/// \return  whether it is as it should be: nothing cut off, and a question's answers in one row
+bool KeyMap::lay_side_by_side(cairo_t* canvas, const Page& page, double width) {
+  constexpr double kRowHeight = 5.2, kWidest = 12;  // units
+  items_.clear();
+  bool whole = true;
+  std::vector<double> rows;  // px, how wide each is
+  std::vector<std::size_t> row_of;
+  for (const auto& [key, answer] : page.keys) {
+    Item item{TextBlock(canvas, keycap_label(key), 1.15 * unit_),
+              TextBlock(canvas, answer, unit_),
+              0,
+              0,
+              0,
+              0,
+              0,
+              (kKeycapHeight + 0.45) * unit_};
+    whole = whole && item.answer.size().width <= kWidest * unit_;
+    item.answer.cut_at_width(std::min(item.answer.size().width + 2, kWidest * unit_));
+    item.cap_width = std::max(kKeycapHeight * unit_, item.key.size().width + 1.2 * unit_);
+    item.width = std::max(item.cap_width, item.answer.size().width) + 2 * unit_;
+    if (rows.empty() || rows.back() + item.width > width) rows.push_back(0);
+    row_of.push_back(rows.size() - 1);
+    item.x = rows.back() + (item.width - item.cap_width) / 2;
+    item.answer_x = rows.back() + (item.width - item.answer.size().width) / 2;
+    rows.back() += item.width;
+    items_.push_back(std::move(item));
+  }
+  for (std::size_t i = 0; i < items_.size(); ++i) {
+    Item& item = items_[i];
+    const double top = static_cast<double>(row_of[i]) * kRowHeight * unit_;
+    item.x -= rows[row_of[i]] / 2;
+    item.answer_x -= rows[row_of[i]] / 2;
+    item.y += top;
+    item.answer_y += top;
+  }
+  height_ = (static_cast<double>(rows.size()) * kRowHeight - 0.8) * unit_;
+  return whole && (page.kind != Page::Kind::text || rows.size() == 1);
+}
+
+/// \return  whether it fits
+bool KeyMap::lay_in_columns(cairo_t* canvas, const Page& page, double width, double room,
+                            int columns) {
+  constexpr double kGap = 0.5;  // units, between one and the next
+  const std::size_t each = (page.keys.size() + static_cast<std::size_t>(columns) - 1) /
+                           static_cast<std::size_t>(columns);
+  double cap_width = kKeycapHeight * unit_;
+  for (const auto& [key, answer] : page.keys)
+    cap_width = std::max(
+        cap_width, TextBlock(canvas, keycap_label(key), 1.15 * unit_).size().width + 1.2 * unit_);
+  const double text_left = cap_width + 0.8 * unit_;
+  const double most = width / columns - text_left - unit_;
+  if (most < 6 * unit_ && columns > 1) return false;
+  items_.clear();
+  height_ = 0;
+  double left = 0, y = 0, widest = 0;
+  for (std::size_t i = 0; i < page.keys.size(); ++i) {
+    if (i > 0 && i % each == 0) {
+      left += text_left + widest + unit_;
+      y = widest = 0;
+    }
+    const auto& [key, answer] = page.keys[i];
+    Item item{TextBlock(canvas, keycap_label(key), 1.15 * unit_),
+              TextBlock(canvas, answer, unit_, std::max(most, unit_)),
+              cap_width,
+              0,
+              left,
+              y,
+              left + text_left,
+              y};
+    const Size size = item.answer.size();
+    const double high = std::max(kKeycapHeight * unit_, size.height);
+    item.y += (high - kKeycapHeight * unit_) / 2;
+    item.answer_y += (high - size.height) / 2;
+    widest = std::max(widest, size.width);
+    height_ = std::max(height_, y + high);
+    y += high + kGap * unit_;
+    items_.push_back(std::move(item));
+  }
+  const double all = left + text_left + widest;
+  for (Item& item : items_) {
+    item.x -= all / 2;
+    item.answer_x -= all / 2;
+  }
+  return height_ <= room && all <= 1.06 * width;
+}
+
+void KeyMap::draw(cairo_t* canvas, double middle, double top) const {
+  for (const Item& item : items_) {
+    const double left = middle + item.x, y = top + item.y;
+    draw_keycap(canvas, std::round(left), std::round(y), std::round(item.cap_width),
+                std::round(kKeycapHeight * unit_));
+    const Size key = item.key.size();
+    item.key.draw(canvas, left + (item.cap_width - key.width) / 2,
+                  y + (kKeycapHeight * unit_ - key.height) / 2, kText);
+    item.answer.draw(canvas, middle + item.answer_x, top + item.answer_y, kQuietInk);
+  }
+}
+
+void draw_picture(cairo_t* canvas, const std::string& bytes, double middle, double top,
+                  double width, double room) {
+  PngBytes source{bytes};
+  const std::unique_ptr<cairo_surface_t, decltype(&cairo_surface_destroy)> picture(
+      cairo_image_surface_create_from_png_stream(&read_png, &source), &cairo_surface_destroy);
+  if (cairo_surface_status(picture.get()) != CAIRO_STATUS_SUCCESS) {
+    TextBlock(canvas, "(PNG?)", room / 8).draw(canvas, middle - room / 6, top, kReply);
+    return;
+  }
+  const double wide = cairo_image_surface_get_width(picture.get());
+  const double high = cairo_image_surface_get_height(picture.get());
+  const double scale = std::min({width / wide, room / high, 2.0});
+  cairo_save(canvas);
+  cairo_translate(canvas, middle - scale * wide / 2, top + (room - scale * high) / 2);
+  cairo_scale(canvas, scale, scale);
+  cairo_set_source_surface(canvas, picture.get(), 0, 0);
+  cairo_paint(canvas);
+  cairo_restore(canvas);
+}
+
+void draw_typed(cairo_t* canvas, const std::string& typed, double middle, double top, double unit,
+                double width) {
+  TextBlock words(canvas, typed + "_", 1.6 * unit);
+  // The end is what is being typed.
+  std::string shown = typed;
+  while (words.size().width > width - unit && shown.size() > 1) {
+    shown.erase(0, 1);
+    while (!shown.empty() && continues_character(shown[0])) shown.erase(0, 1);
+    words = TextBlock(canvas, "\u2026" + shown + "_", 1.6 * unit);
+  }
+  const double field = std::max(words.size().width + unit, std::min(10 * unit, width));
+  draw_keycap(canvas, std::round(middle - field / 2), std::round(top), std::round(field),
+              std::round(2.9 * unit));
+  words.draw(canvas, middle - words.size().width / 2, top + (2.9 * unit - words.size().height) / 2,
+             kText);
+}
+
+void draw_go_on(cairo_t* canvas, double middle, double top, double unit) {
+  const double width = 9 * unit, height = 1.9 * unit;
+  draw_keycap(canvas, std::round(middle - width / 2), std::round(top), std::round(width),
+              std::round(height));
+  set_colour(canvas, kQuietInk);
+  cairo_set_line_width(canvas, std::max(1.0, 0.1 * unit));
+  // The usual symbol of the space bar, and an arrow to the right.
+  const double base = top + 0.62 * height, left = middle - 1.9 * unit;
+  cairo_move_to(canvas, left, base - 0.35 * unit);
+  cairo_line_to(canvas, left, base);
+  cairo_line_to(canvas, left + 1.6 * unit, base);
+  cairo_line_to(canvas, left + 1.6 * unit, base - 0.35 * unit);
+  const double line = top + height / 2, tip = middle + 2 * unit;
+  cairo_move_to(canvas, tip - 1.6 * unit, line);
+  cairo_line_to(canvas, tip, line);
+  cairo_move_to(canvas, tip - 0.45 * unit, line - 0.4 * unit);
+  cairo_line_to(canvas, tip, line);
+  cairo_line_to(canvas, tip - 0.45 * unit, line + 0.4 * unit);
+  cairo_stroke(canvas);
+}
+
+double text_width(double width, double unit) { return std::min(0.84 * width, 38 * unit); }
+
+void draw_progress(cairo_t* canvas, const Page& page, double unit, double width) {
+  if (page.trials <= 0 || page.done <= 0) return;
+  const double fraction = std::min(1.0, static_cast<double>(page.done) / page.trials);
+  const double left = 0.08 * width, all = 0.84 * width, top = 1.2 * unit;
+  const TextBlock count(canvas, std::to_string(page.done) + " / " + std::to_string(page.trials),
+                        unit);
+  const double bar = all - count.size().width - unit;
+  for (const auto& [wide, colour] : {std::pair(bar, kKeycap), std::pair(fraction * bar, kGo)}) {
+    set_colour(canvas, colour);
+    cairo_rectangle(canvas, std::round(left), std::round(top), std::round(wide),
+                    std::round(0.3 * unit));
+    cairo_fill(canvas);
+  }
+  count.draw(canvas, left + all - count.size().width, top + 0.15 * unit - count.size().height / 2,
+             kQuietInk);
+}
+
+std::string minutes_and_seconds(int seconds) {
+  const std::string rest = std::to_string(seconds % 60);
+  return std::to_string(seconds / 60) + (rest.size() < 2 ? ":0" : ":") + rest;
+}
+
+void draw_checklist(cairo_t* canvas, const Checklist& list, double unit, double width, double top,
+                    double room) {
+  using State = Checklist::Step::State;
+  const double line_width = text_width(width, unit), left = (width - line_width) / 2;
+  std::size_t due = 0;
+  while (due < list.steps.size() && list.steps[due].state != State::now) ++due;
+  const std::string of = std::to_string(std::min(due + 1, list.steps.size())) + " / " +
+                         std::to_string(list.steps.size());
+  TextBlock(canvas, of, 2 * unit).draw(canvas, left, top, kQuietInk);
+  double y = top + 4 * unit;
+  const double steps = static_cast<double>(list.steps.size()) * 2.2 * unit;
+  std::string instruction = list.instruction;
+  if (!instruction.empty() && instruction[0] >= 'a' && instruction[0] <= 'z') instruction[0] -= 32;
+  const double instructions = std::max(room - 4 * unit - steps - unit, 3 * unit);
+  TextBlock how(canvas, instruction, kTextSize * unit, line_width);
+  for (double size = kTextSize * unit; how.size().height > instructions && size > unit;) {
+    size *= 0.94;
+    how.set_size(size);
+  }
+  how.draw(canvas, left, y, kText);
+  y += how.size().height + 2 * unit;  // if not everything fits, the last steps are cut off
+  for (const Checklist::Step& step : list.steps) {
+    const bool now = step.state == State::now;
+    const char* const mark = step.state == State::done       ? "\u2713"
+                             : step.state == State::left_out ? "\u2013"
+                             : now                           ? "\u25b6"
+                                                             : "\u25cb";
+    const Colour& colour = step.state == State::done ? kGo : now ? kText : kQuietInk;
+    TextBlock(canvas, mark, 1.1 * unit).draw(canvas, left, y, colour);
+    TextBlock(canvas, step.words, 1.1 * unit).draw(canvas, left + 2.4 * unit, y, colour);
+    y += 2.2 * unit;
+  }
+}
+
+namespace {
+
+constexpr double kSmallestUnit = 14;  // px, at scale 1
+constexpr double kMostKeys = 0.55;    // of the height, for the answer keys
+constexpr std::size_t kMostScreens = 200;
+constexpr double kSmallestSize = 0.45;  // of the normal size; below it text is truncated instead
+
+/// Splits a text between lines into screens, all with the same text size.
+std::vector<std::string> split_into_screens(cairo_t* canvas, const std::string& text, double unit,
+                                            double width, double room) {
+  const std::string valid = valid_utf8(text);
+  const TextBlock words(canvas, valid, kTextSize * unit, text_width(width, unit));
+  const std::vector<std::size_t> starts = words.line_starts();
+  const double line = words.size().height / std::max(words.lines(), 1);
+  const auto fit = static_cast<std::size_t>(std::max(1.0, std::floor(room / line)));
+  std::vector<std::string> screens;
+  for (std::size_t i = 0; i < starts.size() && screens.size() < kMostScreens; i += fit) {
+    const std::size_t end = i + fit < starts.size() ? starts[i + fit] : valid.size();
+    std::string part = valid.substr(starts[i], end - starts[i]);
+    while (!part.empty() && part.back() == '\n') part.pop_back();
+    if (!part.empty()) screens.push_back(std::move(part));
+  }
+  if (screens.empty()) screens.emplace_back();
+  return screens;
+}
+
+void draw_text(cairo_t* canvas, const std::string& text, double size, double smallest, double width,
+               double line_width, double top, double room, const Colour& colour, bool centred) {
+  if (text.empty() || room <= 0) return;
+  TextBlock words(canvas, text, size, line_width);
+  while (words.size().height > room && size > smallest) {
+    size *= 0.94;
+    words.set_size(size);
+  }
+  // Pango's height limit ignores the line spacing.
+  for (double height = room; words.size().height > room && height > size; height *= 0.94) {
+    words.cut_at_height(height);
+  }
+  if (centred || words.lines() <= 2) words.centre();
+  words.draw(canvas, (width - line_width) / 2,
+             top + (room - std::min(room, words.size().height)) / 2, colour);
+}
+
+/// Positions of a page's elements for a screen size.
+class PageLayout {
+ public:
+  PageLayout(cairo_t* canvas, const Page& page, double width, double height, double ui_scale)
+      : canvas_(canvas),
+        page_(page),
+        width_(width),
+        unit_(std::max({2.0, std::min(height / 34, width / 46),
+                        std::min({kSmallestUnit * ui_scale, height / 16, width / 20})})),
+        keys_(canvas, page, unit_, 0.94 * width, kMostKeys * height) {
+    const double margin = 2.5 * unit_;
+    const bool goes_on = page.kind == Page::Kind::text;
+    const bool typing = page.typing != Page::Typing::none;
+    go_on_top_ = height - margin - 1.9 * unit_;
+    keys_top_ = (goes_on ? go_on_top_ - 2 * unit_ : height - margin - 1.2 * unit_) - keys_.height();
+    reply_top_ =
+        (page.keys.empty() ? (goes_on ? go_on_top_ : height - unit_) : keys_top_) - 2.4 * unit_;
+    top_ = margin + 0.6 * unit_;
+    typed_top_ = reply_top_ - (typing ? 4 * unit_ : 0);
+    count_top_ = typed_top_ - (page.seconds_left > 0 ? 4.5 * unit_ : 0);
+    const double all = count_top_ - margin / 2 - top_;
+    picture_ = page.picture ? 0.6 * all : 0;
+    picture_top_ = top_;
+    top_ += picture_;
+    room_ = all - picture_;
+  }
+
+  std::vector<std::string> screens() const {
+    if (page_.kind != Page::Kind::text) return {page_.text};
+    return split_into_screens(canvas_, page_.text, unit_, width_, room_);
+  }
+
+  void draw(int screen) const {
+    const auto last = static_cast<int>(screens().size()) - 1;
+    const bool answers = !page_.keys.empty() && screen >= last;
+    if (answers || page_.kind != Page::Kind::text)
+      keys_.draw(canvas_, width_ / 2, std::max(keys_top_, 0.0));
+    if (page_.picture)
+      draw_picture(canvas_, *page_.picture, width_ / 2, picture_top_, text_width(width_, unit_),
+                   0.96 * picture_);
+    if (page_.typing != Page::Typing::none)
+      draw_typed(canvas_, page_.typed, width_ / 2, typed_top_, unit_, text_width(width_, unit_));
+    draw_progress(canvas_, page_, unit_, width_);
+    if (page_.seconds_left > 0)
+      draw_line(minutes_and_seconds(page_.seconds_left), 3 * unit_, count_top_, kQuietInk);
+    if (!page_.reply.empty()) draw_line(page_.reply, 1.2 * unit_, reply_top_, kReply);
+    if (page_.kind == Page::Kind::text) {
+      if (!answers) draw_go_on(canvas_, width_ / 2, go_on_top_, unit_);
+      draw_screen(screen);
+    } else if (page_.kind == Page::Kind::checklist) {
+      draw_checklist(canvas_, page_.checklist, unit_, width_, top_, room_);
+    } else {
+      const bool large = page_.kind != Page::Kind::message;
+      const double letters = page_.kind == Page::Kind::feedback ? 8 : large ? 2.6 : 1.8;
+      draw_text(canvas_, page_.text, letters * unit_, kSmallestSize * unit_, width_,
+                text_width(width_, unit_), top_, room_, page_.go ? kGo : kText, large);
+    }
+  }
+
+ private:
+  void draw_line(const std::string& text, double size, double top, const Colour& colour) const {
+    TextBlock words(canvas_, text, size);
+    while (words.size().width > 0.94 * width_ && size > kSmallestSize * unit_) {
+      size *= 0.94;
+      words.set_size(size);
+    }
+    if (words.size().width > 0.94 * width_) words.cut_at_width(0.94 * width_);
+    words.draw(canvas_, (width_ - std::min(words.size().width, 0.94 * width_)) / 2, top, colour);
+  }
+
+  void draw_screen(int screen) const {
+    const std::vector<std::string> all = screens();
+    const auto count = static_cast<int>(all.size());
+    const int at = std::clamp(screen, 0, count - 1);
+    // Not centred, like the other screens, even if the last has only two lines.
+    draw_text(canvas_, all[static_cast<std::size_t>(at)], kTextSize * unit_, kSmallestSize * unit_,
+              width_, text_width(width_, unit_), top_, room_, kText, false);
+    if (count == 1 && page_.parts < 2) return;
+    const auto of = [](int one, int total) {
+      return std::to_string(one) + " / " + std::to_string(total);
+    };
+    std::string place = page_.parts > 1 ? of(page_.part, page_.parts) : of(at + 1, count);
+    if (page_.parts > 1 && count > 1) place += "  (" + of(at + 1, count) + ")";
+    const TextBlock number(canvas_, place, unit_);
+    number.draw(canvas_, width_ / 2 + 6 * unit_, go_on_top_ + 0.3 * unit_, kQuietInk);
+  }
+
+  cairo_t* canvas_;
+  const Page& page_;
+  double width_, unit_;
+  KeyMap keys_;
+  double go_on_top_ = 0, keys_top_ = 0, reply_top_ = 0, count_top_ = 0, top_ = 0, room_ = 0;
+  double typed_top_ = 0, picture_ = 0, picture_top_ = 0;
+};
+
+}  // namespace
+
+Image draw_page(const Page& page, int width, int height, const PageOptions& setting) {
+  Image image{std::max(width, 1), std::max(height, 1), {}};
+  image.pixels.resize(static_cast<std::size_t>(image.width) * image.height);
+  const std::unique_ptr<cairo_surface_t, decltype(&cairo_surface_destroy)> surface(
+      cairo_image_surface_create_for_data(reinterpret_cast<unsigned char*>(image.pixels.data()),
+                                          CAIRO_FORMAT_RGB24, image.width, image.height,
+                                          4 * image.width),
+      &cairo_surface_destroy);
+  const Canvas owned(cairo_create(surface.get()), &cairo_destroy);
+  set_colour(owned.get(), kGround);
+  cairo_paint(owned.get());
+  PageLayout(owned.get(), page, image.width, image.height, setting.ui_scale).draw(setting.screen);
+  cairo_surface_flush(surface.get());
+  for (std::uint32_t& pixel : image.pixels) pixel |= 0xff000000U;
+  return image;
+}
+
+int screen_count(const Page& page, int width, int height, double ui_scale) {
+  if (page.kind != Page::Kind::text) return 1;
+  const std::unique_ptr<cairo_surface_t, decltype(&cairo_surface_destroy)> surface(
+      cairo_image_surface_create(CAIRO_FORMAT_RGB24, 1, 1), &cairo_surface_destroy);
+  const Canvas owned(cairo_create(surface.get()), &cairo_destroy);
+  const PageLayout frame(owned.get(), page, std::max(width, 1), std::max(height, 1), ui_scale);
+  return static_cast<int>(frame.screens().size());
+}
+
+std::uint32_t ground_colour() {
+  const auto level = [](double fraction) {
+    return static_cast<std::uint32_t>(std::lround(fraction * 255));
+  };
+  return 0xff000000U | level(kGround.red) << 16 | level(kGround.green) << 8 | level(kGround.blue);
+}
 
 ParticipantWindow::ParticipantWindow(const WindowSettings& settings, const WindowGeometry& geometry,
                                      double ui_scale)

@@ -1,17 +1,57 @@
 #pragma once
 // 3D view of object and stylus for the console, rendered off screen into a texture.
 
+#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "runner/devices/mouse.h"
+#include "runner/display/scene/camera.h"
 #include "runner/display/scene/scene_drawing.h"
 #include "runner/display/scene/scene_renderer.h"
 #include "runner/servo/sample.h"
+#include "runner/servo/servo.h"
 
 namespace palpate::runner {
+
+/// Pointer input over the console's view since the last frame. Pixels of the view.
+struct PointerMotion {
+  glm::vec2 at{0, 0}, moved{0, 0};
+  float wheel = 0;     ///< notches, away from the user
+  bool over = false;   ///< the pointer is over the view
+  bool turn = false;   ///< Ctrl or the left button: turns the stylus instead of moving it
+  bool depth = false;  ///< Shift: vertical motion acts like the wheel
+  bool orbit = false;  ///< the right button: moves the camera; the stylus stays
+};
+
+/// The first point where a line of sight meets the object. \param from  m, virtual frame
+using LineOfSight =
+    std::function<std::optional<glm::vec3>(const glm::vec3& from, const glm::vec3& along)>;
+
+/// Moves the mouse device's stylus with the pointer: the tip is under the pointer, pressed a little
+/// into the surface seen there; beside the object it lies in a plane in front of it, outside of the
+/// home zone. The wheel changes the penetration depth, and beside the object the plane's distance.
+class PointerControl {
+ public:
+  PointerControl(MouseStylus& device, const WorkspaceMap& workspace);
+  void step(const PointerMotion& pointer, const Camera& camera, const LineOfSight& object);
+  /// The stylus stays there, or goes there, until the next step. \param stylus  m, virtual frame
+  void rest_at(const rendering::LineProbe& stylus);
+
+ private:
+  Vec3 wanted(const glm::vec2& pixel, const Camera& camera, const LineOfSight& object);
+
+  MouseStylus& device_;
+  WorkspaceMap workspace_;
+  StylusTarget target_;
+  glm::vec2 pointer_offset_{0, 0};  ///< px, from the tip to the pointer, kept after a turn
+  bool was_over_ = false, touches_ = false;
+  double press_depth_ = 0;     ///< m, penetration depth along the line of sight
+  double plane_distance_ = 0;  ///< m, from the centre towards the viewer
+};
 
 /// Needs a current OpenGL 3.3 context, also to be destroyed.
 class SceneView {

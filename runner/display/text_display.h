@@ -2,20 +2,112 @@
 // Participant's screen and experimenter's console on one terminal or on pipes, for computers
 // without a display. It never names the shape, because the participant may see it.
 
+#include <sys/eventfd.h>
+#include <termios.h>
 #include <unistd.h>
 
 #include <atomic>
+#include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <string>
+#include <string_view>
+#include <variant>
 #include <vector>
 
 #include "runner/display/display.h"
 #include "runner/display/mailbox.h"
-#include "runner/display/terminal.h"
 #include "runner/display/window.h"
 
 namespace palpate::runner {
+
+// The terminal of the text display: its mode, its width, and waking the thread that waits for keys.
+
+/// Puts the terminal into character mode without echo; Ctrl-C still sends a signal.
+class RawTerminal {
+ public:
+  RawTerminal() : on_(isatty(STDIN_FILENO) == 1 && tcgetattr(STDIN_FILENO, &before_) == 0) {
+    if (!on_) return;
+    termios raw = before_;
+    raw.c_lflag &= ~static_cast<tcflag_t>(ICANON | ECHO);
+    raw.c_cc[VMIN] = 1;
+    raw.c_cc[VTIME] = 0;
+    tcsetattr(STDIN_FILENO, TCSANOW, &raw);
+  }
+  RawTerminal(const RawTerminal&) = delete;
+  RawTerminal& operator=(const RawTerminal&) = delete;
+  ~RawTerminal() {
+    if (on_) tcsetattr(STDIN_FILENO, TCSANOW, &before_);
+  }
+  bool on() const { return on_; }
+
+ private:
+  termios before_{};
+  bool on_;
+};
+
+/// Wakes a thread that waits in poll().
+class WakeEvent {
+ public:
+  WakeEvent() : file_(eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)) {}
+  WakeEvent(const WakeEvent&) = delete;
+  WakeEvent& operator=(const WakeEvent&) = delete;
+  ~WakeEvent() { close(file_); }
+  void signal() noexcept {
+    const std::uint64_t one = 1;
+    // Fails only when the counter overflows; it is set then anyway.
+    [[maybe_unused]] const ssize_t written = write(file_, &one, sizeof one);
+  }
+  void clear() noexcept {
+    std::uint64_t count = 0;
+    [[maybe_unused]] const ssize_t got = read(file_, &count, sizeof count);
+  }
+  int file() const { return file_; }
+
+ private:
+  int file_;
+};
+
+/// Breaks lines between words where they are longer than the terminal is wide.
+/// \param columns  of the terminal; 0: unknown, nothing is broken
+std::string wrapped(const std::string& text, std::size_t columns);
+
+/// Width of the terminal that a file descriptor is; 0: it is none, or its width is unknown.
+std::size_t columns_of(int file);
+
+// Parses terminal input: single keys are answers, a line that begins with ':' is a command, Escape
+// and F12 are emergency keys, and so is Alt with any key.
+
+/// The list of commands of the text console.
+const char* text_commands_help();
+
+/// The text to type for a command, without the colon.
+std::string_view text_command(ConsoleCommand::Kind kind);
+
+/// "pause", "note TEXT", ... without the colon. Unknown: kind note with an empty text.
+ConsoleCommand parse_text_command(std::string_view line, std::int64_t time_ns);
+
+class TextInput {
+ public:
+  struct Unknown {
+    std::string line;
+  };
+  using Event = std::variant<KeyPress, ConsoleCommand, Unknown>;
+
+  /// \param bytes  that arrived together at `time_ns`
+  std::vector<Event> feed(std::string_view bytes, std::int64_t time_ns);
+  /// The command line being typed, with its colon; empty: none.
+  const std::string& line() const { return line_; }
+
+ private:
+  std::size_t escape(std::string_view rest, std::int64_t time_ns, std::vector<Event>& out);
+  void letter(const std::string& text, std::int64_t time_ns, std::vector<Event>& out);
+  void end_line(std::int64_t time_ns, std::vector<Event>& out);
+
+  std::string line_;
+  std::string partial_;  ///< a UTF-8 sequence that has not come whole
+};
 
 // Participant's screen and console as text, written by the thread of TextDisplay.
 

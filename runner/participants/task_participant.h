@@ -1,8 +1,8 @@
 #pragma once
 // A simulated participant for the tasks of version 2. Shapes it identifies as SimulatedParticipant
 // does, percept by percept. In all other tasks it explores as that one does, feels for a while, and
-// judges levels (task_judgement.h) from what the hand met (level_percept.h), where that tells them;
-// other levels are known to the model.
+// judges levels from contact (task_judgement.h) where contact tells them; the model knows the other
+// levels.
 
 #include <cstdint>
 #include <map>
@@ -11,7 +11,6 @@
 #include <string>
 #include <vector>
 
-#include "runner/participants/level_percept.h"
 #include "runner/participants/respondent.h"
 #include "runner/participants/simulated.h"
 #include "runner/participants/task_judgement.h"

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "data/column_table.h"
-#include "runner/commands/render/trajectory_csv.h"
+#include "runner/commands/render/forces.h"
 
 namespace palpate::runner {
 

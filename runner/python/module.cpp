@@ -17,10 +17,10 @@
 #include "protocols/parse.h"
 #include "runner/commands/render/forces.h"
 #include "runner/commands/shared/command.h"
-#include "runner/commands/shared/schedule_rows.h"
-#include "runner/commands/shared/simulation.h"
+#include "runner/commands/shared/study_options.h"
+#include "runner/commands/shared/task_words.h"
 #include "runner/python/arrays.h"
-#include "runner/session/simulated_session.h"
+#include "runner/session/simulated_study.h"
 #include "stimuli/convex_mesh.h"
 
 namespace palpate::runner {

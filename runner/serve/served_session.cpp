@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "runner/safety/fault_signals.h"
-#include "runner/session/level_scenes.h"
+#include "runner/session/session_plan.h"
 #include "stimuli/shapes.h"
 
 namespace palpate::runner {

@@ -15,7 +15,6 @@
 #include "runner/serve/outlets.h"
 #include "runner/session/live_forces.h"
 #include "runner/session/session.h"
-#include "runner/session/session_end.h"
 #include "runner/session/station.h"
 
 namespace palpate::runner {

@@ -3,22 +3,169 @@
 // clock and the device. Scenes go in by an exchange of pointers, every sample comes out through a
 // ring of fixed size, the newest through a triple buffer. No locks.
 
+#include <semaphore.h>
+
+#include <array>
 #include <atomic>
 #include <chrono>
+#include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
+#include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
+#include "rendering/bodies/soft/soft_scene.h"
 #include "runner/servo/realtime.h"
 #include "runner/servo/ring.h"
+#include "runner/servo/sample.h"
 #include "runner/servo/servo.h"
-#include "runner/servo/servo_health.h"
-#include "runner/servo/soft_threads.h"
+#include "runner/servo/shared_value.h"
 #include "runner/servo/touched_places.h"
 #include "runner/servo/triple_buffer.h"
 
 namespace palpate::runner {
+
+// Timing statistics of the servo loop over every tick: lateness, computing time, missed ticks.
+
+/// Counts of times in steps of 1/8 of their size (12.5 % wide at most; exact below 16 ns), from 0
+/// to hours. One thread adds, any may read meanwhile.
+class TimeHistogram {
+ public:
+  void add(std::int64_t ns) noexcept;
+  std::uint64_t count() const noexcept { return count_.load(std::memory_order_relaxed); }
+  std::int64_t longest() const noexcept { return longest_.load(std::memory_order_relaxed); }
+  /// The time that the fraction `p` of the counts does not exceed, as the upper edge of its step,
+  /// ns.
+  std::int64_t quantile(double p) const noexcept;
+  /// Fraction of counts in steps that lie above `ns`.
+  double fraction_above(std::int64_t ns) const noexcept;
+  /// The steps that hold any, as upper edge (ns) and count, in order.
+  std::vector<std::pair<std::int64_t, std::uint64_t>> steps() const;
+
+ private:
+  static constexpr int kSteps = 8;   ///< for each doubling
+  static constexpr int kBins = 352;  ///< up to 2^45 ns
+  static int bin(std::int64_t ns) noexcept;
+  static std::int64_t upper_edge(int bin) noexcept;
+
+  std::array<std::atomic<std::uint64_t>, kBins> bins_{};
+  std::atomic<std::uint64_t> count_{0};
+  std::atomic<std::int64_t> longest_{0};
+};
+
+/// Ticks against the clock: elapsed_ns / period = ticks - 1 + missed_ticks, whole numbers all.
+struct TimeKept {
+  std::uint64_t ticks = 0;
+  std::uint64_t missed_ticks = 0;  ///< whole periods that passed without a tick
+  /// By the clock, from the time when the first tick was due to the start of the last one.
+  std::int64_t elapsed_ns = 0;
+};
+
+/// Of all ticks of a servo thread.
+class ServoHealth {
+ public:
+  /// By the servo's thread.
+  void add(const Sample& sample, std::int64_t period_ns) noexcept;
+  void add_lost_sample() noexcept;
+
+  /// All three of the same moment.
+  TimeKept time_kept() const noexcept;
+  std::uint64_t ticks() const noexcept { return lateness_.count(); }
+  std::uint64_t missed_ticks() const noexcept { return time_kept().missed_ticks; }
+  std::uint64_t lost_samples() const noexcept { return lost_.load(std::memory_order_relaxed); }
+  std::uint32_t faults() const noexcept { return faults_.load(std::memory_order_relaxed); }
+  std::int64_t longest_period_ns() const noexcept {
+    return longest_period_.load(std::memory_order_relaxed);
+  }
+  const TimeHistogram& lateness() const { return lateness_; }
+  const TimeHistogram& compute() const { return compute_; }
+
+ private:
+  TimeHistogram lateness_, compute_;
+  TimeKept counted_;               ///< the servo's own
+  std::int64_t first_due_ns_ = 0;  ///< likewise
+  SharedValue<TimeKept> time_kept_;
+  std::atomic<std::uint64_t> lost_{0};
+  std::atomic<std::uint32_t> faults_{0};
+  std::atomic<std::int64_t> longest_period_{0};
+};
+
+/// For a session's record, as JSON: counts, quantiles, and the histograms of every tick's lateness
+/// and computing time.
+std::string to_json_text(const ServoHealth& health, double rate);
+
+// The steps of soft objects, each object's in a thread of its own beside the servo's.
+
+/// Where the surface of a soft object was at its last step, to be drawn.
+struct SoftSnapshot {
+  std::vector<Vec3> now;  ///< m, of the nodes of the surface; empty: it has not been stepped
+  std::uint64_t steps = 0;
+};
+
+/// One object's thread. The servo asks for a step and takes it, one at a time, by an exchange of
+/// buffers: it never waits, and the thread touches nothing of the servo's in between. The thread's
+/// own priority is below the servo's.
+class SoftThread final : public rendering::SoftStepper {
+ public:
+  /// \param realtime  the servo's. \throws std::system_error where no thread can be had
+  SoftThread(std::shared_ptr<const rendering::SoftObject> object, const RealtimeSettings& realtime);
+  ~SoftThread() override;  ///< after the step in hand. The servo must have left it
+  SoftThread(const SoftThread&) = delete;
+  SoftThread& operator=(const SoftThread&) = delete;
+
+  // By the servo:
+  void ask(std::span<const rendering::NodeForce> forces) noexcept override;
+  bool ready() const noexcept override {
+    return phase_.load(std::memory_order_acquire) == Phase::made;
+  }
+  bool take(rendering::SoftView& view) noexcept override;
+
+  /// By one other thread. False where there is nothing new.
+  bool latest(SoftSnapshot& snapshot) noexcept { return drawn_.read(snapshot); }
+  int object() const { return object_->object; }  ///< index in the scene
+  /// From any thread: steps wait, as those of a thread that has no processor. For tests.
+  void stall(bool stalled) noexcept { stalled_.store(stalled); }
+
+ private:
+  enum class Phase : std::uint8_t { idle, asked, made };
+  void run() noexcept;
+
+  const std::shared_ptr<const rendering::SoftObject> object_;
+  const RealtimeSettings realtime_;
+  sem_t asked_{};
+  std::atomic<Phase> phase_{Phase::idle};
+  static_assert(std::atomic<Phase>::is_always_lock_free);
+  std::atomic<bool> quit_{false}, stalled_{false};
+  // Whose turn it is owns these: the servo's when idle or made, the thread's when asked.
+  std::vector<rendering::NodeForce> forces_;
+  rendering::SoftView view_;
+  bool good_ = true;
+  // The thread's own:
+  rendering::SoftState body_;
+  SoftSnapshot snapshot_;
+  TripleBuffer<SoftSnapshot> drawn_;
+  std::jthread thread_;  ///< last: ends first
+};
+
+/// Those of a scene; none where nothing is soft.
+class SoftThreads {
+ public:
+  SoftThreads(const rendering::Scene& scene, const RealtimeSettings& realtime);
+  /// Has the state's steps made here from now on. Right after initial_state().
+  void attach(rendering::RenderState& state);
+
+  bool empty() const { return threads_.empty(); }
+  /// In the order of soft_objects().
+  SoftThread& operator[](std::size_t i) { return *threads_[i]; }
+  std::size_t size() const { return threads_.size(); }
+
+ private:
+  std::vector<std::unique_ptr<SoftThread>> threads_;
+};
 
 struct ServoSettings {
   double rate = 1000;  ///< Hz

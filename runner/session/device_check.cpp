@@ -2,15 +2,154 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <glm/geometric.hpp>
 #include <nlohmann/json.hpp>
 #include <sstream>
 #include <stdexcept>
 
 #include "data/base/json_text.h"
+#include "data/files/utc.h"
 #include "protocols/tasks/levels.h"
 
 namespace palpate::runner {
+namespace {
+
+constexpr double kRounding = 1e-9;  // N
+constexpr double kEnough = 1e-3;    // N, that may be missing at the end
+
+std::string newtons(const char* before, double a, const char* between, double b) {
+  char text[160];
+  std::snprintf(text, sizeof text, "%s%.2f N%s%.2f N", before, a, between, b);
+  return text;
+}
+
+/// Holds what was commanded, tick by tick, against what may be.
+class CommandCheck {
+ public:
+  explicit CommandCheck(const ForceDirectionCheck& settings) : settings_(settings) {}
+
+  /// \return what is wrong with the tick; empty: nothing
+  std::string check(const Sample& sample) {
+    if (sample.faults & servo_fault::kTripped) {
+      const std::string why = advice(sample.trouble);
+      return "the forces went off" + (why.empty() ? why : ": " + why);
+    }
+    if (sample.phase != Phase::feeling) return "";
+    if (sample.tick == 0) began_ns_ = sample.time_ns;
+    elapsed_ = static_cast<double>(sample.time_ns - began_ns_) * 1e-9;
+    size_ = std::max(glm::length(sample.device1), glm::length(sample.device2));
+    const double change =
+        std::max(glm::length(sample.device1 - last1_), glm::length(sample.device2 - last2_));
+    last1_ = sample.device1;
+    last2_ = sample.device2;
+    const ForceLimits& limits = settings_.limits();
+    if (size_ > limits.max_force + kRounding)
+      return newtons("", size_, " were commanded, above the limit of ", limits.max_force);
+    if (size_ > settings_.force() + kRounding)
+      return newtons("", size_, " were commanded for a push of ", settings_.force());
+    const bool gap = (sample.faults & servo_fault::kSamplesLost) != 0;
+    if (change > limits.max_change + kRounding && !gap)
+      return newtons("the force changed by ", change, " in a tick, above the limit of ",
+                     limits.max_change);
+    return "";
+  }
+  bool over() const { return elapsed_ >= ForceDirectionCheck::kSeconds; }
+  std::string verdict() const {
+    if (size_ >= settings_.force() - kEnough) return "";
+    return newtons("no more than ", size_, " were commanded for a push of ", settings_.force());
+  }
+
+ private:
+  const ForceDirectionCheck& settings_;
+  std::int64_t began_ns_ = 0;
+  double elapsed_ = 0, size_ = 0;
+  Vec3 last1_, last2_;
+};
+
+}  // namespace
+
+ForceDirectionCheck::ForceDirectionCheck(const ForceLimits& limits, int driven)
+    : limits_(limits), force_(std::min(1.0, 0.5 * limits.max_force)), both_ends_(driven >= 5) {}
+
+rendering::Rendering ForceDirectionCheck::tick(const rendering::Scene&, rendering::RenderState&,
+                                               const rendering::LineProbe& probe,
+                                               double) const noexcept {
+  rendering::Rendering out;
+  out.device1 = Vec3(force_, 0, 0);
+  if (both_ends_) out.device2 = out.device1;
+  out.force = out.device1 + out.device2;
+  out.ideal = probe;
+  return out;
+}
+
+std::string ForceDirectionCheck::push(TickSource& servo, const std::function<bool()>& stop) const {
+  const rendering::Scene nothing({}, false);
+  constexpr HomeZone kAnywhere{0, 0};
+  CommandCheck check(*this);
+  std::string fault;
+  servo.prepare(nothing, *this, kAnywhere);
+  while (fault.empty() && !check.over()) {
+    fault = stop() ? "it was stopped" : check.check(servo.next());
+  }
+  servo.stop();
+  return fault.empty() ? check.verdict() : fault;
+}
+
+namespace {
+
+constexpr double kSecond = 1e9, kDay = 86400 * kSecond, kYear = 365.25 * kDay;  // ns
+// 2024-01-01, before there was this program: what a computer without a battery wakes up with.
+constexpr std::int64_t kBeforeThisProgram_ns = 1'704'067'200'000'000'000;
+// Clocks are set right by a second or so now and then; disks of other systems keep local time.
+constexpr double kRecordSlack = 2 * kSecond, kFileSlack = kDay;
+constexpr double kStudyRests = 2 * kYear, kProtocolRests = 5 * kYear;
+
+std::string span(double ns) {
+  const auto words = [](double value, const char* unit) {
+    const auto whole = std::lround(value);
+    return std::to_string(whole) + " " + unit + (whole == 1 ? "" : "s");
+  };
+  if (ns >= kYear) return words(ns / kYear, "year");
+  if (ns >= kDay) return words(ns / kDay, "day");
+  if (ns >= 3600 * kSecond) return words(ns / (3600 * kSecond), "hour");
+  return ns >= 60 * kSecond ? words(ns / (60 * kSecond), "minute") : words(ns / kSecond, "second");
+}
+
+std::string day_and_minute(std::int64_t ns) {
+  std::string text = data::format_utc(ns).substr(0, 16);
+  text[10] = ' ';
+  return text + " UTC";
+}
+
+}  // namespace
+
+std::string clock_warning(const ClockEvidence& evidence) {
+  const std::int64_t now = evidence.now_ns;
+  const auto doubt = [now](const std::string& why) {
+    return "the computer's clock says " + day_and_minute(now) + ", " + why +
+           "; every date on record follows it: if it is wrong, end here and set it (timedatectl)";
+  };
+  // As doubles: the difference of two dates of a damaged file need not fit.
+  const auto ahead = [now](std::int64_t then) {
+    return static_cast<double>(now) - static_cast<double>(then);
+  };
+  if (const auto& record = evidence.newest_record_ns) {
+    const std::string of = "the newest record of this database (" + day_and_minute(*record) + ")";
+    if (ahead(*record) < -kRecordSlack) return doubt(span(-ahead(*record)) + " before " + of);
+    if (ahead(*record) > kStudyRests) return doubt(span(ahead(*record)) + " after " + of);
+  }
+  if (now < kBeforeThisProgram_ns) return doubt("which is before this program existed");
+  if (const auto& file = evidence.newest_file_ns) {
+    const std::string of =
+        "the protocol or the program was written last (" + day_and_minute(*file) + ")";
+    if (ahead(*file) < -kFileSlack) return doubt(span(-ahead(*file)) + " before " + of);
+    if (!evidence.newest_record_ns && ahead(*file) > kProtocolRests)
+      return doubt(span(ahead(*file)) + " after " + of);
+  }
+  return "";
+}
+
 namespace {
 
 using Json = nlohmann::ordered_json;

@@ -9,10 +9,7 @@
 #include "runner/participants/keyboard.h"
 #include "runner/session/live_forces.h"
 #include "runner/session/session.h"
-#include "runner/session/session_end.h"
-#include "runner/session/session_hold.h"
 #include "runner/session/session_monitor.h"
-#include "runner/session/session_noise.h"
 #include "runner/session/station.h"
 
 namespace palpate::runner {

@@ -9,7 +9,8 @@
 #include "runner/display/display.h"
 #include "runner/participants/keyboard.h"
 #include "runner/servo/sample.h"
-#include "runner/session/force_direction_check.h"
+#include "runner/session/device_check.h"
+#include "runner/session/station.h"
 
 namespace palpate::runner {
 
@@ -65,5 +66,18 @@ class Preflight {
   std::vector<std::string> findings_;
   std::vector<Step> left_out_;
 };
+
+// The pre-flight of a live session at the console: the servo runs, the experimenter goes through
+// the checklist, and no trial has begun.
+
+struct PreflightResult {
+  std::vector<std::string> findings;  ///< what was checked and what was left out, for the record
+  std::vector<std::string> messages;  ///< that the console has shown
+};
+
+/// Until every step is done or left out and forces are allowed. For the session's own thread.
+/// \param news  messages that the console shows first
+/// \throws EndOfSession
+PreflightResult run_preflight(const LiveStation& station, const std::vector<std::string>& news);
 
 }  // namespace palpate::runner

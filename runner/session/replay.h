@@ -2,17 +2,47 @@
 // Renders a recorded trial again, tick by tick.
 
 #include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "data/record.h"
+#include "data/store/store.h"
 #include "protocols/protocol.h"
 #include "runner/servo/sample.h"
 #include "stimuli/shapes.h"
+#include "stimuli/vec.h"
 
 namespace palpate::runner {
+
+// A trial of a database with what is needed to render it again: its record, its protocol and the
+// materials as its device showed them.
+
+struct RecordedTrial {
+  data::StoredTrial stored;
+  protocols::Protocol protocol;  ///< materials as they were limited to the device of its run
+  bool limited = false;          ///< some were
+};
+
+/// The completed attempt at a trial.
+/// \param protocol     the protocol's name, where the code is enrolled in several; empty: any
+/// \param mesh_folder  where mesh files are, for a database of before they were kept in it
+/// \throws StoreRefused: it is not there, is in several protocols, has no samples, or its record
+/// and protocol do not agree; InputError, MeshError: the stored protocol cannot be read
+RecordedTrial load_recorded_trial(data::Store& store, const data::TrialName& name,
+                                  const std::string& protocol, const std::string& mesh_folder);
+
+/// The protocol that a trial was shown with, its materials limited as its device showed them.
+/// \param limited  set where some were
+/// \throws StoreRefused, InputError, MeshError: the stored protocol cannot be read
+protocols::Protocol protocol_as_shown(data::Store& store, const data::StoredTrial& trial,
+                                      const std::string& mesh_folder, bool& limited);
+
+/// "P03/1/12"
+std::string to_string(const data::TrialName& name);
 
 class StimulusLibrary;
 
@@ -55,5 +85,55 @@ void replay(const protocols::Protocol& protocol, const StimulusLibrary& library,
 /// \param tick  of the record's samples
 bool equals_record(const data::TrialRecord& recorded, const data::SampleRecord& tick,
                    const ReplayedSample& again);
+
+// A recorded trial held against what the renderers make of its path today.
+
+/// What one renderer showed along the path.
+struct ForceSummary {
+  std::string renderer;
+  double time_in_contact = 0;           ///< fraction of the ticks
+  std::optional<double> first_contact;  ///< s from time zero; none: no contact
+  double rms_force = 0, max_force = 0;  ///< N
+  double max_depth = 0;                 ///< m, penetration
+};
+
+struct RenderedForce {
+  Vec3 force, torque;  ///< N, N m, on the hand
+  double depth = 0;    ///< m
+};
+
+struct ReplayedTick {
+  double time = 0;           ///< s from the interval's time zero
+  std::size_t interval = 1;  ///< from 1
+  const data::SampleRecord* recorded;
+  RenderedForce again;  ///< by the recorded renderer
+  RenderedForce other;  ///< by the other one, where it was asked for
+};
+
+/// A trial of version 1 has one.
+struct ReplayedInterval {
+  std::string stimulus, renderer;  ///< as recorded; no stimulus: nothing was there
+  std::optional<double> level = std::nullopt;
+  bool standard = false;
+  std::size_t ticks = 0, equal_ticks = 0;
+};
+
+struct ReplayComparison {
+  std::size_t equal_ticks = 0;                    ///< to the bit
+  std::optional<std::uint32_t> first_difference;  ///< tick
+  std::size_t differing_interval = 1;             ///< its interval
+  bool periods_known = true;  ///< the record holds the ticks' periods, on which damping depends
+  ForceSummary recorded;
+  std::optional<ForceSummary> other;
+  double rms_difference = 0, max_difference = 0;  ///< N, of the two renderers' forces
+  std::vector<ReplayedTick> ticks;                ///< all, in order
+  std::vector<ReplayedInterval> intervals;        ///< all, in order
+};
+
+/// \param record         with samples; must outlive the result
+/// \param compare_other  whether the other renderer goes along the same path
+/// \throws std::invalid_argument where protocol and record do not agree
+ReplayComparison compare_with_record(const protocols::Protocol& protocol,
+                                     const data::TrialRecord& record, bool compare_other);
 
 }  // namespace palpate::runner

@@ -1,16 +1,59 @@
 #pragma once
 // The record of a live session: its participant, run, notes and trials.
 
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "data/record.h"
 #include "data/store/store.h"
 #include "protocols/protocol.h"
-#include "runner/session/protocol_info.h"
-#include "runner/session/trial_log.h"
+#include "rendering/probe.h"
 
 namespace palpate::runner {
+
+// Where a stimulus that moves is, as the store keeps it.
+
+inline data::BodyRecord body_record(const rendering::BodyPose& body) {
+  data::BodyRecord out;
+  out.centre = {body.centre.x, body.centre.y, body.centre.z};
+  const Quat& q = body.orientation;
+  out.orientation_wxyz = {q.w, q.x, q.y, q.z};
+  out.velocity = {body.velocity.x, body.velocity.y, body.velocity.z};
+  out.spin = {body.spin.x, body.spin.y, body.spin.z};
+  return out;
+}
+
+inline bool same_body(const data::BodyRecord& a, const data::BodyRecord& b) {
+  return a.centre == b.centre && a.orientation_wxyz == b.orientation_wxyz &&
+         a.velocity == b.velocity && a.spin == b.spin;
+}
+
+// From a parsed protocol to the record of it.
+
+/// A protocol as the store keeps it: its text, and every file that it names as it was read.
+data::ProtocolInfo info_of(const protocols::Protocol& protocol);
+
+// The trial loop's way to the database.
+
+/// Where a session writes its trials, before and after each is shown.
+class TrialLog {
+ public:
+  virtual ~TrialLog() = default;
+  /// Before the stimulus is shown. \return the attempt's number, 1, 2, ...
+  virtual int begin(const data::TrialRecord& planned, std::int64_t began_ns) = 0;
+  /// After the answer; the trial is acknowledged when this returns.
+  virtual void finish(const data::TrialRecord& record) = 0;
+  /// The trial will be shown again.
+  virtual void cut_off(const std::string& reason) = 0;
+  /// The answers to a page of version 2, together. A log that keeps none loses them.
+  virtual void answered(const std::vector<data::PageAnswer>& /*answers*/) {}
+  /// An event of the session, as JSON. A log that keeps none loses it. \param at_ns  session clock
+  virtual void note(std::int64_t /*at_ns*/, const std::string& /*text*/) {}
+  /// Whether a page of this session has been answered: it is not shown again.
+  virtual bool has_answers(const std::string& /*page*/) { return false; }
+};
 
 /// A new participant is enrolled, and takes a number of the counterbalancing, when the first trial
 /// begins: not where the pre-flight was abandoned or a display did not open. Notes of before then

@@ -10,11 +10,109 @@
 
 #include "data/record.h"
 #include "runner/participants/respondent.h"
-#include "runner/session/contact_log.h"
-#include "runner/session/level_scenes.h"
+#include "runner/session/live_forces.h"
+#include "runner/session/session_plan.h"
 #include "runner/session/station.h"
 
 namespace palpate::runner {
+
+// Why and how a live session ends before its last trial.
+
+/// The end of a session before its last trial; what() says why, for the record.
+class EndOfSession : public std::runtime_error {
+ public:
+  EndOfSession(data::RunEnd how, const std::string& why, bool by_fault = false)
+      : std::runtime_error(why), end(how), failed(by_fault) {}
+  data::RunEnd end;
+  bool failed;  ///< ended by a signal or fault
+};
+
+/// What the experimenter's "quit" with these words means. Any form of "withdraw" among them, in
+/// upper or lower case, records a withdrawal.
+EndOfSession end_by_experimenter(const std::string& words);
+
+// What keeps the next trial of a live session from beginning: the experimenter's pause, or a fault
+// that took the forces off. After a fault forces come back only as the experimenter allows them.
+
+/// Belongs to the session's thread.
+class SessionHold {
+ public:
+  /// Each says more than the one before.
+  enum class Kind {
+    none,
+    pause,
+    transient_fault,  ///< forces are off, but what took them off is over: going on clears it
+    fault,            ///< forces are off: it must be cleared before the session can go on
+  };
+
+  /// \param say  takes messages for the experimenter. All must outlive it.
+  SessionHold(const LiveStation& station, LiveForces& forces,
+              std::function<void(const std::string&)> say)
+      : station_(station), forces_(forces), say_(std::move(say)) {}
+
+  Kind kind() const { return kind_; }
+  /// Why forces are off; empty: they are not, or not by a fault that has been noticed.
+  const std::string& fault() const { return fault_; }
+  /// For the console: "paused" or "fault".
+  std::string state() const { return kind_ == Kind::pause ? "paused" : fault_state_; }
+  /// For the console: the reason, and what to press or type to go on.
+  std::string held_by() const;
+  /// What to press or type to go on.
+  std::string how_to_continue() const;
+
+  void pause();
+  /// Forces are off and nothing goes on until the experimenter says so.
+  /// \param transient  what took them off is over by itself
+  void hold(const std::string& reason, bool transient, DeviceTrouble trouble);
+  /// Zero force at once, as somebody asked. \param by  what asked for it: "the key F12"
+  /// \param in_trial  the trial under way is cut off first; else nothing goes on from now
+  void emergency_zero(const std::string& by, bool in_trial);
+  /// The experimenter says that the cause is removed. True: forces are allowed again and the
+  /// session is paused; false: forces stay off, or there is no fault; either is said.
+  bool clear_fault();
+  void go_on();
+  /// The session goes on: the reason was another time's.
+  void forget_reason() { reason_.clear(); }
+
+ private:
+  bool allow_forces();  ///< false: forces stay off; why is said
+
+  const LiveStation& station_;
+  LiveForces& forces_;
+  std::function<void(const std::string&)> say_;
+  Kind kind_ = Kind::none;
+  std::string fault_;
+  std::string fault_state_, reason_;  ///< of the last fault
+  std::string zero_asked_by_;         ///< " by the key F12"
+};
+
+// Masking noise in a live session: it sounds while trials are run, and what was heard goes on
+// record.
+
+/// Belongs to the session's thread. Does nothing where the station has no noise.
+class SessionNoise {
+ public:
+  /// \param say  takes messages for the experimenter. The station must outlive it.
+  SessionNoise(const LiveStation& station, std::function<void(const std::string&)> say)
+      : station_(station), say_(std::move(say)) {}
+
+  /// On, if it is not. False: the sound output cannot be opened, which is said.
+  bool start();
+  /// Off, if it is on.
+  void stop();
+  /// True where the output has failed since start(), as when headphones are pulled out: it is said,
+  /// and the noise is off.
+  bool has_failed();
+  /// "Go": forces are on.
+  void go_tone();
+  /// Of the protocol's sounds, where it has this one.
+  void cue(SoundCue cue);
+
+ private:
+  const LiveStation& station_;
+  std::function<void(const std::string&)> say_;
+  bool on_record_ = false;  ///< its start is on record, its end is not
+};
 
 /// A trial could not go on: the device was lost or forces went off. The attempt is on record as cut
 /// off, forces are zero.
@@ -101,7 +199,7 @@ class Session {
   };
   std::optional<Answer> show_stimulus(const protocols::Trial& trial, ServoState& servo);
   std::optional<Answer> wait_for_answer(ServoState& servo);
-  // Version 2 (session_tasks.cpp)
+  // Version 2 (session.cpp)
   void plan_task(const protocols::Trial& trial, data::TrialRecord& record) const;
   std::optional<Answer> show_intervals(const protocols::Trial& trial, ServoState& servo);
   std::optional<Answer> adjust(const protocols::Trial& trial, ServoState& servo);

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "protocols/tasks/levels.h"
-#include "runner/session/level_scenes.h"
+#include "runner/session/session_plan.h"
 #include "stimuli/shapes.h"
 
 namespace palpate::runner {

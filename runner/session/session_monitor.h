@@ -8,8 +8,6 @@
 #include "runner/session/live_forces.h"
 #include "runner/session/markers.h"
 #include "runner/session/session.h"
-#include "runner/session/session_hold.h"
-#include "runner/session/session_noise.h"
 #include "runner/session/station.h"
 
 namespace palpate::runner {

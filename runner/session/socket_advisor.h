@@ -15,12 +15,29 @@
 // again.
 
 #include <chrono>
+#include <optional>
 #include <string>
 #include <vector>
 
-#include "runner/session/level_advisor.h"
+#include "data/record.h"
+#include "protocols/protocol.h"
+#include "protocols/schedule.h"
 
 namespace palpate::runner {
+
+// Somebody outside of the program who proposes the levels of adaptive blocks.
+
+class LevelAdvisor {
+ public:
+  virtual ~LevelAdvisor() = default;
+  /// Before a trial of an adaptive block, forces off. \return the level to be shown, within those
+  /// of levels_of(block); nullopt: the block's own procedure goes on, and trouble() says why
+  virtual std::optional<double> ask(const protocols::Trial& next) = 0;
+  /// A trial of an adaptive block is on record.
+  virtual void tell(const data::TrialRecord& record) = 0;
+  /// Why the last question had no answer; empty: it had one.
+  virtual const std::string& trouble() const = 0;
+};
 
 /// Why nobody can be asked at a socket; empty: somebody listens.
 std::string socket_fault(const std::string& path);

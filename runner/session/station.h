@@ -11,12 +11,11 @@
 #include "runner/safety/guarded_device.h"
 #include "runner/scene_builder.h"
 #include "runner/servo/servo_thread.h"
-#include "runner/session/force_direction_check.h"
-#include "runner/session/level_advisor.h"
+#include "runner/session/device_check.h"
 #include "runner/session/markers.h"
 #include "runner/session/run_record.h"
 #include "runner/session/session_plan.h"
-#include "runner/session/trial_log.h"
+#include "runner/session/socket_advisor.h"
 #include "runner/sound/masking_noise.h"
 
 namespace palpate::runner {

@@ -3,7 +3,7 @@
 #include "data/record.h"
 #include "runner/participants/respondent.h"
 #include "runner/servo/tick_source.h"
-#include "runner/session/contact_log.h"
+#include "runner/session/live_forces.h"
 
 namespace palpate::bench {
 

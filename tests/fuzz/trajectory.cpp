@@ -3,7 +3,7 @@
 #include <cstdlib>
 
 #include "protocols/parse.h"
-#include "runner/commands/render/trajectory_csv.h"
+#include "runner/commands/render/forces.h"
 #include "tests/fuzz/input_file.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

@@ -1,5 +1,5 @@
 #pragma once
-// What `palpate accuracy` measured (measure.h), and its text, tables, JSON, figure and page.
+// What `palpate accuracy` measured (accuracy.cpp), and its text, tables, JSON, figure and page.
 
 #include <nlohmann/json.hpp>
 #include <optional>

@@ -7,7 +7,7 @@
 #include <set>
 
 #include "analysis/input/trials.h"
-#include "analysis/report/report_json.h"
+#include "analysis/report/report.h"
 #include "analysis/statistics/analysis.h"
 #include "analysis/text.h"
 #include "data/base/text.h"

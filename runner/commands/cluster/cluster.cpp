@@ -16,10 +16,7 @@
 #include "protocols/parse.h"
 #include "protocols/tasks/task_plan.h"
 #include "runner/commands/cluster/job.h"
-#include "runner/commands/cluster/plan_scripts.h"
-#include "runner/commands/cluster/slurm.h"
 #include "runner/commands/shared/command.h"
-#include "runner/commands/shared/simulation.h"
 #include "runner/commands/shared/study_options.h"
 #include "runner/commands/sweep/planned.h"
 

@@ -1,24 +1,156 @@
 #include "runner/commands/cluster/job.h"
 
 #include <sys/stat.h>
+#include <sys/wait.h>
 
 #include <algorithm>
+#include <array>
+#include <charconv>
 #include <chrono>
+#include <cstdio>
+#include <cstdlib>
 #include <iostream>
 #include <nlohmann/json.hpp>
+#include <sstream>
+#include <stdexcept>
 
 #include "data/base/json_text.h"
 #include "data/files/file_permissions.h"
 #include "data/store/store.h"
 #include "data/store/sweep_file.h"
 #include "protocols/json_document.h"
-#include "runner/commands/cluster/slurm.h"
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/outputs.h"
-#include "runner/commands/shared/shard.h"
-#include "runner/session/protocol_info.h"
+#include "runner/commands/shared/study_options.h"
+#include "runner/session/run_record.h"
 
 namespace palpate::runner {
+namespace {
+
+namespace fs = std::filesystem;
+namespace po = boost::program_options;
+
+/// The options that were given as words of a shell's command line, files with their whole path;
+/// without --trials.
+std::string plan_words(const PlanOptions& options, const po::variables_map& values) {
+  std::string out;
+  for (const auto& [name, value] : values) {
+    constexpr std::array kNumbers{"power",        "alpha",       "gain-sd",     "shape-gain-sd",
+                                  "intercept-sd", "correlation", "residual-sd", "share-used"};
+    constexpr std::array kTexts{"effect", "goal", "participants", "test", "studies"};
+    if (value.defaulted()) continue;
+    if (name == "db" || name == "csv") {
+      const std::string& file = name == "db" ? options.database : options.csv;
+      out += " --" + name + " " + shell_quoted(fs::absolute(file).string());
+    } else if (std::ranges::find(kNumbers, name) != kNumbers.end()) {
+      std::array<char, 32> digits{};
+      const auto end =
+          std::to_chars(digits.data(), digits.data() + digits.size(), value.as<double>()).ptr;
+      out += " --" + name + "=" + std::string(digits.data(), end);
+    } else if (std::ranges::find(kTexts, name) != kTexts.end()) {
+      out += " --" + name + " " + shell_quoted(value.as<std::string>());
+    } else if (name == "seed") {
+      out += " --seed " + std::to_string(options.seed);
+    }
+  }
+  return out;
+}
+
+}  // namespace
+
+void write_plan_scripts(const fs::path& folder, const std::vector<std::size_t>& trials,
+                        const PlanOptions& options, const po::variables_map& values) {
+  const std::string enter = "cd " + shell_quoted(folder.string());
+  const std::string plan = shell_quoted(fs::read_symlink("/proc/self/exe").string()) + " plan" +
+                           plan_words(options, values);
+  std::string each, all;
+  for (const std::size_t number : trials) {
+    each += " " + std::to_string(number);
+    all += (all.empty() ? "" : ",") + std::to_string(number);
+  }
+  write_script(
+      folder / "shard.sh",
+      "# The power curve of one number of trials.\n" + enter + " || exit 1\ntrials=(none" + each +
+          ")\nk=${1:-$SLURM_ARRAY_TASK_ID}\nexec " + plan +
+          " --jobs 1 --trials \"${trials[$k]}\" --json \"parts/part$(printf %06d \"$k\").json\"\n");
+  write_script(
+      folder / "finish.sh",
+      "# When all curves are there: one plan.\nset -e\n" + enter +
+          "\nknown=()\nfor part in parts/*.json; do known+=(--reuse \"$part\"); done\n" + plan +
+          " --trials " + all +
+          " \"${known[@]}\" --json analysis.json --figure power.svg --force > analysis.txt\n");
+}
+
+namespace {
+
+struct Output {
+  int status = 0;
+  std::string text;  ///< stdout and stderr
+};
+
+Output run(const std::string& command) {
+  std::FILE* const pipe = ::popen((command + " 2>&1").c_str(), "re");
+  if (pipe == nullptr) throw std::runtime_error("a shell cannot be started");
+  Output out;
+  std::array<char, 4096> part{};
+  while (const std::size_t read = std::fread(part.data(), 1, part.size(), pipe))
+    out.text.append(part.data(), read);
+  const int status = ::pclose(pipe);
+  out.status = WIFEXITED(status) ? WEXITSTATUS(status) : 1;
+  while (!out.text.empty() && out.text.back() == '\n') out.text.pop_back();
+  return out;
+}
+
+}  // namespace
+
+std::string shell_quoted(const std::string& text) {
+  std::string out = "'";
+  for (const char c : text) out += c == '\'' ? std::string("'\\''") : std::string(1, c);
+  return out + "'";
+}
+
+std::string array_text(const std::vector<std::int64_t>& tasks) {
+  std::string out;
+  for (std::size_t i = 0; i < tasks.size();) {
+    std::size_t last = i;
+    while (last + 1 < tasks.size() && tasks[last + 1] == tasks[last] + 1) ++last;
+    out += (out.empty() ? "" : ",") + std::to_string(tasks[i]);
+    if (last > i) out += "-" + std::to_string(tasks[last]);
+    i = last + 1;
+  }
+  return out;
+}
+
+std::string submit(const std::vector<std::string>& arguments) {
+  std::string command = "sbatch --parsable";
+  for (const std::string& argument : arguments) command += " " + shell_quoted(argument);
+  const Output said = run(command);
+  const std::string job = said.text.substr(0, said.text.find(';'));  // "123;cluster"
+  const bool number = !job.empty() && std::all_of(job.begin(), job.end(),
+                                                  [](char c) { return c >= '0' && c <= '9'; });
+  if (said.status == 127)
+    throw std::runtime_error("there is no Slurm here (no command sbatch): " + said.text);
+  if (said.status != 0 || !number) throw std::runtime_error("sbatch refused the job: " + said.text);
+  return job;
+}
+
+std::map<std::int64_t, std::string> queue_states(const std::string& job) {
+  const Output said = run("squeue --noheader --array --format='%K %T' --jobs=" + shell_quoted(job));
+  if (said.status == 127) throw std::runtime_error("there is no Slurm here (no command squeue)");
+  // A job that ended some minutes ago is unknown to squeue.
+  if (said.status != 0 && said.text.find("Invalid job id") != std::string::npos) return {};
+  if (said.status != 0) throw std::runtime_error("squeue failed: " + said.text);
+  std::map<std::int64_t, std::string> out;
+  std::istringstream lines(said.text);
+  std::string task, state;
+  while (lines >> task >> state) {
+    char* end = nullptr;
+    const long long number = std::strtoll(task.c_str(), &end, 10);
+    if (end != task.c_str() && *end == '\0') out[number] = state;
+  }
+  return out;
+}
+
 namespace {
 
 namespace fs = std::filesystem;

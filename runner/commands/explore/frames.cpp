@@ -11,7 +11,7 @@
 
 #include "data/files/atomic_file.h"
 #include "data/files/atomic_folder.h"
-#include "runner/commands/explore/recorded_touch.h"
+#include "runner/commands/explore/live_touch.h"
 #include "runner/commands/render/forces.h"
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/progress_line.h"

@@ -6,8 +6,8 @@
 
 #include "protocols/parse.h"
 #include "rendering/renderer.h"
-#include "runner/commands/explore/option_values.h"
-#include "runner/commands/render/trajectory_csv.h"
+#include "runner/commands/explore/explore.h"
+#include "runner/commands/render/forces.h"
 
 namespace palpate::runner {
 

@@ -1,18 +1,219 @@
 #include "runner/commands/explore/live_touch.h"
 
 #include <chrono>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <cstdio>
 #include <exception>
+#include <filesystem>
+#include <iostream>
 #include <iterator>
 #include <memory>
 #include <utility>
 
+#include "data/base/text.h"
 #include "runner/commands/render/forces.h"
+#include "runner/commands/run/opening.h"
+#include "runner/commands/shared/command.h"
+#include "runner/commands/shared/outputs.h"
+#include "runner/commands/shared/progress_line.h"
+#include "runner/commands/shared/scene_notes.h"
+#include "runner/display/explore_window.h"
 #include "runner/display/timeline.h"
+#include "runner/safety/fault_signals.h"
+#include "runner/serve/served_scene.h"
 #include "runner/servo/sample.h"
+#include "runner/session/device_check.h"
 
 namespace palpate::runner {
+namespace {
+
+constexpr double kSoftInterval =
+    0.015;  // s; a minute of every tick's surfaces would fill the memory
+
+}  // namespace
+
+SceneMoment moment_of(const TimedPose& pose, const protocols::SceneSpec& spec,
+                      const rendering::Scene& scene, const rendering::Rendering& rendering,
+                      const rendering::RenderState& state) {
+  SceneMoment out{.sample = {}, .contacts = contact_places(scene, state, rendering)};
+  out.sample.time_ns = std::llround(pose.t * 1e9);
+  out.sample.probe = virtual_stylus(spec, pose.probe);
+  out.sample.rendering = rendering;
+  out.sample.faults = rendering.faults;
+  out.sample.device1 = rendering.device1;
+  out.sample.device2 = rendering.device2;
+  if (spec.reach) out.held = pose.probe;
+  out.poses = object_poses(spec.objects, state);
+  out.soft = soft_surfaces(scene, state);
+  return out;
+}
+
+RecordedTouch::RecordedTouch(std::string scene_path, protocols::SceneSpec spec,
+                             const rendering::Renderer& renderer, std::vector<TimedPose> poses)
+    : scene_path_(std::move(scene_path)),
+      spec_(std::move(spec)),
+      renderer_(renderer),
+      poses_(std::move(poses)) {
+  touch();
+}
+
+void RecordedTouch::touch() {
+  const rendering::Scene scene = build_scene(scene_path_, spec_, renderer_);
+  const std::size_t stride = (poses_.size() + Timeline::kMost - 2) / (Timeline::kMost - 1);
+  std::size_t row = 0;
+  std::uint32_t faults = 0;
+  double soft_time = -1;  // of the surfaces that were kept last: fewer than there are ticks
+  std::vector<std::shared_ptr<const SoftSurfaceNow>> soft;
+  moments_.clear();
+  render_along(scene, spec_, renderer_, poses_,
+               [&](const TimedPose& pose, const rendering::Rendering& rendering,
+                   const rendering::RenderState& state) {
+                 faults |= rendering.faults;  // of rows that are not kept as well
+                 if (row++ % stride != 0) return;
+                 moments_.push_back(moment_of(pose, spec_, scene, rendering, state));
+                 moments_.back().sample.faults = std::exchange(faults, 0);
+                 if (pose.t >= soft_time && pose.t < soft_time + kSoftInterval && soft_time >= 0) {
+                   moments_.back().soft = soft;
+                 } else {
+                   soft = moments_.back().soft;
+                   soft_time = pose.t;
+                 }
+               });
+}
+
+void RecordedTouch::take(std::vector<SceneMoment>& out) {
+  out.insert(out.end(), std::make_move_iterator(moments_.begin()),
+             std::make_move_iterator(moments_.end()));
+  moments_.clear();
+}
+
+void RecordedTouch::show(const std::vector<stimuli::ObjectSpec>& objects) {
+  const std::vector<stimuli::ObjectSpec> before = std::exchange(spec_.objects, objects);
+  trouble_.clear();
+  try {
+    touch();
+  } catch (const std::exception& fault) {
+    trouble_ = fault.what();
+    spec_.objects = before;
+    touch();
+  }
+}
+
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Keeps pictures as scene-1.png and so on, the first number that is free; clips likewise.
+std::string keep_in(const std::string& folder, const std::string& bytes, const char* kind) {
+  try {
+    fs::create_directories(folder);
+    for (int number = 1;; ++number) {
+      const fs::path path = fs::path(folder) / ("scene-" + std::to_string(number) + kind);
+      if (fs::exists(path)) continue;
+      write_whole(path.string(), bytes);
+      return "kept as " + path.string();
+    }
+  } catch (const std::exception& fault) {
+    return fault.what();
+  }
+}
+
+ExploreSettings window_settings(const protocols::SceneSpec& spec,
+                                const rendering::Renderer& renderer,
+                                const HandsOnSettings& settings) {
+  SceneDrawing drawing(spec.objects, tool_of(spec.tool));
+  const rendering::Scene scene = build_scene(settings.scene_path, spec, renderer);
+  for (const std::string& note : scene_notes(spec, scene))
+    std::cerr << printable(settings.scene_path) << ": " << note << '\n';
+  drawing.add_compiled(scene);
+  ExploreSettings out{.title = fs::path(settings.scene_path).filename().string(),
+                      .objects = spec.objects,
+                      .drawing = std::move(drawing),
+                      .looks = {.sides = renderer.side_contact(), .labels = settings.labels}};
+  if (!settings.pictures.empty())
+    out.keep_picture = [folder = settings.pictures](const std::string& bytes, const char* kind) {
+      return keep_in(folder, bytes, kind);
+    };
+  return out;
+}
+
+/// Signals that end the program command zero force while this lives.
+class WatchedForces {
+ public:
+  WatchedForces(FaultSignals& signals, ServoThread& servo) : signals_(signals) {
+    signals_.watch(&servo);
+  }
+  WatchedForces(const WatchedForces&) = delete;
+  WatchedForces& operator=(const WatchedForces&) = delete;
+  ~WatchedForces() {
+    signals_.watch(static_cast<ServoThread*>(nullptr));
+    signals_.watch(static_cast<GuardedDevice*>(nullptr));
+  }
+
+ private:
+  FaultSignals& signals_;
+};
+
+int explore_live(const protocols::SceneSpec& spec, const rendering::Renderer& renderer,
+                 const HandsOnSettings& settings) {
+  protocols::Protocol protocol = protocol_of(spec, renderer);
+  protocol.material_limit = protocols::MaterialLimit::limit;
+  RunSettings run;
+  run.device = settings.device;
+  run.calibration = settings.calibration;
+  run.without_calibration = settings.without_calibration;
+  const DeviceKind& kind = find_device_kind(settings.device);
+  ExploreSettings window = window_settings(spec, renderer, settings);
+  FaultSignals signals;
+  const OpenDevice open = open_device(kind, run, protocol);
+  signals.watch(open.guard);
+  const DeviceCapabilities& device = open.device->capabilities();
+  if (open.guard != nullptr) check_fitness(open, run, protocol, StimulusLibrary(protocol));
+  RealClock clock;
+  ServoSettings servo;
+  servo.rate = protocol.servo_rate;
+  servo.workspace = workspace_of(protocol);
+  window.mouse = dynamic_cast<MouseStylus*>(open.device.get());
+  window.workspace = servo.workspace;
+  window.end_requested = [&signals] { return signals.end_requested() != 0; };
+  const auto limit = [&](std::vector<stimuli::ObjectSpec>& objects) {
+    protocols::Protocol limited = protocol;
+    for (std::size_t i = 0; i < objects.size(); ++i) limited.stimuli[i].object = objects[i];
+    for (const LimitedMaterial& what : limit_materials(limited, device))
+      std::fprintf(stderr, "%s\n", printable(what.text).c_str());
+    for (std::size_t i = 0; i < objects.size(); ++i) objects[i] = limited.stimuli[i].object;
+  };
+  LiveTouch touch(*open.device, clock,
+                  {.scene_path = settings.scene_path,
+                   .spec = spec,
+                   .renderer = &renderer,
+                   .servo = servo,
+                   .limit = limit,
+                   .emergency = [guard = open.guard] {
+                     if (guard != nullptr) guard->emergency_zero();
+                   }});
+  const WatchedForces watched(signals, touch.servo());
+  explore_in_window(std::move(window), touch);
+  const ServoHealth& health = touch.servo().health();
+  std::cout << health.ticks() << " ticks, " << health.missed_ticks() << " missed, "
+            << health.lost_samples() << " not shown\n";
+  return 0;
+}
+
+}  // namespace
+
+int explore_hands_on(const protocols::SceneSpec& spec, const rendering::Renderer& renderer,
+                     const HandsOnSettings& settings) {
+  if (settings.trajectory.empty()) return explore_live(spec, renderer, settings);
+  RecordedTouch touch(settings.scene_path, spec, renderer, read_trajectory(settings.trajectory));
+  ExploreSettings window = window_settings(spec, renderer, settings);
+  window.end_requested = [&stop = catch_stop_signals()] { return stop.load(); };
+  explore_in_window(std::move(window), touch);
+  return 0;
+}
+
 namespace {
 
 constexpr auto kIdle = std::chrono::milliseconds(5);

@@ -14,10 +14,57 @@
 
 #include "protocols/parse.h"
 #include "rendering/renderer.h"
+#include "runner/commands/render/forces.h"
 #include "runner/display/display.h"
 #include "runner/servo/servo_thread.h"
 
 namespace palpate::runner {
+
+/// What a tick of a scene along a recorded path shows. \param state  after it
+SceneMoment moment_of(const TimedPose& pose, const protocols::SceneSpec& spec,
+                      const rendering::Scene& scene, const rendering::Rendering& rendering,
+                      const rendering::RenderState& state);
+
+/// A recorded path, touched in one go. Of a long path at most Timeline::kMost rows are kept,
+/// evenly.
+class RecordedTouch final : public TouchSource {
+ public:
+  /// \throws MeshError
+  RecordedTouch(std::string scene_path, protocols::SceneSpec spec,
+                const rendering::Renderer& renderer, std::vector<TimedPose> poses);
+
+  bool live() const override { return false; }
+  void take(std::vector<SceneMoment>& out) override;
+  void hold(bool) override {}
+  void show(const std::vector<stimuli::ObjectSpec>& objects) override;
+  void emergency_zero() noexcept override {}
+  void clear_fault() noexcept override {}
+  std::string trouble() const override { return trouble_; }
+
+ private:
+  void touch();
+
+  std::string scene_path_;
+  protocols::SceneSpec spec_;
+  const rendering::Renderer& renderer_;
+  std::vector<TimedPose> poses_;
+  std::vector<SceneMoment> moments_;
+  std::string trouble_;
+};
+
+// The window of `palpate explore`.
+
+struct HandsOnSettings {
+  std::string scene_path, trajectory, device;  ///< a path or a device
+  std::string pictures;                        ///< folder for those that are kept; empty: none
+  std::string calibration;                     ///< file of calibrations; empty: the usual one
+  bool without_calibration = false, labels = false;
+};
+
+/// Touches the scene in a window until that is closed. \return exit status
+/// \throws UsageError, DisplayError, InputError, MeshError; std::runtime_error: no such device
+int explore_hands_on(const protocols::SceneSpec& spec, const rendering::Renderer& renderer,
+                     const HandsOnSettings& settings);
 
 /// The servo has a thread of its own, which waits for nothing but the clock and the device. Another
 /// one empties the servo's ring and keeps the samples for the display, so that a display that

@@ -13,10 +13,10 @@
 #include "data/base/text.h"
 #include "runner/commands/movement/touched_trial.h"
 #include "runner/commands/shared/command.h"
-#include "runner/commands/shared/csv_text.h"
+#include "runner/commands/shared/outputs.h"
 #include "runner/commands/shared/progress_line.h"
-#include "runner/commands/shared/study_trials.h"
-#include "runner/session/recorded_trial.h"
+#include "runner/commands/shared/study_options.h"
+#include "runner/session/replay.h"
 
 namespace palpate::runner {
 namespace {

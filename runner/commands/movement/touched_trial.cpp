@@ -9,8 +9,7 @@
 #include <utility>
 
 #include "data/export/sample_slots.h"
-#include "runner/session/contact_log.h"
-#include "runner/session/recorded_trial.h"
+#include "runner/session/live_forces.h"
 #include "runner/session/replay.h"
 
 namespace palpate::runner {

@@ -1,19 +1,416 @@
+#include "runner/commands/plan/plan.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
 #include <iostream>
+#include <optional>
+#include <set>
 #include <stdexcept>
 #include <string>
+#include <thread>
 #include <utility>
 #include <vector>
 
 #include "analysis/figures/figure_svg.h"
 #include "analysis/report/plan_report.h"
+#include "analysis/statistics/analysis.h"
+#include "analysis/statistics/comparison.h"
+#include "analysis/statistics/interval_coverage.h"
+#include "analysis/statistics/threshold_plan.h"
+#include "analysis/text.h"
 #include "protocols/json_document.h"
-#include "runner/commands/plan/options.h"
-#include "runner/commands/plan/thresholds.h"
+#include "protocols/parse.h"
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/outputs.h"
 #include "runner/commands/shared/progress_line.h"
+#include "runner/commands/shared/study_options.h"
 
 namespace palpate::runner {
+
+// The part of 'palpate plan' that is about thresholds.
+
+struct ThresholdOptions {
+  double effect = 0, weber = 0.1, participant_sd = 0.3, effect_sd = 0.2, pse_sd = 0.5, reach = 2.5;
+};
+void add_threshold_options(CommandLine& line, ThresholdOptions& options);
+/// Prints the plan, and writes its JSON. \throws UsageError
+void plan_thresholds_of(const ThresholdOptions& thresholds, const PlanOptions& options,
+                        const boost::program_options::variables_map& values, Outputs& outputs);
+
+/// Prints how often the intervals of thresholds hold the truth, and writes its JSON.
+/// \throws UsageError
+void print_coverage(const PlanOptions& options, const boost::program_options::variables_map& values,
+                    Outputs& outputs);
+
+namespace po = boost::program_options;
+
+namespace {
+
+constexpr std::size_t kMostParticipants = 10'000, kMostTrials = 10'000, kMostStudies = 10'000'000;
+constexpr double kMostSd = 100;  // log seconds
+
+std::vector<std::string> split(const std::string& text, char at) {
+  std::vector<std::string> parts(1);
+  for (const char c : text) {
+    if (c == at) {
+      parts.emplace_back();
+    } else {
+      parts.back() += c;
+    }
+  }
+  return parts;
+}
+
+std::size_t whole_number(const std::string& option, const std::string& text, std::size_t least,
+                         std::size_t most) {
+  std::size_t value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size() || value < least || value > most) {
+    throw UsageError("--" + option + ": expected a whole number from " + std::to_string(least) +
+                     " to " + std::to_string(most) + ", found '" + printable(text, 60) + "'");
+  }
+  return value;
+}
+
+double real_number(const std::string& option, const std::string& text) {
+  double value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(value)) {
+    throw UsageError("--" + option + ": expected a number, found '" + printable(text, 60) + "'");
+  }
+  return value;
+}
+
+void check_within(const std::string& option, double value, double low, double high) {
+  if (value >= low && value <= high) return;
+  throw UsageError("--" + option + ": expected a number from " + analysis::fixed(low, 2) + " to " +
+                   analysis::fixed(high, 2));
+}
+
+std::string shapes_of(const analysis::StudyModel& model) {
+  std::string known;
+  for (const std::string& each : model.shapes)
+    known += (known.empty() ? "" : ", ") + printable(each, 60);
+  return known;
+}
+
+/// "cone=22,cube=11": percent reductions; shapes that are not named have no effect. "11": all.
+void put_effects(const std::string& text, analysis::StudyModel& model) {
+  const auto log_ratio = [](const std::string& percent) {
+    const double value = real_number("effect", percent);
+    if (!(value < 100) || value < -1000) {
+      throw UsageError("--effect: expected a percent reduction of time below 100, found '" +
+                       printable(percent, 60) + "'");
+    }
+    return std::log1p(-value / 100);
+  };
+  if (text.find('=') == std::string::npos) {
+    std::ranges::fill(model.log_ratios, log_ratio(text));
+    return;
+  }
+  std::ranges::fill(model.log_ratios, 0.0);
+  std::set<std::string> named;
+  for (const std::string& part : split(text, ',')) {
+    const std::size_t at = part.rfind('=');
+    const std::string name = part.substr(0, at);
+    const auto shape = std::ranges::find(model.shapes, name);
+    if (at == std::string::npos || shape == model.shapes.end()) {
+      throw UsageError("--effect: expected SHAPE=PERCENT with a shape of " + shapes_of(model) +
+                       ", found '" + printable(part, 60) + "'");
+    }
+    if (!named.insert(name).second) {
+      throw UsageError("--effect: expected each shape once, found '" + printable(name, 60) +
+                       "' again");
+    }
+    model.log_ratios[static_cast<std::size_t>(shape - model.shapes.begin())] =
+        log_ratio(part.substr(at + 1));
+  }
+}
+
+/// The paper's figure 15, for the shapes that are there; of other shapes all get the smaller of the
+/// paper's effects. \return which effects were assumed
+std::string put_default_effects(analysis::StudyModel& model) {
+  double smallest = 100;
+  for (const analysis::PaperEffect& effect : analysis::kPaperEffects) {
+    smallest = std::min(smallest, effect.percent_reduction.value_or(smallest));
+  }
+  bool known = false;
+  for (std::size_t s = 0; s < model.shapes.size(); ++s) {
+    const analysis::PaperEffect* effect = analysis::find_paper_effect(model.shapes[s]);
+    const double percent = effect ? effect->percent_reduction.value_or(0) : 0;
+    model.log_ratios[s] = std::log1p(-percent / 100);
+    known = known || percent > 0;
+  }
+  std::string assumed = "the paper's";
+  if (!known) {
+    std::ranges::fill(model.log_ratios, std::log1p(-smallest / 100));
+    assumed = analysis::fixed(smallest, 0) +
+              " % for every shape, the smaller of the paper's, whose shapes are "
+              "not among these";
+  }
+  return "No effects were given (--effect SHAPE=PERCENT,...); assumed: " + assumed +
+         ". The shapes: " + shapes_of(model) + ".";
+}
+
+}  // namespace
+
+void add_plan_options(CommandLine& line, PlanOptions& options) {
+  auto add = line.options.add_options();
+  add("db", po::value(&options.database)->value_name("FILE"), "a pilot's database");
+  add("csv", po::value(&options.csv)->value_name("FILE"), "a pilot's trials as CSV");
+  add("effect", po::value(&options.effect)->value_name("SHAPE=PERCENT,..."),
+      "wanted reductions of time with the ray (of a pilot of other renderers: with its second "
+      "renderer), or one number for all shapes; default for ray: the paper's, cone=22,cube=11, or "
+      "where there is neither, 11");
+  add("power", po::value(&options.power)->default_value(0.8, "0.8")->value_name("P"),
+      "wanted power");
+  add("alpha", po::value(&options.alpha)->default_value(0.05, "0.05")->value_name("P"),
+      "of the tests, after Holm");
+  add("goal", po::value(&options.goal)->default_value("all")->value_name("all|any"),
+      "find every shape with an effect, or at least one");
+  add("participants", po::value(&options.participants)->default_value("2-100")->value_name("A-B"),
+      "range of the numbers of participants");
+  add("trials", po::value(&options.trials)->default_value("10,20,40,76")->value_name("N,..."),
+      "trials of each shape with each renderer; a power curve for each");
+  add("test", po::value(&options.test)->default_value("paired")->value_name("paired|model"),
+      "paired t-tests, or a mixed model fitted to every study (slow)");
+  add("gain-sd", po::value(&options.gain_sd)->value_name("SD"),
+      "of participants' gains (random slope); a pilot's unless given");
+  add("shape-gain-sd", po::value(&options.shape_gain_sd)->value_name("SD"),
+      "of a participant's gain for a shape beyond that; a pilot's, or 0");
+  add("residual-sd", po::value(&options.residual_sd)->value_name("SD"),
+      "of single trials; a pilot's unless given");
+  add("intercept-sd", po::value(&options.intercept_sd)->value_name("SD"),
+      "of participants; a pilot's, or 0.3 (used by --test model only)");
+  add("correlation", po::value(&options.correlation)->value_name("R"),
+      "of participants' intercepts and gains; a pilot's, or 0");
+  add("share-used", po::value(&options.share_used)->value_name("SHARE"),
+      "of trials that give a time; a pilot's, or 1");
+  add("studies", po::value(&options.studies)->value_name("N"),
+      "simulated for each power; default 10000, with --test model 1000");
+  add("seed", po::value(&options.seed)->default_value(2000)->value_name("S"), "of the simulation");
+}
+
+analysis::Pilot starting_point(const PlanOptions& options, const po::variables_map& values) {
+  analysis::Pilot pilot;
+  if (options.database.empty() && options.csv.empty()) {
+    for (const char* needed : {"gain-sd", "residual-sd"}) {
+      if (values.count(needed) == 0) {
+        throw UsageError(std::string("without a pilot (--db or --csv) expected --") + needed +
+                         "; more: add --help");
+      }
+    }
+    pilot.pair = {"point", "ray", std::nullopt, std::nullopt};
+    for (const analysis::PaperEffect& effect : analysis::kPaperEffects)
+      pilot.model.shapes.emplace_back(effect.shape);
+    pilot.model.log_ratios.assign(pilot.model.shapes.size(), 0.0);
+    pilot.model.intercept_sd = options.intercept_sd;
+    return pilot;
+  }
+  const std::string& source = options.csv.empty() ? options.database : options.csv;
+  pilot = analysis::read_pilot(
+      analysis::analyze(read_study_trials(options.database, options.csv), {}, PALPATE_VERSION));
+  if (!pilot.undefined.empty()) {
+    throw UsageError(
+        source + ": expected a pilot that the mixed model can be fitted to: " + pilot.undefined);
+  }
+  pilot.notes.insert(pilot.notes.begin(),
+                     "Standard deviations and proportion of used trials are from " +
+                         printable(source, 200) + "; the effects to find are not.");
+  return pilot;
+}
+
+analysis::StudyModel model_of(analysis::Pilot& pilot, const PlanOptions& options,
+                              const po::variables_map& values) {
+  analysis::StudyModel model = std::move(pilot.model);
+  const auto put = [&](const char* option, double value, double low, double high, double& target) {
+    if (values.count(option) == 0) return;
+    check_within(option, value, low, high);
+    target = value;
+  };
+  put("gain-sd", options.gain_sd, 0, kMostSd, model.gain_sd);
+  put("shape-gain-sd", options.shape_gain_sd, 0, kMostSd, model.shape_gain_sd);
+  put("intercept-sd", options.intercept_sd, 0, kMostSd, model.intercept_sd);
+  put("correlation", options.correlation, -1, 1, model.correlation);
+  put("residual-sd", options.residual_sd, 0, kMostSd, model.residual_sd);
+  put("share-used", options.share_used, 0.01, 1, model.proportion_used);
+  if (model.gain_sd == 0 && model.shape_gain_sd == 0 && model.residual_sd == 0) {
+    throw UsageError(
+        "expected some variation: --gain-sd, --shape-gain-sd or --residual-sd above 0");
+  }
+  if (values.count("effect") != 0) {
+    put_effects(options.effect, model);
+  } else if (pilot.pair.is_ray_minus_point()) {
+    pilot.notes.push_back(put_default_effects(model));
+  } else {
+    throw UsageError(
+        "expected --effect SHAPE=PERCENT,...: the paper's effects are of ray against "
+        "point, this pilot is of " +
+        printable(pilot.pair.renderer, 60) + " against " + printable(pilot.pair.reference, 60) +
+        "; its shapes: " + shapes_of(model));
+  }
+  if (std::ranges::all_of(model.log_ratios, [](double effect) { return effect == 0; })) {
+    throw UsageError(
+        "expected the wanted effect of some shape: --effect SHAPE=PERCENT,... with a shape of " +
+        shapes_of(model));
+  }
+  return model;
+}
+
+analysis::PlanSettings settings_of(const PlanOptions& options, const po::variables_map& values) {
+  analysis::PlanSettings out;
+  const auto ends = split(options.participants, '-');
+  if (ends.size() > 2) throw UsageError("--participants: expected a range such as 4-40");
+  out.min_participants = whole_number("participants", ends.front(), 2, kMostParticipants);
+  out.max_participants =
+      whole_number("participants", ends.back(), out.min_participants, kMostParticipants);
+  for (const std::string& trials : split(options.trials, ',')) {
+    out.trials.push_back(whole_number("trials", trials, 1, kMostTrials));
+  }
+  check_within("power", options.power, 0.01, 0.9999);
+  check_within("alpha", options.alpha, 0.0001, 0.5);
+  out.power = options.power;
+  if (options.goal != "all" && options.goal != "any") {
+    throw UsageError("--goal: expected all or any");
+  }
+  out.goal = options.goal == "all" ? analysis::Goal::all : analysis::Goal::any;
+  if (options.test != "paired" && options.test != "model") {
+    throw UsageError("--test: expected paired or model");
+  }
+  analysis::PowerSettings& simulation = out.simulation;
+  simulation.test =
+      options.test == "paired" ? analysis::StudyTest::paired : analysis::StudyTest::model;
+  simulation.alpha = options.alpha;
+  simulation.seed = options.seed;
+  simulation.studies = simulation.test == analysis::StudyTest::paired ? 10'000 : 1'000;
+  if (values.count("studies") != 0) {
+    simulation.studies = whole_number("studies", options.studies, 100, kMostStudies);
+  }
+  simulation.jobs = std::max(1U, std::thread::hardware_concurrency());
+  if (values.count("jobs") != 0) simulation.jobs = whole_number("jobs", options.jobs, 1, 256);
+  return out;
+}
+
+namespace po = boost::program_options;
+
+namespace {
+
+void require(bool right, const char* option, const char* expected) {
+  if (!right) throw UsageError(std::string("--") + option + ": expected " + expected);
+}
+
+analysis::ThresholdStudy study_of(const ThresholdOptions& thresholds, const PlanOptions& options) {
+  const auto within = [](double value, double low, double high) {
+    return value >= low && value <= high;  // false for what is no number
+  };
+  require(within(thresholds.effect, -400, 95), "jnd-effect", "percent from -400 to 95");
+  require(within(thresholds.weber, 0.001, 1), "weber", "a JND / standard from 0.001 to 1");
+  require(within(thresholds.participant_sd, 0, 2), "jnd-sd", "0 to 2");
+  require(within(thresholds.effect_sd, 0, 2), "jnd-effect-sd", "0 to 2");
+  require(within(thresholds.pse_sd, 0, 5), "pse-sd", "0 to 5 JNDs");
+  require(within(thresholds.reach, 0.5, 10), "reach", "0.5 to 10 JNDs");
+  require(within(options.alpha, 1e-6, 0.5), "alpha", "0.000001 to 0.5");
+  require(within(options.power, 0.01, 0.999), "power", "0.01 to 0.999");
+  analysis::ThresholdStudy study;
+  study.weber_fraction = thresholds.weber;
+  study.ratio = 1 - thresholds.effect / 100;
+  study.participant_sd = thresholds.participant_sd;
+  study.effect_sd = thresholds.effect_sd;
+  study.pse_sd = thresholds.pse_sd;
+  study.reach = thresholds.reach;
+  study.alpha = options.alpha;
+  return study;
+}
+
+/// At most twelve numbers of participants over the range.
+std::vector<std::size_t> numbers_over(std::size_t least, std::size_t most) {
+  constexpr std::size_t kMost = 12;
+  std::vector<std::size_t> numbers;
+  const std::size_t steps = std::min(kMost - 1, most - least);
+  for (std::size_t i = 0; i <= steps; ++i)
+    numbers.push_back(steps == 0 ? least : least + i * (most - least) / steps);
+  return numbers;
+}
+
+}  // namespace
+
+void add_threshold_options(CommandLine& line, ThresholdOptions& options) {
+  auto add = line.options.add_options();
+  add("jnd-effect", po::value(&options.effect)->value_name("PERCENT"),
+      "of thresholds instead of times: how much smaller the JND is with the second renderer or "
+      "condition; --trials are those of a participant with each, --participants a range");
+  add("weber", po::value(&options.weber)->default_value(0.1, "0.1")->value_name("W"),
+      "JND / standard with the first condition");
+  add("jnd-sd", po::value(&options.participant_sd)->default_value(0.3, "0.3")->value_name("SD"),
+      "of participants' log JND");
+  add("jnd-effect-sd", po::value(&options.effect_sd)->default_value(0.2, "0.2")->value_name("SD"),
+      "of participants' log ratio of their JNDs");
+  add("pse-sd", po::value(&options.pse_sd)->default_value(0.5, "0.5")->value_name("SD"),
+      "of participants' PSE, in JNDs");
+  add("reach", po::value(&options.reach)->default_value(2.5, "2.5")->value_name("JNDS"),
+      "how far the levels reach from the standard");
+  add("coverage",
+      "how often the 95 % intervals of thresholds, slopes and lapses hold the truth, after each "
+      "procedure, with lapses and without; takes --studies (200), --seed, --jobs, --json");
+}
+
+void print_coverage(const PlanOptions& options, const po::variables_map& values, Outputs& outputs) {
+  for (const char* other :
+       {"db", "csv", "effect", "gain-sd", "residual-sd", "figure", "reuse", "jnd-effect"}) {
+    if (values.count(other))
+      throw UsageError(std::string("--") + other + ": is of a plan; not with --coverage");
+  }
+  PlanOptions own = options;
+  std::size_t studies = 200;
+  if (values.count("studies")) {
+    const char* const end = own.studies.data() + own.studies.size();
+    const auto [stop, error] = std::from_chars(own.studies.data(), end, studies);
+    require(error == std::errc() && stop == end && studies >= 1 && studies <= 100'000, "studies",
+            "a whole number from 1 to 100000");
+    own.studies = "100";  // of plans, which are not made
+  }
+  const analysis::PowerSettings asked = settings_of(own, values).simulation;
+  analysis::CoverageSettings settings;
+  settings.studies = studies;
+  settings.seed = asked.seed;
+  settings.jobs = asked.jobs;
+  ProgressLine progress("simulated studies");
+  settings.progress = [&progress](double share) { progress.show(share); };
+  const auto results = analysis::interval_coverage(settings);
+  progress.clear();
+  if (outputs.wanted("json")) outputs.put("json", analysis::coverage_json(results, settings));
+  outputs.write();
+  std::cout << analysis::coverage_text(results, settings);
+}
+
+void plan_thresholds_of(const ThresholdOptions& thresholds, const PlanOptions& options,
+                        const po::variables_map& values, Outputs& outputs) {
+  for (const char* other : {"db", "csv", "effect", "gain-sd", "residual-sd", "figure", "reuse"}) {
+    if (values.count(other))
+      throw UsageError(std::string("--") + other + ": is of response times; not with --jnd-effect");
+  }
+  const analysis::ThresholdStudy study = study_of(thresholds, options);
+  analysis::ThresholdPlanSettings settings;
+  PlanOptions own = options;
+  if (values["trials"].defaulted()) own.trials = "70,140,280";
+  if (values["participants"].defaulted()) own.participants = "4-40";
+  const analysis::PlanSettings asked = settings_of(own, values);
+  settings.trials = asked.trials;
+  settings.participants = numbers_over(asked.min_participants, asked.max_participants);
+  constexpr std::size_t kStudies = 500;
+  settings.studies = values.count("studies") ? asked.simulation.studies : kStudies;
+  settings.seed = own.seed;
+  settings.power = own.power;
+  std::sort(settings.trials.begin(), settings.trials.end());
+  ProgressLine progress("simulated studies");
+  settings.progress = [&progress](double share) { progress.show(share); };
+  const analysis::ThresholdPlan plan = analysis::plan_thresholds(study, std::move(settings));
+  progress.clear();
+  if (outputs.wanted("json")) outputs.put("json", analysis::threshold_plan_json(plan));
+  outputs.write();
+  std::cout << analysis::threshold_plan_text(plan);
+}
 
 namespace po = boost::program_options;
 

@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "analysis/report/plan_report.h"
-#include "analysis/report/report_json.h"
+#include "analysis/report/report.h"
 #include "analysis/statistics/analysis.h"
 #include "analysis/statistics/sensitivity.h"
 #include "analysis/text.h"
@@ -30,7 +30,7 @@
 #include "runner/commands/shared/progress_line.h"
 #include "runner/commands/shared/sealed_folder.h"
 #include "runner/participants/simulated_settings.h"
-#include "runner/session/protocol_info.h"
+#include "runner/session/run_record.h"
 
 namespace palpate::runner {
 namespace {

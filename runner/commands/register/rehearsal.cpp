@@ -9,7 +9,7 @@
 #include <thread>
 #include <utility>
 
-#include "analysis/report/report_json.h"
+#include "analysis/report/report.h"
 #include "analysis/statistics/analysis.h"
 #include "analysis/statistics/model_study.h"
 #include "data/base/checksum.h"
@@ -18,8 +18,8 @@
 #include "data/store/store.h"
 #include "runner/build_info.h"
 #include "runner/commands/shared/command.h"
-#include "runner/commands/shared/protocol_facts.h"
-#include "runner/session/protocol_info.h"
+#include "runner/commands/shared/protocol_choice.h"
+#include "runner/session/run_record.h"
 #include "runner/session/simulated_study.h"
 
 namespace palpate::runner {

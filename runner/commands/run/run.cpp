@@ -1,8 +1,3 @@
-// `palpate run`: a live session with a person and a device. Opens the station, runs the session in
-// a thread of its own beside the display's loop, and reports. From here to a force:
-// live_session.cpp, session.cpp (the trial loop), servo_thread.cpp, servo.cpp (the tick),
-// rendering.
-
 #include <algorithm>
 #include <csignal>
 #include <cstdint>
@@ -19,6 +14,7 @@
 #include <vector>
 
 #include "data/base/checksum.h"
+#include "data/base/text.h"
 #include "data/store/store.h"
 #include "data/store/task_text.h"
 #include "protocols/answer_keys.h"
@@ -26,20 +22,78 @@
 #include "protocols/tasks/texts.h"
 #include "runner/commands/run/admission.h"
 #include "runner/commands/run/opening.h"
-#include "runner/commands/run/report.h"
-#include "runner/commands/run/resumption.h"
-#include "runner/commands/run/run_info.h"
 #include "runner/commands/run/settings.h"
 #include "runner/commands/shared/command.h"
 #include "runner/safety/fault_signals.h"
 #include "runner/session/device_check.h"
 #include "runner/session/live_session.h"
-#include "runner/session/preflight_dialogue.h"
+#include "runner/session/preflight.h"
 #include "runner/session/sample_stream.h"
 #include "runner/session/socket_advisor.h"
 #include "runner/session/station.h"
 
 namespace palpate::runner {
+
+// What `palpate run` prints before and after a session.
+
+/// \param simulated  by its device
+void print_participant(const data::Participant& participant, int session, int sessions,
+                       bool simulated);
+/// \param elapsed  s, since the servo thread began
+void print_servo_health(const ServoHealth& health, double elapsed);
+/// \param who  as the store holds them now
+void print_outcome(const LiveStation& station, const data::Participant& who,
+                   const LiveSession::Outcome& outcome);
+
+void print_participant(const data::Participant& participant, int session, int sessions,
+                       bool simulated) {
+  std::printf("participant %s has number %d; session %d of %d\n", participant.code.c_str(),
+              participant.number, session, sessions);
+  std::fflush(stdout);
+  if (participant.enrolled_number != participant.number)
+    std::fprintf(stderr,
+                 "renumbered when databases were merged: the trials are those of number %d\n",
+                 participant.enrolled_number);
+  if (participant.id == 0)
+    std::fprintf(
+        stderr, "the participant is enrolled, and the number taken, when the first trial begins\n");
+  if (simulated) std::fprintf(stderr, "SIMULATED device: the data are labelled so\n");
+}
+
+void print_servo_health(const ServoHealth& health, double elapsed) {
+  std::fprintf(stderr,
+               "servo: %llu ticks in %.3f s, %llu missed, longest period %.2f ms, lateness p99.9 "
+               "%.0f us\n",
+               static_cast<unsigned long long>(health.ticks()), elapsed,
+               static_cast<unsigned long long>(health.missed_ticks()),
+               static_cast<double>(health.longest_period_ns()) * 1e-6,
+               static_cast<double>(health.lateness().quantile(0.999)) * 1e-3);
+}
+
+void print_outcome(const LiveStation& station, const data::Participant& who,
+                   const LiveSession::Outcome& outcome) {
+  const std::string number = who.id == 0 ? "not enrolled" : "number " + std::to_string(who.number);
+  std::printf("%s, participant %s (%s), session %d: %zu of %zu trials on record; %s\n",
+              station.protocol.name.c_str(), who.code.c_str(), number.c_str(),
+              station.record.session(), outcome.recorded, outcome.trials,
+              data::to_string(outcome.end));
+  for (const std::string& note : outcome.unkept)
+    std::fprintf(stderr, "not on record, as nobody was enrolled: %s\n",
+                 printable_lines(note).c_str());
+  if (!outcome.reason.empty())
+    std::fprintf(stderr, "%s\n", printable_lines(outcome.reason).c_str());
+  if (outcome.end == data::RunEnd::paused || outcome.end == data::RunEnd::aborted)
+    std::fprintf(stderr, "the same command resumes from here\n");
+  if (station.markers.dropped() > 0)
+    std::fprintf(stderr, "%llu markers were not taken by their receivers\n",
+                 static_cast<unsigned long long>(station.markers.dropped()));
+}
+
+// `palpate run`: a live session with a person and a device. Opens the station, runs the session in
+// a thread of its own beside the display's loop, and reports. From here to a force:
+// live_session.cpp, session.cpp (the trial loop), servo_thread.cpp, servo.cpp (the tick),
+// rendering.
+
 namespace {
 
 /// What is known before the session begins and belongs into its record or onto the console.

@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "data/record.h"
-#include "runner/commands/shared/ask.h"
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/study_options.h"
 

@@ -4,10 +4,27 @@
 
 #include <chrono>
 #include <cmath>
+#include <csignal>
 #include <iostream>
 #include <utility>
 
 namespace palpate::runner {
+namespace {
+
+std::atomic<bool> stop_asked{false};  // a signal handler can reach nothing else
+
+void ask_to_stop(int) { stop_asked = true; }
+
+}  // namespace
+
+const std::atomic<bool>& catch_stop_signals() {
+  struct sigaction action = {};
+  action.sa_handler = ask_to_stop;
+  action.sa_flags = static_cast<int>(SA_RESETHAND);
+  sigaction(SIGINT, &action, nullptr);
+  sigaction(SIGTERM, &action, nullptr);
+  return stop_asked;
+}
 
 double now_ns() {
   return std::chrono::duration<double, std::nano>(

@@ -5,11 +5,17 @@
 #include <optional>
 #include <string>
 
+#include "data/export/settings.h"
 #include "data/store/store.h"
 #include "protocols/difference.h"
 #include "protocols/protocol.h"
 
 namespace palpate::runner {
+
+// What exports need that data/ does not know: protocols, meanings of fault bits, the version.
+
+/// With all of that; the rest as by default.
+data::ExportSettings export_settings();
 
 /// The protocol that a participant began with, if it differs from the named one.
 struct EarlierProtocol {

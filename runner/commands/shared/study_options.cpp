@@ -1,10 +1,27 @@
 #include "runner/commands/shared/study_options.h"
 
+#include <algorithm>
+#include <charconv>
+#include <cstdio>
+#include <optional>
+#include <string>
+#include <vector>
+
 #include "data/base/text.h"
-#include "runner/commands/shared/simulation.h"
+#include "data/store/store.h"
+#include "runner/commands/shared/command.h"
 #include "runner/session/socket_advisor.h"
 
 namespace palpate::runner {
+
+analysis::TrialTable read_study_trials(const std::string& database, const std::string& csv) {
+  if (!csv.empty()) return analysis::read_trials_csv(csv);
+  try {
+    return analysis::read_trials_store(database);
+  } catch (const data::StoreRefused& error) {
+    throw UsageError(error.what());  // the file that was named is bad input: status 2
+  }
+}
 
 namespace po = boost::program_options;
 
@@ -35,6 +52,113 @@ void check_advisor(const std::string& path, double time_out) {
   if (const std::string fault = socket_fault(path); !fault.empty())
     throw UsageError("--ask: expected the Unix domain socket of a program that listens, found " +
                      printable(path) + ": " + fault);
+}
+
+namespace {
+
+constexpr std::int64_t kMostShards = 1'000'000;
+
+std::optional<std::int64_t> number(const std::string& text) {
+  std::int64_t value = 0;
+  const char* const end = text.data() + text.size();
+  const auto read = std::from_chars(text.data(), end, value);
+  if (read.ec != std::errc() || read.ptr != end || value < 0) return std::nullopt;
+  return value;
+}
+
+std::int64_t slurm_number(const char* name,
+                          const std::function<const char*(const char*)>& variable) {
+  const char* const text = variable(name);
+  if (text == nullptr) {
+    throw UsageError(
+        std::string("--shard auto: expected a task of a Slurm array (sbatch --array), but ") +
+        name + " is not set; elsewhere give --shard K/N");
+  }
+  const auto value = number(text);
+  if (!value)
+    throw UsageError(std::string("--shard auto: expected a number in ") + name + ", found '" +
+                     text + "'");
+  return *value;
+}
+
+}  // namespace
+
+std::int64_t Shard::part(std::int64_t items, std::int64_t parts) const {
+  // items * parts / count, without overflow.
+  return items / count * parts + items % count * parts / count;
+}
+
+Shard parse_shard(const std::string& text,
+                  const std::function<const char*(const char*)>& variable) {
+  Shard shard;
+  if (text == "auto") {
+    shard.count = slurm_number("SLURM_ARRAY_TASK_COUNT", variable);
+    shard.number = slurm_number("SLURM_ARRAY_TASK_ID", variable) -
+                   slurm_number("SLURM_ARRAY_TASK_MIN", variable) + 1;
+    if (shard.count < 1 || shard.count > kMostShards || shard.number < 1 ||
+        shard.number > shard.count) {
+      throw UsageError(
+          "--shard auto: task " + std::to_string(shard.number) + " of " +
+          std::to_string(shard.count) +
+          " is no shard; the array's task numbers must follow one another (--array=1-N)");
+    }
+    return shard;
+  }
+  const std::size_t slash = text.find('/');
+  const auto k = number(text.substr(0, slash));
+  const auto n = slash == std::string::npos ? std::nullopt : number(text.substr(slash + 1));
+  if (!k || !n || *n < 1 || *n > kMostShards || *k < 1 || *k > *n) {
+    throw UsageError("--shard: expected K/N with 1 <= K <= N <= " + std::to_string(kMostShards) +
+                     ", such as 3/8, or auto; found '" + text + "'");
+  }
+  return {*k, *n};
+}
+
+void check_simulated_participants(int participants) {
+  if (participants < 1 || participants > 100000)
+    throw UsageError("--participants: must be 1 to 100000");
+}
+
+void add_participant_version(CommandLine& line, int& version) {
+  line.options.add_options()(
+      "participant-version", boost::program_options::value(&version)->value_name("1|2|3"),
+      ("of the simulated participant; each is frozen. Default: the one that FILE was begun with, "
+       "else " +
+       std::to_string(kDefaultParticipantVersion))
+          .c_str());
+}
+
+void check_participant_version(const boost::program_options::variables_map& values, int version) {
+  if (values.count("participant-version") == 0) return;
+  const std::vector<int> versions = participant_versions();
+  if (std::find(versions.begin(), versions.end(), version) == versions.end())
+    throw UsageError("--participant-version: must be 1 to " + std::to_string(versions.back()));
+}
+
+int version_to_go_on_with(const std::set<int>& begun, const std::string& file) {
+  if (begun.empty()) return kDefaultParticipantVersion;
+  if (begun.size() > 1) {
+    std::string versions;
+    for (const int version : begun)
+      versions += (versions.empty() ? "" : ", ") + std::to_string(version);
+    throw UsageError(printable(file) + ": holds versions " + versions +
+                     " of the simulated participant; choose one with --participant-version");
+  }
+  if (*begun.begin() != kDefaultParticipantVersion) {
+    std::fprintf(stderr, "%s: goes on with version %d of the simulated participant\n",
+                 printable(file).c_str(), *begun.begin());
+  }
+  return *begun.begin();
+}
+
+LimitedForSimulation fit_to_simulation(protocols::Protocol& protocol,
+                                       const SimulatedSettings& simulated) {
+  LimitedForSimulation limited = limit_for_simulation(protocol, simulated);
+  std::string reasons;
+  for (const std::string& fault : simulation_faults(protocol, StimulusLibrary(protocol), simulated))
+    reasons += "\n" + fault;
+  if (!reasons.empty()) throw UsageError("this protocol cannot be simulated:" + reasons);
+  return limited;
 }
 
 }  // namespace palpate::runner

@@ -1,14 +1,130 @@
 #include "runner/commands/shared/task_words.h"
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
+#include <cstdio>
 #include <iomanip>
+#include <nlohmann/json.hpp>
 #include <sstream>
+#include <string>
+#include <vector>
 
 #include "data/base/random.h"
+#include "protocols/procedures/recovery.h"
 #include "protocols/tasks/levels.h"
+#include "runner/commands/shared/command.h"
+#include "runner/commands/shared/outputs.h"
 
 namespace palpate::runner {
+namespace {
+
+struct ListedTrial {
+  const protocols::Trial& trial;
+  const protocols::TaskBlock& block;
+  std::string stimulus, level;
+  int comparison = 0;
+  bool example = false;  ///< depends on answers
+};
+
+ListedTrial listed(const protocols::Protocol& protocol, const protocols::Trial& trial) {
+  const auto& block = protocol.blocks[static_cast<std::size_t>(trial.task_block)];
+  return {trial,
+          block,
+          protocol.stimuli[static_cast<std::size_t>(trial.stimulus)].name,
+          trial.level ? protocols::level_text(*trial.level) : "",
+          comparison_interval(block, trial),
+          protocols::is_adaptive(block)};
+}
+
+std::string table_text(const protocols::Protocol& protocol,
+                       const std::vector<protocols::Trial>& trials) {
+  std::ostringstream out;
+  int block = 0;
+  for (const protocols::Trial& trial : trials) {
+    const ListedTrial row = listed(protocol, trial);
+    if (trial.block != block) {
+      block = trial.block;
+      out << (block > 1 ? "\n" : "") << "session " << trial.session << ", block " << block << ", "
+          << row.block.name << "\n";
+      for (const std::string& line : in_words(protocol, row.block)) out << "  " << line << "\n";
+      if (row.example)
+        out << "  answers choose the levels; with those of a participant whose threshold is in "
+               "the middle:\n";
+      out << "  trial  track  renderer  level         comparison  stimulus\n";
+    }
+    out << "  " << std::right << std::setw(5) << trial.trial << std::setw(7) << trial.track << "  "
+        << std::left << std::setw(8) << protocols::to_string(trial.renderer) << "  "
+        << std::setw(12) << (trial.catch_trial ? "catch" : row.level) << "  " << std::setw(10)
+        << (row.comparison > 0 ? std::to_string(row.comparison) : "") << "  " << row.stimulus
+        << "\n";
+  }
+  return out.str();
+}
+
+std::string csv_text(const protocols::Protocol& protocol, int participant,
+                     const std::vector<protocols::Trial>& trials) {
+  std::vector<std::string> columns = schedule_columns();
+  for (const char* more :
+       {"task", "block_name", "track", "level", "catch_trial", "comparison_interval", "example"})
+    columns.emplace_back(more);
+  CsvText table(columns, "\r\n");
+  for (const protocols::Trial& trial : trials) {
+    const ListedTrial row = listed(protocol, trial);
+    const Quat& q = trial.orientation;
+    table << participant << trial.session << trial.block << trial.trial
+          << protocols::to_string(trial.renderer) << row.stimulus << q.w << q.x << q.y << q.z
+          << trial.practice << protocol.sha256 << PALPATE_VERSION
+          << protocols::to_string(row.block.task) << row.block.name << trial.track << row.level
+          << trial.catch_trial << (row.comparison > 0 ? std::to_string(row.comparison) : "")
+          << row.example;
+    table.end_row();
+  }
+  return table.text();
+}
+
+std::string json_text(const protocols::Protocol& protocol, int participant,
+                      const std::vector<protocols::Trial>& trials) {
+  nlohmann::ordered_json rows = nlohmann::ordered_json::array();
+  for (const protocols::Trial& trial : trials) {
+    const ListedTrial row = listed(protocol, trial);
+    const Quat& q = trial.orientation;
+    nlohmann::ordered_json out = {{"session", trial.session},
+                                  {"block", trial.block},
+                                  {"trial", trial.trial},
+                                  {"task", protocols::to_string(row.block.task)},
+                                  {"block_name", row.block.name},
+                                  {"track", trial.track},
+                                  {"renderer", protocols::to_string(trial.renderer)},
+                                  {"shape", row.stimulus},
+                                  {"level", nullptr},
+                                  {"catch_trial", trial.catch_trial},
+                                  {"comparison_interval", nullptr},
+                                  {"orientation_wxyz", {q.w, q.x, q.y, q.z}},
+                                  {"practice", trial.practice},
+                                  {"example", row.example}};
+    if (trial.level) out["level"] = *trial.level;
+    if (row.comparison > 0) out["comparison_interval"] = row.comparison;
+    rows.push_back(std::move(out));
+  }
+  const nlohmann::ordered_json document = {{"protocol", protocol.name},
+                                           {"protocol_sha256", protocol.sha256},
+                                           {"program_version", PALPATE_VERSION},
+                                           {"participant_number", participant},
+                                           {"trials", rows}};
+  return document.dump(1) + "\n";
+}
+
+}  // namespace
+
+std::string task_schedule_text(const protocols::Protocol& protocol, int participant,
+                               const std::string& format) {
+  const std::vector<protocols::Trial> trials = example_trials(protocol, participant);
+  if (format == "csv") return csv_text(protocol, participant, trials);
+  if (format == "json") return json_text(protocol, participant, trials);
+  return table_text(protocol, trials);
+}
+
 namespace {
 
 using protocols::level_text;
@@ -137,6 +253,107 @@ int comparison_interval(const protocols::TaskBlock& block, const protocols::Tria
     if (!trial.intervals[i].standard) return static_cast<int>(i) + 1;
   }
   return 0;
+}
+
+namespace {
+
+struct RecoveredProcedure {
+  const protocols::TaskBlock* block;
+  std::size_t number;  ///< from 1, within the block
+  protocols::PsychometricParticipant participant;
+  double truth;  ///< a level
+  protocols::Recovery recovery;
+};
+
+/// QUEST+ is tried with a participant that it can find: of its function, in the middle of its
+/// grids.
+protocols::PsychometricParticipant participant_for(const protocols::Protocol& protocol,
+                                                   const protocols::TaskBlock& block,
+                                                   const protocols::ProcedureSpec& procedure) {
+  protocols::PsychometricParticipant participant = protocols::typical_participant(protocol, block);
+  if (const auto* quest = std::get_if<protocols::QuestPlus>(&procedure)) {
+    const auto middle = [](const protocols::ParameterGrid& grid) {
+      return grid.values[grid.values.size() / 2];
+    };
+    participant.function = quest->function;
+    participant.parameters = {middle(quest->threshold), middle(quest->slope),
+                              quest->guess.values.front(), quest->lapse.values.front()};
+  }
+  return participant;
+}
+
+std::vector<RecoveredProcedure> recovered(const protocols::Protocol& protocol, int participants,
+                                          std::uint64_t seed) {
+  std::vector<RecoveredProcedure> all;
+  for (const protocols::TaskBlock& block : protocol.blocks) {
+    for (std::size_t i = 0; i < block.procedures.size(); ++i) {
+      const protocols::ProcedureSpec& procedure = block.procedures[i];
+      if (block.practice || std::holds_alternative<protocols::ConstantStimuli>(procedure)) continue;
+      const auto participant = participant_for(protocol, block, procedure);
+      all.push_back({&block, i + 1, participant, protocols::true_threshold(procedure, participant),
+                     protocols::simulate_recovery(procedure, participant, participants, seed)});
+    }
+  }
+  if (all.empty())
+    throw UsageError(
+        "--recover: expected a protocol of version 2 with a staircase, QUEST+ or limits");
+  return all;
+}
+
+std::string table_text(const std::vector<RecoveredProcedure>& all, int participants,
+                       std::uint64_t seed) {
+  std::string text = std::to_string(participants) +
+                     " SIMULATED participants whose function is known, seed " +
+                     std::to_string(seed) + "; bias and spread on the scale of the procedure\n";
+  for (const RecoveredProcedure& one : all) {
+    std::array<char, 300> line{};
+    std::snprintf(line.data(), line.size(),
+                  "%s, %s\n  true threshold %.6g: bias %.4g (standard error %.2g), spread %.4g, "
+                  "%.1f trials, %d without an estimate\n",
+                  one.block->name.c_str(),
+                  in_words(one.block->procedures[one.number - 1]).substr(0, 150).c_str(), one.truth,
+                  one.recovery.bias, one.recovery.bias_se, one.recovery.spread,
+                  one.recovery.mean_trials, one.recovery.without_estimate);
+    text += line.data();
+  }
+  return text;
+}
+
+}  // namespace
+
+std::string recovery_text(const protocols::Protocol& protocol, int participants, std::uint64_t seed,
+                          const std::string& format) {
+  const std::vector<RecoveredProcedure> all = recovered(protocol, participants, seed);
+  if (format == "table") return table_text(all, participants, seed);
+  const std::vector<std::string> columns{
+      "block", "procedure", "participants", "seed",        "true_threshold",
+      "bias",  "bias_se",   "spread",       "mean_trials", "without_estimate"};
+  CsvText csv(columns, "\r\n");
+  nlohmann::ordered_json rows = nlohmann::ordered_json::array();
+  for (const RecoveredProcedure& one : all) {
+    const protocols::Recovery& r = one.recovery;
+    csv << one.block->name << static_cast<int>(one.number) << participants << std::to_string(seed)
+        << one.truth << r.bias << r.bias_se << r.spread << r.mean_trials << r.without_estimate;
+    csv.end_row();
+    rows.push_back({{"block", one.block->name},
+                    {"procedure", one.number},
+                    {"true_threshold", one.truth},
+                    {"slope", one.participant.parameters.slope},
+                    {"guess", one.participant.parameters.guess},
+                    {"lapse", one.participant.parameters.lapse},
+                    {"bias", r.bias},
+                    {"bias_se", r.bias_se},
+                    {"spread", r.spread},
+                    {"mean_trials", r.mean_trials},
+                    {"without_estimate", r.without_estimate}});
+  }
+  if (format == "csv") return csv.text();
+  const nlohmann::ordered_json document{{"protocol", protocol.name},
+                                        {"simulated", true},
+                                        {"participants", participants},
+                                        {"seed", seed},
+                                        {"procedures", rows}};
+  return document.dump(1) + "\n";
 }
 
 }  // namespace palpate::runner

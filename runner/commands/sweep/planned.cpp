@@ -1,14 +1,25 @@
 #include "runner/commands/sweep/planned.h"
 
 #include <algorithm>
+#include <exception>
 #include <iostream>
+#include <map>
 #include <nlohmann/json.hpp>
+#include <numeric>
 #include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
 
+#include "analysis/statistics/describe.h"
+#include "analysis/statistics/paired.h"
+#include "analysis/statistics/task_analysis.h"
 #include "data/base/checksum.h"
 #include "data/base/json_text.h"
-#include "runner/commands/shared/simulation.h"
-#include "runner/session/protocol_info.h"
+#include "data/base/text.h"
+#include "runner/commands/shared/study_options.h"
+#include "runner/session/run_record.h"
+#include "runner/session/simulated_study.h"
 
 namespace palpate::runner {
 namespace {
@@ -132,6 +143,243 @@ PlannedSweep::PlannedSweep(const SweepSettings& settings)
     std::cerr << settings.design << ": " << design.size() << " points of the " << settings.points
               << " asked for\n";
   }
+}
+
+namespace {
+
+using nlohmann::json;
+
+constexpr double kTooFast = 0.2;         // s, as `analyze` leaves out by default
+constexpr std::size_t kMaxReason = 300;  // bytes: a row a point
+
+std::size_t index_of(const std::vector<std::string>& names, const std::string& name) {
+  const auto found = std::find(names.begin(), names.end(), name);
+  if (found == names.end())
+    throw std::runtime_error("a trial of '" + name + "', which the protocol has not");
+  return static_cast<std::size_t>(found - names.begin());
+}
+
+/// Trials as the analysis takes them, and the time in contact of each cell.
+class TrialCollection {
+ public:
+  explicit TrialCollection(const data::SweepPlan& plan)
+      : cells_(plan.renderers.size() * plan.shapes.size()) {
+    table_.renderers = plan.renderers;
+    table_.shapes = table_.answers = plan.shapes;
+    for (int i = 1; i <= plan.participants; ++i) table_.participants.push_back(simulated_code(i));
+  }
+
+  void add(int participant, const data::TrialRecord& record, std::uint64_t contact_ticks) {
+    if (record.practice) return;
+    analysis::TrialRow row;
+    row.participant = static_cast<std::uint32_t>(participant - 1);
+    row.renderer = static_cast<std::uint16_t>(index_of(table_.renderers, record.renderer));
+    row.shape = static_cast<std::uint16_t>(index_of(table_.shapes, record.shape));
+    if (!record.response.empty())
+      row.answer = static_cast<std::int32_t>(index_of(table_.answers, record.response));
+    row.correct = record.correct;
+    row.timed_out = record.timed_out;
+    row.response_time = record.response_time;
+    table_.rows.push_back(row);
+    Cell& cell = cells_[row.renderer * table_.shapes.size() + row.shape];
+    cell.ticks += record.ticks;
+    cell.contact_ticks += contact_ticks;
+  }
+
+  /// In the order of figure_columns().
+  std::vector<std::optional<double>> figures() const {
+    const analysis::Description description = analysis::describe(table_, kTooFast);
+    std::vector<std::optional<double>> out = gains(description);
+    const auto each_cell = [&](const auto& figure) {
+      for (std::size_t r = 0; r < table_.renderers.size(); ++r) {
+        for (std::size_t s = 0; s < table_.shapes.size(); ++s) out.push_back(figure(r, s));
+      }
+    };
+    using Figure = std::optional<double>;
+    each_cell([&](auto r, auto s) { return description.times[r][s].mean_of_participant_means; });
+    each_cell([&](auto r, auto s) { return description.accuracy[r][s].accuracy; });
+    each_cell([&](auto r, auto s) -> Figure {
+      const analysis::AccuracyCell& cell = description.accuracy[r][s];
+      if (cell.n_trials == 0) return std::nullopt;
+      return static_cast<double>(cell.n_timeouts) / static_cast<double>(cell.n_trials);
+    });
+    each_cell([&](auto r, auto s) -> Figure {
+      const Cell& cell = cells_[r * table_.shapes.size() + s];
+      if (cell.ticks == 0) return std::nullopt;
+      return static_cast<double>(cell.contact_ticks) / static_cast<double>(cell.ticks);
+    });
+    return out;
+  }
+
+ private:
+  struct Cell {
+    std::uint64_t ticks = 0, contact_ticks = 0;
+  };
+
+  std::vector<std::optional<double>> gains(const analysis::Description& description) const {
+    std::vector<std::optional<double>> gains(table_.shapes.size()), errors(table_.shapes.size());
+    if (table_.renderers.size() == 2) {
+      const analysis::RendererPair pair = analysis::renderer_pairs(table_.renderers).front();
+      const auto shapes = analysis::compare_by_shape(table_, description, pair);
+      for (std::size_t s = 0; s < shapes.size(); ++s) {
+        gains[s] = shapes[s].percent_reduction_geometric;
+        // To first order: the slope of 100 (1 - exp m) is 100 exp m.
+        if (gains[s] && shapes[s].t_test.se) errors[s] = (100 - *gains[s]) * *shapes[s].t_test.se;
+      }
+    }
+    gains.insert(gains.end(), errors.begin(), errors.end());
+    return gains;
+  }
+
+  analysis::TrialTable table_;
+  std::vector<Cell> cells_;
+};
+
+std::optional<double> mean_of(const std::vector<double>& values) {
+  if (values.empty()) return std::nullopt;
+  return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
+}
+
+/// A figure of each participant of a cell of a task.
+std::vector<double> figures_of_participants(const analysis::TaskCell& cell,
+                                            const std::string& measure) {
+  std::vector<double> values;
+  const auto add = [&](const std::optional<double>& value) {
+    if (value) values.push_back(*value);
+  };
+  for (const analysis::ParticipantFunction& one : cell.functions) {
+    if (measure == "d_prime") add(one.detectability.d_prime);
+    if (!one.fit.undefined.empty() || !one.determined) continue;
+    if (measure == "threshold") add(one.fit.parameters.threshold);
+    if (measure == "jnd") add(one.figures.jnd);
+  }
+  if (cell.magnitude && measure == "exponent") {
+    for (const analysis::StevensLine& line : cell.magnitude->lines) add(line.exponent);
+  }
+  for (const analysis::Adjustment& one : cell.adjustments) {
+    if (measure == "pse") add(one.pse);
+    if (measure == "jnd") add(one.jnd);
+  }
+  for (const analysis::InformationTransfer& one : cell.informations) {
+    if (measure == "bits") add(one.corrected);
+  }
+  return values;
+}
+
+/// Shares correct, or means of the times of correct answers, of each participant with a stimulus.
+std::vector<double> identified(const analysis::TaskTable& table, const data::TaskCellColumns& cell,
+                               bool times) {
+  struct Sum {
+    double sum = 0;
+    int n = 0;
+  };
+  std::map<std::string, Sum> sums;
+  for (const analysis::TaskTrial& trial : table.trials) {
+    if (trial.block_name != cell.block || trial.shape != cell.stimulus ||
+        trial.renderer != cell.renderer)
+      continue;
+    if (times && !(trial.correct && *trial.response_time >= kTooFast)) continue;
+    Sum& own = sums[trial.participant];
+    own.sum += times ? *trial.response_time : trial.correct ? 1 : 0;
+    ++own.n;
+  }
+  std::vector<double> values;
+  values.reserve(sums.size());
+  for (const auto& [participant, own] : sums) values.push_back(own.sum / own.n);
+  return values;
+}
+
+/// Of a protocol of version 2, in the order of figure_columns().
+std::vector<std::optional<double>> task_figures_of(const data::SweepPlan& plan,
+                                                   analysis::TaskTable table) {
+  analysis::FunctionSettings without_p;
+  without_p.simulations = 0;
+  const analysis::TaskAnalysis found = analysis::analyze_tasks(std::move(table), without_p);
+  std::vector<std::optional<double>> out;
+  for (const data::TaskCellColumns& wanted : data::task_columns(plan)) {
+    const auto cell =
+        std::find_if(found.cells.begin(), found.cells.end(), [&](const analysis::TaskCell& one) {
+          return one.block_name == wanted.block && one.renderer == wanted.renderer &&
+                 one.shape == (wanted.task == "identify" ? "" : wanted.stimulus);
+        });
+    for (const std::string& measure : wanted.measures) {
+      std::vector<double> values;
+      if (measure == "accuracy" || measure == "time") {
+        values = identified(found.table, wanted, measure == "time");
+      } else if (cell != found.cells.end()) {
+        values = figures_of_participants(*cell, measure);
+      }
+      out.push_back(mean_of(values));
+      out.push_back(analysis::t_test(values).se);
+    }
+  }
+  return out;
+}
+
+std::vector<json> values_of_point(const Sweep& sweep, std::int64_t point) {
+  std::vector<json> values;
+  const std::vector<double> shares = sweep.design.at(point);
+  const auto& parameters = sweep.study.space().parameters;
+  for (std::size_t i = 0; i < parameters.size(); ++i)
+    values.push_back(parameters[i].value_at(shares[i]));
+  return values;
+}
+
+data::SweepValue stored(const json& value) {
+  if (value.is_string()) return value.get<std::string>();
+  if (value.is_boolean()) return value.get<bool>() ? 1.0 : 0.0;
+  return value.get<double>();
+}
+
+/// Without names of files: the same on every machine.
+std::string reason_of(const std::exception& error) {
+  std::string text;
+  if (const auto* const input = dynamic_cast<const protocols::InputError*>(&error)) {
+    for (const protocols::Fault& fault : input->faults())
+      text += (text.empty() ? "" : "; ") + fault.location + ": " + fault.expected;
+  } else {
+    text = error.what();
+  }
+  std::replace(text.begin(), text.end(), '\n', ' ');
+  text = printable(text, kMaxReason);
+  return text.empty() ? "unknown" : text;
+}
+
+}  // namespace
+
+PointStudy study_of_point(const Sweep& sweep, std::int64_t point) {
+  return sweep.study.at(sweep.plan.seed, point, values_of_point(sweep, point));
+}
+
+std::optional<data::SweepRow> run_point(const Sweep& sweep, std::int64_t point,
+                                        const std::atomic<bool>& stop) {
+  data::SweepRow row;
+  row.point = point;
+  for (const json& value : values_of_point(sweep, point)) row.values.push_back(stored(value));
+  const PointStudy study = study_of_point(sweep, point);
+  row.seed = study.seed;
+  row.order_seed = study.order_seed;
+  try {
+    protocols::Protocol protocol = sweep.study.parse(study.protocol);
+    const SimulatedSettings settings = read_simulated_settings(study.settings.dump());
+    limit_for_simulation(protocol, settings);
+    TrialCollection trials(sweep.plan);
+    analysis::TaskTable tasks;
+    const bool done = simulate_in_memory(
+        protocol, settings, sweep.plan.participants, study.seed, stop,
+        [&](int participant, const data::TrialRecord& record, std::uint64_t contact_ticks) {
+          if (!record.task) return trials.add(participant, record, contact_ticks);
+          if (!record.practice)
+            tasks.trials.push_back(analysis::task_trial_of(simulated_code(participant), record));
+        });
+    if (!done) return std::nullopt;
+    row.figures =
+        protocol.version == 2 ? task_figures_of(sweep.plan, std::move(tasks)) : trials.figures();
+  } catch (const std::exception& error) {
+    row.reason = reason_of(error);
+    row.figures.assign(data::figure_columns(sweep.plan).size(), std::nullopt);
+  }
+  return row;
 }
 
 }  // namespace palpate::runner

@@ -1,7 +1,9 @@
 #pragma once
 // A sweep as it was asked for: the options that its results depend on, checked, and its plan.
 
+#include <atomic>
 #include <cstdint>
+#include <optional>
 #include <string>
 
 #include "data/sweep_record.h"
@@ -36,5 +38,22 @@ struct PlannedSweep {
   Design design;
   data::SweepPlan plan;
 };
+
+// One point of a sweep: a study in memory, and its figures as `analyze` defines them.
+
+/// What a point follows from.
+struct Sweep {
+  const SweptStudy& study;
+  const Design& design;
+  const data::SweepPlan& plan;
+};
+
+/// The point's study, not run.
+PointStudy study_of_point(const Sweep& sweep, std::int64_t point);
+
+/// Runs it. Whatever it throws is the reason why the point failed. \return none: it was stopped
+/// before its end
+std::optional<data::SweepRow> run_point(const Sweep& sweep, std::int64_t point,
+                                        const std::atomic<bool>& stop);
 
 }  // namespace palpate::runner

@@ -1,27 +1,179 @@
 #include "runner/commands/watch/trial_page.h"
 
+#include <zlib.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <glm/geometric.hpp>
+#include <limits>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <set>
 #include <span>
+#include <stdexcept>
+#include <string>
 #include <utility>
+#include <vector>
 
 #include "analysis/report/html_page.h"
 #include "analysis/text.h"
 #include "data/base/text.h"
 #include "rendering/renderer.h"
-#include "runner/commands/watch/picture_mesh.h"
-#include "runner/commands/watch/whole_numbers.h"
+#include "runner/display/scene/drawn_mesh.h"
 #include "runner/safety/fault_signals.h"
 #include "runner/scene_builder.h"
 #include "runner/session/replay.h"
 
 namespace palpate::runner {
+
+// Columns of numbers in the text of a page: whole numbers of a step, as differences of the order
+// that takes the fewest bytes, 7 bits a byte (zigzag, least significant first), one zlib stream
+// (RFC 1950) in base64. watch.js reads them.
+
+class WholeNumbers {
+ public:
+  /// Values are rounded to the step; where one is not finite, the one before stands again.
+  /// \param steps_per_unit  1e8: to 10 nm
+  void add(const std::string& name, std::span<const double> values, double steps_per_unit);
+
+  /// [[name, count, steps per unit, order], ...]
+  const nlohmann::ordered_json& columns() const { return columns_; }
+  /// All columns, one after the other.
+  std::string text() const;
+
+ private:
+  nlohmann::ordered_json columns_ = nlohmann::ordered_json::array();
+  std::string bytes_;
+};
+
+namespace {
+
+constexpr int kHighestOrder = 3;
+// A page counts in double precision, exact to 2^53; a difference of order 3 is up to 8 times a
+// value, and zigzag doubles it.
+constexpr double kLargest = 1e14;
+
+void put(std::string& out, std::int64_t value) {
+  std::uint64_t rest =
+      (static_cast<std::uint64_t>(value) << 1) ^ static_cast<std::uint64_t>(value >> 63);  // zigzag
+  for (; rest > 127; rest >>= 7) out += static_cast<char>((rest & 127) | 128);
+  out += static_cast<char>(rest);
+}
+
+std::string packed(const std::vector<std::int64_t>& values) {
+  std::string out;
+  for (const std::int64_t value : values) put(out, value);
+  return out;
+}
+
+/// In place; what was before the first value counts as 0.
+void difference(std::vector<std::int64_t>& values) {
+  for (std::size_t i = values.size(); i-- > 1;) values[i] -= values[i - 1];
+}
+
+std::string deflated(const std::string& bytes) {
+  uLongf size = compressBound(static_cast<uLong>(bytes.size()));
+  std::string out(size, '\0');
+  if (compress2(reinterpret_cast<Bytef*>(out.data()), &size,
+                reinterpret_cast<const Bytef*>(bytes.data()), static_cast<uLong>(bytes.size()),
+                Z_BEST_COMPRESSION) != Z_OK)
+    throw std::runtime_error("the ticks could not be compressed");
+  out.resize(size);
+  return out;
+}
+
+}  // namespace
+
+void WholeNumbers::add(const std::string& name, std::span<const double> values,
+                       double steps_per_unit) {
+  std::vector<std::int64_t> whole;
+  whole.reserve(values.size());
+  for (const double value : values) {
+    const double steps = value * steps_per_unit;
+    const std::int64_t before = whole.empty() ? 0 : whole.back();
+    whole.push_back(std::isfinite(steps) ? std::llround(std::clamp(steps, -kLargest, kLargest))
+                                         : before);
+  }
+  int best_order = 0;
+  std::string best = packed(whole);
+  for (int order = 1; order <= kHighestOrder; ++order) {
+    difference(whole);
+    std::string bytes = packed(whole);
+    if (bytes.size() >= best.size()) continue;
+    best = std::move(bytes);
+    best_order = order;
+  }
+  columns_.push_back({name, values.size(), steps_per_unit, best_order});
+  bytes_ += best;
+}
+
+std::string WholeNumbers::text() const { return base64_encoded(deflated(bytes_)); }
+
+namespace {
+
+using Cell = std::array<std::int64_t, 3>;
+
+/// Corners of one cell of a grid become one, in their middle; triangles that collapse go.
+PictureMesh clustered(const DrawnMesh& drawn, double cell) {
+  PictureMesh out;
+  std::map<Cell, std::uint32_t> known;
+  std::vector<double> counts;
+  std::set<std::array<std::uint32_t, 3>> seen;
+  for (std::size_t i = 0; i + 2 < drawn.size(); i += 3) {
+    std::array<std::uint32_t, 3> triangle{};
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Vec3 p(drawn[i + k].position);
+      const Cell at{std::llround(p.x / cell), std::llround(p.y / cell), std::llround(p.z / cell)};
+      const auto [found, is_new] =
+          known.try_emplace(at, static_cast<std::uint32_t>(out.corners.size()));
+      if (is_new) {
+        out.corners.emplace_back(0);
+        counts.push_back(0);
+      }
+      triangle[k] = found->second;
+      out.corners[triangle[k]] += p;
+      ++counts[triangle[k]];
+    }
+    if (triangle[0] == triangle[1] || triangle[1] == triangle[2] || triangle[2] == triangle[0])
+      continue;
+    // The same way round from its lowest corner, so that equal ones are found.
+    std::rotate(triangle.begin(), std::min_element(triangle.begin(), triangle.end()),
+                triangle.end());
+    if (seen.insert(triangle).second) out.triangles.push_back(triangle);
+  }
+  for (std::size_t i = 0; i < out.corners.size(); ++i) out.corners[i] /= counts[i];
+  return out;
+}
+
+double size_of(const DrawnMesh& drawn) {
+  Vec3 low(std::numeric_limits<double>::max()), high(-std::numeric_limits<double>::max());
+  for (const DrawnVertex& corner : drawn) {
+    low = glm::min(low, Vec3(corner.position));
+    high = glm::max(high, Vec3(corner.position));
+  }
+  return std::max({high.x - low.x, high.y - low.y, high.z - low.z});
+}
+
+}  // namespace
+
+PictureMesh picture_mesh(const stimuli::ObjectSpec& object, std::size_t most) {
+  constexpr double kSame = 1e-6, kCoarser = 1.25;  // of the size
+  const DrawnMesh drawn = triangles_of(object);
+  const double size = size_of(drawn);
+  PictureMesh mesh = clustered(drawn, kSame * size);
+  const std::size_t all = mesh.triangles.size();
+  // A surface of n triangles has corners some size / sqrt(n) apart.
+  for (double cell = 0.5 * size / std::sqrt(static_cast<double>(most));
+       mesh.triangles.size() > most; cell *= kCoarser)
+    mesh = clustered(drawn, cell);
+  mesh.all_triangles = all;
+  return mesh;
+}
+
 namespace {
 
 using analysis::counted;

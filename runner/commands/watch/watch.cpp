@@ -7,7 +7,6 @@
 #include "data/store/store.h"
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/outputs.h"
-#include "runner/commands/shared/trial_option.h"
 #include "runner/commands/watch/trial_page.h"
 
 namespace palpate::runner {

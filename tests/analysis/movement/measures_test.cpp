@@ -9,11 +9,9 @@
 #include <glm/geometric.hpp>
 #include <numbers>
 
-#include "analysis/movement/contacts.h"
 #include "analysis/movement/coverage.h"
 #include "analysis/movement/pictures.h"
 #include "analysis/movement/signal.h"
-#include "analysis/movement/smoothness.h"
 #include "data/base/random.h"
 
 namespace palpate::analysis {

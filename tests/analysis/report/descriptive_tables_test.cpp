@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "analysis/input/trials.h"
-#include "analysis/report/report_text.h"
+#include "analysis/report/report.h"
 #include "analysis/report/tables.h"
 #include "analysis/statistics/analysis.h"
 

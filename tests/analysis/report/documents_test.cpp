@@ -11,8 +11,7 @@
 
 #include "analysis/figures/figures.h"
 #include "analysis/input/trials.h"
-#include "analysis/report/report_html.h"
-#include "analysis/report/report_json.h"
+#include "analysis/report/report.h"
 #include "analysis/report/tables.h"
 #include "analysis/statistics/analysis.h"
 #include "analysis/text.h"

@@ -7,8 +7,7 @@
 
 #include "analysis/input/trials.h"
 #include "analysis/report/html_page.h"
-#include "analysis/report/report_assets.h"
-#include "analysis/report/report_html.h"
+#include "analysis/report/report.h"
 #include "analysis/statistics/analysis.h"
 
 namespace palpate::analysis {

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "analysis/input/trials.h"
-#include "analysis/report/report_html.h"
+#include "analysis/report/report.h"
 #include "analysis/statistics/analysis.h"
 
 namespace palpate::analysis {

@@ -1,5 +1,7 @@
 // Texts and form of the reports.
 
+#include "analysis/report/report.h"
+
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -12,9 +14,6 @@
 #include "analysis/figures/figure_svg.h"
 #include "analysis/figures/figures.h"
 #include "analysis/input/trials.h"
-#include "analysis/report/report_html.h"
-#include "analysis/report/report_json.h"
-#include "analysis/report/report_text.h"
 #include "analysis/statistics/analysis.h"
 #include "analysis/statistics/conclusions.h"
 #include "analysis/text.h"

@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "analysis/report/report_json.h"
+#include "analysis/report/report.h"
 #include "analysis/statistics/analysis.h"
 #include "data/base/random.h"
 

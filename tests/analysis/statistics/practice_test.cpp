@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "analysis/input/trials.h"
-#include "analysis/report/report_text.h"
+#include "analysis/report/report.h"
 #include "analysis/statistics/analysis.h"
-#include "analysis/statistics/speed_accuracy.h"
+#include "analysis/statistics/comparison.h"
 #include "data/base/random.h"
 
 namespace palpate::analysis {

@@ -7,7 +7,6 @@
 #include <cstdio>
 #include <vector>
 
-#include "analysis/statistics/psychometric_bayes.h"
 #include "analysis/statistics/psychometric_fit.h"
 #include "data/base/random.h"
 #include "tests/shared/rounds.h"

@@ -14,7 +14,6 @@
 #include <vector>
 
 #include "analysis/statistics/discrimination.h"
-#include "analysis/statistics/psychometric_bayes.h"
 
 namespace palpate::analysis {
 namespace {

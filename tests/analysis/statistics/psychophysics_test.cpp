@@ -7,9 +7,9 @@
 #include <nlohmann/json.hpp>
 
 #include "analysis/statistics/discrimination.h"
-#include "analysis/statistics/information.h"
 #include "analysis/statistics/mixed_logistic.h"
 #include "analysis/statistics/scaling.h"
+#include "analysis/statistics/task_analysis.h"
 #include "analysis/statistics/task_comparisons.h"
 #include "data/base/random.h"
 

@@ -1,5 +1,4 @@
-#include "data/export/sweep_csv.h"
-
+#include "data/export/csv.h"
 #include "tests/data/store/sweep_fixture.h"
 
 namespace palpate::data {

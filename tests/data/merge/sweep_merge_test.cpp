@@ -1,8 +1,7 @@
-#include "data/merge/sweep_merge.h"
-
 #include <functional>
 #include <utility>
 
+#include "data/merge/merge.h"
 #include "tests/data/store/sweep_fixture.h"
 
 namespace palpate::data {

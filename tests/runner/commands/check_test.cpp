@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "analysis/report/report_json.h"
+#include "analysis/report/report.h"
 #include "analysis/statistics/analysis.h"
 #include "data/base/checksum.h"
 #include "data/store/task_text.h"
@@ -19,7 +19,7 @@
 #include "runner/build_info.h"
 #include "runner/commands/check/deviations.h"
 #include "runner/commands/shared/command.h"
-#include "runner/session/protocol_info.h"
+#include "runner/session/run_record.h"
 #include "tests/shared/temporary_folder.h"
 
 namespace palpate::runner {

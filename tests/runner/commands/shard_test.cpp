@@ -1,7 +1,5 @@
 // Shards: every item in one of them, whatever the counts; what is no shard is refused.
 
-#include "runner/commands/shared/shard.h"
-
 #include <gtest/gtest.h>
 
 #include <cstdint>
@@ -11,6 +9,7 @@
 #include <tuple>
 
 #include "runner/commands/shared/command.h"
+#include "runner/commands/shared/study_options.h"
 
 namespace palpate::runner {
 namespace {

@@ -8,7 +8,7 @@
 #include <ctime>
 #include <string>
 
-#include "runner/commands/run/resumption.h"
+#include "runner/commands/run/admission.h"
 #include "tests/data/store/store_fixture.h"
 
 namespace palpate::runner {

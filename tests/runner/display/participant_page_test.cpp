@@ -1,5 +1,3 @@
-#include "runner/display/participant_page.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -9,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "runner/display/participant_window.h"
 #include "runner/display/window.h"
 #include "tests/runner/display/kept_fonts.h"
 

@@ -1,8 +1,8 @@
 // What is typed, byte by byte.
 
-#include "runner/display/text_input.h"
-
 #include <gtest/gtest.h>
+
+#include "runner/display/text_display.h"
 
 namespace palpate::runner {
 namespace {

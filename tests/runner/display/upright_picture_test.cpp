@@ -12,9 +12,9 @@
 #include <utility>
 
 #include "runner/devices/mouse.h"
-#include "runner/display/pointer_control.h"
 #include "runner/display/scene/painter.h"
 #include "runner/display/scene/scene_drawing.h"
+#include "runner/display/scene_view.h"
 
 namespace palpate::runner {
 namespace {

@@ -1,8 +1,6 @@
 // What a hand tells of a level, against closed forms: the surface that passes through the places
 // that were felt.
 
-#include "runner/participants/level_percept.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -12,6 +10,7 @@
 #include <vector>
 
 #include "protocols/parse.h"
+#include "runner/participants/task_judgement.h"
 
 namespace palpate::runner {
 namespace {

@@ -1,10 +1,10 @@
 // What a session's record says of its servo, from ticks that are known.
 
-#include "runner/servo/servo_health.h"
-
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
+
+#include "runner/servo/servo_thread.h"
 
 namespace palpate::runner {
 namespace {

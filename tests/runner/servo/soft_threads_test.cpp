@@ -1,8 +1,6 @@
 // Soft bodies that are stepped beside the servo: what a hand feels does not depend on how fast
 // their threads are, but for ticks that say so; and where they do not answer, forces end.
 
-#include "runner/servo/soft_threads.h"
-
 #include <gtest/gtest.h>
 
 #include <chrono>

@@ -1,8 +1,8 @@
-#include "runner/session/clock_check.h"
-
 #include <gtest/gtest.h>
 
 #include <limits>
+
+#include "runner/session/device_check.h"
 
 namespace palpate::runner {
 namespace {

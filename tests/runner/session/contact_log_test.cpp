@@ -1,8 +1,6 @@
 // Contact share and edge dwell against what their definitions say of recorded samples and of closed
 // forms of the shapes.
 
-#include "runner/session/contact_log.h"
-
 #include <gtest/gtest.h>
 
 #include <array>
@@ -16,7 +14,8 @@
 #include "data/base/random.h"
 #include "protocols/parse.h"
 #include "runner/scene_builder.h"
-#include "runner/session/simulated_session.h"
+#include "runner/session/live_forces.h"
+#include "runner/session/simulated_study.h"
 
 namespace palpate::runner {
 namespace {

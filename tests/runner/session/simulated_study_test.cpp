@@ -19,7 +19,7 @@
 #include "data/base/random.h"
 #include "data/export/csv.h"
 #include "protocols/parse.h"
-#include "runner/session/replay_comparison.h"
+#include "runner/session/replay.h"
 #include "tests/shared/temporary_folder.h"
 
 namespace palpate::runner {
