@@ -45,7 +45,7 @@ const Column kOrientation[] = {
 };
 
 std::vector<Column> make_trials() {
-  return {
+  std::vector<Column> columns = {
       kParticipant,
       kSession,
       kBlock,
@@ -105,15 +105,11 @@ std::vector<Column> make_trials() {
        {{"keyboard", "keys, also of a numeric pad"},
         {"device buttons", "buttons of the force-feedback device"},
         {"simulated", "a SIMULATED participant"}}},
-      {"contact_share",
-       "Share of the servo ticks, from the first one with forces on to the answer, in which the "
-       "stylus touched the stimulus; missing where it was not measured",
-       "1"},
-      {"edge_dwell",
-       "Time in contact within 3 mm of an edge or vertex at which the surface turns by 30 degrees "
-       "or more; missing where it was not measured or the stimulus has more than 2000 of them",
-       "s"},
   };
+  for (const MeasuredColumn& column : kMeasured) {
+    if (*column.description) columns.push_back({column.name, column.description, column.unit});
+  }
+  return columns;
 }
 
 /// With what trials of version 2 of protocols have besides.

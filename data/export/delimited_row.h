@@ -18,6 +18,7 @@
 #include "data/files/text_sink.h"
 #include "data/store/export_log.h"
 #include "data/store/store.h"
+#include "data/trial_columns.h"
 
 namespace palpate::data {
 
@@ -124,7 +125,10 @@ void put_trial_without_participant(Row& row, const StoredTrial& trial, const Exp
       << record.started_inside << record.ticks
       << static_cast<double>(record.longest_period_ns) / 1e9 << record.faults << record.max_force
       << trial.run.observer_sha256 << (!record.response.empty() && !record.first_contact_time)
-      << trial.run.response_device << record.contact_share << record.edge_dwell;
+      << trial.run.response_device;
+  for_each_measured(record, [&](const MeasuredColumn& column, const auto& value) {
+    if (*column.description) row << value;
+  });
   if (clock.tasks()) {
     const TaskValues task(record);
     row << task.task << task.block_name << task.track << task.level << task.standard_level

@@ -15,6 +15,7 @@
 #include "data/store/samples_codec.h"
 #include "data/store/seals.h"
 #include "data/store/task_text.h"
+#include "data/trial_columns.h"
 
 namespace palpate::data {
 namespace {
@@ -376,13 +377,15 @@ constexpr const char* kInsertAttempt =
     "orientation_w, orientation_x, orientation_y, orientation_z, began_ns, task, state) "
     "VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, 'running')";
 
-constexpr const char* kComplete =
-    "UPDATE attempts SET state = 'completed', response = ?, correct = ?, timed_out = ?, "
-    "response_time = ?, first_contact_time = ?, onset_ns = ?, response_ns = ?, start_tip_x = ?, "
-    "start_tip_y = ?, start_tip_z = ?, start_tail_x = ?, start_tail_y = ?, start_tail_z = ?, "
-    "ticks = ?, missed_ticks = ?, longest_period_ns = ?, faults = ?, started_inside = ?, "
-    "max_force = ?, contact_share = ?, edge_dwell = ?, samples_sha256 = ?, task = ? WHERE id "
-    "= ?";
+/// The statement of complete().
+std::string completing_sql() {
+  std::string sql =
+      "UPDATE attempts SET state = 'completed', response = ?, correct = ?, timed_out = ?, "
+      "response_time = ?, first_contact_time = ?, onset_ns = ?, response_ns = ?, start_tip_x = ?, "
+      "start_tip_y = ?, start_tip_z = ?, start_tail_x = ?, start_tail_y = ?, start_tail_z = ?, ";
+  for (const MeasuredColumn& column : kMeasured) sql += std::string(column.name) + " = ?, ";
+  return sql + "samples_sha256 = ?, task = ? WHERE id = ?";
+}
 
 void complete(SQLite::Database& db, SQLite::Statement& update, std::int64_t id,
               const TrialRecord& record) {
@@ -392,8 +395,7 @@ void complete(SQLite::Database& db, SQLite::Statement& update, std::int64_t id,
        << record.first_contact_time << record.onset_ns << record.response_ns;
   for (const double x : record.start_tip) bind << x;
   for (const double x : record.start_tail) bind << x;
-  bind << record.ticks << record.missed_ticks << record.longest_period_ns << record.faults
-       << record.started_inside << record.max_force << record.contact_share << record.edge_dwell;
+  for_each_measured(record, [&](const MeasuredColumn&, const auto& value) { bind << value; });
   const auto count = static_cast<std::int64_t>(record.samples.size());
   const std::string packed = count > 0 ? pack_samples(record.samples, record.bodies) : "";
   const int packing = packing_for(record.bodies);
@@ -470,7 +472,7 @@ void Store::finish_attempt(const Run& run, const TrialRecord& record) {
                     " does not belong to the attempt that was begun (trial " +
                     std::to_string(plan.trial) + ", attempt " + std::to_string(plan.attempt) + ")");
     }
-    SQLite::Statement update(db, kComplete);
+    SQLite::Statement update(db, completing_sql());
     complete(db, update, open->id, record);
     impl_->seals->attempt(open->id);
     return true;
@@ -506,7 +508,7 @@ void Store::record_simulated(const Run& run, const std::vector<TrialRecord>& rec
     if (!person.executeStep() || person.getColumn(0).getInt() != 1) {
       impl_->refuse("trials of a real participant are begun and finished one by one");
     }
-    SQLite::Statement insert(db, kInsertAttempt), update(db, kComplete);
+    SQLite::Statement insert(db, kInsertAttempt), update(db, completing_sql());
     for (const auto& record : records) {
       if (has_record(db, run, record.trial))
         impl_->refuse(trial_name(record) + " already has a record");

@@ -6,9 +6,11 @@
 
 #include <charconv>
 #include <cmath>
+#include <concepts>
 #include <cstdint>
 #include <limits>
 #include <optional>
+#include <sstream>
 #include <stdexcept>
 #include <string>
 
@@ -16,6 +18,7 @@
 #include "data/base/text.h"
 #include "data/errors.h"
 #include "data/store/task_text.h"
+#include "data/trial_columns.h"
 
 namespace palpate::data {
 namespace {
@@ -42,6 +45,14 @@ void require_finite(const StoredTrial& trial, const char* field, double value) {
 void require_amount(const StoredTrial& trial, const char* field, double value) {
   require_finite(trial, field, value);
   if (value < 0) throw_damaged(trial, field, "is below zero");
+}
+
+/// The value where it is a real number that is present.
+std::optional<double> amount_of(const std::optional<double>& value) { return value; }
+std::optional<double> amount_of(double value) { return value; }
+template <std::integral Whole>
+std::optional<double> amount_of(Whole) {
+  return std::nullopt;
 }
 
 }  // namespace
@@ -73,10 +84,12 @@ void require_valid_record(const StoredTrial& trial) {
   for (const double q : record.orientation_wxyz) require_finite(trial, "orientation", q);
   require_amount(trial, "response_time", record.response_time);
   require_amount(trial, "first_contact_time", record.first_contact_time.value_or(0));
-  require_amount(trial, "max_force", record.max_force);
-  require_amount(trial, "contact_share", record.contact_share.value_or(0));
-  if (record.contact_share.value_or(0) > 1) throw_damaged(trial, "contact_share", "is above 1");
-  require_amount(trial, "edge_dwell", record.edge_dwell.value_or(0));
+  for_each_measured(record, [&](const MeasuredColumn& column, const auto& value) {
+    const auto amount = amount_of(value);
+    if (!amount) return;
+    require_amount(trial, column.name, *amount);
+    if (*amount > column.most) throw_damaged(trial, column.name, "is above what is possible");
+  });
 }
 
 RunEnd run_end_of(const std::string& text) {
@@ -164,12 +177,14 @@ void read_task(RowReader& row, TrialRecord& record) {
 }
 
 std::string outcome_columns(int version) {
-  return std::string(
-             "a.response, a.correct, a.timed_out, a.response_time, a.first_contact_time, "
-             "a.onset_ns, a.response_ns, a.start_tip_x, a.start_tip_y, a.start_tip_z, "
-             "a.start_tail_x, a.start_tail_y, a.start_tail_z, a.ticks, a.missed_ticks, "
-             "a.longest_period_ns, a.faults, a.started_inside, a.max_force, ") +
-         (version < 4 ? "NULL, NULL" : "a.contact_share, a.edge_dwell");
+  std::string columns =
+      "a.response, a.correct, a.timed_out, a.response_time, a.first_contact_time, "
+      "a.onset_ns, a.response_ns, a.start_tip_x, a.start_tip_y, a.start_tip_z, "
+      "a.start_tail_x, a.start_tail_y, a.start_tail_z";
+  for (const MeasuredColumn& column : kMeasured) {
+    columns += column.since > version ? ", NULL" : std::string(", a.") + column.name;
+  }
+  return columns;
 }
 
 RowReader& operator>>(RowReader& row, PageAnswer& answer) {
@@ -182,8 +197,7 @@ void read_outcome(RowReader& row, TrialRecord& record) {
       record.first_contact_time >> record.onset_ns >> record.response_ns;
   for (double& x : record.start_tip) row >> x;
   for (double& x : record.start_tail) row >> x;
-  row >> record.ticks >> record.missed_ticks >> record.longest_period_ns >> record.faults >>
-      record.started_inside >> record.max_force >> record.contact_share >> record.edge_dwell;
+  for_each_measured(record, [&](const MeasuredColumn&, auto& value) { row >> value; });
 }
 
 bool is_clean_utf8(std::string_view text) {
@@ -295,13 +309,15 @@ void validate_outcome(Validator& validator, const TrialRecord& record) {
     validator.finite("start_tip", record.start_tip[i]);
     validator.finite("start_tail", record.start_tail[i]);
   }
-  validator.amount("max_force", record.max_force);
-  if (record.contact_share) {
-    validator.amount("contact_share", *record.contact_share);
-    validator.expect(!(*record.contact_share > 1), "contact_share must be at most 1");
-  }
+  for_each_measured(record, [&](const MeasuredColumn& column, const auto& value) {
+    const auto amount = amount_of(value);
+    if (!amount) return;
+    validator.amount(column.name, *amount);
+    std::ostringstream most;
+    most << column.name << " must be at most " << column.most;
+    validator.expect(!(*amount > column.most), most.str());
+  });
   if (record.task) validate_task(validator, *record.task);
-  if (record.edge_dwell) validator.amount("edge_dwell", *record.edge_dwell);
   validator.expect(record.ticks <= kMost && record.missed_ticks <= kMost, "ticks must fit 63 bits");
   validator.expect(!record.timed_out || (record.response.empty() && !record.correct),
                    "a time-out has no response and is not correct");

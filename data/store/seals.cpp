@@ -9,7 +9,9 @@
 #include "data/errors.h"
 #include "data/store/connection.h"
 #include "data/store/record_columns.h"
+#include "data/store/schema.h"
 #include "data/store/task_text.h"
+#include "data/trial_columns.h"
 
 namespace palpate::data {
 namespace {
@@ -244,6 +246,37 @@ void put_note(SealedValues& out, std::int64_t run_link, std::int64_t at_ns,
   out.begin("note") << run_link << at_ns << text;
 }
 
+namespace {
+
+/// How many measured columns this version of the schema brought.
+constexpr int measured_by(int version) {
+  int n = 0;
+  for (const MeasuredColumn& column : kMeasured) n += column.since == version ? 1 : 0;
+  return n;
+}
+
+template <class T>
+bool is_present(const T&) {
+  return true;
+}
+bool is_present(const std::optional<double>& value) { return value.has_value(); }
+
+/// Those columns; nothing where all of them are null. From version 5 on the version stands first,
+/// which tells one group from the other.
+void put_measured(SealedValues& out, const TrialRecord& record, int version) {
+  bool any = false;
+  for_each_measured(record, [&](const MeasuredColumn& column, const auto& value) {
+    if (column.since == version) any = any || is_present(value);
+  });
+  if (!any) return;
+  if (version > 4) out << version;
+  for_each_measured(record, [&](const MeasuredColumn& column, const auto& value) {
+    if (column.since == version) out << value;
+  });
+}
+
+}  // namespace
+
 void put_attempt(SealedValues& out, const AttemptSealed& attempt, const TrialRecord& record) {
   out.begin("attempt") << attempt.run_link << record.trial << record.attempt << record.block
                        << record.renderer << record.shape << record.practice;
@@ -251,20 +284,20 @@ void put_attempt(SealedValues& out, const AttemptSealed& attempt, const TrialRec
   out << attempt.began_ns;
   if (attempt.cut_off_reason) {
     out << std::string("cut_off") << *attempt.cut_off_reason;
-    constexpr int kOutcomes = 19;  // columns from response to max_force
-    for (int i = 0; i < kOutcomes; ++i) out << std::optional<int>();
+    constexpr int kOutcomes = 13;  // columns from response to start_tail_z
+    for (int i = 0; i < kOutcomes + measured_by(1); ++i) out << std::optional<int>();
   } else {
     out << std::string("completed") << std::optional<int>() << record.response << record.correct
         << record.timed_out << record.response_time << record.first_contact_time << record.onset_ns
         << record.response_ns;
     for (const double x : record.start_tip) out << x;
     for (const double x : record.start_tail) out << x;
-    out << record.ticks << record.missed_ticks << record.longest_period_ns << record.faults
-        << record.started_inside << record.max_force;
+    put_measured(out, record, 1);
   }
   out << attempt.samples;
-  if (record.contact_share || record.edge_dwell) out << record.contact_share << record.edge_dwell;
+  put_measured(out, record, 4);
   if (record.task) out << task_text(*record.task);
+  for (int version = 5; version <= kSchemaVersion; ++version) put_measured(out, record, version);
 }
 
 void put_page_answer(SealedValues& out, std::int64_t run_link, const PageAnswer& answer) {

@@ -17,7 +17,9 @@
 //            files_sha256
 //   note     link of its run, at_ns, text
 //   attempt  link of its run, the columns of attempts from trial to samples_sha256; then
-//            contact_share and edge_dwell, unless both are null; then task, unless it is null
+//            contact_share and edge_dwell, unless both are null; then task, unless it is null; then
+//            for each later version of the schema its number and its measured columns
+//            (data/trial_columns.h), unless all of them are null
 //   page     link of its run, the columns of page_answers from page to at_ns
 //   end      link of its run, end_reason, ended_ns
 
