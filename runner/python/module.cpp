@@ -8,6 +8,7 @@
 #include <chrono>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "data/base/text.h"
@@ -131,7 +132,7 @@ PYBIND11_MODULE(_palpate, module) {
   static const py::exception<UsageError> input_error(module, "InputError", PyExc_ValueError);
   py::register_exception_translator([](std::exception_ptr thrown) {
     try {
-      if (thrown) std::rethrow_exception(thrown);
+      if (thrown) std::rethrow_exception(std::move(thrown));
     } catch (const std::exception& error) {
       if (!is_bad_input(error)) throw;  // pybind11 knows what becomes of it
       PyErr_SetString(input_error.ptr(), printable_lines(error.what()).c_str());

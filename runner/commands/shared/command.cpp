@@ -98,10 +98,10 @@ void check_number(const std::string& option, const std::string& text, const boos
 
 /// "; did you mean '--jobs'?", or "".
 std::string option_meant(const std::string& given, const po::options_description& options) {
-  constexpr std::size_t kLongest = 40;  // of what may be a misspelt option
+  constexpr std::size_t kLongestOption = 40;  // that may be misspelt
   const std::size_t begin = std::min(given.find_first_not_of('-'), given.size());
   const std::string word = given.substr(begin, given.find('=') - begin);
-  if (word.size() > kLongest) return "";
+  if (word.size() > kLongestOption) return "";
   std::vector<std::string> names;
   for (const auto& option : options.options()) names.push_back(option->long_name());
   const std::string meant = nearest_word(word, names);
