@@ -9,6 +9,7 @@
 // more: forces go off.
 
 const ALIVE_EVERY = 200;  // ms; the server waits for half a second
+const CLOCK_FOR = 5000;   // ms; the server takes two clocks for drifting apart
 const WIDTHS = {tip: 3, tail: 3, force: 3, rendered: 3, contact: 3};  // columns; else one
 
 /** The server refused a message, or has gone. `code` is for programs, `place` a JSON pointer. */
@@ -27,6 +28,8 @@ export class Hand extends EventTarget {
   #waiting = new Map();
   #fields = [];
   #alive = null;
+  #clock_asked = 0;  // ms, of performance.now()
+  #clock_seen = 0;   // ns: when the server sent the newest answer of clock()
 
   /** What the server said of itself; with a protocol `server.record` has participant, session and what is stored. */
   server = {};
@@ -108,8 +111,12 @@ export class Hand extends EventTarget {
   load(scene) { return this.ask('load', {scene}); }
   /** Forces on: {stimulus, renderer, trial, level, orientation_wxyz}, each may be left out. Resolves once they are. */
   start(what = {}) { return this.ask('start', what); }
-  /** Ends the trial; resolves with what it was like. `more`: {correct, t_ns}. */
-  async answer(response, more = {}) { return this.#next(await this.ask('answer', {response, ...more})); }
+  /** Ends the trial; resolves with what it was like. `more`: {correct, t_ns}; a time is taken once clock() was asked for:
+      `stamped` says 'client', else 'arrival'. */
+  async answer(response, more = {}) {
+    if (more.t_ns !== undefined && this.#clock_seen && performance.now() - this.#clock_asked > CLOCK_FOR) await this.clock(3);
+    return this.#next(await this.ask('answer', {response, ...more}));
+  }
   /** Changes the scene at a JSON pointer. */
   set(path, value) { return this.ask('set', {path, value}); }
   /** Forces off, without an answer. */
@@ -131,7 +138,9 @@ export class Hand extends EventTarget {
     let best = null;
     for (let i = 0; i < times; ++i) {
       const sent = performance.now();
-      const said = await this.ask('clock');
+      this.#clock_asked = sent;
+      const said = await this.ask('clock', {t_client: sent * 1e6, ...(this.#clock_seen && {t_seen_ns: this.#clock_seen})});
+      this.#clock_seen = said.t_sent_ns;
       const came = performance.now();
       const round_trip_ms = came - sent - (said.t_sent_ns - said.t_received_ns) / 1e6;
       const offset_ms = (said.t_received_ns + said.t_sent_ns) / 2e6 - (sent + came) / 2;

@@ -45,6 +45,12 @@ constexpr std::pair<const char*, StreamField> kFields[] = {
 constexpr std::size_t kLongestText = 1000;  // characters of a name, note or reason
 constexpr double kMostRate = 1000;          // Hz
 
+/// Of a text in UTF-8, as JSON schemas count them.
+std::size_t characters(const std::string& text) {
+  return static_cast<std::size_t>(std::ranges::count_if(
+      text, [](char byte) { return (static_cast<unsigned char>(byte) & 0xC0) != 0x80; }));
+}
+
 /// The members of one message; what is wrong with them is collected.
 class MemberReader {
  public:
@@ -60,8 +66,8 @@ class MemberReader {
   void text(const char* key, std::string& out, bool required, std::size_t most = kLongestText) {
     const json* const value = member(key, required);
     if (value == nullptr) return;
-    if (!value->is_string() || value->get_ref<const std::string&>().size() > most)
-      return fault(key, "expected a text of at most " + std::to_string(most) + " bytes");
+    if (!value->is_string() || characters(value->get_ref<const std::string&>()) > most)
+      return fault(key, "expected a text of at most " + std::to_string(most) + " characters");
     out = value->get<std::string>();
   }
   std::optional<std::int64_t> integer(const char* key, bool required, std::int64_t least,
@@ -72,6 +78,12 @@ class MemberReader {
         !(value->is_number_unsigned() && value->get<std::uint64_t>() > std::uint64_t{INT64_MAX})) {
       const auto number = value->get<std::int64_t>();
       if (number >= least && number <= most) return number;
+    } else if (value->is_number_float()) {  // 3.0 is a whole number, too
+      constexpr double kExact = 9007199254740992;
+      const auto number = value->get<double>();
+      if (std::abs(number) <= kExact && number == std::floor(number) &&
+          number >= static_cast<double>(least) && number <= static_cast<double>(most))
+        return static_cast<std::int64_t>(number);
     }
     fault(key,
           "expected a whole number from " + std::to_string(least) + " to " + std::to_string(most));
@@ -211,6 +223,7 @@ void read_rest(MemberReader& reader, Message& out) {
         else
           reader.fault("t_client", "expected a number");
       }
+      out.seen = reader.integer("t_seen_ns", false, 0, kMost);
       break;
     case MessageType::alive:
     case MessageType::emergency:
@@ -271,6 +284,31 @@ Message parse_message(const std::string& text) {
   reader.refuse_unknown();
   if (!reader.faults().empty()) throw MessageRefused(std::move(reader.faults()), id);
   return out;
+}
+
+void ClientClock::forget() {
+  least_ = -kNever;
+  most_ = kNever;
+}
+
+void ClientClock::take(double t_client, std::int64_t received_ns,
+                       std::optional<std::int64_t> seen) {
+  const double drift = kDrift * static_cast<double>(received_ns - at_ns_);
+  at_ns_ = received_ns;
+  const double most = static_cast<double>(received_ns) - t_client;
+  most_ = std::min(most_ + drift, most);
+  // It cannot have seen what was not sent.
+  const bool credible = seen && *seen > 0 && *seen == sent_ns_;
+  const double least = credible ? static_cast<double>(*seen) - t_client : -kNever;
+  least_ = std::max(least_ - drift, least);
+  if (least_ <= most_) return;
+  forget();  // the clock was set
+  most_ = most;
+}
+
+bool ClientClock::is_known(std::int64_t now_ns) const {
+  const double drift = kDrift * static_cast<double>(now_ns - at_ns_);
+  return (most_ - least_) / 2 + drift <= kWithin;
 }
 
 std::string accepted(std::int64_t id, const ordered_json& more) {

@@ -76,11 +76,44 @@ struct Message {
   nlohmann::json value;               ///< set
   std::string text;                   ///< answer's response, stop's reason, mark's and note's text
   std::optional<std::int64_t> t_ns;   ///< answer
+  bool clock_is_known = false;        ///< answer: the client's clock was measured, see ClientClock
   std::optional<bool> correct;        ///< answer
   int code = 0;                       ///< mark
   double rate = 0;                    ///< subscribe: Hz, 0: no stream
   std::vector<StreamField> fields;    ///< subscribe
   nlohmann::json t_client;            ///< clock: comes back as it is
+  std::optional<std::int64_t> seen;   ///< clock: ns, of the newest answer to `clock` that it knows
+};
+
+/// When an answer was given: by its own time where the client's clock is known, else on arrival.
+inline std::int64_t answer_time(const Message& message, std::int64_t arrived_ns) {
+  return message.clock_is_known ? message.t_ns.value_or(arrived_ns) : arrived_ns;
+}
+/// As replies name it.
+inline const char* stamped_by(const Message& message) {
+  return message.clock_is_known && message.t_ns ? "client" : "arrival";
+}
+
+/// What is known of a client's clock, from its `clock` messages. A message was sent before it
+/// arrived, and after the answer that it has seen was sent: both bound the clock's offset.
+class ClientClock {
+ public:
+  static constexpr double kWithin = 1e6;   ///< ns, of an answer's time
+  static constexpr double kDrift = 50e-6;  ///< of two quartz clocks
+
+  /// \param t_client  by its clock, ns, when it asked. \param seen  when the answer was sent that
+  /// it knew then, by the server's clock
+  void take(double t_client, std::int64_t received_ns, std::optional<std::int64_t> seen);
+  void answered(std::int64_t sent_ns) { sent_ns_ = sent_ns; }
+  /// Whether its offset is known to kWithin.
+  bool is_known(std::int64_t now_ns) const;
+
+ private:
+  void forget();
+  // Server's clock less client's, ns, at at_ns_.
+  double least_ = -kNever, most_ = kNever;
+  std::int64_t at_ns_ = 0, sent_ns_ = 0;
+  static constexpr double kNever = 1e300;
 };
 
 /// \throws MessageRefused with every fault

@@ -151,6 +151,7 @@ class Client : public std::enable_shared_from_this<Client> {
   Role role = Role::unknown;
   bool closed = false;
   asio::steady_timer hello_timer;
+  ClientClock clock;
   std::int64_t heard_ns = 0;
   std::int64_t second_ns = 0;  ///< of the rate
   int in_second = 0;           ///< messages
@@ -381,10 +382,9 @@ class Network::Impl final : public Hub {
 
   void gone(Client& client) override {
     if (client.role == Client::Role::control) {
-      const std::int64_t now = now_ns();
       if (hooks_.forces_are_on()) {
         hooks_.emergency();
-        tell_all(event("controller_gone", now));
+        tell_all(event("controller_gone", now_ns()));  // from here on no force is commanded
       }
       command({client.id, true, {}});
     }
@@ -576,7 +576,13 @@ class Network::Impl final : public Hub {
       case MessageType::alive:
         return client.send(accepted(message.id));
       case MessageType::clock: {
-        nlohmann::ordered_json more = {{"t_received_ns", received_ns}, {"t_sent_ns", now_ns()}};
+        if (!message.t_client.is_null())
+          client.clock.take(message.t_client.get<double>(), received_ns, message.seen);
+        const std::int64_t sent_ns = now_ns();
+        client.clock.answered(sent_ns);
+        nlohmann::ordered_json more = {{"t_received_ns", received_ns},
+                                       {"t_sent_ns", sent_ns},
+                                       {"known", client.clock.is_known(received_ns)}};
         if (!message.t_client.is_null()) more["t_client"] = message.t_client;
         return client.send(accepted(message.id, more));
       }
@@ -605,6 +611,7 @@ class Network::Impl final : public Hub {
     }
     if (client.role != Client::Role::control)
       return refuse("not-controller", "only the controller may say this");
+    message.clock_is_known = client.clock.is_known(received_ns);
     const std::int64_t id = message.id;
     if (!command({client.id, false, std::move(message)}))
       client.send(refused(id, {{"busy", "64 messages wait for the session already", ""}}));
@@ -657,7 +664,8 @@ class Network::Impl final : public Hub {
     if (client.rate <= 0) return;
     // Half a period early: ticks come a little sooner or later than their times.
     constexpr double kEveryTick = 1000;  // Hz
-    const auto period = static_cast<std::int64_t>(1e9 / client.rate);
+    constexpr double kLongest = 1e18;    // ns
+    const auto period = static_cast<std::int64_t>(std::min(1e9 / client.rate, kLongest));
     if (client.rate < kEveryTick && sample.time_ns + period / 2 < client.next_ns) return;
     client.next_ns = std::max(client.next_ns + period, sample.time_ns);
     if (client.row_count >= kMostRows) {

@@ -166,7 +166,8 @@ void ServedScene::set(std::uint64_t client, const Message& message) {
   try {
     // What a scene leaves out has its default, and may be set.
     const json::json_pointer path(message.path);
-    if (!changed.contains(path.parent_pointer()))
+    const json::json_pointer in = path.parent_pointer();
+    if (!changed.contains(in) || (changed[in].is_array() && !changed.contains(path)))
       throw MessageRefused("bad-message", "no such object in the scene", "/path");
     changed[path] = message.value;
   } catch (const json::exception&) {
@@ -230,13 +231,14 @@ void ServedScene::obey(std::uint64_t client, const Message& message) {
         if (!trial_ || !trial_->holds)
           throw MessageRefused("nothing-felt", "nothing is felt now: start first");
         const std::int64_t now = clock_.now_ns();
-        const std::int64_t at = message.t_ns.value_or(now);
+        const std::int64_t at = answer_time(message, now);
         if (at < trial_->zero_ns || at > now)
           throw MessageRefused("bad-message",
                                "expected a time of this trial, CLOCK_MONOTONIC in ns", "/t_ns");
         ordered_json out = end_trial();
         out["response"] = message.text;
         out["t_ns"] = at;
+        out["stamped"] = stamped_by(message);
         out["response_time_s"] =
             static_cast<double>(at - out["zero_t_ns"].get<std::int64_t>()) * 1e-9;
         tell("answered", at, out);

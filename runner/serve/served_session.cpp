@@ -196,6 +196,7 @@ ServedSession::Outcome ServedSession::run_trials() {
     said["faults"] = fault_words(stored_->faults);
     said["next"] = next_trial();
     tell("stored", clock_.now_ns(), said);
+    if (answer_) said["stamped"] = stamped_by(answer_->message);
     if (answer_) output_->reply(answer_->client, accepted(answer_->message.id, std::move(said)));
     answer_.reset();
     stored_.reset();
@@ -382,15 +383,15 @@ void ServedSession::answer(const Asked& asked) {
   if (given_) throw MessageRefused("answered", "the trial is answered");
   Answer given = answer_of(asked.message);
   const std::int64_t now = clock_.now_ns();
-  given.time_ns = asked.message.t_ns.value_or(now);
+  given.time_ns = answer_time(asked.message, now);
   if (given.time_ns < onset_ns_ || given.time_ns > now)
     throw MessageRefused("bad-message", "expected a time of this trial, CLOCK_MONOTONIC in ns",
                          "/t_ns");
   if (asked.message.t_ns) {
     const ordered_json stamped = {{"answer_time",
-                                   {{"by", "the program"},
+                                   {{"stamped", stamped_by(asked.message)},
                                     {"trial", trial_.trial},
-                                    {"t_ns", given.time_ns},
+                                    {"t_ns", *asked.message.t_ns},
                                     {"arrived_ns", now}}}};
     parts_.record.note(now, stamped.dump());
   }

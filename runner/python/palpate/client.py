@@ -35,6 +35,7 @@ WIDTHS = {"tip": 3, "tail": 3, "force": 3, "rendered": 3, "contact": 3}  # colum
 MOST_ROWS = 600_000  # of a stream that nobody takes: ten minutes
 START_TIME_OUT = 3600  # s, until the stylus is at home
 CLOCK_WITHIN_NS = 1_000_000  # of the time of an answer
+CLOCK_FOR_NS = 5_000_000_000  # the server takes two clocks for drifting apart
 LONGEST_LINE = 4 << 20  # bytes
 
 
@@ -198,6 +199,8 @@ class _Inbox:
         #: With a protocol: the trial that is due; None behind the last one.
         self.next: Optional[Dict[str, Any]] = None
         self.best_clock: Optional[Clock] = None  #: as clock() found it
+        self._clock_asked = 0  # time.monotonic_ns()
+        self._clock_seen: Optional[int] = None  # ns: when the server sent the newest answer of clock()
 
     def _take_next(self, said: Dict[str, Any]) -> Dict[str, Any]:
         if "record" in said:
@@ -273,6 +276,11 @@ def _started(stimulus: Optional[str], renderer: Optional[str], trial: Optional[i
 def _check_clock(t_ns: Optional[int], best: Optional[Clock]) -> None:
     if t_ns is not None and (best is None or best.round_trip_ns > 2 * CLOCK_WITHIN_NS):
         raise ValueError("the server's clock is not known within 1 ms: ask clock() before a time is given")
+
+
+def _is_stale(asked_ns: int) -> bool:
+    """Two clocks that were compared then may have drifted apart by a part of a millisecond."""
+    return time.monotonic_ns() - asked_ns > CLOCK_FOR_NS
 
 
 def _closer(best: Optional[Clock], sent: int, came: int, reply: Mapping[str, Any]) -> Clock:
@@ -409,9 +417,11 @@ class Client(_Inbox):
 
         With a protocol this returns once the trial is on record; `next` is what is due then, None behind the last one.
         `t_ns`: when it was given, by the server's clock, which clock() must have measured within 1 ms; without it the
-        server's time of arrival counts. `correct`: of an external block; without it whether the response is the stimulus.
+        server's time of arrival counts. `stamped` says which: "client" or "arrival". `correct`: of an external block; without it whether the response is the stimulus.
         """
         _check_clock(t_ns, self.best_clock)
+        if t_ns is not None and _is_stale(self._clock_asked):
+            self.clock(3)
         return self._take_next(self.ask("answer", response=response, **_given(t_ns=t_ns, correct=correct)))
 
     def stop(self, reason: str = "") -> Dict[str, Any]:
@@ -438,9 +448,10 @@ class Client(_Inbox):
         """By the quickest of so many questions."""
         best: Optional[Clock] = None
         for _ in range(times):
-            sent = time.monotonic_ns()
-            reply = self.ask("clock")
+            self._clock_asked = sent = time.monotonic_ns()
+            reply = self.ask("clock", t_client=sent, **_given(t_seen_ns=self._clock_seen))
             best = _closer(best, sent, time.monotonic_ns(), reply)
+            self._clock_seen = reply["t_sent_ns"]
         assert best is not None
         self.best_clock = best
         return best
@@ -642,6 +653,8 @@ class AsyncClient(_Inbox):
     async def answer(self, response: str, t_ns: Optional[int] = None, correct: Optional[bool] = None) -> Dict[str, Any]:
         """As Client.answer."""
         _check_clock(t_ns, self.best_clock)
+        if t_ns is not None and _is_stale(self._clock_asked):
+            await self.clock(3)
         return self._take_next(await self.ask("answer", response=response, **_given(t_ns=t_ns, correct=correct)))
 
     async def stop(self, reason: str = "") -> Dict[str, Any]:
@@ -668,9 +681,10 @@ class AsyncClient(_Inbox):
         """As Client.clock."""
         best: Optional[Clock] = None
         for _ in range(times):
-            sent = time.monotonic_ns()
-            reply = await self.ask("clock")
+            self._clock_asked = sent = time.monotonic_ns()
+            reply = await self.ask("clock", t_client=sent, **_given(t_seen_ns=self._clock_seen))
             best = _closer(best, sent, time.monotonic_ns(), reply)
+            self._clock_seen = reply["t_sent_ns"]
         assert best is not None
         self.best_clock = best
         return best

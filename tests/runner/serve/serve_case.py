@@ -59,12 +59,20 @@ class ServeCase(unittest.TestCase):
 
     def one_of(self, who, *names):
         """The next event of one of these names."""
-        while True:
+        end = time.monotonic() + PATIENCE
+        while time.monotonic() < end:
             for number, event in enumerate(events := who.events()):
                 if event["event"] in names:
                     who._events.extendleft(reversed(events[number + 1:]))
                     return event
             time.sleep(0.01)
+        raise AssertionError(f"none of {names} came")
+
+    def know_the_clock(self, hand):
+        """Asks until the server knows the client's clock: on a busy machine answers may take long."""
+        end = time.monotonic() + PATIENCE
+        while not (hand.clock() and hand.ask("clock")["known"]):
+            self.assertLess(time.monotonic(), end, "the clock stays unknown")
 
     def touch(self, hand, **more):
         """Starts until something was felt: of a starved machine forces go off before. \return zero, the contact"""

@@ -7,6 +7,7 @@ import asyncio
 import contextlib
 import csv
 import json
+import pathlib
 import signal
 import socket
 import stat
@@ -236,16 +237,23 @@ class Serve(ServeCase):
                 '{"id":4,"type":"subscribe","rate_hz":0.5,"fields":["depth"]}', '{"id":5,"type":"clear"}',
                 '{"id":6,"type":"load","scene":' + ball + '}', '{"id":7,"type":"note","text":"h\u00e4nd"}',
                 '{"id":8,"type":"start","renderer":"point","trial":3}', '{"id":9,"type":"stop","reason":"x"}',
-                '{"id":10,"type":"set","path":"/objects/0/damping_ns_per_m","value":0}', '{"id":9007199254740992,"type":"emergency"}']
+                '{"id":10,"type":"set","path":"/objects/0/damping_ns_per_m","value":0}', '{"id":9007199254740992,"type":"emergency"}',
+                '{"id":1.2e1,"type":"alive"}', '{"id":13,"type":"note","text":"' + "\u00e9" * 1000 + '"}',
+                '{"id":14,"type":"clock","t_client":1.5,"t_seen_ns":9223372036854775807}',
+                '{"id":15,"type":"subscribe","rate_hz":1e-300,"fields":[]}']
         bad = ['{"id":1,"type":"jump"}', '{"type":"alive"}', '{"id":-1,"type":"alive"}', '{"id":1.5,"type":"alive"}',
                '{"id":1,"type":"alive","more":0}', '{"id":1,"type":"mark","code":256}', '{"id":1,"type":"mark"}',
                '{"id":1,"type":"subscribe","rate_hz":1001}', '{"id":1,"type":"subscribe","rate_hz":1,"fields":["tip","tip"]}',
                '{"id":1,"type":"subscribe","rate_hz":1,"fields":["smell"]}', '{"id":1,"type":"start","renderer":"line"}',
                '{"id":1,"type":"start","trial":0}', '{"id":1,"type":"set","path":"/gravity","value":1}', '{"id":1,"type":"note"}',
                '{"id":1,"type":"answer","response":3}', '{"id":1,"type":"load","scene":[]}', '{"id":"1","type":"alive"}',
-               '{"id":1,"type":"clock","t_client":"now"}', '[]', '3', 'null']
+               '{"id":1,"type":"clock","t_client":"now"}', '[]', '3', 'null',
+               '{"id":1e300,"type":"alive"}', '{"id":9007199254740993,"type":"alive"}', '{"id":1,"type":"mark","code":1.5}',
+               '{"id":1,"type":"note","text":"' + "\u00e9" * 1001 + '"}', '{"id":1,"type":"clock","t_seen_ns":-1}',
+               '{"id":1,"type":"clock","t_seen_ns":123456789012345678901234567890}']
         no_json = ['', '{', '{"id":1,"type":"alive"', "{'id':1}", '{"id":1,"id":2,"type":"alive"}', '\xff', '[' * 5000,
-                   '{"id":NaN,"type":"alive"}']
+                   '{"id":NaN,"type":"alive"}', '{"id":1,"type":"note","text":"\\ud800"}', '{"id":1e400,"type":"alive"}',
+                   '{"id":1,"type":"load","scene":' + '{"objects":' * 300 + '1' + '}' * 301]
         link = self.lines()
         self.assertTrue(self.hello(link)["ok"])
         for text in good:
@@ -328,6 +336,57 @@ class Serve(ServeCase):
             clock = hand.clock(30)
             self.assertLess(abs(clock.offset_ns), clock.round_trip_ns / 2 + 1)  # both are CLOCK_MONOTONIC
             self.assertEqual(hand.ask("clock", t_client=0.25)["t_client"], 0.25)
+
+    def test_the_time_of_an_answer_is_taken_where_the_clock_is_known(self):
+        self.serve()
+
+        def answered(hand):
+            hand.stop()
+            hand.clear()
+            hand.start()
+            time.sleep(0.05)
+            now = time.monotonic_ns()
+            hand.ask("alive")
+            said = hand.ask("answer", response="x", t_ns=now)
+            self.assertEqual(said["t_ns"] == now, said["stamped"] == "client")
+            self.assertGreaterEqual(said["t_ns"], now)
+            return said["stamped"]
+
+        with self.client() as hand:
+            self.assertEqual(answered(hand), "arrival")
+            for _ in range(5):  # without having seen an answer it may be anywhere before
+                self.assertFalse(hand.ask("clock", t_client=time.monotonic_ns())["known"])
+            for seen in (1, time.monotonic_ns(), 2**62):  # no answer was sent then
+                self.assertFalse(hand.ask("clock", t_client=time.monotonic_ns(), t_seen_ns=seen)["known"])
+            self.assertEqual(answered(hand), "arrival")
+            self.know_the_clock(hand)
+            self.assertEqual(answered(hand), "client")
+            # Another clock's time is known as well, where it is asked for; one that was set, is not.
+            seen = hand.ask("clock", t_client=time.monotonic_ns() + 5e9)["t_sent_ns"]
+            self.assertEqual(answered(hand), "arrival")
+            while not (said := hand.ask("clock", t_client=time.monotonic_ns() + 5e9, t_seen_ns=seen))["known"]:
+                seen = said["t_sent_ns"]
+            self.know_the_clock(hand)
+            hand.start()
+            zero = time.monotonic_ns()
+            self.refused("bad-message", hand.ask, "answer", response="x", t_ns=zero - 3_000_000_000)
+            self.refused("bad-message", hand.ask, "answer", response="x", t_ns=zero + 3_000_000_000)
+
+    def test_what_is_set_lies_within_the_scene(self):
+        server = self.serve(scene=False)
+        memory = pathlib.Path(f"/proc/{server.pid}/statm")
+        placed = {"objects": [{**BALL["objects"][0], "position_m": [0, 0, 0]}]}
+        with self.client() as hand:
+            hand.load(placed)
+            before = int(memory.read_text().split()[1])
+            for path in ("/objects/-", "/objects/1", "/objects/2000000000", "/objects/0/position_m/2000000000",
+                         "/objects/0/position_m/-", "/objects/0/position_m/x", "/objects/~2", "/objects/00/radius_m", "/objects/"):
+                self.refused("bad-message", hand.set, path, 0.001)
+            self.assertLess(int(memory.read_text().split()[1]) - before, 2000)  # pages
+            hand.set("/objects/0/position_m/1", 0.001)
+            self.assertEqual(placed["objects"][0]["position_m"], [0, 0, 0])
+        with self.client(role="watch") as eye:
+            self.assertEqual(eye.server["scene"]["objects"][0]["position_m"], [0, 0.001, 0])
 
     def test_a_watcher_that_does_not_read_loses_its_rows_alone(self):
         self.serve(rate=1000)

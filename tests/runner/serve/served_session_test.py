@@ -146,13 +146,14 @@ class Served(ServeCase):
                 except ServeError:
                     hand.clear()
             self.assertTrue(said["correct"])
-            hand.clock()
+            self.know_the_clock(hand)
             zero = hand.start(stimulus="ball", level=40, renderer="point")
             time.sleep(0.05)
             now = time.monotonic_ns()
             with self.assertRaises(ServeError):
                 hand.answer("hard", t_ns=zero - 1)
             said = hand.answer("hard", t_ns=now)
+            self.assertEqual(said["stamped"], "client")
             self.assertAlmostEqual(said["response_time_s"], (now - zero) * 1e-9, places=9)
         process.send_signal(signal.SIGTERM)
         self.assertEqual(process.wait(PATIENCE), 0)
