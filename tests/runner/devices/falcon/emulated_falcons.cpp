@@ -1,10 +1,12 @@
 // Runs a command with emulated Falcons on its USB bus:
 //
-//   emulated_falcons [--falcons N] [--bare | --unhomed] [--control FIFO] [--last PATH] COMMAND...
+//   emulated_falcons [--falcons N] [--bare | --unhomed] [--control FIFO] [--last PATH]
+//                    [--record PATH] COMMAND...
 //
 // Their serial numbers are EMU1, EMU2, ... Firmware is loaded unless --bare; they are homed unless
 // --bare or --unhomed. Exits as COMMAND does; what they are at then is written to PATH, as by
-// state. Lines written to FIFO do something to Falcon K (from 1), vectors in its own frame:
+// state, and the packets of the first one as by record. Lines written to FIFO do something to
+// Falcon K (from 1), vectors in its own frame:
 //
 //   unplug K | plug K | lose_homing K | buttons K BITS | firmware_file PATH
 //   hand K X Y Z STIFFNESS DAMPING     the hand wants the grip there (m, N/m, N s/m)
@@ -12,17 +14,22 @@
 //   load K X Y Z MASS                  a force (N) and mass (kg) at the grip
 //   scale K COUNTS                     true counts per newton metre
 //   state PATH                         writes what they are at, as JSON
+//   record K PATH                      writes its newest packets: time (ns, CLOCK_MONOTONIC),
+//                                      commands of the motors (counts), as CSV
 
 #include <fcntl.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <array>
 #include <atomic>
+#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <cstring>
+#include <deque>
 #include <fstream>
 #include <iostream>
 #include <nlohmann/json.hpp>
@@ -67,6 +74,20 @@ void write_state(EmulatedBus& bus, int falcons, const std::string& path) {
   std::rename((path + ".part").c_str(), path.c_str());
 }
 
+void write_record(EmulatedBus& bus, int index, const std::string& path) {
+  std::deque<Emulator::Heard> record;
+  bus.with(index, [&record](Emulator& emulator) { record = emulator.record(); });
+  std::ofstream out(path + ".part");
+  out << "t_ns,motor1,motor2,motor3\n";
+  for (const Emulator::Heard& heard : record) {
+    out << heard.time_ns;
+    for (const int motor : heard.motors) out << ',' << motor;
+    out << '\n';
+  }
+  out.close();
+  std::rename((path + ".part").c_str(), path.c_str());
+}
+
 bool obey(EmulatedBus& bus, int falcons, const std::string& line) {
   std::istringstream words(line);
   std::string verb;
@@ -87,6 +108,12 @@ bool obey(EmulatedBus& bus, int falcons, const std::string& line) {
   int number = 0;
   std::array<double, 5> values{};
   if (!(words >> number) || number < 1 || number > falcons) return false;
+  if (verb == "record") {
+    std::string path;
+    if (!(words >> path)) return false;
+    write_record(bus, number - 1, path);
+    return true;
+  }
   std::size_t count = 0;
   while (count < values.size() && words >> values[count]) ++count;
   const int index = number - 1;
@@ -141,7 +168,7 @@ void listen(EmulatedBus& bus, int falcons, const std::string& fifo) {
 int run(int argc, char** argv) {
   int falcons = 1, at = 1;
   bool bare = false, homed = true;
-  std::string fifo, last;
+  std::string fifo, last, record;
   for (; at < argc && std::strncmp(argv[at], "--", 2) == 0; ++at) {
     const std::string option = argv[at];
     if (option == "--bare") bare = true;
@@ -149,12 +176,16 @@ int run(int argc, char** argv) {
     if (option == "--falcons" && at + 1 < argc) falcons = std::atoi(argv[++at]);
     if (option == "--control" && at + 1 < argc) fifo = argv[++at];
     if (option == "--last" && at + 1 < argc) last = argv[++at];
+    if (option == "--record" && at + 1 < argc) record = argv[++at];
   }
   if (at >= argc) {
     std::cerr << "usage: emulated_falcons [--falcons N] [--bare | --unhomed] [--control FIFO] "
-                 "[--last PATH] COMMAND...\n";
+                 "[--last PATH] [--record PATH] COMMAND...\n";
     return 2;
   }
+  // A real Falcon does not wait for a processor. Where rights allow, nor does this one.
+  const int usual = getpriority(PRIO_PROCESS, 0);
+  setpriority(PRIO_PROCESS, 0, -15);
   EmulatedBus bus;
   for (int i = 0; i < falcons; ++i) {
     bus.add("EMU" + std::to_string(i + 1));
@@ -165,13 +196,23 @@ int run(int argc, char** argv) {
   if (!fifo.empty()) std::thread(listen, std::ref(bus), falcons, fifo).detach();
   const pid_t child = fork();
   if (child == 0) {
+    setpriority(PRIO_PROCESS, 0, usual);
     execvp(argv[at], argv + at);
     _exit(127);
   }
   int status = 0;
   while (waitpid(child, &status, 0) < 0) {
   }
+  // A guard process outlives the command that it guards.
+  const auto torque = [&bus, falcons] {
+    for (int i = 0; i < falcons; ++i)
+      if (!bus.read(i, &Emulator::torque_is_zero)) return true;
+    return false;
+  };
+  for (int ms = 0; ms < 1000 && torque(); ++ms)
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
   if (!last.empty()) write_state(bus, falcons, last);
+  if (!record.empty()) write_record(bus, 0, record);
   std::cout.flush();
   // The listener has no end of its own.
   std::_Exit(WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status));

@@ -47,6 +47,7 @@ bool EmulatedUsbfs::ioctl(UMockdevIoctlClient* client) {
   switch (umockdev_ioctl_client_get_request(client)) {
     case USBDEVFS_GET_CAPABILITIES: {
       UMockdevIoctlData* data = umockdev_ioctl_data_resolve(argument, 0, 4, nullptr);
+      if (data == nullptr) return complete(client, -1, EFAULT);
       const std::uint32_t all = USBDEVFS_CAP_ZERO_PACKET | USBDEVFS_CAP_BULK_CONTINUATION |
                                 USBDEVFS_CAP_NO_PACKET_SIZE_LIM |
                                 USBDEVFS_CAP_REAP_AFTER_DISCONNECT;
@@ -102,10 +103,16 @@ bool EmulatedUsbfs::submit(UMockdevIoctlClient* client, UMockdevIoctlData* argum
   if (unplugged) return complete(client, -1, ENODEV);
   Urb urb;
   urb.client = client;
+  // A client that is killed meanwhile gives no memory.
   urb.request = umockdev_ioctl_data_resolve(argument, 0, sizeof(usbdevfs_urb), nullptr);
+  if (urb.request == nullptr) return complete(client, -1, EFAULT);
   const auto size = static_cast<std::size_t>(urb.urb().buffer_length);
   urb.buffer =
       umockdev_ioctl_data_resolve(urb.request, offsetof(usbdevfs_urb, buffer), size, nullptr);
+  if (urb.buffer == nullptr) {
+    g_object_unref(urb.request);
+    return complete(client, -1, EFAULT);
+  }
   if (urb.urb().type == USBDEVFS_URB_TYPE_CONTROL) {
     const int length = control(urb.buffer->data, size);
     finish(urb, length < 0 ? -EPIPE : 0, static_cast<std::size_t>(std::max(length, 0)));
@@ -185,6 +192,10 @@ bool EmulatedUsbfs::reap(UMockdevIoctlClient* client, UMockdevIoctlData* argumen
   const Urb urb = *found;
   done_.erase(found);
   UMockdevIoctlData* out = umockdev_ioctl_data_resolve(argument, 0, sizeof(void*), nullptr);
+  if (out == nullptr) {
+    urb.release();
+    return complete(client, -1, EFAULT);
+  }
   umockdev_ioctl_data_set_ptr(out, 0, urb.request);
   g_object_unref(out);
   complete(client, 0, 0);

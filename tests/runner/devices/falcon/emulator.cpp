@@ -21,6 +21,7 @@ constexpr std::size_t kChipBytes = 62;          // of data in a full IN packet
 constexpr double kIndexCount = -60;             // of each axis: near the middle of its way
 constexpr double kPowerUpOffset = -700;         // counts, before homing
 constexpr double kStep = 1e-4;                  // s, of the plant
+constexpr std::size_t kRecord = 60'000;         // packets
 
 }  // namespace
 
@@ -182,6 +183,8 @@ void Emulator::obey(std::int64_t now_ns) {
   move_to(now_ns);
   const bool had_torque = !torque_is_zero();
   motors_ = command->motors;
+  record_.push_back({now_ns, motors_});
+  if (record_.size() > kRecord) record_.pop_front();
   if (had_torque && torque_is_zero()) zeroed_ns_ = now_ns;
   for (const int motor : motors_) largest_count_ = std::max(largest_count_, std::abs(motor));
   if (!torque_is_zero()) {

@@ -67,6 +67,12 @@ class Emulator {
   /// When a zero command last ended a torque, ns; -1: never.
   std::int64_t zeroed_ns() const { return zeroed_ns_; }
   int largest_count() const { return largest_count_; }
+  /// The newest packets, oldest first; none are lost within a minute at 1 kHz.
+  struct Heard {
+    std::int64_t time_ns;
+    std::array<int, 3> motors;
+  };
+  const std::deque<Heard>& record() const { return record_; }
   bool torque_before_homing() const { return torque_before_homing_; }
   unsigned homed() const { return homed_; }
   unsigned leds() const { return leds_; }
@@ -108,6 +114,7 @@ class Emulator {
   int uploads_ = 0;
 
   std::uint64_t packets_ = 0, malformed_ = 0;
+  std::deque<Heard> record_;
   std::array<int, 3> motors_{};
   std::int64_t last_torque_ns_ = -1, zeroed_ns_ = -1;
   int largest_count_ = 0;

@@ -1,8 +1,14 @@
 """Says to emulated Falcons what happens to them, and asks how they are."""
 
+import csv
 import json
 import os
 import time
+
+
+def read_record(path):
+    with open(path, newline="") as table:
+        return [(int(row["t_ns"]), max(abs(int(row[f"motor{i}"])) for i in (1, 2, 3))) for row in csv.DictReader(table)]
 
 
 class EmulatorControl:
@@ -29,6 +35,14 @@ class EmulatorControl:
         self.tell(f"state {path}")
         self.wait_until(lambda: path.exists() or given_up())
         return json.loads(path.read_text()) if path.exists() else None
+
+    def record(self, number=1):
+        """The packets of a Falcon, oldest first: time (ns, of time.monotonic_ns), the largest of the motors' counts."""
+        path = self.folder / "record.csv"
+        path.unlink(missing_ok=True)
+        self.tell(f"record {number} {path}")
+        self.wait_until(path.exists)
+        return read_record(path)
 
     def wait_until(self, done):
         end = time.monotonic() + self.patience
