@@ -260,6 +260,28 @@ def test_stubs_and_docstrings_fit_the_module():
             assert parameter.name in function.__doc__ or function is palpate.schedule
 
 
+def test_both_clients_are_annotated_and_alike():
+    def public(kind):
+        return {name: getattr(kind, name) for name in dir(kind) if not name.startswith("_") and callable(getattr(kind, name))}
+
+    blocking, awaited = public(palpate.Client), public(palpate.AsyncClient)
+    assert set(awaited) - set(blocking) == {"connect"}
+    assert set(blocking) <= set(awaited)
+    for name, function in {**blocking, "connect": palpate.AsyncClient.connect}.items():
+        signature = inspect.signature(function)
+        assert function.__doc__, name
+        assert signature.return_annotation is not inspect.Signature.empty, name
+        for parameter in signature.parameters.values():
+            assert parameter.name == "self" or parameter.annotation is not inspect.Parameter.empty, (name, parameter)
+        if name not in ("connect", "from_token_file"):
+            other = inspect.signature(awaited[name])
+            assert list(other.parameters.values()) == list(signature.parameters.values()), name
+            assert other.return_annotation == signature.return_annotation, name
+    # connect() is the constructor of the other.
+    made = inspect.signature(palpate.Client).parameters
+    assert list(inspect.signature(palpate.AsyncClient.connect).parameters.values()) == list(made.values())
+
+
 def test_without_its_compiled_part_it_says_how_to_build_it(tmp_path):
     package = tmp_path / "palpate"
     package.mkdir()

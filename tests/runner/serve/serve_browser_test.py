@@ -11,6 +11,7 @@ import hashlib
 import http.server
 import json
 import pathlib
+import re
 import shutil
 import subprocess
 import sys
@@ -148,6 +149,34 @@ class Pages(ServeCase):
             self.assertAlmostEqual(one["rt"], 1000 * float(row["response_time"]), places=5)
             self.assertEqual(one["trial_type"], "palpate")
         self.assertEqual({one["response"] for one in data}, {"ball", "box"})
+
+    def test_the_block_of_the_readme(self):
+        readme = (SOURCES / "runner" / "README.md").read_text(encoding="utf-8")
+        block, = re.findall(r"```js\n(import .*?)```", readme, re.DOTALL)
+        imports, _, rest = block.partition("\n\n")
+        page = PAGE[:PAGE.index("import ")] + imports + """
+window.run = async (url, token) => {
+  const jsPsych = initJsPsych();
+""" + rest + """
+  await hand.close();
+  return jsPsych.data.get().values();
+};
+window.ready = true;
+</script>"""
+        origin = self.pages({"index.html": page.encode(), "jspsych.js": jspsych()})
+        free = {"name": "free", "task": "external", "stimuli": ["ball", "box"], "trials": 1, "answers": ["yes", "no"]}
+        (self.dir / "p.json").write_text(json.dumps({**PROTOCOL, "blocks": [free]}))
+        process = self.run_server([PALPATE, "serve", "--device", "simulated", "--protocol", self.dir / "p.json", "--db",
+                                   self.dir / "page.db", "--participant", "P01", "--allow-origin", origin])
+        self.browser.open_url(origin + "/index.html")
+        self.until("window.ready === true")
+        self.browser.run(f"void (window.done = run({json.dumps(self.said['url'])}, {json.dumps(self.said['token'])})"
+                         ".then(data => window.data = data, error => window.failed = String(error)))")
+        self.until("""window.failed || window.data ||
+            (document.querySelector('[data-choice="go on"]') ?? document.querySelector('[data-choice=yes]'))?.click(), window.data""")
+        self.assertIsNone(self.browser.run("window.failed ?? null"))
+        self.assertEqual([(one["stimulus"], one["response"]) for one in self.browser.run("window.data")], [("ball", "yes")])
+        self.assertEqual(process.wait(PATIENCE), 0)
 
     def test_pages_of_others_do_not_connect(self):
         mine, other = self.pages({"index.html": PAGE.encode()}), self.pages({"index.html": PAGE.encode()})

@@ -8,8 +8,10 @@ import csv
 import importlib.util
 import io
 import json
-import pathlib
+import os
+import re
 import shutil
+import signal
 import subprocess
 import sys
 import time
@@ -19,6 +21,8 @@ from serve_case import BALL, CLIENT, PALPATE, PATIENCE, ServeCase, ServeError, c
 
 EXAMPLES = CLIENT.parents[1] / "examples"
 OCTAVE = CLIENT.parents[2] / "octave"
+SOURCES = CLIENT.parents[3]
+README = (SOURCES / "runner" / "README.md").read_text(encoding="utf-8")
 PROTOCOL = {
     "version": 2, "name": "clients", "renderers": ["ray"], "seed": 5, "servo": {"rate_hz": 100}, "home": {"rest_s": 0.1},
     "material": {"stiffness_n_per_m": 50},
@@ -177,6 +181,68 @@ class Clients(ServeCase):
         program.stderr.close()
         self.assertEqual(picture.read_bytes()[:8], b"\x89PNG\r\n\x1a\n")
         self.assertGreater(picture.stat().st_size, 5000)
+
+    def readme(self, language, words):
+        """The README's block of a language that holds these words, as it is shown."""
+        section = README[README.index("## How to drive palpate from PsychoPy"):]
+        found = [block for block in re.findall(rf"```{language}\n(.*?)```", section[:section.index("\n## ", 1)], re.DOTALL)
+                 if words in block]
+        self.assertEqual(len(found), 1, words)
+        return found[0]
+
+    def serve_as_in_the_readme(self, command, **more):
+        """In a folder with the protocols of the sources, with the program in PATH."""
+        if not (self.dir / "protocols").exists():
+            (self.dir / "protocols").symlink_to(SOURCES / "protocols")
+        process = subprocess.Popen(["bash", "-c", "exec " + command.strip()], cwd=self.dir, stdout=subprocess.PIPE,
+                                   stderr=subprocess.DEVNULL, text=True,
+                                   env={**os.environ, "PATH": f"{PALPATE.parent}:{os.environ['PATH']}"}, **more)
+        self.addCleanup(lambda: (process.kill(), process.communicate()))
+        self.assertIn("serving", process.stdout.readline())
+        self.said = json.loads(self.token.read_text())
+        return process
+
+    def study_as_in_the_readme(self, trials):
+        """Its protocol has the block of the README, with fewer trials and a slower servo."""
+        block = json.loads(self.readme("json", '"external"'))
+        (self.dir / "study.json").write_text(json.dumps({**PROTOCOL, "blocks": [{**block, "trials": trials}]}))
+        return self.serve_as_in_the_readme(self.readme("sh not tested:[^\n]*", "--participant P03"))
+
+    def run_until_done(self, command, **more):
+        """Again where a busy machine took forces off: the session goes on with the trial that is due."""
+        while True:
+            done = subprocess.run(list(map(str, command)), capture_output=True, text=True, timeout=PATIENCE, cwd=self.dir, **more)
+            if done.returncode == 0:
+                return done.stdout
+            self.assertRegex(done.stderr, "forces-off|nothing-felt|stopped")
+            with self.client() as hand:
+                hand.clear()
+
+    def test_the_scene_of_the_readme_is_served(self):
+        process = self.serve_as_in_the_readme(self.readme("sh not tested:[^\n]*", "--scene"))
+        with self.client(role="watch") as eye:
+            self.assertTrue(eye.server["scene"]["objects"])
+        process.send_signal(signal.SIGINT)
+        self.assertEqual(process.wait(PATIENCE), 0)
+
+    def test_python_as_in_the_readme(self):
+        process = self.study_as_in_the_readme(trials=2)
+        (self.dir / "loop.py").write_text(self.readme("python", "from client"))
+        out = self.run_until_done([sys.executable, "loop.py"], input="yes\nno\n",
+                                  env={**os.environ, "PYTHONPATH": str(CLIENT.parent)})
+        self.assertEqual(process.wait(PATIENCE), 0)
+        rows = self.rows()
+        self.assertEqual([row["shape"] for row in rows], ["ball", "ball"])
+        self.assertEqual(rows[-1]["response"], out.split("? ")[-1].split()[1])
+
+    def test_octave_as_in_the_readme(self):
+        if shutil.which("octave-cli") is None:
+            self.skipTest("Octave is not installed")
+        process = self.study_as_in_the_readme(trials=1)
+        (self.dir / "loop.m").write_text(self.readme("octave", "palpate ("))
+        self.run_until_done(["octave-cli", "--no-init-file", "--path", OCTAVE, "loop.m"])
+        self.assertEqual(process.wait(PATIENCE), 0)
+        self.assertEqual([(row["shape"], row["response"]) for row in self.rows()], [("ball", "yes")])
 
     def test_octave(self):
         if shutil.which("octave-cli") is None:
