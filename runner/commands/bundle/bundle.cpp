@@ -142,7 +142,7 @@ class Crate {
 
   /// \return its id
   std::string license() {
-    const std::string url = data::license_url(facts_.about);
+    std::string url = data::license_url(facts_.about);
     graph_.push_back(
         {{"@id", url},
          {"@type", "CreativeWork"},
