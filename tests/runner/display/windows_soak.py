@@ -4,7 +4,8 @@ Usage: windows_soak.py PALPATE [--minutes M] [--seed S] [--size 1024x768] [--man
 
 It begins with pages, then takes turns: trials that are answered, with the pointer on the object; windows that are
 moved and resized; pauses; the emergency button; a session that is closed by its window and begun again. Meant for
-builds with AddressSanitizer (preset asan) or, with `--with "valgrind --error-exitcode=9"`, for portable ones. Drawn
+builds with AddressSanitizer (preset asan) or, with
+`--with "valgrind --suppressions=tests/shared/valgrind.supp --error-exitcode=9"`, for portable ones. Drawn
 in software with one thread, which is where a driver's errors of timing have been seen.
 """
 
@@ -113,7 +114,7 @@ class Soak:
 
     def close(self):
         self.screen.ask_to_close(self.participant)
-        if self.program.wait(300) != 1:  # closed by the participant's window
+        if self.program.wait(1200 if self.options.using else 300) != 1:  # closed by the participant's window
             raise AssertionError(f"status {self.program.returncode}")
 
     def run(self):
