@@ -12,7 +12,7 @@
 
 namespace palpate::data {
 
-/// A table that is appended to from left to right, row by row, as the rows of a CSV file are.
+/// A table filled from left to right, row by row, like a CSV file.
 class ColumnTable {
  public:
   /// Booleans are bytes, 0 or 1. A missing number is NaN, a missing text "".
@@ -25,7 +25,7 @@ class ColumnTable {
 
   explicit ColumnTable(const std::vector<std::string>& names);
 
-  // Of each column all values are of one type. \throws std::logic_error
+  // All values of a column have one type. \throws std::logic_error
   ColumnTable& operator<<(double value) { return append(value); }
   ColumnTable& operator<<(bool value) { return append(std::uint8_t{value}); }
   ColumnTable& operator<<(std::integral auto value) {
@@ -36,7 +36,7 @@ class ColumnTable {
   ColumnTable& operator<<(const std::optional<double>& value) {
     return append(value.value_or(std::numeric_limits<double>::quiet_NaN()));
   }
-  /// After the last value of a row. \throws std::logic_error: not every column has got one
+  /// Ends a row. \throws std::logic_error: a column has no value yet
   void end_row();
 
   std::size_t rows() const { return rows_; }

@@ -43,7 +43,7 @@ bool has_right_answer(const TrialRecord& record) {
 bool is_participant_code(std::string_view code) {
   if (code.empty() || code.size() > 32) return false;
   for (const char c : code) {
-    // Not std::isalnum: that one follows the locale.
+    // Not std::isalnum, which depends on the locale.
     if (!((c >= '0' && c <= '9') || (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z'))) return false;
   }
   return true;

@@ -1,6 +1,6 @@
 #pragma once
-// The records of a session and of every trial: plain values that sessions fill, the store keeps,
-// and exports and analysis read. SI units; times are int64 nanoseconds.
+// Records of a session and of every trial: plain values, filled by sessions, kept by the store,
+// read by exports and analysis. SI units; times are int64 nanoseconds.
 
 #include <array>
 #include <cstdint>
@@ -11,7 +11,7 @@
 
 namespace palpate::data {
 
-/// Where a stimulus that moves is, by the column names of `palpate render --bodies`. World frame.
+/// State of a moving stimulus, named as the columns of `palpate render --bodies`. World frame.
 struct BodyRecord {
   std::array<double, 3> centre{};  ///< m, of mass
   std::array<double, 4> orientation_wxyz{1, 0, 0, 0};
@@ -33,7 +33,7 @@ struct SampleRecord {
   std::uint8_t contacts = 0;
   std::uint8_t contact_type = 0;
   std::uint8_t buttons = 0;
-  std::uint8_t bodies = 0;   ///< 1: the stimulus moves; where it is after the tick: body_of()
+  std::uint8_t bodies = 0;   ///< 1: the stimulus moves; body_of() is its state after the tick
   std::uint32_t faults = 0;  ///< fault bits of the tick
 };
 
@@ -41,34 +41,35 @@ struct SampleRecord {
 struct IntervalRecord {
   std::string stimulus;  ///< "": nothing was shown
   std::string renderer;
-  std::optional<double> level;  ///< none: the stimulus as the protocol has it
+  std::optional<double> level;  ///< none: the stimulus unchanged from the protocol
   bool standard = false;
   std::int64_t onset_ns = 0, end_ns = 0;  ///< forces on, forces off; session clock; 0: not yet
 };
 
-/// What a trial of version 2 has besides. Onset, response time and contact are those of the
-/// interval that was felt last.
+/// Further values of a trial of version 2. Onset, response time and contact are those of the last
+/// interval felt.
 struct TaskRecord {
   std::string task;  ///< "identify", "compare", "detect", "rate", "adjust", "external"
   std::string block_name;
   int track = 1;                         ///< stimulus, renderer and procedure
-  std::optional<double> level;           ///< asked about; adjust: where it started
-  std::optional<double> standard_level;  ///< of the standard, where it has one
+  std::optional<double> level;           ///< level of the trial; adjust: start value
+  std::optional<double> standard_level;  ///< of the standard, if it has one
   bool catch_trial = false;
   std::vector<IntervalRecord> intervals;  ///< in order; adjust: one for each stimulus felt
-  /// The comparison was chosen, "yes", "different", the right stimulus: what procedures count.
+  /// The outcome that procedures count: the comparison was chosen, "yes", "different", the right
+  /// stimulus.
   bool success = false;
-  std::optional<double> number;  ///< rate: as answered; adjust: the level left
+  std::optional<double> number;  ///< rate: as answered; adjust: the level that was set
   std::optional<double> confidence;
   std::optional<std::int64_t> confidence_ns;  ///< session clock
 };
 
-/// An answer to a question of a page, or the consent given. Personal data: never exported unless
-/// asked.
+/// An answer to a question of a page, or the consent given. Personal data: exported on request
+/// only.
 struct PageAnswer {
   std::string page, item;   ///< names; consent: item "consent"
   std::string version;      ///< of a consent
-  std::string text_sha256;  ///< of what was shown
+  std::string text_sha256;  ///< of the text shown
   std::string answer;       ///< "": left out
   std::int64_t at_ns = 0;   ///< session clock
 };
@@ -93,25 +94,25 @@ struct TrialRecord {
   bool started_inside = false;  ///< the stylus was inside an object at time zero
   double max_force = 0;         ///< N
   /// How the object was touched (runner/session/live_forces.h): share of the ticks with contact,
-  /// and s with contact near an edge. None: recorded by a version without them; edge_dwell also
-  /// where the stimulus has too many edges.
+  /// and s with contact near an edge. None: recorded by a version without them; edge_dwell also if
+  /// the stimulus has too many edges.
   std::optional<double> contact_share, edge_dwell;
   std::vector<SampleRecord> samples;              ///< empty unless recorded and requested
   std::optional<TaskRecord> task = std::nullopt;  ///< none: version 1
-  /// Of the samples, one each; empty where nothing moves in any of them.
+  /// One for each sample; empty: nothing moves in any of them.
   std::vector<BodyRecord> bodies = {};
 };
 
-/// Where the stimulus was after the tick; none: it did not move, or there was none.
-/// \param sample  of the record's own
+/// State of the stimulus after the tick; none: it did not move, or there was none.
+/// \param sample  an element of record.samples
 std::optional<BodyRecord> body_of(const TrialRecord& record, const SampleRecord& sample);
 
-/// First tick with forces on in the first interval that was felt, session clock; version 1: the
-/// trial's onset.
+/// First tick with forces on in the first interval felt, session clock; version 1: the trial's
+/// onset.
 std::int64_t first_onset_ns(const TrialRecord& record);
 
-/// Whether an answer to the trial can be right or wrong: not a number or a level that was set, and
-/// not the choice between two intervals of the same level.
+/// Whether an answer to the trial can be right or wrong. False for a number, a level that was set,
+/// and a choice between two intervals of the same level.
 bool has_right_answer(const TrialRecord& record);
 
 /// A file that a protocol names, such as a mesh.
@@ -125,7 +126,7 @@ struct ProtocolInfo {
   std::string name;
   std::string text;                      ///< of the file, byte for byte
   std::string sha256;                    ///< of text, 64 lower-case hexadecimal digits
-  std::vector<ProtocolFile> files = {};  ///< that it names, each once
+  std::vector<ProtocolFile> files = {};  ///< named in the text, each once
 };
 
 /// A person or a simulated participant, enrolled in one protocol. Pseudonyms only.
@@ -133,7 +134,7 @@ struct Participant {
   std::int64_t id = 0;  ///< row id in the database
   std::string code;     ///< 1 to 32 letters and digits
   int number = 0;       ///< 1, 2, ...: unique within the protocol
-  /// Selects the counterbalanced order: equals number unless a merge has changed that since.
+  /// Selects the counterbalanced order: equals `number` unless a merge has changed that one.
   int enrolled_number = 0;
   bool simulated = false;
   std::optional<std::uint64_t> seed;  ///< of a simulated participant
@@ -160,7 +161,7 @@ enum class RunEnd {
 const char* to_string(RunEnd end);                           ///< "running", "done", ...
 std::optional<RunEnd> parse_run_end(std::string_view text);  ///< the inverse of to_string
 
-/// What is recorded when a process begins or resumes a session. Empty texts: unknown.
+/// Recorded when a process begins or resumes a session. Empty texts: unknown.
 struct RunInfo {
   int session = 1;
   ClockStamp clock;
@@ -177,7 +178,7 @@ struct RunInfo {
   /// Allows begin_run to resume a session that ended as `withdrawn`: the participant asks to take
   /// part again. Not stored.
   bool after_withdrawal = false;
-  /// Of the protocol that the run was shown with, if its texts differ from the participant's; "":
+  /// SHA-256 of the protocol that the run showed, if its texts differ from the participant's; "":
   /// the participant's own.
   std::string protocol_sha256;
   /// Of the stored files of that protocol (files_checksum); "": none, or recorded by a version that

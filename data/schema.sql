@@ -29,7 +29,7 @@ CREATE TABLE sessions (
   UNIQUE (participant_id, number)
 ) STRICT;
 
--- A session can be interrupted and resumed: a row for each process that ran a part of it.
+-- A session can be interrupted and resumed: one row for each process that ran a part of it.
 CREATE TABLE runs (
   id INTEGER PRIMARY KEY,
   session_id INTEGER NOT NULL REFERENCES sessions (id),
@@ -59,7 +59,7 @@ CREATE TABLE notes (
 ) STRICT;
 CREATE INDEX notes_of_run ON notes (run_id);
 
--- Every presentation of a trial. Only a completed one is data; one that was cut off is kept as such.
+-- Every presentation of a trial. Only completed ones are data; cut-off ones are kept, but marked.
 CREATE TABLE attempts (
   id INTEGER PRIMARY KEY,
   session_id INTEGER NOT NULL REFERENCES sessions (id),

@@ -10,7 +10,7 @@
 namespace palpate::data {
 namespace {
 
-constexpr std::size_t kMaxNamed = 5;  // places that a difference names
+constexpr std::size_t kMaxNamed = 5;  // most places named in a difference
 constexpr std::size_t kMaxValue = 43;
 
 std::string shown(const nlohmann::json& value) { return json_excerpt(value, kMaxValue); }
@@ -21,7 +21,7 @@ std::string in_lower_case(std::string text) {
   return text;
 }
 
-/// Of a step that turns one document into another (RFC 6902), what it changes: "/seed 1 and 2".
+/// Describes the steps that turn one document into another (RFC 6902): "/seed 1 and 2".
 class DifferenceTexts {
  public:
   explicit DifferenceTexts(const nlohmann::json& one) : one_(one) {}
@@ -36,7 +36,7 @@ class DifferenceTexts {
   }
 
  private:
-  /// "-" stands for the place behind a list's last element.
+  /// "-" denotes the place after a list's last element.
   std::string place_of_added(const nlohmann::json::json_pointer& place) {
     const nlohmann::json::json_pointer list = place.parent_pointer();
     if (place.back() != "-" || !one_.at(list).is_array()) return place.to_string();

@@ -1,5 +1,5 @@
 #pragma once
-// The records of a sweep: its plan, and what came out at each point. Plain values.
+// The records of a sweep: its plan, and the results at each point. Plain values.
 
 #include <cstdint>
 #include <optional>
@@ -10,14 +10,14 @@
 
 namespace palpate::data {
 
-/// All that the results of a sweep depend on. Two files of one plan can be put together.
+/// Everything that determines the results of a sweep. Files of one plan can be merged.
 struct SweepPlan {
-  std::string protocol;      ///< JSON; layout and order of keys do not count
-  std::string files_sha256;  ///< of the names and contents of the files that it names; "": none
+  std::string protocol;      ///< JSON; layout and order of keys do not matter
+  std::string files_sha256;  ///< of names and contents of the protocol's files; "": none
   std::string settings;      ///< JSON, of the simulated participant before anything varies
-  std::string space;         ///< JSON, what varies
+  std::string space;         ///< JSON, the varied parameters
   std::string design;        ///< lhs, sobol, grid, saltelli
-  std::int64_t points = 0;   ///< of the whole sweep, whatever this file holds
+  std::int64_t points = 0;   ///< of the whole sweep, not only this file
   std::uint64_t seed = 1;
   int participants = 7;
   std::string program_version;
@@ -25,7 +25,8 @@ struct SweepPlan {
   std::vector<std::string> shapes, renderers;  ///< names, as the protocol lists them
 };
 
-/// A sentence for each thing in which two plans differ, a's value first; empty: they are one plan.
+/// A sentence for each difference between two plans, a's value first; empty: they are the same
+/// plan.
 std::vector<std::string> differences(const SweepPlan& a, const SweepPlan& b);
 
 using SweepValue = std::variant<double, std::string>;  ///< true and false are 1 and 0
@@ -36,7 +37,7 @@ struct SweepRow {
   std::uint64_t seed = 0, order_seed = 0;  ///< of its participants, and of their schedules
   std::string reason;                      ///< why it failed; "": it did not
   std::vector<SweepValue> values;          ///< of the plan's parameters
-  /// As figure_columns() names them; none: undefined, or the point failed.
+  /// In the order of figure_columns(); none: undefined, or the point failed.
   std::vector<std::optional<double>> figures;
 };
 
@@ -45,19 +46,18 @@ struct SweepRow {
 /// over correct answers), accuracy_R_S, time_outs_R_S (share of trials) and contact_share_R_S
 /// (share of the time with forces on).
 ///
-/// Of a protocol of version 2, for each block B that is no practice, stimulus S and renderer R,
-/// means over the participants and their standard errors: compare and detect threshold_B_S_R
-/// (compare with levels on both sides of the standard: PSE) and threshold_se_B_S_R, compare
-/// jnd_..., detect d_prime_..., rate exponent_..., adjust pse_... and jnd_..., identify
-/// accuracy_... and time_... (s) likewise, and bits_B_R. Participants without the figure are left
-/// out.
+/// For a protocol of version 2, for each block B except practice, stimulus S and renderer R, means
+/// over the participants and their standard errors: compare and detect threshold_B_S_R (compare
+/// with levels on both sides of the standard: PSE) and threshold_se_B_S_R, compare jnd_..., detect
+/// d_prime_..., rate exponent_..., adjust pse_... and jnd_..., identify accuracy_... and time_...
+/// (s) likewise, and bits_B_R. Participants without the figure are left out.
 std::vector<std::string> figure_columns(const SweepPlan& plan);
 
-/// What is measured in a cell of a protocol of version 2, and the names of its columns.
+/// The measures of a cell of a protocol of version 2, and the names of their columns.
 struct TaskCellColumns {
   std::string task, block, stimulus, renderer;  ///< stimulus "": identify, all together
-  std::vector<std::string> measures;            ///< "threshold", ..., each with an error
-  std::vector<std::string> columns;             ///< a measure and its error in turn
+  std::vector<std::string> measures;            ///< "threshold", ..., each with a standard error
+  std::vector<std::string> columns;             ///< measures and their errors, alternating
 };
 /// Empty: version 1.
 std::vector<TaskCellColumns> task_columns(const SweepPlan& plan);

@@ -1,7 +1,7 @@
 #pragma once
-// The columns that a trial's servo ticks fill. A row of kMeasured is all that such a column needs
-// beside a member of TrialRecord and a migration (store/schema.cpp): the SQL, reading, writing,
-// checks, seal, exports and codebooks follow the table.
+// The columns measured over a trial's servo ticks. A new column needs a row of kMeasured, a member
+// of TrialRecord and a migration (store/schema.cpp); SQL, reading, writing, checks, seal, exports
+// and codebooks follow the table.
 
 #include <cstdint>
 #include <limits>
@@ -13,13 +13,13 @@
 namespace palpate::data {
 
 struct MeasuredColumn {
-  const char* name;  ///< in `attempts` and, where it has a description, in exports
+  const char* name;  ///< in `attempts` and, if it has a description, in exports
   std::variant<std::uint64_t TrialRecord::*, std::int64_t TrialRecord::*,
                std::uint32_t TrialRecord::*, bool TrialRecord::*, double TrialRecord::*,
                std::optional<double> TrialRecord::*>
       member;
-  int since;  ///< version of the schema that brought the column
-  /// Exported after the columns of schema 1, in the table's order. Empty: has a place of its own.
+  int since;  ///< version of the schema that added the column
+  /// Exported after the columns of schema 1, in the table's order. Empty: placed separately.
   const char* description = "";
   const char* unit = "";
   double most = std::numeric_limits<double>::infinity();  ///< largest valid value
@@ -36,11 +36,11 @@ inline constexpr MeasuredColumn kMeasured[] = {
     {"max_force", &TrialRecord::max_force, 1},
     {"contact_share", &TrialRecord::contact_share, 4,
      "Share of the servo ticks, from the first one with forces on to the answer, in which the "
-     "stylus touched the stimulus; missing where it was not measured",
+     "stylus touched the stimulus; missing: not measured",
      "1", 1},
     {"edge_dwell", &TrialRecord::edge_dwell, 4,
      "Time in contact within 3 mm of an edge or vertex at which the surface turns by 30 degrees or "
-     "more; missing where it was not measured or the stimulus has more than 2000 of them",
+     "more; missing: not measured, or the stimulus has more than 2000 such edges and vertices",
      "s"},
 };
 

@@ -21,10 +21,10 @@ std::string size_text(std::uintmax_t bytes) {
 
 }  // namespace
 
-// O_NONBLOCK: opening a pipe does not wait for who writes into it.
+// O_NONBLOCK: opening a pipe does not wait for its writer.
 InputFile::InputFile(const std::string& path, std::uintmax_t most_bytes)
     : file_(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOCTTY | O_NONBLOCK)), most_(most_bytes) {
-  if (file_ < 0) refuse(errno == ENOENT ? "there is none" : std::strerror(errno));
+  if (file_ < 0) refuse(errno == ENOENT ? "no such file" : std::strerror(errno));
   struct stat is {};
   const bool known = ::fstat(file_, &is) == 0;
   if (known && !S_ISDIR(is.st_mode)) return;

@@ -1,6 +1,6 @@
 #pragma once
-// A file named by the user, read with limits, so that reading ends whatever it is (a pipe,
-// /dev/zero).
+// Reads a file named by the user, with limits on size and waiting, so that reading always ends (a
+// pipe, /dev/zero).
 
 #include <cstddef>
 #include <cstdint>
@@ -38,8 +38,7 @@ std::string read_whole(const std::string& path, std::uintmax_t most_bytes);
 
 // Numbers in binary files.
 
-/// The unsigned number of `size` (1 to 4) bytes, the lowest first, at byte `at`, which must be
-/// there.
+/// Reads an unsigned little-endian number of `size` (1 to 4) bytes, which must exist, at byte `at`.
 inline std::uint32_t little_endian(std::string_view bytes, std::size_t at, std::size_t size = 4) {
   std::uint32_t word = 0;
   for (std::size_t i = size; i-- > 0;)

@@ -20,18 +20,18 @@ Json read(std::string_view text) {
   try {
     return Json::parse(text, within_depth);
   } catch (const typename Json::parse_error& error) {
-    // The parser's byte counts from 1 and follows what could be read.
+    // The parser counts bytes from 1 and points behind the readable part.
     const std::size_t byte = error.byte > 0 ? error.byte - 1 : 0;
-    throw JsonError("JSON in UTF-8", "no such at byte " + std::to_string(byte),
+    throw JsonError("JSON in UTF-8", "other text at byte " + std::to_string(byte),
                     std::min(byte, text.size()));
   } catch (const typename Json::out_of_range&) {
-    throw JsonError("JSON with numbers below 1e308", "a greater one");
+    throw JsonError("JSON with numbers below 1e308", "a larger one");
   }
 }
 
 /// The first `most` characters of a value as JSON, or somewhat more.
 void put_start(const nlohmann::json& value, std::size_t most, std::string& out) {
-  // A truncated character must not make the message ill-formed: other than ASCII is escaped.
+  // Escape all but ASCII: a truncated character must not make the message ill-formed.
   const auto ascii = [](const nlohmann::json& word) {
     return word.dump(-1, ' ', true, nlohmann::json::error_handler_t::replace);
   };

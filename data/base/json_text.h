@@ -1,9 +1,8 @@
 #pragma once
-// Reads JSON (RFC 8259, UTF-8), whoever wrote it: files, rows of databases, messages of other
-// programs. A document that nests deeper than kDeepestJson is refused: comparing, copying and
-// writing a document recurse for each level, and would overflow the stack.
-// protocols/json_document.h reads with the line of every value, to the same depth. Nothing else
-// parses JSON.
+// Reads untrusted JSON (RFC 8259, UTF-8): files, rows of databases, messages of other programs.
+// Refuses a document that nests deeper than kDeepestJson: comparing, copying and writing recurse
+// for each level, and would overflow the stack. protocols/json_document.h also records the line of
+// every value, to the same depth. No other code parses JSON.
 
 #include <cstddef>
 #include <nlohmann/json_fwd.hpp>
@@ -23,7 +22,7 @@ class JsonError : public std::runtime_error {
   JsonError(std::string expected, std::string found, std::optional<std::size_t> byte = {});
 
   std::string expected, found;
-  std::optional<std::size_t> byte;  ///< where it is no JSON, from 0
+  std::optional<std::size_t> byte;  ///< first byte that is not JSON, from 0
 };
 
 /// \throws JsonError
@@ -31,11 +30,11 @@ nlohmann::json read_json(std::string_view text);
 
 /// With the keys in the order of the text. \throws JsonError
 nlohmann::ordered_json read_ordered_json(std::string_view text);
-/// A discarded value, which is of no type, where read_json() would throw.
+/// Like read_json(), but returns a discarded value instead of throwing.
 nlohmann::json json_or_discarded(std::string_view text);
 
-/// A value as JSON in ASCII, at most so many characters of it; for messages. A long value is not
-/// written out in full.
+/// A value as JSON in ASCII, cut after `most` characters, for messages. A long value is not
+/// serialised in full.
 std::string json_excerpt(const nlohmann::json& value, std::size_t most = 60);
 
 }  // namespace palpate

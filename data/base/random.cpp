@@ -20,8 +20,8 @@ std::uint64_t splitmix64(std::uint64_t& state) {
 }  // namespace
 
 Random::Random(std::uint64_t seed, std::initializer_list<std::uint64_t> stream) {
-  // Hashing before each element is mixed in makes its position count, and keeps (seed, element)
-  // apart from (seed ^ element, 0). With no stream this is the usual seeding of xoshiro256++.
+  // Hash before mixing in each element, so that its position matters and (seed, element) differs
+  // from (seed ^ element, 0). Without a stream this is the usual seeding of xoshiro256++.
   for (const std::uint64_t element : stream) seed = splitmix64(seed) ^ element;
   if (stream.size() > 0) seed = splitmix64(seed) ^ stream.size();
   for (std::uint64_t& word : state_) word = splitmix64(seed);
@@ -41,7 +41,7 @@ std::uint64_t Random::next() {
 
 std::uint64_t Random::below(std::uint64_t bound) {
   if (bound == 0) throw std::invalid_argument("Random::below: the bound must be above 0");
-  // The lowest 2^64 mod bound outputs are refused, so that every remainder is equally frequent.
+  // Reject the lowest 2^64 mod bound outputs, so that every remainder is equally frequent.
   const std::uint64_t refused = (0 - bound) % bound;
   std::uint64_t bits = next();
   while (bits < refused) bits = next();

@@ -1,6 +1,6 @@
 #pragma once
-// Generator, shuffle and distributions of our own: std::shuffle and the std distributions differ
-// between standard libraries, and a schedule must be the same on every machine.
+// Own generator, shuffle and distributions: std::shuffle and the std distributions differ between
+// standard libraries, but a schedule must be the same on every machine.
 
 #include <array>
 #include <cstddef>

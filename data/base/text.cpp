@@ -128,7 +128,7 @@ bool is_plain(const Character& c) {
     return false;
   if (within(0x2028, 0x2029)) return false;                      // separators of lines
   if (c.code == 0xFEFF || within(0xFFF9, 0xFFFB)) return false;  // byte order mark, annotations
-  if (within(0xE0000, 0xE007F)) return false;                    // tags: text that nobody sees
+  if (within(0xE0000, 0xE007F)) return false;                    // tags: invisible text
   return (c.code & 0xFFFE) != 0xFFFE && !within(0xFDD0, 0xFDEF);
 }
 

@@ -23,25 +23,25 @@
 
 namespace palpate::data {
 
-// Internal to data/export: what stands beside the samples of a BIDS run that is written as motion
+// Internal to data/export: the files beside the samples of a BIDS run written as motion
 // (https://bids-specification.readthedocs.io, "Motion").
 
 /// Name of the tracking system in files: tracksys-stylus.
 inline constexpr const char* kTrackingSystem = "stylus";
 
-/// ..._channels.tsv: a row a column of the recording. Tip, tail and a stimulus that moves are
+/// ..._channels.tsv: one row per column of the recording. Tip, tail and a moving stimulus are
 /// tracked points; BIDS has no type for forces, so they are MISC with their units.
 std::string motion_channels(const std::vector<Column>& columns);
-/// ..._channels.json: the frame that the channels are in.
+/// ..._channels.json: the reference frame of the channels.
 nlohmann::ordered_json motion_frames();
-/// What BIDS asks of ..._motion.json besides the task. \param rows of the recording
+/// Required fields of ..._motion.json other than the task. \param rows of the recording
 nlohmann::ordered_json motion_facts(const std::vector<Column>& columns, double rate,
                                     std::int64_t rows, const RunInfo& run);
 
-/// The trials of a recording, and where they have several intervals those as well.
+/// The trials of a recording, and their intervals if they have several.
 class MotionEvents {
  public:
-  /// \param slot  of the trial's onset, servo periods from the begin of the run
+  /// \param slot  of the trial's onset, in servo periods from the start of the run
   void add(const StoredTrial& trial, std::int64_t slot);
   /// ..._events.tsv. \param first_row  slot of the recording's first row
   std::string table(std::int64_t first_row, double rate) const;
@@ -100,9 +100,9 @@ std::string unit_or_none(const Column& column) {
 const std::vector<Column>& event_columns() {
   static const std::vector<Column> all = {
       {"onset", "From the first row of the motion file of the same run", "s"},
-      {"duration", "Of a trial to the response, or the limit for a time-out", "s"},
+      {"duration", "To the response of a trial; in a time-out, the time limit", "s"},
       {"trial_type",
-       "What the row is",
+       "Kind of the row",
        "",
        {{"trial", "a trial, from forces on to its answer"},
         {"interval", "one of several intervals of a trial"}}},
@@ -110,10 +110,10 @@ const std::vector<Column>& event_columns() {
       {"interval", "Interval of the trial, from 1; missing for a trial as a whole", "1"},
       {"renderer", "How the stimulus was rendered", ""},
       {"shape", "The stimulus shown; missing: none", "", {}, Column::Names::stimuli},
-      {"level", "Level of an interval; missing: the stimulus as the protocol has it", "1"},
+      {"level", "Level of an interval; missing: the stimulus unchanged from the protocol", "1"},
       {"response", "The answer; missing: none", "", {}, Column::Names::answers},
       {"correct",
-       "Whether the answer is right; missing where none is right",
+       "Whether the answer is right; missing if no answer is right or wrong",
        "",
        {{"0", "no"}, {"1", "yes"}}},
       {"orientation_w", "Orientation of the stimulus, unit quaternion, w", "1"},
@@ -138,7 +138,7 @@ std::string motion_channels(const std::vector<Column>& columns) {
   std::string table = row.end();
   for (const Column& column : columns) {
     const Channel channel = channel_of(column.name);
-    // "" is how a row says n/a.
+    // A row writes "" as n/a.
     const auto put = [&row](const std::string& text) { row << (text == "n/a" ? "" : text); };
     row << column.name;
     put(channel.component);
@@ -202,7 +202,7 @@ void MotionEvents::add(const StoredTrial& trial, std::int64_t slot) {
   event.correct.reset();
   for (const IntervalRecord& interval : record.task->intervals) {
     ++event.interval;
-    if (interval.onset_ns == 0) continue;  // it was not reached
+    if (interval.onset_ns == 0) continue;  // never shown
     event.since = seconds(begin, interval.onset_ns);
     event.duration = interval.end_ns == 0 ? 0 : seconds(interval.onset_ns, interval.end_ns);
     event.renderer = interval.renderer;
@@ -240,7 +240,7 @@ nlohmann::ordered_json MotionEvents::description(const ProtocolFacts& facts) {
 // Internal to data/export: the servo samples of a BIDS run as one physiological recording
 // (https://bids-specification.readthedocs.io, "Physiological recordings"), or one of motion.
 
-/// A TSV without header, gzipped unless it is of motion (BIDS has it so), one row per servo period
+/// A TSV without header, gzipped except for motion (as BIDS requires), one row per servo period
 /// from the first sample to the last. BIDS requires a constant sampling frequency: periods between
 /// trials and missed ticks are rows of n/a. Time is relative to the onset of the first trial of the
 /// run.
@@ -255,18 +255,18 @@ class BidsRecording {
   /// \param path of the file, which is created with the first samples
   /// \throws StoreRefused: the samples are damaged.
   void add(const StoredTrial& trial, const std::string& path);
-  /// Closes the file. \return false where no trial had samples: there is none.
+  /// Closes the file. \return false: no trial had samples, so there is no file.
   bool finish();
   /// After finish(): the JSON beside a physiological recording.
   nlohmann::ordered_json physio_sidecar() const;
-  /// After finish(): of one of motion.
+  /// After finish(): the JSON beside a motion recording.
   nlohmann::ordered_json motion_sidecar() const;
-  /// Where each trial stands and what was felt; BIDS allows no such keys beside motion.
+  /// Rows and stimulus of each trial; BIDS allows no such keys beside motion.
   void put_trials(nlohmann::ordered_json& sidecar) const;
   const std::vector<Column>& columns() const { return columns_; }
-  /// Of one of motion: ..._events.tsv.
+  /// ..._events.tsv of a motion recording.
   std::string motion_events() const;
-  /// Of its first row, ns since 1970.
+  /// Time of the first row, ns since 1970.
   std::int64_t first_row_ns() const;
 
  private:
@@ -302,7 +302,8 @@ namespace {
 
 constexpr double kLongestGap = 60;  // s
 
-const Column kTrialOfSample{"trial", "Trial within the session, from 1, that the tick is of", "1"};
+const Column kTrialOfSample{"trial", "Trial within the session, from 1, to which the tick belongs",
+                            "1"};
 
 std::vector<Column> columns_of(const StudyLabel& study, bool contacts) {
   std::vector<Column> all{kTrialOfSample};
@@ -313,7 +314,7 @@ std::vector<Column> columns_of(const StudyLabel& study, bool contacts) {
   return all;
 }
 
-/// What was felt in each interval.
+/// The stimulus of each interval.
 nlohmann::ordered_json intervals_of(const TaskRecord& task) {
   nlohmann::ordered_json all = nlohmann::ordered_json::array();
   for (const IntervalRecord& interval : task.intervals) {
@@ -454,8 +455,8 @@ nlohmann::ordered_json BidsRecording::physio_sidecar() const {
 }
 
 nlohmann::ordered_json BidsRecording::motion_sidecar() const {
-  // BIDS has no other key that could say it.
-  const std::string label = simulated_ ? "SIMULATED participant, no person. " : "";
+  // BIDS has no other key for this.
+  const std::string label = simulated_ ? "SIMULATED participant, not a person. " : "";
   nlohmann::ordered_json json{{"TaskName", study_.protocol.name},
                               {"TaskDescription", label + study_.facts.title}};
   json.update(motion_facts(columns_, study_.facts.servo_rate, next_row_ - first_row_, run_));
@@ -464,14 +465,14 @@ nlohmann::ordered_json BidsRecording::motion_sidecar() const {
 
 void BidsRecording::put_trials(nlohmann::ordered_json& sidecar) const {
   sidecar["TrialsDescription"] =
-      "Where each trial stands (first_row counts from 0, onset in s) and what was felt: the object "
-      "of that name in Objects, turned by the quaternion about the origin of the world frame; "
-      "intervals, where a trial has "
-      "them: what was felt in each, null for nothing, or a level of its own";
+      "Rows of each trial (first_row counts from 0, onset in s) and its stimulus: the object "
+      "of that name in Objects, rotated by the quaternion about the origin of the world frame; "
+      "intervals, if a trial has "
+      "them: the stimulus of each, null for nothing, or its level";
   sidecar["Trials"] = trials_;
   sidecar["ObjectsDescription"] =
-      "The protocol's stimuli: position_m, where it is there, and orientation_wxyz place the "
-      "object before it is turned; lengths in m";
+      "The protocol's stimuli: position_m, if present, and orientation_wxyz place the "
+      "object before it is rotated; lengths in m";
   sidecar["Objects"] = objects_of(study_);
 }
 
@@ -495,11 +496,13 @@ std::span<const Column> beh_columns(const ExportClock& clock) {
   return trial_columns(clock.times(), clock.tasks(), clock.torque().any()).subspan(1);
 }
 
-const Column kOnset{"onset",
-                    "First tick with forces on (of several intervals: in the first one), from that "
-                    "of the first row",
-                    "s"};
-const Column kDuration{"duration", "From onset to the response, or the limit for a time-out", "s"};
+const Column kOnset{
+    "onset",
+    "First tick with forces on (with several intervals: in the first one), from that "
+    "of the first row",
+    "s"};
+const Column kDuration{"duration", "From onset to the response; in a time-out, the time limit",
+                       "s"};
 
 /// Levels of the columns whose values come from the runs: device, version, protocol, observer.
 Json recorded_levels(const std::string& column, const std::vector<RunInfo>& runs,
@@ -539,35 +542,35 @@ std::string readme_text(const std::map<std::string, StudyLabel>& labels, bool si
                         bool relative, const ExportSettings& settings) {
   const std::string samples =
       settings.motion
-          ? "Where a table's name has run-N, servo-rate samples were kept: motion/ beside beh/ "
-            "holds those of\nall its trials as a motion recording, one row a period of the servo; "
-            "channels.tsv names the columns,\nevents.tsv says when each trial was, and the table's "
-            "JSON file where it stands, which object was\nfelt, how it was turned and with which "
+          ? "If a table's name has run-N, servo-rate samples were kept: motion/ beside beh/ "
+            "holds those of\nall its trials as a motion recording, one row per servo period; "
+            "channels.tsv names the columns,\nevents.tsv gives the time of each trial, and the "
+            "table's "
+            "JSON file its rows, the object that was\nfelt, its orientation and the "
             "renderer. "
-          : "Where a table's name has run-N, servo-rate samples were kept: recording-haptic beside "
-            "it holds\nthose of all its trials, one row a period of the servo, and its JSON file "
-            "where each trial stands,\nwhich object was felt, how it was turned and with which "
+          : "If a table's name has run-N, servo-rate samples were kept: recording-haptic beside "
+            "it holds\nthose of all its trials, one row per servo period, and its JSON file "
+            "gives the rows of each trial,\nthe object that was felt, its orientation and the "
             "renderer. ";
   return dataset_name(labels, simulated) + "\n\n" + dataset_description(labels, simulated) +
          "\n\n" + about_text(settings.about) +
-         "sub-CODE/ses-S/beh/ holds the trials of session S of a participant, one row a trial, "
+         "sub-CODE/ses-S/beh/ holds the trials of session S of a participant, one row per trial, "
          "sorted by\nonset. Every column is described in the JSON file beside the table. The "
          "protocol that was run\nis in sourcedata/, byte for byte; protocol_sha256 is its "
          "checksum.\n\n" +
          samples +
          "A new run begins with every\nstart of the program and after more than a minute between "
-         "two trials. Periods between trials, and\nthose whose tick was missed, are rows of n/a. "
-         "Places are rounded to 1 nm, forces to 1 uN and\ntorques to 1 uN m.\n\n" +
-         (settings.derived
-              ? "derivatives/palpate/ holds measures that were derived from the "
-                "samples, one row a trial, with a\nJSON file that says what each is. " +
-                    settings.derived->how + "\n\n"
-              : "") +
+         "two trials. Periods between trials, and\nmissed ticks, are rows of n/a. "
+         "Positions are rounded to 1 nm, forces to 1 uN and\ntorques to 1 uN m.\n\n" +
+         (settings.derived ? "derivatives/palpate/ holds measures derived from the "
+                             "samples, one row per trial, with a\nJSON file that defines each. " +
+                                 settings.derived->how + "\n\n"
+                           : "") +
          (relative ? kRelativeSentence : "") + kGuardSentence +
          "\n"
-         "sourcedata/attempts.csv, where it is there, lists attempts that were cut off; their "
-         "trials were\nshown again. They are in no other table. sourcedata/pages.csv, where it is "
-         "there, "
+         "sourcedata/attempts.csv, if present, lists attempts that were cut off; their "
+         "trials were\nshown again. They are in no other table. sourcedata/pages.csv, if "
+         "present, "
          "has the\nparticipants' answers to pages: personal data.\n";
 }
 
@@ -592,7 +595,7 @@ class BidsWriter : public DatasetWriter {
   /// The session, or with samples the BIDS run, whose rows are being collected.
   struct Table {
     std::string stem;         // of its files, with folders
-    std::string motion, run;  // likewise of those of motion, before and after tracksys
+    std::string motion, run;  // of the motion files, before and after tracksys
     const StudyLabel* study = nullptr;
     Participant person;
     std::vector<Row> rows;
@@ -706,7 +709,7 @@ std::string BidsWriter::recording_name() const {
   return table_.motion + "_tracksys-" + kTrackingSystem + table_.run + "_motion.tsv";
 }
 
-/// What describes it.
+/// Writes the recording and its descriptions.
 void BidsWriter::write_recording() {
   if (!settings_.motion) {
     write(table_.stem + "_recording-haptic_physio.json", json_text(recording_->physio_sidecar()));
@@ -783,15 +786,15 @@ void BidsWriter::describe_participants() {
   const Json json{
       {"participant_id", {{"Description", "Pseudonym of the participant"}}},
       {"simulated",
-       {{"Description", "Who took part"},
+       {{"Description", "Person or simulated participant"},
         {"Levels",
          {{"0", "a person"},
-          {"1", "a SIMULATED participant: no person"},
+          {"1", "a SIMULATED participant, not a person"},
           {"mixed", "simulated with one protocol, a person with another: see the beh.tsv"}}}}}};
   write("participants.json", json_text(json));
 }
 
-/// A dataset of its own, as BIDS has derivatives.
+/// In BIDS, derivatives are a separate dataset.
 void BidsWriter::describe_derivatives(bool simulated) {
   if (!settings_.derived) return;
   const Json json{

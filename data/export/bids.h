@@ -19,11 +19,11 @@ namespace palpate::data {
 /// T is the protocol's name without '-'. Rows are sorted by onset (s, from the session's first
 /// trial); their other columns are those of trials.csv but for participant_id.
 ///
-/// Where servo samples are stored, the session is split into BIDS runs: a new one with every start
-/// of the program and after more than a minute without a trial. Each has a table,
-/// ..._run-1_beh.tsv, and one recording, ..._run-1_recording-haptic_physio.tsv.gz, with one row a
-/// servo period (bids.h); its sidecar has the trials' places, poses and renderers and the
-/// objects. Memory holds the samples of one trial at a time.
+/// If servo samples are stored, the session is split into BIDS runs: a new one with every start of
+/// the program and after more than a minute without a trial. Each has a table, ..._run-1_beh.tsv,
+/// and one recording, ..._run-1_recording-haptic_physio.tsv.gz, with one row per servo period; its
+/// sidecar has the rows, poses and renderers of the trials, and the objects. Memory holds the
+/// samples of one trial at a time.
 ///
 /// Experimenter's notes are not exported. The folder appears complete or not at all.
 /// \throws StoreRefused: `path` exists (see require_replaceable), there are no trials, a text

@@ -18,14 +18,14 @@ class ExportClock {
   ExportClock(Store& store, Times times);
   ExportClock() : times_(Times::absolute) {}
 
-  /// Whether rows of trials have the columns of tasks: the store has a study of version 2.
+  /// Whether rows of trials have the columns of tasks: the database has a study of version 2.
   bool tasks() const { return tasks_; }
-  /// Rows of trials have the column torque_driven where any run left torque out.
+  /// Rows of trials have the column torque_driven if any run left torque out.
   const TorqueNotes& torque() const { return torque_; }
 
   Times times() const { return times_; }
   bool relative() const { return times_ == Times::relative; }
-  /// ISO 8601 of the onset of a trial, or of the begin of an attempt that was cut off.
+  /// ISO 8601 of the onset of a trial, or of the start of an attempt that was cut off.
   std::string onset_utc(const StoredTrial& trial) const;
   /// s from the participant's first trial to the same moment.
   double elapsed(const StoredTrial& trial) const;

@@ -14,7 +14,7 @@
 
 namespace palpate::data {
 
-// Internal to data/export: the table of attempts that were cut off, the same in every format.
+// Internal to data/export: the table of attempts that were cut off, common to all formats.
 
 /// RFC 4180 with a header. \return rows
 std::int64_t write_attempts(Store& store, TextSink& out, const ExportClock& clock,

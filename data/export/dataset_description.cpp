@@ -105,7 +105,7 @@ void write_protocol_files(Store& store, const StudyLabel& study, const std::stri
 }
 
 std::map<std::string, StudyLabel> label_protocols(Store& store, const ExportSettings& settings) {
-  constexpr std::size_t kLongest = 64;  // of a name: file systems end at 255 bytes
+  constexpr std::size_t kLongest = 64;  // of a name: file systems allow 255 bytes
   std::map<std::string, StudyLabel> labels;
   std::map<std::string, int> uses;
   for (const ProtocolInfo& protocol : store.protocols()) {
@@ -168,7 +168,7 @@ void add_stimuli(nlohmann::ordered_json& levels, const ProtocolFacts& facts) {
     levels[guarded_text(stimulus.name)] = "stimulus of the protocol";
 }
 
-/// None where numbers are answered, too.
+/// Adds no codes if some answers are numbers.
 void add_answers(nlohmann::ordered_json& levels, const ProtocolFacts& facts) {
   std::set<std::string> tasks;
   for (const BlockFacts& block : facts.blocks) tasks.insert(block.task);

@@ -29,8 +29,8 @@ struct StudyLabel {
   std::map<std::string, std::string> files = {};  ///< named in the protocol -> name in the dataset
 };
 
-/// SHA-256 -> label, of all protocols of the database. Labels are the names without other
-/// characters than letters and digits; equal ones get their checksum appended.
+/// SHA-256 -> label, for all protocols of the database. A label is the letters and digits of the
+/// name; equal labels get the checksum appended.
 std::map<std::string, StudyLabel> label_protocols(Store& store, const ExportSettings& settings);
 
 /// Writes the files that a protocol names to `folder`/LABEL/ in the dataset.
@@ -49,12 +49,12 @@ std::string dataset_description(const std::map<std::string, StudyLabel>& labels,
 /// In every description of data with simulated participants.
 inline constexpr const char* kSimulatedSentence =
     "The participants marked simulated = 1 are SIMULATED: a mechanistic model of a hand and an "
-    "observer, no people.";
+    "observer, not people.";
 
-/// Value -> meaning, including the names of stimuli as they are in the table; null: the values are
-/// no codes.
+/// Value -> meaning, including the names of stimuli as written in the table; null: the values are
+/// not codes.
 nlohmann::ordered_json column_levels(const Column& column, const ProtocolFacts& facts);
-/// As the protocols say where theirs is the only one.
+/// The unit from the protocols, if all name the same one.
 std::string unit_of(const Column& column, const ProtocolFacts& facts);
 /// Fault bit -> meaning for the columns of fault bits; null for others.
 nlohmann::ordered_json column_bits(const Column& column,
@@ -64,20 +64,21 @@ nlohmann::ordered_json describe_column(const Column& column, const ProtocolFacts
                                        const std::vector<FaultMeaning>& fault_bits);
 /// The stimuli of all protocols together.
 ProtocolFacts all_facts(const std::map<std::string, StudyLabel>& labels);
-/// A text as it is in a table: with a guard against formulas where it needs one.
+/// A text as written in a table, with a guard against formulas if needed.
 std::string guarded_text(std::string_view text);
 
 /// Explains relative times.
 inline constexpr const char* kRelativeSentence =
     "Dates are shifted: the first trial of every participant is at 1900-01-01T00:00:00Z, and "
     "elapsed "
-    "counts\nthe seconds from it. Intervals are true. palpate export --times absolute tells the "
+    "counts\nthe seconds from it. Intervals are true. palpate export --times absolute gives the "
     "true dates.\n\n";
 
 /// Explains how to read guarded texts.
 inline constexpr const char* kGuardSentence =
     "A text that begins with = + - @, a tab or a line break has a ' in front, so that no "
-    "spreadsheet runs it;\nso has one that begins with '= and the like. Take the ' away to get the "
+    "spreadsheet runs it;\nso has a text that begins with ' and one of these. Remove the first ' "
+    "to restore the "
     "text; palpate analyze --csv does.\n";
 
 /// JSON as the text of a file. Invalid UTF-8 is replaced.
@@ -90,11 +91,11 @@ std::string json_text(const nlohmann::ordered_json& json);
 void write_codebook(TextSink& out, const ProtocolFacts& facts, const ExportSettings& settings,
                     std::span<const Column> trials);
 
-// Internal to data/export: the part that BIDS and Psych-DS have in common: a folder of tables that
-// appears complete or not at all, and that the database records.
+// Internal to data/export: the common part of BIDS and Psych-DS: a folder of tables that appears
+// complete or not at all and is recorded in the database.
 
-/// Writes the files of one dataset. A format derives from it and decides which files there are; it
-/// has a static has_file(name) as well: whether its exports contain such a file.
+/// Writes the files of one dataset. Each format derives from it and chooses its files; it also has
+/// a static has_file(name): whether its exports contain such a file.
 class DatasetWriter {
  public:
   DatasetWriter(Store& store, const std::string& path, const ExportSettings& settings,
@@ -115,7 +116,7 @@ class DatasetWriter {
   virtual std::string begin_attempts() = 0;
   /// \return the name of the table of answers to pages
   virtual std::string begin_pages() = 0;
-  /// Writes what describes the tables, after all of them. \param simulated participants are in it
+  /// Writes the descriptions, after all tables. \param simulated the dataset has such participants
   virtual void describe_dataset(bool simulated) = 0;
   std::int64_t samples() const { return samples_; }  ///< written so far
 

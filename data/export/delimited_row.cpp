@@ -16,10 +16,10 @@ const Column kParticipant{"participant_id", "Pseudonym of the participant"};
 const Column kSession{"session", "Session of the participant, from 1", "1"};
 const Column kBlock{"block", "Block, from 1 through all sessions of the participant", "1"};
 const Column kTrial{"trial", "Trial within the session, from 1", "1"};
-const Column kAttempt{
-    "attempt", "How often the trial had to be begun: 1, or more where attempts were cut off", "1"};
+const Column kAttempt{"attempt", "Number of the attempt: above 1 if earlier attempts were cut off",
+                      "1"};
 const Column kRenderer{"renderer",
-                       "How the stylus was felt",
+                       "Rendering of the stylus",
                        "",
                        {{"point", "only its tip"}, {"ray", "tip and side, as force and torque"}}};
 const Column kShape{"shape", "Name of the stimulus that was shown", "", {}, Column::Names::stimuli};
@@ -29,10 +29,11 @@ const Column kPractice{
     "",
     {{"0", "a trial that counts"}, {"1", "practice or warm-up, not to be analysed"}}};
 const Column kDevice{"device", "Force-feedback device"};
-const Column kSimulated{"simulated",
-                        "Who took part",
-                        "",
-                        {{"0", "a person"}, {"1", "SIMULATED: no person, or no real device"}}};
+const Column kSimulated{
+    "simulated",
+    "Person or simulated participant",
+    "",
+    {{"0", "a person"}, {"1", "SIMULATED: not a person, or not a real device"}}};
 const Column kProtocol{"protocol_sha256", "SHA-256 of the protocol's text"};
 const Column kVersion{"program_version", "Version of palpate that recorded the trial"};
 const Column kNumber{"participant_number",
@@ -53,7 +54,7 @@ std::vector<Column> make_trials() {
       kRenderer,
       kShape,
       {"response",
-       "Name of the stimulus that was answered; missing where there was no answer",
+       "Name of the stimulus given as the answer; missing: no answer",
        "",
        {},
        Column::Names::stimuli},
@@ -62,7 +63,7 @@ std::vector<Column> make_trials() {
        "",
        {{"0", "wrong, or no answer in time"}, {"1", "correct"}}},
       {"response_time",
-       "From the first tick with forces on to the response; the limit for a time-out. The latency "
+       "From the first tick with forces on to the response; in a time-out, the limit. The latency "
        "of the response device is not subtracted",
        "s"},
       kOrientation[0],
@@ -75,8 +76,7 @@ std::vector<Column> make_trials() {
        "",
        {{"0", "answered"}, {"1", "no answer in time"}}},
       {"first_contact_time",
-       "From the first tick with forces on to the first contact; missing where there was none",
-       "s"},
+       "From the first tick with forces on to the first contact; missing: no contact", "s"},
       {"onset_utc", "First tick with forces on, ISO 8601, UTC", "ISO 8601"},
       kDevice,
       kSimulated,
@@ -88,7 +88,7 @@ std::vector<Column> make_trials() {
       {"started_inside",
        "Whether the stylus was inside an object when forces went on",
        "",
-       {{"0", "outside"}, {"1", "inside: that object gave no force until it was left"}}},
+       {{"0", "outside"}, {"1", "inside: that object gave no force until the stylus had left it"}}},
       {"ticks", "Servo ticks of the trial", "1"},
       {"longest_period", "Longest time between two servo ticks", "s"},
       {"faults", "Fault bits of all ticks, or-ed; 0 for none", "1"},
@@ -100,7 +100,7 @@ std::vector<Column> make_trials() {
        "",
        {{"0", "after it, or no answer"}, {"1", "before it: nothing had been felt"}}},
       {"response_device",
-       "What the participant answered with; missing where it is not known",
+       "Device of the response; missing: not known",
        "",
        {{"keyboard", "keys, also of a numeric pad"},
         {"device buttons", "buttons of the force-feedback device"},
@@ -112,60 +112,61 @@ std::vector<Column> make_trials() {
   return columns;
 }
 
-/// With what trials of version 2 of protocols have besides.
+/// Adds the columns of trials of protocol version 2.
 std::vector<Column> with_tasks(std::vector<Column> columns) {
   for (Column& column : columns) {
     const std::string_view name = column.name;
     if (name == "shape") {
       column.description =
-          "Name of the stimulus that was shown; compare, adjust: of what was "
-          "compared with the standard or adjusted to it; detect: of what was to "
-          "be detected, also in catch trials";
+          "Name of the stimulus that was shown; compare, adjust: the stimulus "
+          "compared with or adjusted to the standard; detect: the stimulus to "
+          "detect, also in catch trials";
     } else if (name == "response") {
       column.description =
           "Answer: identify: a stimulus; compare: the interval, or same or different; detect: yes "
-          "or no; rate: a number; adjust: the level left; missing where there was none";
+          "or no; rate: a number; adjust: the level that was set; missing: no answer";
       column.names = Column::Names::answers;
     } else if (name == "correct") {
       column.description =
-          "Whether the answer was right; rate and adjust: missing, no answer is right or wrong";
+          "Whether the answer was right; missing for rate and adjust, as no answer is right or "
+          "wrong";
     }
   }
   const std::vector<Column> more = {
       {"task",
-       "What was asked; missing: a study of version 1, which identifies",
+       "Task; missing: a study of version 1, in which shapes are identified",
        "",
-       {{"identify", "which stimulus it was"},
-        {"compare", "which interval held the comparison, or whether they were the same"},
-        {"detect", "whether there was anything"},
-        {"rate", "a number for it"},
-        {"adjust", "a level that equals the standard"}}},
+       {{"identify", "which stimulus was it?"},
+        {"compare", "which interval held the comparison, or were they the same?"},
+        {"detect", "was there a stimulus?"},
+        {"rate", "a number for the magnitude"},
+        {"adjust", "set a level that equals the standard"}}},
       {"block_name", "Name of the block in the protocol", "", {}, Column::Names::blocks},
       {"track", "Stimulus, renderer and procedure within the block, from 1", "1"},
       {"level",
-       "The varied number of the stimulus; adjust: where it started; missing in catch trials and "
-       "where nothing is varied",
+       "The varied number of the stimulus; adjust: its start value; missing in catch trials and "
+       "if nothing is varied",
        Column::kLevelUnit},
       {"standard_level", "The same number of the standard", Column::kLevelUnit},
       {"catch_trial",
-       "Whether there was nothing to find",
+       "Catch trial",
        "",
        {{"0", "no"}, {"1", "yes: nothing to detect, or no difference"}}},
       {"success",
-       "What procedures count",
+       "Outcome that procedures count",
        "",
-       {{"0", "not, or no answer"},
+       {{"0", "another answer, or none"},
         {"1", "the comparison was chosen; different; yes; the right stimulus"}}},
-      {"number", "rate: the number answered; adjust: the level left"},
-      {"confidence", "How sure the participant was, a number of the protocol's scale"},
+      {"number", "rate: the number answered; adjust: the level that was set"},
+      {"confidence", "Confidence of the participant, a number on the protocol's scale"},
       {"confidence_delay", "From the response to the answer about confidence", "s"},
       {"comparison_interval", "compare: which interval held the comparison, from 1", "1"},
       {"interval_onsets",
        "First tick with forces on of each interval felt, from that of the first, s, separated by "
-       "semicolons; onset_utc, response_time and contact are those of the last one, adjust: "
-       "onset_utc and response_time of the first"},
-      {"interval_ends", "When its forces went off, likewise"},
-      {"interval_levels", "Level of each interval felt; empty: the stimulus as it is, or nothing"},
+       "semicolons; onset_utc, response_time and contact are those of the last interval (adjust: "
+       "onset_utc and response_time of the first)"},
+      {"interval_ends", "When the forces of each interval went off, in the same form"},
+      {"interval_levels", "Level of each interval felt; empty: the stimulus unchanged, or nothing"},
   };
   columns.insert(columns.end(), more.begin(), more.end());
   return columns;
@@ -174,9 +175,9 @@ std::vector<Column> with_tasks(std::vector<Column> columns) {
 std::vector<Column> with_torque(std::vector<Column> columns) {
   columns.push_back(
       {"torque_driven",
-       "Whether the device drove the torque of the renderer; missing where the renderer gives none",
+       "Whether the device drove the torque of the renderer; missing: the renderer gives no torque",
        "",
-       {{"0", "it drives force alone: the force was felt at the grip, without torque"},
+       {{"0", "the device drives force alone: the force was felt at the grip, without torque"},
         {"1", "driven, as the renderer gave it"}}});
   return columns;
 }
@@ -224,7 +225,7 @@ std::vector<Column> make_samples() {
       {"device2_x", "Force commanded to the device at the tail, after the limits, x", "N"},
       {"device2_y", "Force commanded to the device at the tail, after the limits, y", "N"},
       {"device2_z", "Force commanded to the device at the tail, after the limits, z", "N"},
-      {"depth", "Depth of the deepest contact, 0 in free space", "m"},
+      {"depth", "Penetration depth of the deepest contact, 0 in free space", "m"},
       {"contacts", "Contacts of the stylus", "1"},
       {"contact_type",
        "Type of the deepest contact",
@@ -232,13 +233,13 @@ std::vector<Column> make_samples() {
        {{"0", "none"}, {"1", "point-polygon"}, {"2", "segment-edge"}, {"3", "segment-face"}}},
       {"buttons", "Buttons of the device, one bit each", "1"},
       {"faults", "Fault bits of the tick; 0 for none", "1"},
-      {"period", "Time since the tick before; 0 where it is not known", "s"},
-      {"lateness", "Begin of the tick behind the time at which it was due", "s"},
-      {"compute", "From the device's reading to the command for it", "s"},
+      {"period", "Time since the previous tick; 0: not known", "s"},
+      {"lateness", "Delay of the tick's start after its due time", "s"},
+      {"compute", "From reading the device to commanding it", "s"},
   };
 }
 
-/// By the names of `palpate render --bodies`.
+/// Names as in `palpate render --bodies`.
 std::vector<Column> make_bodies() {
   return {
       {"body_x", "Centre of mass of the stimulus after the tick, world frame, x", "m"},
@@ -257,22 +258,22 @@ std::vector<Column> make_bodies() {
   };
 }
 
-/// By the names of `palpate render`.
+/// Names as in `palpate render`.
 std::vector<Column> make_contacts() {
   return {
-      {"contact_x", "Place of the deepest contact, by rendering the trial again, world frame, x",
+      {"contact_x", "Position of the deepest contact, by rendering the trial again, world frame, x",
        "m"},
-      {"contact_y", "Place of the deepest contact, by rendering the trial again, world frame, y",
+      {"contact_y", "Position of the deepest contact, by rendering the trial again, world frame, y",
        "m"},
-      {"contact_z", "Place of the deepest contact, by rendering the trial again, world frame, z",
+      {"contact_z", "Position of the deepest contact, by rendering the trial again, world frame, z",
        "m"},
-      {"normal_x", "Direction of the surface there, out of the object, world frame, x", "1"},
-      {"normal_y", "Direction of the surface there, out of the object, world frame, y", "1"},
-      {"normal_z", "Direction of the surface there, out of the object, world frame, z", "1"},
+      {"normal_x", "Normal of the surface there, out of the object, world frame, x", "1"},
+      {"normal_y", "Normal of the surface there, out of the object, world frame, y", "1"},
+      {"normal_z", "Normal of the surface there, out of the object, world frame, z", "1"},
   };
 }
 
-/// With shifted dates, and the seconds between them in the column elapsed.
+/// With shifted dates, and the column elapsed.
 std::vector<Column> made_relative(std::vector<Column> columns) {
   for (Column& column : columns) {
     const std::string_view name = column.name;
@@ -286,8 +287,7 @@ std::vector<Column> made_relative(std::vector<Column> columns) {
           "1900-01-01T00:00:00Z; intervals are true";
     }
   }
-  columns.push_back(
-      {"elapsed", "The moment of the row's date, from the participant's first trial", "s"});
+  columns.push_back({"elapsed", "Time of the row, from the participant's first trial", "s"});
   return columns;
 }
 
@@ -308,8 +308,8 @@ std::span<const Column> attempt_columns(Times times) {
 }
 
 const Column& interval_column() {
-  static const Column interval{"interval", "Interval of the trial that the tick is of, from 1",
-                               "1"};
+  static const Column interval{"interval",
+                               "Interval of the trial, from 1, to which the tick belongs", "1"};
   return interval;
 }
 
@@ -495,17 +495,17 @@ std::span<const Column> page_columns() {
       {"protocol", "Name of the protocol"},
       {"session", "Session of the participant, from 1", "1"},
       {"page", "Name of the page"},
-      {"item", "Name of the question; 'consent' of a consent"},
+      {"item", "Name of the question; 'consent' for a consent"},
       {"answer",
-       "As it was typed, or the choice in the protocol's own language; missing where it was left "
-       "out. Of a consent: agree"},
-      {"consent_version", "Of a consent's text, as the protocol calls it"},
+       "As typed, or the choice in the protocol's own language; missing: left "
+       "out. For a consent: agree"},
+      {"consent_version", "Version of a consent's text, as in the protocol"},
       {"text_sha256", "SHA-256 of the text or question that was shown"},
-      {"answered_utc", "When it was answered, ISO 8601, UTC", "ISO 8601"},
+      {"answered_utc", "Time of the answer, ISO 8601, UTC", "ISO 8601"},
       {"simulated",
        "Who answered",
        "",
-       {{"0", "a person"}, {"1", "SIMULATED: drawn by chance, or at no real device"}}},
+       {{"0", "a person"}, {"1", "SIMULATED: drawn at random, or not at a real device"}}},
   };
   return all;
 }

@@ -1,5 +1,5 @@
 #pragma once
-// Internal to data/export: rows of CSV and TSV files, and the tables that are made of them.
+// Internal to data/export: rows of CSV and TSV files, and tables made of them.
 
 #include <array>
 #include <charconv>
@@ -31,23 +31,23 @@ struct Column {
   const char* name;
   const char* description;
   const char* unit = "";  ///< "1": a pure number; "": a text or a code
-  /// Code -> meaning; empty where the values are no codes.
+  /// Code -> meaning; empty: the values are not codes.
   std::vector<std::pair<const char*, const char*>> levels = {};
-  /// What else the values are: names that the protocol gives, or answers to its tasks.
+  /// Other values: names from the protocol, or answers to its tasks.
   enum class Names { none, stimuli, blocks, answers } names = Names::none;
 };
 
-/// Of trials.csv, in order. \param tasks  a protocol of version 2 is among the studies: with the
-/// columns of its tasks. \param torque  torque was left out in a run: with torque_driven. Relative
-/// times add the column elapsed.
+/// Columns of trials.csv, in order. \param tasks adds the columns of tasks, for a protocol of
+/// version 2. \param torque adds torque_driven, for a run with torque left out. Relative times add
+/// the column elapsed.
 std::span<const Column> trial_columns(Times times, bool tasks = false, bool torque = false);
 std::span<const Column> attempt_columns(Times times);  ///< of attempts.csv, likewise
 std::span<const Column> sample_columns();              ///< of a servo tick, in order
-/// After them where a stimulus of the protocol moves: where it was after the tick.
+/// After them, if a stimulus of the protocol moves: its state after the tick.
 std::span<const Column> body_columns();
-/// After those where contacts are asked for.
+/// After those, if contacts are requested.
 std::span<const Column> contact_columns();
-/// Before them where a protocol of version 2 is among the studies.
+/// Before them, if the database has a protocol of version 2.
 const Column& interval_column();
 
 enum class DelimitedFormat {
@@ -72,7 +72,7 @@ class DelimitedRow {
     const auto end = std::to_chars(text.data(), text.data() + text.size(), value);
     return raw({text.data(), static_cast<std::size_t>(end.ptr - text.data())});
   }
-  /// With at most so many decimals, without trailing zeros.
+  /// With at most `decimals` decimals, without trailing zeros.
   DelimitedRow& rounded(double value, int decimals);
   template <class T>
   DelimitedRow& operator<<(const std::optional<T>& value) {
@@ -94,7 +94,7 @@ class DelimitedRow {
 // Internal to data/export: the values of the columns that delimited_row.h defines, in the same
 // order.
 
-/// From task on.
+/// The columns from `task` on.
 struct TaskValues {
   explicit TaskValues(const TrialRecord& record);
   std::string task, block_name;
@@ -150,12 +150,12 @@ void put_attempt(DelimitedRow& row, const StoredTrial& attempt, const ExportCloc
 /// sample_columns(): positions rounded to 1 nm, forces to 1 uN and torques to 1 uN m, a thousandth
 /// of the resolution of any device; the database has all digits.
 void put_sample(DelimitedRow& row, const SampleRecord& sample);
-/// contact_columns(), places rounded to 1 nm; missing in free space.
+/// contact_columns(), positions rounded to 1 nm; missing in free space.
 void put_contact(DelimitedRow& row, const std::optional<TickContact>& contact);
 /// Whether a stimulus of the protocol moves: samples then have body_columns() as well.
 bool has_bodies(const ProtocolFacts& facts);
-/// body_columns(), rounded to 1e-9 of their unit; missing where nothing moved.
-/// \param sample  of the record's own
+/// body_columns(), rounded to 1e-9 of their unit; missing if the stimulus is at rest.
+/// \param sample  an element of record.samples
 void put_body(DelimitedRow& row, const TrialRecord& record, const SampleRecord& sample);
 
 // Internal to data/export: answers to pages as a table. Personal data: written only when asked for.

@@ -32,14 +32,15 @@ const std::vector<Column>& DerivedTable::trial_names() {
       {"session", "Session, from 1", "1"},
       {"block", "Block within the session, from 1", "1"},
       {"trial", "Trial within the session, from 1", "1"},
-      {"renderer", "How the shape was rendered"},
+      {"renderer", "Renderer of the shape"},
       {"shape", "The stimulus shown", "", {}, Column::Names::stimuli},
   };
   return all;
 }
 
 const Column& DerivedTable::missing() {
-  static const Column why{"missing", "Why the trial has no numbers; missing itself where it has"};
+  static const Column why{"missing",
+                          "Reason why the trial has no numbers; missing itself if it has them"};
   return why;
 }
 

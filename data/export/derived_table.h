@@ -1,5 +1,5 @@
 #pragma once
-// Internal to data/export: a table of numbers that were derived from the samples of trials.
+// Internal to data/export: a table of numbers derived from the samples of trials.
 
 #include <optional>
 #include <string>
@@ -13,14 +13,16 @@
 
 namespace palpate::data {
 
-/// One row for each trial without practice: which one it is, the numbers, and why there are none.
+/// One row for each trial except practice: its identity, the numbers, and the reason if they are
+/// missing.
 class DerivedTable {
  public:
   DerivedTable(const std::string& path, DelimitedFormat format, const DerivedMeasures& measures);
   void add(const StoredTrial& trial);
   void close() { file_.close(false); }
 
-  /// Columns that say which trial it is, before the numbers; and after them, why there are none.
+  /// Columns that identify the trial, before the numbers; and after them, the reason if they are
+  /// missing.
   static const std::vector<Column>& trial_names();
   static const Column& missing();
 
@@ -30,7 +32,7 @@ class DerivedTable {
   DelimitedRow row_;
 };
 
-/// What a sidecar says of each column.
+/// The description of each column in a sidecar.
 nlohmann::ordered_json describe_derived(const DerivedMeasures& measures,
                                         const ProtocolFacts& facts);
 

@@ -42,26 +42,26 @@ Json describe_variable(const Column& column, const ProtocolFacts& facts,
 std::string dataset_readme(const std::string& name, const std::string& description, bool relative,
                            const ExportSettings& settings) {
   const std::string derived =
-      settings.derived
-          ? "`..._description-movement_data.csv` holds measures that were derived from the "
-            "samples, one row a trial.\n" +
-                settings.derived->how + "\n"
-          : "";
+      settings.derived ? "`..._description-movement_data.csv` holds measures derived from the "
+                         "samples, one row per trial.\n" +
+                             settings.derived->how + "\n"
+                       : "";
   return "# " + name + "\n\n" + description + "\n\n" + about_text(settings.about) +
          "`data/subject-CODE/study-T_subject-CODE_data.csv` holds all trials of a participant, "
-         "one row a trial.\n"
-         "`..._session-S_description-haptic_data.csv`, where it is there, holds the servo-rate "
-         "samples of session S,\none row a tick; `time` counts from the first tick with forces on "
-         "of its trial, which is the `onset_utc` of\nthat trial, or of several intervals from that "
+         "one row per trial.\n"
+         "`..._session-S_description-haptic_data.csv`, if present, holds the servo-rate "
+         "samples of session S,\none row per tick; `time` counts from the first tick with forces "
+         "on "
+         "of its trial, which is the `onset_utc` of\nthat trial (with several intervals, from that "
          "of the "
-         "first one. What was felt, how it was turned and with\nwhich renderer stands in the "
+         "first one). The stimulus, its orientation and\nthe renderer are in the "
          "trial's "
-         "row. Places are rounded to 1 nm, forces to "
+         "row. Positions are rounded to 1 nm, forces to "
          "1 uN and torques to 1 uN m.\n" +
          derived +
-         "`data/study-T_description-attempts_data.csv`, where it is there, lists attempts that "
+         "`data/study-T_description-attempts_data.csv`, if present, lists attempts that "
          "were cut off; their\ntrials were shown again.\n"
-         "`data/study-T_description-pages_data.csv`, where it is there, has the participants' "
+         "`data/study-T_description-pages_data.csv`, if present, has the participants' "
          "answers "
          "to pages:\npersonal data.\n"
          "Every column is described in `dataset_description.json`; an empty field is a missing "
@@ -80,7 +80,7 @@ class PsychDsWriter : public DatasetWriter {
   void add(const StoredTrial& trial) override;
   void end_table() override;
   void describe_dataset(bool simulated) override;
-  /// One table for all participants and protocols: its columns name them.
+  /// One table for all participants and protocols, which are columns of it.
   std::string begin_attempts() override {
     use(attempt_columns(settings_.times));
     return "data/study-" + labels_.begin()->second.label + "_description-attempts_data.csv";

@@ -22,12 +22,12 @@ double duration_of(const TrialRecord& record) {
   return record.response_time + seconds_between(first_onset_ns(record), record.onset_ns);
 }
 
-/// -1: there is no interval left
+/// -1: no interval is left
 std::int64_t SampleSlots::begin_of_next_interval() {
   if (!trial_.record.task) return -1;
   const std::vector<IntervalRecord>& all = trial_.record.task->intervals;
   for (std::size_t i = static_cast<std::size_t>(interval_) + 1; i < all.size(); ++i) {
-    if (all[i].onset_ns == 0) continue;  // it was not reached
+    if (all[i].onset_ns == 0) continue;  // never shown
     interval_ = static_cast<int>(i);
     const double since = seconds_between(first_onset_ns(trial_.record), all[i].onset_ns);
     return static_cast<std::int64_t>(std::round(std::clamp(since, 0.0, kLongestTrial) * rate_));
@@ -41,8 +41,8 @@ std::int64_t SampleSlots::next() {
   if (index_++ == 0) return slot_ = sample.tick;
   const SampleRecord& before = samples[index_ - 2];
   if (sample.tick <= before.tick) {
-    // One that begins at the very time at which the one before has ended (an adjustment goes on)
-    // comes in the next slot; each of them may have put off the others by one.
+    // An interval that begins when the previous one ends (an adjustment continues) takes the next
+    // slot; each of these may have delayed the later ones by one slot.
     const std::int64_t begin = begin_of_next_interval();
     if (begin >= 0 && begin + interval_ > slot_)
       return slot_ = std::max(begin + sample.tick, slot_ + 1);

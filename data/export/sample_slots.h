@@ -22,7 +22,7 @@ class SampleSlots {
   /// \throws StoreRefused: ticks do not increase, or have an impossible gap: the samples are
   /// damaged.
   std::int64_t next();
-  /// Of the sample whose slot was asked for last, from 1.
+  /// The interval of the sample that next() returned last, from 1.
   int interval() const { return interval_ + 1; }
 
  private:

@@ -26,7 +26,7 @@ struct BlockFacts {
   std::string level_unit;
 };
 
-/// What an export needs of a protocol beyond its text; the caller parses it, data/ cannot.
+/// Facts from a protocol that an export needs; the caller parses them, because data/ cannot.
 struct ProtocolFacts {
   std::string title = {};    ///< "" for none
   double servo_rate = 1000;  ///< Hz
@@ -54,11 +54,11 @@ struct DerivedColumn {
   std::string unit;  ///< "1": a pure number
 };
 
-/// Numbers that were derived from the samples of each trial, for tables of their own.
+/// Numbers derived from the samples of each trial, for separate tables.
 struct DerivedMeasures {
   struct Values {
-    std::vector<std::optional<double>> numbers;  ///< of the columns; empty: none of them
-    std::string missing;                         ///< why there are none
+    std::vector<std::optional<double>> numbers;  ///< one per column; empty: all missing
+    std::string missing;                         ///< reason why all are missing
   };
   std::string name;  ///< of the tables, "movement"
   std::string how;   ///< a sentence on the settings
@@ -69,7 +69,7 @@ struct DerivedMeasures {
 enum class Times {
   absolute,  ///< on the calendar
   /// Seconds from the participant's first trial; dates are shifted so that this trial is at the
-  /// beginning of 1900 (BIDS: shifted dates are before 1925, to be told from real ones).
+  /// beginning of 1900 (BIDS: years before 1925 mark shifted dates).
   relative,
 };
 
@@ -83,14 +83,14 @@ struct ExportSettings {
   bool pages = false;  ///< with the answers to pages, which are personal data
   /// BIDS: samples as a motion recording in place of a physiological one.
   bool motion = false;
-  /// Contacts of each sample of a trial; samples have their columns then. May return none at all
-  /// for a trial: they are missing.
+  /// Contacts of each sample of a trial, for the columns of contacts. An empty result: they are
+  /// missing in this trial.
   std::function<std::vector<std::optional<TickContact>>(const StoredTrial&)> contacts = {};
   std::optional<DerivedMeasures> derived = {};  ///< BIDS and Psych-DS: tables of them as well
   /// Parses the text of a protocol; called by exports with descriptions only. May throw.
   std::function<ProtocolFacts(const ProtocolInfo&)> facts = {};
-  /// Called every so many trials with their number; may throw to stop the export, which then leaves
-  /// no file.
+  /// Called regularly with the number of trials so far; may throw to stop the export, which then
+  /// leaves no file.
   std::function<void(std::int64_t)> progress = {};
   /// Path that the database records, where the export will be moved to; "": that of the export.
   std::string recorded_as = {};

@@ -1,5 +1,5 @@
 #pragma once
-// Who made a study and under which terms others may use it: neither protocol nor database knows.
+// Authors and terms of use of a study, which neither protocol nor database holds.
 
 #include <nlohmann/json.hpp>
 #include <string>
@@ -18,7 +18,7 @@ struct StudyFunding {
   std::string grant = {};  ///< its number; "" for none
 };
 
-/// What the file of `--about` says (protocols/study.schema.json). Empty: not said.
+/// The content of the file of `--about` (protocols/study.schema.json). Empty: not given.
 struct StudyAbout {
   std::vector<StudyAuthor> authors = {};
   std::string license = {};  ///< SPDX identifier such as CC-BY-4.0, or an address
@@ -34,11 +34,11 @@ std::string license_url(const StudyAbout& about);
 /// "https://doi.org/10.5281/zenodo.1234"
 std::string doi_url(const StudyAbout& about);
 
-/// The fields of BIDS's dataset_description.json, those that are said.
+/// The given ones, as fields of BIDS's dataset_description.json.
 nlohmann::ordered_json bids_fields(const StudyAbout& about);
 /// The terms of https://schema.org/Dataset. It has none for ethics and acknowledgements.
 nlohmann::ordered_json schema_org_terms(const StudyAbout& about);
-/// Paragraphs for a README, each with a blank line after it; "" if nothing is said.
+/// Paragraphs for a README, each with a blank line after it; "" if nothing is given.
 std::string about_text(const StudyAbout& about);
 
 }  // namespace palpate::data

@@ -25,7 +25,7 @@ namespace fs = std::filesystem;
 constexpr std::size_t kLetters = 6;
 constexpr std::string_view kMark = ".palpate-";
 
-/// Removes entries of the folder with such a name, of this user, that no process has locked.
+/// Removes this user's temporary entries of the folder that no process has locked.
 template <class IsTemporary>
 void remove_unlocked(const fs::path& folder, IsTemporary is_temporary) {
   std::error_code error;
@@ -49,7 +49,7 @@ std::string random_letters() {
       "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-_";
   std::array<std::uint8_t, kLetters> bytes{};
   if (::getrandom(bytes.data(), bytes.size(), 0) != static_cast<ssize_t>(bytes.size())) {
-    throw StoreError("the system gives no random numbers");
+    throw StoreError("the system provides no random numbers");
   }
   std::string letters;
   for (const std::uint8_t byte : bytes) letters += kAlphabet[byte % kAlphabet.size()];
@@ -176,7 +176,7 @@ void AtomicFile::commit(bool replace) {
     ::unlinkat(folder_, temporary_.c_str(), 0);
     state_ = State::renamed;
   }
-  ::fsync(folder_);  // may fail: a folder that can be written need not be readable
+  ::fsync(folder_);  // may fail: a writable folder need not be readable
 }
 
 void AtomicFile::roll_back() {
@@ -208,7 +208,7 @@ bool rename_if_absent(const std::string& temporary, const std::string& path) {
   }
   const fs::path folder = fs::path(path).parent_path();
   const int opened = ::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_CLOEXEC);
-  if (opened < 0) return true;  // a folder that can be written need not be readable
+  if (opened < 0) return true;  // a writable folder need not be readable
   ::fsync(opened);
   ::close(opened);
   return true;

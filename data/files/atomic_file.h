@@ -9,8 +9,7 @@
 
 namespace palpate::data {
 
-// Names of the temporary files and folders that are renamed to their final name when they are
-// complete, and removal of those that killed processes left.
+// Names of temporary files and folders, and removal of those that killed processes left.
 
 /// ".NAME.palpate-" in the folder of the target; six random characters follow.
 std::string temporary_prefix(const std::string& target);
@@ -25,12 +24,12 @@ void remove_stale_temporaries_in(const std::string& folder);
 std::string random_letters();
 
 /// The temporary file has mode 0600 and is locked (flock) while its process lives. Works on a
-/// descriptor of the folder, so that renaming the folder meanwhile does no harm.
+/// descriptor of the folder, so that the folder may be renamed meanwhile.
 class AtomicFile {
  public:
   /// \throws StoreRefused, StoreError: a temporary file cannot be created there.
   explicit AtomicFile(const std::string& target);
-  ~AtomicFile();  ///< removes the temporary file, or after a commit what it replaced
+  ~AtomicFile();  ///< removes the temporary file, or after a commit the replaced file
   AtomicFile(const AtomicFile&) = delete;
   AtomicFile& operator=(const AtomicFile&) = delete;
 

@@ -132,7 +132,7 @@ std::string ownership_fault(const std::string& path) {
     const std::string folder = "is in " + above.string() + ", which";
     if (::stat(above.c_str(), &found) != 0) return folder + " cannot be read";
     if (is_foreign(found.st_uid)) return folder + owner + std::to_string(found.st_uid) + ")";
-    // In a sticky folder nobody can replace what is ours.
+    // In a sticky folder nobody else can replace this user's files.
     if (others_may_write(found) && (found.st_mode & S_ISVTX) == 0)
       return folder + " others can write to (mode " + octal(found.st_mode) + ")";
     if (above == above.parent_path()) return "";

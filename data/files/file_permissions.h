@@ -20,7 +20,7 @@ struct FileIdentity {
 FileIdentity identity_of(const std::string& path);
 
 // Resolves symbolic links of a path that is to be written. In a shared folder another user could
-// lay a link that redirects the output: only links of this user and of root are followed.
+// place a link that redirects the output: only links of this user and of root are followed.
 
 struct ResolvedPath {
   std::string path;  ///< absolute, links resolved
@@ -40,9 +40,9 @@ void require_private_sqlite_files(const std::string& file);
 /// A sentence on how other users could access the database or put files beside it; "": they cannot.
 std::string access_warning(const std::string& database);
 
-/// Why a file or folder that is about to be run or trusted is not safely this user's own, to be
-/// appended to its path in a message; "": it is. Looks at the name itself (a link is none of ours),
-/// its owner, its permissions, and at the folders above it.
+/// Reason why a file or folder must not be run or trusted, to be appended to its path in a message;
+/// "": it is safely this user's own. Checks that the name itself is not a link, its owner, its
+/// permissions, and the folders above it.
 std::string ownership_fault(const std::string& path);
 
 }  // namespace palpate::data

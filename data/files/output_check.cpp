@@ -43,8 +43,8 @@ bool is_null_device(const struct stat& found) {
   return S_ISCHR(found.st_mode) && found.st_rdev == makedev(1, 3);
 }
 
-/// Why a file that is not a regular one cannot be written to; "" for pipes, terminals and what the
-/// shell has opened.
+/// Why a file that is not regular cannot be written to; "" for pipes, terminals and descriptors
+/// that the shell opened.
 std::string stream_refusal(const struct stat& found, std::optional<int> descriptor) {
   if (S_ISDIR(found.st_mode)) return "is a folder; must be a file";
   if (is_null_device(found)) return "";
@@ -68,7 +68,7 @@ const std::vector<std::string>& sqlite_file_suffixes() {
 
 bool may_be_database(const std::string& path) {
   const auto found = stat_of(path);
-  // A pipe is not even opened: the process at its other end would take this one for its reader.
+  // Do not open a pipe: its writer would take this process for the reader.
   if (!found || !S_ISREG(found->st_mode)) return false;
   const int file = ::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
   if (file < 0) return true;

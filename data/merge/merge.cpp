@@ -42,7 +42,8 @@ void require_new(const std::string& out) {
   if (out.empty()) throw StoreRefused("'' is not a path of a sweep's file");
   for (const char* end : {"", "-journal", "-wal"}) {
     if (!fs::exists(fs::symlink_status(out + end, error))) continue;
-    throw StoreRefused(out + end + ": exists already; a merge makes a new file and replaces none");
+    throw StoreRefused(out + end +
+                       ": exists already; merge creates a new file and never replaces one");
   }
   if (belongs_to_database(out)) {
     throw StoreRefused(out +
@@ -53,8 +54,8 @@ void require_new(const std::string& out) {
 void require_same_plan(const SweepPlan& plan, const std::string& first, const SweepFile& other) {
   const std::vector<std::string> reasons = differences(plan, other.plan());
   if (reasons.empty()) return;
-  std::string text = other.path() + ": is of another sweep than " + first + ". Of " + first +
-                     " and of this one differ:";
+  std::string text = other.path() + ": holds another sweep than " + first +
+                     ". Differences (first " + first + ", then this file):";
   for (const std::string& reason : reasons) text += "\n  " + reason;
   throw StoreRefused(text);
 }
@@ -101,7 +102,7 @@ struct SessionRows {
   std::string select;
 };
 
-/// Runs: position in the session (1, 2, ...), checksum of a protocol of its own or NULL. Notes,
+/// Runs: position in the session (1, 2, ...), checksum of the run's own protocol or NULL. Notes,
 /// attempts and answers to pages: position of their run, 0. Samples: trial and number of their
 /// attempt.
 inline constexpr int kParentColumns = 2;
@@ -185,7 +186,7 @@ class Planner {
   void assign_numbers(PlannedProtocol& protocol, NumberConflict clash);
   void add_sessions(PlannedParticipant& known, const PlannedParticipant& found);
   void require_same_protocols(const std::deque<StationDatabase>& stations);
-  /// \param other_conflicts number of conflicts that are not about participant numbers
+  /// \param other_conflicts number of conflicts other than participant numbers
   [[noreturn]] void raise(std::size_t other_conflicts) const;
 
   MergePlan plan_;
@@ -193,7 +194,7 @@ class Planner {
   std::map<std::string, std::map<std::string, FoundParticipant>> people_;  // checksum -> by code
   std::map<std::string, std::map<const StationDatabase*, std::set<std::string>>>
       names_;                              // -> checksums
-  std::map<std::string, bool> withdrawn_;  // codes that were looked up
+  std::map<std::string, bool> withdrawn_;  // codes looked up so far
   std::vector<std::string> conflicts_;
 };
 
@@ -225,13 +226,14 @@ void Planner::raise(std::size_t other_conflicts) const {
   for (const std::string& one : conflicts_) message += "\n  " + one;
   if (conflicts_.size() > other_conflicts) {
     message +=
-        "\nTwo stations gave the same number: --renumber gives another one to who began later, and "
-        "keeps on record whose order of trials was shown. From now on keep the stations' numbers "
-        "apart with palpate run --number";
+        "\nTwo stations gave the same number: --renumber gives another number to the participant "
+        "who began later, and records the number that ordered the trials. Keep the stations' "
+        "numbers "
+        "apart from now on with palpate run --number";
   }
   if (other_conflicts > 0) {
     message +=
-        "\nLeave one of the databases out, or remove a participant who is in the wrong place from "
+        "\nLeave one of the databases out, or remove a misplaced participant from "
         "a copy of it with palpate forget";
   }
   throw StoreRefused(message);
@@ -269,7 +271,7 @@ void Planner::add_protocols(StationDatabase& station) {
   }
 }
 
-/// Not every station has the files: earlier versions did not store them.
+/// Earlier versions did not store the files, so a station may lack them.
 void Planner::add_files(ProtocolInfo& known, StationDatabase& station, std::int64_t protocol_id) {
   for (ProtocolFile& file : protocol_files(station.db(), protocol_id)) {
     const auto at = std::lower_bound(known.files.begin(), known.files.end(), file.name,
@@ -315,8 +317,8 @@ void Planner::add_participant(PlannedProtocol& protocol, FoundParticipant found)
   }
 }
 
-/// Of participants with the same number the one who began first keeps it, but those who were
-/// enrolled with it before those who were renumbered to it.
+/// Participants enrolled with a number come before those renumbered to it; among equals, the first
+/// to begin keeps it.
 void Planner::assign_numbers(PlannedProtocol& protocol, NumberConflict clash) {
   std::vector<std::pair<std::tuple<int, bool, double, std::string>, FoundParticipant*>> ordered;
   for (auto& [code, one] : people_[protocol.info.sha256]) {
@@ -377,8 +379,8 @@ void Planner::add_sessions(PlannedParticipant& known, const PlannedParticipant& 
   }
 }
 
-/// A station may have several versions (checksums) of a protocol name: it was changed there. Two
-/// stations where neither has all versions of the other ran different studies.
+/// A station that changed a protocol has several versions (checksums) of its name. Two stations ran
+/// different studies if neither has all versions of the other.
 void Planner::require_same_protocols(const std::deque<StationDatabase>& stations) {
   for (const auto& [name, by_station] : names_) {
     for (std::size_t i = 0; i < stations.size(); ++i) {
@@ -636,9 +638,10 @@ void require_free(const std::string& out) {
   if (out.empty()) throw StoreRefused("'' is not a path of a database");
   for (const char* end : {"", "-wal", "-shm", "-journal"}) {
     if (!fs::exists(fs::symlink_status(out + end, error))) continue;
-    throw StoreRefused(out + end +
-                       ": exists already; a merge creates a new database and replaces none, give "
-                       "another name or move it away");
+    throw StoreRefused(
+        out + end +
+        ": exists already; merge creates a new database and never replaces one; give "
+        "another name or move it away");
   }
   if (belongs_to_database(out)) {
     throw StoreRefused(

@@ -1,5 +1,5 @@
 #pragma once
-// palpate merge: the databases of several stations (computers that run parts of a study) into one.
+// palpate merge: joins the databases of several stations (computers that run parts of a study).
 
 #include <cstdint>
 #include <deque>
@@ -16,7 +16,7 @@
 
 namespace palpate::data {
 
-// palpate merge, of sweeps: the files of shards into one.
+// palpate merge, of sweeps: joins the files of shards.
 
 struct SweepMergeResult {
   SweepPlan plan;
@@ -35,15 +35,15 @@ struct SweepMergeResult {
 SweepMergeResult merge_sweeps(const std::string& out, const std::vector<std::string>& inputs,
                               const std::function<void(std::int64_t)>& progress = {});
 
-/// A participant who has withdrawn at one station and is still in the database of another.
+/// A participant who withdrew at one station and is still in the database of another.
 struct ExcludedParticipant {
   std::string code, path;  ///< path: of the database that still holds the participant
 };
 
-/// A participant who got a new number, because another one has the same.
+/// A participant with a new number, because another one has the same.
 struct RenumberedParticipant {
   std::string code, other, path;  ///< path: of the database that holds `code`
-  int from = 0, to = 0;           ///< from: keeps selecting the order of trials
+  int from = 0, to = 0;           ///< from: still selects the order of trials
 };
 
 struct MergeResult {
@@ -55,7 +55,8 @@ struct MergeResult {
 /// Two codes with one number in a protocol: two stations numbered independently.
 enum class NumberConflict {
   refuse,
-  renumber,  ///< the one who began later gets the next free number; the store keeps both
+  renumber,  ///< the participant who began later gets the next free number; the store keeps both
+             ///< numbers
 };
 
 /// Creates the union of several databases: every protocol, participant, session, run, note,
@@ -74,16 +75,16 @@ MergeResult merge(const std::string& out, const std::vector<std::string>& inputs
                   const std::function<void(std::int64_t, std::int64_t)>& progress = {},
                   NumberConflict clash = NumberConflict::refuse);
 
-// Internal to data/merge: what is copied from which station, and the conflicts that prevent a
+// Internal to data/merge: the rows to copy from each station, and the conflicts that prevent a
 // merge.
 
 struct PlannedSession {
-  StationDatabase* station = nullptr;  ///< to copy it from
-  std::int64_t id = 0;                 ///< there
+  StationDatabase* station = nullptr;  ///< source of the copy
+  std::int64_t id = 0;                 ///< row id at the station
 };
 
 struct PlannedParticipant {
-  StationDatabase* station = nullptr;  ///< where it was found first
+  StationDatabase* station = nullptr;  ///< first station that has it
   std::string code;
   int enrolled_number = 0;  ///< as of Participant
   bool simulated = false;
@@ -92,7 +93,7 @@ struct PlannedParticipant {
 };
 
 struct PlannedProtocol {
-  ProtocolInfo info;                               ///< with its files, by name
+  ProtocolInfo info;                               ///< includes its files, by name
   std::map<int, PlannedParticipant> participants;  ///< by number
 };
 

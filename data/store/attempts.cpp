@@ -84,7 +84,7 @@ class AttemptReader {
   StoredTrial trial_;
   SealedValues values_;
   std::map<std::int64_t, KnownRun> runs_;      // of the session, by id
-  std::int64_t known_run_ = 0, run_link_ = 0;  // of the run that trial_.run holds
+  std::int64_t known_run_ = 0, run_link_ = 0;  // of the run in trial_.run
   std::map<std::int64_t, std::string> files_;  // checksum of a protocol's
   std::int64_t seen_ = 0;
 };
@@ -123,7 +123,7 @@ void AttemptReader::read_page_answers(std::int64_t session, ChainCheck& chain) {
   }
 }
 
-/// The stored files of the protocol are those that the run recorded as shown.
+/// Verifies that the stored files of the protocol are those that the run recorded.
 void AttemptReader::require_files(const RunInfo& run, std::int64_t protocol) {
   if (run.files_sha256.empty()) return;
   auto known = files_.find(protocol);
@@ -131,7 +131,7 @@ void AttemptReader::require_files(const RunInfo& run, std::int64_t protocol) {
   if (known->second == run.files_sha256) return;
   throw SQLite::Exception("participant " + trial_.participant.code + ", session " +
                               std::to_string(run.session) +
-                              ": the files that the protocol names are not those that were shown",
+                              ": the stored files of the protocol are not those that were shown",
                           SQLITE_CORRUPT);
 }
 
@@ -202,7 +202,7 @@ void AttemptReader::read_samples(std::int64_t attempt, const std::optional<Check
   if (filter_.samples != SampleReading::unpack) return;
   if (packing < 1 || packing > kSamplesPacking) {
     throw StoreRefused(
-        path_ + ": holds samples in a packing that this palpate does not know; use a newer one");
+        path_ + ": holds samples in a packing unknown to this version of palpate; use a newer one");
   }
   try {
     RecordedSamples recorded = unpack_samples(bytes, size, count, packing);
@@ -237,7 +237,7 @@ void AttemptReader::read_attempt(std::optional<ChainCheck>& chain) {
   if (completed) read_outcome(row, record);
   if (about.cut_off_reason.has_value() == completed) {
     throw SQLite::Exception(
-        "a completed attempt has a reason for being cut off, or one that was cut off has none",
+        "a completed attempt has a reason for being cut off, or a cut-off attempt has no reason",
         SQLITE_CORRUPT);
   }
   if (run != known_run_) {
@@ -322,8 +322,8 @@ void read_attempts(SQLite::Database& db, const std::string& path, int version,
 }
 
 // Writes attempts: one by one as they are shown, or many simulated ones in one transaction.
-// begin_attempt commits before anything is shown, so that a crash leaves a trace of the attempt;
-// finish_attempt commits its record.
+// begin_attempt commits before the stimulus is shown, so that a crash leaves a trace of the
+// attempt; finish_attempt commits its record.
 
 namespace {
 

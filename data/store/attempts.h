@@ -1,5 +1,5 @@
 #pragma once
-// Internal to data/: attempts, read one at a time and verified, and ended where a run left one
+// Internal to data/: reads and verifies attempts one at a time, and ends an attempt that a run left
 // open.
 
 #include <SQLiteCpp/Database.h>
@@ -15,9 +15,9 @@
 
 namespace palpate::data {
 
-// Internal to data/: reads attempts one at a time, in order, and verifies them: every session that
-// is touched is checked against its hash chain (seals.h), every value against the range that
-// palpate writes. Store, and StationDatabase for merge, read trials through this only.
+// Reads attempts in order and verifies them: every session visited against its hash chain
+// (seals.h), every value against the range that palpate writes. Store, and StationDatabase for
+// merge, read trials through this only.
 
 enum class AttemptState { running, completed, cut_off };
 
@@ -33,19 +33,19 @@ struct AttemptFilter {
   const TrialName* trial = nullptr;                          ///< this one, in every protocol
   std::optional<std::pair<std::int64_t, int>> session = {};  ///< participant's id, number
   SampleReading samples = SampleReading::skip;
-  /// Of which completed trials samples are read, asked in order; none: of all.
+  /// Selects the completed trials whose samples are read, called in order; none: all.
   const std::function<bool(const StoredTrial&)>* samples_wanted = nullptr;
-  bool seals_verified = false;  ///< already, in the same snapshot of the database
+  bool seals_verified = false;  ///< they are verified already, in the same snapshot of the database
 };
 
-/// Visits attempts by protocol, participant number, session, trial and attempt. Rows of a session
-/// that are not visited are verified, too. \param version of the schema; seals exist since 3.
+/// Visits attempts by protocol, participant number, session, trial and attempt. Also verifies the
+/// rows of a session that are not visited. \param version of the schema; seals exist since 3.
 /// \throws SQLite::Exception (damage), StoreRefused (a row does not match its seal).
 void read_attempts(SQLite::Database& db, const std::string& path, int version,
                    const AttemptFilter& filter,
                    const std::function<void(const StoredTrial&)>& visit);
 
-/// Within a transaction of the caller; no effect where no attempt is open.
+/// Runs within a transaction of the caller; no effect if no attempt is open.
 void cut_off_open_attempt(SQLite::Database& db, SealWriter& seals, const Run& run,
                           const std::string& reason);
 

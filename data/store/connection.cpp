@@ -19,7 +19,7 @@
 namespace palpate::data {
 namespace {
 
-/// SQLite reports a full disk as such only where it writes a page; not for the memory that it maps.
+/// SQLite reports a full disk when it writes a page, but not when it maps memory.
 bool disk_is_full(const std::string& path) {
   constexpr unsigned long kMappedAtOnce = 32'768;  // bytes, of a -shm
   const std::string folder = std::filesystem::path(path).parent_path().string();
@@ -98,8 +98,8 @@ constexpr std::string_view kMark = "palpate ";  // and the process's number
 
 [[noreturn]] void refuse_foreign_lock(const std::string& file, const std::string& path,
                                       const std::string& why) {
-  throw StoreRefused(path + ": its lock file " + file + " is not one of yours (" + why +
-                     ") and is not used. Move it away if no palpate writes to the database");
+  throw StoreRefused(path + ": its lock file " + file + " was not written by your palpate (" + why +
+                     ") and is not used. Move it away if no other palpate writes to the database");
 }
 
 std::string text_of(int descriptor) {
@@ -108,7 +108,7 @@ std::string text_of(int descriptor) {
   return {text.data(), length > 0 ? static_cast<std::size_t>(length) : 0};
 }
 
-/// A file of another program or user is neither locked nor changed.
+/// Refuses a file of another program or user: it is neither locked nor changed.
 void require_our_lock(const struct stat& found, const std::string& file, const std::string& path) {
   struct stat database {};
   const bool theirs = ::stat(path.c_str(), &database) == 0 && found.st_uid == database.st_uid;
@@ -150,7 +150,7 @@ int open_lock_file(const std::string& file, const std::string& path) {
                        " cannot be created: " + std::generic_category().message(errno) +
                        "; check that the folder exists and that you may write there");
     }
-    // Left by a killed process, or held by a running one.
+    // It was left by a killed process, or is held by a running one.
     const int old = open_old_lock(file, path);
     if (old >= 0) return old;
   }
@@ -170,7 +170,7 @@ std::string holder(int descriptor) {
                      "; wait until that has ended, or use another database and merge later");
 }
 
-// Whether the path still names the open file: a writer that ends removes it.
+// Whether the path still names the open file: a writer removes it when it ends.
 bool is_same_file(int descriptor, const std::string& file) {
   struct stat opened {
   }, found{};
@@ -247,8 +247,8 @@ void Store::Impl::repair_wal_index() {
     index_size = found.st_size;
     return;
   }
-  // By name: closing a descriptor of it would release SQLite's POSIX locks. To 0 first, so that it
-  // is zero-filled and SQLite recovers all of it from the -wal.
+  // Truncate by name: closing a descriptor would release SQLite's POSIX locks. Truncate to 0 first,
+  // so that the file is zero-filled and SQLite recovers all of it from the -wal.
   if (::truncate(index.c_str(), 0) != 0 || ::truncate(index.c_str(), index_size) != 0) {
     throw StoreError(path + ": its WAL index " + index +
                      " was truncated while in use and cannot be restored; this step was not saved");

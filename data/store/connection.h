@@ -1,6 +1,5 @@
 #pragma once
-// Internal to data/store: the open database of a Store, and the transaction that every writing call
-// runs in.
+// Internal to data/store: the open database of a Store, and the transaction of every writing call.
 
 #include <SQLiteCpp/Column.h>
 #include <SQLiteCpp/Database.h>
@@ -23,9 +22,9 @@
 
 namespace palpate::data {
 
-// SQLite's result codes (https://www.sqlite.org/rescode.html) as messages that say what to do.
+// SQLite's result codes (https://www.sqlite.org/rescode.html) as messages that name a remedy.
 
-/// \throws StoreRefused: the file is damaged or no database; StoreError: any other `error`.
+/// \throws StoreRefused: the file is damaged or not a database; StoreError: any other `error`.
 [[noreturn]] void raise_store_error(const std::string& path, const SQLite::Exception& error);
 
 /// Calls `work` and converts SQLite's exceptions to StoreError and StoreRefused.
@@ -38,8 +37,8 @@ decltype(auto) guarded(const std::string& path, Work&& work) {
   }
 }
 
-// C++ values into the bound parameters of a SQL statement, and out of the columns of a result row,
-// in order. Every value that is read is checked against the range of its type: the file may be
+// Binds C++ values to the parameters of a SQL statement, and reads them from the columns of a
+// result row, in order. Checks every value read against the range of its type: the file may be
 // damaged.
 
 /// Binds values to the parameters of a statement, left to right.
@@ -135,7 +134,7 @@ class RowReader {
   }
 
  private:
-  /// \param read returns whether the column was not NULL, which it asks only where it read 0 or "".
+  /// \param read returns whether the column was not NULL; checks it only after reading 0 or "".
   template <class Read>
   RowReader& next(const Read& read) {
     const bool present = columns_ != nullptr ? read((*columns_)[static_cast<std::size_t>(index_)])
@@ -164,9 +163,10 @@ class RowReader {
 // Internal to data/store: one writer per database, across processes.
 
 /// Advisory lock (flock) on the file `path`.palpate-lock, held until destruction or until the
-/// process ends. The file contains the process id of the holder and is removed with the lock; one
-/// that a killed process left is reused. Not on the database itself: closing any descriptor of it
-/// would release SQLite's POSIX locks (https://www.sqlite.org/howtocorrupt.html, 2.2).
+/// process ends. The file contains the process id of the holder and is removed with the lock; the
+/// file of a killed process is reused. The lock is not on the database itself: closing any
+/// descriptor of it would release SQLite's POSIX locks (https://www.sqlite.org/howtocorrupt.html,
+/// 2.2).
 class WriterLock {
  public:
   /// \throws StoreRefused: another writer holds it (names the process), or the file is not a lock
@@ -237,7 +237,7 @@ struct Store::Impl {
 
   // Parts of begin_run, within its transaction.
   std::int64_t resume_or_create_session(const Participant& participant, const RunInfo& info);
-  /// The protocol that the run is shown with, if it is not the participant's `own`; stores it.
+  /// Stores the protocol that the run shows, if it is not the participant's `own`.
   std::optional<std::int64_t> other_protocol(const Participant& participant, std::int64_t own,
                                              const ProtocolInfo* shown_with);
 

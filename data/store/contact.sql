@@ -1,4 +1,4 @@
--- Schema version 4: how the object of a trial was touched.
+-- Schema version 4: measures of contact with the object of a trial.
 
 -- NULL: recorded by a version that did not measure it. Sealed where it is there (seals.h).
 ALTER TABLE attempts ADD COLUMN contact_share REAL CHECK (contact_share BETWEEN 0 AND 1);

@@ -1,6 +1,5 @@
 #pragma once
-// The record of exports that were made of a database: forget lists those that hold a participant
-// who has withdrawn.
+// The record of a database's exports: forget lists those that hold a withdrawn participant.
 
 #include <cstdint>
 #include <string>
@@ -11,7 +10,7 @@
 namespace palpate::data {
 
 struct ExportRecord {
-  std::string path;    ///< as recorded_path() has it
+  std::string path;    ///< as returned by recorded_path()
   std::string format;  ///< "csv", "bids", "psych-ds"
   std::int64_t made_utc_ns = 0;
 };
@@ -39,13 +38,13 @@ class ExportedParticipants {
   bool any_simulated() const { return any_simulated_; }
   bool all_simulated() const { return any_simulated_ && !any_real_; }
 
-  /// \return why it could not be recorded (read-only disk), or "". \throws StoreRefused: one of
-  /// them was withdrawn meanwhile.
+  /// \return the reason why it was not recorded (read-only disk), or "". \throws StoreRefused: one
+  /// of them was withdrawn meanwhile.
   std::string record(const std::string& database, const std::string& path,
                      const std::string& format) const;
 
  private:
-  std::vector<std::int64_t> ids_;  // each once
+  std::vector<std::int64_t> ids_;  // without duplicates
   bool any_simulated_ = false, any_real_ = false;
 };
 

@@ -38,7 +38,7 @@ constexpr unsigned long kCost = 3;
 std::string new_salt() {
   std::array<char, CRYPT_GENSALT_OUTPUT_SIZE> text{};
   if (::crypt_gensalt_rn(kPrefix, kCost, nullptr, 0, text.data(), text.size()) == nullptr) {
-    throw StoreError("cannot make a salt: the system gives no random numbers");
+    throw StoreError("cannot make a salt: the system provides no random numbers");
   }
   return text.data();
 }
@@ -62,7 +62,7 @@ std::string hash_with(const std::string& code, const std::string& salt) {
 std::string new_secret() {
   std::string secret(32, '\0');
   if (::getrandom(secret.data(), secret.size(), 0) != static_cast<ssize_t>(secret.size())) {
-    throw StoreError("cannot make a secret: the system gives no random numbers");
+    throw StoreError("cannot make a secret: the system provides no random numbers");
   }
   return secret;
 }
@@ -176,7 +176,7 @@ std::string contents_of(const fs::path& file) {
   return {std::istreambuf_iterator<char>(in), {}};
 }
 
-/// What the tables of a palpate database say.
+/// Whether the tables of a palpate database hold the code.
 Holds table_holds(const std::string& file, const std::string& code) {
   try {
     SQLite::Database db(immutable_uri(file), SQLite::OPEN_READONLY | SQLite::OPEN_URI);
@@ -184,7 +184,7 @@ Holds table_holds(const std::string& file, const std::string& code) {
     find.bind(1, code);
     return find.executeStep() ? Holds::yes : Holds::no;
   } catch (const SQLite::Exception&) {
-    return Holds::unknown;  // of another program, or damaged
+    return Holds::unknown;  // another program's, or damaged
   }
 }
 
@@ -202,7 +202,7 @@ bool is_compressed(std::string_view begin) {
 /// Looks beside the database and into folders, for one code.
 class Search {
  public:
-  /// \param database  its file name, after which copies are named
+  /// \param database  its file name, which the names of copies contain
   Search(std::string code, const fs::path& database, std::set<fs::path> leave_out)
       : code_(std::move(code)), stem_(database.stem().string()), leave_out_(std::move(leave_out)) {}
 
@@ -280,7 +280,7 @@ class Search {
     if (size > kLargestText) return Holds::unknown;
     bytes_ += size;
     const std::string text = contents_of(file);
-    // In a damaged database and in a log, a value stands beside others without a gap.
+    // In a damaged database and in a log, values follow each other without a gap.
     const bool log = begin.starts_with("\x37\x7f\x06") || begin.starts_with("\xd9\xd5\x05\xf9");
     const bool holds =
         database || log ? text.find(code_) != std::string::npos : mentions(text, code_);
@@ -365,8 +365,8 @@ void delete_rows(SQLite::Database& db, const std::string& code) {
   }
 }
 
-/// Paths of exports may contain the code, too: replaces it by "...", unless the code is short and
-/// part of another word ("1" occurs in many paths).
+/// Replaces the code in paths of exports by "...", unless it is short and part of another word ("1"
+/// occurs in many paths).
 void redact_export_paths(SQLite::Database& db, const std::string& code) {
   constexpr std::size_t kUnmistakable = 6;  // characters
   SQLite::Statement find(db, "SELECT id, path FROM exports WHERE instr(path, ?)");
@@ -444,8 +444,8 @@ Withdrawal remove_backups(const std::string& file, const std::string& code) {
   return done;
 }
 
-/// Exports that hold the code, also those of before a withdrawal. \param hash of its tombstone, or
-/// ""
+/// Exports that hold the code, also those made before a withdrawal. \param hash of its tombstone,
+/// or ""
 std::vector<ExportRecord> exports_of(SQLite::Database& db, const std::string& code,
                                      const std::string& hash) {
   SQLite::Statement exports(
@@ -531,9 +531,9 @@ Withdrawal Store::forget(const std::string& code) {
   Tombstones::Tombstone tombstone = tombstones.find(code);
   const std::string earlier_hash = tombstone.hash;
   if (earlier_hash.empty() && participant_summary(code).protocols == 0) {
-    impl_->refuse("there is no participant " + code + " here");
+    impl_->refuse("there is no participant " + code);
   }
-  // A tombstone of schema version 2 has no secret: made again, now that the code is known.
+  // Remake a tombstone of schema version 2, which has no secret, now that the code is known.
   if (tombstone.secret.empty()) tombstone = tombstones.made_for(code);
   impl_->commit([&] {
     impl_->replace_by_tombstone(code, tombstone, earlier_hash);

@@ -1,6 +1,6 @@
 #pragma once
-// What withdrawal leaves: copies that it does not remove, and tombstones, salted hashes of
-// withdrawn participant codes. enrol and merge refuse or exclude a code that has one.
+// What remains after a withdrawal: copies that it does not remove, and tombstones (salted hashes of
+// withdrawn codes). enrol refuses and merge excludes a code with a tombstone.
 
 #include <SQLiteCpp/Database.h>
 
@@ -27,7 +27,7 @@ class Tombstones {
   static Tombstones read(SQLite::Database& db, const std::string& path);
 
   bool holds(const std::string& code) const { return !find(code).hash.empty(); }
-  Tombstone find(const std::string& code) const;  ///< with an empty hash: none
+  Tombstone find(const std::string& code) const;  ///< empty hash: none
 
   /// A tombstone for a code. Reuses an existing secret and salt, so that comparing a code with all
   /// tombstones takes one hash. \throws StoreError: the system has no random numbers.
@@ -49,21 +49,21 @@ class Tombstones {
 
 // Internal to data/store: copies of a participant's data that a withdrawal does not remove.
 
-/// Files beside the database, beside its exports and in the folders there that hold `code` or may:
+/// Files that hold or may hold `code`, beside the database, beside its exports and in folders
+/// there:
 ///
 /// * other palpate databases, whatever their names, with their logs;
 /// * texts (tables, reports, figures) with the code in their name or content;
-/// * files that are named after the database and cannot be searched (compressed, not readable,
-/// above
+/// * files named after the database that cannot be searched (compressed, not readable, above
 ///   256 MiB).
 ///
 /// A folder with the code in the name of a file in it, as in a dataset, is named as a whole. Leaves
-/// out the database and its -wal, -shm, -journal, and `known`. Follows no links. After 100,000
-/// entries or 8 GiB it ends and names the folder that it was in.
+/// out the database and its -wal, -shm, -journal, and `known`. Follows no links. Stops after
+/// 100,000 entries or 8 GiB and names the folder that it had reached.
 std::vector<std::string> find_remaining_copies(const std::string& database, const std::string& code,
                                                const std::vector<std::string>& known);
 
-/// Whether `text` contains `code` as a word of its own.
+/// Whether `text` contains `code` as a separate word.
 bool mentions(const std::string& text, const std::string& code);
 
 }  // namespace palpate::data

@@ -70,8 +70,7 @@ void require_palpate_database(const std::string& file, const std::string& path) 
   try {
     require_application_id(probe, path);
   } catch (const SQLite::Exception& error) {
-    // Beside a writer, the size in the header may exceed the file: left to the checks after
-    // opening.
+    // Beside a writer, the size in the header may exceed the file; the checks after opening decide.
     if (error.getErrorCode() != SQLITE_CORRUPT) throw;
   }
 }
@@ -104,8 +103,8 @@ constexpr int kBusyTimeoutMs = 5000;
 constexpr int kOpenRead = SQLITE_OPEN_READONLY | SQLITE_OPEN_NOMUTEX;
 constexpr int kOpenWrite = SQLITE_OPEN_READWRITE | SQLITE_OPEN_NOMUTEX;
 
-/// This process is the only writer (WriterLock): a run in state `running` belongs to a process that
-/// has died.
+/// This process is the only writer (WriterLock), so a run in state `running` belongs to a dead
+/// process.
 void mark_interrupted_runs(SQLite::Database& db, SealWriter& seals) {
   SQLite::Statement find(db, "SELECT 1 FROM runs WHERE end_reason = 'running' LIMIT 1");
   if (!find.executeStep()) return;
@@ -157,7 +156,7 @@ void Store::Impl::require_usable_path() {
   std::error_code error;
   file = fs::weakly_canonical(fs::absolute(path, error), error).string();
   if (path.empty() || error) throw StoreRefused("'" + path + "' is not a path of a database");
-  // Reading follows links of other users; writing does not, they could redirect it.
+  // Reading follows links of other users; writing does not, because they could redirect it.
   if (writes()) {
     const ResolvedPath resolved = resolve_trusted_links(path);
     if (!resolved.fault.empty()) refuse(resolved.fault);
@@ -230,7 +229,8 @@ Store Store::open(const std::string& path, Mode mode) {
   std::error_code error;
   if (std::filesystem::file_size(file, error) == 0 && !error) {
     impl->refuse(
-        "is empty, which a palpate database never is; restore a backup, or remove it to create a "
+        "is empty; a palpate database is never empty. Restore a backup, or remove the file to "
+        "create a "
         "new one");
   }
   require_private_sqlite_files(file);

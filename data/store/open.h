@@ -12,9 +12,8 @@ namespace palpate::data {
 /// Only for files that nobody writes to.
 std::string immutable_uri(const std::string& file);
 
-/// Takes no locks and writes nothing, so that another program's database is not rolled back or
-/// checkpointed by an attempt to open it. \throws StoreRefused: another program's;
-/// SQLite::Exception: not a database.
+/// Takes no locks and writes nothing: opening another program's database must not roll it back or
+/// checkpoint it. \throws StoreRefused: another program's; SQLite::Exception: not a database.
 void require_palpate_database(const std::string& file, const std::string& path);
 
 /// Refuses a file whose size is not a multiple of the page size: it is truncated, which SQLite does

@@ -1,4 +1,4 @@
-// Answers to pages: personal data, in a table apart from trials.
+// Answers to pages: personal data, in a separate table.
 
 #include <SQLiteCpp/Statement.h>
 
@@ -62,7 +62,7 @@ std::vector<StoredPageAnswer> Store::page_answers() {
 bool Store::has_tasks() {
   return guarded(impl_->path, [&] {
     if (impl_->version < kPagesSince) return false;
-    // Of each run one attempt tells it: a run has one protocol.
+    // One attempt per run suffices: a run has one protocol.
     SQLite::Statement find(*impl_->db,
                            "SELECT 1 FROM runs r WHERE (SELECT task FROM attempts a WHERE a.run_id "
                            "= r.id LIMIT 1) IS NOT NULL LIMIT 1");
@@ -84,7 +84,7 @@ std::vector<std::string> Store::answered_pages(const Participant& participant, i
   });
 }
 
-// Who takes part: enrolment in a protocol, codes and numbers.
+// Enrolment in a protocol, codes and numbers.
 
 namespace {
 

@@ -50,22 +50,22 @@ void require_same_files(SQLite::Database& db, const std::string& path, std::int6
                                     [&](const auto& one) { return one.first == file.name; });
     const std::string sha256 = checksum_hex(file.bytes);
     if (known == stored.end() || known->second == sha256) continue;
-    throw StoreRefused(path + ": " + file.name + " is not the file that protocol " + protocol.name +
-                       " was begun with in this database (SHA-256 " + abbreviated(sha256) +
-                       ", stored " + abbreviated(known->second) +
-                       "): participants would not touch the same shape; restore the file (an "
+    throw StoreRefused(path + ": " + file.name + " is not the file with which protocol " +
+                       protocol.name + " was begun in this database (SHA-256 " +
+                       abbreviated(sha256) + ", stored " + abbreviated(known->second) +
+                       "): participants would touch another shape; restore the file (an "
                        "export holds it), or name the changed one differently in the protocol, "
-                       "which makes it another protocol");
+                       "which creates another protocol");
   }
 }
 
-/// \throws StoreRefused: such a text was never stored by palpate, and cannot even be compared.
+/// \throws StoreRefused: such a text was never stored by palpate, and cannot be compared.
 void require_shallow(const std::string& path, const ProtocolInfo& protocol) {
   try {
     read_json(protocol.text);
   } catch (const JsonError& error) {
     if (error.byte) return;
-    throw StoreRefused(path + ": the text of protocol " + protocol.name + ": " + error.what());
+    throw StoreRefused(path + ": text of protocol " + protocol.name + ": " + error.what());
   }
 }
 

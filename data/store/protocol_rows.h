@@ -14,11 +14,11 @@
 namespace palpate::data {
 
 /// The row id of a protocol, if it is stored. \throws StoreRefused: its text or a file differs from
-/// what is stored.
+/// the stored one.
 std::optional<std::int64_t> find_protocol(SQLite::Database& db, const std::string& path,
                                           const ProtocolInfo& protocol);
 
-/// The same; inserts it where it is absent. Adds the files to one that an earlier version stored
+/// The same; inserts an absent protocol. Adds the files if an earlier version stored the protocol
 /// without them.
 std::int64_t insert_protocol_if_absent(SQLite::Database& db, const std::string& path,
                                        const ProtocolInfo& protocol);

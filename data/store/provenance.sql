@@ -1,4 +1,4 @@
--- Schema version 3: with what a study was shown, and seals that show what was changed since.
+-- Schema version 3: protocol and files of each run, and seals that reveal later changes.
 
 -- Every file that a protocol names (meshes), byte for byte.
 CREATE TABLE files (
@@ -14,15 +14,15 @@ CREATE TABLE protocol_files (
   PRIMARY KEY (protocol_id, name)
 ) STRICT, WITHOUT ROWID;
 
--- Who has another number here than at the station: two stations had given the same one.
+-- Participants with a new number, because two stations had given the same one.
 CREATE TABLE renumberings (
   participant_id INTEGER PRIMARY KEY REFERENCES participants (id),
   enrolled_number INTEGER NOT NULL CHECK (enrolled_number >= 1)  -- orders the trials, also from here on
 ) STRICT;
 
--- The protocol that a run was shown with, where only its texts differ from the participant's.
+-- The protocol of a run, if it differs from the participant's in its texts only.
 ALTER TABLE runs ADD COLUMN protocol_id INTEGER REFERENCES protocols (id);
--- SHA-256 of the names and checksums of the files it was shown with (seals.h); '': none, or not known.
+-- SHA-256 of the names and checksums of the protocol's files (seals.h); '': none, or not known.
 ALTER TABLE runs ADD COLUMN files_sha256 TEXT NOT NULL DEFAULT '' CHECK (length(files_sha256) IN (0, 64));
 
 -- The rows of a session form a chain (seals.h): a seal is the SHA-256 of the seal before and of what

@@ -47,7 +47,7 @@ void require_amount(const StoredTrial& trial, const char* field, double value) {
   if (value < 0) throw_damaged(trial, field, "is below zero");
 }
 
-/// The value where it is a real number that is present.
+/// The value, if it is a real number and present.
 std::optional<double> amount_of(const std::optional<double>& value) { return value; }
 std::optional<double> amount_of(double value) { return value; }
 template <std::integral Whole>
@@ -88,7 +88,7 @@ void require_valid_record(const StoredTrial& trial) {
     const auto amount = amount_of(value);
     if (!amount) return;
     require_amount(trial, column.name, *amount);
-    if (*amount > column.most) throw_damaged(trial, column.name, "is above what is possible");
+    if (*amount > column.most) throw_damaged(trial, column.name, "is above the possible maximum");
   });
 }
 

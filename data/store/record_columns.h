@@ -1,6 +1,6 @@
 #pragma once
-// Internal to data/: the SQL columns that make up a participant, a run and a trial, each list
-// beside the function that reads it from a row, in the same order.
+// Internal to data/: the SQL columns of a participant, a run and a trial, each list beside the
+// function that reads it, in the same order.
 
 #include <SQLiteCpp/Database.h>
 
@@ -15,7 +15,7 @@
 
 namespace palpate::data {
 
-// Internal to data/store: validates values that were read, which a damaged or edited file may hold.
+// Internal to data/store: validates values read from a file that may be damaged or edited.
 
 /// Together with RowReader, which refuses NULL and booleans other than 0 and 1, these are all of
 /// the table's CHECK constraints on an attempt. SQLite's quick_check takes twice as long for them,
@@ -34,7 +34,7 @@ RowReader& operator>>(RowReader& row, RunInfo& info);
 /// \throws SQLite::Exception (damage)
 RunEnd run_end_of(const std::string& text);
 
-/// What session rows are sealed with: participant, protocol and number.
+/// The sealed values of a session: participant, protocol and number.
 struct SessionHead {
   std::int64_t id = 0, protocol_id = 0;
   std::string protocol_name, protocol_sha256;
@@ -48,11 +48,11 @@ SessionHead read_session_head(SQLite::Database& db, std::int64_t id, int version
 inline constexpr const char* kPlanColumns =
     "a.id, a.block, a.trial, a.attempt, a.renderer, a.shape, a.practice, "
     "a.orientation_w, a.orientation_x, a.orientation_y, a.orientation_z, a.began_ns";
-/// Reads kPlanColumns into every field of a plan but the session. onset_ns is when the attempt was
-/// begun until read_outcome sets it. \returns the row id of the attempt
+/// Reads kPlanColumns into every field of a plan but the session. Until read_outcome sets it,
+/// onset_ns is the start of the attempt. \return the row id of the attempt
 std::int64_t read_plan(RowReader& row, TrialRecord& record);
 
-/// One column, read by read_task, of every attempt.
+/// The column that read_task reads.
 const char* task_column(int version);
 /// \throws SQLite::Exception (damage)
 void read_task(RowReader& row, TrialRecord& record);
@@ -60,20 +60,20 @@ void read_task(RowReader& row, TrialRecord& record);
 std::string outcome_columns(int version);  ///< of the schema
 void read_outcome(RowReader& row, TrialRecord& record);
 
-/// p: page_answers. Read by the operator.
+/// p: page_answers. Read by operator>>.
 inline constexpr const char* kPageAnswerColumns =
     "p.page, p.item, p.version, p.text_sha256, p.answer, p.at_ns";
 RowReader& operator>>(RowReader& row, PageAnswer& answer);
 
 // CROSS JOIN fixes SQLite's join order (https://www.sqlite.org/optoverview.html, 7.3): each level
-// is read in the order of its index, so that nothing is sorted in memory or in a temporary file.
+// is read in the order of its index, without sorting in memory or in a temporary file.
 inline constexpr const char* kFromProtocolDown =
     " FROM protocols pr CROSS JOIN participants pa ON pa.protocol_id = pr.id CROSS JOIN sessions s "
     "ON s.participant_id = pa.id ";
 
-// Internal to data/store: validates values before they are written to the database, so that a
-// caller learns every fault at once and not SQLite's first failed CHECK. Every writing call of
-// Store uses it; attempts.cpp uses is_clean_utf8 on what it reads.
+// Internal to data/store: validates values before they are written, so that a caller learns every
+// fault at once instead of SQLite's first failed CHECK. Every writing call of Store uses it;
+// attempts.cpp uses is_clean_utf8 on what it reads.
 
 /// Collects the faults of one record.
 class Validator {
@@ -96,10 +96,10 @@ bool is_clean_utf8(std::string_view text);  ///< well-formed, and no NUL
 
 void validate(Validator& validator, const ProtocolInfo& protocol);
 void validate(Validator& validator, const RunInfo& info, bool simulated);
-/// The fields that are known before the trial is shown.
+/// Fields known before the trial is shown.
 void validate_plan(Validator& validator, const TrialRecord& record, int session);
 void validate(Validator& validator, const PageAnswer& answer);
-/// The fields that are known when it has ended.
+/// Fields known after it has ended.
 void validate_outcome(Validator& validator, const TrialRecord& record);
 
 }  // namespace palpate::data

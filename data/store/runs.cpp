@@ -1,5 +1,5 @@
-// Sessions and runs: a session belongs to a participant; a run is the part of it that one process
-// showed, so that an interrupted session has several.
+// Sessions and runs: a session belongs to a participant; a run is the part of it shown by one
+// process, so an interrupted session has several.
 
 #include "data/store/attempts.h"
 #include "data/store/connection.h"
@@ -36,7 +36,7 @@ std::int64_t insert_session(SQLite::Database& db, std::int64_t participant, cons
   return db.getLastInsertRowid();
 }
 
-/// How the latest run of a session ended; `paused` where there is none.
+/// The end of a session's latest run; `paused` if there is none.
 RunEnd latest_run_end(SQLite::Database& db, std::int64_t session) {
   SQLite::Statement last(
       db, "SELECT end_reason FROM runs WHERE session_id = ? ORDER BY id DESC LIMIT 1");
@@ -101,8 +101,8 @@ std::optional<std::int64_t> Store::Impl::other_protocol(const Participant& parti
   const std::int64_t shown = insert_protocol_if_absent(*db, path, *shown_with);
   const std::string files = files_checksum(*db, own);
   if (!files.empty() && files_checksum(*db, shown) != files) {
-    refuse("the files that the protocol names now are not those that participant " +
-           participant.code + " began with; put them back as they were");
+    refuse("the files that the protocol names differ from those with which participant " +
+           participant.code + " began; restore them");
   }
   return shown != own ? std::optional(shown) : std::nullopt;
 }
@@ -146,7 +146,7 @@ void Store::add_note(const Run& run, std::int64_t at_ns, const std::string& text
 
 void Store::end_run(const Run& run, RunEnd reason, std::int64_t ended_ns) {
   if (reason == RunEnd::running || reason == RunEnd::interrupted) {
-    impl_->refuse(std::string("a run cannot be ended as ") + to_string(reason));
+    impl_->refuse(std::string("a run cannot end as ") + to_string(reason));
   }
   impl_->commit([&] {
     impl_->require_running(run);

@@ -17,20 +17,20 @@ constexpr std::size_t bytes_a_sample(int packing) {
   return 4 + (packing > 1 ? 8 : 0) + 13 * 8 + 4 + (packing > 2 ? 2 * 8 + 6 * 8 + 3 : 0) +
          (packing > 3 ? 1 + 13 * 8 : 0);
 }
-// Limits of the count that is read, so that a damaged one cannot make the decoder allocate memory
-// out of proportion to the compressed bytes: at most a trial of an hour at the highest rate, and
-// beyond some minutes at least the bytes per sample that the jitter of a clock takes (zlib
-// compresses 1000 equal bytes to one).
+// Limits of the stored count, so that a damaged one cannot make the decoder allocate memory out of
+// proportion to the compressed bytes: at most a trial of an hour at the highest rate; beyond some
+// minutes, at least as many bytes per sample as the jitter of a clock takes (zlib compresses 1000
+// equal bytes to one).
 constexpr std::int64_t kMostSamples = 40'000'000;
 constexpr std::size_t kSamplesWithFewBytes = 400'000;
 constexpr std::size_t kLeastBytesASample = 2;
 constexpr std::size_t kMostShrunk = 1032;             // the highest compression ratio of zlib
-constexpr std::size_t kPiece = std::size_t{1} << 16;  // bytes that are decompressed at a time
+constexpr std::size_t kPiece = std::size_t{1} << 16;  // bytes decompressed at a time
 // zlib's level: a trial of 10 s takes some 50 ms, and higher levels save little, because the low
 // bytes of a measured signal are noise.
 constexpr int kLevel = 3;
 
-// Visits the columns in their order, for encoder and decoder: calls column(rows, get, form), where
+// Visits the columns in order, for encoder and decoder: calls column(rows, get, form), where
 // get(row) is a reference to the field and `form` a value of its stored type.
 template <class Samples, class Bodies, class Visitor>
 void visit_columns(int packing, Samples& samples, Bodies& bodies, Visitor&& visit) {
@@ -190,7 +190,7 @@ std::string pack_samples(const std::vector<SampleRecord>& samples,
                          const std::vector<BodyRecord>& bodies) {
   const std::size_t count = samples.size();
   if (!bodies.empty() && bodies.size() != count)
-    throw std::invalid_argument("one body for each sample is expected, or none at all");
+    throw std::invalid_argument("expected one body for each sample, or none");
   const int packing = packing_for(bodies);
   std::vector<unsigned char> planes(count * bytes_a_sample(packing));
   std::size_t offset = 0;
@@ -210,7 +210,7 @@ std::string pack_samples(const std::vector<SampleRecord>& samples,
     offset += sizeof(Field) * count;
   });
   std::string packed = compressed(planes, kLevel);
-  // Samples that hardly differ would look like a false count: stored uncompressed.
+  // Store nearly equal samples uncompressed: their compressed size would look like a damaged count.
   if (!bytes_suffice(count, packed.size())) packed = compressed(planes, Z_NO_COMPRESSION);
   const std::uint32_t crc = crc_of(planes.data(), planes.size());
   for (int shift = 24; shift >= 0; shift -= 8) packed += static_cast<char>(crc >> shift);

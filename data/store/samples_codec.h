@@ -10,18 +10,20 @@
 
 namespace palpate::data {
 
-/// Packing 4: packing 3, and after it `bodies` and the fields of TrialRecord::bodies; of samples of
-/// which some have a body.
-/// Packing 3: the fields of SampleRecord but for `bodies` in order of declaration, each as a column
+/// Packing 4: packing 3, followed by `bodies` and the fields of TrialRecord::bodies; for samples
+/// with a body.
+///
+/// Packing 3: the fields of SampleRecord except `bodies`, in order of declaration, each as a column
 /// of `count` values (vectors as three columns). Delta encoding: a value is its bit pattern minus
 /// the previous one (modulo 2^32 or 2^64; 8-bit fields without delta). Byte transposition: each
 /// column is stored as byte planes, most significant first; the upper bytes of consecutive samples
 /// are alike and compress well. The whole is one zlib stream (RFC 1950), followed by the CRC-32 of
 /// its content, most significant byte first (zlib's Adler-32 misses some single-bit errors).
+///
 /// Packing 2: without lateness_ns, compute_ns, device1, device2 (all read as 0) and the CRC, and
 /// with only the lowest 8 bits of faults. Packing 1: in addition without period_ns.
 inline constexpr int kSamplesPacking = 4;
-inline constexpr int kPlainSamplesPacking = 3;  ///< of samples without bodies
+inline constexpr int kPlainSamplesPacking = 3;  ///< for samples without bodies
 
 /// As in TrialRecord.
 struct RecordedSamples {
@@ -29,10 +31,10 @@ struct RecordedSamples {
   std::vector<BodyRecord> bodies;
 };
 
-/// In which they are packed: 4 where there are bodies, else 3.
+/// The packing for samples: 4 if there are bodies, else 3.
 int packing_for(const std::vector<BodyRecord>& bodies);
-/// In packing_for them. \param bodies  one for each sample, or none
-/// \throws std::invalid_argument: there are more or fewer
+/// Packs samples in packing_for(bodies). \param bodies one for each sample, or none
+/// \throws std::invalid_argument: another number of bodies
 std::string pack_samples(const std::vector<SampleRecord>& samples,
                          const std::vector<BodyRecord>& bodies = {});
 

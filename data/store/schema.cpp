@@ -1,5 +1,5 @@
-// Verifies the schema of a file: one that carries palpate's application_id may still have other
-// table definitions, or triggers that would run when it is written to.
+// Verifies the schema of a file: even with palpate's application_id it may have other table
+// definitions, or triggers that run on writing.
 #include "data/store/schema.h"
 
 #include <SQLiteCpp/Backup.h>
@@ -26,7 +26,7 @@
 namespace palpate::data {
 namespace {
 
-/// SQL without comments, every run of white space as one space; text in quotes unchanged.
+/// SQL without comments and with single spaces; quoted text unchanged.
 std::string normalized_sql(const std::string& sql) {
   std::string plain;
   bool quoted = false;
@@ -51,9 +51,10 @@ std::map<std::string, std::string> objects_of(SQLite::Database& db, const std::s
   while (find.executeStep()) {
     const std::string type = find.getColumn(0).getString(), name = find.getColumn(1).getString();
     if (type == "trigger") {
-      throw StoreRefused(path + ": has a trigger, '" + name +
-                         "', which no palpate database has; remove it with: sqlite3 FILE 'DROP "
-                         "TRIGGER ...', or restore a backup");
+      throw StoreRefused(
+          path + ": has a trigger, '" + name +
+          "', unlike every database that palpate creates; remove it with: sqlite3 FILE 'DROP "
+          "TRIGGER ...', or restore a backup");
     }
     objects[name] = normalized_sql(find.getColumn(2).getString());
   }
@@ -91,7 +92,7 @@ void set_version(SQLite::Database& db, int version) {
   db.exec("PRAGMA user_version = " + std::to_string(version));
 }
 
-/// In a private folder, where no other user can put files beside it.
+/// Creates it in a private folder, where no other user can put files beside it.
 void make_private_file(const std::string& file) {
   const int descriptor = ::open(file.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
   if (descriptor < 0) {
@@ -101,7 +102,7 @@ void make_private_file(const std::string& file) {
   ::close(descriptor);
 }
 
-/// All of the log into the file. \throws SQLite::Exception: the disk is full
+/// Moves all of the log into the file. \throws SQLite::Exception: the disk is full
 void checkpoint(SQLite::Database& db) {
   SQLite::Statement all(db, "PRAGMA wal_checkpoint(TRUNCATE)");
   all.executeStep();
@@ -152,7 +153,7 @@ void create_database(const std::string& path) {
     db.exec("PRAGMA application_id = " + std::to_string(kApplicationId));
     set_version(db, kSchemaVersion);
     transaction.commit();
-    checkpoint(db);  // closing does it, too, but cannot say that the disk is full
+    checkpoint(db);  // closing does so too, but cannot report a full disk
   });
   if (!rename_if_absent(temporary, path)) {
     throw StoreRefused(path + ": another program created it at the same moment; start again");
@@ -162,9 +163,10 @@ void create_database(const std::string& path) {
 void require_application_id(SQLite::Database& db, const std::string& path) {
   if (db.execAndGet("PRAGMA application_id").getInt() == kApplicationId) return;
   if (db.execAndGet("PRAGMA application_id").getInt() == kSweepApplicationId) {
-    throw StoreRefused(path +
-                       ": is the file of a sweep, no study's database; 'palpate analyze --sweep', "
-                       "'export' and 'merge' take it, 'palpate sweep' goes on with it");
+    throw StoreRefused(
+        path +
+        ": is the file of a sweep, not a study's database; read it with 'palpate analyze --sweep', "
+        "'export' or 'merge', resume it with 'palpate sweep'");
   }
   throw StoreRefused(path + ": is not a palpate database but another program's; name another file");
 }
@@ -175,8 +177,8 @@ int checked_version(SQLite::Database& db, const std::string& path, int newest) {
     const int version = db.execAndGet("PRAGMA user_version").getInt();
     if (version > newest || version < 1) {
       throw StoreRefused(path + ": has schema version " + std::to_string(version) +
-                         ", this palpate knows 1 to " + std::to_string(newest) +
-                         "; use the palpate that wrote it or a newer one");
+                         "; this version of palpate reads 1 to " + std::to_string(newest) +
+                         "; use the version that wrote it or a newer one");
     }
     return version;
   });
@@ -186,7 +188,7 @@ std::string migrate(SQLite::Database& db, const std::string& path, int from, int
                     std::span<const Migration> steps) {
   std::string copy = back_up(db, path, from);
   guarded(path, [&] {
-    // A step may rebuild tables that others refer to: foreign keys are checked once, at the end.
+    // A step may rebuild tables that others refer to; check foreign keys once, at the end.
     db.exec("PRAGMA foreign_keys = OFF");
     SQLite::Transaction transaction(db, SQLite::TransactionBehavior::IMMEDIATE);
     int version = from;

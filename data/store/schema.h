@@ -26,7 +26,7 @@ const char* tasks_sql();
 struct Migration {
   int from;
   const char* sql;
-  void (*fill)(SQLite::Database&) = nullptr;  ///< after the SQL: what SQL cannot do
+  void (*fill)(SQLite::Database&) = nullptr;  ///< after the SQL, for changes beyond SQL
 };
 
 /// The migrations to kSchemaVersion, in order.

@@ -16,9 +16,9 @@
 namespace palpate::data {
 namespace {
 
-constexpr int kVersion = 3;  // of the schema that brought the seals
+constexpr int kVersion = 3;  // first version of the schema with seals
 
-/// Of the schema: the rows of an older database are sealed before it has the columns of today.
+/// Version of the schema: rows of an older database are sealed before migration adds columns.
 int version_of(SQLite::Database& db) {
   SQLite::Statement tasks(db, "SELECT 1 FROM pragma_table_info('attempts') WHERE name = 'task'");
   if (tasks.executeStep()) return 5;
@@ -41,7 +41,7 @@ void require_row(SQLite::Statement& find) {
 
 }  // namespace
 
-/// The last link of a session in the database; link 0 (the session itself) where there is none.
+/// The last link of a session in the database; or link 0 (the session itself) if there is none.
 const Link& SealWriter::last_of(std::int64_t session) {
   const auto known = last_.find(session);
   if (known != last_.end()) return known->second;
@@ -248,7 +248,7 @@ void put_note(SealedValues& out, std::int64_t run_link, std::int64_t at_ns,
 
 namespace {
 
-/// How many measured columns this version of the schema brought.
+/// Number of measured columns that this version of the schema added.
 constexpr int measured_by(int version) {
   int n = 0;
   for (const MeasuredColumn& column : kMeasured) n += column.since == version ? 1 : 0;
@@ -261,8 +261,8 @@ bool is_present(const T&) {
 }
 bool is_present(const std::optional<double>& value) { return value.has_value(); }
 
-/// Those columns; nothing where all of them are null. From version 5 on the version stands first,
-/// which tells one group from the other.
+/// Appends those columns, unless all are null. From version 5 on the version comes first, to
+/// distinguish the groups.
 void put_measured(SealedValues& out, const TrialRecord& record, int version) {
   bool any = false;
   for_each_measured(record, [&](const MeasuredColumn& column, const auto& value) {
@@ -322,7 +322,7 @@ void ChainCheck::fail(const RowName& name, const char* what) const {
 void ChainCheck::take(const Checksum& seal, const SealedValues& values, const RowName& name) {
   if (values.seal(last_) != seal) {
     fail(name, links_ > 0 ? ": was changed since it was recorded: it does not match its seal"
-                          : ", or the participant, protocol or settings that it belongs to, was "
+                          : ", or its participant, protocol or settings, was "
                             "changed since it was recorded: it does not match its seal");
   }
   last_ = seal;

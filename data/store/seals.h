@@ -1,9 +1,9 @@
 #pragma once
-// Internal to data/store: the hash chain over the rows of a session. Its links are called seals.
+// Internal to data/store: the hash chain over the rows of a session; its links are called seals.
 //
 // A seal is SHA-256(previous seal, values of the row). It detects accidents and silent edits:
 // changing a value changes what its seal was computed from, and removing a row breaks the chain. It
-// does not prove authenticity: whoever has this program can compute seals anew. Where that matters,
+// does not prove authenticity: anyone with this program can recompute seals. Where that matters,
 // keep the last seal elsewhere.
 //
 // Encoding of the values, one after the other: a letter for the type (n null, i integer, r real, t
@@ -41,7 +41,7 @@
 
 namespace palpate::data {
 
-/// The values of a row in the encoding that is hashed.
+/// The values of a row, encoded for hashing.
 class SealedValues {
  public:
   /// Starts a row of this kind; drops the values of the previous row.
@@ -93,7 +93,7 @@ class SealedValues {
 
 struct SessionHead;
 
-/// The sealed values of an attempt that are not in its TrialRecord.
+/// Sealed values of an attempt outside its TrialRecord.
 struct AttemptSealed {
   std::int64_t run_link = 0, began_ns = 0;
   std::optional<std::string> cut_off_reason;  ///< none: it was completed
@@ -121,7 +121,7 @@ struct Link {
 struct RowName {
   const char* kind;  ///< "trial", "note of run", ...
   std::int64_t number = 0;
-  int attempt = 0;  ///< 0: it has none
+  int attempt = 0;  ///< 0: not an attempt
 };
 
 /// Verifies the rows of one session against their seals. Rows may be added in any order.

@@ -26,7 +26,7 @@ std::string renamed(std::string message, const std::string& copy, const std::str
   return message;
 }
 
-/// Copying on a full disk may fail with another error.
+/// Copying on a full disk may fail with an unrelated error.
 std::string cause_of(const std::error_code& error, const std::string& copy) {
   constexpr std::uintmax_t kFull = 65'536;  // bytes
   std::error_code unknown;
@@ -52,14 +52,14 @@ StationDatabase::StationDatabase(const std::string& path, const std::string& scr
     throw StoreRefused(path + ": there is no such file (or its folder may not be read)");
   }
   if (fs::file_size(file_, error) == 0 || error) {
-    throw StoreRefused(path + ": is empty, which a palpate database never is");
+    throw StoreRefused(path + ": is empty; a palpate database is never empty");
   }
   try {
     lock_.emplace(file_);
   } catch (const StoreRefused&) {
     throw;  // another process writes to it
   } catch (const StoreError&) {
-    lock_.reset();  // no write permission for its folder, so no writer of this user either
+    lock_.reset();  // no write permission for its folder, so this user has no writer either
   }
   opened_ = state_of_file(file_);
   guarded(path, [&] {
@@ -73,7 +73,7 @@ StationDatabase::StationDatabase(const std::string& path, const std::string& scr
     verify_schema(*db_, path, checked_version(*db_, path));
     if (read == file_) quick_check(*db_, path);
     verify_protocol_checksums(*db_, path, kSchemaVersion);
-    // Rows of a copy were sealed during its migration: their samples are decoded as well.
+    // Also decode the samples of a copy: its rows were sealed during migration.
     AttemptFilter all;
     all.samples = read == file_ ? SampleReading::verify : SampleReading::unpack;
     read_attempts(*db_, path_, kSchemaVersion, all, [](const StoredTrial&) {});
@@ -115,7 +115,7 @@ void StationDatabase::take_copy(const std::string& scratch) {
   } catch (const StoreError& error) {
     throw StoreError(path_ + ": cannot be read through a copy: " + error.what());
   }
-  // It is read without its log, which closing has written into it unless the disk is full.
+  // The copy is read without its log; closing has merged the log unless the disk is full.
   std::error_code none;
   if (const auto left = fs::file_size(scratch + "-wal", none); !none && left > 0) {
     throw StoreError(path_ + ": cannot be copied to " + scratch +
@@ -125,8 +125,8 @@ void StationDatabase::take_copy(const std::string& scratch) {
 
 void StationDatabase::require_unchanged() const {
   if (state_of_file(file_) == opened_) return;
-  throw StoreError(
-      path_ + ": was written to while it was read; start again when the other program has ended");
+  throw StoreError(path_ +
+                   ": was changed while it was read; start again when the other program has ended");
 }
 
 }  // namespace palpate::data

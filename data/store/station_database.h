@@ -13,10 +13,9 @@
 
 namespace palpate::data {
 
-/// The content that Store::open for writing would leave: current schema, -wal checkpointed, runs of
-/// crashed processes marked as interrupted. Where the file differs from that, a private copy is
-/// brought there and read instead. Holds the writer's lock, so that no other process writes
-/// meanwhile.
+/// Gives the content as after Store::open for writing: current schema, -wal checkpointed, runs of
+/// crashed processes marked as interrupted. If the file differs from that, reads a private copy
+/// brought to this state. Holds the writer's lock, so that no other process writes meanwhile.
 class StationDatabase {
  public:
   /// \param scratch path for the private copy; must not exist. \throws as Store::open.
@@ -29,7 +28,7 @@ class StationDatabase {
   void require_unchanged() const;
 
  private:
-  /// Differs after the file was written to.
+  /// Changes when the file is written to.
   struct FileState {
     FileIdentity identity;
     std::int64_t size = 0, modified_ns = 0;

@@ -49,7 +49,7 @@ struct SessionProgress {
 struct StoredTrial {
   Participant participant;
   std::string protocol_name, protocol_sha256;
-  RunInfo run;         ///< the run in which this attempt was shown
+  RunInfo run;         ///< the run that showed this attempt
   TrialRecord record;  ///< of a cut-off attempt: identity, orientation and onset (its begin) only
   std::string cut_off_reason;  ///< "" when completed
 };
@@ -87,10 +87,10 @@ struct StoredRun {
 /// The rows and files of one participant code, in all protocols.
 struct ParticipantSummary {
   bool withdrawn_before = false;  ///< the code has a tombstone
-  std::int64_t protocols = 0;     ///< that it is enrolled in
+  std::int64_t protocols = 0;     ///< in which it is enrolled
   std::int64_t sessions = 0, trials = 0, cut_off = 0;
   std::int64_t mentions = 0;                  ///< notes on other participants that contain the code
-  std::vector<ExportRecord> exports;          ///< that hold it, also from before a withdrawal
+  std::vector<ExportRecord> exports;          ///< that hold it, also those before a withdrawal
   std::vector<std::string> remaining_copies;  ///< files and folders that contain the code
 };
 
@@ -112,7 +112,7 @@ class Store {
     /// a backup beside it (FILE.v<N>.backup). Marks runs of crashed processes as `interrupted` and
     /// their open attempts as cut off.
     write_or_create,
-    /// Any number of readers, also beside a writer: a snapshot of what is committed now.
+    /// Any number of readers, also beside a writer: a snapshot of the committed state.
     read_only,
   };
 
@@ -128,16 +128,16 @@ class Store {
 
   // --- writing -------------------------------------------------------------------------------
 
-  /// Finds `code` in this protocol or adds it, with `wanted_number` or the smallest unused number.
-  /// Protocols are identified by SHA-256. \throws StoreRefused: a code that is not 1 to 32 letters
-  /// and digits, or is withdrawn; a number below 1 or of another code; a known code with another
-  /// number or seed, or simulated instead of real.
+  /// Finds `code` in this protocol or enrols it, with `wanted_number` or the smallest unused
+  /// number. Protocols are identified by SHA-256. \throws StoreRefused: a code that is not 1 to 32
+  /// letters and digits, or is withdrawn; a number below 1 or of another code; a known code with
+  /// another number or seed, or simulated instead of real.
   Participant enrol(const ProtocolInfo& protocol, const std::string& code,
                     std::optional<int> wanted_number = std::nullopt, bool simulated = false,
                     std::optional<std::uint64_t> seed = std::nullopt);
 
-  /// What enrol would return, without writing: id 0 and the number to be assigned, if `code` is not
-  /// in this protocol yet. \throws as enrol.
+  /// The result of enrol, without writing: id 0 and the number to be assigned, if `code` is not in
+  /// this protocol yet. \throws as enrol.
   Participant look_up(const ProtocolInfo& protocol, const std::string& code,
                       std::optional<int> wanted_number = std::nullopt, bool simulated = false,
                       std::optional<std::uint64_t> seed = std::nullopt);
@@ -168,8 +168,8 @@ class Store {
   /// Ends the open attempt without a record; its trial is shown again. \param reason "device fault"
   void cut_off_attempt(const Run& run, const std::string& reason);
 
-  /// Finished trials of a simulated run in one transaction; `attempt` must be 1. Trials that were
-  /// not committed when the process died are simulated again. \throws StoreRefused: as
+  /// Stores finished trials of a simulated run in one transaction; `attempt` must be 1. Trials that
+  /// were not committed when the process died are simulated again. \throws StoreRefused: as
   /// finish_attempt; a participant who is not simulated.
   void record_simulated(const Run& run, const std::vector<TrialRecord>& records);
 
@@ -185,18 +185,18 @@ class Store {
 
   /// Withdrawal: removes all data of a participant, in all protocols. Deletes the rows with
   /// secure_delete, truncates the -wal, rebuilds the file (VACUUM) and deletes backups beside it
-  /// that hold the participant. A salted hash of the code stays (forget.h), with which enrol
-  /// and merge refuse it. After a crash the same call finishes what is left. \throws StoreRefused:
+  /// that hold the participant. A salted hash of the code stays (forget.h), with which enrol and
+  /// merge refuse it. After a crash the same call completes the withdrawal. \throws StoreRefused:
   /// no such participant; StoreError: another program reads (the rows are deleted, but the -wal
   /// still holds them), or the disk fails.
   Withdrawal forget(const std::string& code);
 
   // --- reading -------------------------------------------------------------------------------
 
-  /// Empty where the session was never begun.
+  /// Empty if the session was never begun.
   SessionProgress progress(const Participant& participant, int session);
 
-  /// In the order of insertion, without their files; includes those of RunInfo::protocol_sha256.
+  /// In order of insertion, without their files; includes those of RunInfo::protocol_sha256.
   std::vector<ProtocolInfo> protocols();
   /// The files that a protocol names, by name.
   std::vector<ProtocolFile> files(const std::string& protocol_sha256);
@@ -208,10 +208,10 @@ class Store {
   std::vector<StoredNote> notes();   ///< in the same order
   /// Answers to pages, in the same order.
   std::vector<StoredPageAnswer> page_answers();
-  /// Names of the pages that a session has answers to.
+  /// Names of the pages answered in a session.
   std::vector<std::string> answered_pages(const Participant& participant, int session);
   /// The latest recorded time of live sessions, ns since 1970; simulated sessions use a virtual
-  /// clock. To detect a clock that was set back.
+  /// clock. Used to detect a clock that was set back.
   std::optional<std::int64_t> latest_recorded_time();
   StoreCounts counts();
   ParticipantSummary participant_summary(const std::string& code);
@@ -224,8 +224,8 @@ class Store {
   /// they need not fit into memory. `visit` must not write to this store.
   void for_each_trial(const std::function<void(const StoredTrial&)>& visit,
                       bool with_samples = false);
-  /// Likewise, with the samples of those trials that `samples_wanted` says, which is asked of each
-  /// before its visit: several threads, each with a store of its own, can share the work.
+  /// The same, with samples only for trials that `samples_wanted` selects; it is called before each
+  /// visit. So several threads, each with its own store, can share the work.
   void for_each_trial(const std::function<void(const StoredTrial&)>& visit,
                       const std::function<bool(const StoredTrial&)>& samples_wanted);
   /// Attempts that were cut off, in the same order, then by attempt.

@@ -37,7 +37,7 @@ namespace palpate::data {
 
 // Internal to data/store: tables and rows of a sweep's file.
 
-/// What the tables of a file are read with.
+/// The plan and seal needed to read the tables of a file.
 struct SweepTables {
   SweepPlan plan;
   int version = 0;
@@ -47,11 +47,11 @@ struct SweepTables {
 
 /// Within a transaction, in an empty database: identity and version, table `sweep` with the plan in
 /// its only row, table `points` with a column for each parameter and figure. \throws StoreRefused:
-/// a name that is no column's
+/// a name cannot be a column's
 SweepTables create_sweep_tables(SQLite::Database& db, const SweepPlan& plan);
 
-/// Checks version, integrity, that the tables are those that create_sweep_tables makes, and all
-/// seals. \throws StoreRefused; SQLite::Exception.
+/// Checks version, integrity, tables (as made by create_sweep_tables) and all seals. \throws
+/// StoreRefused; SQLite::Exception.
 SweepTables read_sweep_tables(SQLite::Database& db, const std::string& path);
 
 /// Adds rows to a file of the current version.
@@ -66,15 +66,15 @@ class SweepRowWriter {
   SQLite::Statement insert_, find_, seal_;
 };
 
-/// Of the row of either version that a SELECT * stands at; computed from its values.
+/// Computes the seal from the values of the current row of a SELECT *, of either version.
 Checksum seal_of_row(SQLite::Statement& row, const SweepTables& tables);
 /// Verifies the row's seal. \throws StoreRefused, naming the row
 void require_sealed(SQLite::Statement& row, const SweepTables& tables, const std::string& path);
-/// From SELECT *; verified.
+/// Reads and verifies the current row of a SELECT *.
 SweepRow read_sweep_row(SQLite::Statement& row, const SweepTables& tables, const std::string& path);
 
 std::string insert_sweep_row_sql(const SweepPlan& plan);
-/// Binds what stands in the columns of a row of either version, and its seal.
+/// Binds the columns of a row of either version, and its seal.
 void copy_row(SQLite::Statement& row, const Checksum& seal, SQLite::Statement& insert);
 
 namespace {
@@ -94,7 +94,7 @@ constexpr const char* kSweepColumns =
     "NULL, "
     "parameters TEXT NOT NULL, shapes TEXT NOT NULL, renderers TEXT NOT NULL";
 
-/// As a column of SQL. \throws StoreRefused
+/// A name as a column of SQL. \throws StoreRefused
 std::string quoted(const std::string& name) {
   const bool plain = !name.empty() && std::all_of(name.begin(), name.end(), [](unsigned char c) {
     return std::isalnum(c) != 0 || c == '_' || c == '-';
@@ -132,14 +132,14 @@ int known_version(SQLite::Database& db, const std::string& path) {
   const int version = db.execAndGet("PRAGMA user_version").getInt();
   if (version >= 1 && version <= kSweepVersion) return version;
   throw StoreRefused(path + ": a sweep's file of version " + std::to_string(version) +
-                     ", this palpate knows 1 to " + std::to_string(kSweepVersion) +
-                     "; use the palpate that wrote it or a newer one");
+                     "; this version of palpate reads 1 to " + std::to_string(kSweepVersion) +
+                     "; use the version that wrote it or a newer one");
 }
 
 [[noreturn]] void refuse_seal(const std::string& path, const std::string& row) {
   throw StoreRefused(path + ": " + row +
                      " does not match its checksum: the file is damaged or was changed; restore a "
-                     "backup, or make it anew: of the same plan it comes out the same");
+                     "backup, or run the sweep again: the same plan gives the same results");
 }
 
 /// Columns of a row before its seal.
@@ -232,7 +232,7 @@ SweepTables create_sweep_tables(SQLite::Database& db, const SweepPlan& plan) {
                  << plan.program_version << nlohmann::json(plan.parameters).dump()
                  << nlohmann::json(plan.shapes).dump() << nlohmann::json(plan.renderers).dump();
   insert.exec();
-  // Sealed as it was stored.
+  // Seal the row as stored.
   SQLite::Statement find(db, "SELECT * FROM sweep");
   find.executeStep();
   SweepTables tables{plan, kSweepVersion, seal_of_plan(find), value_count(plan)};
@@ -246,7 +246,8 @@ SweepTables create_sweep_tables(SQLite::Database& db, const SweepPlan& plan) {
 SweepTables read_sweep_tables(SQLite::Database& db, const std::string& path) {
   const int version = known_version(db, path);
   const auto refuse = [&](const char* why) {
-    throw StoreRefused(path + ": " + why + "; the file is damaged or was changed, make it anew");
+    throw StoreRefused(path + ": " + why +
+                       "; the file is damaged or was changed; run the sweep again");
   };
   const Objects found = objects_of_sweep(db);
   const auto table = found.find("sweep");
@@ -293,7 +294,7 @@ void SweepRowWriter::add(const SweepRow& row) {
   bind << Checksum{};
   insert_.exec();
   insert_.reset();
-  // Sealed as it was stored: SQLite keeps no NaN, and no sign of a zero.
+  // Seal the row as stored: SQLite keeps neither NaN nor the sign of zero.
   Binder(find_) << row.point;
   find_.executeStep();
   const Checksum seal = seal_of_row(find_, tables_);
@@ -367,10 +368,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// A reader in another program, such as an export, does not end a sweep of hours; nor does a writer
-// that waits for that reader end others.
+// Wait for a reader in another program, such as an export, instead of ending a sweep of hours;
+// others wait for this writer likewise.
 constexpr int kBusyTimeoutMs = 60'000;
-constexpr std::size_t kPageRows = 1000;  // that are read at a time
+constexpr std::size_t kPageRows = 1000;  // rows read at a time
 constexpr int kOpenWrite = SQLITE_OPEN_READWRITE | SQLITE_OPEN_NOMUTEX;
 
 void sync_path(const std::string& path, const std::string& named) {
@@ -397,14 +398,15 @@ void require_fitting(const SweepPlan& plan, const SweepRow& row, const std::stri
     return;
   }
   throw StoreRefused(path + ": point " + std::to_string(row.point) +
-                     " does not fit to the sweep's plan");
+                     " does not fit the sweep's plan");
 }
 
 [[noreturn]] void refuse_other_plan(const std::string& path,
                                     const std::vector<std::string>& reasons) {
-  std::string text = path + ": holds another sweep. Of that and of this one differ:";
+  std::string text = path + ": holds another sweep. Differences (that sweep, then this one):";
   for (const std::string& reason : reasons) text += "\n  " + reason;
-  throw StoreRefused(text + "\nName another file, or give what that sweep was begun with");
+  throw StoreRefused(text +
+                     "\nName another file, or give the settings with which that sweep was begun");
 }
 
 }  // namespace
@@ -473,12 +475,12 @@ struct SweepFile::Impl {
     writes = writing;
     if (!is_sweep_file(file)) {
       throw StoreRefused(path +
-                         ": is no sweep's file; 'palpate sweep' makes one. A study's database is "
-                         "analysed and exported with --db");
+                         ": is not a sweep's file; 'palpate sweep' creates one. Analyse and export "
+                         "a study's database with --db");
     }
     require_private_sqlite_files(file);
     guarded(path, [&] {
-      // A journal that a killed process left is rolled back by whoever opens the file.
+      // Opening the file rolls back the journal of a killed process.
       if (writes || ::access(file.c_str(), W_OK) == 0) {
         db.emplace(file, kOpenWrite, kBusyTimeoutMs);
       } else if (fs::exists(file + "-journal")) {
@@ -610,15 +612,15 @@ struct SweepCopy::Impl {
   SweepTables tables;
   std::optional<SQLite::Database> db;
   std::optional<SQLite::Transaction> transaction;
-  std::int64_t last = 0;  ///< point that was added
+  std::int64_t last = 0;  ///< last point added
   bool in_order = true;
 
   void begin() {
     make_empty_file(path);
     guarded(path, [&] {
       db.emplace(path, kOpenWrite, kBusyTimeoutMs);
-      // A temporary file, deleted if anything fails: needs no journal. One transaction, whatever
-      // the number of sources: the header counts them.
+      // A temporary file, deleted if anything fails: needs no journal. One transaction for all
+      // sources: the header counts transactions.
       db->exec("PRAGMA page_size = 4096; PRAGMA journal_mode = OFF; PRAGMA synchronous = OFF");
       transaction.emplace(*db);
       tables = create_sweep_tables(*db, plan);
@@ -651,7 +653,7 @@ void SweepCopy::add(SweepFile& from) {
           if (seal_of_row(find, impl_->tables) == seal) continue;
           throw StoreRefused(
               from.path() + ": point " + std::to_string(point) +
-              " has other results than in a file before it, with the same seeds; one of "
+              " has other results than in an earlier file, with the same seeds; one of "
               "them is wrong");
         }
         impl_->in_order = false;

@@ -85,7 +85,7 @@ TaskRecord parse_task_text(const std::string& text) {
 
 namespace {
 
-/// The point alone has no side, and gives force only.
+/// Only the point renderer has no side; it gives force only.
 bool gives_torque(const std::string& renderer) { return !renderer.empty() && renderer != "point"; }
 
 }  // namespace

@@ -1,6 +1,6 @@
 #pragma once
-// Internal to data/store: a trial's task as the database keeps it, one line of JSON. Keys that have
-// no value are left out.
+// Internal to data/store: a trial's task in the database, one line of JSON. Keys without a value
+// are left out.
 
 #include <cstdint>
 #include <optional>
@@ -17,9 +17,9 @@ std::string task_text(const TaskRecord& task);
 /// The inverse. \throws std::invalid_argument: damaged
 TaskRecord parse_task_text(const std::string& text);
 
-// Where the renderer's torque was left out: runs say so by a note.
+// Runs in which the renderer's torque was left out; each has a note.
 
-/// The note of a run whose device senses the stylus's axis and drives force alone.
+/// The note of a run with a device that senses the stylus's axis but drives force alone.
 inline constexpr const char* kTorqueLeftOutNote = R"({"torque":"left out"})";
 
 class TorqueNotes {
@@ -30,11 +30,12 @@ class TorqueNotes {
   /// Whether torque was left out in a run.
   bool any() const { return !runs_.empty(); }
   bool left_out(const Participant& participant, const RunInfo& run) const;
-  /// Whether the device drove the torque of the trial's renderer; missing where that gives none.
+  /// Whether the device drove the torque of the trial's renderer; missing if the renderer gives
+  /// none.
   std::optional<bool> driven(const StoredTrial& trial) const;
 
  private:
-  /// Participant, session, and when it began on both clocks.
+  /// Participant, session, and start of the run on both clocks.
   using RunKey = std::tuple<std::int64_t, int, std::int64_t, std::int64_t>;
   std::set<RunKey> runs_;
 };

@@ -1,4 +1,4 @@
--- Schema version 2: what a withdrawal needs to know, and what it leaves.
+-- Schema version 2: exports, which a withdrawal lists, and tombstones, which it leaves.
 
 -- The exports that palpate made of this database: a withdrawal lists those that hold the participant.
 CREATE TABLE exports (
@@ -15,14 +15,14 @@ CREATE TABLE export_participants (
 ) STRICT, WITHOUT ROWID;
 CREATE INDEX exports_of_participant ON export_participants (participant_id);
 
--- One row for each code that was withdrawn; nothing else is kept of it.
+-- One row for each withdrawn code; no other data of it remain.
 CREATE TABLE tombstones (
   id INTEGER PRIMARY KEY,
   code_hash TEXT NOT NULL UNIQUE,  -- crypt(3), yescrypt: salted and slow
   cleared INTEGER NOT NULL CHECK (cleared IN (0, 1))  -- 0: log, free pages, backups may still hold it
 ) STRICT;
 
--- Exports that hold somebody who has withdrawn since.
+-- Exports that hold a participant who has withdrawn since.
 CREATE TABLE tombstone_exports (
   tombstone_id INTEGER NOT NULL REFERENCES tombstones (id),
   export_id INTEGER NOT NULL REFERENCES exports (id),

@@ -44,11 +44,11 @@ TEST(JsonText, IsReadToADepthOf64) {
 }
 
 TEST(JsonText, FaultsSayWhereTheyAre) {
-  EXPECT_EQ(fault_of("[1, x]"), "expected JSON in UTF-8, found no such at byte 4");
-  EXPECT_EQ(fault_of(""), "expected JSON in UTF-8, found no such at byte 0");
-  EXPECT_EQ(fault_of("[1] 2"), "expected JSON in UTF-8, found no such at byte 4");
+  EXPECT_EQ(fault_of("[1, x]"), "expected JSON in UTF-8, found other text at byte 4");
+  EXPECT_EQ(fault_of(""), "expected JSON in UTF-8, found other text at byte 0");
+  EXPECT_EQ(fault_of("[1] 2"), "expected JSON in UTF-8, found other text at byte 4");
   EXPECT_NE(fault_of("\"\xff\""), "");
-  EXPECT_EQ(fault_of("[1e999]"), "expected JSON with numbers below 1e308, found a greater one");
+  EXPECT_EQ(fault_of("[1e999]"), "expected JSON with numbers below 1e308, found a larger one");
   try {
     read_json("[1, x]");
     ADD_FAILURE();

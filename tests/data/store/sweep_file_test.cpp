@@ -288,7 +288,7 @@ TEST_F(Sweeps, OtherFilesAreNoSweeps) {
   std::ofstream(path_) << "text";
   EXPECT_FALSE(is_sweep_file(path_));
   EXPECT_FALSE(is_sweep_file(folder_ / "none"));
-  expect_refused([&] { SweepFile::open(path_); }, "is no sweep's file");
+  expect_refused([&] { SweepFile::open(path_); }, "is not a sweep's file");
   expect_refused([&] { SweepFile::open(folder_ / "none"); }, "no such file");
   expect_refused([&] { SweepFile::open(folder_.path()); }, "is not a file");
   make_sweep(folder_ / "b.sweep", {1, 2});

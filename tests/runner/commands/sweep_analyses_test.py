@@ -100,7 +100,7 @@ class SweepAnalyses(SweepCase):
                                 (["--sweep", "a.sweep", "--db", "study.db"], "expected one of"),
                                 (["--db", "study.db", "--pattern", "ball > 5"], "--sweep"),
                                 (["--sweep", "a.sweep", "--too-fast-s", "1"], "--too-fast-s"),
-                                (["--sweep", "study.db"], "is no sweep's file"), (["--sweep", "none"], "no such file"),
+                                (["--sweep", "study.db"], "is not a sweep's file"), (["--sweep", "none"], "no such file"),
                                 (["--sweep", "a.sweep", "--json", "a.sweep", "--force"], "--sweep reads it")):
             self.assertIn(said, self.palpate("analyze", *arguments, status=2), arguments)
         with sqlite3.connect(self.folder / "a.sweep") as file:

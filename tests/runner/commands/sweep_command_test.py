@@ -227,7 +227,7 @@ class Sweeps(SweepCase):
         self.sweep("a.sweep", points=1)
         self.palpate("simulate", "p.json", "--db", "study.db", "--participants", 1)
         before = self.bytes("a.sweep"), self.bytes("study.db")
-        self.assertIn("is no sweep's file", self.sweep("study.db", points=1, status=2))
+        self.assertIn("is not a sweep's file", self.sweep("study.db", points=1, status=2))
         for command in (["simulate", "p.json", "--db", "a.sweep"], ["analyze", "--db", "a.sweep"],
                         ["forget", "--db", "a.sweep", "--participant", "S001", "--yes"]):
             self.assertIn("is the file of a sweep", self.palpate(*command, status=2), command)
