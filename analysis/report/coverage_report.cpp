@@ -32,8 +32,8 @@ nlohmann::ordered_json counts_json(const CoverageCounts& counts, std::size_t stu
 
 std::string coverage_text(const std::vector<CoverageResult>& results,
                           const CoverageSettings& settings) {
-  std::string text = "SIMULATED STUDIES\n\nHow often 95 % intervals hold the truth, in %: " +
-                     std::to_string(settings.studies) + " studies a line, seed " +
+  std::string text = "SIMULATED STUDIES\n\nCoverage of 95 % intervals, in % of " +
+                     std::to_string(settings.studies) + " studies per line, seed " +
                      std::to_string(settings.seed) + "\n\n" + std::string(55, ' ') +
                      "likelihood           Bayes\n" + pad_right("", 43) + " lapses" +
                      "  thresh  slope  lapse thresh  slope  lapse  bad fit  open\n";
@@ -51,10 +51,11 @@ std::string coverage_text(const std::vector<CoverageResult>& results,
   const Interval noise = coverage_interval(held, settings.studies);
   return text + "\nThe simulation's own 95 % interval about 95 %: " + fixed(100 * noise.low, 1) +
          " to " + fixed(100 * noise.high, 1) +
-         " %. Bad fit: goodness of fit has p <= 0.05\n(5 % where the model is right). Open: the "
-         "interval of the threshold has no end on a side. Lapses: at each\nend, where levels lie "
-         "on both sides of the standard. The JND is read off the slope there, and off the "
-         "threshold\nof a forced choice. Staircases and QUEST+ have 140 trials. Bayes of yes/no: "
+         " %. Bad fit: goodness of fit has p <= 0.05\n(5 % if the model is correct). Open: the "
+         "interval of the threshold is unbounded on one side. Lapses: at both\nasymptotes if "
+         "levels lie "
+         "on both sides of the standard. The JND follows from the slope there, and from the "
+         "threshold\nin a forced choice. Staircases and QUEST+ have 140 trials. Bayes of yes/no: "
          "one study in four.\n";
 }
 

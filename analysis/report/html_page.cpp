@@ -81,7 +81,7 @@ void put_table(std::string& out, const Table& table) {
   };
   if (n < table.rows.size() || table.header.size() > kMostColumns) {
     note("Cut to " + std::to_string(kMostRows) + " rows and " + std::to_string(kMostColumns) +
-         " columns; the JSON file has all.");
+         " columns; the JSON file is complete.");
   }
   for (const std::string& text : table.notes) note(text);
 }

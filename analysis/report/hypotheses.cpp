@@ -49,7 +49,7 @@ void put_short_names(NamedResults& out) {
   out.merge(found);
 }
 
-/// An expression with the names that it uses, as columns of `used`.
+/// An expression; its names become columns of `used`.
 Pattern read_expression(const std::string& text, const NamedResults& known,
                         std::vector<std::string>& used) {
   std::vector<std::string> names;
@@ -95,7 +95,7 @@ std::string read_condition(const char* key, const NamedResults& known,
                           "expected a condition on a number of the analysis; this one is always "
                           "the same");
   } catch (const PatternError& error) {
-    // A fault is a line: the expression below it, with its mark, stands in the file.
+    // A fault is one line: drop the expression with its mark, which the file shows.
     const std::string said = error.what();
     reader.faults().add(reader.pointer(key), said.substr(0, said.find('\n')));
   }

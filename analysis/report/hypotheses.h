@@ -1,6 +1,6 @@
 #pragma once
 // Hypotheses as conditions on the numbers of an analysis (Lakens & DeBruine 2021,
-// 10.1177/2515245920970949): each says what would corroborate it and what would refute it.
+// 10.1177/2515245920970949): each has a condition that corroborates it and one that refutes it.
 
 #include <cstddef>
 #include <functional>
@@ -14,21 +14,21 @@
 
 namespace palpate::analysis {
 
-/// Not a number: undefined in this analysis.
+/// NaN: undefined in this analysis.
 using NamedResults = std::map<std::string, double, std::less<>>;
 
 /// The numbers of analysis.json by name: the keys that lead to a number, joined by dots
-/// ("paired_by_shape.cone.t_test.p_holm"; true and false are 1 and 0, members of lists have no
+/// ("paired_by_shape.cone.t_test.p_holm"; true and false are 1 and 0, elements of lists have no
 /// name), the short names of kShortNames, and "alpha".
 /// \param analysis  text of report_json() \param alpha  of the tests, as registered
 NamedResults named_results(const std::string& analysis, double alpha);
 
-/// A short name and what it stands for; * is the name of a shape, renderer or effect.
+/// A short name and its long name; * is the name of a shape, renderer or effect.
 struct ShortName {
   const char* name;
   const char* key;
 };
-/// The one place in which they are defined; analysis/README.md explains them.
+/// Their only definition; analysis/README.md explains them.
 inline constexpr ShortName kShortNames[] = {
     {"paired.*.n_pairs", "paired_by_shape.*.n_pairs"},
     {"paired.*.reduction", "paired_by_shape.*.percent_reduction_geometric"},
@@ -55,7 +55,7 @@ inline constexpr ShortName kShortNames[] = {
 enum class Verdict {
   corroborated,
   refuted,
-  undecided  ///< neither holds, both do, or that depends on an undefined number
+  undecided  ///< neither holds, both do, or the outcome depends on an undefined number
 };
 const char* to_string(Verdict verdict);
 
@@ -67,7 +67,7 @@ struct Hypothesis {
 };
 
 /// Reads hypotheses.json: [{"id": "H1", "text": "...", "corroborated": "...", "refuted": "..."}].
-/// \param known  names that an analysis has; empty: any are accepted
+/// \param known  names of an analysis; empty: any are accepted
 /// \throws protocols::InputError with every fault
 std::vector<Hypothesis> read_hypotheses(const std::string& text, const std::string& file,
                                         const NamedResults& known);
@@ -75,11 +75,11 @@ std::vector<Hypothesis> read_hypotheses(const std::string& text, const std::stri
 struct Judgement {
   Verdict verdict = Verdict::undecided;
   std::optional<bool> corroborated, refuted;  ///< none: depends on an undefined number
-  /// That the expressions name, each once, in their order.
+  /// Names in the expressions, each once, in order of appearance.
   std::vector<std::pair<std::string, double>> numbers;
 };
 
-/// Names that the results do not have count as undefined. \throws PatternError
+/// Unknown names count as undefined. \throws PatternError
 Judgement judge(const Hypothesis& hypothesis, const NamedResults& results);
 
 }  // namespace palpate::analysis

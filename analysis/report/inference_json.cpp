@@ -9,7 +9,7 @@ namespace {
 
 constexpr const char* kModelNote =
     "Complements the primary inference (paired_by_shape.*.t_test): the model has no participant x "
-    "shape variance, so its intervals are too narrow where there is some.";
+    "shape variance, so its intervals are too narrow if there is such a variance.";
 
 Json model_estimate(const ModelEstimate& value) {
   Json out;
@@ -23,7 +23,7 @@ Json model_estimate(const ModelEstimate& value) {
   return out;
 }
 
-/// t-test on a mean over participants, whose value has a key of its own.
+/// t-test on a mean over participants; its value has a separate key.
 void put_test(Json& out, const TTest& test) {
   put_status(out, test.undefined);
   out["sd"] = number(test.sd);
@@ -86,7 +86,7 @@ Json contrasts_json(const std::vector<ModelEstimate>& contrasts, const TrialTabl
   return out;
 }
 
-/// With one slope its sd and correlation have keys of their own; with several there are lists.
+/// One slope: separate keys for sd and correlation; several: lists.
 Json variance_components(const MixedModel& model, const std::vector<std::string>& renderers) {
   const bool many = model.random_sds.size() > 2;
   Json out;
@@ -98,7 +98,7 @@ Json variance_components(const MixedModel& model, const std::vector<std::string>
   }
   put_status(out, !model.undefined.empty() ? model.undefined
                   : many ? "several slopes: see participant_renderer_slope_sds and correlations"
-                  : !correlation ? "no correlation with what does not vary"
+                  : !correlation ? "no correlation with a standard deviation of 0"
                                  : "");
   out["participant_intercept_sd"] = number(intercept);
   out["participant_renderer_slope_sd"] = number(slope);

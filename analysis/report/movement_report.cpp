@@ -25,8 +25,8 @@ std::string movement_caption(const MovementAnalysis& analysis, const std::string
 }
 
 std::string settings_note(const MovementAnalysis& analysis) {
-  return "Settings: low pass of the path at " + fixed(analysis.table.settings.cutoff, 1) +
-         " Hz; contacts by rendering each trial again, to the bit.";
+  return "Settings: low-pass filter of the path at " + fixed(analysis.table.settings.cutoff, 1) +
+         " Hz; contacts from rendering each trial again, with forces identical to the bit.";
 }
 
 /// Four significant digits.
@@ -37,7 +37,7 @@ std::string short_number(const std::optional<double>& value) {
   return fixed(*value, size < 0.1 ? 4 : std::max(0, 4 - before));
 }
 
-/// The mean over participants, back from the scale.
+/// The mean over participants, transformed back from the scale.
 std::optional<double> mean_in_units(const MeasureComparison& measure,
                                     const std::optional<std::size_t>& renderer, std::size_t shape) {
   if (!renderer) return std::nullopt;
@@ -76,10 +76,11 @@ Table measures_table(const MovementAnalysis& analysis, std::size_t comparison) {
     }
   }
   table.notes.push_back(
-      "Means over participants in SI units, back from the scale of comparison; the difference is "
+      "Means over participants in SI units, transformed back from the scale of comparison; the "
+      "difference is "
       "on that scale: log (lengths, speeds, times, forces), log of value + 1 (counts, rates), "
-      "logit (shares, held within 0.005 and 0.995), as it is (sparc, ldlj). Paired t-tests over "
-      "participants, p adjusted by Holm over the shapes of a measure, not over measures.");
+      "logit (shares, limited to 0.005 to 0.995), untransformed (sparc, ldlj). Paired t-tests over "
+      "participants, p adjusted (Holm) over the shapes of a measure, not over measures.");
   table.notes.push_back(settings_note(analysis));
   return table;
 }
@@ -98,7 +99,7 @@ Table definitions_table() {
 
 Table gains_table(const MovementAnalysis& analysis) {
   Table table;
-  table.caption = movement_caption(analysis, "Gain in time beside differences of movement");
+  table.caption = movement_caption(analysis, "Gain in time and differences of movement");
   table.n_names = 2;
   table.header = {"shape",          "measure",    "trials",
                   "log time",       "of measure", "time at equal measure",
@@ -113,13 +114,14 @@ Table gains_table(const MovementAnalysis& analysis) {
   table.notes.push_back(
       "Correct trials, within participants. log time, of measure: difference between the "
       "renderers. time at equal measure: the difference of log time in a regression that has the "
-      "measure beside the renderer; time by measure: its coefficient. The table describes which "
-      "differences occur together; the movements were not set by anybody.");
+      "measure and the renderer; time by measure: the measure's coefficient. The table describes "
+      "which "
+      "differences occur together; the movements were not manipulated.");
   table.notes.push_back(settings_note(analysis));
   return table;
 }
 
-/// A sentence for each shape: gain in time, and what else differs.
+/// A sentence for each shape: gain in time, also at equal coverage rate.
 std::vector<std::string> gain_sentences(const MovementAnalysis& analysis) {
   std::vector<std::string> sentences;
   const auto percent = [](double log_ratio) { return 100 * (std::exp(log_ratio) - 1); };
@@ -133,7 +135,7 @@ std::vector<std::string> gain_sentences(const MovementAnalysis& analysis) {
     sentences.push_back(printable(analysis.table.trials.shapes[gain.shape], 40) + ": " +
                         fixed(std::abs(change), 1) + " % " + (change < 0 ? "less" : "more") +
                         " time with " + printable(pair.renderer, 40) + " than with " +
-                        printable(pair.reference, 40) + "; at equal coverage a second, " +
+                        printable(pair.reference, 40) + "; at equal coverage rate, " +
                         fixed(std::abs(percent(*gain.time_difference_at_equal_measure)), 1) +
                         " % " + (*gain.time_difference_at_equal_measure < 0 ? "less" : "more") +
                         ".");
@@ -142,13 +144,15 @@ std::vector<std::string> gain_sentences(const MovementAnalysis& analysis) {
 }
 
 constexpr const char* kHowToRead =
-    "Each trial with servo samples was rendered again, which gives the recorded forces to the bit "
-    "and the place of every contact. The path of the stylus's tip, in the frame of the object, was "
-    "freed from noise by a low pass without delay; from path, contacts and forces follow the "
-    "measures that are defined below. They are compared between renderers as response times are: "
-    "each participant's mean on the measure's scale, then paired t-tests over participants, "
-    "adjusted by Holm over the shapes of a measure, beside a mixed model. With so many measures "
-    "some p are small by chance: choose the measures before you look.";
+    "Each trial with servo samples was rendered again, which reproduced the recorded forces to the "
+    "bit "
+    "and gave the position of every contact. The path of the stylus tip, in the frame of the "
+    "object, was "
+    "smoothed with a zero-phase low-pass filter. The measures defined below were computed from "
+    "path, contacts and forces, and compared between renderers in the same way as response times: "
+    "participants' means on the measure's scale were compared by paired t-tests, with p "
+    "adjusted (Holm) over the shapes of a measure, and by a mixed model. With so many measures "
+    "some p are small by chance: choose the measures before the analysis.";
 
 Json measure_json(const MovementAnalysis& analysis, const MeasureComparison& measure) {
   const MeasureDefinition& known = definition(measure.measure);
@@ -216,7 +220,8 @@ std::string movement_text(const MovementAnalysis& analysis) {
   const TrialTable& trials = analysis.table.trials;
   std::string out;
   const std::string label = simulated_label(trials.simulated);
-  if (!label.empty()) out += paragraph_text(label + ": the movements below are a model's.") + "\n";
+  if (!label.empty())
+    out += paragraph_text(label + ": the movements below are those of a model.") + "\n";
   std::size_t measured = trials.rows.size();
   for (const auto& [reason, count] : analysis.table.missing) measured -= count;
   out += paragraph_text("Movement of " + counted(measured, "trial", "trials") + " of " +
@@ -233,8 +238,10 @@ std::string movement_html(const MovementAnalysis& analysis, const MovementPictur
   const TrialTable& trials = analysis.table.trials;
   const std::string label = simulated_label(trials.simulated);
   const std::string study = trials.provenance.protocol_name;
-  HtmlPage page("What the hand did" + (study.empty() ? "" : ": " + printable(study, 200)), label);
-  if (!label.empty()) page.put_banner(label + ": the movements here are a model's, not of humans.");
+  HtmlPage page("Movements of the hand" + (study.empty() ? "" : ": " + printable(study, 200)),
+                label);
+  if (!label.empty())
+    page.put_banner(label + ": the movements here are those of a model, not of humans.");
   std::size_t missing = 0;
   for (const auto& [reason, count] : analysis.table.missing) missing += count;
   page.below_title() +=
@@ -257,18 +264,21 @@ std::string movement_html(const MovementAnalysis& analysis, const MovementPictur
       trial_options += " --trial " + one.name;
     }
     page.put_note(
-        "A trial can be seen as it was felt, here the first of the paths: palpate watch "
+        "To play back a trial, here the first of the paths: palpate watch "
         "--db " +
         printable(trials.provenance.source, 400) + trial_options + " --out trial.html");
   }
   if (!analysis.gains.empty()) {
-    page.begin_section("gain", "Gain in time beside differences of movement", "Gain");
+    page.begin_section("gain", "Gain in time and differences of movement", "Gain");
     page.body() +=
-        "<p>Does the hand move differently where a shape is found in less time? For each shape the "
-        "table has the difference of time between the renderers, the difference of a measure, and "
-        "the difference of time that is left between trials of equal measure. It describes what "
-        "occurs together. The movements were not set by the experiment, so it does not tell which "
-        "of them comes first.</p>\n";
+        "<p>Does the hand move differently if a shape is identified in less time? For each shape "
+        "the "
+        "table gives the difference of time between the renderers, the difference of a measure, "
+        "and "
+        "the remaining difference of time between trials of equal measure. It describes which "
+        "differences "
+        "occur together. The movements were not manipulated, so it does not show which of them "
+        "is the cause.</p>\n";
     put_list(page.body(), gain_sentences(analysis));
     put_table(page.body(), gains_table(analysis));
     page.end_section();
@@ -276,7 +286,7 @@ std::string movement_html(const MovementAnalysis& analysis, const MovementPictur
   page.begin_section("measures", "Measures by shape and renderer", "Measures");
   for (std::size_t c = 0; c < analysis.measures.front().comparisons.size(); ++c)
     put_table(page.body(), measures_table(analysis, c));
-  put_collapsible_tables(page.body(), "What each measure is", {definitions_table()});
+  put_collapsible_tables(page.body(), "Definitions of the measures", {definitions_table()});
   page.end_section();
   page.begin_section("source", "Source and settings", "Source");
   Table source;
@@ -293,7 +303,7 @@ std::string movement_html(const MovementAnalysis& analysis, const MovementPictur
   for (const std::string& version : trials.provenance.program_versions)
     add("recorded by palpate", version);
   add("simulated participants' settings SHA-256", trials.provenance.observer_sha256);
-  add("low pass of the path", fixed(analysis.table.settings.cutoff, 1) + " Hz");
+  add("low-pass filter of the path", fixed(analysis.table.settings.cutoff, 1) + " Hz");
   add("coverage", std::to_string(TouchedSurface::kPlaces) + " places, within " +
                       fixed(1000 * TouchedSurface::kReach, 0) + " mm");
   put_table(page.body(), source);

@@ -20,11 +20,11 @@ struct MovementAnalysis {
 /// Runs every analysis on the table.
 MovementAnalysis analyze_movement(MovementTable table, const std::string& program_version);
 
-/// At most 100 columns; labelled where participants are simulated.
+/// At most 100 columns; labelled if participants are simulated.
 std::string movement_text(const MovementAnalysis& analysis);
 /// Every number, setting and definition.
 std::string movement_json(const MovementAnalysis& analysis);
-/// A self-contained page with the figures, and what they show in words.
+/// A self-contained page with the figures and their description in words.
 std::string movement_html(const MovementAnalysis& analysis, const MovementPictures& pictures);
 
 }  // namespace palpate::analysis

@@ -93,7 +93,7 @@ std::size_t count_of(const Json& proportion, std::size_t studies) {
 void require_same(const std::string& what, const Json& found, const Json& expected) {
   for (const auto& [key, value] : expected.items()) {
     if (found.contains(key) && found.at(key) == value) continue;
-    throw std::invalid_argument("is of another " + what + ": " + key + " is " +
+    throw std::invalid_argument("has another " + what + ": " + key + " is " +
                                 (found.contains(key) ? json_excerpt(found.at(key)) : "missing") +
                                 ", expected " + json_excerpt(value));
   }
@@ -178,7 +178,7 @@ PlanRecord read_plan(const std::string& json) {
     const Json in = read_ordered_json(json);
     if (in.is_object() && !in.contains("model"))
       throw std::invalid_argument(
-          "expected a plan of times (palpate plan --effect); this is another one");
+          "expected a plan of times (palpate plan --effect), found another kind of plan");
     require_same("version of plans", in, {{"version", 1}});
     PlanRecord plan;
     plan.model = read_model(in.at("model"));
@@ -331,15 +331,16 @@ std::string plan_text(const Plan& plan) {
   }
   for (const PlanCurve& curve : plan.curves) put_curve(out, plan, curve);
   out += "\n";
-  put_line(out, "Log times are drawn with standard deviations: participants' gains " +
-                    fixed(model.gain_sd, 3) + ", their gains for single shapes beyond that " +
+  put_line(out, "Log times are drawn with these standard deviations: participants' gains " +
+                    fixed(model.gain_sd, 3) + ", additional gains for single shapes " +
                     fixed(model.shape_gain_sd, 3) + ", single trials " +
                     fixed(model.residual_sd, 3) + "; " + percent(model.proportion_used) +
-                    " of the trials give a time. " + std::to_string(settings.simulation.studies) +
+                    " of the trials have a usable time. " +
+                    std::to_string(settings.simulation.studies) +
                     " studies for each power (standard error of a power at most " +
                     percent(0.5 / std::sqrt(static_cast<double>(settings.simulation.studies))) +
                     "), seed " + std::to_string(settings.simulation.seed) +
-                    ". For a shape without an effect the number is the rate of false positives.");
+                    ". For a shape without an effect, the number is the rate of false positives.");
   for (const std::string& note : plan.notes) put_line(out, "Note: " + note);
   return out;
 }
@@ -431,8 +432,9 @@ Figure plan_figure(const Plan& plan) {
   }
   figure.panels.push_back(std::move(panel));
   figure.notes = {
-      "A line for each number of trials of each shape with each renderer. The number at a line: "
-      "the fewest participants with the wanted power."};
+      "Each line is for one number of trials of each shape with each renderer. The number at a "
+      "line is "
+      "the smallest number of participants with the wanted power."};
   return figure;
 }
 
@@ -446,7 +448,7 @@ std::string conclusion_of(const ThresholdPlan& plan, std::size_t trials) {
              fixed(one.power, 2) + " [" + fixed(one.ci95.low, 2) + ", " + fixed(one.ci95.high, 2) +
              "]\n";
   }
-  return with + "no number of participants asked about reaches a power of " +
+  return with + "no number of participants in the range reaches a power of " +
          fixed(plan.settings.power, 2) + "\n";
 }
 
@@ -457,7 +459,7 @@ std::string threshold_plan_text(const ThresholdPlan& plan) {
   std::string text = "SIMULATED STUDIES\n\nA JND that is " +
                      fixed(100 * std::abs(1 - study.ratio), 1) +
                      (study.ratio <= 1 ? " % smaller" : " % larger") +
-                     " with the second condition, of the same participants; paired t-test of log "
+                     " with the second condition, within participants; paired t-test of log "
                      "JNDs, alpha " +
                      fixed(study.alpha, 3) + "\n\n";
   for (const std::size_t trials : plan.settings.trials) text += conclusion_of(plan, trials);
@@ -477,7 +479,7 @@ std::string threshold_plan_text(const ThresholdPlan& plan) {
   return text +
          "\nConstant stimuli, two intervals, seven levels around the standard; each JND is fitted "
          "as "
-         "analyze does.\nLeft out: JNDs that the data of a participant do not tell.\n";
+         "analyze does.\nLeft out: JNDs that a participant's data do not determine.\n";
 }
 
 std::string threshold_plan_json(const ThresholdPlan& plan) {

@@ -13,27 +13,28 @@ namespace palpate::analysis {
 
 std::string plan_text(const Plan& plan);
 std::string plan_json(const Plan& plan);
-/// The points of a plan from its JSON. \throws std::invalid_argument: it is not what plan_json
-/// writes, or of another model or simulation than these, with what differs
+/// The points of a plan from its JSON. \throws std::invalid_argument: it is not output of
+/// plan_json, or has another model or simulation; the message names the difference
 std::vector<PlanPoint> read_plan_points(const std::string& json, const StudyModel& model,
                                         const PlanSettings& settings);
-/// What a plan's JSON says of the study to be run.
+/// The planned study, from a plan's JSON.
 struct PlanRecord {
   StudyModel model;
   double power = 0.8, alpha = 0.05;
   Goal goal = Goal::all;
   StudyTest test = StudyTest::paired;
-  std::size_t studies = 0;  ///< simulated for each power
+  std::size_t studies = 0;  ///< simulated per power
   std::string pilot_label;  ///< "SIMULATED PARTICIPANTS"; empty: people, or no pilot
   std::vector<std::string> notes;
   struct Curve {
-    std::size_t trials = 0;                   ///< of each shape with each renderer
-    std::optional<std::size_t> participants;  ///< that reach the power; none: not in the range
-    std::map<std::size_t, double> power;      ///< by number of participants
+    std::size_t trials = 0;  ///< of each shape with each renderer
+    std::optional<std::size_t>
+        participants;                     ///< fewest that reach the power; none: not in the range
+    std::map<std::size_t, double> power;  ///< by number of participants
   };
   std::vector<Curve> curves;
 };
-/// \throws std::invalid_argument: it is not what plan_json writes, with what is wrong
+/// \throws std::invalid_argument: it is not output of plan_json; the message names the fault
 PlanRecord read_plan(const std::string& json);
 /// Power (%) over the number of participants, a line for each number of trials.
 Figure plan_figure(const Plan& plan);

@@ -159,7 +159,7 @@ Json accuracy(const AccuracyCell& cell) {
 
 Json times(const TimesCell& cell) {
   Json out;
-  put_status(out, cell.n_participants == 0   ? "no trial can be used for times"
+  put_status(out, cell.n_participants == 0   ? "no trial has a usable time"
                   : cell.n_participants == 1 ? "one participant has no standard deviation"
                                              : "");
   out["n_participants"] = cell.n_participants;
@@ -235,8 +235,8 @@ Json paired_shapes(const Comparison& comparison, const TrialTable& table) {
   return out;
 }
 
-/// paired_by_shape is the first comparison (ray with point if both are in the data); its renderers
-/// are named if it is not ray with point. Further comparisons are in a list, complete.
+/// paired_by_shape is the first comparison (ray with point if both are in the data); it names its
+/// renderers unless they are ray and point. All further comparisons are in a list.
 void put_comparisons(Json& out, const Analysis& analysis) {
   const TrialTable& table = analysis.table;
   const std::vector<Comparison>& all = analysis.comparisons;
@@ -312,7 +312,7 @@ std::string report_json(const Analysis& analysis) {
                                              {"n_correct_too_fast", lost.n_too_fast},
                                              {"n_used_for_times", lost.n_used}};
   }
-  // Invalid UTF-8 from a file is replaced, so that the JSON is valid.
+  // Replace invalid UTF-8 from a file, so that the JSON is valid.
   return out.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
@@ -321,7 +321,7 @@ namespace {
 constexpr double kSignificanceLevel = 0.05;
 constexpr std::size_t kMostCards = 12, kMostRowsOfCards = 4;
 
-/// Outcome of the t-test at alpha 0.05: Holm-adjusted, and unadjusted where the two differ.
+/// Outcome of the t-test at alpha 0.05: Holm-adjusted, and also unadjusted if the two differ.
 std::string verdict(const TTest& test, std::size_t tests) {
   if (!test.p_holm) return "not testable";
   const auto p_is = [](double p) { return std::string(p < 0.001 ? "p " : "p = ") + p_text(p); };
@@ -463,7 +463,7 @@ class Report {
     out += "</ul>\n";
   }
 
-  /// The protocol's title where it has one, else its name.
+  /// The protocol's title if it has one, else its name.
   std::string study_name() const {
     for (const ProtocolText& protocol : record_.protocols) {
       if (!protocol.title.empty()) return protocol.title;
@@ -515,8 +515,8 @@ class Report {
                     paper ? "Figure 15" : "Mean times"},
                    {times_table(analysis_)}, "No times to show.");
     begin({"speedup",
-           "How much faster " + with_renderer(analysis_, "than with") +
-               (paper ? ", beside the paper" : ""),
+           "Reduction of response time " + with_renderer(analysis_, "against") +
+               (paper ? ", and in the paper" : ""),
            "Speed-up"});
     if (!put_figure("speedup")) {
       page_.put_note(
@@ -556,7 +556,7 @@ class Report {
     }
     page_.end_section();
     if (!record_.checked.empty()) {
-      begin({"registration", "Held against its registration", "Registration"});
+      begin({"registration", "Check against the registration", "Registration"});
       page_.body() += "<p>" + escaped_sentence(printable(record_.checked, 4000)) +
                       "</p>\n<p><a href=\"" + escaped(record_.check_page) +
                       "\">The check, point by point</a></p>\n";
@@ -607,7 +607,7 @@ class Report {
     put_table(page_.body(), table);
     if (!record_.protocols.empty()) {
       page_.put_note(
-          "Where servo samples were kept, a single trial can be seen as it was felt: palpate watch "
+          "If servo samples were kept, a trial can be played back: palpate watch "
           "--db FILE --trial CODE/SESSION/TRIAL --out PAGE.html");
     }
     if (!record_.seeds.empty()) {

@@ -25,14 +25,14 @@ void put_pattern(HtmlPage& page, const SweepAnalysis& analysis) {
   page.begin_section("pattern", "The pattern", "Pattern");
   page.body() +=
       "<pre tabindex=\"0\">" + escaped(printable(analysis.pattern->expression, 2000)) + "</pre>\n";
-  page.put_note("A shape's name stands for its gain in percent. " + pattern_note(analysis));
+  page.put_note("A shape's name denotes its gain in percent. " + pattern_note(analysis));
   page.end_section();
 }
 
 Table sweep_source_table(const SweepAnalysis& analysis) {
   const SweepTable& sweep = analysis.table;
   Table table;
-  table.caption = "What was swept";
+  table.caption = "Settings of the sweep";
   table.header = {"what", "value"};
   table.n_names = 2;
   table.rows = {
@@ -114,7 +114,7 @@ Json pattern_json(const SweepAnalysis& analysis) {
   out["note"] = pattern_note(analysis);
   if (!pattern.share) {
     out["status"] = "undefined";
-    out["reason"] = "no setting in which it is defined";
+    out["reason"] = "not defined in any setting";
   }
   return out;
 }
@@ -220,8 +220,8 @@ Table gains_table(const SweepAnalysis& analysis) {
   Table table;
   table.caption =
       "Less time with the second renderer, percent, over the settings" + std::string(kSimulated);
-  table.header = {"shape",       "paper", "settings", "median", "half of them",
-                  "nine in ten", "mean",  "above 0",  "chance"};
+  table.header = {"shape",       "paper", "settings", "median", "middle 50 %",
+                  "middle 90 %", "mean",  "above 0",  "chance"};
   for (std::size_t s = 0; s < analysis.table.shapes.size(); ++s) {
     const Spread& one = analysis.gains[s];
     const auto percent_of = [](const std::optional<double>& share) {
@@ -234,16 +234,16 @@ Table gains_table(const SweepAnalysis& analysis) {
                           percent_of(one.noise_share)});
   }
   table.notes = {
-      "chance: how much of the variance over the settings is that of the studies, by their "
+      "chance: share of the variance over the settings due to the studies' standard "
       "standard "
-      "errors; more participants or repetitions at each point make it smaller."};
+      "errors; more participants or repetitions at each point reduce it."};
   return table;
 }
 
 Table drivers_table(const SweepAnalysis& analysis, const Drivers& drivers) {
   Table table;
   const bool sobol = drivers.sobol.has_value();
-  table.caption = "What " + drivers.output + " depends on: " + driver_name(analysis) + kSimulated;
+  table.caption = "Drivers of " + drivers.output + ": " + driver_name(analysis) + kSimulated;
   table.header = sobol
                      ? std::vector<std::string>{"parameter", "total", "95 %", "first order", "95 %"}
                      : std::vector<std::string>{"parameter", "partial", "95 %", "Spearman", "95 %"};
@@ -267,11 +267,11 @@ Table drivers_table(const SweepAnalysis& analysis, const Drivers& drivers) {
   if (sobol && drivers.sobol->noise_share) {
     table.notes.push_back("Shares of the variance over the settings, of which " +
                           fixed(100 * *drivers.sobol->noise_share, 0) +
-                          " % is chance within the points and belongs to no parameter.");
+                          " % is due to chance within the points and not to a parameter.");
   }
   if (sobol && drivers.sobol->dropped > 0) {
     table.notes.push_back(counted(drivers.sobol->dropped, "base point is", "base points are") +
-                          " left out, of which a sample has no figure.");
+                          " left out, because a sample lacks the figure.");
   }
   if (const std::string note = chance_note(drivers); !note.empty()) table.notes.push_back(note);
   const auto lacks_partial = [](const RankCorrelation& one) {
@@ -279,7 +279,7 @@ Table drivers_table(const SweepAnalysis& analysis, const Drivers& drivers) {
   };
   if (std::any_of(drivers.ranks.begin(), drivers.ranks.end(), lacks_partial)) {
     table.notes.emplace_back(
-        "No partial correlations: fewer points with a figure than they need with so many "
+        "No partial correlations: too few points with a figure for so many "
         "parameters, or parameters that "
         "vary together.");
   }
@@ -293,7 +293,7 @@ Table drivers_table(const SweepAnalysis& analysis, const Drivers& drivers) {
 
 Table reasons_table(const SweepAnalysis& analysis) {
   Table table;
-  table.caption = "Why points failed";
+  table.caption = "Reasons of failed points";
   table.header = {"points", "reason"};
   table.n_names = 2;
   const auto& reasons = analysis.table.reasons;
@@ -338,22 +338,24 @@ std::string pattern_note(const SweepAnalysis& analysis) {
                                           : " settings");
   if (pattern.undefined > 0) {
     out += "; in " + std::to_string(pattern.undefined) +
-           " others it is undefined (failed, or a figure is missing)";
+           " others it is undefined (the point failed, or a figure is missing)";
   }
   if (design == "grid")
     return out +
-           ". No interval: a share of a grid's points is no estimate of a share of the space.";
+           ". No interval: a share of a grid's points does not estimate a share of the space.";
   if (!pattern.ci95) return out + ".";
   return out +
-         ". Wilson's interval, of independent settings: a design's are more even, so it is rather "
-         "too wide. It is about the space that was given, with its distributions, not about "
+         ". The interval is Wilson's for independent settings; those of a design are more even, so "
+         "it is rather "
+         "too wide. It refers to the given space with its distributions, not to "
          "people.";
 }
 
 std::string chance_note(const Drivers& drivers) {
   if (!drivers.sobol || !drivers.sobol->undefined.empty() || drivers.sobol->noise_share) return "";
-  return "Chance within the points is a part of every total index: it has no standard errors that "
-         "could be subtracted.";
+  return "Every total index includes chance within the points, because the output has no standard "
+         "errors "
+         "that could be subtracted.";
 }
 
 std::string sweep_text(const SweepAnalysis& analysis) {
@@ -377,7 +379,7 @@ std::string sweep_text(const SweepAnalysis& analysis) {
     const std::size_t more = one.rows.size() > kMostInText ? one.rows.size() - kMostInText : 0;
     if (more > 0) {
       one.rows.resize(kMostInText);
-      one.notes.push_back("And " + std::to_string(more) + " more: --json and --report have all.");
+      one.notes.push_back("And " + std::to_string(more) + " more: see --json and --report.");
     }
     out += "\n" + table_text(one);
   }

@@ -89,7 +89,7 @@ std::string narrow_bootstrap_note(const Analysis& analysis) {
     text += (text.empty() ? "" : ", ") + fixed(100 * coverage, 0) + " % with " +
             std::to_string(pairs) + " pairs";
   }
-  return "BCa intervals are too short for few participants: instead of 95 % their coverage is " +
+  return "BCa intervals are too short for few participants: their coverage is not 95 % but " +
          text +
          " (simulated, normal differences; the t interval: 95 %). With skewed differences the "
          "coverage of both is lower.";
@@ -123,9 +123,7 @@ Table reduction_table(const Analysis& analysis) {
   std::vector<std::string> header{"geometric", "95 % interval", "arithmetic", "p (Holm)", "pairs"};
   if (paper_too) header.emplace_back("paper");
   Table table = comparison_table(
-      analysis,
-      "How much faster " + with_renderer(analysis, "than with") + ": reduction of response time",
-      header);
+      analysis, "Reduction of response time " + with_renderer(analysis, "against"), header);
   Reasons reasons;
   for (const Comparison& comparison : analysis.comparisons) {
     for (std::size_t s = 0; s < comparison.shapes.size(); ++s) {
@@ -187,7 +185,7 @@ Table times_table(const Analysis& analysis) {
 
 Table accuracy_table(const Analysis& analysis) {
   Table table;
-  table.caption = caption(analysis, "Accuracy, all trials");
+  table.caption = caption(analysis, "Accuracy in all trials");
   table.n_names = 2;
   table.header = {"shape",   "renderer",  "accuracy", "of answered", "mean of participants",
                   "correct", "no answer", "trials"};
@@ -426,7 +424,7 @@ Table anova_table(const Analysis& analysis) {
                           number(sphericity.hf_epsilon_used, 3), p_or_missing(sphericity.hf_p)});
   }
   table.notes = {
-      "On participants with a time in every cell. Generalised η²: SS / (SS + SS of "
+      "Participants with a time in every cell. Generalised η²: SS / (SS + SS of "
       "participants + all error SS). W: Mauchly; GG: Greenhouse and Geisser; HF: Huynh and Feldt."};
   if (!anova.undefined.empty()) {
     table.notes.push_back(sentence("Undefined", anova.undefined));
@@ -443,7 +441,7 @@ Table anova_table(const Analysis& analysis) {
   if (!anova.dropped.empty()) {
     std::vector<std::string> names;
     for (const std::size_t p : anova.dropped) names.push_back(analysis.table.participants[p]);
-    table.notes.push_back("Left out, without a time in some cell: " + joined(names) + ".");
+    table.notes.push_back("Left out because a cell has no time: " + joined(names) + ".");
   }
   return table;
 }
@@ -478,7 +476,7 @@ Table mixed_model_table(const Analysis& analysis) {
   }
   table.notes.push_back(
       "Complements the paired t-tests: the model has no participant × shape variance, so its "
-      "intervals are too narrow and p too small where there is some. df: Satterthwaite.");
+      "intervals are too narrow and p too small if there is such a variance. df: Satterthwaite.");
   if (!model.singular.empty()) {
     table.notes.push_back(
         sentence("Singular fit, on the boundary of the parameter space", model.singular) +
@@ -557,16 +555,18 @@ Table renderer_order_table(const Analysis& analysis) {
         (has_several_comparisons(analysis)
              ? with_article(first.reference) + " and " + with_article(pair.renderer)
              : "both renderers") +
-        " mixed: no order, not counted here.");
+        " interleaved: without an order, not counted here.");
   }
   table.notes = {
-      "Percent reductions by which renderer came first. Practice makes the second one look faster: "
-      "a gain is too large with " +
+      "Percent reductions by the renderer that came first. Practice makes the second renderer "
+      "appear faster: "
+      "the gain is too large with " +
       first.reference + " first and too small with " +
       (has_several_comparisons(analysis) ? "the other" : first.renderer) +
       " first. Difference: ratio of " + renderer + " to " + first.reference + " times, " +
       first.reference + " first against " + renderer +
-      " first; below 0 where practice helps; p adjusted over all tests of practice (slopes over "
+      " first; below 0 if practice shortens times; p adjusted over all tests of practice (slopes "
+      "over "
       "the trials and orders, " +
       std::to_string(analysis.practice.n_tests) +
       " in all). Balanced: both orders with equal weight."};
@@ -616,12 +616,14 @@ Table censored_table(const Analysis& analysis) {
     }
   }
   table.notes = {
-      "A trial that ends at the limit would have taken longer: leaving it out biases the times of "
-      "a slow condition downwards. Here log time ~ participant + renderer with normal residuals, "
-      "time-outs censored at their limit, by maximum likelihood; interval by t from scores summed "
+      "A trial that ends at the limit would have taken longer; excluding it biases the times of "
+      "a slow condition downwards. The model is log time ~ participant + renderer with normal "
+      "residuals, "
+      "time-outs censored at their limit, fitted by maximum likelihood; interval by t from scores "
+      "summed "
       "by "
       "participant. It assumes log-normal times beyond the limit and complements the paired "
-      "t-test; without time-outs and with equally many trials in all cells both are equal."};
+      "t-test; the two are equal without time-outs and with equal numbers of trials in all cells."};
   reasons.put(table.notes);
   return table;
 }

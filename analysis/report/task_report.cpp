@@ -49,15 +49,17 @@ Table group_table(const TaskAnalysis& analysis, const std::string& label) {
                             std::to_string(one.n_undetermined)});
   }
   table.notes = {
-      "Geometric means where all values are positive and have a true zero, but of exponents; t "
-      "intervals, of one participant none. Left out: functions without a threshold among the "
-      "levels shown, or with answers the other way round."};
+      "Means are geometric if all values are positive and have a true zero, except for exponents; "
+      "t "
+      "intervals from two participants on. Left out: functions without a threshold among the "
+      "levels shown, or with reversed answers."};
   return table;
 }
 
 Table comparison_table(const TaskAnalysis& analysis, const std::string& label) {
   Table table;
-  table.caption = "The same participants, by renderer" + (label.empty() ? "" : " (" + label + ")");
+  table.caption =
+      "Comparison within participants, by renderer" + (label.empty() ? "" : " (" + label + ")");
   table.header = {"measure",       "task, block, stimulus",
                   "compared",      "value",
                   "95 % interval", "p",
@@ -82,9 +84,9 @@ Table comparison_table(const TaskAnalysis& analysis, const std::string& label) {
     }
   }
   table.notes = {
-      "Paired t-tests: of ratios (/) on natural logarithms where all values are positive and have "
+      "Paired t-tests: of ratios (/) on natural logarithms if all values are positive and have a "
       "a "
-      "true zero, else of differences (−)."};
+      "true zero, otherwise of differences (−)."};
   return table;
 }
 
@@ -155,7 +157,7 @@ TaskJson ends_json(const std::optional<Interval>& interval) {
   return {finite(interval->low), finite(interval->high)};
 }
 
-/// As protocols say it.
+/// Word for it in protocols.
 const char* easier_name(protocols::Easier easier) {
   return easier == protocols::Easier::higher ? "higher" : "lower";
 }
@@ -211,7 +213,7 @@ TaskJson posterior_json(const PsychometricPosterior& posterior) {
   return out;
 }
 
-/// What an adaptive procedure makes of its answers itself.
+/// An adaptive procedure's own estimate.
 TaskJson procedure_json(const TrackProcedure& procedure) {
   const protocols::Estimate& estimate = procedure.estimate;
   TaskJson out{{"kind", kind_of(procedure.spec)},
@@ -442,7 +444,7 @@ std::string with_interval(double value, const Interval& interval) {
          short_number(interval.high) + "]";
 }
 
-/// To 0.01 %: searches end so near to 0.
+/// Rounded to 0.01 %: searches end this close to 0.
 double rounded_rate(double rate) { return std::round(rate * 1e4) / 1e4; }
 
 std::string optional_interval(const std::optional<double>& value,
@@ -469,15 +471,15 @@ std::string procedure_text(const Track& track) {
   if (!estimate.threshold) {
     text += "no estimate";
   } else if (target) {
-    text += short_number(*estimate.threshold) + ", its reversals' mean, where it converges at " +
+    text += short_number(*estimate.threshold) + ", mean of its reversals, converging to " +
             fixed(100 * *target, 1) + " % successes";
-    if (fitted) text += "; the function is there at " + short_number(*fitted);
+    if (fitted) text += "; fitted function there at " + short_number(*fitted);
   } else if (quest != nullptr) {
     text += "threshold " + short_number(*estimate.threshold) + ", slope " +
-            short_number(*estimate.slope) + ", means of its posterior (" +
+            short_number(*estimate.slope) + ", posterior means (" +
             to_string(quest->function.shape) + ", " + to_string(quest->function.scale) + ")";
   } else {
-    text += short_number(*estimate.threshold) + ", mean of where the answer changed";
+    text += short_number(*estimate.threshold) + ", mean level at which the answer changed";
   }
   text += "; " + counted(static_cast<std::size_t>(estimate.trials), "trial", "trials");
   if (estimate.reversals > 0)
@@ -492,9 +494,9 @@ std::string procedure_text(const Track& track) {
 std::string reversal_text(protocols::Easier easier,
                           const std::optional<protocols::Easier>& expected) {
   const bool falls = easier == protocols::Easier::lower;
-  std::string text =
-      falls ? "successes FALL as the level rises, where " : "successes RISE with the level, where ";
-  text += expected ? "the task has them " : "those of the others ";
+  std::string text = falls ? "successes FALL as the level rises, although "
+                           : "successes RISE with the level, although ";
+  text += expected ? "the task expects them to " : "those of the others ";
   return text + (falls ? "rise" : "fall") + " (are keys swapped?)";
 }
 
@@ -540,20 +542,20 @@ std::string function_text(const ParticipantFunction& one,
 }
 
 std::string explanation(const FunctionSettings& functions) {
-  std::string text = std::string("Intervals are of 95 %. Psychometric functions: ") +
-                     to_string(functions.shape) + ", lapses free up to " +
-                     short_number(kMostLapse) +
-                     "; compare with levels on\nboth sides of the standard: lapses as many at "
-                     "both ends; on one side: guesses 1 / intervals, the\n";
+  std::string text =
+      std::string("Intervals are 95 % intervals. Psychometric functions: ") +
+      to_string(functions.shape) + ", lapse rate free up to " + short_number(kMostLapse) +
+      ".\ncompare with levels on both sides of the standard: the same lapse rate at both "
+      "asymptotes; on one\nside: guess rate 1 / intervals, and the ";
   text += functions.shape == protocols::PsychometricShape::weibull
               ? "JND is measured half-way from there to certainty (threshold: at 63 %)"
               : "threshold is half-way from there to certainty";
   return text +
-         "; detect, same/different: guesses free.\nd': log-linear correction. Bayes: posterior "
+         ";\ndetect, same/different: guess rate free. d': log-linear correction.\nBayes: posterior "
          "mean of the threshold on a grid.\n";
 }
 
-/// Where levels are taken as they are because nothing is known of their procedure.
+/// A note if levels are taken as they are because their procedure is unknown.
 std::string scale_note(const TaskAnalysis& analysis) {
   const bool unknown =
       analysis.table.procedures.empty() && !analysis.functions.scale &&
@@ -561,10 +563,9 @@ std::string scale_note(const TaskAnalysis& analysis) {
         return !cell.functions.empty() && cell.no_function.empty() &&
                cell.scale == protocols::LevelScale::linear;
       });
-  return unknown
-             ? "A table does not say on which scale an adaptive procedure has its levels: where "
-               "that is\nlogarithmic, give --scale log.\n"
-             : "";
+  return unknown ? "A table does not contain the scale of an adaptive procedure's levels: if "
+                   "it is\nlogarithmic, give --scale log.\n"
+                 : "";
 }
 
 std::string magnitude_text(const TaskCell& cell) {
@@ -574,7 +575,7 @@ std::string magnitude_text(const TaskCell& cell) {
     text += "  " + pad_right(printable(cell.participants[line.participant]), 12);
     text += line.exponent ? "exponent " + short_number(*line.exponent) : line.undefined;
     if (line.r_squared) text += ", r2 " + short_number(*line.r_squared);
-    if (line.exponent.value_or(0) < 0) text += ", the numbers FALL as the level rises";
+    if (line.exponent.value_or(0) < 0) text += ", numbers FALL as the level rises";
     text += "\n";
   }
   if (magnitude.exponent)
@@ -596,7 +597,8 @@ std::string adjustment_text(const TaskCell& cell) {
             optional_interval(one.pse, one.pse_ci95) + ", constant error " +
             short_number(one.constant_error);
     if (one.jnd) text += ", JND " + short_number(*one.jnd);
-    if (one.start_effect) text += ", from above less from below " + short_number(*one.start_effect);
+    if (one.start_effect)
+      text += ", settings from above minus from below " + short_number(*one.start_effect);
     text += "\n";
   }
   return text;
@@ -612,7 +614,7 @@ std::string cell_text(const TaskCell& cell) {
           std::to_string(cell.answered) + " answered\n";
   if (!cell.functions.empty() && cell.no_function.empty())
     text += cell.scale == protocols::LevelScale::linear
-                ? "  functions over the levels as they are\n"
+                ? "  functions over the untransformed levels\n"
                 : "  functions over the logarithm (base 10) of the levels\n";
   for (const ParticipantFunction& one : cell.functions)
     text += function_text(one, cell.expected_easier);
@@ -620,7 +622,8 @@ std::string cell_text(const TaskCell& cell) {
   text += adjustment_text(cell);
   if (cell.information && cell.information->plain) {
     text += "  information transfer " + short_number(*cell.information->plain) + " bit of " +
-            short_number(cell.information->stimulus_entropy) + "; less the bias of few trials " +
+            short_number(cell.information->stimulus_entropy) +
+            "; corrected for the bias of few trials " +
             short_number(std::max(0.0, *cell.information->corrected)) + " bit, " +
             short_number(*cell.information->categories) + " categories";
     if (cell.information_mean)
@@ -632,7 +635,7 @@ std::string cell_text(const TaskCell& cell) {
     text += "  confidence: area under the type 2 ROC " +
             optional_interval(cell.confidence.area, cell.confidence.area_ci95) +
             (cell.confidence.area_ci95 && cell.confidence.area_ci95->high < 0.5
-                 ? " (BELOW 0.5: is the scale turned round?)"
+                 ? " (BELOW 0.5: is the scale reversed?)"
                  : "") +
             "\n";
   return text + "\n";
@@ -670,7 +673,7 @@ std::string comparison_text(const TaskComparison& one, bool of_renderers) {
   if (!one.comparison.undefined.empty()) text += "  " + one.comparison.undefined + "\n";
   if (one.n_undetermined > 0)
     text += "  " + counted(one.n_undetermined, "function", "functions") +
-            " left out: no threshold among the levels shown, or answers the other way round\n";
+            " left out: no threshold among the levels shown, or reversed answers\n";
   for (const ConditionDifference& difference : one.comparison.differences) {
     const auto shown = [&](double value) {
       return short_number(one.logarithms ? std::exp(value) : value);

@@ -206,7 +206,7 @@ class Tasks(TaskStudy):
                 self.assertEqual((one["fit"]["reversed"], one["fit"]["easier"], one["fit"]["determined"]),
                                  (swapped, "lower" if swapped else "higher", not swapped))
             said, = [line for line in self.analyze().stdout.splitlines() if "FALL" in line]
-            self.assertRegex(said, r"^  T2 .*NOT COMPARED: successes FALL as the level rises, where the task has them rise")
+            self.assertRegex(said, r"^  T2 .*NOT COMPARED: successes FALL as the level rises, although the task expects them to rise")
             group = self.found(rows)["group_results"][0]["renderers"][0]
             self.assertEqual((group["n_participants"], group["n_undetermined"]), (PEOPLE - 1, 1))
             # On both sides a table does not say what is asked: the others do.

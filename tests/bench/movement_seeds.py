@@ -6,7 +6,7 @@ Simulates the paper's study with servo samples, with fewer trials (4 presentatio
 7 participants x 2 renderers x 16 trials a seed), once for each seed and version, measures its movement
 (palpate analyze --movement), and prints a table in Markdown. For each version and shape, mean over seeds with
 its 95 % interval (Student's t over seeds): the gain in time with the ray in %, the ratio ray / point of coverage
-a second and of strokes, the share of contact point / ray, and the gain in time that is left between trials of
+a second and of strokes, the share of contact point / ray, and the remaining gain in time between trials of
 equal measure. The table describes what occurs together: nobody set the movements.
 Results stay in FOLDER: called again, the command goes on where it stopped. Databases are deleted.
 """
@@ -81,7 +81,7 @@ def ratio(one, measure, shape):
 def print_table(done):
     print("SIMULATED PARTICIPANTS\n")
     print("| version, shape | seeds | gain in time, % | coverage a second, ray / point | strokes, ray / point | "
-          "contact share, point / ray | gain at equal coverage a second | at equal strokes | at equal contact share |")
+          "contact share, point / ray | gain at equal coverage rate | at equal strokes | at equal contact share |")
     print("|---|---|" + "---|" * 7)
     for version, studies in done.items():
         for shape in SHAPES:

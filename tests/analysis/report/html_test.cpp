@@ -70,7 +70,7 @@ TEST(HtmlTable, IsCutWithANote) {
   EXPECT_FALSE(holds(drawn(400, 60), "Cut to"));
   EXPECT_EQ(count_of(drawn(400, 2), "<tr>"), 401U);
   EXPECT_EQ(count_of(drawn(401, 2), "<tr>"), 401U);
-  EXPECT_TRUE(holds(drawn(401, 2), "Cut to 400 rows and 60 columns; the JSON file has all."));
+  EXPECT_TRUE(holds(drawn(401, 2), "Cut to 400 rows and 60 columns; the JSON file is complete."));
   EXPECT_EQ(count_of(drawn(1, 61), ">v<"), 60U);
   EXPECT_TRUE(holds(drawn(1, 61), "Cut to 400 rows"));
 }

@@ -76,8 +76,9 @@ TEST(PlanText, SaysTheGoalAndHowManyAreEnough) {
       "participant): power 81.0 %.");
   says("Power with 10 trials of each shape with each renderer (60 trials for each participant)");
   says(
-      "participants' gains 0.125, their gains for single shapes beyond that 0.250, single trials "
-      "0.625; 87.5 % of the trials give a time. 1000 studies for each power (standard error of a "
+      "participants' gains 0.125, additional gains for single shapes 0.250, single trials "
+      "0.625; 87.5 % of the trials have a usable time. 1000 studies for each power (standard error "
+      "of a "
       "power at most 1.6 %), seed 7.");
   says("Note: a note");
   Plan any = a_plan();

@@ -17,11 +17,12 @@ using testing::named_cell;
 using testing::track_of;
 
 const char* const kLogisticText =
-    "Intervals are of 95 %. Psychometric functions: logistic, lapses free up to 0.06; compare with "
-    "levels on\nboth sides of the standard: lapses as many at both ends; on one side: guesses 1 / "
-    "intervals, the\nthreshold is half-way from there to certainty; detect, same/different: "
-    "guesses "
-    "free.\nd': log-linear correction. Bayes: posterior mean of the threshold on a grid.\n";
+    "Intervals are 95 % intervals. Psychometric functions: logistic, lapse rate free up to 0.06.\n"
+    "compare with levels on both sides of the standard: the same lapse rate at both asymptotes; on "
+    "one\n"
+    "side: guess rate 1 / intervals, and the threshold is half-way from there to certainty;\n"
+    "detect, same/different: guess rate free. d': log-linear correction.\nBayes: posterior mean of "
+    "the threshold on a grid.\n";
 
 std::string text_of_cell(TaskCell cell) {
   TaskAnalysis analysis;
@@ -52,10 +53,13 @@ TEST(TaskText, AnEmptyAnalysisSaysHowItIsDone) {
   EXPECT_EQ(
       task_report_text(analysis),
       "SIMULATED PARTICIPANTS\n\n"
-      "Intervals are of 95 %. Psychometric functions: weibull, lapses free up to 0.06; compare "
-      "with levels on\nboth sides of the standard: lapses as many at both ends; on one side: "
-      "guesses 1 / intervals, the\nJND is measured half-way from there to certainty (threshold: at "
-      "63 %); detect, same/different: guesses free.\nd': log-linear correction. Bayes: posterior "
+      "Intervals are 95 % intervals. Psychometric functions: weibull, lapse rate free up to 0.06.\n"
+      "compare with levels on both sides of the standard: the same lapse rate at both asymptotes; "
+      "on one\n"
+      "side: guess rate 1 / intervals, and the JND is measured half-way from there to certainty "
+      "(threshold: at "
+      "63 %);\ndetect, same/different: guess rate free. d': log-linear correction.\nBayes: "
+      "posterior "
       "mean of the threshold on a grid.\n");
   analysis = {};
   analysis.table.warnings = {"Column 'Level'?", "another"};
@@ -106,15 +110,16 @@ TEST(TaskText, AnswersTheOtherWayRoundAreSaid) {
   const auto has = [&](const std::string& words) {
     return text_of_cell(cell).find(words) != std::string::npos;
   };
-  EXPECT_TRUE(has(
-      "[0, 0.06], NOT COMPARED: successes FALL as the level rises, where those of the others rise "
-      "(are keys swapped?), fit p"))
+  EXPECT_TRUE(
+      has("[0, 0.06], NOT COMPARED: successes FALL as the level rises, although those of the "
+          "others rise "
+          "(are keys swapped?), fit p"))
       << text_of_cell(cell);
   EXPECT_FALSE(has("NOT DETERMINED"));
   cell.expected_easier = protocols::Easier::higher;
-  EXPECT_TRUE(has("where the task has them rise (are keys swapped?)"));
+  EXPECT_TRUE(has("although the task expects them to rise (are keys swapped?)"));
   cell.expected_easier = one.model.function.easier = protocols::Easier::higher;
-  EXPECT_TRUE(has("successes RISE with the level, where the task has them fall"));
+  EXPECT_TRUE(has("successes RISE with the level, although the task expects them to fall"));
   one.reversed = false;
   one.detectability.d_prime = -1;
   one.detectability.d_prime_ci95 = Interval{-2, -0.5};
@@ -123,7 +128,7 @@ TEST(TaskText, AnswersTheOtherWayRoundAreSaid) {
   EXPECT_FALSE(has("BELOW"));
   cell.confidence.area = 0.25;
   cell.confidence.area_ci95 = Interval{0.125, 0.375};
-  EXPECT_TRUE(has("0.25 [0.125, 0.375] (BELOW 0.5: is the scale turned round?)\n"));
+  EXPECT_TRUE(has("0.25 [0.125, 0.375] (BELOW 0.5: is the scale reversed?)\n"));
   cell.confidence.area_ci95 = Interval{0.125, 0.625};
   EXPECT_FALSE(has("BELOW"));
 }
@@ -178,17 +183,18 @@ TEST(TaskText, ProceduresOfTracks) {
   one.tracks.push_back(track_of("5", staircase, estimate));
   one.tracks.back().procedure->target = 0.5;
   one.tracks.back().procedure->fitted_level = 2.25;
-  EXPECT_EQ(line_of_function(one),
-            "  B           no function: none\n"
-            "    track 1, staircase: no estimate; 1 trial\n"
-            "    track 2, staircase: 2.5, its reversals' mean, where it converges at 70.7 % "
-            "successes; 40 trials, 1 reversal, 3 at an end of its range\n"
-            "    track 3, QUEST+: threshold 2.5, slope 7.5, means of its posterior (weibull, db); "
-            "40 trials, 3 series without a change\n"
-            "    track 4, limits: 2.5, mean of where the answer changed; 40 trials, 9 reversals, 1 "
-            "series without a change\n"
-            "    track 5, staircase: 2.5, its reversals' mean, where it converges at 50.0 % "
-            "successes; the function is there at 2.25; 40 trials, 9 reversals");
+  EXPECT_EQ(
+      line_of_function(one),
+      "  B           no function: none\n"
+      "    track 1, staircase: no estimate; 1 trial\n"
+      "    track 2, staircase: 2.5, mean of its reversals, converging to 70.7 % "
+      "successes; 40 trials, 1 reversal, 3 at an end of its range\n"
+      "    track 3, QUEST+: threshold 2.5, slope 7.5, posterior means (weibull, db); "
+      "40 trials, 3 series without a change\n"
+      "    track 4, limits: 2.5, mean level at which the answer changed; 40 trials, 9 reversals, 1 "
+      "series without a change\n"
+      "    track 5, staircase: 2.5, mean of its reversals, converging to 50.0 % "
+      "successes; fitted function there at 2.25; 40 trials, 9 reversals");
 }
 
 TEST(TaskText, CellsOfNumbersSettingsAnswersAndConfidence) {
@@ -228,13 +234,13 @@ TEST(TaskText, CellsOfNumbersSettingsAnswersAndConfidence) {
                      {0, 1, 499, {}, -1, {}, {}, {}}};
   set.confidence.area = 0.6875;
   set.confidence.area_ci95 = Interval{0.5625, 0.8125};
-  EXPECT_EQ(
-      text_of_cell(set),
-      "adjust, match, ball, point: 1 trial of 1 participant, 0 answered\n"
-      "  Carl        PSE 502.5 [490, 515], constant error 2.25, JND 7.5, from above less from "
-      "below 5.5\n"
-      "  Carl        PSE 499, constant error -1\n"
-      "  confidence: area under the type 2 ROC 0.6875 [0.5625, 0.8125]\n\n");
+  EXPECT_EQ(text_of_cell(set),
+            "adjust, match, ball, point: 1 trial of 1 participant, 0 answered\n"
+            "  Carl        PSE 502.5 [490, 515], constant error 2.25, JND 7.5, settings from above "
+            "minus from "
+            "below 5.5\n"
+            "  Carl        PSE 499, constant error -1\n"
+            "  confidence: area under the type 2 ROC 0.6875 [0.5625, 0.8125]\n\n");
 
   TaskCell named = named_cell("identify", "shapes", "", "ray");
   named.information.emplace();
@@ -324,8 +330,8 @@ TEST(TaskText, Comparisons) {
   one.comparison.differences[0].t_test.log_ratio_ci95 = Interval{std::log(0.25), std::log(4)};
   EXPECT_EQ(text_of_comparison(one, false),
             "JNDs by block and stimulus, detect, ray (ratios)\n"
-            "  2 functions left out: no threshold among the levels shown, or answers the other way "
-            "round\n"
+            "  2 functions left out: no threshold among the levels shown, or reversed answers\n"
+            ""
             "  b, ball / a, ball: 0.5 [0.25, 4], p 0.500; mixed model 2 (1 pair)\n\n");
 
   one.comparison.differences.clear();
@@ -335,8 +341,8 @@ TEST(TaskText, Comparisons) {
   EXPECT_EQ(text_of_comparison(one, false),
             "PSEs by block and stimulus, detect, ray (ratios)\n"
             "  nothing to compare\n"
-            "  1 function left out: no threshold among the levels shown, or answers the other way "
-            "round\n\n");
+            "  1 function left out: no threshold among the levels shown, or reversed answers\n"
+            "\n");
   one.measure = "exponent";
   EXPECT_EQ(text_of_comparison(one, false).substr(0, 10), "Exponents ");
 }

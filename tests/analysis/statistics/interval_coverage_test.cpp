@@ -67,7 +67,7 @@ TEST(IntervalCoverage, TextAndJsonSayTheCounts) {
   settings.studies = 50;
   settings.seed = 77;
   const std::string text = coverage_text({result}, settings);
-  EXPECT_NE(text.find("50 studies a line, seed 77"), std::string::npos);
+  EXPECT_NE(text.find("50 studies per line, seed 77"), std::string::npos);
   EXPECT_NE(text.find("0.02    96.0   90.0  100.0   90.0   80.0   70.0      4.0   2.0\n"),
             std::string::npos)
       << text;

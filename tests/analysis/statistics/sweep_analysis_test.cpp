@@ -88,9 +88,9 @@ TEST(SweepAnalysis, SaysOfEachTotalIndexWhetherChanceIsAPartOfIt) {
                              }),
                     "", "1");
   EXPECT_FALSE(unknown.drivers[0].sobol->noise_share);
-  EXPECT_NE(sweep_text(unknown).find("Chance within the points is a part of every total index"),
+  EXPECT_NE(sweep_text(unknown).find("Every total index includes chance within the points"),
             std::string::npos);
-  EXPECT_NE(sweep_json(unknown).find("Chance within the points is a part of every total index"),
+  EXPECT_NE(sweep_json(unknown).find("Every total index includes chance within the points"),
             std::string::npos);
 }
 

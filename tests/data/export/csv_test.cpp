@@ -55,7 +55,8 @@ TEST_F(ExportCsv, TorqueThatWasLeftOutStandsInAColumnOfItsOwn) {
     EXPECT_EQ(driven, (std::map<std::string, std::string>{
                           {"P1ray", "0"}, {"P1point", ""}, {"P2ray", "1"}}));
     const std::string book = contents_of(settings.codebook);
-    EXPECT_NE(book.find("trials,torque_driven,,0,\"it drives force alone"), std::string::npos);
+    EXPECT_NE(book.find("trials,torque_driven,,0,\"the device drives force alone"),
+              std::string::npos);
   }
 }
 

@@ -204,7 +204,7 @@ TEST_F(DamagedDatabase, ValuesThatPalpateNeverWrites) {
        "row 1 of attempts: a completed attempt has a reason"},
       {"cut off for no reason",
        "UPDATE attempts SET cut_off_reason = NULL WHERE state = 'cut_off' AND run_id = 1",
-       "one that was cut off has none"},
+       "a cut-off attempt has no reason"},
       {"a number below the first", "UPDATE participants SET number = 0 WHERE id = 1", "damaged"},
       {"a run that ended otherwise", "UPDATE runs SET end_reason = 'x' WHERE id = 1", "damaged"},
       {"a trial number beyond int", "UPDATE attempts SET trial = 4294967297 WHERE id = 1",

@@ -254,7 +254,7 @@ class Movement(CommandCase):
             self.assertEqual(found["n_pairs"], 3)
             self.assertAlmostEqual(found["mean_difference"], difference.mean(), delta=1e-12)
             self.assertAlmostEqual(found["t"], difference.mean() / (difference.std(ddof=1) / math.sqrt(3)), delta=1e-9)
-        self.assertIn("Gain in time beside differences of movement", done.stdout)
+        self.assertIn("Gain in time and differences of movement", done.stdout)
 
     def test_figures_and_page_show_the_trials(self):
         db = self.study(participants=1)
@@ -272,7 +272,7 @@ class Movement(CommandCase):
         text = page.read_text()
         for name in names:
             self.assertIn(f'<section id="movement-{name}"', text)
-        for said in ("SIMULATED PARTICIPANTS", "low pass of the path", "palpate watch --db", "was rendered again"):
+        for said in ("SIMULATED PARTICIPANTS", "low-pass filter of the path", "palpate watch --db", "was rendered again"):
             self.assertIn(said, text)
         html.parser.HTMLParser().feed(text)
 

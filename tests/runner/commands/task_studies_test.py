@@ -119,7 +119,7 @@ class TaskStudies(CommandCase):
     def test_what_an_adaptive_procedure_made_of_its_answers_stands_beside_the_fit(self):
         db = self.simulated(PROTOCOLS / "stiffness-2afc.json", "stairs", participants=3)
         said = self.palpate("analyze", "--db", db, "--report", self.dir / "stairs.html").stdout
-        self.assertIn("its reversals' mean, where it converges at 70.7 % successes", said)
+        self.assertIn("mean of its reversals, converging to 70.7 % successes", said)
         page = (self.dir / "stairs.html").read_text()
         self.assertTrue("where it converges at 70.7 % successes" in page)
         title = json.loads((PROTOCOLS / "stiffness-2afc.json").read_text())["title"]
