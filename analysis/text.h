@@ -34,8 +34,8 @@ std::string counted(std::size_t n, std::string_view one, std::string_view many);
 /// Fixed notation, independent of the locale: decimal point, minus sign U+2212, no negative zero.
 std::string fixed(double value, int decimals);
 
-/// Four significant digits, the shortest way, with a decimal point: levels may be millimetres or
-/// kilonewtons. "inf", "-inf".
+/// Four significant digits, in the shortest form, with a decimal point: levels may be millimetres
+/// or kilonewtons. "inf", "-inf".
 std::string short_number(double value);
 
 /// A p value with three decimals: "0.042", "<0.001".

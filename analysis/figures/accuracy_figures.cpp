@@ -79,7 +79,7 @@ std::string servo_sentence(const Analysis& analysis, const StudyRecord& record) 
   double longest = 0;
   for (const ServoQuality& servo : record.servo) longest = std::max(longest, servo.longest_period);
   std::string text = "All trials have their longest servo period in the same bin, up to " +
-                     fixed(1000 * longest, 3) + " ms: there is nothing to draw.";
+                     fixed(1000 * longest, 3) + " ms: no figure is drawn.";
   if (analysis.table.simulated != Simulated::no) text += kVirtualClock;
   return text;
 }
@@ -123,7 +123,7 @@ Panel confusion_panel(const Analysis& analysis, std::size_t renderer, std::size_
       panel.marks.push_back(rect_mark(Role::heat, x + 0.02, y + 0.03, x + 0.98, y + 0.97,
                                       n ? 0.08 + 0.9 * proportion : 0.03, text));
       if (n == 0) continue;
-      // Contrast: text on a strongly coloured cell has the colour of the page.
+      // For contrast, text on a strongly coloured cell has the colour of the page.
       Mark mark = text_mark(proportion > 0.5 ? Role::page : Role::ink, x + 0.5, y + 0.5,
                             percent_text(n, total), 12);
       mark.bold = analysis.table.answers.size() > a && answers[a] == table.shapes[s];
@@ -141,7 +141,7 @@ std::optional<Interval> percent_change(const std::optional<Interval>& log_ratio)
   return Interval{-reduction.high, -reduction.low};
 }
 
-/// Adds a comparison's shapes: change of accuracy over change of time. \return false where none is
+/// Adds a comparison's shapes: change of accuracy over change of time. \return false if none is
 /// defined
 bool add_changes(Panel& panel, const Comparison& comparison, const std::vector<std::string>& names,
                  std::size_t shapes, std::string& description) {
@@ -199,13 +199,12 @@ Figure confusion_of(const Analysis& analysis) {
   }
   figure.notes.insert(
       figure.notes.begin(),
-      "Percent of the trials of a row; bold: the right answer. None: no answer in time.");
+      "Percent of the trials of a row; bold: correct answers. None: no answer in time.");
   return figure;
 }
 
 Figure speed_accuracy_of(const Analysis& analysis) {
-  Figure figure =
-      new_figure(analysis, "speed-accuracy", "Change of time beside change of accuracy");
+  Figure figure = new_figure(analysis, "speed-accuracy", "Change of time and change of accuracy");
   const std::size_t shapes = shown_shapes(analysis, figure);
   const std::size_t comparisons = shown_comparisons(analysis, figure);
   double widest = 5, highest = 3;
@@ -270,7 +269,7 @@ Figure exclusions_of(const Analysis& analysis) {
   for (const Reason& reason : kReasons) names.emplace_back(reason.name);
   Panel panel;
   panel.x = names_axis(names, kGroups, "");
-  panel.y = linear_axis(0, highest, "left out of the times (% of trials)");
+  panel.y = linear_axis(0, highest, "excluded from the times (% of trials)");
   panel.width = kFullPanelWidth;
   panel.height = 260;
   panel.marks.push_back(

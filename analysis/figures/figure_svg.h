@@ -8,13 +8,13 @@
 
 namespace palpate::analysis {
 
-/// standalone: a file of its own, with title and notes; in_page: the HTML page shows title and
-/// notes; in_narrow_page: likewise, for narrow screens, with narrower panels below each other.
+/// standalone: a separate file, with title and notes; in_page: the HTML page shows title and notes;
+/// in_narrow_page: the same for narrow screens, with narrower panels stacked vertically.
 enum class FigurePlacement { standalone, in_page, in_narrow_page };
 
 /// In a page, title and notes are outside the visible part (viewBox) and used when the drawing is
-/// saved. Marks have their numbers as <title> (tooltip); marks of one participant are <g> with the
-/// attribute data-person.
+/// saved. Marks have a <title> (tooltip) with their numbers; marks of one participant are a <g>
+/// with the attribute data-person.
 std::string figure_svg(const Figure& figure, const Palette& palette,
                        FigurePlacement placement = FigurePlacement::standalone);
 

@@ -12,7 +12,7 @@
 namespace palpate::analysis {
 
 /// What a colour encodes; each palette gives it a value. point, ray, third to eighth: a renderer or
-/// a line of its own; paper: results of Ho, Basdogan & Srinivasan (2000); heat: cells of a matrix;
+/// a separate line; paper: results of Ho, Basdogan & Srinivasan (2000); heat: cells of a matrix;
 /// ink, soft, grid, page: text, secondary text, grid lines, background; amber: warnings, limits,
 /// censored estimates.
 enum class Role {
@@ -41,7 +41,7 @@ enum class MarkerShape { circle, square, diamond, up, down, dash, right, cross, 
 
 /// A graphical element of a panel; coordinates in the units of the panel's axes.
 struct Mark {
-  /// label: a text beside its point, placed where it overlaps least.
+  /// label: a text beside its point, placed with the least overlap.
   enum class Kind { rect, area, line, interval, symbol, text, label };
   Kind kind = Kind::symbol;
   Role role = Role::ink;
@@ -51,14 +51,14 @@ struct Mark {
   double opacity = 1;
   double size = 6;  ///< px: half the width of a symbol, width of a line, font size of a text
   MarkerShape shape = MarkerShape::circle;
-  std::string text;         ///< of a text or label: itself; of others: the tooltip
+  std::string text;         ///< of a text or label: the text; of others: the tooltip
   std::string participant;  ///< code; marks with the same code are highlighted together
   int anchor = 0;           ///< of a text: -1 begins, 0 is centred, 1 ends at x
   bool bold = false;        ///< of a text
   bool dashed = false;      ///< of a line
   double dx = 0, dy = 0;    ///< px, y down: offset of a symbol or text from (x, y)
   /// Of a text: largest width in units of x (0: unlimited). A wider text is replaced by `shorter`,
-  /// and left out where that is too wide as well.
+  /// or left out if that is too wide as well.
   double max_width = 0;
   std::string shorter;
 };
@@ -93,13 +93,13 @@ struct LegendEntry {
 struct Figure {
   std::string id;  ///< file name without .svg and anchor in a page, such as "figure15"
   std::string title;
-  std::string subtitle;     ///< how many participants and trials
+  std::string subtitle;     ///< numbers of participants and trials
   std::string label;        ///< "SIMULATED PARTICIPANTS" or empty
-  std::string description;  ///< text alternative for screen readers: the numbers that are drawn
+  std::string description;  ///< text alternative for screen readers: the numbers drawn
   std::vector<std::string> notes;
   std::vector<LegendEntry> legend;
   std::vector<Panel> panels;
-  double max_row_width = 1000;  ///< px: panels are put side by side up to this width
+  double max_row_width = 1000;  ///< px: panels are placed side by side up to this width
 };
 
 /// The figures for which there are data, in the order of display: figure15, speedup, times,
@@ -115,12 +115,12 @@ Figure figure15_of(const Analysis& analysis);
 /// comparison.
 Figure speedup_of(const Analysis& analysis);
 
-/// A sentence that says why there is no figure of the servo periods.
+/// The reason, in a sentence, why there is no figure of the servo periods.
 std::string servo_sentence(const Analysis& analysis, const StudyRecord& record);
 
 /// Largest number of shapes in a figure; tables and JSON have all.
 constexpr std::size_t kShownShapes = 24;
-/// Largest number of renderers in a figure: so many styles (colour and symbol) there are.
+/// Largest number of renderers in a figure: the number of styles (colour and symbol).
 constexpr std::size_t kShownRenderers = 6;
 /// Largest number of participants drawn one by one.
 constexpr std::size_t kShownParticipants = 200;

@@ -25,7 +25,8 @@ std::optional<Interval> interval_of(const TimesCell& cell) {
   return Interval{*cell.mean_of_participant_means - half, *cell.mean_of_participant_means + half};
 }
 
-/// Position of a renderer's marks within a shape's slot, 0 to 1, at most `spread` from its middle.
+/// Position of a renderer's marks within the slot of a shape, 0 to 1, at most `spread` from its
+/// middle.
 double slot_position(std::size_t renderer, std::size_t renderers, double spread) {
   if (renderers < 2) return 0.5;
   return 0.5 +
@@ -74,8 +75,8 @@ void add_participants(Panel& panel, const Analysis& analysis, std::size_t render
   }
 }
 
-/// Upper end of the time axis, s. Intervals are cut at 1.5 times the largest participant's mean:
-/// those of two participants may be ten times as long.
+/// Upper end of the time axis, s. Intervals are cut at 1.5 times the largest participant's mean: an
+/// interval of two participants may be ten times as long.
 double highest_time(const Analysis& analysis, std::size_t renderers, std::size_t shapes) {
   double largest = 0, largest_end = 0;
   for (std::size_t r = 0; r < renderers; ++r) {
@@ -99,7 +100,7 @@ const CensoredEstimate* shown_censored(const Comparison& comparison, std::size_t
   return censored.n_censored > 0 && censored.log_ratio ? &censored : nullptr;
 }
 
-/// The percent axis that the panels of all comparisons have.
+/// The percent axis common to the panels of all comparisons.
 FigureAxis reduction_axis(const Analysis& analysis, std::size_t comparisons, std::size_t shapes) {
   double low = 0, high = compares_as_paper(analysis) ? 25 : 10;  // the paper's largest is 22 %
   const auto include = [&](const Interval& log_ratio) {
@@ -157,7 +158,7 @@ void add_censored(Panel& panel, const CensoredEstimate& censored, double x, std:
   text += "; " + own;
 }
 
-/// Adds a comparison's reductions, shape by shape. \return false where none is defined
+/// Adds a comparison's reductions, shape by shape. \return false if none is defined
 bool add_reductions(Panel& panel, const Comparison& comparison,
                     const std::vector<std::string>& names, std::size_t shapes,
                     std::string& description) {
@@ -250,8 +251,8 @@ Figure figure15_of(const Analysis& analysis) {
 }
 
 Figure speedup_of(const Analysis& analysis) {
-  Figure figure =
-      new_figure(analysis, "speedup", "How much less time " + with_renderer(analysis, "than with"));
+  Figure figure = new_figure(analysis, "speedup",
+                             "Reduction of response time " + with_renderer(analysis, "against"));
   const std::size_t shapes = shown_shapes(analysis, figure);
   const std::size_t comparisons = shown_comparisons(analysis, figure);
   const FigureAxis axis = reduction_axis(analysis, comparisons, shapes);
@@ -289,15 +290,14 @@ Figure speedup_of(const Analysis& analysis) {
   figure.notes.insert(
       figure.notes.begin(),
       "Above 0 " +
-          (many ? "it is faster than with " + with_article(short_name(first.reference))
+          (many ? "the renderer is faster than " + with_article(short_name(first.reference))
                 : with_article(short_name(first.renderer)) + " is faster") +
           ". Geometric reduction over participants with both renderers; bars: 95 % interval of the "
-          "paired t-test on log times, not adjusted; p adjusted over " +
-          (many ? "all shapes and comparisons" : "the shapes") + " after Holm, bold below 0.05." +
-          (with_censored
-               ? " Time-outs as censored: log-normal times that are longer than the limit "
-                 "where nobody answered in time."
-               : "") +
+          "paired t-test on log times, not adjusted; p (Holm) adjusted over " +
+          (many ? "all shapes and comparisons" : "the shapes") + ", bold below 0.05." +
+          (with_censored ? " Time-outs as censored: log-normal times that exceed the limit "
+                           "in trials without an answer in time."
+                         : "") +
           (with_paper ? " n.s.: the paper found no significant difference." : ""));
   return figure;
 }

@@ -117,8 +117,8 @@ std::vector<Flat> hull_of(std::vector<Flat> points) {
   return hull;
 }
 
-/// A view along an axis, at its place among the three: the front below left, the top above it, the
-/// right side beside it.
+/// A view along an axis, at its position among the three: the front below left, the top above it,
+/// the right side beside it.
 struct View {
   const char* name;
   int across, up;       ///< axes of the object
@@ -180,7 +180,7 @@ Panel Drawer::views_of(std::size_t renderer, std::size_t s, const TypicalTrial& 
   const ShapeOutline& outline = pictures_.outlines[s];
   const double reach = reach_of(outline), limit = 1.25 * reach, apart = 2.65 * reach;
   Panel panel = panel_of(renderer, s, one);
-  panel.width = panel.height = 300;  // as wide in a narrow page, or the views would be squeezed
+  panel.width = panel.height = 300;  // also on a narrow page: views keep their shape
   panel.x = {"", -limit, apart + limit, {}, false, false};
   panel.y = panel.x;
   const std::vector<std::pair<bool, std::vector<Vec3>>> runs = runs_of(one.trial, limit);
@@ -205,7 +205,7 @@ Panel Drawer::views_of(std::size_t renderer, std::size_t s, const TypicalTrial& 
     text.dy = 8;
     panel.marks.push_back(std::move(text));
   }
-  // 20 mm, in the corner that has no view.
+  // A scale bar of 20 mm, in the corner without a view.
   const double x = apart - 10, y = apart;
   panel.marks.push_back(line_mark(Role::ink, {x, x + 20}, {y, y}, 2));
   Mark scale = text_mark(Role::ink, x + 10, y, "20 mm", 11);
@@ -215,7 +215,7 @@ Panel Drawer::views_of(std::size_t renderer, std::size_t s, const TypicalTrial& 
 }
 
 Figure Drawer::paths() const {
-  Figure figure = new_figure("movement-paths", "Where the hand went, on three views of the object");
+  Figure figure = new_figure("movement-paths", "Path of the hand, on three views of the object");
   figure.description = "Paths of typical trials:";
   for (std::size_t s = 0; s < shapes_; ++s) {
     if (pictures_.outlines[s].places.empty()) continue;
@@ -230,9 +230,9 @@ Figure Drawer::paths() const {
     figure.legend.push_back({name(r) + ", in contact", role(r), MarkerShape::dash});
   figure.legend.push_back({"in free space", Role::soft, MarkerShape::dash});
   figure.notes.push_back(
-      "One trial of each kind: the right answer whose duration is nearest to the median. In the "
-      "object's frame. In contact the line is where the stylus touched, in free space (dashed) "
-      "where its tip was.");
+      "One trial of each kind: the correct answer whose duration is nearest to the median, in the "
+      "object's frame. The line shows the contact point, or in free space (dashed) the tip of "
+      "the stylus.");
   return figure;
 }
 
@@ -244,7 +244,7 @@ double opacity_of(double density) {
   return std::round(20 * std::clamp(density / kFullDensity, 0.0, 1.0)) / 20;
 }
 
-/// An edge on the map; cut where it goes over the map's side.
+/// An edge on the map, cut at the map's side.
 void add_edge(Panel& panel, const Vec3& from, const Vec3& to) {
   constexpr int kSteps = 16;
   std::vector<double> x, y;
@@ -276,7 +276,7 @@ Panel Drawer::map_of(std::size_t renderer, std::size_t s, const ContactMap& map)
         {k * static_cast<double>(SurfaceMap::kColumns) / 4, fixed(90 * k - 180, 0) + "°"});
   panel.y = {"height", 0, SurfaceMap::kRows, {}, false, false};
   panel.y.ticks = {{0, "low"}, {SurfaceMap::kRows / 2.0, "middle"}, {SurfaceMap::kRows, "high"}};
-  // In steps of 5 %, so that neighbours of a row are often one rectangle: each is a line of the
+  // Use steps of 5 %: neighbours of a row then often form one rectangle, which takes a line of the
   // file.
   for (std::size_t c = 0, next = 0; c < map.density.size(); c = next) {
     const double opacity = opacity_of(map.density[c]);
@@ -299,7 +299,8 @@ Panel Drawer::map_of(std::size_t renderer, std::size_t s, const ContactMap& map)
 
 Figure Drawer::contact() const {
   Figure figure = new_figure("movement-contact", "Where the surface was touched");
-  figure.description = "Contact time by place on the surface. The most touched tenth of the map:";
+  figure.description =
+      "Contact time by position on the surface. The most touched tenth of the map:";
   for (std::size_t s = 0; s < shapes_; ++s) {
     for (std::size_t r = 0; r < renderers_; ++r) {
       const ContactMap& map = pictures_.contact[r][s];
@@ -308,7 +309,7 @@ Figure Drawer::contact() const {
       std::vector<double> sorted = map.density;
       std::sort(sorted.rbegin(), sorted.rend());
       figure.description += " " + figure.panels.back().title + " from " +
-                            fixed(sorted[sorted.size() / 10], 1) + " times even contact on;";
+                            fixed(sorted[sorted.size() / 10], 1) + " times uniform contact;";
     }
   }
   for (std::size_t r = 0; r < renderers_; ++r)
@@ -316,8 +317,8 @@ Figure Drawer::contact() const {
   figure.notes.push_back(
       "The surface as seen from the middle of the object, unfolded: the angle about its upright "
       "axis across, the height (sine of the elevation) upwards; edges are lines. Colour: contact "
-      "time by area of the surface. Full colour is 4 times or more of what even contact would "
-      "give, a quarter of the colour is even, white is none. Each trial has the same weight.");
+      "time per area of the surface. Full colour is at least 4 times that of uniform contact, "
+      "a quarter of the colour is uniform contact, white is none. Each trial has the same weight.");
   return figure;
 }
 
@@ -386,9 +387,9 @@ Figure Drawer::speed() const {
   for (std::size_t r = 0; r < renderers_; ++r)
     figure.legend.push_back({"contact, " + name(r), role(r), MarkerShape::square});
   figure.notes.push_back(
-      "The same trials as in the paths; speed of the tip after the low pass at " +
+      "The same trials as in the paths; speed of the tip after the low-pass filter at " +
       fixed(table_.settings.cutoff, 1) +
-      " Hz. Shaded: movements, which are at least 5 % of the greatest speed for "
+      " Hz. Shaded: movements, at least 5 % of the greatest speed for "
       "100 ms or more. Bar on top: contact.");
   return figure;
 }
@@ -396,7 +397,7 @@ Figure Drawer::speed() const {
 // --- coverage over time -----------------------------------------------------------------------
 
 Figure Drawer::coverage() const {
-  Figure figure = new_figure("movement-coverage", "How much of the surface was touched, over time");
+  Figure figure = new_figure("movement-coverage", "Share of the surface touched, over time");
   figure.description = "Mean share of the surface touched at the median duration:";
   for (std::size_t s = 0; s < shapes_; ++s) {
     Panel panel;
@@ -418,7 +419,7 @@ Figure Drawer::coverage() const {
     for (std::size_t r = 0; r < renderers_; ++r) {
       const CoverageCurve& curve = pictures_.coverage[r][s];
       if (curve.mean.empty()) continue;
-      std::array<std::vector<double>, 2> x, y;  // half of the trials go on; have ended
+      std::array<std::vector<double>, 2> x, y;  // at least half of the trials continue; have ended
       double at_median = 0;
       for (std::size_t k = 0; k < curve.mean.size(); ++k) {
         const double at = static_cast<double>(k) * TrialTally::kStep;
@@ -445,7 +446,7 @@ Figure Drawer::coverage() const {
   for (std::size_t r = 0; r < renderers_; ++r)
     figure.legend.push_back({name(r), role(r), MarkerShape::dash});
   figure.notes.push_back(
-      "Share of 10,000 places on the surface that were within 5 mm of a contact so far: mean over "
+      "Share of 10,000 points on the surface that were within 5 mm of a contact so far: mean over "
       "participants' means. A trial that has ended keeps its last value; dashed: more than half of "
       "the trials have ended.");
   return figure;
@@ -464,7 +465,7 @@ Figure Drawer::procedures() const {
        {"share_pressure", "pressure", Role::third, 0.9},
        {"share_lateral", "lateral motion", Role::fourth, 0.9},
        {"share_contour", "contour following", Role::seventh, 0.9}}};
-  Figure figure = new_figure("movement-procedures", "What the hand did in contact");
+  Figure figure = new_figure("movement-procedures", "Exploratory procedures in contact");
   figure.description = "Share of exploratory procedures, static, pressure, lateral, contour:";
   for (std::size_t r = 0; r < renderers_; ++r) {
     Panel panel;
@@ -496,9 +497,9 @@ Figure Drawer::procedures() const {
   for (const Kind& kind : kKinds)
     figure.legend.push_back({kind.name, kind.role, MarkerShape::square});
   figure.notes.push_back(
-      "Procedures of Lederman & Klatzky (1987), told apart in windows of 100 ms by speed along the "
+      "Procedures of Lederman & Klatzky (1987), classified in windows of 100 ms by speed along the "
       "surface (10 mm/s), change of force (0.3 of its mean) and nearness of an edge (3 mm); the "
-      "limits are ours. Mean over participants' means.");
+      "limits are our own. Mean over participants' means.");
   return figure;
 }
 

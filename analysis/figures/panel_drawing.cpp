@@ -266,7 +266,7 @@ class Placement {
 
  private:
   void take_segment(double x0, double y0, double x1, double y1) {
-    constexpr int kPieces = 4;  // of an oblique segment: one bounding box would cover too much
+    constexpr int kPieces = 4;  // of an oblique segment, as one bounding box would cover too much
     const int pieces = x0 == x1 || y0 == y1 ? 1 : kPieces;
     for (int i = 0; i < pieces; ++i) {
       const double from = static_cast<double>(i) / pieces, to = static_cast<double>(i + 1) / pieces;
@@ -292,7 +292,7 @@ class Placement {
     return {left, left + wide, base - text.size, base + 3};
   }
 
-  /// Overlaps of a box; extending beyond the panel counts as three.
+  /// Number of overlaps of a box; extending beyond the panel counts as three.
   std::ptrdiff_t n_hidden(const Box& box) const {
     const bool outside = box.left < -kLeft || box.right > width_ + kRight;
     return std::ranges::count_if(taken_, [&](const Box& other) { return box.meets(other); }) +
@@ -425,8 +425,8 @@ const std::string& colour(const Palette& palette, Role role) {
 
 std::string tick_text(const Tick& tick) { return shortened(tick.label, kLongestName); }
 
-/// Which ticks have labels: every `every`-th from `first` on, the fewest left out so that labels do
-/// not overlap; the tick at 0 has one.
+/// The labelled ticks: every `every`-th from `first` on, as many as fit without overlap; the tick
+/// at 0 is labelled.
 struct LabelStride {
   std::size_t every = 1, first = 0;
   bool has_label(std::size_t tick) const { return tick % every == first; }
@@ -472,7 +472,7 @@ void draw_left_axis(Svg& svg, const PlacedPanel& placed, const Palette& palette)
            {kTickSize, colour(palette, Role::soft), Svg::Anchor::middle, false, -90});
 }
 
-/// Names of categories, rotated where one is wider than its slot. \return height used, px
+/// Names of categories, rotated if one is wider than its slot. \return height used, px
 double draw_names(Svg& svg, const PlacedPanel& placed, const Palette& palette) {
   const Panel& panel = *placed.panel;
   const double bottom = placed.top + panel.height;

@@ -14,8 +14,8 @@ namespace palpate::analysis {
 
 // Axes of panels: range, ticks and tick labels.
 
-/// Categorical axis: slot i spans i to i + 1 and has its name in the middle. \param shown how many
-/// of the names
+/// Categorical axis: slot i spans i to i + 1 and has its name in the middle. \param shown number of
+/// names shown
 FigureAxis names_axis(const std::vector<std::string>& names, std::size_t shown, std::string title);
 /// Linear axis with ticks at multiples of 1, 2 or 5 times a power of ten; its ends are ticks, at or
 /// beyond low and high.
@@ -35,7 +35,7 @@ Mark line_mark(Role role, std::vector<double> x, std::vector<double> y, double w
 Mark rect_mark(Role role, double x0, double y0, double x1, double y1, double opacity,
                std::string text);
 
-/// Vertical interval with end caps; where it extends beyond the axis it is cut, with an arrowhead.
+/// Vertical interval with end caps; cut at the axis, with an arrowhead.
 void add_interval(Panel& panel, Role role, double x, double low, double high, std::string text);
 /// The same, horizontal.
 void add_interval_across(Panel& panel, Role role, double y, double low, double high,
@@ -44,22 +44,22 @@ void add_interval_across(Panel& panel, Role role, double y, double low, double h
 /// Corners of right, left, cross and saltire within -1 to 1, y down; empty for the other shapes.
 std::vector<std::pair<double, double>> outline_of(MarkerShape shape);
 
-// Places the labels of data points where they overlap least.
+// Places the labels of data points with the least overlap.
 
 /// The panel's labels (Mark::Kind::label) as texts beside their points: each, in order, at the
 /// candidate position (right or left, several heights) that overlaps the fewest points, intervals,
 /// lines and labels placed before. \param width px, of the panel as it is drawn
 std::vector<Mark> placed_labels(const Panel& panel, double width);
 
-// What all figures of an analysis have in common: title and label, style and legend of renderers,
-// how many shapes, renderers and comparisons are drawn, empty panels, and the functions that make
+// Common parts of the figures of an analysis: title and label, style and legend of renderers,
+// numbers of shapes, renderers and comparisons drawn, empty panels, and the functions that make
 // each figure. Internal to analysis/figures/.
 
 /// px: width of the only panel of a row, and of the panel of one comparison among several.
 constexpr double kFullPanelWidth = 850, kComparisonPanelWidth = 370;
 
-/// A figure without panels: id, title, "SIMULATED" label where it applies, numbers of participants
-/// and trials.
+/// A figure without panels: id, title, "SIMULATED" label if it applies, numbers of participants and
+/// trials.
 Figure new_figure(const Analysis& analysis, std::string id, std::string title);
 
 /// Colour and symbol of a renderer.
@@ -67,7 +67,7 @@ struct RendererStyle {
   Role role = Role::ink;
   MarkerShape shape = MarkerShape::circle;
 };
-/// Point and ray have fixed styles; the others take the free ones in the order of
+/// Point and ray have fixed styles; other renderers take the remaining ones in the order of
 /// TrialTable::renderers.
 RendererStyle style_of(const Analysis& analysis, std::string_view renderer);
 /// A renderer's name, cut to 40 bytes.
@@ -75,13 +75,12 @@ std::string short_name(const std::string& renderer);
 /// Adds the first `shown` renderers to the legend.
 void add_renderers(Figure& figure, const Analysis& analysis, std::size_t shown);
 
-/// How many shapes, renderers and comparisons are drawn; adds a note to the figure where there are
-/// more.
+/// Numbers of shapes, renderers and comparisons drawn; adds a note to the figure if there are more.
 std::size_t shown_shapes(const Analysis& analysis, Figure& figure);
 std::size_t shown_renderers(const Analysis& analysis, Figure& figure);
 std::size_t shown_comparisons(const Analysis& analysis, Figure& figure);
 
-/// An empty panel for a comparison, titled where there are several. \param slot px for each shape
+/// An empty panel for a comparison, titled if there are several. \param slot px for each shape
 Panel comparison_panel(const Analysis& analysis, const RendererPair& pair, std::size_t shapes,
                        double slot);
 /// Axis title such as "less time with the ray (%)". \param joint as for with_renderer()
@@ -114,10 +113,10 @@ struct PlacedPanel {
   }
 };
 
-/// px that the left axis with its labels and title takes.
+/// Width in px of the left axis with its labels and title.
 double left_axis_width(const Panel& panel);
 
-/// \return px that the lower axis with its labels and title takes
+/// \return height in px of the lower axis with its labels and title
 double draw_axes(Svg& svg, const PlacedPanel& placed, const Palette& palette);
 void draw_marks(Svg& svg, const PlacedPanel& placed, const Palette& palette);
 

@@ -23,7 +23,7 @@ std::optional<double> half_interval(const LearningBin& bin) {
   return quantile(distribution, 0.975) * *bin.se_mean_log;
 }
 
-/// Adds a comparison's gains by order, shape by shape. \return false where none is defined
+/// Adds a comparison's gains by order, shape by shape. \return false if none is defined
 bool add_orders(Panel& panel, const Analysis& analysis, std::size_t comparison, std::size_t shapes,
                 std::string& description) {
   const RendererPair& pair = analysis.comparisons[comparison].pair;
@@ -186,11 +186,11 @@ Figure order_of(const Analysis& analysis) {
   figure.legend.push_back({"orders balanced", Role::ink, MarkerShape::diamond});
   figure.notes.insert(
       figure.notes.begin(),
-      "Practice makes whichever renderer comes second look faster: the gain of those "
+      "Practice makes the second renderer appear faster: the gain of participants "
       "who began with " +
           with_article(short_name(first.reference)) +
           " is then too large, that of the others too small. "
-          "The mean of both groups is free of it (two-period crossover); bars: 95 % "
+          "The mean of both groups is free of this bias (two-period crossover); bars: 95 % "
           "interval.");
   return figure;
 }

@@ -47,7 +47,7 @@ namespace {
 constexpr std::string_view kFont =
     "'Helvetica Neue', Helvetica, Arial, 'Liberation Sans', 'DejaVu Sans', sans-serif";
 
-/// Two decimals, no exponent, ASCII minus, as SVG wants.
+/// Two decimals, no exponent, ASCII minus, as SVG requires.
 std::string coordinate(double value) {
   char digits[512];
   const auto end =

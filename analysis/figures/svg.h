@@ -21,7 +21,7 @@ using Palette = std::array<std::string, kRoles>;
 /// deficiency, some darker for contrast on white.
 Palette light_palette();
 Palette dark_palette();
-/// CSS variables "var(--point)" ..., whose values are in the style of the page.
+/// CSS variables "var(--point)" ..., defined in the style of the page.
 Palette page_palette();
 
 /// Colour of line number `line` (from 0) of a figure; repeats after eight.
@@ -62,7 +62,7 @@ class Svg {
   void begin_standalone();
   void end_group();
 
-  /// Draws the elements of another one over these.
+  /// Draws the elements of another drawing over these.
   void append(const Svg& other) { body_ += other.body_; }
 
   struct Part {
@@ -71,8 +71,8 @@ class Svg {
 
   /// The document. In a page it scales with the width, down to 65 % (legible text) and up to 100 %.
   /// \param id starts the ids of title and description: unique within a page
-  /// \param shown the part that a page shows; the attribute data-whole has the view box of all,
-  /// used for saving
+  /// \param shown the part shown in a page; the attribute data-whole has the whole view box, for
+  /// saving
   std::string document(double width, double height, std::string_view title,
                        std::string_view description, std::string_view id = "figure",
                        const std::optional<Part>& shown = std::nullopt) const;
@@ -83,7 +83,7 @@ class Svg {
 
 /// Estimated width of a text, px, by the widths of DejaVu Sans (an upper bound for the fonts used).
 double text_width(std::string_view text, double size, bool bold = false);
-/// The text, cut with an ellipsis where it is wider than `width` px.
+/// The text, cut with an ellipsis if it is wider than `width` px.
 std::string fitting(std::string_view text, double width, double size);
 /// The text in lines of at most `width` px.
 std::vector<std::string> lines_of(std::string_view text, double width, double size,

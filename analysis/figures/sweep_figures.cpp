@@ -16,9 +16,9 @@ namespace palpate::analysis {
 namespace {
 
 constexpr std::size_t kShownPoints = 400;  // of a scatter
-constexpr double kLowestGain = -100;       // %; a slowing-down has no end: it is cut
+constexpr double kLowestGain = -100;       // %; axes are cut there, as losses are unbounded
 
-/// "" where all points are drawn.
+/// "" if all points are drawn.
 std::string thinned_note(const SweepAnalysis& analysis) {
   if (analysis.table.rows() <= kShownPoints) return "";
   return "At most " + std::to_string(kShownPoints) + " of the points are drawn, chosen at random. ";
@@ -71,8 +71,8 @@ void add_paper_mark(Panel& panel, const PaperEffect& effect, double x) {
   panel.marks.push_back(std::move(text));
 }
 
-/// Rows with a value, drawn at random where there are more than kShownPoints: each with the same
-/// chance, or a design whose points repeat with a period would show a part of itself. Ascending.
+/// Rows with a value, ascending. Beyond kShownPoints, a random sample with equal probabilities:
+/// regular thinning would show only a part of a periodic design.
 std::vector<std::size_t> shown_rows(const SweepAnalysis& analysis,
                                     const std::vector<double>& values) {
   std::vector<std::size_t> rows;
@@ -87,7 +87,7 @@ std::vector<std::size_t> shown_rows(const SweepAnalysis& analysis,
   return rows;
 }
 
-/// Points spread over a strip by the golden section: even, and the same each time.
+/// Points spread over a strip by the golden section: evenly and reproducibly.
 void add_strip(Panel& panel, const SweepAnalysis& analysis, const std::vector<double>& values,
                double centre) {
   const std::vector<std::size_t> rows = shown_rows(analysis, values);
@@ -111,7 +111,7 @@ void add_box(Panel& panel, const Spread& spread, const std::string& text, double
 
 Figure gains_figure(const SweepAnalysis& analysis) {
   Figure figure = sweep_figure(analysis, "gains", "Gains over the space of settings");
-  if (analysis.table.shapes.empty()) return figure;  // of tasks
+  if (analysis.table.shapes.empty()) return figure;  // of tasks: no gains
   const std::size_t shapes = shown_shapes_of(analysis, figure);
   double low = 0, high = 25;
   for (std::size_t s = 0; s < shapes; ++s) {
@@ -132,8 +132,8 @@ Figure gains_figure(const SweepAnalysis& analysis) {
     const auto at = static_cast<double>(s);
     if (spread.n > 0) {
       const std::string text = shape + ": median " + fixed(*spread.q50, 1) +
-                               " %, half of the settings " + fixed(*spread.q25, 1) + " to " +
-                               fixed(*spread.q75, 1) + " %, nine in ten " + fixed(*spread.q05, 1) +
+                               " %, middle 50 % of the settings " + fixed(*spread.q25, 1) + " to " +
+                               fixed(*spread.q75, 1) + " %, middle 90 % " + fixed(*spread.q05, 1) +
                                " to " + fixed(*spread.q95, 1) + " %";
       add_strip(panel, analysis, analysis.drivers[s].values, at + 0.3);
       add_box(panel, spread, text, at + 0.53);
@@ -152,7 +152,7 @@ Figure gains_figure(const SweepAnalysis& analysis) {
       figure.notes.begin(),
       thinned_note(analysis) + "Each small mark is a study at one point of the " +
           (analysis.table.design == "grid" ? "grid" : "space") +
-          "; box: half of them; bar: nine in ten." +
+          "; box: middle 50 %; bar: middle 90 %." +
           std::string(with_paper ? " n.s.: the paper found no significant difference." : ""));
   return figure;
 }
@@ -162,7 +162,7 @@ struct Shown {
   std::optional<Interval> ci95;
 };
 
-/// What the drivers' figure shows of a parameter: the outer mark, and the inner one.
+/// The marks of a parameter in the drivers' figure: the outer and the inner one.
 Shown outer(const Drivers& drivers, std::size_t p) {
   if (drivers.sobol)
     return {drivers.sobol->of[p].total.value_or(0), drivers.sobol->of[p].total_ci95};
@@ -220,34 +220,35 @@ Panel drivers_panel(const SweepAnalysis& analysis, const Drivers& drivers) {
   return panel;
 }
 
-/// Whether chance within the points is a part of the total indices.
+/// States whether the total indices include chance within the points.
 std::string chance_note(const SweepAnalysis& analysis) {
   std::string with;
   for (const Drivers& drivers : analysis.drivers) {
     if (drivers.strongest.empty() || drivers.sobol->noise_share) continue;
     with += (with.empty() ? "" : ", ") + title_of(drivers.output);
   }
-  return with.empty() ? "Chance within the points belongs to no index."
-                      : "Chance within the points is a part of the totals of: " + with + ".";
+  return with.empty()
+             ? "The indices do not include chance within the points."
+             : "The total indices of these include chance within the points: " + with + ".";
 }
 
 Figure drivers_figure(const SweepAnalysis& analysis) {
-  Figure figure = sweep_figure(analysis, "drivers", "What the gains depend on");
+  Figure figure = sweep_figure(analysis, "drivers", "Drivers of the gains");
   for (const Drivers& drivers : analysis.drivers) {
     if (drivers.strongest.empty() || figure.panels.size() > kShownShapes) continue;
     figure.panels.push_back(drivers_panel(analysis, drivers));
     figure.panels.back().starts_row = figure.panels.size() % 2 == 1;
-    figure.description += title_of(drivers.output) + ": most on " +
+    figure.description += title_of(drivers.output) + ": strongest " +
                           analysis.table.parameters[drivers.strongest[0]] + ". ";
   }
   if (figure.panels.empty()) return figure;
   if (analysis.table.design == "saltelli") {
-    figure.legend = {{"with all it acts together with (total)", Role::ink, MarkerShape::circle},
+    figure.legend = {{"with interactions (total)", Role::ink, MarkerShape::circle},
                      {"alone (first order)", Role::ray, MarkerShape::square}};
     figure.notes = {"Shares of the variance over the space, with 95 % bootstrap intervals. " +
                     chance_note(analysis)};
   } else {
-    figure.legend = {{"partial, the others' part taken out", Role::ink, MarkerShape::circle},
+    figure.legend = {{"partial, adjusted for the others", Role::ink, MarkerShape::circle},
                      {"Spearman", Role::ray, MarkerShape::square}};
     if (!has_partial(analysis)) figure.legend = {{"Spearman", Role::ink, MarkerShape::circle}};
     figure.notes = {
@@ -256,7 +257,7 @@ Figure drivers_figure(const SweepAnalysis& analysis) {
         "parameter, the smaller the gain."};
   }
   figure.notes.push_back("The " + std::to_string(kShownDrivers) +
-                         " strongest of each; the tables have all.");
+                         " strongest of each; the tables are complete.");
   return figure;
 }
 
@@ -302,7 +303,7 @@ Panel scatter_panel(const SweepAnalysis& analysis, const Drivers& drivers) {
 }
 
 Figure scatter_figure(const SweepAnalysis& analysis) {
-  Figure figure = sweep_figure(analysis, "scatter", "Each gain over its strongest driver");
+  Figure figure = sweep_figure(analysis, "scatter", "Each gain against its strongest driver");
   for (std::size_t s = 0; s < std::min(analysis.table.shapes.size(), kShownShapes); ++s) {
     if (analysis.drivers[s].strongest.empty()) continue;
     figure.panels.push_back(scatter_panel(analysis, analysis.drivers[s]));

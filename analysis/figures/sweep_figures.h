@@ -8,14 +8,14 @@
 
 namespace palpate::analysis {
 
-/// gains: each shape's over the space, beside the paper's; drivers: what they depend on most;
-/// scatter: each shape's gain over its strongest driver. Those that the data allow.
+/// gains: each shape's gain over the space, with the paper's; drivers: their strongest drivers;
+/// scatter: each shape's gain over its strongest driver. Only figures with data.
 std::vector<Figure> sweep_figures(const SweepAnalysis& analysis);
 
 /// "Sobol index" or "rank correlation".
 std::string driver_measure(const SweepAnalysis& analysis);
 
-/// Parameters that figures and tables show of each shape.
+/// Number of parameters shown for each shape in figures and tables.
 constexpr std::size_t kShownDrivers = 8;
 
 }  // namespace palpate::analysis

@@ -68,8 +68,7 @@ Panel function_panel(const ParticipantFunction& one, const std::string& unit) {
   return panel;
 }
 
-/// Levels in the order of a track: a circle where the answer was a success, a diamond where it
-/// turned.
+/// Levels in the order of a track: a circle for a success, a diamond for a reversal.
 Panel track_panel(const ParticipantFunction& one, const Track& track, const std::string& unit) {
   Panel panel;
   panel.title = printable(one.participant);
@@ -109,7 +108,7 @@ std::string measure_title(const TaskGroup& group) {
   return group.unit.empty() ? name : name + " (" + printable(group.unit) + ")";
 }
 
-/// Of the n-th renderer of a group.
+/// Style of the n-th renderer of a group.
 std::pair<Role, MarkerShape> group_style(const std::string& renderer, std::size_t n) {
   if (renderer == "point") return {Role::point, MarkerShape::circle};
   if (renderer == "ray") return {Role::ray, MarkerShape::square};
@@ -119,7 +118,8 @@ std::pair<Role, MarkerShape> group_style(const std::string& renderer, std::size_
   return {kOthers[n % std::size(kOthers)], kShapes[n % std::size(kShapes)]};
 }
 
-/// What is drawn, and half of it above an interval that only two participants have.
+/// Spans the participants' figures and the intervals, the latter at most by half the range beyond:
+/// those of two participants may be very wide.
 FigureAxis group_axis(const TaskGroup& group) {
   double low = std::numeric_limits<double>::infinity(), high = -low;
   for (const GroupMean& one : group.renderers) {
@@ -226,8 +226,8 @@ void add_group_figures(const TaskAnalysis& analysis, std::vector<Figure>& figure
     }
     if (analysis.table.simulated) figure.label = "SIMULATED PARTICIPANTS";
     figure.notes.push_back(
-        "Large symbols: means over participants with their 95 % intervals (t), geometric where all "
-        "values are ratios. Small ones: participants, joined by a line.");
+        "Large symbols: means over participants with their 95 % intervals (t), geometric if all "
+        "values are ratios. Small symbols: participants, joined by a line.");
     std::size_t most = 0;
     for (; i < analysis.groups.size() && same(analysis.groups[i], first); ++i) {
       const TaskGroup& group = analysis.groups[i];
@@ -282,7 +282,7 @@ std::vector<Figure> task_figures(const TaskAnalysis& analysis) {
     Figure functions = figure_of(analysis, cell, "function" + suffix, "Psychometric functions");
     Figure tracks = figure_of(analysis, cell, "track" + suffix, "Levels over the trials");
     functions.notes.insert(functions.notes.begin(),
-                           "Circles: share of successes, larger where there are more trials. Line: "
+                           "Circles: share of successes, larger for more trials. Line: "
                            "fitted function, with the 95 % interval of its threshold.");
     tracks.notes.insert(tracks.notes.begin(),
                         "Circles: successes (the comparison chosen, yes, different). Crosses: no "

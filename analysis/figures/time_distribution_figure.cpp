@@ -1,6 +1,6 @@
 // Figure of the distributions of response times: violins (kernel density on log10 s) by shape and
-// renderer, with median, quartiles and time-outs. Densities are binned, so that the size of the
-// file does not grow with the trials.
+// renderer, with median, quartiles and time-outs. Densities are binned, so that the file does not
+// grow with the number of trials.
 
 #include <algorithm>
 #include <array>
@@ -16,10 +16,10 @@ namespace palpate::analysis {
 namespace {
 
 constexpr std::size_t kBins = 80;
-constexpr std::size_t kFewTimes = 12;  // with fewer, single times are drawn instead of a density
+constexpr std::size_t kFewTimes = 12;  // below it, single times are drawn instead of a density
 using Bins = std::array<double, kBins>;
 
-/// log10 of s, sorted, of the trials that the times use. [renderer][shape]
+/// log10 of s, sorted, of the trials with usable times. [renderer][shape]
 using Times = std::vector<std::vector<std::vector<float>>>;
 
 Times used_times(const Analysis& analysis) {
@@ -60,7 +60,7 @@ Bins density(const std::vector<float>& sorted, double low, double high) {
   return smooth;
 }
 
-/// Where a cell is drawn: half a violin on one side of x, or a whole one around x.
+/// Position of a cell: half a violin on one side of x, or a whole one around x.
 struct ViolinPosition {
   double x = 0;
   double side = 0;   ///< -1: left half, 1: right half, 0: both
@@ -84,7 +84,7 @@ void add_violin(Panel& panel, Role role, const Bins& bins, const ViolinPosition&
   const double least = 0.004 / position.scale;
   while (first < last && bins[first] < least) ++first;
   while (last > first && bins[last] < least) --last;
-  // The kernel extends beyond the limit, where no time can be.
+  // Cut the kernel at the limit, beyond which there are no times.
   while (last > first && panel.y.low + (static_cast<double>(last) - 0.5) * step > limit) --last;
   if (position.side != 0) {
     const auto beside = [&](double width) { return position.side * (0.02 + width); };
@@ -158,8 +158,8 @@ void add_time_outs(Panel& panel, const TimeOutCell& cell, const RendererStyle& s
   panel.marks.back().dy = -6;
 }
 
-/// The different limits of the time-outs that are drawn, log10 of s, ascending; of more than three
-/// the first and last.
+/// The distinct limits of the time-outs drawn, log10 of s, ascending; of more than three only the
+/// first and last.
 std::vector<double> limits_of(const Analysis& analysis, std::size_t renderers, std::size_t shapes) {
   std::vector<double> limits;
   for (std::size_t r = 0; r < renderers; ++r) {
@@ -178,7 +178,7 @@ std::vector<double> limits_of(const Analysis& analysis, std::size_t renderers, s
   return limits;
 }
 
-/// A line for each limit with a tick of its own on the y axis; ticks close to it are left out.
+/// A line for each limit, with its own tick on the y axis; ticks close to it are left out.
 void add_limits(Panel& panel, const std::vector<double>& limits) {
   constexpr double kApart = 0.07;  // log10 of s: height of a line of text
   for (const double limit : limits) {
@@ -244,7 +244,7 @@ Figure times_of(const Analysis& analysis) {
       if (times[r][s].empty()) continue;
       std::string text =
           name + ": median " + seconds_text(std::pow(10, sorted_quantile(times[r][s], 0.5))) +
-          ", middle half " + fixed(std::pow(10, sorted_quantile(times[r][s], 0.25)), 2) + " to " +
+          ", middle 50 % " + fixed(std::pow(10, sorted_quantile(times[r][s], 0.25)), 2) + " to " +
           fixed(std::pow(10, sorted_quantile(times[r][s], 0.75)), 2) + " s, " +
           counted(times[r][s].size(), "time", "times");
       add_cell(panel, style, times[r][s], densities[r][s], position,
@@ -263,10 +263,10 @@ Figure times_of(const Analysis& analysis) {
       figure.notes.begin(),
       "All correct answers of all participants" +
           std::string(limits.empty() ? ""
-                                     : "; above the limit: trials that ended there, which have no "
+                                     : "; above the limit: trials that ended there, without a "
                                        "time (percent of the cell’s trials)") +
           ". Width: density of the trials "
-          "(smoothed); mark: median; bar: the middle half of the trials. Cells of fewer "
+          "(smoothed); mark: median; bar: the middle 50 % of the trials. Cells of fewer "
           "than " +
           std::to_string(kFewTimes) + " times show each one.");
   return figure;

@@ -11,7 +11,7 @@
 namespace palpate::analysis {
 namespace {
 
-constexpr std::size_t kLongestName = 64;  // bytes; a longer one is nobody's slip
+constexpr std::size_t kLongestName = 64;  // bytes; longer names are not compared
 constexpr std::size_t kMostShown = 40;
 
 bool is_letter_or_digit(char c) {
@@ -37,7 +37,7 @@ std::vector<AlikeColumn> alike_columns(const std::vector<std::string>& found,
     if (own.empty() || name.size() > kLongestName || std::ranges::find(known, name) != known.end())
       continue;
     std::string_view nearest;
-    std::size_t least = own.size() <= 5 ? 2 : 3;  // beyond, it is another word
+    std::size_t least = own.size() <= 5 ? 2 : 3;  // beyond, names count as different
     for (const std::string_view one : known) {
       if (std::ranges::find(found, one) != found.end()) continue;
       const std::size_t distance = edit_distance(own, plain(one));
@@ -84,7 +84,7 @@ CsvReader::CsvReader(const std::string& path) : file_(std::make_unique<InputFile
   if (end_ >= 3 && std::memcmp(buffer_.data(), "\xEF\xBB\xBF", 3) == 0) begin_ = 3;
 }
 
-/// Moves the unread bytes to the front and reads more behind them; false at the end of the file.
+/// Moves unread bytes to the front and appends more from the file; false at its end.
 bool CsvReader::fill() {
   if (at_end_) return false;
   std::memmove(buffer_.data(), buffer_.data() + begin_, end_ - begin_);
@@ -110,7 +110,7 @@ bool CsvReader::end_with(std::string fault) {
 bool CsvReader::next() {
   fault_.clear();
   if (stopped_) return false;
-  std::size_t seen = 0;  // bytes of the record known to hold no newline
+  std::size_t seen = 0;  // bytes of the record already searched for a newline
   for (;;) {
     const char* const first = buffer_.data() + begin_;
     const char* const last = buffer_.data() + end_;

@@ -1,6 +1,6 @@
 #pragma once
-// What a database records of a study beside responses: servo timing, protocols, devices and builds.
-// A CSV table of trials has none of it.
+// Records of a study other than responses: servo timing, protocols, devices and builds. Only a
+// database has them, not a CSV table.
 
 #include <array>
 #include <cstddef>
@@ -14,7 +14,8 @@
 
 namespace palpate::analysis {
 
-// In how many trials a device that drives force alone left the renderer's torque out.
+// Number of trials in which the renderer's torque was left out, because the device drives force
+// alone.
 
 class TorqueCounts {
  public:
@@ -45,7 +46,7 @@ struct ServoQuality {
   double max_force = 0;                              ///< N, largest of all trials
 };
 
-/// What a protocol's text gives as its title; "": none.
+/// The title in a protocol's text; "": none.
 std::string title_of_protocol(const std::string& text);
 
 /// A protocol as stored in the database.
@@ -62,12 +63,12 @@ struct StudyRecord {
   std::vector<std::string> devices, builds, response_devices;
   std::vector<std::string> seeds;  ///< of simulated participants, "CODE: SEED"
   std::size_t n_cut_off = 0;       ///< attempts that were interrupted and repeated
-  /// How the study was held against its registration; empty: it was not.
+  /// The check against the registration; empty: not checked.
   std::string checked;     ///< a sentence
   std::string check_page;  ///< file name of the page beside the report
 };
 
-/// \param database path \throws what data::Store::open throws
+/// \param database path \throws as data::Store::open
 StudyRecord read_study_record(const std::string& database);
 
 }  // namespace palpate::analysis

@@ -13,7 +13,7 @@ namespace palpate::analysis {
 
 struct SweepTable {
   std::string source;         ///< path as the user gave it
-  std::string protocol_name;  ///< "" where the protocol has none
+  std::string protocol_name;  ///< "": the protocol has none
   std::string design;         ///< lhs, sobol, grid, saltelli
   std::int64_t planned = 0;   ///< points of the sweep; the file may hold fewer
   std::uint64_t seed = 0;
@@ -23,19 +23,18 @@ struct SweepTable {
   std::vector<std::string> parameters, shapes, renderers;
   /// Parameters, then figures (gain_SHAPE, time_RENDERER_SHAPE and so on).
   std::vector<std::string> columns;
-  /// [column][row]; not a number: undefined, or of a failed point. A word is its place in `words`.
+  /// [column][row]; NaN: undefined, or of a failed point. A word is stored as its index in `words`.
   std::vector<std::vector<double>> values;
   std::vector<std::vector<std::string>> words;  ///< of each parameter; empty: numbers
   std::vector<std::int64_t> points;             ///< number of each row's point, from 1, ascending
   std::vector<bool> failed;
-  std::vector<std::pair<std::string, std::size_t>>
-      reasons;  ///< of failures, the most frequent first
+  std::vector<std::pair<std::string, std::size_t>> reasons;  ///< of failures, most frequent first
 
   std::size_t rows() const { return points.size(); }
   std::optional<std::size_t> column(std::string_view name) const;
 };
 
-/// \throws what SweepFile::open throws; protocols::InputError where no point is on record.
+/// \throws as SweepFile::open; protocols::InputError: no point is on record.
 SweepTable read_sweep_table(const std::string& path);
 
 }  // namespace palpate::analysis

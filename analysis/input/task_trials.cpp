@@ -56,13 +56,13 @@ class TaskRow {
     if (place == columns_.end() || place->second >= reader_.fields().size()) return {};
     return data::unguarded(reader_.fields()[place->second]);
   }
-  /// "" also where other programs wrote that nothing is there; a name may be NA.
+  /// "" also for missing values as other programs write them; a name may be NA.
   std::string_view value(std::string_view column) const {
     const std::string_view field = text(column);
     return field == "NA" || field == "n/a" || field == "nan" || field == "NaN" ? std::string_view()
                                                                                : field;
   }
-  /// Of a column that is missing, where another looks like it.
+  /// A hint for a missing column, if another resembles it.
   std::string hint(std::string_view column) const {
     std::vector<std::string> found;
     for (const auto& [name, place] : columns_) found.push_back(name);
@@ -82,7 +82,7 @@ class TaskRow {
     return std::nullopt;
   }
 
-  /// From 1; 1 where there is none.
+  /// A whole number from 1; 1 if missing.
   int whole(std::string_view column) {
     const std::string_view field = value(column);
     int value = 1;
@@ -113,7 +113,7 @@ class TaskRow {
   std::vector<protocols::Fault>& faults_;
 };
 
-/// Of data of others, which have no such column. \return false: nothing tells
+/// Derives success for data of other programs without such a column. \return false: not possible
 bool success_of(TaskRow& row, TaskTrial& trial) {
   const bool known = row.has("correct");
   if (trial.task == "identify") {
@@ -132,7 +132,7 @@ bool success_of(TaskRow& row, TaskTrial& trial) {
   return true;
 }
 
-/// Of an export: as many as have an onset.
+/// For an export: the number of onsets.
 int intervals_of(const TaskRow& row) {
   const std::string_view onsets = row.value("interval_onsets");
   if (onsets.empty()) return 0;
@@ -272,7 +272,7 @@ std::optional<TrialTable> identification_of(const TaskTable& table) {
   if (n == 0) return std::nullopt;
   try {
     return builder.finish(table.provenance);
-  } catch (const std::runtime_error&) {  // rows that are there twice, without numbers
+  } catch (const std::runtime_error&) {  // duplicate rows, without trial numbers
     return std::nullopt;
   }
 }

@@ -49,8 +49,8 @@ namespace {
 
 constexpr std::array<std::string_view, 4> kShapes{"sphere", "cone", "cylinder", "cube"};
 
-/// Rank of a shape among the levels: those of Ho, Basdogan & Srinivasan (2000), then as the
-/// protocol lists them.
+/// Rank of a shape among the levels: those of Ho, Basdogan & Srinivasan (2000) first, then in the
+/// order of the protocol.
 std::size_t rank(const std::string& name, const std::vector<std::string>& listed) {
   const auto known = std::find(kShapes.begin(), kShapes.end(), name);
   if (known != kShapes.end()) return static_cast<std::size_t>(known - kShapes.begin());
@@ -264,8 +264,8 @@ constexpr std::array<std::string_view, n_columns> kColumns{
 constexpr int kNeeded = response_time + 1;
 constexpr std::size_t kAbsent = static_cast<std::size_t>(-1);
 
-constexpr std::size_t kMaxName = 200;     // bytes; codes of our own participants have at most 32
-constexpr std::size_t kMaxStimuli = 200;  // the confusion matrix has the square of it
+constexpr std::size_t kMaxName = 200;     // bytes; participant codes of palpate have at most 32
+constexpr std::size_t kMaxStimuli = 200;  // squared in the confusion matrix
 constexpr std::size_t kMaxParticipants = 10000;
 constexpr std::size_t kMaxRenderers = 20;
 constexpr std::size_t kMaxCells = 4'000'000;  // participants x renderers x stimuli: some 500 MB
@@ -344,7 +344,7 @@ class CsvTrials {
       }
     }
     std::vector<std::string_view> known(kColumns.begin(), kColumns.end());
-    known.emplace_back("task");  // a table with it is one of tasks
+    known.emplace_back("task");  // marks a table of tasks
     const std::vector<AlikeColumn> alike =
         alike_columns(std::vector<std::string>(names.begin(), names.end()), known);
     for (const AlikeColumn& one : alike) warnings_.push_back(sentence(one));
@@ -362,14 +362,14 @@ class CsvTrials {
 
   void fault(Column column, std::string_view expected) {
     ok_ = false;
-    // Only faults that are listed are formatted: a file may have millions of bad rows.
+    // Format listed faults only: a file may have millions of bad rows.
     if (faults_.count() >= kMaxFaults) return faults_.add({}, {});
     faults_.add(
         line(*reader_) + ", column " + std::string(kColumns[column]),
         "expected " + std::string(expected) + "; found '" + printable(field(column), 40) + "'");
   }
 
-  /// A name; an apostrophe that an export put before it against spreadsheet formulas is removed.
+  /// A name, without the apostrophe that guards exports against spreadsheet formulas.
   std::string_view name(Column column, const Interner& known) {
     const std::string_view text = data::unguarded(field(column));
     if (known.contains(text)) return text;
@@ -393,7 +393,7 @@ class CsvTrials {
     return value;
   }
 
-  /// How R, pandas, BIDS and spreadsheets write a missing value.
+  /// Missing values as written by R, pandas, BIDS and spreadsheets.
   static bool missing(std::string_view text) {
     for (const std::string_view nothing : {"", "NA", "n/a", "N/A", "NaN", "nan"}) {
       if (text == nothing) return true;
@@ -464,7 +464,7 @@ class CsvTrials {
     if (!raw.practice) torque_.add(raw.renderer, driven);
   }
 
-  /// Whether the numbers of names are within the limits; exceeding them is one fault, after which
+  /// Whether the numbers of names are within the limits. Exceeding them is a single fault; later
   /// rows are ignored.
   bool within_limits() {
     const std::size_t participants = names_.names().size(), renderers = renderers_.names().size(),
@@ -516,7 +516,7 @@ class CsvTrials {
   std::array<std::size_t, n_columns> at_{};
   std::size_t n_fields_ = 0, n_rows_ = 0;
   bool ok_ = true, too_many_ = false;
-  /// Names of valid rows, practice included: each is checked once.
+  /// Names in valid rows, practice included; each is checked once.
   Interner names_, renderers_, stimuli_;
   std::vector<std::string> protocols_, versions_, warnings_;
   TrialTableBuilder builder_;
@@ -529,8 +529,8 @@ TrialTable read_trials_csv(const std::string& path) { return CsvTrials(path).rea
 
 namespace {
 
-/// Names of the stimuli in the order of a stored protocol. Not validated again: it was when it was
-/// stored, and mesh files that it names may be missing now.
+/// Names of the stimuli in the order of a stored protocol. Not validated again: it was valid when
+/// stored, and its mesh files may be missing now.
 std::vector<std::string> stimuli_of(const std::string& protocol_text) {
   std::vector<std::string> names;
   const auto json = json_or_discarded(protocol_text);

@@ -1,6 +1,6 @@
 #pragma once
-// The trials that are analysed, read from a CSV file (columns of
-// data/export/delimited_row.cpp) or a database.
+// The trials to analyse, read from a CSV file (columns of data/export/delimited_row.cpp) or a
+// database.
 
 #include <cstddef>
 #include <cstdint>
@@ -16,7 +16,7 @@
 
 namespace palpate::analysis {
 
-// Pairs of renderers that are compared, and their names in sentences.
+// Pairs of renderers to compare, and their names in sentences.
 
 /// A renderer and its reference; all differences are `renderer` minus `reference`.
 struct RendererPair {
@@ -25,7 +25,8 @@ struct RendererPair {
   std::optional<std::size_t> reference_at, renderer_at;
 
   bool in_data() const { return reference_at && renderer_at; }
-  /// The comparison of Ho, Basdogan & Srinivasan (2000), the only one shown beside their results.
+  /// Whether this is the comparison of Ho, Basdogan & Srinivasan (2000); only this is shown with
+  /// their results.
   bool is_ray_minus_point() const { return reference == "point" && renderer == "ray"; }
 };
 
@@ -49,7 +50,7 @@ struct TrialRow {
   bool correct = false;           ///< false for a time-out
   bool timed_out = false;
   double response_time =
-      0;  ///< s, from the first servo tick with forces on; of a time-out the limit
+      0;  ///< s, from the first servo tick with forces on; for a time-out, the limit
   /// Rank in the order of session, block and trial, from 1: position among all trials of the
   /// participant, exposure among those with this renderer.
   std::uint32_t position = 0, exposure = 0;
@@ -79,20 +80,20 @@ struct TrialTable {
   std::size_t n_practice = 0;        ///< practice trials that were left out
   Simulated simulated = Simulated::no;
   Provenance provenance;
-  std::vector<std::string> warnings;  ///< contradictions and replacements that are no errors
+  std::vector<std::string> warnings;  ///< contradictions and replacements that are not errors
 };
 
-/// Reads trials from CSV: the first nine columns of data/export/columns.cpp in any order,
-/// `practice`, `timed_out`, `simulated`, `protocol_sha256` and `program_version` where they exist;
-/// others are ignored. \throws protocols::InputError with every fault (beyond kMaxFaults their
-/// number).
+/// Reads trials from CSV: the first nine trial columns of data/export/delimited_row.cpp in any
+/// order, and `practice`, `timed_out`, `simulated`, `protocol_sha256` and `program_version` if
+/// present; others are ignored. \throws protocols::InputError with every fault (beyond kMaxFaults
+/// their number).
 TrialTable read_trials_csv(const std::string& path);
 
 /// Reads the completed trials of a database. \throws protocols::InputError if there are none, and
 /// what data::Store::open throws.
 TrialTable read_trials_store(const std::string& path);
 
-/// Number of faults that are listed; further ones are counted.
+/// Number of faults listed; further ones are counted.
 constexpr std::size_t kMaxFaults = 50;
 
 // Builds a TrialTable from the rows of any source.
@@ -113,7 +114,7 @@ class Interner {
   std::uint32_t last_ = 0;
 };
 
-/// Response time of a time-out whose limit the source does not give.
+/// Response time of a time-out with an unknown limit.
 inline constexpr double kNoTime = std::numeric_limits<double>::quiet_NaN();
 
 /// A row of a source, practice included; see data/README.md for the columns.
@@ -131,12 +132,11 @@ class TrialTableBuilder {
  public:
   void add(const RawTrial& raw);
   /// \param listed the stimuli in the protocol's order; empty: unknown
-  /// \throws std::runtime_error without any trial that is not practice, or if a row is repeated
-  /// exactly
+  /// \throws std::runtime_error: there are only practice trials, or a row is repeated exactly
   TrialTable finish(Provenance provenance, const std::vector<std::string>& listed = {});
 
  private:
-  /// What identifies a trial, and its index in rows_.
+  /// Identifies a trial; with its index in rows_.
   struct TrialKey {
     std::uint32_t participant;
     std::int32_t session, block, trial;
@@ -159,7 +159,7 @@ class TrialTableBuilder {
   std::vector<std::uint32_t> shown_;
   std::uint32_t n_shown_ = 0;
   std::vector<TrialRow> rows_;
-  std::vector<std::uint32_t> lines_;  ///< of each row, where the source has lines
+  std::vector<std::uint32_t> lines_;  ///< of each row, if the source has lines
   std::vector<TrialKey> keys_;
   std::size_t n_practice_ = 0, n_simulated_ = 0, n_contradicting_ = 0, n_late_answers_ = 0;
 };

@@ -9,7 +9,7 @@
 namespace palpate::analysis {
 namespace {
 
-/// Of one trial, or a participant's sums.
+/// One trial's values, or a participant's sums.
 struct Observation {
   double time = 0, renderer = 0, measure = 0;
 };
@@ -25,7 +25,7 @@ AdjustedGain gain_of(const std::map<std::uint32_t, std::vector<Observation>>& by
       centre.measure += one.measure;
     }
     const auto n = static_cast<double>(trials.size());
-    if (centre.renderer == 0 || centre.renderer == n) continue;  // without both renderers
+    if (centre.renderer == 0 || centre.renderer == n) continue;  // lacks one of the renderers
     ++gain.n_participants;
     gain.n_trials += trials.size();
     for (const Observation& one : trials) {
@@ -136,7 +136,7 @@ std::vector<MeasureComparison> compare_movement(const MovementTable& table) {
   std::vector<MeasureComparison> all;
   for (std::size_t m = 0; m < kMeasures; ++m) {
     const MeasureScale scale = measure_definitions()[m].scale;
-    // Times are compared by their logs: the value on its scale goes in as the log of a time.
+    // Times are compared by their logs: pass the value on its scale as the log of a time.
     TrialTable trials = table.trials;
     std::vector<TrialRow> rows;
     for (std::size_t i = 0; i < trials.rows.size(); ++i) {

@@ -27,7 +27,7 @@ std::vector<Vec3> draw_places(const std::vector<SurfaceTriangle>& surface, std::
     const auto at = std::upper_bound(until.begin(), until.end(), random.unit() * area);
     const SurfaceTriangle& t = surface[static_cast<std::size_t>(
         std::min<std::ptrdiff_t>(at - until.begin(), std::ssize(until) - 1))];
-    // The square folded along its diagonal.
+    // Fold the square along its diagonal.
     double u = random.unit(), v = random.unit();
     if (u + v > 1) {
       u = 1 - u;
@@ -48,7 +48,7 @@ TouchedSurface::TouchedSurface(std::vector<Vec3> places) : places_(std::move(pla
     corner_ = glm::min(corner_, place);
     top = glm::max(top, place);
   }
-  // No more cells than 40 a side, however large the object is.
+  // At most 40 cells per side, for objects of any size.
   for (int k = 0; k < 3; ++k) cell_ = std::max(cell_, (top[k] - corner_[k]) / 40);
   for (int k = 0; k < 3; ++k)
     cells_[static_cast<std::size_t>(k)] =

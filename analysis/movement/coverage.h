@@ -1,5 +1,5 @@
 #pragma once
-// Which parts of a surface were touched. The object's frame, m.
+// Touched parts of a surface. Object's frame, m.
 
 #include <array>
 #include <cstddef>
@@ -13,7 +13,8 @@ namespace palpate::analysis {
 
 using SurfaceTriangle = std::array<Vec3, 3>;
 
-/// Places drawn evenly on a surface, by a fixed seed: the same surface has the same places.
+/// Points distributed uniformly on a surface with a fixed seed: the same surface has the same
+/// points.
 std::vector<Vec3> draw_places(const std::vector<SurfaceTriangle>& surface, std::size_t count);
 
 /// A surface to count touches on.
@@ -22,11 +23,11 @@ class TouchedSurface {
   static constexpr std::size_t kPlaces = 10000, kParts = 64;
   static constexpr double kReach = 0.005;  ///< m
 
-  /// \param places  evenly on it, at least kParts. The parts halve them six times, each time across
-  /// the longest side of their box: 64 parts of equal area.
+  /// \param places  uniform on it, at least kParts. They are halved six times across the longest
+  /// side of their box: 64 parts of equal area.
   explicit TouchedSurface(std::vector<Vec3> places);
 
-  /// Share of the places within kReach of a point, after each of them.
+  /// Share of the places within kReach of the points so far, after each point.
   std::vector<double> coverage(const std::vector<Vec3>& points) const;
   std::size_t part_of(const Vec3& point) const;
   const std::vector<Vec3>& places() const { return places_; }
@@ -47,10 +48,10 @@ class TouchedSurface {
   std::vector<std::vector<std::uint32_t>> grid_;  ///< places by cell
 };
 
-/// Shannon's entropy of the parts' shares over log2 K, with Miller and Madow's term for the parts
-/// that were found from so many ticks; at most 1. None: no tick.
+/// Shannon entropy of the parts' shares over log2 K, with the bias correction of Miller and Madow
+/// for the number of ticks; at most 1. None: no tick.
 std::optional<double> entropy(const std::vector<std::size_t>& parts);
-/// Changes of part from tick to tick.
+/// Number of changes of part between consecutive ticks.
 std::size_t transitions(const std::vector<std::size_t>& parts);
 
 }  // namespace palpate::analysis

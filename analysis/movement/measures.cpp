@@ -17,7 +17,7 @@ double seconds(std::size_t ticks, double rate) { return static_cast<double>(tick
 std::size_t ticks_of(double seconds, double rate) {
   return std::max<std::size_t>(1, static_cast<std::size_t>(std::llround(seconds * rate)));
 }
-// A duration of just the limit, in spite of rounding.
+// Lets a duration equal to the limit pass despite rounding.
 constexpr double kRounding = 1e-9;
 
 }  // namespace
@@ -140,7 +140,7 @@ std::optional<double> greatest_of(const Values& values) {
   return *std::max_element(values.begin(), values.end());
 }
 
-/// What is found in each piece, where it stands in the trial.
+/// Stretches found in each piece, with indices in the trial.
 template <class Find>
 std::vector<Stretch> in_pieces(const std::vector<Stretch>& pieces, const Find& find) {
   std::vector<Stretch> all;
@@ -202,7 +202,7 @@ void put_motion(const SmoothPath& smooth, const std::vector<Stretch>& pieces, do
   out.set("ldlj_speed", speed_jerk.mean());
 }
 
-/// "force_mean" and its kin.
+/// Sets "force_mean" and the other measures of force.
 void put_force(const std::string& suffix, const Values& force, Filling& out) {
   out.set(("force_mean" + suffix).c_str(), mean_of(force));
   out.set(("force_sd" + suffix).c_str(), sd_of(force));
@@ -298,7 +298,7 @@ const std::array<MeasureDefinition, kMeasures>& measure_definitions() {
        "stretches with 5 % of the greatest speed or more, for 100 ms or more"},
       {"sparc_movement", "1", identity, "spectral arc length by movement, weighted by path"},
       {"ldlj", "1", identity, "log dimensionless vector jerk by movement, weighted by path"},
-      {"ldlj_speed", "1", identity, "likewise of the second difference of speed"},
+      {"ldlj_speed", "1", identity, "the same from the second difference of speed"},
       {"force_mean", "N", log, "mean force in contact"},
       {"force_sd", "N", log, "standard deviation of the force in contact"},
       {"force_max", "N", log, "greatest force in contact"},
@@ -320,10 +320,11 @@ const std::array<MeasureDefinition, kMeasures>& measure_definitions() {
        "share of 10,000 places on the surface within 5 mm of a contact point, or of the touched "
        "part "
        "of the segment"},
-      {"entropy", "1", logit, "of contact time over 64 equal parts of the surface; 1: even"},
-      {"transitions", "1/s", count, "changes of the part, by time in contact"},
-      {"coverage_rate", "1/s", count, "coverage by time of the trial"},
-      {"duration", "s", log, "of the samples"},
+      {"entropy", "1", logit,
+       "normalised entropy of contact time over 64 equal parts of the surface; 1: even"},
+      {"transitions", "1/s", count, "changes between these parts, per time in contact"},
+      {"coverage_rate", "1/s", count, "coverage per time of the trial"},
+      {"duration", "s", log, "duration of the samples"},
       {"share_static", "1", logit,
        "windows of 100 ms in contact slower than 10 mm/s with steady force"},
       {"share_pressure", "1", logit,
@@ -373,7 +374,7 @@ SmoothPath smooth_path(const MovementTrial& trial, const MovementSettings& setti
 std::vector<double> coverage_by_tick(const MovementTrial& trial, const TouchedSurface& surface) {
   constexpr double kStep = TouchedSurface::kReach / 2;
   std::vector<Vec3> points;
-  std::vector<std::size_t> last;  // of each tick in contact: its last point
+  std::vector<std::size_t> last;  // index of the last point of each tick in contact
   for (std::size_t i = 0; i < trial.tip.size(); ++i) {
     if (!trial.contact[i]) continue;
     points.push_back(trial.point[i]);

@@ -76,7 +76,7 @@ ContactMap map_of(const std::vector<std::size_t>& rows, const std::vector<TrialT
     for (std::size_t c = 0; c < SurfaceMap::kCells; ++c) contact[c] += tallies[i].contact[c];
   }
   if (map.trials == 0) return map;
-  // A place or two may be all of a cell that is seen at an angle.
+  // A cell seen at an angle may hold only one or two places.
   const double least = 2 / static_cast<double>(outline.places.size());
   for (std::size_t c = 0; c < SurfaceMap::kCells; ++c)
     map.density.push_back(contact[c] / static_cast<double>(map.trials) / std::max(area[c], least));

@@ -1,6 +1,6 @@
 #pragma once
-// What figures of movement show beyond the measures: where a surface was touched, how its coverage
-// grew, and a typical trial of each kind.
+// Data of movement figures beyond the measures: map of contact, growth of coverage, and a typical
+// trial of each kind.
 
 #include <array>
 #include <cstddef>
@@ -14,8 +14,8 @@
 
 namespace palpate::analysis {
 
-/// An object's surface seen from its middle, unfolded to a map on which each cell spans an equal
-/// solid angle: columns by the angle about z, rows by height over distance.
+/// Map of an object's surface as seen from its middle; each cell spans an equal solid angle:
+/// columns by the angle about z, rows by height over distance.
 struct SurfaceMap {
   static constexpr std::size_t kColumns = 24, kRows = 12, kCells = kColumns * kRows;
   /// 0 to kColumns, 0 to kRows. \param from_middle  m
@@ -23,17 +23,17 @@ struct SurfaceMap {
   static std::size_t cell_of(const Vec3& from_middle);
 };
 
-/// Of one trial: what the figures add up.
+/// One trial's contribution to the figures.
 struct TrialTally {
   static constexpr double kStep = 0.25;      ///< s
   static constexpr std::size_t kSteps = 81;  ///< up to 20 s
   /// Share of the ticks in contact, by cell of the map; empty: no contact, or no surface.
   std::vector<float> contact;
-  std::vector<float> coverage;  ///< after each step; a trial that has ended keeps its last one
+  std::vector<float> coverage;  ///< after each step; a trial that has ended keeps its last value
 };
 TrialTally tally_of(const MovementTrial& trial, const TouchedSurface& surface);
 
-/// How an object looks: places on it, and its sharp edges. Its frame, m.
+/// Shape of an object: points on it, and its sharp edges. Its frame, m.
 struct ShapeOutline {
   std::vector<Vec3> places;
   std::vector<std::array<Vec3, 2>> edges;
@@ -46,10 +46,10 @@ struct CoverageCurve {
   double median_duration = 0;  ///< s: half of the trials have ended by then
 };
 
-/// Over trials, each with the same weight.
+/// Averages over trials, each with the same weight.
 struct ContactMap {
   std::size_t trials = 0;
-  /// Contact time by the area of the surface in a cell; 1 as if all of it were touched alike.
+  /// Contact time per surface area in a cell; 1: uniform contact.
   std::vector<double> density;
 };
 
@@ -61,13 +61,13 @@ struct TypicalTrial {
 
 /// Vectors by renderer and shape, as in TrialTable.
 struct MovementPictures {
-  std::vector<ShapeOutline> outlines;  ///< by shape; empty where it has no surface that stays
+  std::vector<ShapeOutline> outlines;  ///< by shape; empty: no rigid surface
   std::vector<std::vector<CoverageCurve>> coverage;
   std::vector<std::vector<ContactMap>> contact;
   std::vector<TypicalTrial> typical;  ///< at most one for each shape and renderer, in this order
 };
 
-/// The right answer whose duration is nearest to the median of all measured trials of its shape
+/// The correct answer whose duration is nearest to the median of all measured trials of its shape
 /// and renderer; rows of the table, by shape, then renderer.
 std::vector<std::size_t> typical_rows(const MovementTable& table);
 /// Fills in coverage and contact. \param tallies  of each row of the table

@@ -15,7 +15,7 @@ namespace {
 struct Section {
   double b0, b1, b2, a1, a2;
 
-  /// Begins as if the first value had been there for ever.
+  /// Starts in steady state at the first value.
   void run(std::vector<double>& values) const {
     if (values.empty()) return;
     double s2 = (b2 - a2) * values.front();
@@ -106,7 +106,8 @@ namespace {
 
 using Complex = std::complex<double>;
 
-/// Plain product: std::complex's guards against infinities, which costs more than the transform.
+/// Plain product: that of std::complex guards against infinities, which costs more than the
+/// transform.
 Complex times(const Complex& a, const Complex& b) {
   return {a.real() * b.real() - a.imag() * b.imag(), a.real() * b.imag() + a.imag() * b.real()};
 }
@@ -120,7 +121,7 @@ std::vector<Complex> turns_of(std::size_t n) {
   return turns;
 }
 
-/// In place, radix 2, e^(-2 pi i k n / N). \param turns  of its size
+/// In place, radix 2, e^(-2 pi i k n / N). \param turns  roots of unity for its size
 void transform(std::vector<Complex>& x, const std::vector<Complex>& turns) {
   const std::size_t n = x.size();
   for (std::size_t i = 1, j = 0; i < n; ++i) {
@@ -141,8 +142,8 @@ void transform(std::vector<Complex>& x, const std::vector<Complex>& turns) {
   }
 }
 
-/// The first bins of the transform of `values` padded with zeros to `padded`, by Bluestein's chirp:
-/// the lowest percent of a long transform is all that is needed.
+/// The first bins of the transform of `values` padded with zeros to `padded`, by Bluestein's chirp
+/// transform: only the lowest percent of a long transform is needed.
 std::vector<double> low_bins(const std::vector<double>& values, std::size_t padded,
                              std::size_t bins) {
   const std::size_t n = values.size();
@@ -237,7 +238,7 @@ std::vector<Stretch> movements(const std::vector<double>& speed, double rate, do
 
 std::size_t peaks(const std::vector<double>& values, double least) {
   if (values.empty()) return 0;
-  // What goes up by `least` and down by as much again, in turn. The begin is no rise.
+  // Count alternating rises and falls by `least`. The start is not a rise.
   std::size_t found = 0;
   bool rising = false;
   double lowest = values.front(), highest = values.front();

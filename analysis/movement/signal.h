@@ -1,5 +1,5 @@
 #pragma once
-// The path of a hand before it is measured: low pass and differences. Units of the caller.
+// Preprocessing of a hand's path: low-pass filter and differences. Units of the caller.
 
 #include <cstddef>
 #include <optional>
@@ -9,9 +9,10 @@
 
 namespace palpate::analysis {
 
-/// Low pass by Butterworth, order 2, forwards and backwards: no delay. The single pass is set
-/// higher by Winter's factor 0.802, so that both together are down by 3 dB at the cut-off. Ends go
-/// on by point reflection. Unchanged where the cut-off is not below half of the rate.
+/// Butterworth low-pass filter of order 2, forwards and backwards: zero phase. Winter's factor
+/// 0.802 raises the cut-off of a single pass, so that both passes together attenuate by 3 dB at the
+/// cut-off. Ends are extended by point reflection. Unchanged if the cut-off is not below half of
+/// the rate.
 /// \param rate, cutoff  Hz
 std::vector<double> low_pass(const std::vector<double>& values, double rate, double cutoff);
 std::vector<Vec3> low_pass(const std::vector<Vec3>& path, double rate, double cutoff);
@@ -19,10 +20,10 @@ std::vector<Vec3> low_pass(const std::vector<Vec3>& path, double rate, double cu
 /// Central differences, one-sided at the ends; zero for fewer than two values.
 std::vector<Vec3> velocity(const std::vector<Vec3>& path, double rate);
 std::vector<double> lengths(const std::vector<Vec3>& vectors);
-/// m, sum of the steps.
+/// Length, m: sum of the steps.
 double path_length(const std::vector<Vec3>& path);
 
-/// From begin to before end.
+/// Half-open: from begin to before end.
 struct Stretch {
   std::size_t begin = 0, end = 0;
   std::size_t size() const { return end - begin; }
@@ -37,23 +38,23 @@ std::vector<T> part_of(const std::vector<T>& all, const Stretch& stretch) {
           all.begin() + static_cast<std::ptrdiff_t>(stretch.end)};
 }
 
-// How smoothly a hand moves: spectral arc length and dimensionless jerk (Balasubramanian et al.
-// 2015, J. NeuroEng. Rehab., 10.1186/s12984-015-0090-9), movements, peaks of speed.
+// Smoothness of movement: spectral arc length and dimensionless jerk (Balasubramanian et al. 2015,
+// J. NeuroEng. Rehab., 10.1186/s12984-015-0090-9), movements, peaks of speed.
 
-/// Spectral arc length of a profile of speed: zero padding 2^(ceil log2 N + 4), up to 10 Hz, from
-/// there down to where the spectrum is at 0.05 of its greatest value. None: no speed.
-/// \param speed  not negative, so that the spectrum is greatest at 0 Hz. \param rate  Hz
+/// Spectral arc length of a speed profile: zero padding to 2^(ceil log2 N + 4), up to the highest
+/// frequency below 10 Hz with at least 0.05 of the spectrum's maximum. None: no speed.
+/// \param speed  not negative, so that the spectrum is maximal at 0 Hz. \param rate  Hz
 std::optional<double> sparc(const std::vector<double>& speed, double rate);
 
 /// - ln(T^3 / v_max^2 x integral of the vector jerk's square), their table 3. None: too short, or
 /// no speed or jerk.
 /// \param path  of one movement
 std::optional<double> log_dimensionless_jerk(const std::vector<Vec3>& path, double rate);
-/// As the authors' program has it: the second difference of the speed in place of the vector jerk.
+/// As in the authors' program: with the second difference of speed in place of the vector jerk.
 std::optional<double> log_dimensionless_jerk_of_speed(const std::vector<double>& speed,
                                                       double rate);
 
-/// Stretches with at least 5 % of the greatest speed, for 100 ms or more.
+/// Movements: at least 5 % of the greatest speed for 100 ms or more.
 /// \param greatest  m/s, of the whole trial
 std::vector<Stretch> movements(const std::vector<double>& speed, double rate, double greatest);
 inline std::vector<Stretch> movements(const std::vector<double>& speed, double rate) {
@@ -62,8 +63,8 @@ inline std::vector<Stretch> movements(const std::vector<double>& speed, double r
   return movements(speed, rate, greatest);
 }
 
-/// Number of maxima with a prominence of at least `least`: one must go down by as much on both
-/// sides before it goes higher. A plateau counts once.
+/// Number of maxima with a prominence of at least `least`: the curve falls by this much on both
+/// sides before it rises higher. A plateau counts once.
 std::size_t peaks(const std::vector<double>& values, double least);
 
 }  // namespace palpate::analysis

@@ -40,7 +40,7 @@ void warn_of_exclusions(Analysis& analysis) {
     if (proportion > kMuchExcluded) {
       analysis.warnings.push_back(fixed(100 * proportion, 1) + " % of the trials with " +
                                   renderers[r] +
-                                  " are not in the times (wrong, no response or too fast).");
+                                  " are excluded from the times (wrong, no response or too fast).");
     }
   }
   if (renderers.size() < 2) return;
@@ -88,8 +88,9 @@ std::string time_outs_of(const Analysis& analysis, const Comparison& comparison,
                      time_outs_with(analysis, renderer, shape);
   if (censored.log_ratio && paired.percent_reduction_geometric) {
     text += ", reduction " + fixed(percent_reduction(*censored.log_ratio), 1) +
-            " % where they count as censored, " + fixed(*paired.percent_reduction_geometric, 1) +
-            " % without them" + (moved ? ", outside its interval" : "");
+            " % with time-outs as censored times, " +
+            fixed(*paired.percent_reduction_geometric, 1) + " % without them" +
+            (moved ? ", outside its interval" : "");
   }
   return text;
 }
@@ -132,7 +133,7 @@ void warn_of_time_outs(Analysis& analysis) {
 void warn_of_dropped(Analysis& analysis) {
   const TrialTable& table = analysis.table;
   if (table.renderers.size() < 2) return;
-  // [participant][renderer]: shapes without a time. The reference is the same in every comparison.
+  // [participant][renderer]: shapes without a time. All comparisons have the same reference.
   std::map<std::size_t, std::map<std::size_t, std::vector<std::string>>> shapes_of;
   for (std::size_t s = 0; s < table.shapes.size(); ++s) {
     for (const Comparison& comparison : analysis.comparisons) {
@@ -171,7 +172,7 @@ void warn_of_times(Analysis& analysis) {
   }
 }
 
-/// Warns where practice may explain a gain: one order only, or an effect of order.
+/// Warns if practice may explain a gain: one order only, or an effect of order.
 void warn_of_practice(Analysis& analysis) {
   for (std::size_t c = 0; c < analysis.comparisons.size(); ++c) {
     const RendererPair& pair = analysis.comparisons[c].pair;

@@ -1,5 +1,5 @@
 #pragma once
-// The complete analysis of a study as values; reports and figures only present it.
+// The complete analysis of a study as values, which reports and figures present.
 
 #include <cstddef>
 #include <cstdint>
@@ -23,8 +23,8 @@ struct AnalysisSettings {
   std::uint64_t seed = 2000;  ///< of the bootstrap
 };
 
-/// Trials of a renderer that are excluded from the times, by reason: n_trials = n_timeouts +
-/// n_wrong + n_too_fast + n_used.
+/// Trials of a renderer excluded from the times, by reason: n_trials = n_timeouts + n_wrong +
+/// n_too_fast + n_used.
 struct Exclusions {
   std::size_t n_trials = 0, n_timeouts = 0, n_wrong = 0, n_too_fast = 0, n_used = 0;
   double proportion_excluded() const;  ///< of n_trials; 0 without trials
@@ -45,7 +45,7 @@ struct Analysis {
   std::vector<std::string> warnings;   ///< of the table, and limits of the conclusions
 };
 
-/// Runs every analysis on the table. \param program_version is stored as it is
+/// Runs every analysis on the table. \param program_version is stored unchanged
 Analysis analyze(TrialTable table, const AnalysisSettings& settings,
                  const std::string& program_version);
 

@@ -103,7 +103,7 @@ Sphericity sphericity(const Scores& scores, double n_cells, const AnovaEffect& e
     out.undefined = effect.undefined;
     return out;
   }
-  // The smaller one of X X' and X'X, which have the same non-zero eigenvalues.
+  // Use the smaller of X X' and X'X, which have the same non-zero eigenvalues.
   const bool wide = scores.rest.cols() > scores.rest.rows();
   const MatrixXd scatter = wide ? MatrixXd(scores.rest * scores.rest.transpose())
                                 : MatrixXd(scores.rest.transpose() * scores.rest);

@@ -216,7 +216,7 @@ Parameters first_guess(const std::vector<ParticipantData>& participants) {
   return out;
 }
 
-/// Newton's method with step halving. \return why there is no maximum; empty: converged
+/// Newton's method with step halving. \return reason if there is no maximum; empty: converged
 std::string maximise_likelihood(const std::vector<ParticipantData>& participants, Parameters& at,
                                 Evaluation& here) {
   at = first_guess(participants);

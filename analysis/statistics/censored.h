@@ -47,11 +47,11 @@ struct TimeOuts {
 TimeOuts time_outs(const TrialTable& table, const Description& description);
 
 /// Estimate for one shape: log T = intercept of the participant + log_ratio (with the renderer) +
-/// residual_sd N(0, 1), by maximum likelihood. Observed: the correct answers that the times use;
+/// residual_sd N(0, 1), by maximum likelihood. Observed: correct answers with a usable time;
 /// censored at their limit: time-outs; wrong answers are excluded. Participants have such trials
 /// with both renderers and at least one observed time.
 struct CensoredEstimate {
-  std::string undefined;  ///< why values are missing; empty: all are defined
+  std::string undefined;  ///< reason for missing values; empty: all are defined
   std::size_t n_participants = 0, n_observed = 0, n_censored = 0;
   std::optional<double> log_ratio, residual_sd;
   std::optional<double> log_likelihood;  ///< of the times, not of their logs

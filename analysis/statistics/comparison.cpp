@@ -10,8 +10,8 @@ namespace {
 constexpr double kNotableTime = 1;         // percent, smallest change of time that counts
 constexpr double kNotableAccuracy = 0.01;  // proportion, smallest change of accuracy that counts
 
-/// Compares the directions of the changes of time and accuracy; smaller changes than the thresholds
-/// have none.
+/// Compares the directions of the changes of time and accuracy; changes below the thresholds have
+/// no direction.
 std::string read(double percent_change_time, double accuracy_change) {
   const bool notable = std::fabs(percent_change_time) > kNotableTime &&
                        std::fabs(accuracy_change) > kNotableAccuracy;

@@ -1,5 +1,5 @@
 #pragma once
-// All comparisons of a renderer with the reference, shape by shape.
+// All comparisons of a renderer with the reference, for each shape.
 
 #include <algorithm>
 #include <array>

@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kSignificant = 0.05;
 constexpr std::size_t kLongestInPhrase = 40;            // bytes of a renderer's name
-constexpr std::size_t kNamed = 6, kNamedAmongMany = 3;  // of more shapes only the number is given
+constexpr std::size_t kNamed = 6, kNamedAmongMany = 3;  // otherwise only counted
 constexpr std::size_t kFewComparisons = 2, kMostComparisons = 6;
 
 std::string with_reduction(const std::string& name, const PairedShape& shape) {

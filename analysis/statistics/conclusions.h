@@ -10,8 +10,8 @@
 namespace palpate::analysis {
 
 /// For which shapes the renderer is faster or slower than the reference (Holm-adjusted p < 0.05 of
-/// the paired t-tests), for which there is no clear difference, or why there is no test. A sentence
-/// for each of the first comparisons.
+/// the paired t-tests), for which there is no clear difference, or the reason why there is no test.
+/// A sentence for each of the first comparisons.
 std::string conclusion(const Analysis& analysis);
 
 /// Continues a phrase such as "less time": "with the ray" for ray and point, "with tip2 `joint`

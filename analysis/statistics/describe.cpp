@@ -17,7 +17,7 @@ bool used_for_times(const TrialRow& row, double too_fast) {
   return row.correct && row.answer >= 0 && row.response_time >= too_fast;
 }
 
-/// Response times that the times use, by cell and participant (counting sort): those of c begin at
+/// Usable response times by cell and participant (counting sort): those of c begin at
 /// times[start[c]].
 struct Buckets {
   std::vector<std::size_t> start;
@@ -43,7 +43,7 @@ Buckets sort_times(const TrialTable& table, double too_fast) {
   return buckets;
 }
 
-/// Turns the times into their logs.
+/// Replaces the times by their logs.
 void describe_participant(std::vector<double>& times, ParticipantCell& cell) {
   cell.n_used = times.size();
   if (times.empty()) return;

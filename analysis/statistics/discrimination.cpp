@@ -25,11 +25,11 @@ Discrimination discrimination(const PsychometricFit& fit,
   const auto& [threshold, slope, guess, lapse] = fit.parameters;
   Discrimination result;
   result.pse = level(threshold, slope, 0.5);
-  // The distance of PSE and threshold is 0 but for the Weibull function, where its slope is held.
+  // PSE and threshold are equal except for the Weibull function, where the slope is held fixed.
   result.pse_ci95 = {level(fit.threshold_ci95.low, slope, 0.5),
                      level(fit.threshold_ci95.high, slope, 0.5)};
   const auto half = [&](double at_slope) {
-    // Of the scale: the same at any threshold.
+    // Depends on the scale only: equal at any threshold.
     const auto place = [&](double share) {
       return protocols::scale_position(function.scale, level(1, at_slope, share));
     };
@@ -146,7 +146,7 @@ std::optional<double> forced_choice_d_prime(double share, int alternatives) {
   const auto correct = [&](double d) {
     constexpr int kSteps = 2000;
     double sum = 0;
-    for (int i = 0; i <= kSteps; ++i) {  // trapezoids over all that counts: error below 1e-12
+    for (int i = 0; i <= kSteps; ++i) {  // trapezoids over the relevant range: error below 1e-12
       const double x = -9 + d + 18.0 * i / kSteps;
       sum += normal_density(x - d) * std::pow(cumulative(x), alternatives - 1);
     }

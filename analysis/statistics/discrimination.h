@@ -9,26 +9,26 @@
 
 namespace palpate::analysis {
 
-/// What is read off a fitted function. JND: half the distance between the levels of F = 0.25 and
-/// 0.75, on a linear scale in its unit. On a logarithmic scale the ratio of half of it less 1 is
-/// the Weber fraction.
+/// Figures derived from a fitted function. JND: half the distance between the levels of F = 0.25
+/// and 0.75, on a linear scale in its unit. On a logarithmic scale, the ratio of half that distance
+/// minus 1 is the Weber fraction.
 struct Discrimination {
   double pse = 0;  ///< level of F = 0.5
   Interval pse_ci95;
   std::optional<double> jnd;
   std::optional<Interval> jnd_ci95;
-  std::optional<double> weber_fraction;  ///< linear scale: JND / standard, where that is above 0
+  std::optional<double> weber_fraction;  ///< linear scale: JND / standard above 0
   std::optional<Interval> weber_fraction_ci95;
 };
 
-/// \param standard  the level it was compared with; nullopt: the PSE
+/// \param standard  level of the standard; nullopt: the PSE
 Discrimination discrimination(const PsychometricFit& fit,
                               const protocols::PsychometricFunction& function,
                               std::optional<double> standard);
 
 // Sensitivity and criterion of yes/no, two-interval and same/different tasks, and confidence.
 
-/// Answers "yes" (or "different", or "the second") by what was there.
+/// Counts of answers "yes" (or "different", or "the second") with and without a signal.
 struct DetectionCounts {
   int signal_trials = 0, hits = 0;
   int noise_trials = 0, false_alarms = 0;
@@ -37,21 +37,21 @@ struct DetectionCounts {
 /// Model of the observer.
 enum class DetectionTask {
   yes_no,
-  two_interval,   ///< signal: it was the second; noise: it was the first
-  same_different  ///< signal: they differ; by the difference of the two (not by classes)
+  two_interval,   ///< signal: in the second interval; noise: in the first
+  same_different  ///< signal: they differ; decided by their difference (not by classes)
 };
 
-/// Rates are of the counts with 0.5 added to hits and false alarms and 1 to trials, always
-/// (log-linear correction, Hautus 1995). Intervals are normal ones, with the variance of Gourevitch
-/// & Galanter 1967 (same/different: by the delta method).
+/// Rates are from counts with 0.5 added to hits and false alarms and 1 to trials, always
+/// (log-linear correction, Hautus 1995). Intervals are normal, with the variance of Gourevitch &
+/// Galanter 1967 (same/different: by the delta method).
 struct Detectability {
   std::string undefined;
   double hit_rate = 0, false_alarm_rate = 0;  ///< corrected
   std::optional<double> d_prime, d_prime_se;
   std::optional<Interval> d_prime_ci95;
-  /// yes/no: distance of the criterion from the unbiased one, in d' units, positive: rather "no"
-  /// (two_interval: rather the first; in units of one interval's d'). same_different: the smallest
-  /// difference that is called one.
+  /// yes/no: distance of the criterion from the unbiased one, in d' units; positive: biased to "no"
+  /// (two_interval: to the first; in units of one interval's d'). same_different: the smallest
+  /// difference called different.
   std::optional<double> criterion;
   std::optional<Interval> criterion_ci95;
 };
@@ -63,20 +63,20 @@ Detectability detectability(const DetectionCounts& counts, DetectionTask task);
 /// or 1.
 std::optional<double> forced_choice_d_prime(double share, int alternatives);
 
-/// Whether an answer was correct, and how sure the participant was of it.
+/// Correctness of an answer, and the participant's confidence in it.
 struct ConfidenceTrial {
   bool correct = false;
-  double confidence = 0;  ///< any numbers, more is surer
+  double confidence = 0;  ///< any scale; larger: more confident
 };
 
-/// Area under the type 2 ROC: how often a correct answer has more confidence than a wrong one, ties
-/// half. Interval by DeLong et al. 1988 on the logit scale.
+/// Area under the type 2 ROC: probability that a correct answer has more confidence than a wrong
+/// one; ties count half. Interval by DeLong et al. 1988 on the logit scale.
 struct Type2Roc {
   std::string undefined;
   int correct = 0, wrong = 0;
   std::optional<double> area, se;
   std::optional<Interval> area_ci95;
-  /// Points (share of wrong, share of correct answers with at least so much confidence), from (0,
+  /// Points (share of wrong, share of correct answers with at least a given confidence), from (0,
   /// 0) to (1, 1).
   struct Point {
     double wrong = 0, correct = 0;

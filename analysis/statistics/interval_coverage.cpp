@@ -159,10 +159,10 @@ std::vector<LevelCount> answers_to(const CoverageDesign& design,
   return sum_by_level(std::move(counts));
 }
 
-/// The grid of a posterior with two free rates has ten times the points.
+/// A posterior with two free rates has ten times the grid points.
 constexpr std::size_t kStudiesOfAPosterior = 4;
 
-/// What one study adds to the counts.
+/// Contribution of one study to the counts.
 struct CoverageStudy {
   bool fitted = false, open = false, called_bad = false, has_posterior = false;
   CoverageCounts likelihood, bayes;
@@ -171,7 +171,7 @@ struct CoverageStudy {
 };
 
 std::size_t holds(const Interval& interval, double value) {
-  // Ends of rates come from a search: 0 is 1e-9.
+  // Bounds of rates come from a search: 0 appears as 1e-9.
   constexpr double kNear = 1e-6;
   return interval.low - kNear <= value && value <= interval.high + kNear ? 1 : 0;
 }

@@ -1,6 +1,6 @@
 #pragma once
-// How often the 95 % intervals of fitted psychometric functions hold the truth, where levels are
-// chosen in advance or by the answers, with and without lapses.
+// Coverage of the 95 % intervals of fitted psychometric functions, for levels chosen in advance or
+// by the answers, with and without lapses.
 
 #include <cstddef>
 #include <cstdint>
@@ -13,11 +13,11 @@
 
 namespace palpate::analysis {
 
-/// A study of one simulated participant, and how it is fitted.
+/// A study of one simulated participant, and the model of its fit.
 struct CoverageDesign {
   std::string task, procedure;  ///< in words
   std::vector<protocols::ProcedureSpec> tracks;
-  int catch_trials = 0;  ///< beside those of the tracks: nothing is there
+  int catch_trials = 0;  ///< in addition to those of the tracks: without a stimulus
   protocols::PsychometricParticipant truth;
   PsychometricModel model;
 };
@@ -27,23 +27,23 @@ struct CoverageDesign {
 /// The models are those of `analyze`.
 std::vector<CoverageDesign> coverage_designs(const std::vector<double>& lapses);
 
-/// In how many studies an interval held the truth.
+/// Number of studies with the true value in an interval.
 struct CoverageCounts {
   std::size_t threshold = 0, slope = 0, lapse = 0;
 };
 
 struct CoverageResult {
   CoverageDesign design;
-  std::size_t studies = 0;    ///< with a fit: the others have no interval
+  std::size_t studies = 0;    ///< with a fit; others have no interval
   std::size_t unfitted = 0;   ///< all answers alike, or one level
-  std::size_t open = 0;       ///< the interval of the threshold has no end on a side
-  CoverageCounts likelihood;  ///< by the profile likelihood
+  std::size_t open = 0;       ///< the interval of the threshold is unbounded on one side
+  CoverageCounts likelihood;  ///< by profile likelihood
   CoverageCounts bayes;
-  std::size_t bayes_studies = 0;  ///< with a posterior: of two free rates, one study in four
-  /// Fits whose goodness of fit has p <= 0.05; five in a hundred where the model is right.
+  std::size_t bayes_studies = 0;  ///< with a posterior; with two free rates, one study in four
+  /// Fits whose goodness of fit has p <= 0.05; five in a hundred if the model is correct.
   std::size_t called_bad = 0;
   double mean_trials = 0;
-  double slope_bias = 0;  ///< median of the fitted slope over the true one, less 1
+  double slope_bias = 0;  ///< median of fitted slope / true slope, minus 1
 };
 
 /// Wilson's 95 % interval of a share of studies.
@@ -54,11 +54,11 @@ struct CoverageSettings {
   std::size_t studies = 500;  ///< of each design
   std::uint64_t seed = 1;
   std::size_t jobs = 1;
-  int simulations = 39;                  ///< of each goodness of fit: 2 of 40 places are 5 %
-  std::function<void(double)> progress;  ///< share done; may be empty
+  int simulations = 39;                  ///< per goodness of fit: 2 of 40 ranks are 5 %
+  std::function<void(double)> progress;  ///< called with the share done; may be empty
 };
 
-/// The same whatever the number of jobs.
+/// The result does not depend on the number of jobs.
 std::vector<CoverageResult> interval_coverage(const CoverageSettings& settings);
 
 std::string coverage_text(const std::vector<CoverageResult>& results,

@@ -44,7 +44,7 @@ VectorXd minimize_smooth(const SmoothFunction& function, VectorXd start) {
   VectorXd place = std::move(start), gradient = numerical_gradient(function, place);
   double value = function(place);
   MatrixXd inverse = MatrixXd::Identity(place.size(), place.size());
-  // Differences of the values are known to some 1e-13 of them, and so is what is left to gain.
+  // Values are exact to about 1e-13 of their size, which limits the detectable gain.
   const double least_gain = 1e-12 * (1 + std::abs(value));
   for (int i = 0, idle = 0; i < 500 && idle < 2; ++i) {
     VectorXd step = -inverse * gradient;
@@ -153,7 +153,7 @@ double laplace(const Cluster& cluster, const VectorXd& beta, const MatrixXd& fac
   return joint.value - 0.5 * std::log(joint.information.determinant());
 }
 
-/// Lower triangle: one or two standard deviations and what makes their correlation.
+/// Lower triangle: one or two standard deviations and the parameter of their correlation.
 MatrixXd factor_of(const VectorXd& parameters, Eigen::Index effects) {
   MatrixXd factor = MatrixXd::Zero(effects, effects);
   factor(0, 0) = parameters[0];
@@ -251,13 +251,13 @@ MixedLogistic mixed_logistic(const std::vector<BinomialCell>& cells,
   start[fixed] = 0.5;
   if (effects == 2) start[fixed + 2] = 0.5;
   const VectorXd best = minimize_smooth(loss, start);
-  // Answers that a predictor separates without exception have no finite odds.
+  // Perfect separation by a predictor has no finite odds.
   if (best.head(fixed).cwiseAbs().maxCoeff() > 12) {
     model.undefined = "a level has no wrong or no correct answers: its odds are infinite";
     return model;
   }
   const MatrixXd hessian = numerical_hessian(loss, best);
-  // At a boundary only the fixed effects' block is regular.
+  // On the boundary only the block of fixed effects is regular.
   const MatrixXd factor = factor_of(best.tail(spreads), effects);
   fill_variances(model, factor);
   const MatrixXd covariance = model.singular

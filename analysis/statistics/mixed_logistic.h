@@ -1,5 +1,5 @@
 #pragma once
-// Mixed logistic regression by maximum likelihood with Laplace's approximation, as R's
+// Mixed logistic regression by maximum likelihood with Laplace's approximation, like R's
 // lme4::glmer(..., family = binomial) with its default nAGQ = 1 (Bates et al. 2015).
 
 #include <cstddef>
@@ -31,7 +31,7 @@ struct MixedLogistic {
   std::string undefined;
   bool singular = false;  ///< a participants' standard deviation is 0, or their correlation +-1
   std::size_t participants = 0, trials = 0;
-  double log_likelihood = 0;  ///< of the trials in their order, as glmer has it of single trials
+  double log_likelihood = 0;  ///< of single trials in their order, as in glmer
   std::vector<LogisticCoefficient> coefficients;
   std::vector<double> random_sds;
   std::optional<double> random_correlation;

@@ -176,7 +176,7 @@ void put_variances(const RemlOptimum& optimum, const std::vector<std::string>& r
     }
   }
   if (zero_diagonal || zero_sd) {
-    if (reason.empty()) add("participants' effects lie in fewer dimensions than there are");
+    if (reason.empty()) add("participants' effects have a covariance of lower rank");
     out.singular = reason;
   }
 }
@@ -223,7 +223,7 @@ MixedModel mixed_model(const ParticipantCells& participant_cells,
                       : "two of the renderers have no participant with times for both");
   }
   if (prepared.degrees_of_freedom < 1) {
-    return refuse("too few trials: none is left to tell the residual variance");
+    return refuse("too few trials to estimate the residual variance");
   }
   if (std::sqrt(prepared.least_square / prepared.degrees_of_freedom) <=
       1e-10 * std::max(1.0, prepared.scale)) {

@@ -1,7 +1,7 @@
 #pragma once
 // Linear mixed model log(response_time) ~ renderer * shape + (1 + renderer | participant) by
-// restricted maximum likelihood (REML), as R's lme4 (Bates et al. 2015) and lmerTest (Kuznetsova et
-// al. 2017).
+// restricted maximum likelihood (REML), like R's lme4 (Bates et al. 2015) and lmerTest (Kuznetsova
+// et al. 2017).
 
 #include <cstddef>
 #include <optional>
@@ -16,7 +16,7 @@ namespace palpate::analysis {
 /// Estimate and test of a coefficient or contrast (natural log of s) with Satterthwaite's degrees
 /// of freedom.
 struct ModelEstimate {
-  std::string undefined;  ///< why values are missing; empty: all are defined
+  std::string undefined;  ///< reason for missing values; empty: all are defined
   std::optional<double> estimate, se, df_satterthwaite, t, p;
   std::optional<Interval> ci95;
   std::optional<double> p_holm;  ///< contrasts only: adjusted over all contrasts
@@ -24,26 +24,25 @@ struct ModelEstimate {
 
 /// A fixed effect in treatment coding.
 struct FixedEffect {
-  std::string name;  ///< as R prints it: "(Intercept)", "rendererray", "rendererray:shapecone"
+  std::string name;  ///< as in R: "(Intercept)", "rendererray", "rendererray:shapecone"
   ModelEstimate value;
 };
 
 /// The fitted model.
 struct MixedModel {
-  std::string undefined;  ///< why there is no fit; empty: fitted
-  std::string
-      singular;  ///< which parameters lie on the boundary of the parameter space; empty: none
+  std::string undefined;  ///< reason if there is no fit; empty: fitted
+  std::string singular;   ///< parameters on the boundary of the parameter space; empty: none
   std::size_t n_observations = 0, n_participants = 0;
   std::optional<double> log_likelihood_reml;
-  /// Treatment coding with the first renderer and the first shape as reference levels; without
-  /// those of `left_out`.
+  /// Treatment coding with the first renderer and the first shape as reference levels, without
+  /// `left_out`.
   std::vector<FixedEffect> fixed_effects;
   std::vector<std::string>
       left_out;  ///< coefficients that cannot be estimated because of empty cells
   std::optional<double> residual_sd;
   /// Standard deviations of participants' intercepts and of the slopes of each further renderer.
   std::vector<double> random_sds;
-  /// Their correlations, below the diagonal by rows; none where a standard deviation is 0.
+  /// Their correlations, below the diagonal by rows; none: a standard deviation is 0.
   std::vector<std::optional<double>> random_correlations;
   /// [renderer - 1][shape]: each further renderer minus the first.
   std::vector<std::vector<ModelEstimate>> contrasts;

@@ -188,12 +188,12 @@ Bootstrap bootstrap_mean(const std::vector<double>& differences, Random& random,
 namespace {
 
 constexpr std::size_t kManyPairs =
-    1000;  // pairs from which bootstraps run in parallel: they outweigh the start of a thread
+    1000;  // pairs; with more, bootstraps in parallel pay for the start of a thread
 constexpr const char* kOnePair = "one participant, so no variance between participants";
 constexpr const char* kNoPairs = "no participant has times for both renderers";
 constexpr const char* kAllEqual = "all differences are equal (no variance)";
 
-/// Why inference from these differences is impossible; empty: possible.
+/// Reason why inference from these differences is impossible; empty: possible.
 std::string no_inference(const std::vector<double>& differences) {
   if (differences.empty()) return kNoPairs;
   if (differences.size() == 1) return kOnePair;
@@ -311,7 +311,7 @@ std::vector<PairedShape> compare_by_shape(const TrialTable& table, const Descrip
 
 void bootstrap_all(const std::vector<PairedShape*>& tests, std::uint64_t seed) {
   std::atomic<std::size_t> next{0};
-  // A random stream for each: the result does not depend on the number of threads.
+  // Use a random stream for each, so that the result does not depend on the number of threads.
   const auto work = [&] {
     for (std::size_t i = next++; i < tests.size(); i = next++) {
       Random random(seed, {i});

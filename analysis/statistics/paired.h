@@ -1,5 +1,5 @@
 #pragma once
-// Paired comparison of two renderers, shape by shape. Differences are participants' mean log times
+// Paired comparison of two renderers for each shape. Differences are participants' mean log times
 // with the renderer minus with the reference (ray minus point), natural logs: negative if the
 // renderer is faster. The percent reduction of a mean difference m is 100 (1 - exp m): positive if
 // the renderer is faster.
@@ -52,7 +52,7 @@ EffectSize effect_size(const std::vector<double>& differences);
 struct Wilcoxon {
   std::string undefined;
   std::size_t n_nonzero = 0;
-  std::optional<double> positive_rank_sum;  ///< V, as R names it
+  std::optional<double> positive_rank_sum;  ///< V, as named in R
   std::optional<double> p;                  ///< two-sided
   bool exact = true;                        ///< false: normal approximation, beyond kExactWilcoxon
 };
@@ -71,8 +71,8 @@ struct Bootstrap {
   std::optional<Interval> log_ratio_ci95;
 };
 constexpr std::size_t kResamples = 9999;
-/// Coverage of the 95 % BCa interval for the mean of normal differences; none from 20 pairs on,
-/// where it is near 0.95, and below 2.
+/// Coverage of the 95 % BCa interval for the mean of normal differences; none from 20 pairs on
+/// (near 0.95) and below 2.
 std::optional<double> bca_coverage(std::size_t pairs);
 /// BCa interval of the mean (Efron 1987) from `resamples` resamples of the participants.
 Bootstrap bootstrap_mean(const std::vector<double>& differences, Random& random,
@@ -80,7 +80,7 @@ Bootstrap bootstrap_mean(const std::vector<double>& differences, Random& random,
 /// The interval from the resamples' means. \param means reordered
 Bootstrap bca_interval(const std::vector<double>& differences, std::vector<double>& means);
 
-/// p values adjusted by Holm (1979) over those that are defined.
+/// p values adjusted (Holm 1979) over the defined ones.
 std::vector<std::optional<double>> holm(const std::vector<std::optional<double>>& p);
 
 /// A participant with trials of a shape, but without a usable time with one or both renderers of
@@ -93,7 +93,7 @@ struct DroppedParticipant {
 /// Comparison of a pair of renderers for one shape.
 struct PairedShape {
   std::size_t n_pairs = 0;
-  std::string undefined;            ///< why there are no pairs
+  std::string undefined;            ///< reason if there are no pairs
   std::vector<double> differences;  ///< of mean log times, one for each pair
   std::optional<double> percent_reduction_arithmetic;
   std::optional<double> mean_log_ratio, percent_reduction_geometric;

@@ -13,8 +13,8 @@
 
 namespace palpate::analysis {
 
-// Internal to analysis/statistics: a pattern as a tree, which the parser makes and Pattern
-// evaluates.
+// Internal to analysis/statistics: a pattern as a tree, built by the parser and evaluated by
+// Pattern.
 
 struct Pattern::Node {
   enum class Kind {
@@ -46,7 +46,7 @@ struct Pattern::Node {
   std::vector<Node> parts;
 };
 
-/// Whether a node of this kind holds or not; others are numbers.
+/// Whether a node of this kind is a condition; others are numbers.
 inline bool is_truth(Pattern::Node::Kind kind) { return kind >= Pattern::Node::Kind::less; }
 
 /// \throws PatternError
@@ -58,7 +58,7 @@ namespace {
 using Node = Pattern::Node;
 using Kind = Node::Kind;
 
-constexpr std::size_t kDeepest = 100;  // parentheses and signs within each other
+constexpr std::size_t kDeepest = 100;  // depth of nested parentheses and signs
 
 struct Operator {
   const char* text;
@@ -96,11 +96,10 @@ class Parser {
     return true;
   }
   void require_truth(const Node& node) const {
-    if (!is_truth(node.kind))
-      fail(node.place, "something that holds or not, such as 'cone > 5'; this is a number");
+    if (!is_truth(node.kind)) fail(node.place, "a condition such as 'cone > 5'; this is a number");
   }
   void require_number(const Node& node) const {
-    if (is_truth(node.kind)) fail(node.place, "a number; this holds or not");
+    if (is_truth(node.kind)) fail(node.place, "a number; this is a condition");
   }
 
   Node joined_by(const char* word, Kind kind, Node (Parser::*part)()) {
@@ -193,7 +192,7 @@ class Parser {
   Node atom() {
     skip_space();
     const std::size_t place = at_;
-    if (at_ == text_.size()) fail(place, "a number, a name or '('; here it ends");
+    if (at_ == text_.size()) fail(place, "a number, a name or '('; the expression ends here");
     const char c = text_[at_];
     if (take("(")) {
       const Deeper deeper(*this, place);
@@ -221,7 +220,7 @@ class Parser {
 
   Node quoted_name(std::size_t place) {
     const std::size_t end = text_.find(text_[at_], at_ + 1);
-    if (end == std::string::npos) fail(place, "the name's other quotation mark");
+    if (end == std::string::npos) fail(place, "the closing quotation mark of the name");
     const std::string name = text_.substr(at_ + 1, end - at_ - 1);
     at_ = end + 1;
     return column(name, place);
@@ -288,7 +287,7 @@ class Parser {
     return ", such as " + all;
   }
 
-  /// In quotes where the name needs them.
+  /// The name, in quotes if needed.
   static std::string as_written(const std::string& name) {
     bool plain = !name.empty() && is_letter(name[0]) && name.back() != '.';
     for (std::size_t i = 0; plain && i < name.size(); ++i)
@@ -316,8 +315,7 @@ class Parser {
 
   struct Deeper {
     Deeper(Parser& parser, std::size_t place) : parser_(parser) {
-      if (++parser_.depth_ > kDeepest)
-        parser_.fail(place, "at most 100 parentheses within each other");
+      if (++parser_.depth_ > kDeepest) parser_.fail(place, "at most 100 nested parentheses");
     }
     ~Deeper() { --parser_.depth_; }
     Deeper(const Deeper&) = delete;

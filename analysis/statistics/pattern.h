@@ -1,7 +1,7 @@
 #pragma once
-// A condition on named numbers: a pattern that is looked for at each point of a sweep, "cone>5 &&
-// cube>5 && min(cone,cube)>3", or a hypothesis on an analysis, "paired.cone.p_holm < 0.05".
-// What is a number and what holds or not is told apart when the expression is read.
+// A condition on named numbers: a pattern at each point of a sweep, "cone>5 && cube>5 &&
+// min(cone,cube)>3", or a hypothesis on an analysis, "paired.cone.p_holm < 0.05". The parser
+// distinguishes numbers and conditions.
 //
 // clang-format off
 //   or      := and { "||" and }
@@ -26,7 +26,7 @@
 
 namespace palpate::analysis {
 
-/// what(): the expression, a mark below the place, and what was expected there.
+/// what(): the expression, a mark below the place, and the expectation there.
 class PatternError : public std::runtime_error {
  public:
   PatternError(const std::string& expression, std::size_t place, const std::string& expected);
@@ -38,11 +38,11 @@ class PatternError : public std::runtime_error {
 
 class Pattern {
  public:
-  /// The column that a name stands for; none: it is unknown.
+  /// The column of a name; none: unknown.
   using Resolve = std::function<std::optional<std::size_t>(const std::string& name)>;
 
   /// \param known  names to suggest for an unknown one
-  /// \param source  of the names, for messages
+  /// \param source  origin of the names, for messages
   /// \throws PatternError
   Pattern(std::string expression, const Resolve& resolve, const std::vector<std::string>& known,
           const std::string& source = "the sweep");
@@ -52,8 +52,8 @@ class Pattern {
 
   const std::string& expression() const { return expression_; }
 
-  /// Whether it holds. None: that depends on an undefined value (not a number). Where it is the
-  /// same for every number that the value could be, it is that: "x > 5 && 1 > 2" does not hold.
+  /// Whether the pattern holds. None: the outcome depends on an undefined value (NaN). An outcome
+  /// that no value of it can change is defined: "x > 5 && 1 > 2" does not hold.
   /// \param value  of a column
   std::optional<bool> holds(const std::function<double(std::size_t column)>& value) const;
 

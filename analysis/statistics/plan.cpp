@@ -41,7 +41,7 @@ std::size_t n_effects(const StudyModel& model) {
   return model.shapes.size() - static_cast<std::size_t>(std::ranges::count(model.log_ratios, 0.0));
 }
 
-/// Null: has to be simulated.
+/// Null: not known, must be simulated.
 const PlanPoint* find_known(const PlanSettings& settings, const StudyDesign& design) {
   for (const PlanPoint& point : settings.known) {
     if (point.design.participants == design.participants && point.design.trials == design.trials)

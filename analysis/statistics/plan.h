@@ -1,5 +1,5 @@
 #pragma once
-// Sample size planning: the number of participants that reaches a given power, for given numbers of
+// Sample size planning: the number of participants needed for a given power, for given numbers of
 // trials.
 
 #include <cstddef>
@@ -24,10 +24,10 @@ struct PlanPoint {
 struct PlanSettings {
   std::vector<std::size_t> trials;  ///< of each shape with each renderer: a power curve for each
   std::size_t min_participants = 2, max_participants = 2;  ///< 2 <= min <= max
-  double power = 0.8;                                      ///< wanted probability to reach the goal
+  double power = 0.8;  ///< wanted probability of reaching the goal
   Goal goal = Goal::all;
   PowerSettings simulation;
-  /// Simulated before, with the same model and simulation: not simulated again.
+  /// Results of earlier simulations with the same model and settings, which are reused.
   std::vector<PlanPoint> known = {};
 };
 
@@ -45,16 +45,16 @@ struct Plan {
   PlanSettings settings;
   std::vector<std::string> notes;
   std::vector<PlanCurve> curves;
-  std::string label;  ///< as of the pilot: simulated participants
+  std::string label;  ///< that of the pilot: simulated participants
 };
 
-/// Simulates a logarithmic grid of numbers of participants, then bisects between the points around
-/// the wanted power. Power increases with participants up to the error of simulation. \param
-/// progress called with the curve and point (both from 1) that is simulated next
+/// Simulates a logarithmic grid of numbers of participants, then bisects around the wanted power.
+/// Power increases with participants up to the error of simulation. \param progress called with the
+/// next curve and point (both from 1)
 Plan make_plan(StudyModel model, PlanSettings settings, std::vector<std::string> notes,
                const std::function<void(std::size_t, std::size_t)>& progress);
 
-/// Probability to reach the goal.
+/// Probability of reaching the goal.
 double goal_power(const Plan& plan, const Power& power);
 
 /// "find the gain for cone (22.0 %) and cube (11.0 %), all of them"

@@ -109,22 +109,23 @@ Pilot read_pilot(const Analysis& analysis) {
     model.gain_sd = std::sqrt(std::max(0.0, model.gain_sd * model.gain_sd - extra.variance / k));
   } else {
     out.notes.push_back(
-        "Participants' gains for single shapes cannot be told from the common gain in this pilot: "
-        "taken as 0, which makes the power too high where they vary.");
+        "Participants' gains for single shapes cannot be separated from the common gain in this "
+        "pilot: "
+        "they are taken as 0, which makes the power too high if they vary.");
   }
   if (!fit.singular.empty()) {
     out.notes.push_back("The pilot's fit is singular (" + fit.singular +
-                        "): its standard deviations are rough.");
+                        "): its standard deviations are imprecise.");
   }
   if (fit.n_participants < 10) {
     out.notes.push_back("Standard deviations from " +
                         counted(fit.n_participants, "participant", "participants") +
-                        " are rough: try --gain-sd half as large again as well.");
+                        " are imprecise: also try a --gain-sd 1.5 times as large.");
   }
   if (analysis.comparisons.size() > 1) {
     out.notes.push_back("The pilot has " + std::to_string(analysis.table.renderers.size()) +
-                        " renderers: this plan is of " + difference_name(out.pair) +
-                        " alone, with Holm's adjustment over its shapes; a study of all of them "
+                        " renderers: this plan covers " + difference_name(out.pair) +
+                        " only, with Holm's adjustment over its shapes; a study of all of them "
                         "adjusts over more tests and needs more participants.");
   }
   out.label = simulated_label(analysis.table.simulated);
@@ -134,7 +135,7 @@ Pilot read_pilot(const Analysis& analysis) {
 
 namespace {
 
-constexpr std::size_t kChunk = 50;  // studies in a unit of work of a thread
+constexpr std::size_t kChunk = 50;  // studies per unit of work of a thread
 
 /// Number of usable of n trials: binomial, drawn by inversion of the distribution function.
 class UsedTrials {

@@ -12,7 +12,7 @@
 
 namespace palpate::analysis {
 
-/// The model that studies are drawn from. Natural logs of s; standard deviations >= 0.
+/// The model from which studies are drawn. Natural logs of s; standard deviations >= 0.
 struct StudyModel {
   std::vector<std::string> shapes;
   std::vector<double> log_ratios;  ///< effect of each shape, renderer - reference; 0: none
@@ -30,7 +30,7 @@ struct StudyDesign {
   std::size_t trials = 0;  ///< of each shape with each renderer
 };
 
-/// How a study is tested.
+/// Test of a study.
 enum class StudyTest {
   paired,  ///< paired t-tests, Holm over the shapes: the primary inference
   model    ///< contrasts of the mixed model, fitted to every study, Holm over the shapes
@@ -50,9 +50,9 @@ struct PowerSettings {
 /// Numbers of studies with significant results.
 struct Power {
   std::size_t studies = 0;
-  std::vector<std::size_t> found;  ///< by shape; for a shape with an effect only in its direction
-  std::size_t all = 0;             ///< for every shape with an effect
-  std::size_t any = 0;             ///< for at least one of them
+  std::vector<std::size_t> found;  ///< by shape; for a shape with an effect, only in its direction
+  std::size_t all = 0;             ///< studies significant for every shape with an effect
+  std::size_t any = 0;             ///< studies significant for at least one of them
 
   /// n / studies.
   double proportion(std::size_t n) const {
@@ -64,23 +64,22 @@ struct Power {
 Power simulate_power(const StudyModel& model, const StudyDesign& design,
                      const PowerSettings& settings);
 
-// Estimates the model that studies are simulated from, for sample size planning, from a pilot
-// study.
+// Estimates the model for sample size planning from a pilot study.
 
 /// Estimates from a pilot.
 struct Pilot {
   RendererPair pair;      ///< the first comparison of the pilot
-  std::string undefined;  ///< why there is no model; empty: there is
+  std::string undefined;  ///< reason if there is no model; empty: there is one
   StudyModel model;       ///< effects as estimated in the pilot
-  std::string label;      ///< as of simulated_label(); empty: human participants
+  std::string label;      ///< from simulated_label(); empty: human participants
   std::vector<std::string> notes;
 };
 
 /// The parameters of the fitted mixed model, and the participant x shape standard deviation of
-/// gains, which that model does not have: by moments from the mean differences of participants with
-/// all cells (0 if residual variance explains them). If it is above 0 it is subtracted from the
-/// variance of the random slope, which contains a part of it, and the residual is that within
-/// cells.
+/// gains, which that model lacks: by moments from the mean differences of participants with all
+/// cells (0 if residual variance explains them). If it is above 0, it is subtracted from the
+/// variance of the random slope, which contains a part of it, and the residual variance is that
+/// within cells.
 Pilot read_pilot(const Analysis& analysis);
 
 }  // namespace palpate::analysis

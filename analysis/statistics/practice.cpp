@@ -10,7 +10,7 @@ namespace palpate::analysis {
 
 namespace {
 
-constexpr double kPer = 100;  // trials that slopes refer to
+constexpr double kPer = 100;  // trials to which slopes refer
 const std::string kTooFew =
     "fewer than " + std::to_string(kSlopeTrials) + " times or no shape twice";
 

@@ -39,7 +39,7 @@ struct Learning {
   std::size_t n_participants = 0;
 };
 
-/// Participants' gains (mean log renderer - mean log reference) by which of the two came first.
+/// Participants' gains (mean log renderer - mean log reference) by the renderer that came first.
 struct OrderGroup {
   std::size_t n_participants = 0;
   std::optional<double> mean_log_ratio;
@@ -50,12 +50,12 @@ struct OrderGroup {
 /// renderer first.
 struct OrderEffect {
   OrderGroup reference_first, renderer_first;
-  std::string undefined;  ///< why the two orders cannot be compared; empty: they can
+  std::string undefined;  ///< reason why the two orders cannot be compared; empty: they can
   /// Mean log ratio with reference first minus with renderer first; negative: practice shortens
   /// times.
   std::optional<double> difference;
   TTest test;  ///< of the difference, pooled variance
-  /// Mean of the two groups' mean log ratios: the gain without the effect of order.
+  /// Mean of the two groups' mean log ratios: the gain free of the effect of order.
   std::optional<double> balanced_log_ratio;
   std::optional<Interval> balanced_ci95;  ///< of log ratio
 };
@@ -64,7 +64,7 @@ struct OrderEffect {
 struct PairPractice {
   TTest slope_difference;  ///< renderer - reference, participants with both, per 100 trials
   std::optional<double> mean_slope_difference;
-  std::size_t n_interleaved = 0;    ///< participants with interleaved trials of both: no order
+  std::size_t n_interleaved = 0;    ///< participants with both interleaved: no order
   OrderEffect all_shapes;           ///< mean over shapes, participants with a pair in each
   std::vector<OrderEffect> shapes;  ///< one for each of table.shapes
 };

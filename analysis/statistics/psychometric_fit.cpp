@@ -97,17 +97,17 @@ SimplexMinimum minimize(const Function& function, const std::vector<double>& sta
   return best;
 }
 
-// Intervals of 95 % by the profile likelihood: what is held in them, twice the loss of log
-// likelihood stays below the 0.95 quantile of chi squared with one degree of freedom.
+// 95 % intervals by profile likelihood: within them, twice the loss of log likelihood stays below
+// the 0.95 quantile of chi squared with one degree of freedom.
 
-/// Of the threshold, levels. \param best  the fit, as PsychometricObjective::best finds it
+/// Interval of the threshold, in levels. \param best the fit, from PsychometricObjective::best
 Interval threshold_interval(const PlacedData& data, const PsychometricModel& model,
                             const SimplexMinimum& best);
-/// Of the slope. \param log_slope  of the fit
+/// Interval of the slope. \param log_slope of the fit
 Interval slope_interval(const PlacedData& data, const PsychometricModel& model,
                         const SimplexMinimum& best, double log_slope);
-/// Of the guess or lapse rate, within 0 and its most; of a constant, the constant twice. One rate
-/// at both ends is the lapse rate.
+/// Interval of the guess or lapse rate, within 0 and its maximum; for a constant, the constant
+/// twice. One rate for both asymptotes is the lapse rate.
 Interval rate_interval(const PlacedData& data, const PsychometricModel& model,
                        const SimplexMinimum& best, PsychometricRate rate);
 
@@ -134,7 +134,7 @@ PlacedData place_counts(const std::vector<LevelCount>& counts,
     const double distance = places[i] - places[i - 1];
     if (data.spacing == 0 || distance < data.spacing) data.spacing = distance;
   }
-  // Levels that differ by rounding alone are no finer spacing.
+  // Ignore differences of levels by rounding alone.
   data.spacing = std::max(data.spacing, 1e-3 * (data.high - data.low));
   return data;
 }
@@ -206,7 +206,7 @@ SimplexMinimum PsychometricObjective::best(const PsychometricSearch& search,
   SimplexMinimum found;
   found.value = kWorst;
   std::vector<Start> starts = starts_of_grid(search);
-  // What a quick search finds is found by any other as well.
+  // Add the starts of the quick search, so that no search ends worse than it.
   if (search.starts > kQuickSearch.starts) {
     for (Start& start : starts_of_grid(kQuickSearch)) starts.push_back(std::move(start));
   }
@@ -228,7 +228,7 @@ std::optional<std::vector<double>> PsychometricObjective::other_start(
   return far ? std::optional(starts.front().place) : std::nullopt;
 }
 
-/// Rates of the grid, as best_from takes them: near 0 and near their most.
+/// Rates of the grid, as best_from takes them: near 0 and near their maximum.
 std::vector<std::vector<double>> PsychometricObjective::rates_of_grid() const {
   std::vector<std::vector<double>> all{{}};
   const std::size_t rates =
@@ -246,7 +246,7 @@ std::vector<std::vector<double>> PsychometricObjective::rates_of_grid() const {
   return all;
 }
 
-/// The best ones, each two cells from those that are better.
+/// The best points, each at least two cells from better ones.
 std::vector<PsychometricObjective::Start> PsychometricObjective::starts_of_grid(
     const PsychometricSearch& search) const {
   constexpr int kApart = 2;
@@ -290,8 +290,8 @@ using protocols::LevelScale;
 constexpr double kHalfChiSquared95 = 0.5 * 3.841458820694124;
 constexpr double kOpenEnd = std::numeric_limits<double>::infinity();
 
-/// Where a profile that is above 0 at `inside` falls to 0, towards `limit`; nullopt where it does
-/// not, or `inside` is there already.
+/// The point towards `limit` where a profile, above 0 at `inside`, falls to 0; nullopt: it does
+/// not, or `inside` is at the limit.
 template <class Profile>
 std::optional<double> profile_end(const Profile& profile, double inside, double step,
                                   double limit) {
@@ -326,8 +326,8 @@ std::optional<double> profile_end(const Profile& profile, double inside, double 
   return 0.5 * (inside + outside);
 }
 
-/// Loss allowed less the smallest loss with a parameter held. Each search begins where the one
-/// before ended, and at the best place of a grid: there may be another valley.
+/// Allowed loss minus the smallest loss with a parameter held. Each search starts at the end of the
+/// previous one and at the best point of a grid, as there may be another minimum.
 template <class Hold>
 class Profile {
  public:
@@ -365,7 +365,7 @@ Interval threshold_interval(const PlacedData& data, const PsychometricModel& mod
   Profile falling(
       objective, [](auto&held, double x) { held.hold_threshold(x); }, others, allowed),
       rising(falling);
-  // Twenty ranges away from all levels: that is nowhere.
+  // Twenty ranges away from all levels counts as infinite.
   const double at = objective.point(best.place).threshold;
   const auto low = profile_end([&](double x) { return falling(x); }, at, -step,
                                std::max(data.low - 20 * range, data.least));
@@ -427,13 +427,13 @@ std::string reason_not_to_fit(const std::vector<LevelCount>& counts, const Place
   return "";
 }
 
-/// Differences of log likelihood below are none. The steepest slope leaves some 2e-9 of every
-/// answer beside a step, which depends on where a search ends: two fits of perfectly separated
-/// answers differ by 1e-7 to 1e-5.
+/// Smaller differences of log likelihood count as 0. The steepest slope leaves some 2e-9 of every
+/// answer beside a step, depending on the end of a search: two fits of perfectly separated answers
+/// differ by 1e-7 to 1e-5.
 constexpr double kSameLogLikelihood = 1e-4;
 
-/// Where answers change between two levels at once, every threshold between them is as good: then
-/// it is the middle, with the steepest slope.
+/// With perfect separation between two neighbouring levels, every threshold between them fits
+/// equally: takes the middle, with the steepest slope.
 void take_middle_of_step(const PsychometricObjective& objective, const PlacedData& data,
                          SimplexMinimum& best) {
   const auto above = std::find_if(data.places.begin(), data.places.end(),
@@ -446,7 +446,7 @@ void take_middle_of_step(const PsychometricObjective& objective, const PlacedDat
   if (value <= best.value + kSameLogLikelihood) best = {std::move(step), value};
 }
 
-/// Point estimates alone, as the simulations need them.
+/// Point estimates only, for the simulations.
 PsychometricFit fit_point(const std::vector<LevelCount>& counts, const PlacedData& data,
                           const PsychometricModel& model, const PsychometricSearch& search,
                           SimplexMinimum& best) {
@@ -531,7 +531,7 @@ GoodnessOfFit goodness_of_fit(const std::vector<LevelCount>& counts, const Psych
     const PlacedData data = place_counts(simulated, model.function);
     SimplexMinimum best;
     const PsychometricFit refit = fit_point(simulated, data, model, kQuickSearch, best);
-    // All answers alike: any function that goes there fits without deviance.
+    // All answers equal: a function with that asymptote fits without deviance.
     const double deviance = refit.undefined.empty() ? deviance_of(simulated, refit) : 0;
     if (deviance >= result.deviance - 2 * kSameLogLikelihood) ++as_large;
   }
@@ -544,7 +544,8 @@ namespace {
 
 constexpr std::size_t kCoarse = 25, kFine = 81, kRates = 10;
 
-/// Values of a parameter, each in the middle of its share of a range, and their marginal posterior.
+/// Values of a parameter, each in the middle of an equal part of a range, and their marginal
+/// posterior.
 struct PosteriorAxis {
   double low = 0, high = 0;
   std::vector<double> values, marginal;
@@ -572,7 +573,7 @@ struct PosteriorAxis {
     return std::sqrt(sum);
   }
 
-  /// The density is even within a share of the range.
+  /// The density is uniform within a part of the range.
   double quantile(double share) const {
     double below = 0;
     for (std::size_t i = 0; i < values.size(); ++i) {
@@ -583,7 +584,7 @@ struct PosteriorAxis {
     return high;
   }
 
-  /// The part that has all but a millionth on either side, with a margin.
+  /// The part that excludes a millionth on either side, with a margin.
   std::array<double, 2> core() const {
     return {std::max(low, quantile(1e-6) - width()), std::min(high, quantile(1 - 1e-6) + width())};
   }
@@ -597,7 +598,7 @@ double log_prior(const RateModel& rate, double value) {
   return rate.free ? 9 * std::log1p(-value) : 0;
 }
 
-/// One rate at both ends stands on the axis of lapses alone: that of guesses has one value, unused.
+/// One rate for both asymptotes uses the axis of lapses only; that of guesses has one unused value.
 PosteriorAxis guess_axis(const PsychometricModel& model) {
   return rate_axis(model.guess_is_lapse ? RateModel{} : model.guess);
 }

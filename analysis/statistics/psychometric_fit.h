@@ -20,8 +20,8 @@ struct SimplexMinimum {
   double value = 0;
 };
 
-/// A local minimum by Nelder & Mead 1965, begun again from where it ends until that gains less than
-/// `tolerance`. \param steps  first steps, one a parameter; not 0
+/// A local minimum by Nelder & Mead 1965, restarted from its end until a restart gains less than
+/// `tolerance`. \param steps initial steps, one per parameter; not 0
 SimplexMinimum minimize(const std::function<double(const std::vector<double>&)>& function,
                         const std::vector<double>& start, const std::vector<double>& steps,
                         double tolerance = 1e-11);
@@ -32,7 +32,7 @@ struct LevelCount {
   int trials = 0, successes = 0;
 };
 
-/// Sums the trials of equal levels; in order of level.
+/// Sums the trials of equal levels, in order of level.
 std::vector<LevelCount> sum_by_level(std::vector<LevelCount> counts);
 
 /// The guess or lapse rate: a constant, or free from 0 to `most`.
@@ -42,47 +42,47 @@ struct RateModel {
   double most = 0.1;
 };
 
-/// The largest lapse rate that `analyze` looks for.
+/// The largest lapse rate that `analyze` fits.
 inline constexpr double kMostLapse = 0.06;
 
 struct PsychometricModel {
   protocols::PsychometricFunction function;
   RateModel guess, lapse;
-  /// Both ends are lapses, as where levels lie on both sides of a standard: a key pressed by chance
-  /// lifts the lower end by as much as it lowers the upper one. The guess rate is the lapse rate,
-  /// and `guess` is not used.
+  /// Both asymptotes are lapses, for levels on both sides of a standard: a key pressed by chance
+  /// raises the lower asymptote by as much as it lowers the upper one. The guess rate equals the
+  /// lapse rate, and `guess` is not used.
   bool guess_is_lapse = false;
 
   bool guess_is_free() const { return guess.free && !guess_is_lapse; }
 };
 
 struct PsychometricFit {
-  std::string undefined;  ///< why there is no fit; empty: fitted
+  std::string undefined;  ///< reason if there is no fit; empty: fitted
   protocols::PsychometricParameters parameters;
   double log_likelihood = 0;  ///< of the answers in their order: without binomial coefficients
   int trials = 0;
-  /// 95 %, where twice the loss of profile log likelihood is the 0.95 quantile of chi squared with
-  /// one degree of freedom. An end is infinite (threshold: +-, or 0 and infinity where levels are
-  /// above 0) where the data exclude no value on that side.
+  /// 95 %: where twice the loss of profile log likelihood is the 0.95 quantile of chi squared with
+  /// one degree of freedom. An end is infinite (threshold: +-infinity, or 0 and infinity if levels
+  /// are above 0) if the data exclude no value on that side.
   Interval threshold_ci95, slope_ci95;
-  /// Likewise; an end of a free rate is 0 or its most where no value on that side is excluded. Of a
-  /// constant: both ends are it. One rate at both ends has one interval.
+  /// The same; an end of a free rate is 0 or its maximum if no value on that side is excluded. A
+  /// constant: both ends equal it. One rate for both asymptotes has one interval.
   Interval guess_ci95, lapse_ci95;
   bool slope_at_bound =
-      false;  ///< answers change between two levels at once: no slope is too steep
+      false;  ///< perfect separation between two neighbouring levels: no slope is too steep
 };
 
 PsychometricFit fit_psychometric(const std::vector<LevelCount>& counts,
                                  const PsychometricModel& model);
 
-/// The same without intervals, by a quicker search: for simulations.
+/// The same without intervals, by a quicker search, for simulations.
 PsychometricFit quick_fit(const std::vector<LevelCount>& counts, const PsychometricModel& model);
 
-/// Deviance from the saturated model and its place in the distribution of refitted simulations.
+/// Deviance from the saturated model and its rank among refitted simulations.
 struct GoodnessOfFit {
   double deviance = 0;
   int levels = 0;
-  /// (1 + number at least as large) / (1 + simulations); deviances within 2e-4 are equally large.
+  /// (1 + number at least as large) / (1 + simulations); deviances within 2e-4 count as equal.
   std::optional<double> p;
   int simulations = 0;
 };
@@ -91,9 +91,9 @@ struct GoodnessOfFit {
 GoodnessOfFit goodness_of_fit(const std::vector<LevelCount>& counts, const PsychometricModel& model,
                               const PsychometricFit& fit, int simulations, std::uint64_t seed);
 
-// The likelihood that the fits of psychometric functions share.
+// The likelihood common to fits of psychometric functions.
 
-/// Counts with their levels' places on the scale.
+/// Counts with the positions of their levels on the scale.
 struct PlacedCount {
   double place = 0;
   double trials = 0, successes = 0;
@@ -101,14 +101,14 @@ struct PlacedCount {
 
 struct PlacedData {
   std::vector<PlacedCount> counts;
-  std::vector<double> places;  ///< finite ones, each once, in order
+  std::vector<double> places;  ///< finite ones, distinct, ascending
   double low = 0, high = 0;    ///< the first and the last
   double spacing = 0;          ///< smallest distance of two places; 0: one place only
-  /// No threshold is below: 0 on a linear scale of levels that are all above 0, as those of sizes
-  /// and stiffnesses are; else -infinity.
+  /// Lower bound of thresholds: 0 on a linear scale if all levels are above 0, like sizes and
+  /// stiffnesses; else -infinity.
   double least = -std::numeric_limits<double>::infinity();
 
-  /// Slopes beyond are flat or a step, as far as these levels can tell.
+  /// Slopes beyond these bounds are flat or a step at these levels.
   double least_log_slope() const;
   double most_log_slope() const;
 };
@@ -121,23 +121,23 @@ double psychometric_log_likelihood(const PlacedData& data,
                                    const protocols::PsychometricFunction& function,
                                    double threshold, double slope, double guess, double lapse);
 
-// What a fit of a psychometric function makes as small as it can be, and how it looks for that.
+// Objective of the fit of a psychometric function, and its search.
 
-/// How a minimum is looked for: a grid, from whose best places searches begin.
+/// Search for a minimum: a grid; local searches start from its best points.
 struct PsychometricSearch {
   int thresholds = 21, slopes = 19;
   std::size_t starts = 4;
 };
-/// Of a fit, and of the refits of simulations.
+/// For a fit, and for the refits of simulations.
 inline constexpr PsychometricSearch kWholeSearch{}, kQuickSearch{11, 9, 1};
 
 enum class PsychometricRate { guess, lapse };
 
-/// Minus log likelihood over (threshold on the scale, log slope, free rates), one of them held or
-/// none. A free rate is most sin^2(x): never outside 0 .. most.
+/// Minus log likelihood over (threshold on the scale, log slope, free rates), with one or none of
+/// them held. A free rate is most sin^2(x), always within 0 .. most.
 class PsychometricObjective {
  public:
-  /// Both must outlive it. One rate at both ends is the lapse rate: hold that.
+  /// Both must outlive it. One rate for both asymptotes is the lapse rate: hold that.
   PsychometricObjective(const PlacedData& data, const PsychometricModel& model)
       : data_(data), model_(model) {}
 
@@ -154,11 +154,11 @@ class PsychometricObjective {
   Point point(const std::vector<double>& x) const;
   double operator()(const std::vector<double>& x) const;
 
-  /// The best point from a start, whose places are those of point() that are not held.
+  /// The best point from a start, which has the coordinates of point() that are not held.
   SimplexMinimum best_from(const std::vector<double>& start, double step, double tolerance) const;
-  /// The best point from the best starts of a grid: the likelihood may have several maxima.
+  /// The best point from the best grid points: the likelihood may have several maxima.
   SimplexMinimum best(const PsychometricSearch& search, double tolerance) const;
-  /// With a parameter held: the best place of a grid, if that is far from `place`.
+  /// With a parameter held: the best point of a grid, if it is far from `place`.
   std::optional<std::vector<double>> other_start(const std::vector<double>& place) const;
 
  private:
@@ -177,16 +177,16 @@ class PsychometricObjective {
 };
 
 /// Posterior of a psychometric function on a grid. Priors: threshold uniform on the scale over the
-/// levels and half their range beyond on both sides, but not below 0 where all levels are above;
-/// log slope uniform over all that the levels can
-/// tell apart; free rates with density 10 (1 - rate)^9 up to their largest value (Schuett et al.
-/// 2016); one rate at both ends has that density once.
+/// levels and half their range beyond on both sides, but not below 0 if all levels are above 0; log
+/// slope uniform over the range that the levels can resolve; free rates with density 10 (1 -
+/// rate)^9 up to their largest value (Schuett et al. 2016); one rate for both asymptotes has that
+/// density once.
 struct PsychometricPosterior {
   std::string undefined;
-  protocols::PsychometricParameters mean;  ///< threshold and slope: means on the scale, of the log
+  protocols::PsychometricParameters mean;  ///< threshold: mean on the scale; slope: mean of the log
   double threshold_scale_sd = 0;
   Interval threshold_ci95, slope_ci95;  ///< central
-  Interval guess_ci95, lapse_ci95;      ///< of a constant: both ends are it
+  Interval guess_ci95, lapse_ci95;      ///< of a constant: both ends equal it
 };
 
 PsychometricPosterior psychometric_posterior(const std::vector<LevelCount>& counts,

@@ -7,7 +7,7 @@
 
 namespace palpate::analysis {
 
-/// Of sorted values, interpolated (type 7 of Hyndman & Fan 1996). \param sorted  not empty
+/// Quantile of sorted values, interpolated (type 7 of Hyndman & Fan 1996). \param sorted  not empty
 /// \param share  0 to 1
 template <class T>
 double sorted_quantile(const std::vector<T>& sorted, double share) {
@@ -18,11 +18,11 @@ double sorted_quantile(const std::vector<T>& sorted, double share) {
   return low + (place - static_cast<double>(below)) * (high - low);
 }
 
-/// Of the standard normal distribution; 0 < share < 1.
+/// Quantile of the standard normal distribution; 0 < share < 1.
 double normal_quantile(double share);
 
-/// Ranks from 1; ties have the mean of their ranks. \param tolerance  values are tied that are no
-/// further than this above the smallest of their group
+/// Ranks from 1; ties get the mean of their ranks. \param tolerance values within this above the
+/// smallest of their group are tied
 std::vector<double> midranks(const std::vector<double>& values, double tolerance = 0);
 
 }  // namespace palpate::analysis

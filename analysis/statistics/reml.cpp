@@ -242,8 +242,8 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr int kMaxSteps = 200;
-// Participants. With more the criterion has been found to have one minimum: two starting values
-// check it.
+// Participants. With more, the criterion had a single minimum in all tests: two starting values
+// suffice as a check.
 constexpr std::size_t kFew = 500;
 constexpr double kOnBoundary = 1e-4;  // threshold of a diagonal theta, as in lme4's isSingular()
 
@@ -337,8 +337,8 @@ VectorXd with_small_diagonals_at_zero(VectorXd theta, Index q) {
   return theta;
 }
 
-/// descend(), then leaves the boundary where that lowers the deviance, and sets parameters near 0
-/// to exactly 0.
+/// descend(), then leaves the boundary if that lowers the deviance, and sets parameters near 0 to
+/// exactly 0.
 RemlOptimum optimum_from(const RemlStatistics& data, const MatrixXd& coding,
                          const VectorXd& start) {
   const Index q = data.levels;

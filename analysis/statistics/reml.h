@@ -26,9 +26,9 @@ struct RemlParticipant {
 /// Sufficient statistics of the data.
 struct RemlStatistics {
   Eigen::Index levels = 0;  ///< q
-  /// Number of trials - number of all fixed effects, also of those without a column here.
+  /// Number of trials - number of all fixed effects, including those without a column here.
   double degrees_of_freedom = 0;
-  Eigen::VectorXd within;  ///< diagonal of X'X of the deviations from the means; the rest is 0
+  Eigen::VectorXd within;  ///< diagonal of X'X of the deviations from the means; else 0
   Eigen::VectorXd xy;      ///< X'y of them
   double yy = 0;           ///< y'y of them
   std::vector<RemlParticipant> groups;
@@ -45,7 +45,7 @@ struct RemlPoint {
   Eigen::MatrixXd hessian;     ///< of the deviance by theta
   /// Hessian of -2 log restricted likelihood by (theta, sigma).
   Eigen::MatrixXd full_hessian;
-  /// Derivatives of -inverse_xx^-1 by each theta, from which those of vcov follow.
+  /// Derivatives of -inverse_xx^-1 by each theta; those of vcov follow from them.
   std::vector<Eigen::MatrixXd> information_loss;
 };
 
@@ -126,7 +126,7 @@ class ReducedModel {
   Eigen::VectorXd to_cells(const Eigen::VectorXd& columns) const;
 
   std::vector<CellDirections> blocks_;
-  Eigen::VectorXd counts_, centre_;  ///< by cell: trials; centre that was subtracted from y
+  Eigen::VectorXd counts_, centre_;  ///< by cell: trials; centre subtracted from y
 };
 
 }  // namespace palpate::analysis

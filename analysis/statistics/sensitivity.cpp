@@ -15,12 +15,12 @@ constexpr const char* kConstant = "the output is the same at all points";
 
 double square(double x) { return x * x; }
 
-/// Outputs of base points without gaps, less their mean over A and B.
+/// Outputs of complete base points, minus their mean over A and B.
 struct Samples {
   std::size_t parameters = 0;
   std::vector<double> values;          // base points times (parameters + 2)
-  std::vector<double> squared_errors;  // of each base point: sum of those that are known
-  std::vector<double> with_errors;     // of each base point: how many those are
+  std::vector<double> squared_errors;  // for each base point: sum of the known ones
+  std::vector<double> with_errors;     // for each base point: number of known ones
 
   std::size_t size() const { return values.size() / (parameters + 2); }
   const double* at(std::size_t base) const { return &values[base * (parameters + 2)]; }
@@ -93,7 +93,7 @@ Samples complete_samples(const std::vector<double>& outputs, const std::vector<d
   return samples;
 }
 
-/// None where it is not defined: r is 1 or -1, or there are too few points.
+/// None: undefined, as r is 1 or -1, or there are too few points.
 std::optional<Interval> correlation_interval(double r, double n, double held) {
   const double freedom = n - held - 3;
   if (!(std::fabs(r) < 1) || !(freedom > 0)) return std::nullopt;

@@ -35,7 +35,7 @@ Pattern pattern_of(const SweepTable& table, const std::string& expression) {
   return {expression, resolve, known};
 }
 
-/// Of Saltelli's samples: A and B, the first two of each base point.
+/// Saltelli's design: samples A and B, the first two of each base point.
 bool independent_setting(const SweepTable& table, std::size_t row) {
   if (table.design != "saltelli") return true;
   const auto each = static_cast<std::int64_t>(table.parameters.size()) + 2;
@@ -73,7 +73,7 @@ Spread spread_of(const std::vector<double>& values, const std::vector<double>& e
   return out;
 }
 
-/// In the order of Saltelli's samples from the first, whichever points are on record.
+/// All values in the order of Saltelli's samples, with gaps for points not on record.
 std::vector<double> all_samples(const SweepTable& table, const std::vector<double>& values) {
   if (values.empty()) return {};
   std::vector<double> out(static_cast<std::size_t>(table.points.back()), kNone);
@@ -82,7 +82,7 @@ std::vector<double> all_samples(const SweepTable& table, const std::vector<doubl
   return out;
 }
 
-/// More than two words have no order.
+/// Choices of more than two words have no order.
 bool ordered(const SweepTable& table, std::size_t parameter) {
   return table.words[parameter].size() <= 2;
 }
@@ -100,7 +100,7 @@ Drivers drivers_of(const SweepTable& table, std::string output, std::vector<doub
     std::vector<std::vector<double>> inputs(table.values.begin(),
                                             table.values.begin() + static_cast<std::ptrdiff_t>(n));
     for (std::size_t p = 0; p < n; ++p) {
-      if (!ordered(table, p)) inputs[p].assign(table.rows(), 0);  // does not vary
+      if (!ordered(table, p)) inputs[p].assign(table.rows(), 0);  // treated as constant
     }
     out.ranks = rank_correlations(inputs, out.values);
     for (std::size_t p = 0; p < n; ++p) {
@@ -123,23 +123,24 @@ void add_notes(SweepAnalysis& analysis) {
     analysis.notes.push_back("The file holds " + std::to_string(table.rows()) + " of " +
                              std::to_string(table.planned) + " points: " +
                              (table.design == "lhs" || table.design == "grid"
-                                  ? "a part of the design does not stand for the whole space."
-                                  : "estimates are less sure than the whole sweep's."));
+                                  ? "part of a design does not represent the whole space."
+                                  : "estimates are less precise than those of the whole sweep."));
   }
   if (table.design == "grid") {
     analysis.notes.push_back(
-        "A grid's levels are equally spaced with both ends: they are no sample of the "
+        "A grid's levels are equally spaced with both ends: they are not a sample of the "
         "distributions. Shares, quantiles and means are of the grid's points, not of the space, "
-        "and have no interval. For those: --design lhs or sobol.");
+        "and have no interval. To estimate those of the space, use --design lhs or sobol.");
   }
   if (analysis.n_failed > 0) {
-    analysis.notes.push_back(std::to_string(analysis.n_failed) +
-                             " points failed and are in no figure: if that is not by chance, the "
-                             "others do not stand for the space.");
+    analysis.notes.push_back(
+        std::to_string(analysis.n_failed) +
+        " points failed and are excluded from all figures: if they did not fail at random, the "
+        "others do not represent the space.");
   }
 }
 
-/// Of a protocol of version 2: every figure that has a standard error.
+/// For a protocol of version 2: every figure with a standard error.
 void add_task_drivers(SweepAnalysis& out) {
   const SweepTable& table = out.table;
   for (std::size_t c = table.parameters.size(); c + 1 < table.columns.size(); c += 2)

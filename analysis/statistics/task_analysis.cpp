@@ -107,12 +107,12 @@ InformationTransfer information_transfer(const CountTable& counts) {
 
 namespace {
 
-/// A staircase goes one way after a success, if at all, and the other way after a failure: whatever
-/// does not is none.
+/// A staircase moves one way after a success, if at all, and the other way after a failure; any
+/// other track is not a staircase.
 std::vector<std::size_t> reversals_of(const Track& track) {
   std::vector<std::size_t> turns;
   int after_success = 0, last = 0, alike = 0;
-  // So many answers alike move it, failures and successes: the fewest that did. 0: none did yet.
+  // The smallest numbers of equal answers that moved it, failures and successes. 0: none yet.
   std::array<int, 2> moves_after{0, 0};
   for (std::size_t i = 1; i < track.levels.size(); ++i) {
     const bool success = track.successes[i - 1];
@@ -131,7 +131,7 @@ std::vector<std::size_t> reversals_of(const Track& track) {
     alike = 0;
   }
   if (last == 0) return turns;
-  // No level shows what the last answer did.
+  // No level follows the last answer.
   const std::size_t end = track.levels.size() - 1;
   const bool success = track.successes[end];
   alike = alike > 0 && track.successes[end - 1] == success ? alike + 1 : 1;
@@ -140,7 +140,7 @@ std::vector<std::size_t> reversals_of(const Track& track) {
   return turns;
 }
 
-/// The spec of a track; nullptr: its protocol, or its number, is not in the source.
+/// The spec of a track; nullptr: the source has no protocol, or not its number.
 const protocols::ProcedureSpec* spec_of(const Track& track, const TaskTrial& trial,
                                         const TaskTable& table, int& number) {
   const protocols::BlockProcedures* const block = block_of(trial, table);
@@ -150,7 +150,7 @@ const protocols::ProcedureSpec* spec_of(const Track& track, const TaskTrial& tri
   return number < 1 ? nullptr : &block->spec_of(number);
 }
 
-/// Sets procedure and reversals of a track whose spec is known.
+/// Sets procedure and reversals of a track with a known spec.
 void replay(Track& track, const TaskTrial& trial, const TaskTable& table,
             const protocols::ProcedureSpec& spec, int number) {
   if (std::holds_alternative<protocols::ConstantStimuli>(spec)) return;
@@ -307,7 +307,7 @@ DetectionCounts detections_of(const Trials& trials) {
   return counts;
 }
 
-/// Catch trials tell the guess rate: they stand infinitely far on the hard side.
+/// Catch trials determine the guess rate: they count as infinitely far on the hard side.
 std::vector<LevelCount> with_catch_trials(std::vector<LevelCount> counts,
                                           const DetectionCounts& detections,
                                           const protocols::PsychometricFunction& function) {
@@ -319,8 +319,8 @@ std::vector<LevelCount> with_catch_trials(std::vector<LevelCount> counts,
   return counts;
 }
 
-/// Of a forced choice: the level half-way from guessing to certainty, whatever the function. That
-/// of a Weibull function is not its threshold; the slope is held over its interval.
+/// Forced choice: the level half-way from guessing to certainty, for any function. For a Weibull
+/// function it differs from the threshold; the slope is held over its interval.
 LevelFigures distance_from_standard(const PsychometricFit& fit, const PsychometricModel& model,
                                     std::optional<double> standard) {
   LevelFigures figures;
@@ -351,7 +351,7 @@ LevelFigures figures_of(const PsychometricFit& fit, const PsychometricModel& mod
           found.pse_ci95, found.jnd_ci95, found.weber_fraction_ci95};
 }
 
-/// Of which levels a cell's functions are expected to be easier; none: nothing tells.
+/// The levels expected to be easier in a cell; none: unknown.
 std::optional<protocols::Easier> expected_easier(const TaskCell& cell, const Trials& trials,
                                                  bool above, bool below, const Context& context) {
   using protocols::Easier;
@@ -367,13 +367,13 @@ std::optional<protocols::Easier> expected_easier(const TaskCell& cell, const Tri
   return std::nullopt;
 }
 
-/// The counts that a function is fitted to: with those of catch trials.
+/// The counts for the fit of a function, including catch trials.
 std::vector<LevelCount> counts_to_fit(const ParticipantFunction& one,
                                       const DetectionCounts& detections, bool catches) {
   return catches ? with_catch_trials(one.counts, detections, one.model.function) : one.counts;
 }
 
-/// Sets the model's direction to the expected one, or to the other where that is clearly better.
+/// Sets the model's direction to the expected one, or to the other if that fits clearly better.
 void set_direction(ParticipantFunction& one, const DetectionCounts& detections, bool catches,
                    protocols::Easier expected) {
   constexpr double kHalfChiSquared95 = 0.5 * 3.841458820694124;
@@ -430,7 +430,7 @@ ParticipantFunction function_of(const std::string& participant, const Trials& tr
   return result;
 }
 
-/// At least three levels above 0, each as many times the one below as the others.
+/// At least three levels above 0 with equal ratios.
 bool equal_ratios(const std::vector<LevelCount>& counts) {
   constexpr double kRounded = 1e-3;  // of a step: levels are written with few digits
   if (counts.size() < 3 || counts.front().level <= 0) return false;
@@ -441,7 +441,7 @@ bool equal_ratios(const std::vector<LevelCount>& counts) {
   return true;
 }
 
-/// Of the functions of a cell's trials.
+/// Scale of the functions of a cell's trials.
 LevelScale scale_of(const Trials& trials, const Context& context) {
   if (context.settings.scale) return *context.settings.scale;
   if (context.settings.shape == protocols::PsychometricShape::weibull) return LevelScale::log10;
@@ -471,7 +471,7 @@ void add_functions(TaskCell& cell, const Trials& trials, const Context& context)
   cell.forced_choice = compares && above != below && !cell.same_different;
   if (compares && above && below && (cell.same_different || cell.intervals > 2))
     cell.no_function =
-        "levels lie on both sides of the standard: successes are no monotonic function of them";
+        "levels lie on both sides of the standard: successes are not a monotonic function of them";
   cell.scale = scale_of(trials, context);
   if (cell.no_function.empty() && cell.scale != LevelScale::linear &&
       std::any_of(trials.begin(), trials.end(),
@@ -526,7 +526,7 @@ InformationTransfer transfer_of(const Trials& trials) {
   return information_transfer(counts);
 }
 
-/// Miller's bias is of each participant, and so are mappings of stimuli to answers.
+/// Miller's bias, and the mapping of stimuli to answers, apply to each participant.
 void add_information(TaskCell& cell, const Trials& trials) {
   cell.information = transfer_of(trials);
   std::vector<double> bits;
@@ -584,7 +584,7 @@ TaskAnalysis analyze_tasks(TaskTable table, const FunctionSettings& functions,
   Trials all;
   for (const TaskTrial& trial : result.table.trials) all.push_back(&trial);
   const auto key_of = [](const TaskTrial& trial) {
-    // Identification is of all stimuli of a block together.
+    // Identification takes all stimuli of a block together.
     return CellKey{trial.task, trial.block_name, trial.task == "identify" ? "" : trial.shape,
                    trial.renderer};
   };

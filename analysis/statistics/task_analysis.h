@@ -1,5 +1,5 @@
 #pragma once
-// What was found with each task of a study of version 2, by block, stimulus and renderer.
+// Results of each task of a study of version 2, by block, stimulus and renderer.
 
 #include <cstddef>
 #include <cstdint>
@@ -21,41 +21,42 @@ namespace palpate::analysis {
 struct InformationTransfer {
   std::string undefined;
   std::size_t trials = 0;
-  double stimulus_entropy = 0;  ///< plain: what perfect identification would transmit
-  std::optional<double> plain;  ///< of the observed shares; too large with few trials
-  /// Less the bias to first order, (cells - rows - columns + 1) / (2 n ln 2), with the cells, rows
-  /// and columns in which there are trials (Miller 1955, Miller-Madow); at most the stimulus
-  /// entropy. May be below 0 where there is no information.
+  double stimulus_entropy = 0;  ///< that of perfect identification, uncorrected
+  std::optional<double> plain;  ///< from observed shares; too large with few trials
+  /// Minus the bias to first order, (cells - rows - columns + 1) / (2 n ln 2), counting cells, rows
+  /// and columns with trials (Miller 1955, Miller-Madow); at most the stimulus entropy. May be
+  /// below 0 without information.
   std::optional<double> corrected;
-  /// 2^corrected, at least 1: as many categories, identified without error, transmit as much.
+  /// 2^corrected, at least 1: the number of categories that, identified without error, transmit as
+  /// much.
   std::optional<double> categories;
   std::optional<double> se;  ///< jackknife over trials, of the plain figure
 };
 
-/// \param counts  [stimulus][answer]; trials without an answer are no part of it
+/// \param counts  [stimulus][answer]; excludes trials without an answer
 InformationTransfer information_transfer(const std::vector<std::vector<std::size_t>>& counts);
 
-// The tracks of a procedure over the trials, and what it made of its answers itself.
+// The tracks of a procedure over the trials, and its own estimate.
 
 /// An adaptive procedure at the end of a track.
 struct TrackProcedure {
   protocols::ProcedureSpec spec;
-  protocols::Estimate estimate;  ///< the procedure's own, from the answers that it was told
-  /// Staircase: where it converges, as a share of successes, and the level of a fitted function at
-  /// that share. Others have none.
+  protocols::Estimate estimate;  ///< the procedure's own, from its answers
+  /// Staircase: the share of successes to which it converges, and the level of a fitted function at
+  /// that share. None for others.
   std::optional<double> target, fitted_level;
 };
 
 const char* kind_of(
-    const protocols::ProcedureSpec& spec);  ///< as protocols say it: "staircase", ...
+    const protocols::ProcedureSpec& spec);  ///< name in protocols: "staircase", ... ...
 
-/// The scale on which an adaptive procedure has its levels; nullopt: it is none.
+/// The scale of an adaptive procedure's levels; nullopt: it is not adaptive.
 std::optional<protocols::LevelScale> scale_of_adaptive(const protocols::ProcedureSpec& spec);
-/// The levels that an adaptive procedure has as easier; nullopt: it is none.
+/// The levels that are easier in an adaptive procedure; nullopt: it is not adaptive.
 std::optional<protocols::Easier> easier_of_adaptive(const protocols::ProcedureSpec& spec);
-/// How a trial's block chose its levels; nullptr: its protocol is not in the source.
+/// The procedure of a trial's block; nullptr: the source has no protocol.
 const protocols::BlockProcedures* block_of(const TaskTrial& trial, const TaskTable& table);
-/// The procedures of a trial's block; empty: none, or its protocol is not in the source.
+/// The procedures of a trial's block; empty: none, or the source has no protocol.
 const std::vector<protocols::ProcedureSpec>& specs_of(const TaskTrial& trial,
                                                       const TaskTable& table);
 
@@ -64,21 +65,21 @@ struct Track {
   std::string name;
   std::vector<double> levels;
   std::vector<bool> successes;
-  /// Of a staircase: the answers at which it turned, as indices; with its protocol all that it
-  /// counted itself. Without one they follow from levels and answers: empty where the levels do not
-  /// follow the answers, and the last answer turned it if as many alike did before.
+  /// Indices of the answers at which a staircase reversed; with the protocol, as it counted them.
+  /// Without, they follow from levels and answers: empty if the levels do not follow the answers;
+  /// the last answer reversed it if equally many like answers did before.
   std::vector<std::size_t> reversals;
-  /// None: levels are constant, or the protocol is not in the source.
+  /// None: levels are constant, or the source has no protocol.
   std::optional<TrackProcedure> procedure;
 };
 
-/// Of the trials of a participant with a cell, the tracks of more than one trial.
+/// The tracks with more than one trial among a participant's trials in a cell.
 std::vector<Track> tracks_of(const std::vector<const TaskTrial*>& trials, const TaskTable& table);
 /// Sets fitted_level of staircases. \param fit  of the same trials
 void add_fitted_levels(std::vector<Track>& tracks, const PsychometricModel& model,
                        const PsychometricFit& fit);
 
-/// Which psychometric functions are fitted, and how their goodness of fit is judged.
+/// Settings of psychometric functions and their goodness of fit.
 struct FunctionSettings {
   protocols::PsychometricShape shape = protocols::PsychometricShape::logistic;
   /// Of the levels; Weibull functions: not linear. None: log10 of Weibull functions, of blocks
@@ -89,10 +90,9 @@ struct FunctionSettings {
   std::uint64_t seed = 2026;
 };
 
-/// What is read off a participant's function, whatever its task measures. PSE: of two intervals
-/// with levels on both sides of the standard. JND there: half the distance of the levels of 25 and
-/// 75 %; of a forced choice the threshold's distance from the standard. Weber fraction: JND /
-/// standard.
+/// Figures from a participant's function, for any task. PSE: of two intervals with levels on both
+/// sides of the standard. JND there: half the distance of the levels of 25 and 75 %; of a forced
+/// choice the threshold's distance from the standard. Weber fraction: JND / standard.
 struct LevelFigures {
   std::optional<double> pse, jnd, weber_fraction;
   std::optional<Interval> pse_ci95, jnd_ci95, weber_fraction_ci95;
@@ -105,13 +105,12 @@ struct ParticipantFunction {
   PsychometricModel model;
   PsychometricFit fit;
   GoodnessOfFit goodness;
-  /// Answers go the other way round than the task, or the other participants', say, by more than
-  /// chance explains: twice the log likelihood of the better direction exceeds that of the expected
-  /// one by the 0.95 quantile of chi squared with one degree of freedom. The fit is of the
-  /// direction that they have.
+  /// Answers are reversed relative to the task, or to the other participants, by more than chance:
+  /// twice the log likelihood of the better direction exceeds that of the expected one by the 0.95
+  /// quantile of chi squared with one degree of freedom. The fit uses the direction of the answers.
   bool reversed = false;
   /// The threshold lies among the levels shown, its interval is closed, and the function is not
-  /// reversed. Others are reported, but neither compared nor averaged.
+  /// reversed. Otherwise it is reported, but neither compared nor averaged.
   bool determined = false;
   LevelFigures figures;
   PsychometricPosterior posterior;  ///< of the same counts and model
@@ -123,20 +122,19 @@ struct ParticipantFunction {
 struct TaskCell {
   std::string task, block_name, shape, renderer;
   std::size_t trials = 0, answered = 0;
-  std::size_t judged = 0, correct = 0;  ///< trials whose answer can be right or wrong; right ones
+  std::size_t judged = 0, correct = 0;  ///< trials that can be right or wrong; right ones
   std::optional<double> standard_level;
-  /// compare: 1 / `intervals` of the answers succeed without a difference: all levels lie on one
-  /// side of the standard.
+  /// compare: all levels lie on one side of the standard, so the guess rate is 1 / `intervals`.
   bool forced_choice = false;
-  bool same_different = false;  ///< compare: that is what is answered
+  bool same_different = false;  ///< compare: the answers are same or different
   int intervals = 2;            ///< compare
   protocols::LevelScale scale = protocols::LevelScale::linear;  ///< of its functions
-  /// Which levels have more successes, as the task says; none: nothing tells, and most
-  /// participants' answers are taken as right.
+  /// The levels with more successes, according to the task; none: unknown, so the direction of most
+  /// participants is taken as correct.
   std::optional<protocols::Easier> expected_easier;
-  std::string level_unit;                 ///< "N/m", ...; "": unknown, or without unit
-  std::string no_function;                ///< why no psychometric function is fitted; empty: one is
-  std::vector<std::string> participants;  ///< that `magnitude`, `adjustments` number
+  std::string level_unit;   ///< "N/m", ...; "": unknown, or without unit
+  std::string no_function;  ///< reason if no psychometric function is fitted; empty: it is
+  std::vector<std::string> participants;           ///< indexed by `magnitude` and `adjustments`
   std::vector<ParticipantFunction> functions;      ///< compare, detect
   std::optional<MagnitudeEstimation> magnitude;    ///< rate
   std::vector<Adjustment> adjustments;             ///< adjust
@@ -154,7 +152,7 @@ struct TaskAnalysis {
   std::vector<TaskCell> cells;
   std::vector<TaskGroup> groups;
   std::vector<TaskComparison> renderers, conditions;
-  /// What version 1 reports of identification, over all its blocks; none: no identification.
+  /// The report of version 1 on identification, over all its blocks; none: no identification.
   std::optional<Analysis> identification;
   std::optional<MixedLogistic> accuracy;  ///< likewise
 };

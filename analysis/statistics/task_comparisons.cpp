@@ -33,7 +33,7 @@ InterceptModel fit_at(const ValuesByParticipant& values, std::size_t conditions,
   VectorXd score = VectorXd::Zero(size);
   double squares = 0, log_determinant = 0, count = 0;
   for (const auto& [participant, own] : values) {
-    // V = I + ratio 1 1': its inverse takes off a share of the participant's sum.
+    // V = I + ratio 1 1': its inverse subtracts a share of the participant's sum.
     const auto n = static_cast<double>(own.size());
     const double share = ratio / (1 + n * ratio);
     double sum = 0;
@@ -104,7 +104,7 @@ void add_mixed_model(ThresholdComparison& result, const ValuesByParticipant& val
   for (const std::size_t n : by_condition) {
     if (n == 0) return;
   }
-  if (count < conditions + values.size()) return;  // nothing is left for the residuals
+  if (count < conditions + values.size()) return;  // no degrees of freedom remain for the residuals
   const auto [ratio, model] = fit_intercept_model(values, conditions);
   if (!(model.residual_variance > 0)) return;
   result.residual_sd = std::sqrt(model.residual_variance);
@@ -167,7 +167,7 @@ struct Measure {
   std::function<Figures(const TaskCell&)> of;
 };
 
-/// Of functions with such a figure.
+/// Figures of functions that have them.
 Figures of_functions(
     const TaskCell& cell,
     const std::function<std::optional<double>(const ParticipantFunction&)>& value) {
@@ -182,7 +182,7 @@ Figures of_functions(
   return figures;
 }
 
-/// Where it is neither a PSE nor counted from a standard.
+/// Thresholds that are neither a PSE nor relative to a standard.
 Figures thresholds(const TaskCell& cell) {
   return of_functions(cell, [](const ParticipantFunction& one) -> std::optional<double> {
     if (!one.fit.undefined.empty() || one.figures.pse || one.figures.jnd) return std::nullopt;
@@ -196,7 +196,7 @@ Figures pses(const TaskCell& cell) {
 
 Figures jnds(const TaskCell& cell) {
   Figures figures = of_functions(cell, [&](const ParticipantFunction& one) {
-    // A function that is as steep as can be has none.
+    // A function with the steepest slope has no JND.
     const bool none = one.fit.slope_at_bound && !cell.forced_choice;
     return none ? std::nullopt : one.figures.jnd;
   });
@@ -237,7 +237,7 @@ Figures setting_jnds(const TaskCell& cell) {
   return figures;
 }
 
-/// Those that are compared. Weber fractions are JNDs over the same standard.
+/// The compared measures. Weber fractions are left out: they are JNDs over the same standard.
 std::vector<Measure> measures() {
   return {{"threshold", thresholds}, {"pse", pses},     {"jnd", jnds},
           {"exponent", exponents},   {"pse", settings}, {"jnd", setting_jnds}};
@@ -282,7 +282,7 @@ std::optional<TaskGroup> group_of(const std::vector<const TaskCell*>& cells,
   return result;
 }
 
-/// Fewer than two cells that have figures: none.
+/// None: fewer than two cells have figures.
 std::optional<TaskComparison> compared(const std::vector<const TaskCell*>& cells,
                                        const Measure& measure,
                                        const std::function<std::string(const TaskCell&)>& name) {

@@ -1,7 +1,7 @@
 #pragma once
-// Thresholds, JNDs, exponents and settings over participants: their means, and what the same
-// participants have under several renderers, or in several blocks and with several stimuli of a
-// task. Paired and mixed.
+// Thresholds, JNDs, exponents and settings over participants: means, and comparisons within
+// participants between renderers, or between blocks and stimuli of a task. Paired tests and mixed
+// models.
 
 #include <cstddef>
 #include <optional>
@@ -14,20 +14,20 @@ namespace palpate::analysis {
 
 // Thresholds (or PSEs, JNDs, slopes) of the same participants under several conditions.
 
-/// A figure of a participant under a condition, on the scale of the comparison: take logarithms of
-/// what is compared as a ratio.
+/// A figure of a participant under a condition, on the scale of the comparison: logarithms for
+/// ratios.
 struct ParticipantFigure {
   std::size_t participant = 0, condition = 0;
   double value = 0;
 };
 
-/// A condition less the first one.
+/// A condition minus the first one.
 struct ConditionDifference {
   std::size_t condition = 0;
   /// Over participants with both.
   std::size_t n_pairs = 0;
   double mean = 0;
-  TTest t_test;  ///< its interval is one of the difference; p_holm over the conditions
+  TTest t_test;  ///< its interval is that of the difference; p_holm over the conditions
   EffectSize effect_size;
   /// From the mixed model, which also uses participants who lack one of the two.
   std::optional<double> mixed_estimate, mixed_se;
@@ -40,7 +40,7 @@ struct ThresholdComparison {
   std::optional<double> participant_sd, residual_sd;
 };
 
-/// \param conditions  how many there are; each participant at most one value in each
+/// \param conditions  number of conditions; each participant has at most one value in each
 ThresholdComparison compare_thresholds(const std::vector<ParticipantFigure>& figures,
                                        std::size_t conditions);
 
@@ -52,7 +52,7 @@ struct NamedFigure {
   double value = 0;
 };
 
-/// The participants with a renderer.
+/// Mean of the participants with a renderer.
 struct GroupMean {
   std::string renderer;
   std::vector<NamedFigure> participants;
@@ -67,12 +67,12 @@ struct TaskGroup {
   std::string task, block_name, shape;
   std::string measure;  ///< "threshold", "pse", "jnd", "weber_fraction", "exponent"
   std::string unit;     ///< "N/m", ...; "": unknown, or without unit
-  /// Means are geometric where all figures are positive and have a true zero, but of exponents.
+  /// Means are geometric if all figures are positive and have a true zero, except for exponents.
   bool geometric = false;
   std::vector<GroupMean> renderers;  ///< point, ray, then others in order of their first trial
 };
 
-/// Natural logarithms where all figures are positive.
+/// Natural logarithms if all figures are positive.
 struct TaskComparison {
   std::string task;
   std::string measure;            ///< "threshold", "pse", "jnd", "exponent"
@@ -88,13 +88,12 @@ struct TaskComparison {
 /// "Thresholds", "PSEs", "JNDs", "Weber fractions", "Exponents".
 std::string measure_plural(const std::string& measure);
 
-/// Means over participants, of each measure that somebody has.
+/// Means over participants, for each measure with a value.
 std::vector<TaskGroup> group_results(const std::vector<TaskCell>& cells);
-/// In a block with a stimulus, where there are several renderers: the reference is point, or else
-/// that of the first trial.
+/// Compares renderers within a block and stimulus; the reference is point, or else the renderer of
+/// the first trial.
 std::vector<TaskComparison> compare_renderers(const std::vector<TaskCell>& cells);
-/// With a renderer, where a task has several blocks or stimuli whose levels are of one kind: the
-/// standard is the same.
+/// Compares blocks and stimuli of a task with a renderer, if they have the same standard.
 std::vector<TaskComparison> compare_conditions(const std::vector<TaskCell>& cells);
 
 }  // namespace palpate::analysis

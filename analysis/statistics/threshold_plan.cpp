@@ -14,9 +14,9 @@ namespace palpate::analysis {
 namespace {
 
 constexpr int kPlanLevels = 7;
-constexpr double kStandard = 1;  // levels are shares of it
+constexpr double kStandard = 1;  // levels are relative to it
 
-/// The JND of a participant with a condition, as a study finds it.
+/// The JND of a participant with a condition, as measured in a study.
 std::optional<double> measured_jnd(const ThresholdStudy& study, double jnd, double assumed,
                                    double pse, std::size_t trials, Random& random) {
   PsychometricModel model;

@@ -1,6 +1,6 @@
 #pragma once
-// How many participants and trials find a difference between the JNDs (or thresholds) of two
-// renderers or conditions: simulated studies, analysed as `analyze` does.
+// Numbers of participants and trials needed to detect a difference between the JNDs (or thresholds)
+// of two renderers or conditions, from simulated studies analysed as in `analyze`.
 
 #include <cstddef>
 #include <cstdint>
@@ -20,7 +20,7 @@ struct ThresholdStudy {
   double participant_sd = 0.3;  ///< of the participants' log JND
   double effect_sd = 0.2;       ///< of the participants' log ratio
   double pse_sd = 0.5;          ///< of their PSE, in JNDs
-  double lapse = 0.02;          ///< half of it on either side
+  double lapse = 0.02;          ///< half of it at either asymptote
   double reach = 2.5;           ///< JNDs
   double alpha = 0.05;          ///< two-sided
 };
@@ -31,10 +31,10 @@ struct ThresholdPower {
   std::size_t found = 0, studies = 0;
   double power = 0;
   Interval ci95;  ///< Wilson's, of the simulation
-  /// Of studies with a result: mean of the estimated log ratios less the true one, and how often
-  /// its 95 % interval holds the true one.
+  /// Over studies with a result: mean of the estimated log ratios minus the true one, and coverage
+  /// of its 95 % interval.
   double bias = 0, coverage = 0;
-  std::size_t undetermined = 0;  ///< JNDs of all studies that the data did not tell: left out
+  std::size_t undetermined = 0;  ///< undetermined JNDs of all studies, left out
 };
 
 struct ThresholdPlanSettings {
@@ -42,7 +42,7 @@ struct ThresholdPlanSettings {
   std::size_t studies = 1000;
   std::uint64_t seed = 2000;
   double power = 0.8;                    ///< wanted
-  std::function<void(double)> progress;  ///< share done; may be empty
+  std::function<void(double)> progress;  ///< called with the share done; may be empty
 };
 
 struct ThresholdPlan {

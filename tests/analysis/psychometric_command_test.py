@@ -167,7 +167,7 @@ class PsychometricFunctions(TaskStudy):
         found, text = self.scales("--db", db)
         self.assertEqual(found, expected)
         for block, scale in expected.items():
-            words = {"linear": "levels as they are", "log": "logarithm (base 10) of the levels"}[scale]
+            words = {"linear": "untransformed levels", "log": "logarithm (base 10) of the levels"}[scale]
             self.assertRegex(text, rf"compare, {block}, .*\n  functions over the {words.replace('(', '[(]').replace(')', '[)]')}\n")
         self.assertNotIn("[-", text, "no size is below 0")
         for wish in ("linear", "log"):

@@ -321,7 +321,7 @@ class SeveralRenderers(unittest.TestCase):
         three = study([f"P{i}" for i in range(8)], ["point", "ray", "tube"])
         done = self.palpate("plan", three, *quick)
         self.assertEqual((done.returncode, done.stderr), (0, ""))
-        self.assertIn("The pilot has 3 renderers: this plan is of ray − point alone",
+        self.assertIn("The pilot has 3 renderers: this plan covers ray − point only",
                       " ".join(done.stdout.split()))
         others = study([f"P{i}" for i in range(8)], ["tip1", "tip2"])
         done = self.palpate("plan", others, *quick)

@@ -330,7 +330,7 @@ class FigureValues(unittest.TestCase):
                 self.check_y(panel, y, results[renderer][shape]["percent_reduction_geometric"])
         text = " ".join(t.text for t in drawing.texts)
         self.assertIn("The first 6 of 7 renderers", text)
-        self.assertIn("Above 0 it is faster than with the point", text)
+        self.assertIn("Above 0 the renderer is faster than the point", text)
 
 
 if __name__ == "__main__":

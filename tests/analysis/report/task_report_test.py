@@ -129,13 +129,13 @@ class TaskReport(unittest.TestCase):
             self.says(line, "PSE", one["pse"], one["pse_ci95"])
             self.says(line, "constant error", one["constant_error"])
             self.says(line, "JND", one["jnd"])
-            self.says(line, "from above less from below", one["start_effect"])
+            self.says(line, "settings from above minus from below", one["start_effect"])
         cell = cells["identify", "ray"]
         bits = cell["information_transfer"]
         (line,) = [one for one in self.lines_of(cell) if "information transfer" in one]
         self.says(line, "information transfer", bits["bits"])
         self.assertIn(f"bit of {short(bits['stimulus_entropy_bits'])};", line)
-        self.says(line, "less the bias of few trials", bits["bits_corrected"])
+        self.says(line, "corrected for the bias of few trials", bits["bits_corrected"])
         self.assertIn(f" {short(bits['categories'])} categories", line)
         self.says(line, "mean of the participants'", bits["mean_of_participants_bits_corrected"],
                   bits["mean_of_participants_ci95"])

@@ -36,7 +36,7 @@ std::string line_of_function(const ParticipantFunction& one) {
   cell.functions = {one};
   const std::string head =
       "compare, ball: 0 trials of 0 participants, 0 answered\n"
-      "  functions over the levels as they are\n";
+      "  functions over the untransformed levels\n";
   std::string text = text_of_cell(cell);
   EXPECT_EQ(text.substr(0, head.size()), head);
   text = text.substr(head.size());
@@ -252,7 +252,7 @@ TEST(TaskText, CellsOfNumbersSettingsAnswersAndConfidence) {
   named.information->categories = 2.182;
   const std::string bits =
       head +
-      "  information transfer 1.25 bit of 2; less the bias of few trials 1.125 bit, 2.182 "
+      "  information transfer 1.25 bit of 2; corrected for the bias of few trials 1.125 bit, 2.182 "
       "categories";
   EXPECT_EQ(text_of_cell(named), bits + "\n\n");
   named.information_mean = 1.5;
@@ -264,7 +264,7 @@ TEST(TaskText, CellsOfNumbersSettingsAnswersAndConfidence) {
 
 TEST(TaskText, ATableThatSaysNothingOfItsScaleIsPointedOut) {
   const std::string note =
-      "A table does not say on which scale an adaptive procedure has its levels: where that "
+      "A table does not contain the scale of an adaptive procedure's levels: if it "
       "is\nlogarithmic, give --scale log.\n";
   TaskAnalysis analysis;
   analysis.cells = {named_cell("detect", "", "", "ray")};

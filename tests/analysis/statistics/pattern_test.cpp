@@ -86,7 +86,7 @@ TEST(Pattern, ErrorsNameTheirPlaceAndWhatIsExpected) {
                           {"cone", 0, "this is a number"},
                           {"cone > 5 && cube", 12, "this is a number"},
                           {"cone > 5 > 3", 9, "one comparison at a time"},
-                          {"(cone > 5) + 1 > 0", 0, "this holds or not"},
+                          {"(cone > 5) + 1 > 0", 0, "this is a condition"},
                           {"cone > 5 cube", 9, "an operator or the end"},
                           {"(cone > 5", 9, "')'"},
                           {"cone > 5)", 8, "an operator or the end"},
@@ -98,13 +98,13 @@ TEST(Pattern, ErrorsNameTheirPlaceAndWhatIsExpected) {
                           {"sqrt(cone) > 2", 0, "min, max and abs"},
                           {"abs(cone, cube) > 2", 0, "one value"},
                           {"min(cone cube) > 2", 9, "',' or ')'"},
-                          {"min(cone > 2) > 2", 4, "this holds or not"},
+                          {"min(cone > 2) > 2", 4, "this is a condition"},
                           {"'my-shape > 2", 0, "quotation mark"},
                           {"cone > 5 & cube > 5", 9, "an operator or the end"},
                           {"cone > 3x", 8, "an operator after the number"},
                           {"cone > #", 7, "a number, a name or '('"},
                           {"!cone", 1, "this is a number"},
-                          {"-(cone > 5) > 1", 1, "this holds or not"}}) {
+                          {"-(cone > 5) > 1", 1, "this is a condition"}}) {
     try {
       holds(one.expression);
       ADD_FAILURE() << one.expression << " is accepted";

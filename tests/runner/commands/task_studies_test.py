@@ -121,7 +121,7 @@ class TaskStudies(CommandCase):
         said = self.palpate("analyze", "--db", db, "--report", self.dir / "stairs.html").stdout
         self.assertIn("mean of its reversals, converging to 70.7 % successes", said)
         page = (self.dir / "stairs.html").read_text()
-        self.assertTrue("where it converges at 70.7 % successes" in page)
+        self.assertTrue("converging to 70.7 % successes" in page)
         title = json.loads((PROTOCOLS / "stiffness-2afc.json").read_text())["title"]
         self.assertTrue(f"<h1>{title}</h1>" in page, "the study's title heads its report")
         for axis in ("level (N/m)", "JND (N/m)", "PSE (N/m)", "Weber fraction"):
