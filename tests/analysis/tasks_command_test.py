@@ -219,7 +219,7 @@ class Tasks(TaskStudy):
                 for one in cell["psychometric_functions"]:
                     self.assertEqual(one["fit"]["reversed"], (one["participant_id"], cell["renderer"]) == ("T3", "ray"))
                     self.assertEqual(one["fit"]["guess"], one["fit"]["lapse"])
-            self.assertIn("where those of the others rise", self.analyze().stdout)
+            self.assertIn("although those of the others rise", self.analyze().stdout)
 
     def test_answers_by_chance_are_not_called_swapped(self):
         called = 0

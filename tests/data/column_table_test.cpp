@@ -29,7 +29,7 @@ TEST(ColumnTable, KeepsTheTypeOfEachColumnAndMarksWhatIsMissing) {
   EXPECT_TRUE(std::isnan(times[1]));
 }
 
-TEST(ColumnTable, RefusesWhatIsNoTable) {
+TEST(ColumnTable, RefusesIncompleteAndMixedRows) {
   ColumnTable table({"a", "b"});
   table << 1.0;
   EXPECT_THROW(table.end_row(), std::logic_error);

@@ -1,4 +1,4 @@
-// What a record of a trial says of itself.
+// Properties of a trial's record.
 
 #include "data/record.h"
 
@@ -30,13 +30,13 @@ TEST(Record, BeginsWithTheFirstIntervalThatWasFelt) {
   EXPECT_EQ(first_onset_ns(record), 70) << "of version 1";
 }
 
-TEST(Record, OnlyWhatCanBeRightOrWrongHasARightAnswer) {
+TEST(Record, NumbersSettingsAndTiesHaveNoRightAnswer) {
   EXPECT_TRUE(has_right_answer(TrialRecord{})) << "identification, version 1";
   for (const char* const task : {"identify", "detect", "compare"})
     EXPECT_TRUE(has_right_answer(record_of(task))) << task;
   for (const char* const task : {"rate", "adjust"})
     EXPECT_FALSE(has_right_answer(record_of(task))) << task;
-  // Which of two is stiffer, where they are alike.
+  // A comparison of two equally stiff stimuli.
   TrialRecord alike = record_of("compare");
   alike.task->intervals.resize(2);
   alike.task->level = alike.task->standard_level = 400;

@@ -1,4 +1,4 @@
-// Columns of a sweep over tasks, and in what two plans differ.
+// Columns of a sweep over tasks, and differences of two plans.
 
 #include "data/sweep_record.h"
 
@@ -83,7 +83,7 @@ TEST(SweepColumns, OfVersion1AreTimesByShapeAndRenderer) {
                    "time_outs_ray_ball", "contact_share_point_ball", "contact_share_ray_ball"}));
 }
 
-TEST(SweepPlans, DifferInWhatIsNamedFiveAtMost) {
+TEST(SweepPlans, NameAtMostFiveDifferences) {
   SweepPlan one = plan_of(""), two = one;
   EXPECT_EQ(differences(one, two), Names{});
   two.protocol = "\n" + two.protocol;

@@ -118,13 +118,13 @@ TEST(TimesFigure, MarksTheMedianAndTheMiddleHalf) {
   }
   ASSERT_EQ(few.size(), 3U) << "single times where there are few";
   for (std::size_t i = 0; i < 3; ++i) EXPECT_NEAR(few[i], 3 + static_cast<double>(i), 1e-5);
-  const std::string point = "cone, point: median 10.0 s, middle half " +
+  const std::string point = "cone, point: median 10.0 s, middle 50 % " +
                             fixed(std::pow(10, log_quantile(times, 0.25)), 2) + " to " +
                             fixed(std::pow(10, log_quantile(times, 0.75)), 2) + " s, 57 times";
   EXPECT_NE(figure.description.find(point), std::string::npos) << figure.description;
   // Quartiles of the logs: geometric means of the neighbours.
   EXPECT_NE(
-      figure.description.find("cone, ray: median 4.00 s, middle half 3.46 to 4.47 s, 3 times"),
+      figure.description.find("cone, ray: median 4.00 s, middle 50 % 3.46 to 4.47 s, 3 times"),
       std::string::npos)
       << figure.description;
 }

@@ -158,9 +158,9 @@ TEST(Text, WarnsOfExclusions) {
   EXPECT_FALSE(holds(report_text(analysis_of_study(study)), "Warning"));
   study.lost_with_ray = 0.3;
   const std::string text = report_text(analysis_of_study(study));
-  EXPECT_TRUE(holds(text, "of the trials with ray are not in the times"));
+  EXPECT_TRUE(holds(text, "of the trials with ray are excluded from the times"));
   EXPECT_TRUE(holds(text, "Exclusions differ between renderers"));
-  EXPECT_FALSE(holds(text, "of the trials with point are not"));
+  EXPECT_FALSE(holds(text, "of the trials with point are excluded"));
 }
 
 TEST(Reports, SayTimeOutsByCellAndLeaveThemOutWhereThereAreNone) {

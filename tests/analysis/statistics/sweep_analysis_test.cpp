@@ -61,12 +61,12 @@ TEST(PatternShare, AGridHasNoInterval) {
   EXPECT_FALSE(analysis.pattern->ci95);
   EXPECT_TRUE(
       std::any_of(analysis.notes.begin(), analysis.notes.end(), [](const std::string& note) {
-        return note.find("no sample of the distributions") != std::string::npos;
+        return note.find("not a sample of the distributions") != std::string::npos;
       }));
   EXPECT_EQ(sweep_answer(analysis), "The pattern holds in 14.3 % of the grid's points");
   for (const std::string& said :
        {sweep_text(analysis), sweep_json(analysis), sweep_html(analysis)}) {
-    EXPECT_NE(said.find("no sample of the distributions"), std::string::npos);
+    EXPECT_NE(said.find("not a sample of the distributions"), std::string::npos);
     EXPECT_EQ(said.find("Wilson's interval"), std::string::npos);
   }
 }

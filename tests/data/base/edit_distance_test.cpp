@@ -38,7 +38,7 @@ TEST(EditDistance, IsAMetric) {
   }
 }
 
-TEST(EditDistance, TheNearestWordIsWhatWasMeant) {
+TEST(EditDistance, SuggestsTheNearestWord) {
   const std::vector<std::string> known = {"analyze", "export", "plan", "run"};
   EXPECT_EQ(nearest_word("analyse", known), "analyze");
   EXPECT_EQ(nearest_word("exprot", known), "export");

@@ -7,7 +7,7 @@
 namespace palpate::data {
 namespace {
 
-/// So many arrays, or objects, within each other.
+/// Nested arrays or objects of this depth.
 std::string nested(int depth, bool objects) {
   std::string begin, end;
   for (int i = 0; i < depth; ++i) {
@@ -37,13 +37,13 @@ TEST(JsonText, IsReadToADepthOf64) {
                 "expected objects and arrays at most 64 deep within each other, found deeper ones");
     }
   }
-  // Beside each other they are not deep.
+  // Side by side they are not deep.
   std::string wide = "[[]";
   for (int i = 0; i < 1000; ++i) wide += ",[]";
   EXPECT_EQ(read_json(wide + "]").size(), 1001U);
 }
 
-TEST(JsonText, FaultsSayWhereTheyAre) {
+TEST(JsonText, FaultsNameTheirPlace) {
   EXPECT_EQ(fault_of("[1, x]"), "expected JSON in UTF-8, found other text at byte 4");
   EXPECT_EQ(fault_of(""), "expected JSON in UTF-8, found other text at byte 0");
   EXPECT_EQ(fault_of("[1] 2"), "expected JSON in UTF-8, found other text at byte 4");
@@ -57,7 +57,7 @@ TEST(JsonText, FaultsSayWhereTheyAre) {
   }
 }
 
-TEST(JsonText, KeysKeepTheirOrderWhereItIsAsked) {
+TEST(JsonText, KeysKeepTheirOrderOnRequest) {
   EXPECT_EQ(read_ordered_json(R"({"b":1,"a":2})").dump(), R"({"b":1,"a":2})");
   EXPECT_EQ(read_json(R"({"b":1,"a":2})").dump(), R"({"a":2,"b":1})");
 }

@@ -15,7 +15,7 @@ TEST(Printable, ShowsPlainTextOfAnyLanguageAsItStands) {
     EXPECT_EQ(printable(text), text);
 }
 
-TEST(Printable, WritesControlCharactersOut) {
+TEST(Printable, EscapesControlCharacters) {
   EXPECT_EQ(printable("a\x1b[31mb"), "a\\u001b[31mb");
   EXPECT_EQ(printable("\x1b]0;title\x07"), "\\u001b]0;title\\u0007");
   EXPECT_EQ(printable("a\r\n\tb"), "a\\u000d\\u000a\\u0009b");
@@ -27,7 +27,7 @@ TEST(Printable, WritesControlCharactersOut) {
   EXPECT_EQ(printable("\xC2\x85"), "\\u0085");
 }
 
-TEST(Printable, WritesOutWhatTurnsTheDirection) {
+TEST(Printable, EscapesChangesOfDirection) {
   for (const auto& [text, shown] : {std::pair{"\u202E", "\\u202e"},
                                     {"\u202A", "\\u202a"},
                                     {"\u2066", "\\u2066"},
@@ -41,7 +41,7 @@ TEST(Printable, WritesOutWhatTurnsTheDirection) {
     EXPECT_EQ(printable(text), shown);
 }
 
-TEST(Printable, WritesOutBytesThatAreNoUtf8) {
+TEST(Printable, EscapesBytesThatAreNotUtf8) {
   EXPECT_EQ(printable("\x9B"
                       "31m"),
             "\\x9b31m");  // CSI as one byte
@@ -51,7 +51,7 @@ TEST(Printable, WritesOutBytesThatAreNoUtf8) {
   EXPECT_EQ(printable("ab\xE5\xBD"), "ab\\xe5\\xbd");
 }
 
-TEST(Printable, KeepsLinesWhereItIsTold) {
+TEST(Printable, KeepsLineFeedsOnRequest) {
   EXPECT_EQ(printable_lines("a\nb\r\n\x1b"), "a\nb\\u000d\n\\u001b");
 }
 
@@ -65,7 +65,7 @@ TEST(Printable, CutsBetweenCharacters) {
             "a…");
 }
 
-TEST(Printable, IsPlainWhateverCameIn) {
+TEST(Printable, IsPlainForAnyInput) {
   std::mt19937 generator(7);
   for (int i = 0; i < 2000; ++i) {
     std::string text;

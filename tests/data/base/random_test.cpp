@@ -11,8 +11,8 @@
 namespace palpate {
 namespace {
 
-// Golden values: from a second implementation in another language, itself checked against the
-// numbers that the authors of xoshiro256++ and splitmix64 publish.
+// Golden values from a second implementation in another language, checked against the published
+// numbers of the authors of xoshiro256++ and splitmix64.
 TEST(Random, GivesTheSameBitsOnEveryCompiler) {
   Random plain(0);
   EXPECT_EQ(plain.next(), 0x53175d61490b23dfU);
@@ -31,7 +31,7 @@ TEST(Random, DrawsAndShufflesAreFixedAsWell) {
   for (const std::uint64_t expected : {5U, 2U, 2U, 0U, 4U, 3U, 0U, 0U, 3U, 3U, 3U, 4U}) {
     EXPECT_EQ(dice.below(6), expected);
   }
-  // Half of all outputs are refused here: the draws that follow show which.
+  // Half of all outputs are rejected here; the following draws show which.
   Random wide(7);
   for (const std::uint64_t expected :
        {4013571156380768369U, 8553008537481577333U, 4130356882116092799U}) {
@@ -44,7 +44,7 @@ TEST(Random, DrawsAndShufflesAreFixedAsWell) {
   EXPECT_EQ(items, (std::vector<int>{7, 9, 3, 6, 0, 4, 5, 2, 8, 1}));
 }
 
-TEST(Random, EveryElementOfAStreamItsPlaceAndTheirNumberCount) {
+TEST(Random, StreamsDifferByElementsOrderAndLength) {
   std::set<std::uint64_t> firsts;
   const auto note = [&](Random random) { EXPECT_TRUE(firsts.insert(random.next()).second); };
   note(Random(1));

@@ -1,4 +1,4 @@
-// The file of --about: what is accepted, and that every fault is named with its place.
+// The file of --about: accepted content, and faults named with their place.
 
 #include "runner/commands/shared/about_file.h"
 

@@ -15,7 +15,7 @@ namespace palpate::data::testing {
 
 using Rows = std::vector<std::vector<std::string>>;
 
-/// RFC 4180 to the letter: anything else fails the test.
+/// Strict RFC 4180: any deviation fails the test.
 inline Rows parse_rfc4180(const std::string& text) {
   Rows rows(1);
   rows.back().emplace_back();

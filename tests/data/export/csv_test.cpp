@@ -27,7 +27,7 @@ TEST_F(ExportCsv, AlwaysHasTheSameColumns) {
       "observer_sha256,before_contact,response_device,contact_share,edge_dwell\r\n");
 }
 
-TEST_F(ExportCsv, TorqueThatWasLeftOutStandsInAColumnOfItsOwn) {
+TEST_F(ExportCsv, LeftOutTorqueHasItsOwnColumn) {
   show(a_record(3));
   TrialRecord point = a_record(4);
   point.renderer = "point";
@@ -199,7 +199,7 @@ TEST_F(ExportCsv, HostileTextsAreQuotedAndOnlyThose) {
   EXPECT_TRUE(contains(raw, ", padded ,"));
 }
 
-TEST_F(ExportCsv, RelativeTimesTellNoDateButTheIntervals) {
+TEST_F(ExportCsv, RelativeTimesKeepIntervalsButNoDates) {
   store_.begin_attempt(run_, a_plan(1), a_run().clock.monotonic_ns);
   store_.cut_off_attempt(run_, "device fault");
   for (const int trial : {1, 2}) {
@@ -219,7 +219,7 @@ TEST_F(ExportCsv, RelativeTimesTellNoDateButTheIntervals) {
   EXPECT_EQ(cut_off.at("elapsed"), "-21");
 }
 
-TEST_F(ExportCsv, AttemptsThatWereCutOffStandBesideIt) {
+TEST_F(ExportCsv, CutOffAttemptsHaveTheirOwnFile) {
   store_.begin_attempt(run_, a_plan(1), a_run().clock.monotonic_ns);
   store_.cut_off_attempt(run_, "device fault, reconnected");
   TrialRecord record = a_record(1);

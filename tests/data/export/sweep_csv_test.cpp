@@ -16,7 +16,7 @@ class SweepCsv : public ::testing::Test {
   const std::string out_ = folder_ / "a.csv";
 };
 
-TEST_F(SweepCsv, ARowAPointWithTheColumnsInTheirOrder) {
+TEST_F(SweepCsv, HasARowPerPointWithColumnsInOrder) {
   SweepRow row = a_sweep_row(4);
   row.values = {0.1, std::string("=1+1")};
   row.figures.assign(row.figures.size(), std::nullopt);
@@ -36,7 +36,7 @@ TEST_F(SweepCsv, ARowAPointWithTheColumnsInTheirOrder) {
                 std::string(19, ',') + "1e-07\r\n");
 }
 
-TEST_F(SweepCsv, EveryPointOfALargeOneIsThere) {
+TEST_F(SweepCsv, HasEveryPointOfALargeSweep) {
   std::vector<SweepRow> rows;
   for (std::int64_t point = 1; point <= 2001; ++point) rows.push_back(a_sweep_row(2 * point));
   SweepFile file = of(rows);
@@ -49,7 +49,7 @@ TEST_F(SweepCsv, EveryPointOfALargeOneIsThere) {
   EXPECT_NE(text.find("\n4002,ok,"), std::string::npos);
 }
 
-TEST_F(SweepCsv, WritesOverNothingUnlessToldTo) {
+TEST_F(SweepCsv, OverwritesOnlyWithForce) {
   SweepFile file = of({a_sweep_row(1)});
   export_sweep_csv(file, out_, false);
   const std::string before = contents_of(out_);
@@ -61,7 +61,7 @@ TEST_F(SweepCsv, WritesOverNothingUnlessToldTo) {
   EXPECT_EQ(contents_of(out_), before);
 }
 
-TEST_F(SweepCsv, WhereItIsStoppedThereIsNoFile) {
+TEST_F(SweepCsv, LeavesNoFileWhenStopped) {
   std::vector<SweepRow> rows;
   for (std::int64_t point = 1; point <= 1000; ++point) rows.push_back(a_sweep_row(point));
   SweepFile file = of(rows);

@@ -1,4 +1,4 @@
-// Files and folders that appear complete or not at all, and what they leave behind: nothing.
+// Files and folders that appear complete or not at all, and leave nothing behind.
 
 #include <fcntl.h>
 #include <gtest/gtest.h>
@@ -88,8 +88,8 @@ TEST_F(AtomicFiles, EveryDescriptorIsClosedWhateverHappens) {
   EXPECT_EQ(names_in(target_), (std::set<std::string>{"deep"}));
 }
 
-TEST_F(AtomicFiles, OnlyWhatAKilledProcessLeftForTheSameTargetIsCleared) {
-  // A folder that is being written is locked; one that a killed process left is not.
+TEST_F(AtomicFiles, ClearsOnlyLeftoversOfKilledProcessesForTheSameTarget) {
+  // A folder in use is locked; the folder of a killed process is not.
   std::string writing;
   {
     const AtomicFolder under_way(target_);
@@ -133,7 +133,7 @@ TEST_F(AtomicFiles, AnExistingFileIsReplacedOnlyWhenAsked) {
   }
   EXPECT_EQ(contents_of(target_), "yours");
   EXPECT_EQ(names_in(folder_.path()), std::set<std::string>{"t"});
-  // A file of another name is moved there only where nothing is.
+  // A file is renamed to a free name only.
   write_file(folder_ / "u", "third");
   EXPECT_FALSE(rename_if_absent(folder_ / "u", target_));
   EXPECT_EQ(contents_of(target_), "yours");
@@ -141,7 +141,7 @@ TEST_F(AtomicFiles, AnExistingFileIsReplacedOnlyWhenAsked) {
   EXPECT_EQ(names_in(folder_.path()), (std::set<std::string>{"t", "v"}));
 }
 
-TEST_F(AtomicFiles, WhatMustNotBeOverwrittenIsNamedWithTheReason) {
+TEST_F(AtomicFiles, RefusesToOverwriteProtectedFilesWithTheReason) {
   const std::string db = folder_ / "study.db", input = folder_ / "in.csv";
   { Store::open(db, Store::Mode::write_or_create); }
   write_file(input, "a,b\n");

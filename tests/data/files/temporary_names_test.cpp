@@ -1,4 +1,4 @@
-// What is cleared of files that killed processes left, and what stays.
+// Which leftovers of killed processes are cleared, and which files stay.
 
 #include <fcntl.h>
 #include <gtest/gtest.h>

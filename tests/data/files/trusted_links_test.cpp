@@ -1,4 +1,4 @@
-// Where the links of a path lead, held against the C library's realpath.
+// Resolution of the links of a path, compared with the C library's realpath.
 
 #include <gtest/gtest.h>
 #include <unistd.h>

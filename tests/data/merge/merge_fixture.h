@@ -1,5 +1,5 @@
 #pragma once
-// Databases of two stations, and what must come out of their merge.
+// Databases of two stations, and the expected result of their merge.
 
 #include <SQLiteCpp/Database.h>
 #include <gtest/gtest.h>
@@ -25,8 +25,7 @@ inline Store open_station(const std::string& path) {
 
 inline constexpr std::int64_t kDay = 86'400'000'000'000;
 
-/// One live session with everything that can be in one: two runs, a note, an attempt that was cut
-/// off, samples.
+/// One live session with every kind of row: two runs, a note, an attempt that was cut off, samples.
 inline void record_session(Store& store, const std::string& code, std::optional<int> number = {},
                            int session = 1, char protocol = 'a') {
   const Participant person = store.enrol(a_protocol(protocol), code, number);
@@ -55,7 +54,7 @@ inline void make_station(const std::string& path, const std::string& code, int n
   record_session(store, code, number);
 }
 
-/// As if this had been recorded.
+/// A version as if recorded in the database.
 inline void record_otherwise(const std::string& path, const std::string& sql) {
   SQLite::Database db(path, SQLite::OPEN_READWRITE);
   db.exec(sql);
@@ -77,7 +76,7 @@ inline Lines exported(const std::string& database, const TemporaryFolder& folder
   return lines;
 }
 
-/// Notes, runs and samples: what a CSV export does not have.
+/// Notes, runs and samples, which a CSV export lacks.
 inline Lines notes_runs_and_samples(const std::string& database) {
   Store store = Store::open(database, Store::Mode::read_only);
   Lines all;

@@ -23,7 +23,7 @@ TEST_F(Merging, ListsEveryConflictAndWritesNothing) {
     b.add_note(b.begin_run(b.enrol(a_protocol(), "P9", 9), a_run()), 1, "alone");
     record_session(b, "P7", 2);     // number 2 again
     record_session(b, "P3", 8);     // another number
-    record_session(b, "P4", 4, 1);  // alike so far
+    record_session(b, "P4", 4, 1);  // equal so far
     b.enrol(a_protocol(), "S5", 5, true, 2);
   }
   record_otherwise(
@@ -77,7 +77,7 @@ TEST_F(Merging, ASessionLastsUntilItsLastRunHasEnded) {
     record_session(a, "P1", 1, 1);
     record_session(b, "P1", 1, 2);
   }
-  // The second run of session 1 began half a day before session 2, long after which it was closed.
+  // The second run of session 1 began half a day before session 2 and was closed long after it.
   record_otherwise(a_, "UPDATE runs SET ended_ns = ended_ns + 86400000000000 WHERE id = 2");
   EXPECT_TRUE(contains(refusal({a_, b_}), "sessions 1 and 2 were at the same time"));
 }

@@ -55,7 +55,7 @@ TEST_F(Merging, AgainOrInAnotherOrderIsTheSameToTheByte) {
     record_session(b, "O1", 1, 1, 'b');
     record_session(a, "O2", 2, 1, 'b');
   }
-  // Two protocols of one name, known to both stations alike.
+  // Two protocols of one name, known to both stations.
   merge(out_, {a_, b_});
   merge(folder_ / "other-order.db", {b_, a_});
   merge(folder_ / "again.db", {out_, a_, out_, b_, a_});
@@ -110,13 +110,14 @@ TEST_F(Merging, NumbersGivenTwiceAreRenumberedOnRequestAndTheTrialsKeepTheirOrde
     EXPECT_EQ(person.enrolled_number, 2);
     EXPECT_EQ(all.look_up(a_protocol(), "NEW").number, 5);
   }
-  // The merged one with its parts again, in any order: nothing changes, and nobody asks again.
+  // Merging the merged database with its parts again, in any order, changes nothing and needs no
+  // option.
   const MergeResult repeated = merge(again, {a_, out_, b_});
   EXPECT_TRUE(repeated.renumbered.empty());
   EXPECT_EQ(exported(again, export_folder_), parts);
   EXPECT_EQ(open_station(again).look_up(a_protocol(), "Q1").number, 3);
   fs::remove(again);
-  // A number that was given away by a merge is no claim against a station that counted so far.
+  // A number assigned by a merge yields to a station that counted up to it.
   const MergeResult more = merge(again, {out_, c}, {}, NumberConflict::renumber);
   ASSERT_EQ(more.renumbered.size(), 1u);
   EXPECT_EQ(more.renumbered[0].code + more.renumbered[0].other, "P2R1");

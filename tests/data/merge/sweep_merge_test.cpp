@@ -65,7 +65,7 @@ TEST_F(SweepMerges, APointWithTwoResultsIsRefused) {
   expect_refused({a, folder_ / "b.sweep"}, "point 2 has other results");
 }
 
-TEST_F(SweepMerges, AnotherPlanIsRefusedWithWhatDiffers) {
+TEST_F(SweepMerges, AnotherPlanIsRefusedWithItsDifferences) {
   const std::string a = made("a.sweep", {1});
   SweepPlan other = a_sweep_plan();
   other.seed = 7;
@@ -76,7 +76,7 @@ TEST_F(SweepMerges, AnotherPlanIsRefusedWithWhatDiffers) {
 TEST(SweepPlans, EveryDifferenceIsNamedAndNoOther) {
   const SweepPlan plan = a_sweep_plan();
   EXPECT_TRUE(differences(plan, plan).empty());
-  // What changes a field, and how the sentence about it must begin.
+  // A change of a field, and the expected start of its sentence.
   const std::vector<std::pair<std::string, std::function<void(SweepPlan&)>>> changes{
       {"protocol", [](SweepPlan& p) { p.protocol = R"({"name": "other"})"; }},
       {"contents of the files", [](SweepPlan& p) { p.files_sha256 = std::string(64, 'a'); }},

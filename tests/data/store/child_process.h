@@ -18,7 +18,7 @@ class ChildProcess {
   pid_t pid() const { return pid_; }
   std::string read_line();               ///< waits; "" at the end of its output
   std::vector<std::string> read_rest();  ///< whole lines until the pipe closes
-  void kill();  ///< SIGKILL, and waits; no effect when it has been waited for
+  void kill();                           ///< SIGKILL, and waits; no effect if already waited for
   /// Waits for its end. \return the exit status, or minus the signal.
   int wait();
 

@@ -1,5 +1,5 @@
-// Databases that are damaged or made up: never a crash, never a file outside of the target, and
-// nothing but our own errors.
+// Damaged or forged databases: never a crash, never a file outside of the target, only palpate's
+// own errors.
 
 #include <SQLiteCpp/Database.h>
 #include <SQLiteCpp/Transaction.h>
@@ -52,7 +52,7 @@ class DamagedDatabase : public ::testing::Test {
     fs::create_directory(folder_ / "out");
     original_ = contents_of(path_);
   }
-  /// Everything that reads a database. \return how many of the ways went through.
+  /// Reads a database in every way. \return the number of ways that succeeded.
   int use(const std::string& path) {
     int done = 0;
     std::string refused;
@@ -82,7 +82,7 @@ class DamagedDatabase : public ::testing::Test {
     refusals_ = refused;
     return done;
   }
-  /// No way through the database has left anything but below out/.
+  /// No way of reading left a file outside of out/.
   void expect_nothing_outside() {
     std::set<std::string> names;
     for (const auto& entry : fs::directory_iterator(folder_.path())) {
@@ -96,14 +96,14 @@ class DamagedDatabase : public ::testing::Test {
           << name;
     }
   }
-  /// As a program writes it that does not care about CHECKs.
+  /// Writes like a program that ignores CHECKs.
   void write_forbidden(const std::string& sql) {
     SQLite::Database db(path_, SQLite::OPEN_READWRITE);
     db.exec(
         "PRAGMA ignore_check_constraints = ON; PRAGMA foreign_keys = OFF; PRAGMA "
         "legacy_alter_table = ON");
     db.exec(sql);
-    // Who makes such a file can make its seals as well.
+    // A forger of such a file can also forge its seals.
     SQLite::Transaction transaction(db);
     try {
       seal_again(db);
@@ -155,11 +155,11 @@ TEST_F(DamagedDatabase, TruncatedAnywhere) {
   }
 }
 
-/// What the schema forbids, as a program that does not care about CHECKs could write it.
+/// Values that the schema forbids, written by a program that ignores CHECKs.
 struct Crafted {
   const char* what;
   std::string sql;
-  const char* expectation;  ///< part of the refusal; "" when all ways go through
+  const char* expectation;  ///< part of the refusal; "" if all ways succeed
 };
 
 TEST_F(DamagedDatabase, ValuesThatPalpateNeverWrites) {
@@ -322,7 +322,7 @@ TEST_F(DamagedDatabase, WhatTheSchemaForbidsIsFoundByAWriterAtOnceByAReaderWhenI
 }
 
 TEST_F(DamagedDatabase, ARowHiddenByADamagedIndexIsDetected) {
-  // An index that was made without one row hides it from every export that goes by the index.
+  // An index without one row hides the row from every export that uses the index.
   SQLite::Database db(path_, SQLite::OPEN_READWRITE);
   db.exec(
       "PRAGMA writable_schema = ON; CREATE TABLE keep AS SELECT rootpage FROM sqlite_schema WHERE "

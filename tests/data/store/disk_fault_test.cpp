@@ -1,4 +1,4 @@
-// The disk fails in the ways disks fail: the trial in hand is never reported as saved.
+// Faults of the disk: the current trial is never reported as saved.
 
 #include <gtest/gtest.h>
 #include <sched.h>
@@ -43,8 +43,8 @@ int show_until_full(Store& store, const Run& run, std::string& error) {
   return 0;
 }
 
-/// Runs `body` in a process of its own where `folder` is a disk of 1 MiB. \return false where this
-/// machine does not let us mount one.
+/// Runs `body` in a separate process with a disk of 1 MiB at `folder`. \return false: this machine
+/// permits no mount.
 bool on_a_small_disk(const std::string& folder, const std::function<void()>& body) {
   constexpr int kImpossible = 77;
   const uid_t user = ::getuid();
@@ -104,7 +104,7 @@ TEST(StoreFault, AFullDiskSavesNothingOfTheTrialAndTheSessionResumesAfterwards) 
   if (!possible) GTEST_SKIP() << "no small disk may be mounted here";
 }
 
-/// What a StoreError says; empty: there was none.
+/// Message of the StoreError; empty: none.
 std::string fault_of(const std::function<void()>& work) {
   try {
     work();
@@ -114,8 +114,8 @@ std::string fault_of(const std::function<void()>& work) {
   }
 }
 
-/// Creates with ever more room, from none on. Where it fails, it says that the disk is full, and
-/// works after room was made. \param name  of what appears whole or not at all
+/// Creates with growing room, from none on. A failure reports a full disk, and a retry with room
+/// succeeds. \param name of the file that appears complete or not at all
 void expect_whole_or_not_at_all(const TemporaryFolder& folder, const std::string& name,
                                 const std::function<void(const std::string& path)>& create,
                                 const std::function<void(const std::string& path)>& read) {
@@ -205,7 +205,7 @@ TEST(StoreFault, AFileThatMayNotGrowSavesNothingOfTheTrial) {
   EXPECT_EQ(store.counts().completed, lost - 1);
 }
 
-/// What happens to the files while a trial is shown must not end in "saved".
+/// Changes of the files during a trial must never be reported as "saved".
 void expect_not_saved_after(const std::function<void(const std::string& path)>& mishap) {
   const TemporaryFolder folder;
   const std::string path = folder / "study.db";
@@ -230,7 +230,8 @@ TEST(StoreFault, AVanishedFileIsNoticed) {
   });
 }
 
-/// Root may write everything: while this lives, the test is nobody, who owns the folder.
+/// Root may write everything: for the lifetime of this object the test runs as nobody, the owner of
+/// the folder.
 class Unprivileged {
  public:
   explicit Unprivileged(const fs::path& folder) : was_root_(::geteuid() == 0) {

@@ -1,5 +1,5 @@
-// A process that writes is killed at any moment: what it had acknowledged is there, and what it had
-// begun is on record.
+// A writing process is killed at any moment: acknowledged trials are there, and begun ones are on
+// record.
 
 #include <SQLiteCpp/Database.h>
 #include <gtest/gtest.h>
@@ -20,21 +20,21 @@ namespace {
 
 using namespace palpate::data::testing;
 
-/// What the lives of a process said.
+/// Output of the lives of a process.
 struct Said {
   int runs = 0;
   int acknowledged = 0;         ///< the last trial
   std::map<int, int> attempts;  ///< trial -> latest attempt
 };
 
-/// When a life ends: so many lines after its start, and then a moment more. Counted in lines, a
-/// slow machine gets as far as a fast one.
+/// End of a life: a number of lines after its start, plus a moment. Counting lines makes slow
+/// machines get as far as fast ones.
 struct Death {
   unsigned lines = 0, microseconds = 0;
 };
 
 Death a_death(std::mt19937& random) {
-  // Without a line to wait for, it dies while the file is made or opened.
+  // Without a line to wait for, it dies while the file is created or opened.
   const unsigned lines = random() % 4 == 0 ? 0 : 1 + random() % 10;
   return {lines, static_cast<unsigned>(random() % (lines == 0 ? 20'000 : 8'000))};
 }
@@ -62,7 +62,7 @@ bool live_once(const std::vector<std::string>& arguments, const Death& death, Sa
       said.acknowledged = trial;
     }
     if (word == "begun") {
-      // Either nobody heard of the attempt before, or every earlier one is counted.
+      // Either the previous attempt was not acknowledged, or every earlier one is counted.
       EXPECT_GT(attempt, said.attempts[trial]) << "trial " << trial;
       said.attempts[trial] = attempt;
     }
@@ -71,7 +71,7 @@ bool live_once(const std::vector<std::string>& arguments, const Death& death, Sa
   return status == -SIGKILL;
 }
 
-/// What is in the file right after a death, before anybody repairs it.
+/// Content of the file right after a death, before any repair.
 void expect_nothing_lost(const std::string& path, const Said& said) {
   if (!std::filesystem::exists(path)) {
     EXPECT_EQ(said.runs, 0);
@@ -127,7 +127,7 @@ TEST(Durability, ASessionKilledAtAnyMomentLosesNothingAndResumes) {
       EXPECT_GE(attempts[trial], attempt) << "trial " << trial;
     const StoreCounts counts = store.counts();
     EXPECT_EQ(counts.completed, kTrials);
-    // A death before begin_run returned left no run, or one that nobody heard of.
+    // A death before begin_run returned left no run, or an unacknowledged one.
     EXPECT_GE(counts.runs, said.runs);
     EXPECT_LE(counts.runs, deaths + 1);
     const auto runs = store.runs();

@@ -140,7 +140,8 @@ TEST_F(Forgetting, AReaderKeepsTheWalAndTheSameCallFinishesLater) {
 TEST_F(Forgetting, KilledAtAnyMomentItIsAllThereOrTheSameCallFinishes) {
   const std::string original = contents_of(path_);
   std::mt19937 random(7);
-  // Killed sooner or later by what came of it, so that a slow or busy machine sees both as well.
+  // The next kill comes sooner or later depending on the outcome, so that slow machines see both
+  // outcomes.
   double longest_us = 45'000;
   int all_there = 0, finished = 0;
   for (int round = 0; round < 40; ++round) {

@@ -1,5 +1,5 @@
-// The way from one version to the next, with made-up steps from the current one on; then the real
-// way from version 1.
+// Migration from one version to the next, with made-up steps from the current version; then the
+// real steps from version 1.
 
 #include <SQLiteCpp/Database.h>
 #include <SQLiteCpp/Statement.h>
@@ -39,7 +39,7 @@ class Migrating : public ::testing::Test {
         .execAndGet("PRAGMA user_version")
         .getInt();
   }
-  /// The database still is the one that the fixture made, and a store takes it.
+  /// The database is still the fixture's, and a store opens it.
   void expect_untouched() {
     EXPECT_EQ(version_of(path_), kNow);
     EXPECT_EQ(Store::open(path_, Store::Mode::write_or_create).counts().completed, 2);

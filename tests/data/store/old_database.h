@@ -9,7 +9,7 @@
 
 namespace palpate::data::testing {
 
-/// As the first palpate made it, with two trials.
+/// A database of the first version, with two trials.
 inline void make_version_1(const std::string& path) {
   SQLite::Database db(path, SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE);
   db.exec("PRAGMA page_size = 4096; PRAGMA journal_mode = WAL");

@@ -1,4 +1,4 @@
-// Which files a store takes, how many may have it, and what it leaves behind.
+// Files that a store opens, its locks, and the files that it leaves.
 
 #include <SQLiteCpp/Database.h>
 #include <gtest/gtest.h>
@@ -260,7 +260,7 @@ TEST_F(StoreOpen, FilesWhoseNamesOnlyResembleItsTemporaryOrLockFilesStay) {
 
 TEST_F(StoreOpen, OfManyConcurrentWritersOneHoldsTheLock) {
   for (int round = 0; round < 5; ++round) {
-    // Once with nothing, then with the lock of one that was killed.
+    // First without a lock file, then with the lock file of a killed process.
     std::vector<std::unique_ptr<ChildProcess>> all;
     for (int i = 0; i < 6; ++i) {
       all.push_back(std::make_unique<ChildProcess>(std::vector<std::string>{"hold", path_}));

@@ -1,4 +1,4 @@
-// What a protocol names is kept with the data, and is what it was when it was stored.
+// Files of a protocol are stored with the data and verified.
 
 #include <SQLiteCpp/Database.h>
 #include <gtest/gtest.h>
@@ -45,9 +45,9 @@ TEST_F(ProtocolFiles, AChangedOneIsRefusedAndNothingIsStored) {
   store.enrol(with_files("v 0 0 0"), "P2");
 }
 
-TEST_F(ProtocolFiles, OneThatWasNotKeptIsAdded) {
+TEST_F(ProtocolFiles, AMissingFileIsAdded) {
   Store store = open();
-  store.enrol(a_protocol(), "P1");  // as an older palpate did
+  store.enrol(a_protocol(), "P1");  // as older versions did
   const palpate::data::Run first = store.begin_run(store.enrol(a_protocol(), "P1"), a_run());
   store.end_run(first, RunEnd::paused, 1);
   store.end_run(store.begin_run(store.enrol(with_files("v"), "P1"), a_run()), RunEnd::done, 2);
@@ -84,7 +84,7 @@ TEST_F(ProtocolFiles, ATextThatNestsTooDeepIsRefusedByEveryReader) {
   EXPECT_TRUE(contains(error_of([&] { merge(folder_ / "all.db", {path_}); }), "64 deep"));
 }
 
-TEST_F(ProtocolFiles, AreMergedAndToldApart) {
+TEST_F(ProtocolFiles, AreMergedAndCompared) {
   const std::string other = folder_ / "other.db";
   open().enrol(with_files("v 0 0 0"), "P1");
   {

@@ -1,5 +1,5 @@
-// Each value that a record cannot have is refused by itself, and the message names it; the nearest
-// that it can have is stored.
+// Each invalid value of a record is refused separately, and the message names it; the nearest valid
+// value is stored.
 
 #include <gtest/gtest.h>
 
@@ -25,7 +25,7 @@ using namespace palpate::data::testing;
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
 
-/// The message; "" where nothing is at fault.
+/// The message; "": no fault.
 std::string message_of(const std::function<void(Validator&)>& validate_it) {
   Validator validator;
   validate_it(validator);
@@ -151,7 +151,7 @@ TEST(Refusals, OfAnAnswerNameTheField) {
   }
 }
 
-// The Unicode Standard, table 3-7: first and last of each row, and what is just beside.
+// The Unicode Standard, table 3-7: first and last of each row, and their invalid neighbours.
 TEST(CleanUtf8, IsWellFormedAndHasNoNul) {
   for (const char* good :
        {"", "a", "\x7f", "\xc2\x80", "\xdf\xbf", "\xe0\xa0\x80", "\xec\xbf\xbf", "\xed\x80\x80",

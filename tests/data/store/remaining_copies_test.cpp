@@ -39,7 +39,7 @@ TEST(RemainingCopies, FiguresInFoldersAndBackupsUnderAnyNameAreNamed) {
   write_file(folder / "figures/figure15.svg", "<text>P07</text>");
   write_file(folder / "figures/figure16.svg", "<text>P08</text>");
   write_file(folder / "figures/more/plot.svg", "<text>P07</text>");
-  // Copied while it was open: the rows are in the log.
+  // Copied while open: the rows are in the log.
   ASSERT_GT(std::filesystem::file_size(path + "-wal"), 0U);
   std::filesystem::copy_file(path, folder / "backup-v2.db");
   std::filesystem::copy_file(path + "-wal", folder / "backup-v2.db-wal");

@@ -1,4 +1,4 @@
-// What a session may do, in which order, and what it finds when it comes back.
+// Permitted operations of a session, their order, and the state on resuming.
 
 #include <gtest/gtest.h>
 

@@ -64,7 +64,7 @@ std::vector<SampleRecord> a_stroke(int ticks) {
   return samples;
 }
 
-TEST(SamplesCodec, WhereABodyWasComesBackAndOthersArePackedAsEver) {
+TEST(SamplesCodec, BodiesComeBackAndOtherSamplesKeepTheirPacking) {
   std::mt19937_64 random(4);
   std::vector<SampleRecord> samples = a_stroke(50);
   std::vector<BodyRecord> bodies;
@@ -127,7 +127,7 @@ TEST(SamplesCodec, EveryBitPatternComesBack) {
   expect_same_bits(samples);
 }
 
-TEST(SamplesCodec, NoneOneAndManyComeBack) {
+TEST(SamplesCodec, AnyNumberOfSamplesComesBack) {
   expect_same_bits({});
   expect_same_bits(a_stroke(1));
   expect_same_bits(a_stroke(10'000));
@@ -187,11 +187,11 @@ TEST(SamplesCodec, TheSecondPackingIsReadWithoutLatenessAndCommands) {
 TEST(SamplesCodec, AnAbsurdCountIsRefusedBeforeMemoryIsAskedFor) {
   const std::string packed = pack_samples(a_stroke(10));
   EXPECT_THROW(unpack_samples(packed.data(), packed.size(), 99'999'999), StoreError);
-  const std::vector<SampleRecord> still(200'000);  // as small as samples get
+  const std::vector<SampleRecord> still(200'000);  // the smallest packed samples
   expect_same_bits(still);
 }
 
-/// A blob of the third packing, whole and in order, of samples that are all zero.
+/// A valid blob of the third packing, with all-zero samples.
 std::string a_bomb(std::size_t count) {
   std::string packed(count, '\0');
   const std::vector<unsigned char> zeros(count);
@@ -229,14 +229,14 @@ TEST(SamplesCodec, MemoryIsInProportionToTheBytes) {
   const std::string stroke = pack_samples(a_stroke(100'000));
   const auto whole = peak(stroke, 100'000, true);
   ASSERT_TRUE(whole);
-  EXPECT_LT(*whole, 100'000 * (kRecord + 8) + (4U << 20U));  // no copy besides
+  EXPECT_LT(*whole, 100'000 * (kRecord + 8) + (4U << 20U));  // no additional copy
   // 180 kB that unpack to a million samples, 187 MB; in memory they would take more.
   const std::string bomb = a_bomb(1'000'000);
   EXPECT_LT(bomb.size(), 500'000U);
   const auto refused = peak(bomb, 1'000'000, false);
   ASSERT_TRUE(refused);
   EXPECT_LT(*refused, 4U << 20U);
-  // As many as are let through whatever their bytes.
+  // The largest count accepted with few bytes.
   const auto most = peak(a_bomb(400'000), 400'000, true);
   ASSERT_TRUE(most);
   EXPECT_LT(*most, 100U << 20U);

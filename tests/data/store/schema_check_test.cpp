@@ -1,4 +1,4 @@
-// Which tables count as palpate's: white space and comments of their SQL are free, all else is not.
+// Tables of palpate: white space and comments of their SQL may differ, nothing else.
 
 #include <SQLiteCpp/Database.h>
 #include <SQLiteCpp/Statement.h>

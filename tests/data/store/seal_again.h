@@ -6,7 +6,7 @@
 
 namespace palpate::data::testing {
 
-/// As somebody who deceives would: every seal is made anew over what the rows say now.
+/// Forges all seals: recomputes each from the current values of its row.
 inline void seal_again(SQLite::Database& db) {
   db.exec(
       "UPDATE runs SET link = NULL, seal = NULL, end_link = NULL, end_seal = NULL;"

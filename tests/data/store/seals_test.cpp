@@ -1,4 +1,4 @@
-// Whatever is changed in the record of a session shows, wherever it is read, and says where.
+// Every change in the record of a session is detected by every reader, with its place.
 
 #include "data/store/seals.h"
 
@@ -57,7 +57,7 @@ class Seals : public ::testing::Test {
     db.exec("PRAGMA foreign_keys = OFF; PRAGMA ignore_check_constraints = ON");
     db.exec(sql);
   }
-  /// What each way of reading refuses with; "" for one that does not.
+  /// The refusal of each way of reading; "": not refused.
   std::vector<std::string> refusals() {
     const auto message = [](const auto& work) -> std::string {
       try {
@@ -126,7 +126,7 @@ TEST_F(Seals, EveryColumnIsSealed) {
     }
     for (const auto& [name, other] : edits) {
       ++columns;
-      // The first row of a table and the last one, which of attempts has all columns.
+      // The first and the last row of a table; the last of attempts has all columns.
       edit("UPDATE " + std::string(table) + " SET " + name + " = " + other +
            " WHERE id = (SELECT max(id) FROM " + table + ")");
       for (const std::string& message : refusals()) {

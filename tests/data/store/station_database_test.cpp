@@ -58,7 +58,7 @@ TEST_F(Merging, ReadsTheDatabaseOfACrashedWriterWithoutChangingIt) {
     record.attempt = a.begin_attempt(run, record, 1);
     a.finish_attempt(run, record);
     a.begin_attempt(run, a_plan(2), 1);
-    // As a crash leaves it: everything in the log, a run under way.
+    // As after a crash: everything in the log, a run in progress.
     for (const char* end : {"", "-wal"}) fs::copy_file(a_ + end, b_ + end);
   }
   const std::string before = contents_of(b_), log = contents_of(b_ + "-wal");

@@ -1,5 +1,5 @@
 #pragma once
-// Values that differ in every field, and a database in a folder of its own.
+// Values that differ in every field, and a database in its own folder.
 
 #include <gtest/gtest.h>
 
@@ -31,7 +31,7 @@ inline RunInfo a_run(int session = 1) {
   return info;
 }
 
-/// As it is known before it is shown.
+/// The fields known before the trial is shown.
 inline TrialRecord a_plan(int trial, int session = 1) {
   TrialRecord plan;
   plan.session = session;
@@ -43,7 +43,7 @@ inline TrialRecord a_plan(int trial, int session = 1) {
   return plan;
 }
 
-/// As it is known when it is over.
+/// The fields known after it has ended.
 inline TrialRecord a_record(int trial, int session = 1) {
   TrialRecord record = a_plan(trial, session);
   record.response = "cone";
@@ -66,7 +66,7 @@ inline void write_file(const std::string& path, const std::string& contents) {
   std::ofstream(path, std::ios::binary) << contents;
 }
 
-/// The message of the StoreError that `work` throws; "" and a failure when it throws none.
+/// The message of the StoreError that `work` throws; "" and a failure if it throws none.
 template <class Work>
 std::string error_of(Work&& work) {
   try {
@@ -82,7 +82,7 @@ inline bool contains(const std::string& text, const std::string& part) {
   return text.find(part) != std::string::npos;
 }
 
-/// A database in a folder of its own, and a live trial from its beginning to its record.
+/// A database in its own folder, and a live trial from its beginning to its record.
 class StoreOnDisk : public ::testing::Test {
  protected:
   Store open() { return Store::open(path_, Store::Mode::write_or_create); }

@@ -76,7 +76,7 @@ TEST_F(Sweeps, BytesOfAFinishedFileDependOnThePlanAndTheResultsAlone) {
   EXPECT_FALSE(fs::exists(path_ + "-journal"));
 }
 
-/// Plan and rows as readers get them; empty where the file is refused.
+/// Plan and rows as readers get them; empty: the file is refused.
 std::string readable(const std::string& path) {
   try {
     SweepFile file = SweepFile::open(path);
@@ -136,7 +136,7 @@ TEST_F(Sweeps, NoFlippedBitGivesOtherValues) {
   EXPECT_GT(refused, 20) << "of " << flips << ": many bytes are of no row";
 }
 
-/// As version 1 was written: without seals.
+/// A file of version 1, without seals.
 void make_version_1(const std::string& path, const std::string& from) {
   SQLite::Database old(path, SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE);
   old.exec("ATTACH '" + from + "' AS new");
@@ -158,7 +158,7 @@ void make_version_1(const std::string& path, const std::string& from) {
   old.exec("PRAGMA user_version = 1");
 }
 
-TEST_F(Sweeps, FilesOfVersion1AreReadAndSealedWhenTheyAreGoneOnWith) {
+TEST_F(Sweeps, FilesOfVersion1AreReadAndSealedWhenResumed) {
   make_sweep(folder_ / "b.sweep", {1, 2, 4}, true);
   make_version_1(path_, folder_ / "b.sweep");
   EXPECT_EQ(readable(path_), readable(folder_ / "b.sweep"));
@@ -172,7 +172,7 @@ TEST_F(Sweeps, FilesOfVersion1AreReadAndSealedWhenTheyAreGoneOnWith) {
   EXPECT_EQ(contents_of(path_), contents_of(folder_ / "c.sweep"));
 }
 
-TEST_F(Sweeps, WhatSQLiteDoesNotKeepIsSealedAsItIsKept) {
+TEST_F(Sweeps, ValuesAreSealedAsSQLiteStoresThem) {
   SweepRow row = a_sweep_row(1);
   row.values[0] = -0.0;
   row.figures[0] = -0.0;
@@ -182,7 +182,7 @@ TEST_F(Sweeps, WhatSQLiteDoesNotKeepIsSealedAsItIsKept) {
   EXPECT_EQ(rows_of(file)[0].figures[1], std::nullopt);
 }
 
-TEST_F(Sweeps, WhatDoesNotFitIsRefusedAndNothingOfItIsRecorded) {
+TEST_F(Sweeps, RowsThatDoNotFitThePlanAreRefusedAndNotRecorded) {
   SweepFile file = SweepFile::open(path_, a_sweep_plan());
   file.record({a_sweep_row(1)});
   EXPECT_THROW(file.record({a_sweep_row(2), a_sweep_row(1)}), StoreError);
@@ -253,8 +253,8 @@ TEST_F(Sweeps, OneWriterAnyNumberOfReaders) {
   EXPECT_EQ(reader.count(), 1);
 }
 
-// Whatever a reader does with the rows that it gets: an export to a slow disk, an analysis.
-TEST_F(Sweeps, PointsAreRecordedWhileAReaderGoesThroughThem) {
+// Readers may be slow: an export to a slow disk, an analysis.
+TEST_F(Sweeps, PointsAreRecordedWhileAReaderVisitsThem) {
   SweepFile writer = SweepFile::open(path_, a_sweep_plan(3000));
   std::vector<SweepRow> rows;
   for (std::int64_t point = 1; point <= 1500; ++point) rows.push_back(a_sweep_row(point));
@@ -269,7 +269,7 @@ TEST_F(Sweeps, PointsAreRecordedWhileAReaderGoesThroughThem) {
   EXPECT_EQ(writer.count(), 1502);
 }
 
-// Longer than the five seconds after which SQLite's users often give up.
+// Longer than five seconds, a common timeout of SQLite's users.
 TEST_F(Sweeps, AReaderOfAnotherProgramThatTakesSecondsDoesNotEndTheWriter) {
   SweepFile writer = SweepFile::open(path_, a_sweep_plan());
   writer.record({a_sweep_row(1), a_sweep_row(2)});
@@ -284,7 +284,7 @@ TEST_F(Sweeps, AReaderOfAnotherProgramThatTakesSecondsDoesNotEndTheWriter) {
   EXPECT_EQ(writer.count(), 3);
 }
 
-TEST_F(Sweeps, OtherFilesAreNoSweeps) {
+TEST_F(Sweeps, OtherFilesAreRefused) {
   std::ofstream(path_) << "text";
   EXPECT_FALSE(is_sweep_file(path_));
   EXPECT_FALSE(is_sweep_file(folder_ / "none"));

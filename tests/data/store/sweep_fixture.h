@@ -59,7 +59,7 @@ inline bool same(const SweepRow& a, const SweepRow& b) {
          a.reason == b.reason && a.values == b.values && a.figures == b.figures;
 }
 
-/// A file with these points of the plan; finished: as a sweep leaves it that has come to its end.
+/// A file with these points of the plan; finished: as after a completed sweep.
 inline void make_sweep(const std::string& path, const std::vector<std::int64_t>& points,
                        bool finished = false, const SweepPlan& plan = a_sweep_plan()) {
   SweepFile file = SweepFile::open(path, plan);

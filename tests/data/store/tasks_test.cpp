@@ -38,7 +38,7 @@ TrialRecord a_compared_trial(int trial) {
   record.task->success = true;
   record.task->number = -0.75;
   record.task->confidence = 3;
-  record.task->confidence_ns = 9'007'199'254'740'993;  // more than a double holds
+  record.task->confidence_ns = 9'007'199'254'740'993;  // not representable as a double
   return record;
 }
 
@@ -110,7 +110,7 @@ TEST(Tasks, AreKeptToTheBit) {
   }
 }
 
-TEST(Tasks, OfAnAttemptThatWasCutOffSayWhatWasShown) {
+TEST(Tasks, OfACutOffAttemptNameTheStimulus) {
   const TemporaryFolder folder;
   Store store = Store::open(folder / "a.db", Store::Mode::write_or_create);
   const auto run = store.begin_run(store.enrol(a_protocol(), "P1"), a_run());
