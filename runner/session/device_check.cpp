@@ -16,7 +16,7 @@ namespace palpate::runner {
 namespace {
 
 constexpr double kRounding = 1e-9;  // N
-constexpr double kEnough = 1e-3;    // N, that may be missing at the end
+constexpr double kEnough = 1e-3;    // N, by which the last force may fall short
 
 std::string newtons(const char* before, double a, const char* between, double b) {
   char text[160];
@@ -24,12 +24,12 @@ std::string newtons(const char* before, double a, const char* between, double b)
   return text;
 }
 
-/// Holds what was commanded, tick by tick, against what may be.
+/// Checks every commanded tick against the limits.
 class CommandCheck {
  public:
   explicit CommandCheck(const ForceDirectionCheck& settings) : settings_(settings) {}
 
-  /// \return what is wrong with the tick; empty: nothing
+  /// \return the fault of the tick; empty: none
   std::string check(const Sample& sample) {
     if (sample.faults & servo_fault::kTripped) {
       const std::string why = advice(sample.trouble);
@@ -99,9 +99,9 @@ std::string ForceDirectionCheck::push(TickSource& servo, const std::function<boo
 namespace {
 
 constexpr double kSecond = 1e9, kDay = 86400 * kSecond, kYear = 365.25 * kDay;  // ns
-// 2024-01-01, before there was this program: what a computer without a battery wakes up with.
+// 2024-01-01, earlier than this program: a computer without a battery starts with such a date.
 constexpr std::int64_t kBeforeThisProgram_ns = 1'704'067'200'000'000'000;
-// Clocks are set right by a second or so now and then; disks of other systems keep local time.
+// Clocks are corrected by a second or so; disks of other systems keep local time.
 constexpr double kRecordSlack = 2 * kSecond, kFileSlack = kDay;
 constexpr double kStudyRests = 2 * kYear, kProtocolRests = 5 * kYear;
 
@@ -130,7 +130,7 @@ std::string clock_warning(const ClockEvidence& evidence) {
     return "the computer's clock says " + day_and_minute(now) + ", " + why +
            "; every date on record follows it: if it is wrong, end here and set it (timedatectl)";
   };
-  // As doubles: the difference of two dates of a damaged file need not fit.
+  // As doubles: the difference of two dates of a damaged file may overflow an integer.
   const auto ahead = [now](std::int64_t then) {
     return static_cast<double>(now) - static_cast<double>(then);
   };
@@ -162,7 +162,7 @@ std::string sentence(const Values&... values) {
   return text.str();
 }
 
-/// Of the surface and all layers together: whoever presses deep feels them all. N/m.
+/// N/m, of the surface and all layers together: a deep press feels them all.
 double whole_stiffness(const stimuli::Material& material) {
   double out = material.stiffness;
   for (const stimuli::Layer& layer : material.layers) out += layer.stiffness;
@@ -183,8 +183,9 @@ void visit_materials(Object& object, const Visit& visit) {
   for (auto& part : object.parts) visit_materials(part, visit);
 }
 
-/// What is felt at most of a stimulus: its parts have one ideal tool for each layer, which rests
-/// on any of them, so that each layer counts as the stiffest of the parts' layers of its number.
+/// Adds the stiffest material that a stimulus can show. Its parts have one ideal tool for each
+/// layer, which may rest on any part, so each layer counts as the stiffest of the parts' layers of
+/// its number.
 void add_felt(const stimuli::ObjectSpec& object, stimuli::Material& felt) {
   for (const stimuli::ObjectSpec& part : object.parts) add_felt(part, felt);
   if (!object.parts.empty()) return;
@@ -233,12 +234,13 @@ stimuli::Material& material_of(protocols::Protocol& protocol, const std::string&
   return *found;
 }
 
-/// Hz: the protocol's, or the device's highest (a protocol that asks for more is refused as such).
+/// Hz: the protocol's, or the device's highest (a protocol that asks for more is refused
+/// elsewhere).
 double shown_rate(const protocols::Protocol& protocol, const DeviceCapabilities& device) {
   return std::min(protocol.servo_rate, device.max_rate);
 }
 
-/// What the passivity controller would do for a material that cannot be shown whole.
+/// How the passivity controller could help with a material that cannot be shown whole.
 std::string passivity_advice(const protocols::Protocol& protocol, const stimuli::Material& material,
                              const DeviceCapabilities& device, const ShowableMaterial& without) {
   if (protocol.passivity_controller) return "";
@@ -251,11 +253,11 @@ std::string passivity_advice(const protocols::Protocol& protocol, const stimuli:
                   "), ");
 }
 
-/// Why the virtual tip cannot get all round a stimulus of this radius about the workspace's origin
-/// (m, device frame); empty: it can.
+/// The reason that the virtual tip cannot reach all sides of a stimulus of this radius about the
+/// workspace's origin (m, device frame); empty: it can.
 std::string workspace_fault(const protocols::Protocol& protocol, double radius,
                             const DeviceCapabilities& device) {
-  constexpr double kRounding = 1e-9;  // m: sums of decimals are no whole decimals
+  constexpr double kRounding = 1e-9;  // m: sums of decimal fractions are rounded
   const WorkspaceMap map = workspace_of(protocol);
   const double far = glm::length(protocol.workspace.centre), held = device.workspace_radius;
   if (!map.reach) {
@@ -267,7 +269,7 @@ std::string workspace_fault(const protocols::Protocol& protocol, double radius,
   }
   const rendering::Reach& reach = *map.reach;
   double nearest = 0, farthest = 0, distance = far;
-  if (reach.in_world) {  // all places of the tip, stretched about the pivot
+  if (reach.in_world) {  // all places of the tip, scaled about the pivot
     const Vec3 centre = stretched(reach, {map.to_virtual(Vec3(0)), Vec3(0)}).tip / map.scale;
     distance = glm::length(centre);
     farthest = reach.factor * held;
@@ -287,8 +289,8 @@ std::string workspace_fault(const protocols::Protocol& protocol, double radius,
                   " m with '", device.name, "': move /workspace/centre_m or change /reach/factor");
 }
 
-/// Whether a stimulus is, or has, a mesh that no hand could get round: its lengths were meant in
-/// millimetres, probably. \param radius  m, of the device
+/// Whether a stimulus is, or has, a mesh too large for any hand: its lengths are probably in
+/// millimetres. \param radius  m, of the device
 bool in_millimetres(const stimuli::ObjectSpec& object, double radius) {
   constexpr double kBeyondHands = 1;  // m
   if (object.shape == stimuli::ShapeKind::mesh) return radius > kBeyondHands;
@@ -297,8 +299,8 @@ bool in_millimetres(const stimuli::ObjectSpec& object, double radius) {
       [radius](const stimuli::ObjectSpec& part) { return in_millimetres(part, radius); });
 }
 
-/// One sentence for all levels of a stimulus that fail the same check, of which there may be
-/// hundreds: about the last one, and how many there are besides.
+/// Makes one sentence for all levels of a stimulus that fail the same check, which may be hundreds:
+/// it describes the last one and counts the others.
 class StimulusFaults {
  public:
   enum class Check { material, workspace };
@@ -346,7 +348,7 @@ double felt_gain(const protocols::Protocol& protocol) {
   if (protocol.tool.segments.empty()) return map.scale * std::max(lever2, stiffness_gain(reach, 1));
   for (const protocols::ToolSegmentSpec& segment : protocol.tool.segments) {
     for (const Vec3& at : {segment.from, segment.to}) {
-      // Beside the stylus, a force along it turns the stylus as well.
+      // A force along the stylus that acts beside its axis also turns the stylus.
       const double aside = std::hypot(at.x, at.y) / length;
       lever2 = std::max(lever2,
                         stiffness_gain(reach, at.z / (reach.factor * length)) + 2 * aside * aside);
@@ -361,7 +363,7 @@ ShowableMaterial showable(const stimuli::Material& material, const DeviceCapabil
   const double whole = whole_stiffness(material), stiffness = whole * gain;
   const double damping = std::abs(whole_damping(material)) * gain;
   const auto bound = [&out](double fraction, const auto&... reason) {
-    // A hair of rounding does not refuse a material that stands at the bound.
+    // Rounding must not refuse a material exactly at the bound.
     if (fraction >= out.fraction || fraction >= 1 - 1e-9) return;
     out = {std::max(0.0, fraction), sentence(reason...)};
   };
@@ -406,7 +408,8 @@ std::vector<LimitedMaterial> limit_materials(protocols::Protocol& protocol,
         return ShowableMaterial{};
       return ShowableMaterial{can.fraction * (1 - 1e-12), can.reason};  // rounding stays below
     };
-    // First what alone is too stiff; parts keep their differences where they can.
+    // First limit each material that is too stiff alone; parts keep their differences where
+    // possible.
     std::vector<ShowableMaterial> shares;
     stimuli::ObjectSpec limited = stimulus.object;
     visit_materials(limited, [&](stimuli::Material& material) {

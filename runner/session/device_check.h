@@ -1,6 +1,7 @@
 #pragma once
 // Whether a device can show a protocol: degrees of freedom, rate, workspace, and stiffness without
-// instability.
+// instability. Also the check of the force's direction before the first trial, the plausibility of
+// the computer's clock, and the limiting of materials to the device.
 
 #include <cstdint>
 #include <functional>
@@ -15,15 +16,16 @@
 
 namespace palpate::runner {
 
-// A weak push to the right before the first trial: the participant feels whether forces have the
-// right direction, and the commands are checked against the limits.
+// The check of the force's direction: a weak push to the right before the first trial. The
+// participant feels whether forces have the right direction, and the commands are checked against
+// the limits.
 
 /// A constant force to the right: 1 N, or half of the largest force allowed where that is less.
 class ForceDirectionCheck final : public rendering::Renderer {
  public:
   static constexpr double kSeconds = 1;  ///< of the push
 
-  /// \param limits  that are in force: the smaller of the program's and the device's
+  /// \param limits  in force: the smaller of the program's and the device's
   /// \param driven  degrees of freedom that the device drives. 5: push both ends of the stylus;
   ///                fewer: all of it at the grip, even where the device senses an axis
   ForceDirectionCheck(const ForceLimits& limits, int driven);
@@ -33,9 +35,9 @@ class ForceDirectionCheck final : public rendering::Renderer {
   const ForceLimits& limits() const { return limits_; }
 
   /// Pushes for kSeconds through the servo and its limits as in a trial, then takes the force off.
-  /// Must outlive the servo, which may still use it after a stop() that was not answered.
+  /// Must outlive the servo, which may still use it after an unanswered stop().
   /// \param stop  asked at each tick; true ends it at once
-  /// \return what was wrong with the commands; empty: nothing
+  /// \return the fault of the commands; empty: none
   std::string push(TickSource& servo, const std::function<bool()>& stop) const;
 
   const char* name() const override { return "push"; }
@@ -49,7 +51,7 @@ class ForceDirectionCheck final : public rendering::Renderer {
   bool both_ends_;
 };
 
-// Plausibility of the computer's clock, which every date on record follows.
+// Plausibility of the computer's clock, the source of every date on record.
 
 /// ns since 1970, UTC.
 struct ClockEvidence {
@@ -58,43 +60,44 @@ struct ClockEvidence {
   std::optional<std::int64_t> newest_file_ns;    ///< when the protocol or the program was written
 };
 
-/// Why the clock seems wrong, in words; empty: it does not.
+/// The reason to doubt the clock, in words; empty: none.
 std::string clock_warning(const ClockEvidence& evidence);
 
-/// Why a protocol cannot be run on a device, one sentence each with what would help; empty: it can.
+/// The reasons that a protocol cannot be run on a device, a sentence each with a remedy; empty: it
+/// can.
 std::vector<std::string> incompatibilities(const protocols::Protocol& protocol,
                                            const StimulusLibrary& library,
                                            const DeviceCapabilities& device);
 
-/// Whether the device senses the axis of the stylus and drives force alone: what a side contact
-/// gives is felt without its torque.
+/// Whether the device senses the axis of the stylus but drives force alone, so that a side contact
+/// is felt without its torque.
 bool torque_is_left_out(const DeviceCapabilities& device);
 
-/// What of a material a device can show at a rate without feeding energy to the hand.
+/// The share of a material that a device can show at a rate without feeding energy to the hand.
 struct ShowableMaterial {
   double fraction = 1;  ///< of its stiffness and damping together; 1: all, 0: nothing
-  std::string reason;   ///< what is in the way; empty: nothing
+  std::string reason;   ///< of the limit; empty: none
 };
 
 /// Sampled spring and damper: K T / 2 + |B| <= b (Colgate & Schenkel 1997), K <= 2 f_c / Delta
 /// (Abbott & Okamura 2005), as far as the device's damping, friction and resolution are known, and
 /// the stiffness that its maker gives for its highest rate, in proportion to the rate. Bounds of
-/// passivity: no hand can make it buzz. The passivity controller makes up for kPassivityExtension
-/// times what the device's own damping does.
-/// Of a material with layers the sums count: all of them are felt at once by who presses deep. Of a
-/// compound's parts the stiffest counts for the surface and for each layer, and the sum of these.
-/// \param gain  the hand feels so many times the stiffness and damping: felt_gain
+/// passivity: no hand can make it buzz. The passivity controller adds kPassivityExtension times the
+/// device's own damping. For a material with layers the sums count, because a deep press feels all
+/// layers at once. For a compound the stiffest part counts for the surface and for each layer, and
+/// then the sum of these.
+/// \param gain  factor on stiffness and damping at the hand: felt_gain
 ShowableMaterial showable(const stimuli::Material& material, const DeviceCapabilities& device,
                           double rate, double gain, bool passivity_controller);
 
-/// How many times a stimulus's stiffness is felt at the ends of the stylus: once for each virtual
-/// metre in a metre of the device, and by the square of the lever of a reach and of a tool that
-/// goes beyond the stylus. The lever is the larger of the reach's factor (the hand turns about the
-/// pivot) and of what the ends feel of a contact when they move each by itself.
+/// The factor by which a stimulus's stiffness is multiplied at the ends of the stylus: virtual
+/// metres in a metre of the device, times the square of the lever of a reach and of a tool that
+/// extends beyond the stylus. The lever is the larger of the reach's factor (the hand turns about
+/// the pivot) and the factor between a contact and the ends when each end moves alone.
 double felt_gain(const protocols::Protocol& protocol);
 
-/// `palpate stability` measures far more than this on every scene, as long as a force is written in
-/// the tick of its reading; a tick late leaves 1.5 (and K T / 2 is no bound any more).
+/// `palpate stability` measures far more than this on every scene, if a force is written in the
+/// tick of its reading; a delay of one tick leaves 1.5 (and K T / 2 is no longer a bound).
 inline constexpr double kPassivityExtension = 2;
 
 /// A material that was scaled down to what a device can show.
@@ -106,18 +109,18 @@ struct LimitedMaterial {
   std::string text;                   ///< a sentence
 };
 
-/// Where the protocol asks for limits (servo.material_limit), scales down what the device cannot
-/// show; to be called before its stimuli are made. What was, in order.
+/// Where the protocol asks for limits (servo.material_limit), scales down the materials that the
+/// device cannot show. Call before its stimuli are made. Returns the changes, in order.
 std::vector<LimitedMaterial> limit_materials(protocols::Protocol& protocol,
                                              const DeviceCapabilities& device);
 
-/// An event for the session's record, one line of JSON: which materials, as asked and as shown, on
-/// which device and at which rate.
+/// An event for the session's record, one line of JSON: the materials as asked and as shown, the
+/// device and the rate.
 std::string to_json_text(const std::vector<LimitedMaterial>& limited,
                          const DeviceCapabilities& device, double rate);
 
-/// Limits the protocol again, to the bit, as an event of to_json_text says; false: it is another
-/// note. \throws std::invalid_argument: it is not of this protocol, or damaged
+/// Repeats the limiting that an event of to_json_text describes, to the bit; false: the note is of
+/// another kind. \throws std::invalid_argument: the event is of another protocol, or damaged
 bool limit_as_recorded(protocols::Protocol& protocol, const std::string& event);
 
 }  // namespace palpate::runner

@@ -22,7 +22,8 @@ void ContactLog::add(const Sample& sample) noexcept {
   if (!edges_->too_many() && on_edge(sample.rendering.deepest.point)) ++edge_ticks_;
 }
 
-/// The distance to the edges changes by no more than the point moves: most ticks need no new one.
+/// The distance to the edges changes by at most the way of the point, so most ticks need no new
+/// one.
 bool ContactLog::on_edge(const Vec3& point) noexcept {
   const Vec3 moved = point - known_;
   if (margin_ >= 0 && glm::dot(moved, moved) < margin_ * margin_) return known_on_edge_;
@@ -45,12 +46,12 @@ std::optional<double> ContactLog::edge_dwell(double period) const {
 
 namespace {
 
-constexpr double kReadingPatience = 0.5;  // s, for a reading; a servo has several in that time
-constexpr double kPlugging = 2;           // s; a bus tells of what was plugged in with some delay
+constexpr double kReadingPatience = 0.5;  // s, for a reading; a servo gives several in that time
+constexpr double kPlugging = 2;           // s; a bus reports a new device with some delay
 
 bool is_well(const Sample& sample) { return (sample.faults & servo_fault::kDeviceLost) == 0; }
 
-/// Not in passing only.
+/// Whether the sample shows a lasting state, not a transient one.
 bool is_settled(const Sample& sample) {
   return is_well(sample) ||
          (sample.trouble != DeviceTrouble::guarded && sample.trouble != DeviceTrouble::guard_late &&
@@ -78,7 +79,7 @@ void LiveForces::end_without_guard() const {
     throw EndOfSession(data::RunEnd::aborted, advice(DeviceTrouble::guard_lost), true);
 }
 
-/// Whether a sample of a tick from now on was as wished. The newest one stays.
+/// Whether a later sample satisfies the wish. The newest sample stays.
 template <class Wished>
 bool LiveForces::await(Wished wished, double seconds, const std::function<bool()>& stop) {
   const std::int64_t began_ns = clock_.now_ns();
@@ -107,7 +108,7 @@ std::string LiveForces::open_again(const std::function<bool()>& stop) {
 
 std::string LiveForces::allow(const std::function<bool()>& stop) {
   const std::int64_t asked_ns = clock_.now_ns();
-  // Zero force that is asked for from now on is kept, however long this takes.
+  // A request for zero force from now on is kept, however long this takes.
   servo_.clear_fault();
   await(is_settled, kReadingPatience, stop);
   if (guard_ != nullptr && needs_reopening(sample_.trouble)) {

@@ -1,5 +1,6 @@
 #pragma once
-// Switches the forces of a live session: off at once, on again only where device and watchdog work.
+// Switches the forces of a live session: off at once, on again only while device and watchdog work.
+// Also measures how a trial's object was touched.
 
 #include <cstdint>
 #include <functional>
@@ -14,8 +15,8 @@
 
 namespace palpate::runner {
 
-// How a trial's object was touched: what tells an active explorer from a passive one. Defined here,
-// for live and simulated sessions alike.
+// Measures how a trial's object was touched, to distinguish active from passive exploration.
+// Defined here for live and simulated sessions alike.
 //
 //   contact share  ticks with contact (at least one contact place with force) over all ticks, from
 //                  time zero to the last tick before the answer
@@ -41,35 +42,36 @@ class ContactLog {
   const SharpEdges* edges_ = nullptr;
   Quat to_object_{1, 0, 0, 0};
   std::uint64_t ticks_ = 0, contact_ticks_ = 0, edge_ticks_ = 0;
-  // Moved by less than margin_ from here, a point stays on the same side of kReach.
+  // A point that moves by less than margin_ from here stays on the same side of kReach.
   Vec3 known_;
   double margin_ = -1;  ///< m; negative: nothing is known yet
   bool known_on_edge_ = false;
 };
 
-/// Belongs to the session's thread: it takes the servo's newest samples.
+/// Turns the forces of a live session off and on. Belongs to the session's thread: it takes the
+/// servo's newest samples.
 class LiveForces {
  public:
-  /// \param guard  may be none. All must outlive it.
+  /// \param guard  may be null. All must outlive it.
   LiveForces(ServoThread& servo, GuardedDevice* guard, Clock& clock)
       : servo_(servo), guard_(guard), clock_(clock) {}
 
   /// Zero force at once, until allow().
   void off() noexcept;
-  /// Likewise by the servo's ramp. From any thread.
+  /// The same by the servo's ramp. From any thread.
   void fade() noexcept { servo_.fade_out(); }
-  /// Allows forces again, once the device has given a good reading. One that is unplugged or silent
-  /// is opened again first, which may take seconds.
-  /// \param stop  asked every few milliseconds: true gives it up
-  /// \return why forces stay off, in words; empty: they are allowed
+  /// Allows forces again, once the device gives a good reading. Reopens an unplugged or silent
+  /// device first, which may take seconds.
+  /// \param stop  asked every few milliseconds; true gives up
+  /// \return the reason that forces stay off, in words; empty: they are allowed
   std::string allow(const std::function<bool()>& stop);
 
   /// The servo's newest sample.
   const Sample& newest() noexcept;
-  /// It gives no readings, not only in passing.
+  /// Whether the device gives no readings, not only for a moment.
   bool device_is_gone() noexcept;
-  /// \throws EndOfSession where the watchdog has ended or hangs, by the sample that newest() gave
-  /// last: forces are zero and cannot come back.
+  /// \throws EndOfSession if the watchdog has ended or hangs, judged by the last sample of
+  /// newest(): forces are zero and cannot come back.
   void end_without_guard() const;
 
  private:

@@ -35,7 +35,7 @@ LiveSession::Outcome LiveSession::run() {
   outcome.trials = session_.plan().size();
   noise_.stop();
   RunRecord& record = station_.record;
-  if (outcome.end == data::RunEnd::withdrawn) record.begin();  // whenever it comes
+  if (outcome.end == data::RunEnd::withdrawn) record.begin();  // at any time
   const std::int64_t now = station_.clock.now_ns();
   for (const std::string& text : record.pending_notes()) {
     if (text.front() != '{') outcome.unkept.push_back(text);
@@ -75,7 +75,7 @@ LiveSession::Outcome LiveSession::run_trials() {
   return {};
 }
 
-/// What was said at the same time as the end, or right after it, counts as well.
+/// Commands given at the time of the end, or right after it, count as well.
 void LiveSession::take_last_commands(Outcome& outcome) {
   for (ConsoleCommand& command : station_.console.commands())
     commands_.push_back(std::move(command));
@@ -89,7 +89,7 @@ void LiveSession::take_last_commands(Outcome& outcome) {
 
 void LiveSession::before_step() {
   const Session::State now = session_.state();
-  if (now == Session::State::response) return;  // a trial that was shown is recorded
+  if (now == Session::State::response) return;  // a shown trial is recorded
   attend();
   stop_if_due();
   const auto& longest = station_.protocol.sessions.max_minutes;
@@ -97,7 +97,7 @@ void LiveSession::before_step() {
     throw EndOfSession(data::RunEnd::paused,
                        "the session has lasted as long as the protocol allows");
   respondent_.set_progress(session_.plan().done(), session_.plan().size());
-  if (now != Session::State::trial) noise_.stop();  // a page to read, and perhaps to talk about
+  if (now != Session::State::trial) noise_.stop();  // a page to read, and perhaps to discuss
   bool ready = false;
   while (!ready) {
     wait_while_held();
@@ -136,7 +136,7 @@ void LiveSession::attend() {
   if (const int signal = station_.end_requested()) throw end_by_signal(signal);
   for (ConsoleCommand& command : station_.console.commands())
     commands_.push_back(std::move(command));
-  while (!commands_.empty()) {  // one of them may throw: the rest is obeyed later
+  while (!commands_.empty()) {  // a command may throw: the others are obeyed later
     const ConsoleCommand command = std::move(commands_.front());
     commands_.pop_front();
     obey(command);
@@ -164,7 +164,7 @@ void LiveSession::check_noise() {
   if (monitor_.in_trial()) throw TrialCutOff("the masking noise stopped");
 }
 
-/// In a break no trial would tell of a device that is gone.
+/// In a break there are no trials, so check here whether the device is gone.
 void LiveSession::check_device() {
   if (monitor_.in_trial() || hold_.kind() >= SessionHold::Kind::transient_fault ||
       !forces_.device_is_gone())
@@ -195,7 +195,7 @@ void LiveSession::obey(const ConsoleCommand& command) {
       plan_stop(command.kind);
       break;
     case Kind::emergency_zero:
-      // While the participant says how sure they are no tick would tell of it.
+      // While confidence is asked there are no trial ticks to show the stop.
       hold_.emergency_zero(command.text, in_trial && !monitor_.asking());
       note(command.time_ns, "emergency zero: " + command.text);
       say("EMERGENCY by " + command.text + ": forces are off until the fault is cleared");
@@ -247,7 +247,7 @@ void LiveSession::note(std::int64_t at_ns, const std::string& text) {
   try {
     station_.record.note(at_ns, text);
     say("note: " + text);
-  } catch (const data::StoreRefused& refused) {  // empty, or no UTF-8
+  } catch (const data::StoreRefused& refused) {  // empty, or invalid UTF-8
     say(refused.what());
   }
 }

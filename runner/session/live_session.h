@@ -16,35 +16,35 @@ namespace palpate::runner {
 
 class LiveSession final : public Attendant {
  public:
-  /// What became of it.
+  /// How the session ended.
   struct Outcome {
     data::RunEnd end = data::RunEnd::done;
     std::string reason;  ///< empty when done
     std::size_t recorded = 0, trials = 0;
     bool failed = false;                ///< ended by a signal or fault
-    std::vector<std::string> unkept{};  ///< the experimenter's notes, where no run was begun
+    std::vector<std::string> unkept{};  ///< the experimenter's notes, if no run was begun
   };
 
   /// \param station  must outlive it
   explicit LiveSession(const LiveStation& station);
   explicit LiveSession(LiveStation&& station) = delete;
 
-  /// Until the session is completed or suspended; the run's end is on record, if it has begun.
-  /// \throws StoreError: what was not acknowledged is not on record; forces are zero.
+  /// Runs until the session is completed or suspended; the run's end is on record, if it has begun.
+  /// \throws StoreError: unacknowledged trials are not on record; forces are zero.
   Outcome run();
 
   /// For the session's own thread. \throws EndOfSession, TrialCutOff
   void attend() override;
   void sound(SoundCue cue) override { noise_.cue(cue); }
-  /// A message for the experimenter.
+  /// Shows a message to the experimenter.
   void say(const std::string& message) { monitor_.say(message); }
-  /// A trial that is on record, for the accuracy so far.
+  /// Counts a recorded trial, for the accuracy so far.
   void count(const data::TrialRecord& record) { monitor_.count(record); }
 
  private:
   Outcome run_trials();
   void before_step();
-  void stop_if_due();  ///< where no trial is under way. \throws EndOfSession
+  void stop_if_due();  ///< only between trials. \throws EndOfSession
   void wait_while_held();
   void obey(const ConsoleCommand& command);
   void plan_stop(ConsoleCommand::Kind kind);
@@ -61,7 +61,7 @@ class LiveSession final : public Attendant {
   KeyboardRespondent respondent_;
   Session session_;
   std::deque<ConsoleCommand> commands_;  ///< not obeyed yet
-  std::string told_trouble_;             ///< of the participant's inputs
+  std::string told_trouble_;             ///< of the participant's inputs, as shown last
   enum class Stop { no, after_trial, after_block } stop_ = Stop::no;
 };
 

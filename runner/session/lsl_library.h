@@ -1,5 +1,5 @@
 #pragma once
-// liblsl, loaded at run time: Debian has no package of it, and its wire protocol is not specified.
+// liblsl, loaded at run time: Debian has no package for it, and its wire protocol is not specified.
 
 #include <dlfcn.h>
 
@@ -11,8 +11,8 @@ namespace palpate::runner {
 /// Stays loaded until the program ends: it has threads of its own.
 class LslLibrary {
  public:
-  /// \param user  that messages name, such as "markers to lsl". \throws std::runtime_error where
-  /// it is not installed
+  /// \param user  named in messages, such as "markers to lsl". \throws std::runtime_error if liblsl
+  /// is not installed
   explicit LslLibrary(std::string user) : user_(std::move(user)) {
     for (const char* library : {"liblsl.so.2", "liblsl.so", "liblsl.so.1"}) {
       handle_ = dlopen(library, RTLD_NOW | RTLD_LOCAL);
@@ -21,7 +21,7 @@ class LslLibrary {
     fail("liblsl is not installed (liblsl.so was not found)");
   }
 
-  /// \throws std::runtime_error where it has no such function
+  /// \throws std::runtime_error if the library lacks the function
   template <class Function>
   void find(Function*& function, const char* name) const {
     function = reinterpret_cast<Function*>(dlsym(handle_, name));

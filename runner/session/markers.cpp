@@ -130,7 +130,7 @@ void Markers::work() {
     if (sync_ && steady_clock::now() >= due) {
       second.time_ns = clock.now_ns();
       batch.push_back(second);
-      while (due <= steady_clock::now()) due += kSecond;  // none later for those that were missed
+      while (due <= steady_clock::now()) due += kSecond;  // skip the missed ones
     }
     for (const Marker& marker : batch) {
       for (const auto& sink : sinks_) dropped_ += sink->send(marker) ? 0 : 1;
@@ -168,8 +168,8 @@ std::int64_t now_ns() {
   return clock.now_ns();
 }
 
-/// Whether what is sent through a connected socket does not leave this computer: it goes to the
-/// loop back, or to the very address that it comes from.
+/// Whether data sent through a connected socket stays on this computer: the peer is the loopback or
+/// the socket's own address.
 bool stays_here(int file) {
   sockaddr_storage here{}, there{};
   socklen_t here_size = sizeof here, there_size = sizeof there;
@@ -201,10 +201,10 @@ class UdpSink final : public MarkerSink {
   bool send(const Marker& marker) noexcept override {
     try {
       const std::string line = to_json_line(marker, now_ns(), with_code_);
-      // A refusal is reported when the next line is sent, which then was not: once more.
+      // A refusal is reported at the next send, whose line is then lost: send it again.
       if (give(line)) return true;
       give(line);
-    } catch (...) {  // no memory
+    } catch (...) {  // out of memory
     }
     return false;
   }
@@ -244,15 +244,15 @@ speed_t speed_of(int baud) {
   return speed->second;
 }
 
-/// Where a byte can be put.
+/// A port that takes bytes.
 class BytePort {
  public:
   virtual ~BytePort() = default;
-  /// False: it was not taken. May not wait.
+  /// False: the byte was not taken. Must not wait.
   virtual bool put(unsigned char byte) noexcept = 0;
 };
 
-/// 8N1.
+/// A serial port, 8N1.
 class SerialPort final : public BytePort {
  public:
   SerialPort(const std::string& path, int baud)
@@ -297,7 +297,7 @@ class ParallelPort final : public BytePort {
   File port_;
 };
 
-/// One byte for each marker.
+/// Writes one byte for each marker.
 class ByteSink final : public MarkerSink {
  public:
   explicit ByteSink(std::unique_ptr<BytePort> port) : port_(std::move(port)) {}
@@ -309,15 +309,16 @@ class ByteSink final : public MarkerSink {
   std::unique_ptr<BytePort> port_;
 };
 
-/// A pulse for each marker: its byte, and 0 after the width. A recorder that samples the lines must
-/// see each, so the next one begins a width after the last ended. In a thread of its own.
+/// Writes a pulse for each marker: its byte, then 0 after the width. A recorder that samples the
+/// lines must see each pulse, so the next one begins one width after the last ended. Uses a thread
+/// of its own.
 class PulseSink final : public MarkerSink {
  public:
   PulseSink(std::unique_ptr<BytePort> port, std::chrono::milliseconds width)
       : port_(std::move(port)), width_(width), thread_([this] { work(); }) {}
   PulseSink(const PulseSink&) = delete;
   PulseSink& operator=(const PulseSink&) = delete;
-  /// Gives the pulses that wait.
+  /// Writes the waiting pulses.
   ~PulseSink() override {
     {
       const std::lock_guard lock(mutex_);
@@ -330,10 +331,10 @@ class PulseSink final : public MarkerSink {
     constexpr std::size_t kMostWaiting = 16;
     try {
       const std::lock_guard lock(mutex_);
-      // What the port did not take is told with the next marker.
+      // A byte that the port did not take is reported with the next marker.
       if (waiting_.size() >= kMostWaiting || std::exchange(failed_, false)) return false;
       waiting_.push_back(static_cast<unsigned char>(marker.code));
-    } catch (...) {  // no memory
+    } catch (...) {  // out of memory
       return false;
     }
     came_.notify_one();
@@ -369,7 +370,7 @@ class PulseSink final : public MarkerSink {
 
 /// Lab Streaming Layer: a stream of type Markers, irregular, one JSON text each, stamped with the
 /// event's own time. liblsl's clock is CLOCK_MONOTONIC in seconds on Linux, but may be built
-/// otherwise: the event's age is what is handed over. Whoever is on the network may listen.
+/// otherwise, so the event's age is passed. Anyone on the network may listen.
 class LslSink final : public MarkerSink {
  public:
   LslSink(const std::string& name, MarkerCodes codes)
@@ -400,7 +401,7 @@ class LslSink final : public MarkerSink {
       const char* sample = line.c_str();
       const double age = static_cast<double>(now - marker.time_ns) * 1e-9;
       return push_(outlet_, &sample, clock_() - age) == 0;
-    } catch (...) {  // no memory
+    } catch (...) {  // out of memory
       return false;
     }
   }
@@ -425,7 +426,7 @@ constexpr const char* kExpected =
   throw std::invalid_argument("no markers to '" + name + "'; " + kExpected);
 }
 
-/// Takes ":NUMBER" off the end of a text. None: it does not end so.
+/// Removes ":NUMBER" from the end of a text and returns the number. None: the text has no such end.
 std::optional<int> number_at_end(std::string& text) {
   const std::size_t colon = text.rfind(':');
   if (colon == std::string::npos || colon == 0) return std::nullopt;

@@ -1,6 +1,6 @@
 #pragma once
 // Event markers for other recordings (EEG, motion capture), sent as they happen. The session never
-// waits for a receiver; markers that are not taken are counted and dropped.
+// waits for a receiver; markers that a receiver does not take are counted and dropped.
 
 #include <atomic>
 #include <condition_variable>
@@ -23,20 +23,20 @@ struct Marker {
     response,
     time_out,
     cut_off,   ///< the trial will be shown again
-    interval,  ///< forces go on again, in a further interval of the trial
-    sync,      ///< a second has passed; of no trial
+    interval,  ///< forces go on again, in a later interval of the trial
+    sync,      ///< a second has passed; belongs to no trial
   };
   Kind kind = Kind::trial_start;
-  int code = 0;              ///< 1 to 255, that of code_of(): what a port gets
+  int code = 0;              ///< 1 to 255, from code_of(): the byte for a port
   std::int64_t time_ns = 0;  ///< CLOCK_MONOTONIC, of the event itself
   std::string participant;
   int session = 0, block = 0, trial = 0, attempt = 0;
-  std::string renderer, shape, response;  ///< response: empty but for Kind::response
+  std::string renderer, shape, response;  ///< response: empty except for Kind::response
 };
 const char* to_string(Marker::Kind kind);  ///< "trial_start", ...
-/// Of the answer where it has one of its own, else of the kind.
+/// The code of the answer if it has one, else of the kind.
 int code_of(const Marker& marker, const protocols::EventCodes& codes);
-/// Who may read a participant's code in a marker: what goes over a network goes in clear.
+/// Who may read a participant's code in a marker: network data is unencrypted.
 enum class MarkerCodes {
   this_computer,  ///< only receivers on this computer; others get null
   everywhere,
@@ -44,31 +44,32 @@ enum class MarkerCodes {
 /// One line of JSON with its newline; `sent_ns` is the present on the clock of time_ns.
 std::string to_json_line(const Marker& marker, std::int64_t sent_ns, bool with_code);
 
-/// Where markers go. send() is called in the markers' own thread.
+/// A receiver of markers. send() is called in the markers' own thread.
 class MarkerSink {
  public:
   virtual ~MarkerSink() = default;
-  /// False: the receiver did not take it. May not wait.
+  /// False: the receiver did not take it. Must not wait.
   virtual bool send(const Marker& marker) noexcept = 0;
 };
 
-/// From what the user names, "udp:HOST:PORT" or one of the others (kExpected in its source).
-/// \throws std::invalid_argument for another text; std::runtime_error where it cannot be opened.
+/// Opens a sink from the user's text, "udp:HOST:PORT" or one of the others (kExpected in the
+/// source). \throws std::invalid_argument for another text; std::runtime_error if it cannot be
+/// opened.
 std::unique_ptr<MarkerSink> open_marker_sink(const std::string& name, MarkerCodes codes);
 
 class Markers {
  public:
-  /// \param sync  sends Kind::sync once a second, too, from now on
+  /// \param sync  from now on also send Kind::sync once a second
   explicit Markers(std::vector<std::unique_ptr<MarkerSink>> sinks,
                    protocols::EventCodes codes = protocols::usual_event_codes(), bool sync = false);
-  /// Sends what is left.
+  /// Sends the remaining markers.
   ~Markers();
   Markers(const Markers&) = delete;
   Markers& operator=(const Markers&) = delete;
 
   /// From the session's thread; returns at once.
   void send(const Marker& marker);
-  /// Not taken by a receiver.
+  /// The number of markers that a receiver did not take.
   std::uint64_t dropped() const noexcept { return dropped_.load(); }
 
  private:
@@ -82,7 +83,7 @@ class Markers {
   std::vector<Marker> queue_;
   bool quit_ = false;
   std::atomic<std::uint64_t> dropped_{0};
-  std::jthread thread_;  ///< none where there is no sink
+  std::jthread thread_;  ///< not running without sinks
 };
 
 }  // namespace palpate::runner

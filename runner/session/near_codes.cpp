@@ -10,7 +10,7 @@ bool is_digit(char c) { return c >= '0' && c <= '9'; }
 
 char lower(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; }
 
-/// Without what is easily misread: case, O and 0, I and l and 1, zeros before a number.
+/// Removes easily misread differences: case, O and 0, I and l and 1, leading zeros of a number.
 std::string read_alike(const std::string& code) {
   std::string all;
   for (char c : code) {
@@ -51,7 +51,7 @@ bool one_changed_or_two_swapped(const std::string& a, const std::string& b) {
 }
 
 bool a_letter_away(const std::string& a, const std::string& b) {
-  // Short codes are a letter away from each other on purpose: A1 and B1, initials of three letters.
+  // Short codes may differ by one letter on purpose: A1 and B1, initials of three letters.
   constexpr std::size_t kTelling = 4;
   const CodeParts x = parts_of(a), y = parts_of(b);
   if (x.digits != y.digits) return false;

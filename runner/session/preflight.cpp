@@ -50,11 +50,11 @@ void Preflight::finish(const std::string& finding, bool left_out) {
 }
 
 void Preflight::add(const Sample& sample) {
-  // Forces that were asked off, or that the guard took off, leave the device where it is.
+  // If forces were turned off on request or by the guard, the device stays homed.
   if (sample.trouble == DeviceTrouble::guarded && step_ != Step::homing) return;
   const bool lost = (sample.faults & servo_fault::kDeviceLost) != 0;
   trouble_ = sample.trouble;
-  if (lost) {  // also later: a device that was lost has to be homed again
+  if (lost) {  // also later: a lost device must be homed again
     homed_ = 0;
     if (step_ == Step::done) return;
     step_ = Step::homing;
@@ -73,7 +73,7 @@ void Preflight::add(const Sample& sample) {
       add_range(sample.probe.tip);
       break;
     case Step::buttons:
-      pressed_ |= sample.buttons & released_;  // one that is stuck does not count
+      pressed_ |= sample.buttons & released_;  // a stuck button does not count
       released_ |= ~static_cast<unsigned>(sample.buttons);
       if (missing_button() == 0) finish("buttons 1 to " + std::to_string(needs_.buttons) + " work");
       break;
@@ -194,7 +194,7 @@ namespace {
 
 using Kind = ConsoleCommand::Kind;
 
-// What is missing changes while the stylus moves: no new instruction before one can be read.
+// The missing items change while the stylus moves: keep an instruction long enough to be read.
 constexpr std::int64_t kReading_ns = 1'000'000'000;
 
 PreflightNeeds needs_of(const LiveStation& station) {
@@ -213,7 +213,7 @@ class PreflightDialogue {
   PreflightDialogue(const LiveStation& station, const std::vector<std::string>& news)
       : station_(station),
         preflight_(needs_of(station)),
-        told_ns_(station.clock.now_ns() - kReading_ns / 2) {  // what is well need not be said
+        told_ns_(station.clock.now_ns() - kReading_ns / 2) {  // waits half a second for news
     state_.study = station.protocol.name;
     state_.participant = station.record.participant().code;
     state_.session = station.record.session();
@@ -225,13 +225,13 @@ class PreflightDialogue {
     while (preflight_.step() != Preflight::Step::done || !state_.fault.empty()) {
       station_.clock.wait_until(station_.clock.now_ns() + kSessionNap_ns);
       if (station_.servo_thread.latest(state_.sample)) preflight_.add(state_.sample);
-      station_.screen.keys();  // none answers yet
+      station_.screen.keys();  // discard earlier keys
       take_commands();
       end_if_due();
       if (preflight_.push_due() && state_.fault.empty()) check_force_direction();
       show();
     }
-    station_.servo_thread.clear_fault();  // before homing there were no readings
+    station_.servo_thread.clear_fault();  // without readings before homing
     station_.console.show(state_);
     std::vector<std::string> findings = preflight_.findings();
     findings.insert(findings.end(), emergencies_.begin(), emergencies_.end());
@@ -245,13 +245,13 @@ class PreflightDialogue {
     for (const ConsoleCommand& command : commands) {
       obey(command);
       if (!state_.fault.empty()) continue;
-      // What was pressed during the push does not tell that it was felt.
+      // A key pressed during the push does not confirm that it was felt.
       if (command.kind == Kind::go_on && command.time_ns >= pushed_ns_) preflight_.skip();
       if (command.kind == Kind::repeat_trial) preflight_.repeat();
     }
   }
 
-  /// What is obeyed at any step. \throws EndOfSession
+  /// Obeys commands that are valid at any step. \throws EndOfSession
   void obey(const ConsoleCommand& command) {
     switch (command.kind) {
       case Kind::quit:
@@ -283,7 +283,7 @@ class PreflightDialogue {
     try {
       station_.record.note(note.time_ns, note.text);
       say("note: " + note.text);
-    } catch (const data::StoreRefused& refused) {  // empty, or no UTF-8
+    } catch (const data::StoreRefused& refused) {  // empty, or invalid UTF-8
       say(refused.what());
     }
   }
@@ -295,7 +295,7 @@ class PreflightDialogue {
     say(trouble.empty() ? "the device works" : "not cleared: " + trouble);
   }
 
-  /// Also where the push or the homing is waited for. \throws EndOfSession
+  /// Called also while waiting for the push or for homing. \throws EndOfSession
   void end_if_due() const {
     const DeviceTrouble trouble = state_.sample.trouble;
     if (station_.end_requested() != 0)
@@ -307,7 +307,7 @@ class PreflightDialogue {
   }
 
   void check_force_direction() {
-    station_.servo_thread.clear_fault();  // before homing there were no readings
+    station_.servo_thread.clear_fault();  // without readings before homing
     preflight_.pushed(station_.direction_check->push(station_.servo_thread, [this] {
       bool quit = station_.end_requested() != 0;
       for (ConsoleCommand& more : station_.console.commands()) {
@@ -322,10 +322,10 @@ class PreflightDialogue {
   Checklist checklist() const {
     Checklist list = preflight_.checklist();
     const DeviceTrouble trouble = state_.sample.trouble;
-    // What takes more than the hand that is at the grip.
+    // Trouble that the hand at the grip cannot fix.
     if (needs_reopening(trouble))
       list.instruction += "; after that " + station_.console.name_of(Kind::clear_fault);
-    if (!state_.fault.empty()) {  // nothing else is obeyed before
+    if (!state_.fault.empty()) {  // no other command is obeyed first
       list.instruction = "forces are off: " + state_.fault +
                          "; next: " + station_.console.name_of(Kind::clear_fault);
       list.choices.clear();
@@ -354,9 +354,9 @@ class PreflightDialogue {
   Preflight preflight_;
   ConsoleState state_;
   std::string told_;                          ///< the instruction on show
-  std::int64_t told_ns_;                      ///< since then; session clock
+  std::int64_t told_ns_;                      ///< shown since then; session clock
   std::int64_t pushed_ns_ = 0;                ///< when the last push ended; session clock
-  std::vector<ConsoleCommand> while_pushed_;  ///< that came during a push: not obeyed yet
+  std::vector<ConsoleCommand> while_pushed_;  ///< commands that came during a push: not obeyed yet
   std::vector<std::string> emergencies_;
 };
 

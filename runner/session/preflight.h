@@ -1,7 +1,6 @@
 #pragma once
-// The checklist before the first trial: the device is homed; with force feedback also that forces
-// have the right direction and keep to their limits, that the device moves as far as the stimuli
-// need, and that its buttons work.
+// The checklist before the first trial: the device is homed; with force feedback also the force
+// direction and limits, the range of movement that the stimuli need, and the buttons.
 
 #include <string>
 #include <vector>
@@ -15,14 +14,14 @@
 namespace palpate::runner {
 
 struct PreflightNeeds {
-  double reach = 0;  ///< m, virtual frame: how far the tip must go to either side of the centre on
-                     ///< each axis; 0: leave the range unchecked
-  int buttons = 0;   ///< so many must work, from the first
+  double reach = 0;  ///< m, virtual frame: how far the tip must move to either side of the centre
+                     ///< on each axis; 0: leave the range unchecked
+  int buttons = 0;   ///< number of buttons that must work, from the first
   const ForceDirectionCheck* push = nullptr;  ///< to be felt; its limits are shown. None: unchecked
-  double device_limit = 0;                    ///< N, the device's own, to be shown
+  double device_limit = 0;                    ///< N, the device's own, for display
 };
 
-/// Fed with the servo's samples, step by step. Shows no force itself.
+/// The steps of the checklist, advanced by the servo's samples. Commands no force itself.
 class Preflight {
  public:
   enum class Step { homing, limits, range, buttons, done };
@@ -31,19 +30,19 @@ class Preflight {
 
   Step step() const { return step_; }
   void add(const Sample& sample);
-  /// The experimenter goes on without the step; homing cannot be left out. Where the limits are
-  /// checked: the push may come, or was felt.
+  /// The experimenter continues without the step; homing cannot be skipped. At the step of the
+  /// limits: begins the push, or confirms that it was felt.
   void skip();
-  /// The push is to come once more.
+  /// Asks for the push once more.
   void repeat();
-  /// Somebody is to push now, and to tell what became of it.
+  /// Whether the push is due; the caller pushes and reports the result to pushed().
   bool push_due() const { return push_ == Push::due; }
-  /// \param fault  what was wrong; empty: nothing
+  /// \param fault  of the push; empty: none
   void pushed(const std::string& fault);
-  /// What there is to do, what of it is done, and what is due: what is missing and what the
-  /// experimenter may say to it.
+  /// The steps, the finished ones, the current one with its missing items and the experimenter's
+  /// options.
   Checklist checklist() const;
-  /// For the record: what was checked and what was left out.
+  /// For the record: the checks done and skipped.
   const std::vector<std::string>& findings() const { return findings_; }
 
  private:
@@ -58,24 +57,24 @@ class Preflight {
   PreflightNeeds needs_;
   Step step_ = Step::homing;
   int homed_ = 0;                                ///< samples in a row
-  DeviceTrouble trouble_ = DeviceTrouble::none;  ///< while it is lost
+  DeviceTrouble trouble_ = DeviceTrouble::none;  ///< while the device is lost
   enum class Push { not_yet, due, given } push_ = Push::not_yet;
-  std::string push_fault_;  ///< of the last one
+  std::string push_fault_;  ///< of the last push
   Vec3 least_, most_;
   unsigned pressed_ = 0, released_ = 0;  ///< buttons seen down, and up
   std::vector<std::string> findings_;
   std::vector<Step> left_out_;
 };
 
-// The pre-flight of a live session at the console: the servo runs, the experimenter goes through
-// the checklist, and no trial has begun.
+// Runs the pre-flight of a live session at the console: the servo runs, the experimenter works
+// through the checklist, and no trial has begun.
 
 struct PreflightResult {
-  std::vector<std::string> findings;  ///< what was checked and what was left out, for the record
-  std::vector<std::string> messages;  ///< that the console has shown
+  std::vector<std::string> findings;  ///< the checks done and skipped, for the record
+  std::vector<std::string> messages;  ///< shown on the console
 };
 
-/// Until every step is done or left out and forces are allowed. For the session's own thread.
+/// Returns when every step is done or skipped and forces are allowed. For the session's own thread.
 /// \param news  messages that the console shows first
 /// \throws EndOfSession
 PreflightResult run_preflight(const LiveStation& station, const std::vector<std::string>& news);

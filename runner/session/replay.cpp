@@ -24,17 +24,17 @@
 namespace palpate::runner {
 namespace {
 
-/// By the protocol's name or what its SHA-256 begins with.
+/// Whether the protocol matches by name or by the first digits of its SHA-256.
 bool is_named(const data::StoredTrial& trial, const std::string& protocol) {
   constexpr std::size_t kDigits = 6;
   return protocol.empty() || trial.protocol_name == protocol ||
          (protocol.size() >= kDigits && trial.protocol_sha256.starts_with(protocol));
 }
 
-/// What is on record beside a trial that is not: "; of P03 there are 1/1 to 1/304".
+/// Names the trials on record in place of a missing one: "; of P03 there are 1/1 to 1/304".
 std::string what_there_is(data::Store& store, const data::TrialName& name) {
   constexpr std::size_t kMostNamed = 8;
-  std::map<int, std::pair<int, int>> trials;  // of each session the first and the last
+  std::map<int, std::pair<int, int>> trials;  // the first and the last of each session
   std::set<std::string> codes;
   store.for_each_trial([&](const data::StoredTrial& trial) {
     codes.insert(trial.participant.code);
@@ -97,7 +97,7 @@ data::StoredTrial find_trial(data::Store& store, const data::TrialName& name,
   return std::move(*found);
 }
 
-/// Where a run was shown with another text, that differs in words only.
+/// The text that was shown, where a run used another text that differs in words only.
 protocols::Protocol stored_protocol(data::Store& store, const data::StoredTrial& trial,
                                     const std::string& mesh_folder) {
   std::string text;
@@ -112,8 +112,8 @@ protocols::Protocol stored_protocol(data::Store& store, const data::StoredTrial&
   return protocols::parse_protocol_text(text, place.string(), files);
 }
 
-/// Scales the materials down to what the device of the trial's run could show. True: there were
-/// any.
+/// Scales the materials down to the limits of the device of the trial's run. True: there were any
+/// limits.
 bool limit_as_recorded(protocols::Protocol& protocol, data::Store& store,
                        const data::StoredTrial& trial) {
   for (const data::StoredNote& note : store.notes()) {
@@ -123,7 +123,7 @@ bool limit_as_recorded(protocols::Protocol& protocol, data::Store& store,
       continue;
     }
     try {
-      // A simulated session that was resumed has the same event again.
+      // A simulated session that was resumed repeats the same event.
       if (runner::limit_as_recorded(protocol, note.text)) return true;
     } catch (const std::invalid_argument& error) {
       throw data::StoreRefused(store.path() + ": " + error.what());
@@ -273,7 +273,7 @@ void replay_shown(const protocols::Protocol& protocol, const data::TrialRecord& 
                   const std::function<void(std::size_t, const data::SampleRecord&,
                                            const ReplayedSample&)>& visit) {
   const auto intervals = samples_of_intervals(recorded);
-  // One whose time was over before it began has none.
+  // An interval whose time was over before it began has no samples.
   const std::size_t least = shown.size() - (recorded.task && recorded.timed_out ? 1 : 0);
   if (intervals.size() > shown.size() || intervals.size() < least)
     throw std::invalid_argument("samples of " + std::to_string(shown.size()) +
@@ -281,9 +281,9 @@ void replay_shown(const protocols::Protocol& protocol, const data::TrialRecord& 
                                 std::to_string(intervals.size()));
   ForceLimits limits;
   limits.max_force = limits.max_change = std::numeric_limits<double>::max();
-  // The record begins where the stylus had rested in the home zone.
+  // The record begins with the stylus at rest in the home zone.
   constexpr HomeZone kAnywhere{0, 0};
-  // Of an extended probe, the record has the virtual stylus; what the hand got of it follows.
+  // For an extended probe the record has the virtual stylus; the forces at the hand follow from it.
   const std::optional<rendering::Reach> reach = workspace_of(protocol).reach;
   for (std::size_t i = 0; i < intervals.size(); ++i) {
     ReplayDevice device(intervals[i], protocol.servo_rate);

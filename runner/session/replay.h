@@ -1,5 +1,5 @@
 #pragma once
-// Renders a recorded trial again, tick by tick.
+// Renders a recorded trial again, tick by tick, and compares the forces with the record.
 
 #include <cstddef>
 #include <cstdint>
@@ -18,25 +18,25 @@
 
 namespace palpate::runner {
 
-// A trial of a database with what is needed to render it again: its record, its protocol and the
+// A trial of a database with all data for rendering it again: its record, its protocol and the
 // materials as its device showed them.
 
 struct RecordedTrial {
   data::StoredTrial stored;
-  protocols::Protocol protocol;  ///< materials as they were limited to the device of its run
-  bool limited = false;          ///< some were
+  protocols::Protocol protocol;  ///< materials as limited to the device of its run
+  bool limited = false;          ///< some materials were limited
 };
 
 /// The completed attempt at a trial.
 /// \param protocol     the protocol's name, where the code is enrolled in several; empty: any
-/// \param mesh_folder  where mesh files are, for a database of before they were kept in it
-/// \throws StoreRefused: it is not there, is in several protocols, has no samples, or its record
-/// and protocol do not agree; InputError, MeshError: the stored protocol cannot be read
+/// \param mesh_folder  folder of the mesh files, for an old database that does not contain them
+/// \throws StoreRefused: the trial is missing, is in several protocols, has no samples, or its
+/// record and protocol disagree; InputError, MeshError: the stored protocol cannot be read
 RecordedTrial load_recorded_trial(data::Store& store, const data::TrialName& name,
                                   const std::string& protocol, const std::string& mesh_folder);
 
 /// The protocol that a trial was shown with, its materials limited as its device showed them.
-/// \param limited  set where some were
+/// \param limited  set if any were limited
 /// \throws StoreRefused, InputError, MeshError: the stored protocol cannot be read
 protocols::Protocol protocol_as_shown(data::Store& store, const data::StoredTrial& trial,
                                       const std::string& mesh_folder, bool& limited);
@@ -46,49 +46,49 @@ std::string to_string(const data::TrialName& name);
 
 class StimulusLibrary;
 
-/// The samples of each interval of a trial, in order: what was recorded begins with tick 0 in each.
-/// A trial of version 1 has one.
+/// The samples of each interval of a trial, in order; the record begins with tick 0 in each. A
+/// trial of version 1 has one interval.
 std::vector<std::span<const data::SampleRecord>> samples_of_intervals(
     const data::TrialRecord& recorded);
 
-/// What each interval of a trial showed, as it stood in the world at its beginning; none: nothing.
+/// The object of each interval, placed in the world as at its beginning; nullopt: no object.
 /// \throws std::invalid_argument where protocol and record do not agree
 std::vector<std::optional<stimuli::ObjectSpec>> shown_objects(const protocols::Protocol& protocol,
                                                               const data::TrialRecord& recorded);
 
-/// What a tick has come to.
+/// The result of a tick.
 struct ReplayedSample : Sample {
-  std::optional<rendering::BodyPose> body;  ///< of a stimulus that moves
+  std::optional<rendering::BodyPose> body;  ///< of a moving stimulus
 };
 
-/// Puts a recorded trial through the servo and a renderer again, interval by interval.
+/// Runs a recorded trial through the servo and a renderer again, interval by interval.
 /// \param recorded  with samples
-/// \param other     false: the recorded renderer, which gives the recorded forces, to the bit;
-/// true:
-///                  the other one, as it would have shown the same path
-/// \param visit     number of the interval from 0, each recorded tick and what comes of it now
+/// \param other     false: the recorded renderer, which reproduces the recorded forces to the bit;
+/// true: the other renderer, along the same path
+/// \param visit     gets the interval's number from 0, each recorded tick and its new result
 /// \throws std::invalid_argument where protocol and record do not agree
 void replay(const protocols::Protocol& protocol, const data::TrialRecord& recorded, bool other,
             const std::function<void(std::size_t, const data::SampleRecord&,
                                      const ReplayedSample&)>& visit);
 
-/// A trial of version 1 by its own renderer, as above, with stimuli that were built once for many.
+/// Replays a trial of version 1 by its own renderer, as above, with stimuli built once for many
+/// trials.
 /// \param library  of the protocol
 void replay(const protocols::Protocol& protocol, const StimulusLibrary& library,
             const data::TrialRecord& recorded,
             const std::function<void(std::size_t, const data::SampleRecord&,
                                      const ReplayedSample&)>& visit);
 
-/// Whether a tick's rendering is what is on record, bit by bit (a zero's sign aside, which the
-/// store does not keep): force, torque, depth, contacts, type of the deepest, the renderer's fault
-/// bits; of a stimulus that moves, where it is and how fast it goes.
-/// \param tick  of the record's samples
+/// Whether a tick's rendering equals the record, bit by bit (except a zero's sign, which the store
+/// does not keep): force, torque, depth, contacts, type of the deepest, the renderer's fault bits;
+/// for a moving stimulus also its pose and velocity.
+/// \param tick  one of the record's samples
 bool equals_record(const data::TrialRecord& recorded, const data::SampleRecord& tick,
                    const ReplayedSample& again);
 
-// A recorded trial held against what the renderers make of its path today.
+// Comparison of a recorded trial with the present renderers along its path.
 
-/// What one renderer showed along the path.
+/// One renderer's forces along the path.
 struct ForceSummary {
   std::string renderer;
   double time_in_contact = 0;           ///< fraction of the ticks
@@ -107,12 +107,12 @@ struct ReplayedTick {
   std::size_t interval = 1;  ///< from 1
   const data::SampleRecord* recorded;
   RenderedForce again;  ///< by the recorded renderer
-  RenderedForce other;  ///< by the other one, where it was asked for
+  RenderedForce other;  ///< by the other one, if requested
 };
 
-/// A trial of version 1 has one.
+/// An interval as replayed. A trial of version 1 has one.
 struct ReplayedInterval {
-  std::string stimulus, renderer;  ///< as recorded; no stimulus: nothing was there
+  std::string stimulus, renderer;  ///< as recorded; no stimulus: no object
   std::optional<double> level = std::nullopt;
   bool standard = false;
   std::size_t ticks = 0, equal_ticks = 0;
@@ -131,7 +131,7 @@ struct ReplayComparison {
 };
 
 /// \param record         with samples; must outlive the result
-/// \param compare_other  whether the other renderer goes along the same path
+/// \param compare_other  whether to run the other renderer along the same path
 /// \throws std::invalid_argument where protocol and record do not agree
 ReplayComparison compare_with_record(const protocols::Protocol& protocol,
                                      const data::TrialRecord& record, bool compare_other);

@@ -1,5 +1,6 @@
 #pragma once
-// The record of a live session: its participant, run, notes and trials.
+// The record of a live session: its participant, run, notes and trials. Also the way of the trial
+// loop to the database.
 
 #include <cstdint>
 #include <optional>
@@ -13,7 +14,7 @@
 
 namespace palpate::runner {
 
-// Where a stimulus that moves is, as the store keeps it.
+// Pose and velocity of a moving stimulus, as the store keeps them.
 
 inline data::BodyRecord body_record(const rendering::BodyPose& body) {
   data::BodyRecord out;
@@ -32,10 +33,10 @@ inline bool same_body(const data::BodyRecord& a, const data::BodyRecord& b) {
 
 // From a parsed protocol to the record of it.
 
-/// A protocol as the store keeps it: its text, and every file that it names as it was read.
+/// A protocol as the store keeps it: its text, and the contents of every file that it names.
 data::ProtocolInfo info_of(const protocols::Protocol& protocol);
 
-// The trial loop's way to the database.
+// The trial log: the trial loop's interface to the database.
 
 /// Where a session writes its trials, before and after each is shown.
 class TrialLog {
@@ -43,25 +44,26 @@ class TrialLog {
   virtual ~TrialLog() = default;
   /// Before the stimulus is shown. \return the attempt's number, 1, 2, ...
   virtual int begin(const data::TrialRecord& planned, std::int64_t began_ns) = 0;
-  /// After the answer; the trial is acknowledged when this returns.
+  /// After the answer; when this returns, the trial is durable.
   virtual void finish(const data::TrialRecord& record) = 0;
   /// The trial will be shown again.
   virtual void cut_off(const std::string& reason) = 0;
-  /// The answers to a page of version 2, together. A log that keeps none loses them.
+  /// Stores the answers to a page of version 2, together. A log without pages ignores them.
   virtual void answered(const std::vector<data::PageAnswer>& /*answers*/) {}
-  /// An event of the session, as JSON. A log that keeps none loses it. \param at_ns  session clock
+  /// Stores an event of the session, as JSON. A log without notes ignores it. \param at_ns  session
+  /// clock
   virtual void note(std::int64_t /*at_ns*/, const std::string& /*text*/) {}
-  /// Whether a page of this session has been answered: it is not shown again.
+  /// Whether a page of this session has been answered; then it is not shown again.
   virtual bool has_answers(const std::string& /*page*/) { return false; }
 };
 
-/// A new participant is enrolled, and takes a number of the counterbalancing, when the first trial
-/// begins: not where the pre-flight was abandoned or a display did not open. Notes of before then
-/// are kept here and written with the run.
+/// The log of a live session. A new participant is enrolled, and takes a number of the
+/// counterbalancing, when the first trial begins, not when the pre-flight was abandoned or a
+/// display did not open. Earlier notes are kept here and written with the run.
 class RunRecord final : public TrialLog {
  public:
-  /// \param participant  from Store::look_up. \throws StoreRefused: the store takes no such run.
-  /// \param shown_with  where other texts are shown than those of the participant's protocol
+  /// \param participant  from Store::look_up. \throws StoreRefused: the store refuses such a run.
+  /// \param shown_with  the texts shown, if they differ from those of the participant's protocol
   RunRecord(data::Store& store, const data::ProtocolInfo& protocol,
             const data::Participant& participant, const data::RunInfo& info,
             const std::optional<data::ProtocolInfo>& shown_with = std::nullopt);
@@ -70,11 +72,11 @@ class RunRecord final : public TrialLog {
   int session() const { return info_.session; }
   bool begun() const { return run_.has_value(); }
 
-  /// Enrols and begins the run now, where that has not been done.
+  /// Enrols the participant and begins the run, unless done already.
   void begin();
-  /// \param at_ns  session clock. \throws StoreRefused: a text that no database keeps.
+  /// \param at_ns  session clock. \throws StoreRefused: the text cannot be stored.
   void note(std::int64_t at_ns, const std::string& text) override;
-  /// Where nothing has begun, nothing is on record.
+  /// Ends the run; without a run, records nothing.
   void end(data::RunEnd how, std::int64_t ended_ns);
   /// Notes that will be written when the run begins.
   std::vector<std::string> pending_notes() const;

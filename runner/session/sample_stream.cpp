@@ -18,7 +18,7 @@ namespace palpate::runner {
 namespace {
 
 constexpr std::chrono::milliseconds kChunk(20);
-constexpr double kRingSeconds = 4;  // a computer that is busy for longer has other troubles
+constexpr double kRingSeconds = 4;  // a longer stall means worse trouble
 constexpr double kSecondsPerNs = 1e-9;
 
 constexpr std::array<StreamChannel, 20> kChannels = {{
@@ -59,7 +59,7 @@ class Outlet {
                         kDouble, ("palpate-" + name).c_str());
     if (info_ == nullptr) library_.fail("liblsl gave no stream");
     describe();
-    constexpr std::int32_t kBuffered = 360;  // s, for a receiver that is away
+    constexpr std::int32_t kBuffered = 360;  // s, for a disconnected receiver
     const auto chunk = static_cast<std::int32_t>(
         std::lround(rate * std::chrono::duration<double>(kChunk).count()));
     outlet_ = create_outlet(info_, std::max(chunk, 1), kBuffered);
@@ -75,7 +75,7 @@ class Outlet {
     destroy_info_(info_);
   }
 
-  /// False: it was not taken.
+  /// False: the rows were not taken.
   bool push(const std::vector<double>& values, const std::vector<double>& times) noexcept {
     return push_(outlet_, values.data(), values.size(), times.data()) == 0;
   }
@@ -83,7 +83,8 @@ class Outlet {
   double now() const noexcept { return clock_(); }
 
  private:
-  /// As XDF's specification has it: desc/channels/channel with label, unit and type.
+  /// Describes the channels as XDF's specification requires: desc/channels/channel with label, unit
+  /// and type.
   void describe() {
     void* (*description)(void*) = nullptr;
     void* (*append)(void*, const char*) = nullptr;
@@ -159,8 +160,8 @@ class SampleStream::Sender {
     }
   }
 
-  /// How far liblsl's clock is ahead of the session's. Of several looks the quickest: whoever loses
-  /// the processor between the two clocks would take that for a difference.
+  /// s, liblsl's clock less the session's. Takes the quickest of several readings: a thread that
+  /// loses the processor between the two clocks would measure a false difference.
   double seconds_ahead() noexcept {
     constexpr int kLooks = 5;
     std::int64_t quickest = std::numeric_limits<std::int64_t>::max();
@@ -177,7 +178,7 @@ class SampleStream::Sender {
     return ahead;
   }
 
-  /// All that came since. Stamped with the ticks' own times: liblsl's clock may be another one than
+  /// Sends all new rows, stamped with the ticks' own times, because liblsl's clock may differ from
   /// the session's.
   void send() noexcept {
     try {
@@ -189,7 +190,7 @@ class SampleStream::Sender {
         values_.insert(values_.end(), row.values.begin(), row.values.end());
         times_.push_back(static_cast<double>(row.time_ns) * kSecondsPerNs + ahead);
       }
-    } catch (...) {  // no memory
+    } catch (...) {  // out of memory
       dropped_ += std::max<std::size_t>(times_.size(), 1);
       return;
     }
@@ -199,7 +200,7 @@ class SampleStream::Sender {
   sample_stream::Outlet outlet_;
   RealClock clock_;
   Ring<StreamRow> ring_;
-  std::vector<double> values_, times_;  ///< the thread's
+  std::vector<double> values_, times_;  ///< the thread's own
   std::atomic<std::uint64_t> dropped_{0};
   std::mutex mutex_;
   std::condition_variable quits_;

@@ -1,6 +1,6 @@
 #pragma once
-// The servo's samples for other recorders, while they happen: a regular stream of Lab Streaming
-// Layer. Nothing waits for it: samples that it cannot take are counted and dropped.
+// The servo's samples, sent live to other recorders as a regular stream of Lab Streaming Layer.
+// Nothing waits for it: samples that it cannot take are counted and dropped.
 
 #include <array>
 #include <atomic>
@@ -15,19 +15,19 @@
 
 namespace palpate::runner {
 
-/// What a channel of the stream is, as its description says.
+/// A channel of the stream, as in its description.
 struct StreamChannel {
   const char *label, *unit, *type;
 };
 
-/// Of one tick: tip, tail (m), force (N), torque (N m), device1, device2 (N), depth (m), contacts;
-/// what a stored sample has under the same names.
+/// The values of one tick: tip, tail (m), force (N), torque (N m), device1, device2 (N), depth (m),
+/// contacts; a stored sample has the same values under the same names.
 struct StreamRow {
   std::int64_t time_ns = 0;  ///< session clock
   std::array<double, 20> values{};
 };
 StreamRow stream_row(const Sample& sample) noexcept;
-/// Of StreamRow::values, in their order.
+/// The channels of StreamRow::values, in their order.
 std::span<const StreamChannel> stream_channels() noexcept;
 
 class SampleStream {
@@ -35,14 +35,14 @@ class SampleStream {
   /// \param name  "lsl" or "lsl:NAME". \param rate  Hz, of the servo
   /// \throws std::invalid_argument for another text; std::runtime_error where liblsl is missing
   SampleStream(const std::string& name, double rate);
-  /// Sends what is left.
+  /// Sends the remaining samples.
   ~SampleStream();
   SampleStream(const SampleStream&) = delete;
   SampleStream& operator=(const SampleStream&) = delete;
 
-  /// By one thread. Returns at once.
+  /// Call from one thread. Returns at once.
   void push(const Sample& sample) noexcept;
-  /// Samples that found no room, or that liblsl did not take.
+  /// The number of samples that found no room or that liblsl did not take.
   std::uint64_t dropped() const noexcept;
 
  private:
@@ -50,8 +50,8 @@ class SampleStream {
   std::unique_ptr<Sender> sender_;
 };
 
-/// A servo whose samples go into a stream when the session takes them: the servo's thread does
-/// nothing for it.
+/// A servo whose samples also go into a stream when the session takes them: the servo's thread does
+/// no work for it.
 class StreamedServo final : public TickSource {
  public:
   StreamedServo(TickSource& servo, SampleStream& stream) : servo_(servo), stream_(stream) {}

@@ -161,7 +161,7 @@ void SessionNoise::cue(SoundCue cue) {
   if (cue == SoundCue::wrong && sounds->feedback) station_.noise->tone(Tone::wrong);
 }
 
-// The part of Session that version 2 has: trials of several intervals, pages.
+// The methods of Session for version 2: trials of several intervals, pages.
 
 namespace {
 
@@ -171,8 +171,8 @@ using protocols::TaskKind;
 
 constexpr double kTaskSecond_ns = 1e9;
 
-/// Whether the comparison is what the question of `compare` asks for. At the standard's own level,
-/// which either could be, as at the other levels.
+/// Whether the comparison answers the question of `compare`. At the standard's own level, where
+/// either answer would do, it follows the rule of the other levels.
 bool comparison_is_right(const protocols::TaskBlock& block, const data::TaskRecord& task,
                          int side) {
   if (block.intervals > 2 || !task.level || !task.standard_level) return true;
@@ -185,7 +185,7 @@ const protocols::TaskAnswer& chosen(const protocols::TaskBlock& block, const Ans
   return block.answers.at(static_cast<std::size_t>(answer.stimulus));
 }
 
-/// The screens of a text that it separates by form feeds, with their pictures.
+/// The screens of a text, separated by form feeds, with their pictures.
 std::vector<ReadScreen> screens_of(const std::string& text,
                                    const std::vector<protocols::PagePicture>& pictures = {}) {
   std::vector<ReadScreen> screens(1);
@@ -297,7 +297,7 @@ std::optional<Answer> Session::show_intervals(const protocols::Trial& trial, Ser
   return answer;
 }
 
-/// The last interval is over: the answer is waited for with forces off.
+/// Asks for the answer after the last interval, with forces off.
 std::optional<Answer> Session::ask_without_forces(const protocols::Trial& trial,
                                                   ServoState& servo) {
   const auto count = static_cast<int>(trial.intervals.size());
@@ -310,9 +310,9 @@ std::optional<Answer> Session::ask_without_forces(const protocols::Trial& trial,
   return answer;
 }
 
-/// The participant turns the level of one stimulus, and feels it and the standard in turn, until
-/// they are equal. After a turn the stylus need not go home: an object that appears around it gives
-/// no force until it has been left.
+/// The participant adjusts the level of one stimulus and feels it and the standard in turn, until
+/// they are equal. After a turn the stylus need not go home: an object that appears around it
+/// exerts no force until the stylus has left it.
 std::optional<Answer> Session::adjust(const protocols::Trial& trial, ServoState& servo) {
   const protocols::TaskBlock& block = task_of(trial);
   protocols::Interval own = trial.intervals[0];
@@ -378,7 +378,7 @@ void Session::take_task_answer(const protocols::Trial& trial, const std::optiona
         task.success = !trial.intervals[at].standard;
         const int side = protocols::side_of_levels(station_.protocol, block);
         record_.correct = task.success == comparison_is_right(block, task, side);
-        // On one side of the standard it is a forced choice: right answers count.
+        // On one side of the standard this is a forced choice: count right answers.
         if (side != 0) task.success = record_.correct;
       }
       break;
@@ -402,8 +402,8 @@ void Session::take_task_answer(const protocols::Trial& trial, const std::optiona
   }
 }
 
-/// Once a trial, however often it is shown; without an answer the block's own procedure goes on,
-/// which is on record.
+/// Ask once per trial, repeats included. Without an answer the block's own procedure continues,
+/// which is recorded.
 void Session::ask_level() {
   const protocols::Trial& trial = station_.plan.next();
   if (station_.advisor == nullptr || !trial.level || trial.task_block < 0) return;
@@ -439,7 +439,7 @@ void Session::read_instructions(const protocols::TaskBlock& block) {
   participant_.read_screens(screens_of(block.instructions));
 }
 
-/// A session that goes on within a block: what it is about is read again.
+/// Shows the block's instructions again when a session resumes within a block.
 void Session::resume_task_block() {
   if (station_.protocol.version == 1 || station_.plan.finished() || station_.plan.block_begins())
     return;
@@ -544,7 +544,7 @@ void Session::step() {
   switch (state_) {
     case State::instruction:
       state_ = before_trial();
-      if (state_ == State::end) {  // interrupted behind the last trial
+      if (state_ == State::end) {  // interrupted after the last trial
         show_pages(protocols::PageSpec::When::after);
         participant_.read(texts.end);
         break;
@@ -596,7 +596,7 @@ void Session::tell_feedback() {
                 .feedback
           : record_.practice || station_.protocol.response.feedback;
   station_.plan.answered(
-      outcome_of(record_));  // first: whoever leaves during the feedback has answered
+      outcome_of(record_));  // first: a participant who leaves during the feedback has answered
   if (feedback && data::has_right_answer(record_)) participant_.feedback(record_.correct);
 }
 
@@ -614,7 +614,7 @@ data::TrialRecord Session::planned_record(const protocols::Trial& trial) const {
   return record;
 }
 
-/// Practice belongs to the block that follows: they are not taken apart.
+/// Practice belongs to the block that follows: no break separates them.
 void Session::rest_between_blocks() {
   if (station_.plan.done() > 0 && !station_.plan.after_practice()) rest();
 }
@@ -726,7 +726,7 @@ void Session::take_answer(const protocols::Trial& trial, const std::optional<Ans
     record_.response = station_.protocol.stimuli[static_cast<std::size_t>(answer->stimulus)].name;
     record_.correct = answer->stimulus == trial.stimulus;
   }
-  // The answer may have come before the tick that was looked at last.
+  // The answer may precede the last tick read.
   if (record_.first_contact_time && *record_.first_contact_time > record_.response_time)
     record_.first_contact_time.reset();
 }
@@ -765,11 +765,11 @@ void Session::record_sample(const Sample& sample) {
   kept.contact_type = static_cast<std::uint8_t>(rendering.deepest.type);
   kept.buttons = sample.buttons;
   kept.faults = sample.faults;
-  const auto bodies = station_.servo.bodies();  // one at most: a stimulus is one object
+  const auto bodies = station_.servo.bodies();  // at most one: a stimulus is one object
   kept.bodies = bodies.empty() ? 0 : 1;
   record_.samples.push_back(kept);
   if (bodies.empty() && record_.bodies.empty()) return;
-  record_.bodies.resize(record_.samples.size());  // with those of intervals without one
+  record_.bodies.resize(record_.samples.size());  // with the samples of empty intervals
   if (!bodies.empty()) record_.bodies.back() = body_record(bodies.front());
 }
 

@@ -1,5 +1,6 @@
 #pragma once
-// The trial loop: a session as a state machine, the same for simulated and live participants.
+// The trial loop: a session as a state machine, the same for simulated and live participants. Also
+// its holds (pauses and faults), its masking noise and its events.
 
 #include <functional>
 #include <memory>
@@ -16,7 +17,7 @@
 
 namespace palpate::runner {
 
-// Why and how a live session ends before its last trial.
+// The end of a session before its last trial.
 
 /// The end of a session before its last trial; what() says why, for the record.
 class EndOfSession : public std::runtime_error {
@@ -27,22 +28,22 @@ class EndOfSession : public std::runtime_error {
   bool failed;  ///< ended by a signal or fault
 };
 
-/// What the experimenter's "quit" with these words means. Any form of "withdraw" among them, in
-/// upper or lower case, records a withdrawal.
+/// The end that the experimenter's "quit" with these words asks for. Any form of "withdraw" among
+/// them, in upper or lower case, records a withdrawal.
 EndOfSession end_by_experimenter(const std::string& words);
 
-// What keeps the next trial of a live session from beginning: the experimenter's pause, or a fault
-// that took the forces off. After a fault forces come back only as the experimenter allows them.
+// A hold prevents the next trial of a live session: the experimenter's pause, or a fault that
+// turned the forces off. After a fault, forces return only when the experimenter allows them.
 
 /// Belongs to the session's thread.
 class SessionHold {
  public:
-  /// Each says more than the one before.
+  /// In order of severity.
   enum class Kind {
     none,
     pause,
-    transient_fault,  ///< forces are off, but what took them off is over: going on clears it
-    fault,            ///< forces are off: it must be cleared before the session can go on
+    transient_fault,  ///< forces are off, but the cause is over: resuming clears it
+    fault,            ///< forces are off: clear it before resuming
   };
 
   /// \param say  takes messages for the experimenter. All must outlive it.
@@ -51,31 +52,31 @@ class SessionHold {
       : station_(station), forces_(forces), say_(std::move(say)) {}
 
   Kind kind() const { return kind_; }
-  /// Why forces are off; empty: they are not, or not by a fault that has been noticed.
+  /// The reason that forces are off; empty: they are on, or the fault has not been noticed.
   const std::string& fault() const { return fault_; }
   /// For the console: "paused" or "fault".
   std::string state() const { return kind_ == Kind::pause ? "paused" : fault_state_; }
-  /// For the console: the reason, and what to press or type to go on.
+  /// For the console: the reason, and the button or command to resume.
   std::string held_by() const;
-  /// What to press or type to go on.
+  /// The button or command to resume.
   std::string how_to_continue() const;
 
   void pause();
-  /// Forces are off and nothing goes on until the experimenter says so.
-  /// \param transient  what took them off is over by itself
+  /// Turns forces off and holds the session until the experimenter resumes it.
+  /// \param transient  whether the cause ends by itself
   void hold(const std::string& reason, bool transient, DeviceTrouble trouble);
-  /// Zero force at once, as somebody asked. \param by  what asked for it: "the key F12"
-  /// \param in_trial  the trial under way is cut off first; else nothing goes on from now
+  /// Zero force at once, on request. \param by  source of the request: "the key F12"
+  /// \param in_trial  first cuts off the current trial; else holds the session now
   void emergency_zero(const std::string& by, bool in_trial);
-  /// The experimenter says that the cause is removed. True: forces are allowed again and the
-  /// session is paused; false: forces stay off, or there is no fault; either is said.
+  /// The experimenter reports the cause removed. True: forces are allowed again and the session is
+  /// paused; false: forces stay off, or there is no fault. Reports either.
   bool clear_fault();
   void go_on();
-  /// The session goes on: the reason was another time's.
+  /// Call when the session resumes: the next hold has its own reason.
   void forget_reason() { reason_.clear(); }
 
  private:
-  bool allow_forces();  ///< false: forces stay off; why is said
+  bool allow_forces();  ///< false: forces stay off; the reason is reported
 
   const LiveStation& station_;
   LiveForces& forces_;
@@ -86,57 +87,57 @@ class SessionHold {
   std::string zero_asked_by_;         ///< " by the key F12"
 };
 
-// Masking noise in a live session: it sounds while trials are run, and what was heard goes on
-// record.
+// Masking noise in a live session: it plays while trials run, and its start and end are recorded.
 
-/// Belongs to the session's thread. Does nothing where the station has no noise.
+/// Belongs to the session's thread. Does nothing if the station has no noise.
 class SessionNoise {
  public:
   /// \param say  takes messages for the experimenter. The station must outlive it.
   SessionNoise(const LiveStation& station, std::function<void(const std::string&)> say)
       : station_(station), say_(std::move(say)) {}
 
-  /// On, if it is not. False: the sound output cannot be opened, which is said.
+  /// Starts the noise, unless it plays. False: the sound output cannot be opened, which is
+  /// reported.
   bool start();
-  /// Off, if it is on.
+  /// Stops the noise if it plays.
   void stop();
-  /// True where the output has failed since start(), as when headphones are pulled out: it is said,
-  /// and the noise is off.
+  /// True if the output has failed since start(), as when headphones are pulled out: reports it and
+  /// stops the noise.
   bool has_failed();
-  /// "Go": forces are on.
+  /// Plays the tone for "go": forces are on.
   void go_tone();
-  /// Of the protocol's sounds, where it has this one.
+  /// Plays the protocol's sound for the cue, if it has one.
   void cue(SoundCue cue);
 
  private:
   const LiveStation& station_;
   std::function<void(const std::string&)> say_;
-  bool on_record_ = false;  ///< its start is on record, its end is not
+  bool on_record_ = false;  ///< its start is on record, its end is not yet
 };
 
-/// A trial could not go on: the device was lost or forces went off. The attempt is on record as cut
-/// off, forces are zero.
+/// A trial could not continue: the device was lost or forces went off. The attempt is recorded as
+/// cut off, forces are zero.
 class SessionFault : public std::runtime_error {
  public:
   SessionFault(const std::string& what, std::string why, std::uint32_t bits, DeviceTrouble device)
       : std::runtime_error(what), reason(std::move(why)), faults(bits), trouble(device) {}
-  /// It is over by itself: the machine was late, nothing is wrong with device or stylus.
+  /// Whether the fault ends by itself: the machine was late, device and stylus are well.
   bool is_transient() const;
-  std::string reason;    ///< why forces are off
+  std::string reason;    ///< of the forces going off
   std::uint32_t faults;  ///< of the tick
   DeviceTrouble trouble;
 };
 
-/// Why forces went off, in words. \param faults, trouble  of a sample with kTripped
+/// The reason that forces went off, in words. \param faults, trouble  of a sample with kTripped
 std::string trip_reason(std::uint32_t faults, DeviceTrouble trouble);
 
-/// What is shown of a page.
+/// The visible part of a page.
 struct PageView {
-  std::string page, question;  ///< names; of a consent the question is "consent"
+  std::string page, question;  ///< names; for a consent the question is "consent"
   int number = 0, questions = 0;
 };
 
-/// What happens in a trial, as it happens: for markers and the experimenter's console.
+/// The events of a trial, as they happen: for markers and the experimenter's console.
 class SessionEvents {
  public:
   virtual ~SessionEvents() = default;
@@ -151,17 +152,17 @@ class SessionEvents {
   virtual void recorded(const data::TrialRecord& record) = 0;
   /// Version 2: an interval of the trial is about to begin.
   virtual void interval(const protocols::Trial& /*trial*/, const IntervalView& /*view*/) {}
-  /// Version 2: a page is shown, or a question of it: its number, from 1, of so many; 0: the text.
-  /// Empty names: the page is over.
+  /// Version 2: a page is shown, or one of its questions: its number, from 1, and their count; 0:
+  /// the text. Empty names: the page is over.
   virtual void page(const PageView& /*view*/) {}
-  /// Version 2: how sure the participant is, is asked, with forces off, or no longer.
+  /// Version 2: the question for confidence begins (forces off) or ends.
   virtual void asking(bool /*now*/) {}
 };
 
 class Session {
  public:
   enum class State {
-    instruction,  ///< what this is about; also after an interruption
+    instruction,  ///< introduces the session; also after an interruption
     practice,     ///< a block that is not analysed begins
     block,        ///< a block begins
     rest,         ///< a break is due
@@ -172,26 +173,26 @@ class Session {
 
   /// \param station      its parts must outlive the session
   /// \param events       may be none
-  /// \param least_reach  m; the home zone leaves at least so much room, whichever the stimulus. A
-  /// person whom the screen tells to move away must not learn a shape from where that ends.
+  /// \param least_reach  m; least radius of the home zone, for every stimulus. The place where the
+  /// screen stops asking to move away must not reveal a shape.
   Session(const Station& station, Respondent& participant, SessionEvents* events = nullptr,
           double least_reach = 0);
 
   State state() const { return state_; }
   const SessionPlan& plan() const { return station_.plan; }
-  /// Whether a page after the last trial waits for answers.
+  /// Whether a page after the last trial still needs answers.
   bool has_open_pages() const;
-  /// Does what the state asks for and moves on. Between any two calls everything that happened is
-  /// on record: whatever is thrown in a trial, forces are zero, the attempt is cut off, and the
-  /// next call shows the trial again. \throws SessionFault; StoreError when a record could not be
-  /// written; what the participant throws, but TrialCutOff.
+  /// Does the work of the current state and moves on. Between two calls every event is on record:
+  /// after any exception in a trial, forces are zero, the attempt is cut off, and the next call
+  /// shows the trial again. \throws SessionFault; StoreError when a record could not be written;
+  /// exceptions of the participant, except TrialCutOff.
   void step();
 
  private:
   State before_trial() const;
   data::TrialRecord planned_record(const protocols::Trial& trial) const;
-  bool run_trial();  ///< false: it was cut off
-  /// What the servo said last in a trial.
+  bool run_trial();  ///< false: the trial was cut off
+  /// The servo's last values in a trial.
   struct ServoState {
     std::uint32_t faults = 0;
     DeviceTrouble trouble = DeviceTrouble::none;
@@ -240,7 +241,7 @@ class Session {
   ContactLog contact_;                   ///< likewise
   ServoQuality quality_;                 ///< likewise, of its intervals so far
   std::unique_ptr<LevelScenes> scenes_;  ///< version 2
-  int asked_trial_ = 0;                  ///< the last one whose level an advisor was asked for
+  int asked_trial_ = 0;                  ///< the last trial for which an advisor was asked
 };
 
 }  // namespace palpate::runner

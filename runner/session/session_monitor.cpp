@@ -16,7 +16,7 @@ constexpr double kSecond_ns = 1e9;
 constexpr std::int64_t kFrame_ns = 33'000'000;  // of the console
 constexpr std::size_t kMostMessages = 200;
 
-/// For the console; null: as it was shown last.
+/// For the console; null: keep the text on show.
 const char* in_words(Session::State state) {
   switch (state) {
     case Session::State::instruction:
@@ -168,7 +168,7 @@ void SessionMonitor::began(const protocols::Trial& trial) {
 
 void SessionMonitor::onset(const data::TrialRecord& so_far) {
   feeling_ = true;
-  if (turned_) return;  // the forces of one interval, changed
+  if (turned_) return;  // a turn changes the forces within one interval
   sources_.noise.go_tone();
   marker_.kind = began_feeling_ ? Marker::Kind::interval : Marker::Kind::trial_start;
   began_feeling_ = true;
@@ -201,7 +201,7 @@ void SessionMonitor::cut_off(const std::string& reason) {
   say("trial " + std::to_string(marker_.trial) + " was cut off: " + reason);
 }
 
-/// The record has every digit of a level that was set.
+/// For the experimenter; the record has every digit of an adjusted level.
 std::string SessionMonitor::answer_in_words(const data::TrialRecord& record) const {
   if (!record.task || !record.task->number ||
       record.task->task != to_string(protocols::TaskKind::adjust))
@@ -225,7 +225,7 @@ void SessionMonitor::recorded(const data::TrialRecord& record) {
   const double took = static_cast<double>(station_.clock.now_ns() - trial_began_ns_) / kSecond_ns;
   ++timed_trials_;
   seconds_per_trial_ += (took - seconds_per_trial_) / timed_trials_;
-  // A device with motors would have cut it off.
+  // A device with motors would have cut the trial off.
   if ((record.faults & servo_fault::kMissedTicks) != 0)
     say("trial " + std::to_string(record.trial) + " missed " + std::to_string(record.missed_ticks) +
         " ticks, up to " + milliseconds(record.longest_period_ns) +

@@ -1,5 +1,5 @@
 #pragma once
-// What others see of a live session: the experimenter's console, and the markers that go to other
+// The outside view of a live session: the experimenter's console, and the markers for other
 // recordings, both fed by the events of its trials.
 
 #include <cstdint>
@@ -12,10 +12,11 @@
 
 namespace palpate::runner {
 
-/// Belongs to the session's thread.
+/// Shows a session's events on the console and sends them as markers. Belongs to the session's
+/// thread.
 class SessionMonitor final : public SessionEvents {
  public:
-  /// What it looks at. All must outlive it.
+  /// Its inputs and outputs. All must outlive it.
   struct Sources {
     const Session& session;
     const KeyboardRespondent& respondent;
@@ -25,22 +26,22 @@ class SessionMonitor final : public SessionEvents {
   };
   SessionMonitor(const LiveStation& station, const Sources& sources);
 
-  /// A message for the experimenter, shown at once.
+  /// Shows a message to the experimenter at once.
   void say(const std::string& message);
-  /// The console as of now.
+  /// Updates the console.
   void show();
-  /// As show(), but no more than 30 times a second.
+  /// Updates the console, at most 30 times a second.
   void show_if_due();
 
-  /// From the beginning of a trial to its answer, or until it is cut off.
+  /// True from the beginning of a trial until its answer or cut-off.
   bool in_trial() const { return in_trial_; }
   /// s, since the session began.
   double elapsed() const;
-  /// A trial that is on record, for the accuracy so far.
+  /// Counts a recorded trial, for the accuracy so far.
   void count(const data::TrialRecord& record);
-  /// "after this trial"; empty: no stop is asked for.
+  /// "after this trial"; empty: no stop is planned.
   void plan_stop(const std::string& when) { state_.stop_plan = when; }
-  /// Nothing goes on, as `hold` says, until going_on().
+  /// The session is held, as `hold` says, until going_on().
   void held();
   void going_on() { state_.held_by.clear(); }
 
@@ -53,7 +54,7 @@ class SessionMonitor final : public SessionEvents {
   void interval(const protocols::Trial& trial, const IntervalView& view) override;
   void page(const PageView& view) override;
   void asking(bool now) override { asking_ = now; }
-  /// The trial's intervals are over, a question of it is not.
+  /// Whether the trial's intervals are over but a question of it is still open.
   bool asking() const { return asking_; }
 
  private:
@@ -62,16 +63,16 @@ class SessionMonitor final : public SessionEvents {
   const LiveStation& station_;
   const Sources sources_;
   ConsoleState state_;
-  Marker marker_;  ///< of the trial under way, to be filled in
+  Marker marker_;  ///< of the current trial, to be filled in
   std::int64_t started_ns_, trial_began_ns_ = 0, shown_ns_ = 0;  ///< session clock
   double seconds_per_trial_ = 0;                                 ///< mean, since the session began
   int timed_trials_ = 0;                                         ///< in that mean
   bool in_trial_ = false, feeling_ = false;
   bool began_feeling_ = false;  ///< the first interval of the trial has begun
-  bool turned_ = false;         ///< the interval follows a turn: nothing new begins for others
-  bool touched_ = false;        ///< in any interval of the trial
+  bool turned_ = false;   ///< the interval follows a turn: it is no new event for other recordings
+  bool touched_ = false;  ///< in any interval of the trial
   bool asking_ = false;
-  std::string page_;  ///< that is shown, as the state in words; empty: none
+  std::string page_;  ///< on show, as the state in words; empty: none
 };
 
 }  // namespace palpate::runner

@@ -11,7 +11,7 @@
 namespace palpate::runner {
 namespace {
 
-constexpr std::size_t kMostKnown = 32;  // a sphere with its trees has a megabyte
+constexpr std::size_t kMostKnown = 32;  // a sphere with its trees takes a megabyte
 
 protocols::StimulusSpec shown_stimulus(const protocols::Protocol& protocol,
                                        const protocols::Trial& trial,

@@ -1,5 +1,5 @@
 #pragma once
-// The schedule of one session as it is worked off.
+// The schedule of one session during its run, and the scenes of its trials of version 2.
 
 #include <map>
 #include <memory>
@@ -15,16 +15,16 @@
 
 namespace palpate::runner {
 
-// The scenes of a session of version 2: stimuli at levels that answers choose, built as they come.
+// The scenes of a session of version 2: stimuli at levels that depend on answers, built on demand.
 
 class LevelScenes {
  public:
   /// \param protocol  must outlive it
   explicit LevelScenes(const protocols::Protocol& protocol);
 
-  /// What an interval of a trial shows, in the trial's orientation.
+  /// The scene of an interval of a trial, in the trial's orientation.
   rendering::Scene scene(const protocols::Trial& trial, const protocols::Interval& interval);
-  /// Its edges, until the next call; nothing to feel has none.
+  /// Its edges, valid until the next call; empty without a stimulus.
   const SharpEdges& edges(const protocols::Trial& trial, const protocols::Interval& interval);
 
  private:
@@ -33,17 +33,17 @@ class LevelScenes {
 
   const protocols::Protocol& protocol_;
   protocols::Protocol one_;  ///< the protocol with one stimulus
-  /// By block, stimulus and level; the newest ones.
+  /// By block, stimulus and level; only the newest ones are kept.
   std::map<std::tuple<int, int, std::optional<double>>, std::unique_ptr<const StimulusLibrary>>
       known_;
 };
 
-/// The level as the scene has it, in the world: for whoever draws it.
+/// The object at the interval's level, placed in the world: for drawing.
 stimuli::ObjectSpec shown_object(const protocols::Protocol& protocol, const protocols::Trial& trial,
                                  const protocols::Interval& interval);
 
-/// The trials of one session in order, grown by further rounds of practice until the protocol's
-/// criterion is met. Feeding it the answers on record brings it to where a session was interrupted.
+/// The trials of one session in order, extended by rounds of practice until the protocol's
+/// criterion is met. Feeding it the recorded answers restores the point of an interruption.
 class SessionPlan {
  public:
   SessionPlan(const protocols::Protocol& protocol, int participant_number, int session);
@@ -52,7 +52,7 @@ class SessionPlan {
   /// \pre not finished()
   const protocols::Trial& next() const { return tasks_ ? tasks_->next() : trials_[next_]; }
   std::size_t done() const { return tasks_ ? tasks_->done() : next_; }
-  /// As far as is known now.
+  /// As far as known now.
   std::size_t size() const { return tasks_ ? tasks_->size() : trials_.size(); }
   /// The number of its last block.
   int blocks() const {
@@ -64,11 +64,11 @@ class SessionPlan {
   std::size_t done_in_block() const { return done_in_block_; }  ///< of the next trial
   /// Whether the trial before the next one was practice, of this session.
   bool after_practice() const { return after_practice_; }
-  /// Version 2: the next trial, of an adaptive block, is shown at another level.
+  /// Version 2: sets another level for the next trial, of an adaptive block.
   void propose(double level) {
     if (tasks_) tasks_->propose(level);
   }
-  /// Version 2: a program says what the next trial, of an external block, is.
+  /// Version 2: an external program chooses the next trial, of an external block.
   void choose(const protocols::TrialChoice& choice) {
     if (tasks_) tasks_->choose(choice);
   }
@@ -89,10 +89,10 @@ class SessionPlan {
   int first_practice_block_ = 0;              ///< blocks before it are warm-up
   int round_ = 1;                             ///< of the practice under way
   int correct_ = 0, shown_ = 0;               ///< in that round
-  std::optional<protocols::TaskPlan> tasks_;  ///< version 2, instead of all this
+  std::optional<protocols::TaskPlan> tasks_;  ///< version 2, instead of all the members above
 };
 
-/// What became of a trial that is on record, for SessionPlan::answered.
+/// The outcome of a recorded trial, for SessionPlan::answered.
 protocols::TrialOutcome outcome_of(const data::TrialRecord& record);
 
 }  // namespace palpate::runner

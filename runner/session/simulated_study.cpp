@@ -82,7 +82,7 @@ void run_simulated_session(const SimulatedStudy& study, const SimulatedSession& 
   const Station station{protocol, study.library, session.plan, servo,
                         clock,    session.utc,   log,          session.advisor};
   Session trials(station, *participant);
-  // A trial that was shown is recorded, also when it is the last for now.
+  // A shown trial is recorded, even if the run stops after it.
   while (trials.state() != Session::State::end &&
          (trials.state() == Session::State::response || !halting())) {
     trials.step();
@@ -130,18 +130,18 @@ bool simulate_in_memory(
 
 namespace {
 
-/// One session of one participant, with what the store already holds of it.
+/// One session of one participant, with its records in the store.
 struct Work {
   data::Participant participant;
   int session = 1;
   std::vector<protocols::TrialOutcome> answers;  ///< of the trials on record
-  std::int64_t clock_ns = 0;                     ///< where the session's clock stood
+  std::int64_t clock_ns = 0;                     ///< the session's clock at its last record
   data::RunInfo info;
   std::vector<std::string> answered_pages;
-  std::vector<data::TrialRecord> completed;  ///< where somebody else proposes levels
+  std::vector<data::TrialRecord> completed;  ///< for an advisor that proposes levels
 };
 
-/// From the workers to the thread that owns the store.
+/// Carries records from the workers to the thread that owns the store.
 class Queue {
  public:
   explicit Queue(std::size_t room) : room_(room) {}
@@ -158,7 +158,7 @@ class Queue {
     if (error && !error_) error_ = error;
     done_.notify_all();
   }
-  /// Answers to a page are kept by the thread that owns the store, before the session's next trial.
+  /// The thread that owns the store keeps answers to a page before the session's next trial.
   void push(std::size_t work, const std::vector<data::PageAnswer>& answers) {
     const std::lock_guard lock(mutex_);
     pages_.emplace_back(work, answers);
@@ -180,7 +180,7 @@ class Queue {
     const std::lock_guard lock(mutex_);
     return std::exchange(pages_, {});
   }
-  /// Waits for up to 0.2 s, or until the workers are done or held up; takes what has come.
+  /// Waits for up to 0.2 s, or until the workers are done or held up; takes the new records.
   std::deque<std::pair<std::size_t, data::TrialRecord>> take(int workers, bool& all_done) {
     std::unique_lock lock(mutex_);
     done_.wait_for(lock, std::chrono::milliseconds(200),
@@ -252,7 +252,7 @@ void run_session(const SimulatedStudy& study, const Work& work, std::size_t inde
                         log, halting);
 }
 
-/// A participant who is there under two texts of one protocol would be counted twice.
+/// Refuses a participant who is enrolled under two texts of one protocol: it would count twice.
 void refuse_changed(data::Store& store, const data::ProtocolInfo& now) {
   for (const data::ProtocolInfo& before : store.protocols()) {
     if (before.name != now.name || before.sha256 == now.sha256 ||
@@ -325,7 +325,7 @@ class Recorder {
         }
         const std::size_t size = plan.size();
         plan.answered(outcome_of(record));
-        // Fewer where a procedure has ended early.
+        // Fewer trials if a procedure has ended early.
         progress.expected +=
             static_cast<std::int64_t>(plan.size()) - static_cast<std::int64_t>(size);
       }
@@ -340,7 +340,7 @@ class Recorder {
     }
     if (!has_pages_) end_finished();
   }
-  /// After the trials of the same time: pages after the last trial belong to its run, too.
+  /// Call after the trials of the same time: pages after the last trial belong to its run, too.
   void record(const std::deque<std::pair<std::size_t, std::vector<data::PageAnswer>>>& pages) {
     for (const auto& [index, answers] : pages) store_.add_page_answers(run_of(index), answers);
   }
@@ -389,8 +389,8 @@ SimulatedStylus simulated_stylus(const protocols::Protocol& protocol,
 
 std::vector<stimuli::ObjectSpec> shapes_of(const protocols::Protocol& protocol) {
   std::vector<stimuli::ObjectSpec> shapes;
-  // Tasks of version 2 but identification are not answered by the shape: any will do to explore
-  // with, and of two that are alike none is ever found, so that it goes on to perceive.
+  // Tasks of version 2 other than identification do not ask for the shape. Any shape serves for
+  // exploring; two equal shapes are never told apart, so the observer continues to perceive.
   if (protocol.version == 2) return {stimuli::ObjectSpec{}, stimuli::ObjectSpec{}};
   for (const protocols::StimulusSpec& stimulus : protocol.stimuli)
     shapes.push_back(stimulus.object);
@@ -418,11 +418,11 @@ std::vector<std::string> simulation_faults(const protocols::Protocol& protocol,
         "another program says what a block of the task 'external' shows: palpate serve runs it");
   }
   for (const protocols::StimulusSpec& stimulus : protocol.stimuli) {
-    if (protocol.version == 2) break;  // its tasks are not answered by the shape
+    if (protocol.version == 2) break;  // its tasks do not ask for the shape
     const std::string fault = ShapeHypotheses::fault_of(stimulus.object);
     if (!fault.empty()) faults.push_back("stimulus '" + stimulus.name + "': " + fault);
   }
-  try {  // settings that were patched
+  try {  // patched settings may be invalid
     const ShapeHypotheses hypotheses({stimuli::ObjectSpec{}});
     SimulatedParticipant(individual(settings, 0, 1), hypotheses, device, protocol, 0, 1);
   } catch (const std::invalid_argument& error) {
@@ -470,7 +470,7 @@ StudyProgress simulate_study(const protocols::Protocol& protocol, data::Store& s
   std::exception_ptr failure;
   for (bool all_done = false; !all_done;) {
     auto came = queue.take(workers, all_done);
-    if (failure) continue;  // the workers are finishing their trials; nothing more can be recorded
+    if (failure) continue;  // the workers finish their trials; no more can be recorded
     try {
       recorder.record(std::move(came), progress);
       recorder.record(queue.take_pages());

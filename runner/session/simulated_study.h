@@ -23,11 +23,12 @@
 namespace palpate::runner {
 
 // One session of one simulated participant: the trial loop, servo and renderers of a live session
-// with a virtual clock. simulate_study() stores what it gives, a sweep keeps figures of it alone.
+// with a virtual clock. simulate_study() stores its records; a sweep keeps only summary figures.
 
-/// What the sessions of a study share, read only.
+/// Data that the sessions of a study share, read only.
 struct SimulatedStudy {
-  /// \throws std::invalid_argument naming what the simulated device or participant cannot do.
+  /// \throws std::invalid_argument naming the demands that the simulated device or participant
+  /// cannot meet.
   /// \param protocol, settings  must outlive it
   SimulatedStudy(const protocols::Protocol& protocol, const SimulatedSettings& settings,
                  std::uint64_t seed);
@@ -43,31 +44,31 @@ struct SimulatedStudy {
 struct SimulatedSession {
   int participant = 1;  ///< number
   SessionPlan plan;
-  std::int64_t clock_ns = 0;  ///< where its clock stands
+  std::int64_t clock_ns = 0;  ///< start of its clock
   data::ClockStamp utc;
   LevelAdvisor* advisor = nullptr;
 };
 
-/// \param halting  asked between trials; one that was shown is finished
+/// \param halting  asked between trials; a shown trial is finished
 void run_simulated_session(const SimulatedStudy& study, const SimulatedSession& session,
                            TrialLog& log, const std::function<bool()>& halting);
 
-/// What is on record of a session of a simulated participant before its first trial. Its clock is
-/// that of a day of its own, from nine in the morning.
+/// The run record of a simulated participant's session before its first trial. Its clock begins at
+/// nine in the morning of a day of its own.
 data::RunInfo simulated_run(const protocols::Protocol& protocol, const SimulatedSettings& settings,
                             int participant, int session);
 
-/// A whole study that is stored nowhere: participants from 1, their sessions in order, in this
-/// thread. \param visit  number of the participant, a trial, its ticks with contact. \return false:
-/// it was stopped before its end. \throws as SimulatedStudy
+/// Simulates a whole study without storing it: participants from 1, their sessions in order, in
+/// this thread. \param visit  gets the participant's number, a trial and its ticks with contact.
+/// \return false: stopped before its end. \throws as SimulatedStudy
 bool simulate_in_memory(
     const protocols::Protocol& protocol, const SimulatedSettings& settings, int participants,
     std::uint64_t seed, const std::atomic<bool>& stop,
     const std::function<void(int, const data::TrialRecord&, std::uint64_t)>& visit);
 
 struct StudyPlan {
-  int participants = 7;         ///< the number of the last one
-  int before = 0;               ///< the number before that of the first one
+  int participants = 7;         ///< number of the last one
+  int before = 0;               ///< number before that of the first one
   std::uint64_t seed = 1;       ///< of the participants; the schedule has the protocol's own
   int jobs = 1;                 ///< threads
   std::string event = {};       ///< for each session's record; empty: none
@@ -77,7 +78,7 @@ struct StudyPlan {
 
 struct StudyProgress {
   std::int64_t recorded = 0;     ///< trials in the store, earlier runs included
-  std::int64_t expected = 0;     ///< in all, as far as is known
+  std::int64_t expected = 0;     ///< in all, as far as known
   std::int64_t this_run = 0;     ///< recorded since this call
   double simulated_seconds = 0;  ///< of session time since this call
   struct Answers {
@@ -87,28 +88,30 @@ struct StudyProgress {
 };
 
 struct LimitedForSimulation {
-  std::vector<std::string> texts;  ///< a sentence for each material that was scaled down
-  std::string event;               ///< for StudyPlan::event; empty: none was
+  std::vector<std::string> texts;  ///< a sentence for each limited material
+  std::string event;               ///< for StudyPlan::event; empty: no material was limited
 };
-/// Scales the protocol's materials down to what the simulated device can show, where the protocol
+/// Scales the protocol's materials down to the limits of the simulated device, where the protocol
 /// asks for that (servo.material_limit).
 LimitedForSimulation limit_for_simulation(protocols::Protocol& protocol,
                                           const SimulatedSettings& settings);
 
-/// The stimuli as the observer's hypotheses need them.
+/// The stimuli as hypotheses of the observer.
 std::vector<stimuli::ObjectSpec> shapes_of(const protocols::Protocol& protocol);
 
-/// Why the simulated device or participant cannot do a protocol, a sentence each; empty: they can.
+/// The reasons that the simulated device or participant cannot run a protocol, a sentence each;
+/// empty: they can.
 std::vector<std::string> simulation_faults(const protocols::Protocol& protocol,
                                            const StimulusLibrary& library,
                                            const SimulatedSettings& settings);
 
-/// Runs what has no record yet. The same seed gives the same records whatever the number of jobs
-/// and of interruptions: each trial has a random stream, each session a virtual clock and calendar
-/// of its own, and a trial that was not recorded is run again as if for the first time. \param stop
-/// set from outside (a signal): the trials under way are finished and recorded \param report called
-/// every 0.2 s or so \throws std::invalid_argument where the simulated device or participant cannot
-/// do the protocol; StoreError
+/// Runs the trials that have no record yet. The same seed gives the same records for any number of
+/// jobs and interruptions: each trial has a random stream, each session a virtual clock and
+/// calendar of its own, and an unrecorded trial is run again as if for the first time.
+/// \param stop  set from outside (a signal): the current trials are finished and recorded
+/// \param report  called every 0.2 s or so
+/// \throws std::invalid_argument: the simulated device or participant cannot run the protocol;
+/// StoreError
 StudyProgress simulate_study(const protocols::Protocol& protocol, data::Store& store,
                              const SimulatedSettings& settings, const StudyPlan& plan,
                              const std::atomic<bool>& stop,

@@ -25,7 +25,7 @@ namespace {
 using AdvisorJson = nlohmann::ordered_json;
 using std::chrono::steady_clock;
 
-constexpr std::size_t kMostShown = 80;  // bytes of what is quoted
+constexpr std::size_t kMostShown = 80;  // bytes of a quotation
 
 std::string line_of(const AdvisorJson& message) {
   return message.dump(-1, ' ', false, AdvisorJson::error_handler_t::replace) + "\n";
@@ -49,7 +49,7 @@ int milliseconds_until(steady_clock::time_point until) {
   return static_cast<int>(std::clamp<long long>(left, 0, 60'000));
 }
 
-/// Connected; -1: none, and why.
+/// A connected socket; -1: none, and `trouble` has the reason.
 int open_socket(const std::string& path, std::string& trouble) {
   sockaddr_un address{};
   address.sun_family = AF_UNIX;
@@ -108,7 +108,7 @@ void SocketAdvisor::disconnect() {
   received_.clear();
 }
 
-/// All of it: who reads nothing has no more room for it soon.
+/// Sends the whole line or fails: a peer that never reads fills its buffer.
 bool SocketAdvisor::send(const std::string& line) {
   const auto until = steady_clock::now() + std::chrono::duration_cast<steady_clock::duration>(
                                                std::chrono::duration<double>(settings_.time_out));
@@ -132,7 +132,7 @@ bool SocketAdvisor::send(const std::string& line) {
 
 std::optional<std::string> SocketAdvisor::receive(Deadline until) {
   while (true) {
-    // A flood of old answers is no answer either.
+    // A flood of old answers counts as no answer.
     if (steady_clock::now() >= until) {
       trouble_ = "no answer in time";
       return std::nullopt;
@@ -171,7 +171,7 @@ std::string SocketAdvisor::refusal(const std::string& message, int trial) const 
   return line_of({{"type", "refused"}, {"trial", trial}, {"message", message}});
 }
 
-/// nullopt with trouble_: nonsense; without: of an earlier question.
+/// nullopt with trouble_: an invalid line; without: the level answers an earlier question.
 std::optional<double> SocketAdvisor::level_in(const std::string& line,
                                               const protocols::Trial& next) {
   const std::string found = "; found " + printable(line, kMostShown);

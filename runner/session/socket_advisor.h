@@ -10,9 +10,9 @@
 //   from it  {"type": "level", "trial": T, "level": X}
 //
 // TRIAL: "trial", "block", "track", "level", "success", "correct", "answered", "catch_trial".
-// Answers to earlier questions are ignored. Who does not answer in time, or answers nonsense, is
-// asked again before the next trial; who is gone, or sends a line that is too long, is called
-// again.
+// Answers to earlier questions are ignored. A program that does not answer in time, or sends an
+// invalid line, is asked again before the next trial; after a closed connection or an overlong
+// line, the session connects again.
 
 #include <chrono>
 #include <optional>
@@ -25,21 +25,21 @@
 
 namespace palpate::runner {
 
-// Somebody outside of the program who proposes the levels of adaptive blocks.
+// An external program that proposes the levels of adaptive blocks.
 
 class LevelAdvisor {
  public:
   virtual ~LevelAdvisor() = default;
-  /// Before a trial of an adaptive block, forces off. \return the level to be shown, within those
-  /// of levels_of(block); nullopt: the block's own procedure goes on, and trouble() says why
+  /// Asks before a trial of an adaptive block, with forces off. \return the level to show, within
+  /// levels_of(block); nullopt: the block's own procedure continues, and trouble() has the reason
   virtual std::optional<double> ask(const protocols::Trial& next) = 0;
-  /// A trial of an adaptive block is on record.
+  /// Reports a recorded trial of an adaptive block.
   virtual void tell(const data::TrialRecord& record) = 0;
-  /// Why the last question had no answer; empty: it had one.
+  /// The reason that the last question had no answer; empty: it had one.
   virtual const std::string& trouble() const = 0;
 };
 
-/// Why nobody can be asked at a socket; empty: somebody listens.
+/// The reason that no program can be asked at a socket; empty: one listens.
 std::string socket_fault(const std::string& path);
 
 class SocketAdvisor final : public LevelAdvisor {
@@ -47,13 +47,13 @@ class SocketAdvisor final : public LevelAdvisor {
   static constexpr std::size_t kMostLine = 65536;  ///< bytes
 
   struct Settings {
-    std::string path;     ///< of the socket at which the program listens
+    std::string path;     ///< of the program's socket
     double time_out = 1;  ///< s, for an answer
     int participant = 1;  ///< number
     int session = 1;
   };
   /// Connects. \param protocol  must outlive it. \param history  completed trials of the session.
-  /// \throws std::invalid_argument: nobody listens there
+  /// \throws std::invalid_argument: no program listens there
   SocketAdvisor(const protocols::Protocol& protocol, Settings settings,
                 const std::vector<data::TrialRecord>& history);
   ~SocketAdvisor() override;
@@ -69,7 +69,7 @@ class SocketAdvisor final : public LevelAdvisor {
   bool connect();
   void disconnect();
   bool send(const std::string& line);
-  /// The next line; nullopt: none until then, and trouble_ says why.
+  /// The next line; nullopt: none until then, and trouble_ has the reason.
   std::optional<std::string> receive(Deadline until);
   std::optional<double> level_in(const std::string& line, const protocols::Trial& next);
   std::string refusal(const std::string& message, int trial) const;
@@ -78,7 +78,7 @@ class SocketAdvisor final : public LevelAdvisor {
   Settings settings_;
   std::string history_;  ///< of all trials so far, as JSON, separated by commas
   int socket_ = -1;
-  std::string received_;  ///< bytes of a line that is not complete
+  std::string received_;  ///< bytes of an incomplete line
   std::string trouble_;
 };
 

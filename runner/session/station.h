@@ -1,6 +1,6 @@
 #pragma once
-// What a session works with, part by part. The `run` command opens a live station and
-// simulate_study() a simulated one; whoever opens it owns its parts until the session is over.
+// A station has the parts that a session works with. The `run` command opens a live station and
+// simulate_study() a simulated one; the opener owns the parts until the session is over.
 
 #include <cstdint>
 #include <functional>
@@ -20,39 +20,40 @@
 
 namespace palpate::runner {
 
-/// Of every session, simulated or live.
+/// The parts of every session, simulated or live.
 struct Station {
-  const protocols::Protocol& protocol;  ///< its materials limited to what the device can show
+  const protocols::Protocol& protocol;  ///< its materials limited to the device
   const StimulusLibrary& library;  ///< the protocol's stimuli at all levels, as convex meshes, m
-  SessionPlan plan;      ///< the schedule, at the first trial that is not on record when it begins
-  TickSource& servo;     ///< the servo loop: one sample a tick. Live: the servo thread
+  SessionPlan plan;                ///< the schedule, initially at the first unrecorded trial
+  TickSource& servo;               ///< the servo loop: one sample a tick. Live: the servo thread
   Clock& clock;          ///< session clock, ns: of ticks, keys, markers. Simulated: virtual
   data::ClockStamp utc;  ///< one moment on the session clock and in UTC
-  TrialLog& log;         ///< takes every trial before the next one begins. Live: the run record
-  LevelAdvisor* advisor = nullptr;  ///< proposes levels of adaptive blocks; none: nobody does
+  TrialLog& log;         ///< records every trial before the next one begins. Live: the run record
+  LevelAdvisor* advisor = nullptr;  ///< proposes levels of adaptive blocks; may be null
 };
 
-/// ns, of the session's thread between two looks at console, device and participant.
+/// ns, between two polls of console, device and participant by the session's thread.
 inline constexpr std::int64_t kSessionNap_ns = 5'000'000;
 
-/// Of a live session: a person, a device, two displays. Threads and processes of their own have the
-/// servo, the watchdog, the displays, the markers and the noise; all else is the session thread's.
+/// The parts of a live session: a person, a device, two displays. The servo, the watchdog, the
+/// displays, the markers and the noise have threads or processes of their own; all else belongs to
+/// the session's thread.
 struct LiveStation : Station {
-  RunRecord& record;                 ///< who takes part, in which session; its notes and trials
-  const DeviceCapabilities& device;  ///< of the device that is open
-  GuardedDevice* guard;              ///< its watchdog; none without force feedback
+  RunRecord& record;                 ///< participant, session, notes and trials
+  const DeviceCapabilities& device;  ///< of the open device
+  GuardedDevice* guard;              ///< its watchdog; null without force feedback
   ServoThread& servo_thread;
-  /// Felt in the pre-flight; none without force feedback. Outlives the servo thread.
+  /// Felt in the pre-flight; null without force feedback. Outlives the servo thread.
   const ForceDirectionCheck* direction_check;
-  std::function<int()> end_requested;  ///< the signal that asked the program to end; 0: none has
+  std::function<int()> end_requested;  ///< the signal that asked the program to end; 0: none
   ParticipantScreen& screen;
   ExperimenterConsole& console;
   AnswerBy answer_by;
   Markers& markers;    ///< for other recordings: EEG, motion capture
-  NoisePlayer* noise;  ///< noise and tones in the participant's headphones; none: not wanted
+  NoisePlayer* noise;  ///< noise and tones in the participant's headphones; null: not wanted
 };
 
-/// The radius about the origin that holds each of the library's stimuli in any orientation, m.
+/// m, the radius about the origin that holds every stimulus of the library in any orientation.
 double largest_reach(const Station& station);
 
 }  // namespace palpate::runner
