@@ -83,7 +83,8 @@ analysis::FunctionSettings function_settings(const boost::program_options::varia
   return settings;
 }
 
-/// Blocks of one name in two protocols are two things. \throws UsageError
+/// Refuses several protocols: blocks of the same name in two protocols are different. \throws
+/// UsageError
 void require_one_protocol(const analysis::TaskTable& table, const std::string& wanted) {
   if (table.protocols.size() < 2) return;
   std::string names;
@@ -92,12 +93,12 @@ void require_one_protocol(const analysis::TaskTable& table, const std::string& w
     names += (names.empty() ? "" : ", ") + printable(name) + " (" + sha256.substr(0, 12) + ")";
     one_name &= name == table.protocols.front().first;
   }
-  if (one_name && !wanted.empty()) return;  // of one name, as was asked for
+  if (one_name && !wanted.empty()) return;  // one name, as requested
   throw UsageError(printable(table.source) + ": has trials of several protocols (" + names +
                    "); say which with --protocol NAME, or with the begin of its checksum");
 }
 
-/// A study of version 2, or its export.
+/// Analyses a study of version 2, or its export.
 void analyze_tasks_of(const std::string& database, const std::string& csv,
                       const std::string& protocol, const analysis::AnalysisSettings& settings,
                       const analysis::FunctionSettings& functions, Outputs& outputs) {
@@ -122,7 +123,7 @@ void analyze_tasks_of(const std::string& database, const std::string& csv,
   std::cout << task_report_text(found);
 }
 
-/// Whether it is one; what cannot be read is told by who reads it.
+/// Whether the data are of tasks; the later reader reports unreadable data.
 bool is_of_tasks(const std::string& database, const std::string& csv) {
   try {
     return csv.empty() ? analysis::has_tasks(database) : analysis::has_task_column(csv);
@@ -131,7 +132,7 @@ bool is_of_tasks(const std::string& database, const std::string& csv) {
   }
 }
 
-/// What belongs to --movement alone, and what does not go with it.
+/// Checks the options of --movement and those that exclude it.
 void check_movement(const boost::program_options::variables_map& values, double cutoff, int jobs) {
   if (!values.count("movement")) {
     for (const char* option : {"movement-csv", "meshes"}) {

@@ -60,7 +60,7 @@ const TickCost* find_union(const std::vector<TickCost>& rows, std::size_t triang
   return nullptr;
 }
 
-/// Ten near parts and three segments: the cost, and with what it grows.
+/// Ten near parts and three segments: the cost, and its growth.
 std::string growth_of_unions(const std::vector<TickCost>& rows) {
   const TickCost* const ten = find_union(rows, 1280, 10);
   const TickCost* const many = find_union(rows, 1280, 1000);
@@ -76,7 +76,7 @@ std::string growth_of_unions(const std::vector<TickCost>& rows) {
   return text;
 }
 
-/// What the numbers mean for a lab.
+/// The meaning of the numbers for a lab.
 std::string conclusions(const std::vector<TickCost>& rows) {
   std::string out;
   char text[300];

@@ -42,7 +42,7 @@ void print(const std::string& out, const data::MergeResult& done) {
   }
 }
 
-/// \throws UsageError: some are, some are not
+/// Whether the inputs are sweeps. \throws UsageError: some are, some are not
 bool are_sweeps(const std::vector<std::string>& inputs) {
   for (const std::string& input : inputs) {
     std::error_code error;
@@ -129,7 +129,7 @@ int merge_command(const std::vector<std::string>& args) {
     warn_of_exposure(out);
     print(out, done);
   } catch (const data::StoreRefused& error) {
-    throw UsageError(error.what());  // the files named are bad input: status 2
+    throw UsageError(error.what());  // a bad file is bad input: status 2
   }
   return 0;
 }

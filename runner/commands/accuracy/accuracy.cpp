@@ -20,18 +20,18 @@
 
 namespace palpate::runner {
 
-// What `palpate accuracy` measures. Shows its progress on a terminal.
+// The measurements of `palpate accuracy`. Shows progress on a terminal.
 
-/// The randomised search, at least `ticks` ticks; the walks are distributed among threads, the sums
-/// do not depend on how.
+/// Runs the randomised search, at least `ticks` ticks, with the walks distributed among threads;
+/// the sums do not depend on the distribution.
 rendering::SearchCounts search_in_threads(std::uint64_t ticks, std::uint64_t seed, int jobs);
 
-/// The same over unions of convex parts and tools.
+/// The same search over unions of convex parts and tools.
 rendering::UnionCounts search_unions_in_threads(std::uint64_t ticks, std::uint64_t seed, int jobs);
 
-/// Fills in everything, by report.settings: errors and run times, first contacts, unions, extreme
-/// cases, short searches.
-/// \param quick  without the extreme case whose mesh takes seconds to build
+/// Fills in the whole report, by report.settings: errors and run times, first contacts, unions,
+/// extreme cases, short searches.
+/// \param quick  skips the extreme case whose mesh takes seconds to build
 /// \param seed   of the searches
 void measure_accuracy(AccuracyReport& report, bool quick, int jobs, std::uint64_t seed);
 
@@ -99,7 +99,7 @@ void time_first_contact(AccuracyReport& report) {
   if (found > 0) throw std::runtime_error("a motion off the cube was taken for a contact");
 }
 
-/// \param quick  without the case whose mesh takes seconds to build
+/// \param quick  skips the case whose mesh takes seconds to build
 void run_extreme_cases(AccuracyReport& report, bool quick) {
   ProgressLine progress("extreme cases");
   const std::span<const rendering::ExtremeCase> cases = rendering::extreme_cases();
@@ -115,7 +115,7 @@ void run_extreme_cases(AccuracyReport& report, bool quick) {
   }
 }
 
-/// \param search  of (seed, first walk, walks)
+/// \param search  called with (seed, first walk, walks)
 template <class Counts>
 Counts in_threads(Counts (*search)(std::uint64_t, std::uint64_t, std::uint64_t),
                   std::uint64_t ticks, std::uint64_t seed, int jobs) {
@@ -156,7 +156,7 @@ void measure_accuracy(AccuracyReport& report, bool quick, int jobs, std::uint64_
     report.rows = rendering::accuracy_study(report.settings, now_ns,
                                             [&](double done) { progress.show(done); });
   }
-  // In proportion to the rest: 2000 of each by default.
+  // In proportion to the other studies: 2000 of each by default.
   study_first_contacts(report,
                        std::max(10, report.settings.paths * report.settings.contact_ticks / 2));
   time_first_contact(report);

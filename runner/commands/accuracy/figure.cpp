@@ -13,7 +13,7 @@
 namespace palpate::runner {
 namespace {
 
-// m: an error of 0 has no logarithm, and nobody needs to tell such errors apart.
+// m: an error of 0 has no logarithm, and smaller errors need not be distinguished.
 constexpr double kLeastOfShape = 1e-10, kLeastOfPolyhedron = 1e-18;
 
 struct MethodLook {
@@ -118,7 +118,7 @@ analysis::Figure accuracy_figure(const AccuracyReport& report) {
     }
   }
   add_row(figure, report, of_shape, kHand.position, "rms error against the shape (m)");
-  // Levels are named where no line is in the way: a shape of flats has one tessellation.
+  // Name levels where no line is in the way: a flat-sided shape has one tessellation.
   const auto flat = std::ranges::find_if(
       figure.panels, [](const analysis::Panel& panel) { return is_flat_sided(panel.title); });
   for (auto panel = figure.panels.begin(); panel != figure.panels.end(); ++panel) {

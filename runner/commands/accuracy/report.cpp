@@ -39,7 +39,7 @@ namespace {
 
 constexpr double kDegree = std::numbers::pi / 180;
 
-/// A dash where there was nothing to compare.
+/// The value, or a dash if nothing was compared.
 std::string known(const rendering::ErrorSpread& spread, double value) {
   return spread.count > 0 ? significant(value) : "-";
 }
@@ -69,7 +69,7 @@ std::string choice(const AccuracyReport& report, const std::string& shape, int t
   return thousands(triangles) + " triangles" + (setting.empty() ? "" : " (" + setting + ")");
 }
 
-/// Worse of the two probes.
+/// The worse error of the two probes.
 double worse(const AccuracyReport& report, const std::string& shape, int triangles,
              double (*of)(const rendering::ErrorSummary&)) {
   double most = 0;
@@ -407,7 +407,7 @@ analysis::Table body_table(const AccuracyReport& report) {
 
 namespace {
 
-/// What was measured, how the numbers are defined, and what the methods are.
+/// The measurements, the definitions of the numbers, and the methods.
 std::vector<std::string> how_to_read(const AccuracyReport& report) {
   const rendering::AccuracySettings& s = report.settings;
   std::vector<std::string> all;

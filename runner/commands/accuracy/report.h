@@ -1,5 +1,5 @@
 #pragma once
-// What `palpate accuracy` measured (accuracy.cpp), and its text, tables, JSON, figure and page.
+// The results of `palpate accuracy` (accuracy.cpp), as text, tables, JSON, figure and page.
 
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -46,16 +46,16 @@ struct AccuracyReport {
   rendering::BodyTickCost body_tick;
   std::optional<rendering::SearchCounts> search;
   std::optional<rendering::UnionCounts> union_search;
-  std::uint64_t search_seed = 0;  ///< of both
+  std::uint64_t search_seed = 0;  ///< of both searches
 };
 
-/// Errors that a hand cannot feel, and that a device does not resolve.
+/// Errors below the hand's threshold, and below a device's resolution.
 constexpr rendering::ErrorLimits kHand{1e-3, 0.17453292519943295};    ///< 1 mm, 10 degrees
 constexpr rendering::ErrorLimits kDevice{3e-5, rendering::kNoLimit};  ///< 0.03 mm
 
 /// The shapes that were measured, in order.
 std::vector<std::string> measured_shapes(const AccuracyReport& report);
-/// Parameters of the shape of this name; none for an unknown name.
+/// Parameters of the shape of this name; default values for an unknown name.
 stimuli::ShapeTraits traits_of_shape(const std::string& name);
 /// Whether it is a polyhedron: its one tessellation is the shape itself.
 bool is_flat_sided(const std::string& shape);
@@ -66,10 +66,10 @@ std::string significant(double value);
 std::string share(std::size_t part, std::size_t all);
 /// "327,680"
 std::string thousands(long long n);
-/// For a terminal.
+/// Writes a table for a terminal.
 void put_table(std::ostream& out, const analysis::Table& table);
 
-/// "sphere: ...", the tessellation to choose.
+/// "sphere: ...", with the recommended tessellation.
 std::string recommendation(const AccuracyReport& report, const std::string& shape);
 std::vector<std::string> recommendations(const AccuracyReport& report);
 /// Contact with unions of convex parts, and its search.
@@ -77,16 +77,16 @@ analysis::Table union_table(const AccuracyReport& report);
 /// Bodies that move and collide, beside other engines.
 analysis::Table body_table(const AccuracyReport& report);
 analysis::Table union_search_table(const rendering::UnionCounts& counts, std::uint64_t seed);
-/// Bodies that give.
+/// Soft bodies.
 analysis::Table soft_table(const AccuracyReport& report);
-/// All that was measured, in the order of display.
+/// All results, in the order of display.
 std::vector<analysis::Table> accuracy_tables(const AccuracyReport& report);
 
 std::string accuracy_text(const AccuracyReport& report);
 nlohmann::ordered_json accuracy_json(const AccuracyReport& report);
 /// The work-precision figure: error over nanoseconds a tick, two panels for each shape.
 analysis::Figure accuracy_figure(const AccuracyReport& report);
-/// All of it as one page.
+/// The whole report as one page.
 std::string accuracy_page(const AccuracyReport& report);
 
 }  // namespace palpate::runner

@@ -43,7 +43,7 @@ namespace palpate::runner {
 struct CrateFile {
   std::string name;  ///< in the bundle, folders separated by '/'
   std::uint64_t bytes = 0;
-  std::string sha256;       ///< "": neither it nor the size is said
+  std::string sha256;       ///< "": neither checksum nor size is stated
   std::string description;  ///< "" for none
 };
 
@@ -68,8 +68,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// A path as a URI reference: reserved characters escaped, letters of every
-/// script as they are.
+/// A path as a URI reference: reserved characters escaped, letters of every script kept.
 std::string uri_of(std::string_view path) {
   constexpr std::string_view kPlain =
       "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-._~/";
@@ -194,8 +193,7 @@ class Crate {
     root["identifier"] = reference(data::doi_url(about));
   }
 
-  /// The entity of a folder, made with those above it. \param folder
-  /// "data/psych-ds"; "": the root
+  /// The entity of a folder, created with its parents. \param folder "data/psych-ds"; "": the root
   Json& parts_of(const std::string& folder) {
     const auto found = folders_.find(folder);
     if (found != folders_.end()) return found->second;
@@ -265,8 +263,8 @@ class Crate {
 
 std::string ro_crate_json(const CrateFacts& facts) { return Crate(facts).text(); }
 
-// `palpate bundle`: a study as one folder to deposit, and the check that it
-// reproduces.
+// `palpate bundle`: makes a study one folder to deposit, and checks that the analysis is
+// reproducible.
 
 namespace {
 
@@ -290,7 +288,7 @@ analysis::Analysis analyze_bundle(const std::string& folder, double too_fast) {
   return analysis::analyze(std::move(table), settings, PALPATE_VERSION);
 }
 
-/// A number as the shell and the options read it back.
+/// A number that the shell and the options read back exactly.
 std::string as_option(double value) { return nlohmann::json(value).dump(); }
 
 std::string reproduce_script(double too_fast) {
@@ -493,7 +491,7 @@ int make_bundle(const BundleOptions& options) {
   return 0;
 }
 
-/// The number of the first line that differs, from 1.
+/// The number of the first differing line, from 1.
 std::size_t first_different_line(const std::string& a, const std::string& b) {
   std::size_t line = 1;
   for (std::size_t i = 0; i < std::min(a.size(), b.size()) && a[i] == b[i]; ++i)

@@ -1,4 +1,4 @@
-// `palpate check`: whether a study was run as it was registered.
+// `palpate check`: compares a study with its registration.
 
 #include <filesystem>
 #include <iostream>
@@ -19,7 +19,7 @@ namespace {
 namespace po = boost::program_options;
 namespace fs = std::filesystem;
 
-/// A check must not change what it checks. \throws UsageError
+/// Refuses outputs in the registration: a check must not change its subject. \throws UsageError
 void require_outside(const po::variables_map& values, const char* option,
                      const std::string& folder) {
   if (values.count(option) == 0) return;

@@ -29,16 +29,16 @@ struct StudyParticipant {
   std::vector<OrderRow> rows;  ///< trials that count, in their order
 };
 
-/// What a database says of the study.
+/// The study's data from a database.
 struct StudyData {
   std::vector<data::ProtocolInfo> protocols;
-  std::vector<StudyParticipant> participants;  ///< who have trials, practice or not
+  std::vector<StudyParticipant> participants;  ///< with trials, practice or not
   std::vector<data::StoredRun> runs;
   std::vector<data::StoredNote> notes;
   std::map<std::string, std::vector<data::ProtocolFile>> files;  ///< by SHA-256 of the protocol
 };
 
-/// "" or "; and 12 more": evidence is cut, not endless.
+/// Most lines of evidence; the rest is counted: "; and 12 more".
 constexpr std::size_t kMostEvidence = 50;
 
 void cut(std::vector<std::string>& evidence) {
@@ -65,7 +65,7 @@ StudyData read_study(data::Store& store) {
   return out;
 }
 
-/// Who ended a session by withdrawing and did not begin again.
+/// Participants who ended a session by withdrawing and did not begin again.
 std::vector<std::string> withdrawn(const std::vector<data::StoredRun>& runs) {
   std::map<std::pair<std::int64_t, int>, const data::StoredRun*> latest;
   for (const data::StoredRun& run : runs) latest[{run.participant.id, run.info.session}] = &run;
@@ -156,7 +156,7 @@ std::map<int, std::vector<OrderRow>> by_session(const std::vector<OrderRow>& row
   return out;
 }
 
-/// Where the trials that were shown first differ from the order; "": nowhere.
+/// The place where the shown trials first differ from the order; "": nowhere.
 std::string order_difference(const std::vector<OrderRow>& expected,
                              const std::vector<OrderRow>& shown) {
   const auto planned = by_session(expected);
@@ -361,7 +361,7 @@ CheckPoint of_versions(const Registration& registered, const StudyData& study) {
   return out;
 }
 
-/// Sessions with a note that `says` recognises.
+/// Sessions with a note that `says` accepts.
 std::vector<std::string> noted(const StudyData& study, bool (*says)(const std::string&)) {
   std::vector<std::string> out;
   for (const data::StoredNote& note : study.notes) {
@@ -383,8 +383,8 @@ CheckPoint left_out(const char* id, const char* title, const std::string& good,
   return out;
 }
 
-/// As registered where the protocol allows it, in all sessions or in none: those with torque cannot
-/// be compared with those without.
+/// Compliant if the protocol allows it and all sessions or none have torque: sessions with and
+/// without torque cannot be compared.
 CheckPoint of_torque(const Registration& registered, const StudyData& study) {
   const auto sessions =
       noted(study, [](const std::string& note) { return note == data::kTorqueLeftOutNote; });
@@ -400,7 +400,7 @@ CheckPoint of_torque(const Registration& registered, const StudyData& study) {
                   all ? std::vector<std::string>() : sessions);
 }
 
-/// The numbers of an analysis as it was reported, beside those that the registered one gives.
+/// Compares the numbers of an analysis as reported with those of the registered analysis.
 CheckPoint of_reported(const analysis::TrialTable& table, const ReportedAnalysis& reported,
                        double too_fast) {
   CheckPoint out{"analysis", "Reported numbers", Finding::as_registered,

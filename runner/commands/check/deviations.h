@@ -1,5 +1,5 @@
 #pragma once
-// A study held against its registration: each point with what was found, and its evidence.
+// The comparison of a study with its registration: each point with its finding and evidence.
 
 #include <cstddef>
 #include <optional>
@@ -16,7 +16,7 @@ namespace palpate::runner {
 enum class Finding {
   as_registered,
   deviation,
-  note  ///< nothing to hold against the registration
+  note  ///< no deviation
 };
 
 struct CheckPoint {
@@ -24,11 +24,10 @@ struct CheckPoint {
   std::string title;
   Finding finding = Finding::as_registered;
   std::string sentence;
-  std::vector<std::string> evidence =
-      {};  ///< a line each: who, what was registered, what was found
+  std::vector<std::string> evidence = {};  ///< a line each: participant, registered value, finding
 };
 
-/// How the data were analysed for the report of the study, where that is known.
+/// The analysis for the report of the study, as far as it is known.
 struct ReportedAnalysis {
   std::optional<double> too_fast = {}, alpha = {};  ///< s; none: as registered
   std::string json = {};                            ///< text of its analysis.json; "": not given
@@ -44,7 +43,7 @@ struct StudyCheck {
 };
 
 /// \param folder  of the registration \throws UsageError: a participant has withdrawn and is still
-/// in the database; what analysis and store throw
+/// in the database; exceptions of analysis and store
 StudyCheck check_study(const Registration& registered, const std::string& folder,
                        const std::string& database, const ReportedAnalysis& reported);
 
@@ -53,7 +52,7 @@ std::string conclusion_of(const StudyCheck& check);
 
 std::string check_text(const StudyCheck& check, const Registration& registered);
 std::string check_json(const StudyCheck& check, const Registration& registered);
-/// A page as analyze's report.
+/// A page like the report of analyze.
 std::string check_html(const StudyCheck& check, const Registration& registered);
 
 }  // namespace palpate::runner

@@ -26,14 +26,14 @@ namespace {
 namespace fs = std::filesystem;
 namespace po = boost::program_options;
 
-/// Where and how, whatever the work.
+/// The place and the options of a job, for all kinds of work.
 struct ClusterSettings {
   std::string folder, time, partition;
   std::int64_t shards = 0;
   bool no_submit = false;
 };
 
-/// Sites ask for tasks of ten minutes at least. \param felt  stimuli of a shard
+/// Warns of short tasks: sites ask for ten minutes at least. \param felt  stimuli of a shard
 void warn_of_small_shards(const std::string& items, double felt) {
   constexpr double kSecondsAStimulus = 10, kSpeed = 3000, kLeast = 600;  // simulated s, in 1 s, s
   const double seconds = felt * kSecondsAStimulus / kSpeed;
@@ -55,7 +55,7 @@ fs::path make_folder(const ClusterSettings& settings) {
   struct stat found {};
   if (::stat(folder.c_str(), &found) != 0 || found.st_uid != ::geteuid())
     throw UsageError("--dir " + settings.folder + ": belongs to another user; name a new folder");
-  fs::permissions(folder, fs::perms::owner_all);  // of an empty one that was there
+  fs::permissions(folder, fs::perms::owner_all);  // of an empty existing one
   fs::create_directories(folder / "parts");
   fs::create_directories(folder / "logs");
   return folder;
@@ -74,8 +74,8 @@ int submit_or_say(const ClusterSettings& settings, const fs::path& folder, Clust
   return 0;
 }
 
-/// \param others  files that the tasks read beside the protocol. \param command  of a shard, from
-/// where the copies of protocol and others are
+/// \param others  files that the tasks read beside the protocol. \param command  of a shard,
+/// relative to the copies of protocol and others
 int begin(const ClusterSettings& settings, ClusterJob job, const protocols::Protocol& protocol,
           const std::vector<std::string>& others,
           const std::function<std::string(const std::vector<std::string>&)>& command,
@@ -95,7 +95,7 @@ int begin(const ClusterSettings& settings, ClusterJob job, const protocols::Prot
   return submit_or_say(settings, folder, std::move(job));
 }
 
-/// Stimuli that a participant feels: of tasks each interval, adaptive ones at most.
+/// Stimuli that a participant feels: each interval of a task, adaptive blocks at their longest.
 /// \param repetitions  of version 1
 double stimuli_felt(const protocols::Protocol& protocol, int repetitions) {
   if (protocol.version == 1)
@@ -221,11 +221,11 @@ int cluster_status(const std::string& given) {
   return 0;
 }
 
-/// A shard a number of trials: a curve takes long only with --test model.
+/// One shard for each number of trials: a curve takes long only with --test model.
 int begin_plan(const ClusterSettings& settings, const PlanOptions& options,
                const po::variables_map& values) {
   analysis::Pilot pilot = starting_point(options, values);
-  model_of(pilot, options, values);  // what is refused is refused here
+  model_of(pilot, options, values);  // refuses bad options here
   const analysis::PlanSettings plan = settings_of(options, values);
   ClusterJob job;
   job.work = "plan";

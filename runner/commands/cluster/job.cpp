@@ -30,8 +30,8 @@ namespace {
 namespace fs = std::filesystem;
 namespace po = boost::program_options;
 
-/// The options that were given as words of a shell's command line, files with their whole path;
-/// without --trials.
+/// The given options as words of a shell's command line, with absolute file paths and without
+/// --trials.
 std::string plan_words(const PlanOptions& options, const po::variables_map& values) {
   std::string out;
   for (const auto& [name, value] : values) {
@@ -137,7 +137,7 @@ std::string submit(const std::vector<std::string>& arguments) {
 std::map<std::int64_t, std::string> queue_states(const std::string& job) {
   const Output said = run("squeue --noheader --array --format='%K %T' --jobs=" + shell_quoted(job));
   if (said.status == 127) throw std::runtime_error("there is no Slurm here (no command squeue)");
-  // A job that ended some minutes ago is unknown to squeue.
+  // squeue does not know a job that ended some minutes ago.
   if (said.status != 0 && said.text.find("Invalid job id") != std::string::npos) return {};
   if (said.status != 0) throw std::runtime_error("squeue failed: " + said.text);
   std::map<std::int64_t, std::string> out;
@@ -168,7 +168,7 @@ fs::path part_of(const fs::path& folder, const ClusterJob& job, std::int64_t sha
 /// Units in a shard's file.
 std::int64_t recorded_in(const ClusterJob& job, const std::string& path) {
   if (!fs::exists(path)) return 0;
-  if (job.work == "plan") return 1;  // written whole
+  if (job.work == "plan") return 1;  // written at once
   if (job.work == "sweep") return data::SweepFile::open(path).count();
   data::Store store = data::Store::open(path, data::Store::Mode::read_only);
   const std::vector<data::StoredRun> runs = store.runs();
@@ -320,7 +320,7 @@ void submit_shards(const fs::path& folder, ClusterJob& job) {
     job.submitted_s = seconds_since_1970();
     job.done_then = recorded_units(states);
     write_job(folder, job);
-    // Where a shard fails it goes, and comes again with the next 'submit'.
+    // If a shard fails, this job is cancelled; the next 'submit' makes it again.
     finish.push_back("--dependency=afterok:" + job.array_job);
     finish.push_back("--kill-on-invalid-dep=yes");
   }
@@ -332,7 +332,7 @@ void submit_shards(const fs::path& folder, ClusterJob& job) {
   std::cout << "job " << last << ": merges and analyses when they are done\n";
 }
 
-// "#SBATCH" is not used: what sbatch is called with stands in cluster.json and goes for both jobs.
+// "#SBATCH" is not used: cluster.json has the arguments of sbatch, for both jobs.
 void write_scripts(const fs::path& folder, const ClusterJob& job, const std::string& command) {
   const std::string program = shell_quoted(fs::read_symlink("/proc/self/exe").string());
   const std::string enter = "cd " + shell_quoted(folder.string());

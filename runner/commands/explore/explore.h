@@ -1,5 +1,5 @@
 #pragma once
-// The values of explore's options.
+// The values of explore's options: size, interval and view.
 
 #include <string>
 
@@ -20,8 +20,8 @@ PictureSize parse_size(const std::string& text);
 /// "16ms" or "0.5s", in s. \throws UsageError naming --every
 double parse_every(const std::string& text);
 
-/// "30,20" or "30,20,1.5": degrees to the right and up, and how many times as large. \throws
-/// UsageError naming --view
+/// "30,20" or "30,20,1.5": degrees to the right and up, and the magnification. \throws UsageError
+/// naming --view
 ViewAngles parse_view(const std::string& text);
 
 }  // namespace palpate::runner

@@ -44,7 +44,7 @@ bool is_frame_name(const std::string& name) {
   return number.size() >= 5 && number.find_first_not_of("0123456789") == std::string_view::npos;
 }
 
-/// The rows of the path that pictures show: at each multiple of `every` the last one before it.
+/// The rows of the path to draw: at each multiple of `every` the last one before it.
 std::vector<std::size_t> shown_rows(const std::vector<TimedPose>& poses, double every) {
   const double length = poses.back().t - poses.front().t;
   const double count = std::floor(length / every + kSlack) + 1;
@@ -61,7 +61,7 @@ std::vector<std::size_t> shown_rows(const std::vector<TimedPose>& poses, double 
   return rows;
 }
 
-/// The scene along the path: what is drawn, and what sizes its arrows and the camera.
+/// The scene along the path: the moments to draw, and the values that scale arrows and camera.
 struct TouchedScene {
   std::vector<SceneMoment> moments;  ///< of the pictures
   double strongest = 0;              ///< N, at one place
@@ -77,7 +77,7 @@ TouchedScene touch(const rendering::Scene& scene, const protocols::SceneSpec& sp
                [&](const TimedPose& pose, const rendering::Rendering& rendering,
                    const rendering::RenderState& state) {
                  const bool shown = next < rows.size() && rows[next] == row++;
-                 // Arrows are sized by the whole path, whichever rows become pictures.
+                 // Scale arrows by the whole path, not only by the drawn rows.
                  for (const ContactPlace& contact : contact_places(scene, state, rendering))
                    out.strongest = std::max(out.strongest, glm::length(contact.force));
                  if (!shown) return;
@@ -99,7 +99,7 @@ SceneDrawingSettings drawing_settings(const SceneDrawing& drawing, const Touched
   return out;
 }
 
-/// What the ticks of the path cost, without pictures: {median, 99th percentile}, ns.
+/// The cost of the path's ticks without pictures: {median, 99th percentile}, ns.
 std::pair<double, double> tick_costs(const rendering::Scene& scene,
                                      const protocols::SceneSpec& spec,
                                      const rendering::Renderer& renderer,

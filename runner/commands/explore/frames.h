@@ -31,7 +31,7 @@ struct DrawnFrames {
   std::size_t pictures = 0;
   std::string animation;                       ///< WebP; empty: none
   double seconds = 0;                          ///< of the path
-  std::vector<std::string> notes;              ///< what the scene asks for and does not get
+  std::vector<std::string> notes;              ///< features of the scene that are left out
   double tick_median_ns = 0, tick_p99_ns = 0;  ///< cost of a row's tick here, by the clock
 };
 

@@ -223,7 +223,7 @@ ServoSettings with_places(ServoSettings settings) {
   settings.touched_places = true;
   return settings;
 }
-// Forces begin wherever the stylus is: an object that it is inside of gives none until it was left.
+// Forces begin at any place of the stylus: an object that encloses it exerts none until left.
 constexpr HomeZone kAnywhere{.radius = 0, .rest = 0};
 
 }  // namespace
@@ -233,7 +233,7 @@ LiveTouch::LiveTouch(Device& device, Clock& clock, Settings settings)
       shown_(settings_.spec.objects),
       patience_(has_motors(device.capabilities())),
       servo_(device, clock, with_places(settings_.servo)) {
-  prepare(shown_);  // faults of the scene are told before there is a window
+  prepare(shown_);  // reports faults of the scene before there is a window
   recorder_ = std::jthread([this](const std::stop_token& stop) { record(stop); });
 }
 
@@ -260,11 +260,11 @@ std::int64_t LiveTouch::period_ns() const {
 }
 
 void LiveTouch::keep(const Sample& sample, std::span<const rendering::BodyPose> bodies) {
-  if (sample.time_ns == last_ns_) return;  // the servo has stopped: its last one again
+  if (sample.time_ns == last_ns_) return;  // the servo has stopped and repeats its last sample
   last_ns_ = sample.time_ns;
   patience_.begin();
   SceneMoment moment{.sample = sample, .contacts = {}};
-  if (stepping_) {  // the hand got next to nothing: shown is what it would have got
+  if (stepping_) {  // the hand got almost no force: show the full one
     moment.sample.device1 = sample.rendering.device1;
     moment.sample.device2 = sample.rendering.device2;
     moment.sample.faults &= ~servo_fault::kForceLimited;
@@ -283,7 +283,7 @@ void LiveTouch::keep(const Sample& sample, std::span<const rendering::BodyPose> 
   if (map.reach) moment.held = unstretched(*map.reach, sample.probe);
   moment.poses = object_poses(shown_, bodies);
   const std::lock_guard lock(mutex_);
-  if (fresh_.size() == Timeline::kMost)  // of a display that stalls: the last minute is enough
+  if (fresh_.size() == Timeline::kMost)  // a stalled display gets only the last minute
     fresh_.erase(fresh_.begin(), fresh_.begin() + static_cast<std::ptrdiff_t>(fresh_.size() / 4));
   fresh_.push_back(std::move(moment));
   recorded_.fetch_add(1);
@@ -357,7 +357,7 @@ void LiveTouch::stop_or_go_on(std::optional<std::vector<stimuli::ObjectSpec>> wa
   const int steps = held ? steps_.exchange(0) : 0;
   if (held && steps <= 0) return;
   if (running_) return;
-  if (stepping_) {  // those that are under way are all there is to come
+  if (stepping_) {  // no ticks follow the current ones
     servo_.stop();
     keep_what_is_there();
   }
@@ -386,7 +386,7 @@ void LiveTouch::record(const std::stop_token& stop) {
     keep_what_is_there();
     if (servo_.away() > 0) patience_.begin();
     if (running_ && patience_.is_over()) {
-      servo_.emergency_zero();  // should it ever come back
+      servo_.emergency_zero();  // in case it returns
       tell_trouble("the servo gives no more samples: forces are off");
     }
     std::this_thread::sleep_for(kIdle);

@@ -1,5 +1,6 @@
 #pragma once
-// A scene that a hand touches through a device.
+// A scene touched by a hand through a device or along a recorded path, and the window of `palpate
+// explore`.
 
 #include <atomic>
 #include <cstdint>
@@ -20,13 +21,13 @@
 
 namespace palpate::runner {
 
-/// What a tick of a scene along a recorded path shows. \param state  after it
+/// The moment of a scene at a tick along a recorded path. \param state  after the tick
 SceneMoment moment_of(const TimedPose& pose, const protocols::SceneSpec& spec,
                       const rendering::Scene& scene, const rendering::Rendering& rendering,
                       const rendering::RenderState& state);
 
-/// A recorded path, touched in one go. Of a long path at most Timeline::kMost rows are kept,
-/// evenly.
+/// A recorded path, rendered at once. Of a long path at most Timeline::kMost rows are kept, evenly
+/// spaced.
 class RecordedTouch final : public TouchSource {
  public:
   /// \throws MeshError
@@ -66,19 +67,19 @@ struct HandsOnSettings {
 int explore_hands_on(const protocols::SceneSpec& spec, const rendering::Renderer& renderer,
                      const HandsOnSettings& settings);
 
-/// The servo has a thread of its own, which waits for nothing but the clock and the device. Another
-/// one empties the servo's ring and keeps the samples for the display, so that a display that
-/// stalls loses nothing of the last minute; it also compiles scenes.
+/// A scene touched through a device. The servo has a thread of its own, which waits only for the
+/// clock and the device. A second thread empties the servo's ring and keeps the samples for the
+/// display, so a stalled display loses nothing of the last minute; it also compiles scenes.
 class LiveTouch final : public TouchSource {
  public:
   struct Settings {
-    std::string scene_path;  ///< that faults name
+    std::string scene_path;  ///< named in faults
     protocols::SceneSpec spec;
     const rendering::Renderer* renderer = nullptr;
     ServoSettings servo;
-    /// Called with the objects before they are shown: limits what the device cannot show.
+    /// Called with the objects before they are shown: limits them to the device.
     std::function<void(std::vector<stimuli::ObjectSpec>&)> limit;
-    /// Called by emergency_zero() beside the servo's own, as of a guard; may be empty.
+    /// Called by emergency_zero() beside the servo's own, such as a guard's; may be empty.
     std::function<void()> emergency;
   };
 
@@ -99,7 +100,7 @@ class LiveTouch final : public TouchSource {
   void clear_fault() noexcept override { servo_.clear_fault(); }
   std::string trouble() const override;
 
-  /// Samples that were kept so far, taken or not. From any thread.
+  /// Samples kept so far, taken or not. From any thread.
   std::uint64_t recorded() const noexcept { return recorded_.load(); }
   ServoThread& servo() { return servo_; }  ///< for signal handlers
 
@@ -121,18 +122,18 @@ class LiveTouch final : public TouchSource {
   std::optional<std::vector<stimuli::ObjectSpec>> wanted_;
   std::string trouble_;
   std::atomic<bool> held_{false};
-  std::atomic<int> steps_{0};  ///< asked for while it is held
+  std::atomic<int> steps_{0};  ///< requested while held
   std::atomic<std::uint64_t> recorded_{0};
   std::vector<stimuli::ObjectSpec> shown_;   ///< the recorder's; so the next
-  bool running_ = true, anew_ = false;       ///< anew: the scene begins at its beginning
-  bool stepping_ = false;                    ///< what comes was asked for by step()
+  bool running_ = true, anew_ = false;       ///< anew: the scene restarts
+  bool stepping_ = false;                    ///< the next samples come from step()
   bool gap_ = false;                         ///< the next sample comes after a pause
   std::int64_t last_ns_ = 0, shown_ns_ = 0;  ///< of the last sample: the servo's, without pauses
   std::int64_t paused_ns_ = 0;               ///< of all pauses
   Patience patience_;                        ///< with the servo
-  TouchedPlaces touched_;                    ///< the next that no sample has had yet
+  TouchedPlaces touched_;                    ///< touched places without a sample yet
   std::vector<std::shared_ptr<const SoftSurfaceNow>> soft_;  ///< the newest, by soft object
-  std::int64_t soft_ns_ = 0;                                 ///< when they were asked for
+  std::int64_t soft_ns_ = 0;                                 ///< when they were requested
   ServoThread servo_;
   std::jthread recorder_;  ///< last: ends first
 };

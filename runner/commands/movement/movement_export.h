@@ -1,5 +1,5 @@
 #pragma once
-// What exports have of the hand: where each sample touched, and the measures of each trial.
+// Movement in exports: the contact of each sample, and the measures of each trial.
 
 #include <cstddef>
 #include <map>
@@ -13,17 +13,17 @@
 
 namespace palpate::runner {
 
-/// Must outlive the export whose settings it is put into.
+/// Adds movement to the settings of an export. Must outlive that export.
 class MovementExport {
  public:
   MovementExport(data::Store& store, std::string mesh_folder)
       : store_(store), stimuli_(std::move(mesh_folder)) {}
 
-  /// Places and normals of the contacts beside the samples, each trial rendered again.
+  /// Adds places and normals of the contacts to the samples, by rendering each trial again.
   void add_contacts(data::ExportSettings& settings);
   /// Tables of the measures. \throws UsageError: no trial has samples
   void add_measures(data::ExportSettings& settings, const MovementRequest& request);
-  /// Trials whose contacts are left out because rendering gives other forces than were recorded.
+  /// Trials without contacts because rendering does not reproduce their recorded forces.
   std::size_t not_rendered() const { return not_rendered_; }
 
  private:

@@ -21,7 +21,7 @@
 namespace palpate::runner {
 namespace {
 
-/// What is kept of a trial.
+/// The kept values of a trial.
 struct TrialRow {
   MovementStudy::TrialKey key;
   std::string participant, renderer, shape;
@@ -30,8 +30,8 @@ struct TrialRow {
   MeasuredTrial measured;
 };
 
-/// Reads the trials of a study, each in one of several threads: most of the time goes into
-/// unpacking samples and rendering them again.
+/// Reads the trials of a study, shared among threads: unpacking and rendering samples takes most of
+/// the time.
 class StudyReader {
  public:
   StudyReader(const MovementRequest& request, StudyStimuli& stimuli, std::size_t trials)
@@ -58,7 +58,7 @@ class StudyReader {
     }
   }
 
-  /// Walks through all trials and takes those that no other thread has.
+  /// Walks through all trials and takes those that no other thread has taken.
   void read_share(ProgressLine* progress) {
     data::Store store = data::Store::open(request_.database, data::Store::Mode::read_only);
     std::size_t index = 0;
@@ -112,7 +112,7 @@ std::vector<std::string> columns() {
   return names;
 }
 
-/// As RFC 4180 has it: in quotes where there is a comma.
+/// A CSV field by RFC 4180: in quotes if it has a comma.
 std::string csv_field(const std::string& text) {
   if (text.find_first_of(",\"\n") == std::string::npos) return text;
   std::string quoted = "\"";

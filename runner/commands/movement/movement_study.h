@@ -26,9 +26,9 @@ struct MovementStudy {
 
   analysis::MovementTable table;
   std::string csv;  ///< movement.csv: a row for each trial of the table, in its order
-  std::vector<std::string> missing;  ///< of each row of the table: why there is no value
+  std::vector<std::string> missing;  ///< of each row of the table: the reason of a missing value
   std::map<TrialKey, std::size_t> rows;
-  analysis::MovementPictures pictures;  ///< where asked for
+  analysis::MovementPictures pictures;  ///< if requested
 };
 
 MovementStudy::TrialKey key_of(const data::StoredTrial& trial);

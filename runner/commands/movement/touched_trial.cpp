@@ -43,7 +43,7 @@ void add_surface(const rendering::PlacedSurface& placed, std::vector<SurfaceTria
 
 bool inside(const rendering::ScenePart& part, const Vec3& place) {
   const Vec3 local = part.local_point(place);
-  // On its surface is not inside: parts that abut share a wall, which both of them hide.
+  // On the surface is not inside: abutting parts hide their common wall from each other.
   const double least = std::max(part.tolerance, 1e-9 * part.mesh->size());
   return std::all_of(part.mesh->facets().begin(), part.mesh->facets().end(),
                      [&](const stimuli::Facet& facet) {
@@ -51,7 +51,7 @@ bool inside(const rendering::ScenePart& part, const Vec3& place) {
                      });
 }
 
-/// Places on the outer surface of a scene; none: nothing of it is rigid.
+/// Places on the outer surface of a scene; none: no part of it is rigid.
 std::vector<Vec3> places_of(const rendering::Scene& scene) {
   constexpr std::size_t kRounds = 8;  // a union hides most of its parts' surfaces at worst
   int outer = std::numeric_limits<int>::max();
@@ -100,8 +100,8 @@ TouchedStimuli::TouchedStimuli(protocols::Protocol protocol)
   }
 }
 
-/// Those of the outer surface that have a facet longer than the reach of a touch: on shorter ones
-/// the touched part is within the reach of the contact.
+/// Keeps the parts of the outer surface with a facet longer than the reach of a touch; on shorter
+/// facets the touched part is within the reach of the contact.
 void TouchedStimuli::add_flat_parts(const rendering::Scene& scene) {
   for (const rendering::ScenePart& part : scene.parts()) {
     if (part.layer != 0) continue;
@@ -182,7 +182,7 @@ void reserve(analysis::MovementTrial& trial, std::size_t ticks) {
   trial.on_edge.reserve(ticks);
 }
 
-/// A missed tick: on the line between its neighbours; in contact where both are.
+/// Interpolates a missed tick linearly between its neighbours; in contact if both are.
 TouchedTick between(const TouchedTick& before, const TouchedTick& after, double share) {
   TouchedTick tick;
   tick.tip = glm::mix(before.tip, after.tip, share);

@@ -1,6 +1,6 @@
 #pragma once
-// A recorded trial as its movement is measured: in the object's frame, with the contacts that its
-// renderer had, by rendering it again.
+// A recorded trial prepared for the measures of movement: in the object's frame, with the contacts
+// found by rendering it again.
 
 #include <array>
 #include <map>
@@ -29,9 +29,9 @@ class TouchedStimuli {
 
   const protocols::Protocol& protocol() const { return protocol_; }
   const StimulusLibrary& library() const { return library_; }
-  /// Index of a stimulus; -1: there is none of that name.
+  /// Index of a stimulus; -1: unknown name.
   int stimulus(const std::string& name) const;
-  /// Null: it is soft, and has no surface that stays.
+  /// Null: the stimulus is soft, and has no fixed surface.
   const analysis::TouchedSurface* surface(int stimulus) const {
     return surfaces_[static_cast<std::size_t>(stimulus)].get();
   }
@@ -51,11 +51,11 @@ class TouchedStimuli {
   protocols::Protocol protocol_;
   StimulusLibrary library_;
   std::vector<std::unique_ptr<const analysis::TouchedSurface>> surfaces_;
-  std::vector<std::vector<ConvexPart>> flat_;  ///< by stimulus: parts with facets to lie on
+  std::vector<std::vector<ConvexPart>> flat_;  ///< by stimulus: parts with long facets
 };
 
-/// The stimuli of each trial of a database; those of a protocol are built once, or once for each
-/// run whose device limited them. Threads may share it.
+/// The stimuli of each trial of a database, built once for each protocol, or for each run whose
+/// device limited them. Threads may share it.
 class StudyStimuli {
  public:
   explicit StudyStimuli(std::string mesh_folder) : folder_(std::move(mesh_folder)) {}
@@ -73,24 +73,24 @@ class StudyStimuli {
 };
 
 struct MeasuredTrial {
-  std::string missing;  ///< why there is no value; empty: there are some
+  std::string missing;  ///< the reason of a missing value; empty: there are values
   std::size_t ticks = 0;
   analysis::MeasureValues values{};
-  analysis::TrialTally tally;  ///< empty unless asked for
+  analysis::TrialTally tally;  ///< empty unless requested
 };
 
-/// Renders the trial again, which must give the recorded forces to the bit. Up to 5 ticks in a row
-/// that were missed are interpolated; the record breaks where more were.
-/// \return why there is no movement; empty: there is
+/// Renders the trial again, which must reproduce the recorded forces to the bit. Gaps of up to 5
+/// missed ticks are interpolated; longer gaps break the record. \return the reason that there is no
+/// movement; empty: there is
 std::string read_movement(const TouchedStimuli& stimuli, const data::StoredTrial& stored,
                           analysis::MovementTrial& trial);
 
-/// The same, measured.
+/// Reads and measures the movement.
 MeasuredTrial measure_trial(const TouchedStimuli& stimuli, const data::StoredTrial& stored,
                             const analysis::MovementSettings& settings, bool with_tally = false);
 
-/// The deepest contact of each sample, by rendering the trial again; empty: that gives other forces
-/// than were recorded, or the trial has none.
+/// The deepest contact of each sample, by rendering the trial again; empty: the recorded forces are
+/// not reproduced, or the trial has no samples.
 std::vector<std::optional<data::TickContact>> contacts_of(const TouchedStimuli& stimuli,
                                                           const data::StoredTrial& stored);
 

@@ -28,7 +28,7 @@
 
 namespace palpate::runner {
 
-// The part of 'palpate plan' that is about thresholds.
+// The part of 'palpate plan' for thresholds.
 
 struct ThresholdOptions {
   double effect = 0, weber = 0.1, participant_sd = 0.3, effect_sd = 0.2, pse_sd = 0.5, reach = 2.5;
@@ -38,7 +38,7 @@ void add_threshold_options(CommandLine& line, ThresholdOptions& options);
 void plan_thresholds_of(const ThresholdOptions& thresholds, const PlanOptions& options,
                         const boost::program_options::variables_map& values, Outputs& outputs);
 
-/// Prints how often the intervals of thresholds hold the truth, and writes its JSON.
+/// Prints how often the intervals of thresholds contain the true value, and writes its JSON.
 /// \throws UsageError
 void print_coverage(const PlanOptions& options, const boost::program_options::variables_map& values,
                     Outputs& outputs);
@@ -95,7 +95,7 @@ std::string shapes_of(const analysis::StudyModel& model) {
   return known;
 }
 
-/// "cone=22,cube=11": percent reductions; shapes that are not named have no effect. "11": all.
+/// "cone=22,cube=11": percent reductions; other shapes have no effect. "11": all shapes.
 void put_effects(const std::string& text, analysis::StudyModel& model) {
   const auto log_ratio = [](const std::string& percent) {
     const double value = real_number("effect", percent);
@@ -128,8 +128,8 @@ void put_effects(const std::string& text, analysis::StudyModel& model) {
   }
 }
 
-/// The paper's figure 15, for the shapes that are there; of other shapes all get the smaller of the
-/// paper's effects. \return which effects were assumed
+/// The paper's figure 15, for the shapes in the model; other shapes all get the smaller of the
+/// paper's effects. \return the assumed effects, in words
 std::string put_default_effects(analysis::StudyModel& model) {
   double smallest = 100;
   for (const analysis::PaperEffect& effect : analysis::kPaperEffects) {
@@ -302,7 +302,7 @@ void require(bool right, const char* option, const char* expected) {
 
 analysis::ThresholdStudy study_of(const ThresholdOptions& thresholds, const PlanOptions& options) {
   const auto within = [](double value, double low, double high) {
-    return value >= low && value <= high;  // false for what is no number
+    return value >= low && value <= high;  // false for NaN
   };
   require(within(thresholds.effect, -400, 95), "jnd-effect", "percent from -400 to 95");
   require(within(thresholds.weber, 0.001, 1), "weber", "a JND / standard from 0.001 to 1");
@@ -368,7 +368,7 @@ void print_coverage(const PlanOptions& options, const po::variables_map& values,
     const auto [stop, error] = std::from_chars(own.studies.data(), end, studies);
     require(error == std::errc() && stop == end && studies >= 1 && studies <= 100'000, "studies",
             "a whole number from 1 to 100000");
-    own.studies = "100";  // of plans, which are not made
+    own.studies = "100";  // the number of plans, which are not made
   }
   const analysis::PowerSettings asked = settings_of(own, values).simulation;
   analysis::CoverageSettings settings;

@@ -1,5 +1,5 @@
 #pragma once
-// What the options of 'palpate plan' ask for.
+// The options of 'palpate plan' and the model that they describe.
 
 #include <boost/program_options.hpp>
 #include <cstdint>
@@ -27,11 +27,11 @@ void add_plan_options(CommandLine& line, PlanOptions& options);
 
 // Each throws UsageError.
 
-/// The pilot's model, or the paper's shapes with the figures given.
+/// The pilot's model, or the paper's shapes with the given figures.
 analysis::Pilot starting_point(const PlanOptions& options,
                                const boost::program_options::variables_map& values);
 
-/// The pilot's model, which is moved from, with the figures and effects given.
+/// The pilot's model, moved from, with the given figures and effects.
 analysis::StudyModel model_of(analysis::Pilot& pilot, const PlanOptions& options,
                               const boost::program_options::variables_map& values);
 

@@ -104,7 +104,7 @@ hypotheses.json:
   return options;
 }
 
-/// Of a registration that is not replaced: one that the lab has filled in.
+/// Refuses to replace a registration that the lab has filled in.
 void require_replaceable(const RegisterOptions& options) {
   require_replaceable_folder(options.out, options.force, kMark, files_to_fill_in());
   if (!options.force || !fs::exists(fs::path(options.out) / kMark)) return;
@@ -249,7 +249,7 @@ analysis::TrialTable read_table(const data::AtomicFolder& draft, const std::stri
   return table;
 }
 
-/// Simulated studies, their analyses and what they say of the hypotheses.
+/// Writes simulated studies, their analyses and their verdicts on the hypotheses.
 void put_simulated(const RegisterOptions& options, const data::AtomicFolder& draft,
                    Registration& made) {
   constexpr const char* kEffect = "simulated/planned-effect.csv";

@@ -1,6 +1,6 @@
 #pragma once
-// A registration: what a lab says, before the first session, of the study that it will run. A
-// folder of files that 'palpate register' makes and 'palpate check' reads.
+// A registration: a lab's statement about its study before the first session. A folder of files
+// that 'palpate register' makes and 'palpate check' reads.
 
 #include <array>
 #include <cstddef>
@@ -30,14 +30,14 @@ std::vector<OrderRow> order_of(const protocols::Protocol& protocol, int particip
 /// SHA-256 of the lines, each with a line feed.
 std::string order_checksum(const std::vector<OrderRow>& rows);
 
-/// In how many simulated studies a hypothesis came out how.
+/// Counts of a hypothesis' verdicts in simulated studies.
 struct VerdictCounts {
   std::size_t corroborated = 0, refuted = 0, undecided = 0;
   void add(analysis::Verdict verdict);
   std::size_t studies() const { return corroborated + refuted + undecided; }
 };
 
-/// What simulated studies say of a hypothesis.
+/// The verdicts of simulated studies on a hypothesis.
 struct Rehearsal {
   VerdictCounts with_effect, without_effect;
 };
@@ -59,26 +59,26 @@ struct Registration {
   std::vector<Rehearsal> rehearsals;           ///< one for each hypothesis
   std::uint64_t seed = 1;                      ///< of the simulated studies
   double typical_time = 0;                     ///< s, of the simulated studies
-  std::optional<std::size_t> sessions_so_far;  ///< in the database that was named; none: none was
+  std::optional<std::size_t> sessions_so_far;  ///< in the named database; none: no database
   std::vector<std::string> warnings;
 };
 
-/// The files that the lab fills in: no checksum is listed, registration.json has those of the
-/// begin.
+/// The files that the lab fills in: their checksums are not listed; registration.json has the
+/// initial ones.
 const std::vector<std::string>& files_to_fill_in();
 
 /// registration.json, which read_registration reads.
-/// \param texts  of files_to_fill_in(), as they were made
+/// \param texts  of files_to_fill_in(), as made
 std::string registration_json(const Registration& registration,
                               const std::vector<std::string>& texts);
-/// Those of them that have changed since they were made. \throws UsageError
+/// The files to fill in that have changed since they were made. \throws UsageError
 std::vector<std::string> filled_in(const std::string& folder);
 
-/// The registration in the folder, as its files say, changed or not. \throws UsageError,
-/// InputError: it is none
+/// Reads the registration in the folder, changed or not. \throws UsageError, InputError: the folder
+/// has no registration
 Registration read_registration(const std::string& folder);
 
-/// Of a protocol's files: names that lead to a place below its folder. \throws UsageError
+/// Requires that all names of a protocol's files lead below its folder. \throws UsageError
 void require_files_below(const std::vector<data::ProtocolFile>& files);
 
 }  // namespace palpate::runner

@@ -20,7 +20,7 @@ using Kind = Paragraph::Kind;
 using analysis::counted;
 using analysis::joined;
 
-/// As few digits as tell the number.
+/// The fewest digits that identify the number.
 std::string plain(double value) {
   std::array<char, 40> digits{};
   std::snprintf(digits.data(), digits.size(), "%.6g", value);

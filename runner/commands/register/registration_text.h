@@ -1,6 +1,6 @@
 #pragma once
-// A registration in words: the questions of OSF Preregistration, version 3, that the protocol, the
-// plan and the hypotheses answer. What only the lab can say remains a question.
+// The text of a registration: the questions of OSF Preregistration, version 3, that the protocol,
+// the plan and the hypotheses answer. Questions that only the lab can answer stay open.
 
 #include <string>
 #include <string_view>
@@ -10,10 +10,10 @@
 
 namespace palpate::runner {
 
-/// Marks what only the lab can say.
+/// Marks text that only the lab can provide.
 inline constexpr const char* kFillIn = "FILL IN: ";
 
-/// A paragraph, a point of a list, or lines as they are.
+/// A paragraph, an item of a list, or literal lines.
 struct Paragraph {
   enum class Kind { text, item, lines } kind = Kind::text;
   std::string text;
@@ -36,7 +36,8 @@ std::string registration_markdown(const Registration& registration,
 /// osf.json: the answers by question id.
 std::string registration_osf(const std::vector<Question>& questions);
 
-/// Text from files as Markdown that shows it as it is, within a line: no markup, HTML or links.
+/// Escapes text from files for Markdown within a line: it is shown literally, without markup, HTML
+/// or links.
 std::string as_markdown(std::string_view text);
 /// The same at the beginning of a paragraph, where more characters are markup.
 std::string as_paragraph(std::string_view text);

@@ -1,6 +1,6 @@
 #pragma once
-// Studies simulated from a plan's model, before there are data: their tables try the analysis and
-// the hypotheses.
+// Studies simulated from a plan's model before there are data, to rehearse the analysis and the
+// hypotheses.
 
 #include <cstddef>
 #include <cstdint>
@@ -22,8 +22,8 @@ class PlannedStudies {
   PlannedStudies(const protocols::Protocol& protocol, const analysis::StudyModel& model,
                  std::size_t participants, std::uint64_t seed);
 
-  /// s; the plan has no times, only ratios: geometric middle between what is too fast and the
-  /// time-out, so that as few trials as possible are lost at either end.
+  /// s; the plan has only ratios of times, so this is the geometric middle between the limit of too
+  /// fast answers and the time-out, to lose the fewest trials at either end.
   static double typical_time(const protocols::Protocol& protocol, double too_fast);
 
   /// Writes a study with the planned effect, or none, as 'palpate export' writes data.
@@ -32,9 +32,9 @@ class PlannedStudies {
   void write(const std::string& folder, const std::string& csv, const std::string& codebook,
              bool with_effect, double typical_time) const;
 
-  /// How hypotheses come out in studies with the planned effect and in as many without; the first
-  /// of each are those of write(). The result does not depend on `jobs`.
-  /// \param first  the trials of one of them \param progress  studies that are done
+  /// Verdicts on hypotheses in studies with the planned effect and in as many without; the first of
+  /// each are those of write(). The result does not depend on `jobs`.
+  /// \param first  the trials of the first study \param progress  called with the finished studies
   std::vector<Rehearsal> rehearse(const analysis::TrialTable& first,
                                   const Registration& registration, std::size_t studies,
                                   std::size_t jobs,

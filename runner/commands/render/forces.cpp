@@ -37,7 +37,7 @@ std::string joined(const std::vector<std::string_view>& fields) {
 
 constexpr std::size_t kPoseColumns = 7, kSideColumns = 3;
 
-/// The numbers of a row, zero beyond the first `count`. Empty where it holds anything else.
+/// The numbers of a row, zero beyond the first `count`. Empty if the row has anything else.
 std::optional<std::array<double, kPoseColumns + kSideColumns>> numbers_of(
     const std::vector<std::string_view>& fields, std::size_t count) {
   std::array<double, kPoseColumns + kSideColumns> out{};
@@ -187,7 +187,7 @@ rendering::Reach reach_for(const protocols::ReachSpec& spec, const rendering::Li
   return reach_of(spec, glm::distance(real.tip, real.tail), kGrip);
 }
 
-/// One tick of a stylus that reaches farther than it is long.
+/// One tick of a stylus with an extended reach.
 rendering::Rendering extended_tick(const rendering::Scene& scene, rendering::RenderState& state,
                                    const rendering::Renderer& renderer,
                                    const protocols::ReachSpec& spec,

@@ -1,5 +1,5 @@
 #pragma once
-// The work of `palpate render`: forces along a path over a scene.
+// The work of `palpate render`: forces along a path over a scene, read from and written to CSV.
 
 #include <cstdint>
 #include <functional>
@@ -22,19 +22,19 @@ inline constexpr std::size_t kMostPoses = 4'000'000;                 // more tha
 
 struct TimedPose {
   double t = 0;                ///< s
-  rendering::LineProbe probe;  ///< as it is held
+  rendering::LineProbe probe;  ///< of the real stylus
   Vec3 side{0, 0, 0};          ///< of the tool, its +x; zero: not measured
   std::size_t line = 0;        ///< of the file
 };
 
-/// Why a pose cannot follow those before it: what is expected; "": it can.
+/// The requirement that a pose violates after those before it; "": none.
 std::string fault_of(const TimedPose& pose, const std::vector<TimedPose>& before);
 
 /// Coordinates that are not finite are accepted: the renderer reports them in the faults column.
-/// \throws InputError with the faults, the first of many
+/// \throws InputError with the faults, at most the first ones
 std::vector<TimedPose> read_trajectory(const std::string& path);
 
-/// Of the forces along a path. \param tool  whether the stylus carries one: more columns
+/// Columns of the forces along a path. \param tool  whether the stylus carries one: more columns
 std::vector<std::string> force_columns(bool tool);
 
 /// "non-finite+started-inside".
@@ -64,7 +64,7 @@ class ForceTable {
   explicit ForceTable(bool tool);
   void add(const TimedPose& pose, const rendering::Rendering& rendering);
   const std::string& text() const { return csv_.text(); }
-  /// A line for each kind of fault: in how many ticks, and where first. Empty: no faults.
+  /// A line for each kind of fault: its number of ticks and its first tick. Empty: no faults.
   std::string warnings(const std::string& path) const;
 
  private:
@@ -90,14 +90,14 @@ class BodyTable {
   CsvText csv_;
 };
 
-/// \throws UsageError: neither point nor ray
+/// \throws UsageError: the name is neither point nor ray
 const rendering::Renderer& renderer_named(const std::string& name);
 
-/// \param path  that faults name. \throws stimuli::MeshError
+/// \param path  named in faults. \throws stimuli::MeshError
 rendering::Scene build_scene(const std::string& path, const protocols::SceneSpec& spec,
                              const rendering::Renderer& renderer);
 
-/// A row of the path, its tick, and what the renderer remembers after it.
+/// Gets a row of the path, its tick, and the renderer's state after it.
 using TickVisitor = std::function<void(const TimedPose&, const rendering::Rendering&,
                                        const rendering::RenderState&)>;
 

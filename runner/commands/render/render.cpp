@@ -24,13 +24,13 @@
 
 namespace palpate::runner {
 
-// `palpate render --explain`: the stages of a tick over a scene, and what each costs.
+// `palpate render --explain`: the stages of a tick over a scene, and their costs.
 
 /// A stage with its cost on this machine.
 struct StageCost {
   rendering::TickStage stage;
   /// ns for a call, run in isolation over recorded ticks; empty: left out, did not happen, or
-  /// cannot be told apart from others.
+  /// cannot be separated from others.
   std::optional<double> ns;
 };
 
@@ -111,7 +111,7 @@ StageCost soft_stage(const rendering::SoftObject& object) {
   return {{"soft body", rendering::StageTime::tick, true, text}, std::nullopt};
 }
 
-/// What bodies do beside the contact law, with all of them in motion and the probe far away.
+/// The cost of bodies beside the contact law, with all of them in motion and the probe far away.
 StageCost bodies_stage(const rendering::Scene& scene, const rendering::Renderer& renderer,
                        const rendering::MovingSummary& moving) {
   constexpr int kTicks = 500;
@@ -252,7 +252,7 @@ namespace {
 
 namespace po = boost::program_options;
 
-/// An option's value; \throws UsageError where it was not given.
+/// An option's value; \throws UsageError if it was not given.
 std::string given(const po::variables_map& values, const char* option, const char* because) {
   if (values.count(option) == 0)
     throw UsageError("the option '--" + std::string(option) + "' is required " + because);

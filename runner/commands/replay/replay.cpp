@@ -14,15 +14,15 @@
 
 namespace palpate::runner {
 
-// What `palpate replay` found, as text, JSON and CSV.
+// The findings of `palpate replay`, as text, JSON and CSV.
 
 /// \param name  "P03/1/12", as the trial was named
 std::string to_text(const std::string& name, const RecordedTrial& trial,
                     const ReplayComparison& found);
 std::string to_json_text(const std::string& name, const RecordedTrial& trial,
                          const ReplayComparison& found);
-/// A row for each tick: s, m, N, N m; the other renderer's columns where it was asked for. Of a
-/// trial of version 2 `interval` comes first, and t counts within it.
+/// A row for each tick: s, m, N, N m; the other renderer's columns if requested. For a trial of
+/// version 2 `interval` comes first, and t counts within it.
 std::string to_csv(const RecordedTrial& trial, const ReplayComparison& found);
 
 namespace {
@@ -88,7 +88,7 @@ void put(std::string& row, const RenderedForce& shown) {
   put(row, shown.depth);
 }
 
-/// Empty cells in an interval in which nothing moves.
+/// Empty cells in an interval without a moving object.
 void put(std::string& row, const std::optional<data::BodyRecord>& body) {
   if (!body) {
     row += std::string(13, ',');
@@ -215,7 +215,7 @@ std::string to_csv(const RecordedTrial& trial, const ReplayComparison& found) {
   return text;
 }
 
-// `palpate replay`: a stored trial through the servo and its renderer again.
+// `palpate replay`: runs a stored trial through the servo and its renderer again.
 
 int replay_command(const std::vector<std::string>& args) {
   CommandLine line;

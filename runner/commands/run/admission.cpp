@@ -56,7 +56,7 @@ std::string in_format(const std::tm& time, const char* format) {
   return text;
 }
 
-/// The newest that `wanted` is true of.
+/// The newest run that `wanted` accepts.
 template <class Wanted>
 std::optional<data::StoredRun> newest_run(data::Store& store, Wanted wanted) {
   std::optional<data::StoredRun> newest;
@@ -67,7 +67,7 @@ std::optional<data::StoredRun> newest_run(data::Store& store, Wanted wanted) {
   return newest;
 }
 
-/// As choose_session, but for withdrawals.
+/// Like choose_session, but ignores withdrawals.
 int session_due(data::Store& store, const data::Participant& participant,
                 const protocols::Protocol& protocol, const RunSettings& settings) {
   const int count = protocol.sessions.count;
@@ -94,7 +94,7 @@ int session_due(data::Store& store, const data::Participant& participant,
   return session;
 }
 
-/// \throws UsageError: the participant has withdrawn, and nobody said that this is known.
+/// \throws UsageError: the participant has withdrawn, and no option acknowledges it.
 void check_withdrawal(data::Store& store, const data::Participant& participant, int session,
                       const RunSettings& settings) {
   const std::string& code = participant.code;
@@ -211,17 +211,17 @@ namespace fs = std::filesystem;
 
 void say(const std::string& text) { std::fprintf(stderr, "%s\n", printable_lines(text).c_str()); }
 
-/// What the database holds already.
+/// The facts that the database holds.
 struct Known {
   std::vector<std::string> codes;          ///< in the order they came
   bool enrolled = false;                   ///< the code, in this protocol
   std::optional<EarlierProtocol> earlier;  ///< of the code, where it is not enrolled in this one
-  std::vector<std::string> others;         ///< what differs in protocols of the same name, in words
-  std::optional<int> number;               ///< that somebody new is to get, where texts changed
+  std::vector<std::string> others;  ///< differences from protocols of the same name, in words
+  std::optional<int> number;        ///< for a new participant, if texts changed
   std::optional<std::int64_t> newest_ns;
 };
 
-/// Other texts, the same trials: one counterbalancing, so numbers count on.
+/// Other texts, the same trials: one counterbalancing, so its numbers continue.
 void count_on(data::Store& store, const protocols::Protocol& protocol, const RunSettings& settings,
               Known& known) {
   std::set<int> taken;
@@ -246,7 +246,7 @@ void count_on(data::Store& store, const protocols::Protocol& protocol, const Run
   known.number = settings.number.value_or(next);
 }
 
-/// In a moment: nothing is held open while somebody thinks about a question, or a guard is forked.
+/// Reads the database briefly: it is closed again before a question is asked or a guard is forked.
 Known look_into(const RunSettings& settings, const protocols::Protocol& protocol,
                 const std::string& code) {
   Known known;
@@ -262,12 +262,12 @@ Known look_into(const RunSettings& settings, const protocols::Protocol& protocol
   known.earlier = earlier_protocol(store, protocol, code);
   if (known.earlier) return known;
   count_on(store, protocol, settings, known);
-  // Whether the code and the number can be given is said before anything is asked.
+  // Report an impossible code or number before asking any question.
   store.look_up(info_of(protocol), code, known.number ? known.number : settings.number);
   return known;
 }
 
-/// The last ones, to recognise one's own among them.
+/// The last codes, so that a participant can recognise their own.
 std::string latest(const std::vector<std::string>& codes) {
   constexpr std::size_t kShown = 5;
   const std::size_t shown = std::min(kShown, codes.size());

@@ -31,26 +31,27 @@ struct OpenDevice {
 /// \throws UsageError; std::runtime_error: the device cannot be opened
 OpenDevice open_device(const DeviceKind& kind, const RunSettings& settings,
                        const protocols::Protocol& protocol);
-/// \throws UsageError where the device cannot or should not show the protocol.
+/// \throws UsageError: the device cannot or should not show the protocol.
 void check_fitness(const OpenDevice& open, const RunSettings& settings,
                    const protocols::Protocol& protocol, const StimulusLibrary& library);
 
 ServoSettings servo_settings_of(const protocols::Protocol& protocol);
 
-/// \throws UsageError: no markers go there
+/// \throws UsageError: a receiver cannot be opened
 std::vector<std::unique_ptr<MarkerSink>> open_markers(const RunSettings& settings);
 
-/// None where the protocol wants none, or the experimenter. \throws SoundError
+/// Null if the protocol or the experimenter wants no noise. \throws SoundError
 std::unique_ptr<NoisePlayer> open_noise(const RunSettings& settings,
                                         const protocols::Protocol& protocol);
 
-/// Two windows, or text where there is no display. \throws DisplayError: the mouse needs a window
-/// None where none is named. \param emergency  commands zero force at once; called in its thread
-/// \throws UsageError; std::runtime_error: its port cannot be opened
+/// Null if no response box is named. \param emergency  commands zero force at once; called in the
+/// box's thread. \throws UsageError; std::runtime_error: its port cannot be opened
 std::unique_ptr<ResponseBox> open_response_box(const RunSettings& settings,
                                                const protocols::Protocol& protocol, Clock& clock,
                                                const std::function<void()>& emergency);
-/// \param store  says where windows were put last
+/// Opens two windows, or text where there is no display. \throws DisplayError: the mouse needs a
+/// window
+/// \param store  has the last places of the windows
 /// \param emergency  commands zero force at once; called in the display's thread
 std::unique_ptr<DisplayLoop> open_display(const RunSettings& settings,
                                           const protocols::Protocol& protocol, data::Store& store,

@@ -34,14 +34,14 @@
 
 namespace palpate::runner {
 
-// What `palpate run` prints before and after a session.
+// The output of `palpate run` before and after a session.
 
-/// \param simulated  by its device
+/// \param simulated  whether the device is simulated
 void print_participant(const data::Participant& participant, int session, int sessions,
                        bool simulated);
 /// \param elapsed  s, since the servo thread began
 void print_servo_health(const ServoHealth& health, double elapsed);
-/// \param who  as the store holds them now
+/// \param who  as stored now
 void print_outcome(const LiveStation& station, const data::Participant& who,
                    const LiveSession::Outcome& outcome);
 
@@ -90,20 +90,20 @@ void print_outcome(const LiveStation& station, const data::Participant& who,
 }
 
 // `palpate run`: a live session with a person and a device. Opens the station, runs the session in
-// a thread of its own beside the display's loop, and reports. From here to a force:
+// a thread of its own beside the display's loop, and reports. The path to a force continues in
 // live_session.cpp, session.cpp (the trial loop), servo_thread.cpp, servo.cpp (the tick),
 // rendering.
 
 namespace {
 
-/// What is known before the session begins and belongs into its record or onto the console.
+/// Facts known before the session, for its record or the console.
 struct Beforehand {
   const RunSettings& settings;
   const Admission& admission;
   const std::vector<LimitedMaterial>& limited;
   const data::SessionProgress& progress;  ///< what is on record of this session
   std::int64_t servo_began_ns;            ///< session clock
-  std::vector<std::string> news;          ///< for the console, first of all
+  std::vector<std::string> news;          ///< shown first on the console
 };
 
 /// While it lives, signals turn these forces off.
@@ -127,8 +127,8 @@ ForceLimits limits_of(const ServoSettings& settings, const DeviceCapabilities& d
   return limits;
 }
 
-/// Before the first trial. Only what must not be lost begins a run: that somebody withdrew, and
-/// notes on somebody who has a number already.
+/// Ends before the first trial. Begins a run only for events that must be kept: a withdrawal, and
+/// notes on a participant who has a number already.
 LiveSession::Outcome end_before_trials(const LiveStation& station, const EndOfSession& end) {
   RunRecord& record = station.record;
   LiveSession::Outcome outcome{end.end, end.what(), station.plan.done(), station.plan.size(),
@@ -143,7 +143,7 @@ LiveSession::Outcome end_before_trials(const LiveStation& station, const EndOfSe
   return outcome;
 }
 
-/// Onto the console and into the record, before the first trial.
+/// Puts the known facts onto the console and into the record, before the first trial.
 void tell(LiveSession& session, const LiveStation& station, const Beforehand& known,
           const PreflightResult& preflight) {
   const std::int64_t began_ns = station.utc.monotonic_ns;
@@ -189,7 +189,7 @@ void tell(LiveSession& session, const LiveStation& station, const Beforehand& kn
   if (!missing.empty()) session.say(missing);
 }
 
-/// Pre-flight, then the trials that are not on record yet: the session's own thread.
+/// Runs the pre-flight, then the unrecorded trials, in the session's own thread.
 /// \throws as LiveSession::run
 LiveSession::Outcome run_session(const LiveStation& station, const Beforehand& known) {
   PreflightResult preflight;
@@ -198,14 +198,14 @@ LiveSession::Outcome run_session(const LiveStation& station, const Beforehand& k
   } catch (const EndOfSession& end) {
     return end_before_trials(station, end);
   }
-  if (station.record.participant().id != 0) station.record.begin();  // no number is taken by that
+  if (station.record.participant().id != 0) station.record.begin();  // takes no number
   LiveSession session(station);
   tell(session, station, known, preflight);
   return session.run();
 }
 
-/// The session in its own thread, the display's loop in this one, until both have ended. Whatever
-/// either throws: zero force first.
+/// Runs the session in its own thread and the display's loop in this one, until both have ended. On
+/// an exception from either: zero force first.
 LiveSession::Outcome run_beside_display(const LiveStation& station, const Beforehand& known,
                                         DisplayLoop& display,
                                         const std::function<void()>& emergency) {
@@ -222,7 +222,7 @@ LiveSession::Outcome run_beside_display(const LiveStation& station, const Before
   });
   try {
     display.run();
-  } catch (...) {  // the session ends by itself: its participant sees nothing
+  } catch (...) {  // the session ends by itself: its display is gone
     emergency();
     display_failure = std::current_exception();
   }
@@ -234,7 +234,7 @@ LiveSession::Outcome run_beside_display(const LiveStation& station, const Before
   return outcome;
 }
 
-/// What the experimenter should know first of all.
+/// The most important messages for the experimenter.
 std::vector<std::string> news(const std::string& resumed, const DisplayLoop& display,
                               const std::vector<LimitedMaterial>& limited) {
   std::vector<std::string> out;
@@ -260,7 +260,7 @@ bool has_joystick(const RunSettings& settings, const protocols::Protocol& protoc
   return !protocol.responses.joystick.empty() && !settings.no_window;
 }
 
-/// None where nobody asked for it.
+/// Null if not requested.
 std::unique_ptr<SampleStream> open_stream(const RunSettings& settings,
                                           const protocols::Protocol& protocol) {
   if (settings.stream.empty()) return nullptr;
@@ -271,7 +271,7 @@ std::unique_ptr<SampleStream> open_stream(const RunSettings& settings,
   }
 }
 
-/// The texts that were shown go on record as a whole.
+/// Replaces the texts by a translation; the shown texts are recorded whole.
 void translate_texts(const RunSettings& settings, Admission& admission) {
   protocols::Protocol& protocol = admission.protocol;
   if (has_joystick(settings, protocol) != !protocol.responses.joystick.empty())
@@ -291,7 +291,7 @@ int run_command(const std::vector<std::string>& args) {
   std::optional<RunSettings> given = parse_run_settings(args);
   if (!given) return 0;
   RunSettings& settings = *given;
-  std::signal(SIGPIPE, SIG_IGN);  // a reader that goes away does not end a session
+  std::signal(SIGPIPE, SIG_IGN);  // a closed reader must not end a session
 
   // Who takes part, in which protocol.
   const DeviceKind& kind = find_device_kind(settings.device);
@@ -317,7 +317,7 @@ int run_command(const std::vector<std::string>& args) {
   check_fitness(open, settings, protocol, library);
   const auto noise = open_noise(settings, protocol);
 
-  // The record. What a simulated device gave is labelled simulated, whoever answered.
+  // The record. Data from a simulated device is labelled simulated, whoever answers.
   data::Store store = data::Store::open(settings.database, data::Store::Mode::write_or_create);
   warn_of_exposure(store.path());
   RealClock clock;
@@ -328,7 +328,7 @@ int run_command(const std::vector<std::string>& args) {
   if (settings.consent.empty() && !asks_for_consent(protocol))
     std::fprintf(stderr, "no consent is recorded (--consent VERSION)\n");
 
-  // The servo loop, without forces until the first trial; the displays, of which each can end them.
+  // The servo loop, without forces until the first trial; the displays, each of which can end them.
   const ServoSettings servo_settings = servo_settings_of(protocol);
   const ForceDirectionCheck direction_check(limits_of(servo_settings, device),
                                             device.actuated_freedom);

@@ -12,7 +12,7 @@ namespace {
 
 namespace po = boost::program_options;
 
-/// It becomes part of a file's name.
+/// Checks a language code: it becomes part of a file's name.
 void check_language(const std::string& language) {
   const bool letters = std::all_of(language.begin(), language.end(), [](char c) {
     return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' ||

@@ -1,5 +1,5 @@
 #pragma once
-// What the command line of `palpate run` asks for.
+// The settings of `palpate run` from its command line.
 
 #include <optional>
 #include <string>
@@ -16,7 +16,7 @@ struct RunSettings {
   std::optional<double> response_latency;            ///< s, measured; recorded, never subtracted
   int participant_monitor = 0, console_monitor = 0;  ///< from 1; 0: as it comes
   double ui_scale = 0;                               ///< 0: from the monitors
-  std::string language;      ///< of the protocol's texts; "": as they are written
+  std::string language;      ///< of the protocol's texts; "": the original ones
   std::string stream;        ///< of the servo's samples: "lsl" or "lsl:NAME"; "": none
   std::string response_box;  ///< serial port; "": none
   bool spoken = false;       ///< the experimenter types the answers
