@@ -37,10 +37,10 @@ void check_fitness(const OpenDevice& open, const RunSettings& settings,
 
 ServoSettings servo_settings_of(const protocols::Protocol& protocol);
 
-/// \throws UsageError: a receiver cannot be opened
+/// \throws UsageError: --markers has an unknown form; std::runtime_error: it cannot be opened
 std::vector<std::unique_ptr<MarkerSink>> open_markers(const RunSettings& settings);
 
-/// Null if the protocol or the experimenter wants no noise. \throws SoundError
+/// Null with --without-noise, or if the protocol has neither noise nor sounds. \throws SoundError
 std::unique_ptr<NoisePlayer> open_noise(const RunSettings& settings,
                                         const protocols::Protocol& protocol);
 
