@@ -1,7 +1,9 @@
 #include "stimuli/primitives.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdio>
 #include <glm/geometric.hpp>
 #include <numbers>
 #include <stdexcept>
@@ -9,6 +11,7 @@
 
 #include "stimuli/half_edges.h"
 #include "stimuli/mesh_file.h"
+#include "stimuli/mesh_names.h"
 
 namespace palpate::stimuli {
 namespace {
@@ -163,6 +166,28 @@ PolygonSoup box(const Vec3& size) {
           {{0, 3, 2, 1}, {4, 5, 6, 7}, {0, 1, 5, 4}, {1, 2, 6, 5}, {2, 3, 7, 6}, {3, 0, 4, 7}}};
 }
 
+namespace {
+
+/// m, of any coordinate: poses farther away are no hand's, and the renderers take them for faults.
+constexpr double kFarthestCorner = 1e6;
+
+void check_reach(const PolygonSoup& soup, const std::string& file) {
+  MeshFaults faults;
+  for (std::size_t v = 0; v < soup.vertices.size(); ++v) {
+    const Vec3& at = soup.vertices[v];
+    if (std::max({std::abs(at.x), std::abs(at.y), std::abs(at.z)}) <= kFarthestCorner) continue;
+    faults.add("too far", [&] {
+      char text[120];
+      std::snprintf(text, sizeof text, "(%.6g, %.6g, %.6g)", at.x, at.y, at.z);
+      return file + ": " + MeshNaming(soup.names).vertex(static_cast<Index>(v), at) +
+             ": expected coordinates in metres, up to 1e6 from the origin, found " + text;
+    });
+  }
+  faults.throw_if_any();
+}
+
+}  // namespace
+
 PolygonSoup polygons_of(const ObjectSpec& spec) {
   switch (spec.shape) {
     case ShapeKind::sphere:
@@ -175,8 +200,12 @@ PolygonSoup polygons_of(const ObjectSpec& spec) {
       return cube(spec.edge);
     case ShapeKind::box:
       return box(spec.size);
-    case ShapeKind::mesh:
-      return spec.file_bytes ? read_mesh(spec.file, *spec.file_bytes) : read_mesh_file(spec.file);
+    case ShapeKind::mesh: {
+      PolygonSoup soup =
+          spec.file_bytes ? read_mesh(spec.file, *spec.file_bytes) : read_mesh_file(spec.file);
+      check_reach(soup, spec.file);
+      return soup;
+    }
     case ShapeKind::compound:
       break;
   }

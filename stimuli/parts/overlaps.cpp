@@ -80,12 +80,19 @@ std::vector<std::string> group_overlaps(const ObjectSpec& spec) {
   const PolygonSoup soup = polygons_of(spec);
   if (soup.group_names.size() < 2) return {};
   std::vector<Group> groups;
+  std::vector<std::string> sentences;
   for (const SolidGroup& solid : solid_groups(soup)) {
-    Group group{solid.name, convex_parts(solid.soup)};
+    Group group{solid.name, {}};
+    try {
+      group.parts = convex_parts(solid.soup);
+    } catch (const MeshError&) {
+      sentences.push_back(solid.name +
+                          " falls into no convex parts: where it overlaps others is not known");
+      continue;
+    }
     for (const ConvexMesh& part : group.parts) group.volume += volume_of(part);
     groups.push_back(std::move(group));
   }
-  std::vector<std::string> sentences;
   for (std::size_t i = 0; i < groups.size(); ++i) {
     for (std::size_t k = i + 1; k < groups.size(); ++k) {
       double common = 0;

@@ -239,6 +239,7 @@ nlohmann::ordered_json to_json(const Explanation& e) {
           {"renderer", e.renderer},
           {"objects", e.objects},
           {"parts", e.parts},
+          {"surfaces", e.surfaces},
           {"facets", e.facets},
           {"edges", e.edges},
           {"contact_ns", figure(e.contact_ns)},

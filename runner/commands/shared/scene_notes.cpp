@@ -13,6 +13,12 @@
 #include "stimuli/primitives.h"
 
 namespace palpate::runner {
+namespace {
+
+// mm; no hand goes round what is larger, and none feels the shape of what is smaller.
+constexpr double kBeyondHands = 1000, kBelowTouch = 0.1;
+
+}  // namespace
 
 std::vector<std::string> objects_passed_through(const protocols::SceneSpec& scene) {
   const auto is_soft = [](const stimuli::ObjectSpec& object) { return object.soft.has_value(); };
@@ -64,6 +70,14 @@ std::vector<std::string> mesh_notes(const stimuli::ObjectSpec& object) {
   std::snprintf(text, sizeof text, "%.4g x %.4g x %.4g mm, %zu faces", size.x, size.y, size.z,
                 soup.faces.size());
   std::string note = printable(object.file_name) + ": " + text;
+  const double largest = std::max({size.x, size.y, size.z});
+  if (largest > kBeyondHands) {
+    note +=
+        "; larger than a metre: expected coordinates in metres, which a file in millimetres "
+        "becomes scaled by 0.001";
+  } else if (largest < kBelowTouch) {
+    note += "; smaller than a tenth of a millimetre: expected coordinates in metres";
+  }
   try {
     for (const std::string& done : stimuli::closed_surface(soup).notes) note += "; " + done;
   } catch (const stimuli::MeshError&) {
