@@ -65,6 +65,18 @@ std::vector<rendering::MovingObject> moving_of(const std::vector<stimuli::Object
   return moving;
 }
 
+/// What object i may collide with, for messages: the first object that moves, or if it moves
+/// itself the first other one. Empty: nothing.
+std::string met_by(const std::vector<stimuli::ObjectSpec>& objects, std::size_t i) {
+  if (objects[i].soft) return {};
+  for (std::size_t k = 0; k < objects.size(); ++k) {
+    if (k == i || objects[k].soft) continue;
+    if (objects[k].body) return "/objects/" + std::to_string(k) + ", which moves";
+    if (objects[i].body) return "/objects/" + std::to_string(k) + " as it moves";
+  }
+  return {};
+}
+
 bool has_layers(const stimuli::ObjectSpec& spec) {
   if (spec.shape != stimuli::ShapeKind::compound) return !spec.material.layers.empty();
   return std::any_of(spec.parts.begin(), spec.parts.end(), has_layers);
@@ -296,21 +308,27 @@ void SceneBuilder::add_shells(const stimuli::ObjectSpec& spec, const Pose& in_ob
 }
 
 SceneBuilder::Placed SceneBuilder::placed(const stimuli::ObjectSpec& spec, int object,
-                                          bool side_contact, bool collides) {
+                                          bool side_contact, const std::string& meets) {
   Placed out;
   // A solid of tetrahedra need not fall into convex parts, and nothing rigid is made of it.
   if (spec.soft && spec.shape == stimuli::ShapeKind::mesh) return out;
-  Placing placing{object, side_contact, has_layers(spec), !collides && has_concave(spec),
-                  out.parts};
+  Placing placing{object, side_contact, has_layers(spec), has_concave(spec), out.parts};
+  std::string reason = "its layers are made of convex parts, and it falls into none: ";
   try {
     place(spec, Pose{}, placing);
     place_layers(placing);
+    if (placing.by_surface && !meets.empty()) {
+      reason = "it may meet " + meets +
+               ", and collisions are of convex parts, of which it falls into none: ";
+      for (const PlacedShape& shape : placing.all) {
+        for (const Prepared& part : prepare(*shape.spec, 0, side_contact)) {
+          out.solids.push_back({part.mesh, shape.pose, shape.spec->material, object, part.trees});
+        }
+      }
+    }
   } catch (const stimuli::MeshError& error) {
-    if (!has_concave(spec)) throw;
+    if (!placing.by_surface) throw;
     // What asks for the cutting that failed.
-    const std::string reason =
-        collides ? "objects that move, and what they meet, are cut into convex parts: "
-                 : "layers are made of convex parts: ";
     std::vector<std::string> faults = error.faults();
     for (std::string& fault : faults) {
       if (!fault.starts_with('/')) fault.insert(0, reason);
@@ -342,15 +360,13 @@ SceneBuilder::Placed SceneBuilder::placed(const stimuli::ObjectSpec& spec, int o
 rendering::Scene SceneBuilder::build(const std::vector<stimuli::ObjectSpec>& objects,
                                      bool side_contact, const rendering::Tool& tool,
                                      const Vec3& gravity, double soft_radius) {
-  std::vector<rendering::SceneObject> parts, shown;
+  std::vector<rendering::SceneObject> parts, shown, solids;
   std::vector<rendering::SceneSurface> surfaces;
-  const bool collides = std::any_of(objects.begin(), objects.end(),
-                                    [](const auto& object) { return object.body.has_value(); });
   std::vector<std::shared_ptr<const rendering::SoftObject>> soft;
   for (std::size_t i = 0; i < objects.size(); ++i) {
     try {
       const int object = static_cast<int>(i);
-      const Placed placed_here = placed(objects[i], object, side_contact, collides);
+      const Placed placed_here = placed(objects[i], object, side_contact, met_by(objects, i));
       const std::vector<rendering::SceneObject>& own = placed_here.parts;
       shown.insert(shown.end(), own.begin(), own.end());
       if (objects[i].soft) {
@@ -359,6 +375,7 @@ rendering::Scene SceneBuilder::build(const std::vector<stimuli::ObjectSpec>& obj
       } else {
         parts.insert(parts.end(), own.begin(), own.end());
         surfaces.insert(surfaces.end(), placed_here.surfaces.begin(), placed_here.surfaces.end());
+        solids.insert(solids.end(), placed_here.solids.begin(), placed_here.solids.end());
       }
     } catch (const stimuli::MeshError& error) {
       std::string where = "/objects/" + std::to_string(i);
@@ -373,7 +390,7 @@ rendering::Scene SceneBuilder::build(const std::vector<stimuli::ObjectSpec>& obj
   try {
     rendering::Scene others =
         rendering::moving_scene(std::move(parts), moving_of(objects), gravity, side_contact, tool,
-                                true, std::move(surfaces));
+                                true, std::move(surfaces), std::move(solids));
     if (soft.empty()) return others;
     return rendering::soft_scene(std::move(others), std::move(shown), std::move(soft), side_contact,
                                  tool);

@@ -65,9 +65,11 @@ class SceneBuilder {
   struct Placed {
     std::vector<rendering::SceneObject> parts;
     std::vector<rendering::SceneSurface> surfaces;
+    std::vector<rendering::SceneObject> solids;  ///< of its surfaces, for collisions
   };
-  /// \param collides  something in the scene moves: then all of it is made of convex parts
-  Placed placed(const stimuli::ObjectSpec& spec, int object, bool side_contact, bool collides);
+  /// \param meets  what it may collide with, for messages; empty: nothing
+  Placed placed(const stimuli::ObjectSpec& spec, int object, bool side_contact,
+                const std::string& meets);
   /// A mesh that is not made of convex groups; null: it is, or is no mesh.
   std::shared_ptr<const stimuli::ClosedSurface> concave(const stimuli::ObjectSpec& spec);
   bool has_concave(const stimuli::ObjectSpec& spec);

@@ -225,7 +225,7 @@ void MovingBodies::find_probe_contacts(BodiesState& state, std::size_t body,
     contact.segment = c.segment;
     contact.spring.group = static_cast<int>(c.group);
     contact.spring.stiffness = c.loaded.stiffness;
-    contact.spring.damping = shape.parts()[c.loaded.part].material.damping;
+    contact.spring.damping = shape.material_of(c.loaded.part).damping;
     contact.spring.depth = c.loaded.contact.depth;
     contact.spring.normal = c.loaded.contact.normal;
     contact.spring.place = c.place + contact.offset;

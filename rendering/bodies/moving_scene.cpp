@@ -32,20 +32,35 @@ CollidingPart colliding(const SceneObject& part, const Pose& in_frame) {
   return out;
 }
 
-/// \param parts  of the object, where they are at first
-MovingBody make_body(const MovingObject& moving, const std::vector<SceneObject>& parts) {
+/// What a scene has of one object, where it is at first.
+struct OwnParts {
+  std::vector<SceneObject> felt;
+  std::vector<SceneSurface> surfaces;
+  std::vector<SceneObject> solid;  ///< what of it collides
+};
+
+MovingBody make_body(const MovingObject& moving, const OwnParts& own) {
   MovingBody body;
   body.object = moving.object;
   body.of = moving.body;
   std::vector<PlacedMesh> solids;
   const Pose to_object = inverse(moving.pose);
-  for (const SceneObject& part : parts) {
+  for (const SceneObject& part : own.felt)
     body.stiffness = std::max(body.stiffness, part.material.stiffness);
-    if (part.layer <= 0)
-      solids.push_back({part.mesh.get(), stimuli::compose(to_object, part.pose)});
+  for (const SceneSurface& surface : own.surfaces) {
+    for (const stimuli::Material& material : surface.surface->materials())
+      body.stiffness = std::max(body.stiffness, material.stiffness);
   }
-  if (solids.empty()) refuse(moving.object, "expected an object with a surface");
-  const VolumeMoments moments = moments_of_union(solids);
+  for (const SceneObject& part : own.solid)
+    solids.push_back({part.mesh.get(), stimuli::compose(to_object, part.pose)});
+  if (solids.empty() && own.surfaces.empty())
+    refuse(moving.object, "expected an object with a surface");
+  // Parts of a rounded file abut with steps, which their union would count as outer faces.
+  const VolumeMoments moments =
+      own.surfaces.empty()
+          ? moments_of_union(solids)
+          : moments_of_surface(*own.surfaces.front().surface,
+                               stimuli::compose(to_object, own.surfaces.front().pose));
   const MassProperties properties = moving.body.mass ? with_mass(moments, *moving.body.mass)
                                                      : with_density(moments, *moving.body.density);
   try {
@@ -61,13 +76,18 @@ MovingBody make_body(const MovingObject& moving, const std::vector<SceneObject>&
   body.start.spin_momentum =
       spin_momentum_of(body.inertia, body.start.orientation, moving.body.spin);
   const Pose to_body = inverse(body.placed);
-  for (const SceneObject& part : parts) {
-    if (part.layer > 0) continue;
+  for (const SceneObject& part : own.solid) {
     body.parts.push_back(colliding(part, stimuli::compose(to_body, part.pose)));
     const CollidingPart& placed = body.parts.back();
     for (const Vec3& vertex : part.mesh->vertices())
       body.radius = std::max(body.radius,
                              glm::length(placed.pose.orientation * vertex + placed.pose.position));
+  }
+  for (const SceneSurface& surface : own.surfaces) {
+    const Pose placed = stimuli::compose(to_body, surface.pose);
+    for (const Vec3& vertex : surface.surface->vertices())
+      body.radius =
+          std::max(body.radius, glm::length(placed.orientation * vertex + placed.position));
   }
   return body;
 }
@@ -76,7 +96,6 @@ Obstacle make_obstacle(const std::vector<SceneObject>& parts) {
   Obstacle obstacle;
   obstacle.object = parts.front().object;
   for (const SceneObject& part : parts) {
-    if (part.layer > 0) continue;
     obstacle.parts.push_back(colliding(part, part.pose));
     obstacle.centre += obstacle.parts.back().centre;
   }
@@ -167,7 +186,7 @@ std::optional<MovingSummary> moving_summary(const Scene& scene) {
 
 Scene moving_scene(std::vector<SceneObject> parts, const std::vector<MovingObject>& moving,
                    const Vec3& gravity, bool side_contact, const Tool& tool, bool sleeps,
-                   std::vector<SceneSurface> surfaces) {
+                   std::vector<SceneSurface> surfaces, std::vector<SceneObject> solids) {
   if (moving.empty())
     return Scene(std::move(parts), side_contact, tool, nullptr, std::move(surfaces));
   if (moving.size() > kMostBodies)
@@ -180,39 +199,57 @@ Scene moving_scene(std::vector<SceneObject> parts, const std::vector<MovingObjec
   BodyWorld world;
   world.gravity = gravity;
   world.sleeps = sleeps;
-  std::vector<Scene> shapes;
-  std::vector<SceneObject> fixed;
   const auto is_of = [](int object) {
-    return [object](const SceneObject& part) { return part.object == object; };
+    return [object](const auto& part) { return part.object == object; };
   };
+  std::vector<SceneObject> collide;  // the convex parts of all that has some
+  std::copy_if(parts.begin(), parts.end(), std::back_inserter(collide),
+               [&](const SceneObject& part) {
+                 return part.layer <= 0 &&
+                        std::none_of(surfaces.begin(), surfaces.end(), is_of(part.object));
+               });
+  std::move(solids.begin(), solids.end(), std::back_inserter(collide));
+  std::vector<Scene> shapes;
   for (const MovingObject& object : moving) {
-    std::vector<SceneObject> own;
-    std::copy_if(parts.begin(), parts.end(), std::back_inserter(own), is_of(object.object));
+    OwnParts own;
+    const auto is_own = is_of(object.object);
+    std::copy_if(parts.begin(), parts.end(), std::back_inserter(own.felt), is_own);
+    std::copy_if(surfaces.begin(), surfaces.end(), std::back_inserter(own.surfaces), is_own);
+    std::copy_if(collide.begin(), collide.end(), std::back_inserter(own.solid), is_own);
     MovingBody body = make_body(object, own);
     check_limits(body);
     const Pose to_body = inverse(body.placed);
-    for (SceneObject& part : own) part.pose = stimuli::compose(to_body, part.pose);
-    shapes.emplace_back(std::move(own), side_contact, tool);
+    for (SceneObject& part : own.felt) part.pose = stimuli::compose(to_body, part.pose);
+    for (SceneSurface& surface : own.surfaces)
+      surface.pose = stimuli::compose(to_body, surface.pose);
+    shapes.emplace_back(std::move(own.felt), side_contact, tool, nullptr, std::move(own.surfaces));
     world.bodies.push_back(std::move(body));
   }
   check_masses(world);
-  for (const SceneObject& part : parts) {
-    if (std::none_of(moving.begin(), moving.end(),
-                     [&](const MovingObject& m) { return m.object == part.object; }))
-      fixed.push_back(part);
-  }
-  for (std::size_t i = 0; i < fixed.size(); ++i) {
-    if (i > 0 && fixed[i].object == fixed[i - 1].object) continue;
+  const auto moves = [&](const auto& part) {
+    return std::any_of(moving.begin(), moving.end(),
+                       [&](const MovingObject& m) { return m.object == part.object; });
+  };
+  std::erase_if(collide, moves);
+  std::vector<int> met;
+  for (const SceneObject& part : collide) {
+    if (std::find(met.begin(), met.end(), part.object) != met.end()) continue;
+    met.push_back(part.object);
     std::vector<SceneObject> own;
-    std::copy_if(fixed.begin(), fixed.end(), std::back_inserter(own), is_of(fixed[i].object));
-    Obstacle obstacle = make_obstacle(own);
-    if (!obstacle.parts.empty()) world.obstacles.push_back(std::move(obstacle));
+    std::copy_if(collide.begin(), collide.end(), std::back_inserter(own), is_of(part.object));
+    world.obstacles.push_back(make_obstacle(own));
   }
   world.pair_up();
   check_overlaps(world);
+  std::vector<SceneObject> fixed = parts;
+  std::vector<SceneSurface> fixed_surfaces = surfaces;
+  std::erase_if(fixed, moves);
+  std::erase_if(fixed_surfaces, moves);
   auto motion = std::make_shared<const MovingBodies>(
-      std::move(world), Scene(std::move(fixed), side_contact, tool), std::move(shapes));
-  return Scene(std::move(parts), side_contact, tool, std::move(motion));
+      std::move(world),
+      Scene(std::move(fixed), side_contact, tool, nullptr, std::move(fixed_surfaces)),
+      std::move(shapes));
+  return Scene(std::move(parts), side_contact, tool, std::move(motion), std::move(surfaces));
 }
 
 }  // namespace palpate::rendering

@@ -25,11 +25,15 @@ inline constexpr std::size_t kMostBodies = 64;
 /// \param parts    of all objects, where they are at first
 /// \param gravity  m/s^2
 /// \param sleeps   what has come to rest is not moved until something comes near
-/// \param surfaces  of objects without convex parts of their own surface, where they are at first
+/// \param surfaces  of objects without convex parts of their own surface, where they are at first;
+/// one for each of them
+/// \param solids   the convex parts of objects with surfaces, for collisions alone: the
+/// hand feels the surface. Without them such an object meets nothing but the hand
 /// \throws std::invalid_argument naming the object and the limit that is passed
 Scene moving_scene(std::vector<SceneObject> parts, const std::vector<MovingObject>& moving,
                    const Vec3& gravity, bool side_contact = true, const Tool& tool = {},
-                   bool sleeps = true, std::vector<SceneSurface> surfaces = {});
+                   bool sleeps = true, std::vector<SceneSurface> surfaces = {},
+                   std::vector<SceneObject> solids = {});
 
 /// What of a scene moves, in numbers.
 struct MovingSummary {

@@ -1,11 +1,16 @@
 #include "rendering/bodies/rigid_motion.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
+#include <numbers>
 #include <stdexcept>
+
+#include "rendering/surface_patch.h"
 
 namespace palpate::rendering {
 namespace {
@@ -162,6 +167,126 @@ VolumeMoments moments_of_union(std::span<const PlacedMesh> parts) {
   for (std::size_t i = 0; i < placed.size(); ++i) surface.add_part(i);
   moments.about = middle;
   return moments;
+}
+
+namespace {
+
+/// Whether a region is covered twice that some of up to 4,096 triangles lie about.
+bool covers_twice(const Surface& surface) {
+  constexpr std::size_t kAsked = 4096;
+  constexpr double kBelow = 1e-7;  // of the size
+  const auto& triangles = surface.triangles();
+  const std::size_t stride = 1 + triangles.size() / kAsked;
+  for (std::size_t i = 0; i < triangles.size(); i += stride) {
+    const SurfaceTriangle& t = triangles[i];
+    const Vec3 middle = (surface.vertices()[t.corners[0]] + surface.vertices()[t.corners[1]] +
+                         surface.vertices()[t.corners[2]]) /
+                        3.0;
+    if (surface.winding(middle - kBelow * surface.size() * t.normal) > 1) return true;
+  }
+  return false;
+}
+
+/// What of one line along z, of so much area about it, is inside.
+class LineMoments {
+ public:
+  LineMoments(const Surface& surface, VolumeMoments& out) : surface_(surface), out_(out) {}
+
+  /// \param from  below the surface, relative to `about`. \param length  m, to above it
+  void add(const Vec3& from, double length, double area) {
+    crossings_.clear();
+    const Vec3 way(0, 0, length);
+    const Vec3 start = from + out_.about;
+    surface_.near_segment(start, way, 0, [&](std::uint32_t index) {
+      const SurfaceTriangle& t = surface_.triangles()[index];
+      if (t.normal.z == 0) return true;
+      bool in = true, out = true;
+      for (std::size_t k = 0; k < 3; ++k) {
+        const Vec3 a = surface_.vertices()[t.corners[k]] - start;
+        const Vec3 b = surface_.vertices()[t.corners[(k + 1) % 3]] - start;
+        const double side = a.x * b.y - a.y * b.x;
+        in &= side >= 0;
+        out &= side <= 0;
+      }
+      if (in == out) return true;
+      const Vec3 a = surface_.vertices()[t.corners[0]] - start;
+      crossings_.push_back({from.z + glm::dot(t.normal, a) / t.normal.z, t.normal.z < 0 ? 1 : -1});
+      return true;
+    });
+    std::sort(crossings_.begin(), crossings_.end(),
+              [](const Crossing& a, const Crossing& b) { return a.z < b.z; });
+    int inside = 0;
+    for (std::size_t i = 0; i + 1 < crossings_.size(); ++i) {
+      inside += crossings_[i].enters;
+      if (inside > 0) add_piece(from, crossings_[i].z, crossings_[i + 1].z, area);
+    }
+  }
+
+ private:
+  struct Crossing {
+    double z;    ///< m
+    int enters;  ///< 1, or -1: leaves
+  };
+
+  void add_piece(const Vec3& at, double low, double high, double area) {
+    const double volume = area * (high - low);
+    const Vec3 middle(at.x, at.y, 0.5 * (low + high));
+    out_.volume += volume;
+    out_.first += volume * middle;
+    out_.second += volume * glm::outerProduct(middle, middle);
+    out_.second[2][2] += volume * (high - low) * (high - low) / 12;
+  }
+
+  const Surface& surface_;
+  VolumeMoments& out_;
+  std::vector<Crossing> crossings_;
+};
+
+/// Of the surface in its own frame, about its centre.
+VolumeMoments own_moments(const Surface& surface) {
+  VolumeMoments moments;
+  moments.about = surface.centre();
+  if (!covers_twice(surface)) {
+    Polygon corners(3);
+    for (const SurfaceTriangle& t : surface.triangles()) {
+      for (std::size_t k = 0; k < 3; ++k)
+        corners[k] = surface.vertices()[t.corners[k]] - moments.about;
+      add_polygon(corners, moments);
+    }
+    return moments;
+  }
+  constexpr int kLines = 400;  // along each side
+  Vec3 low(HUGE_VAL), high(-HUGE_VAL);
+  for (const Vec3& v : surface.vertices()) {
+    low = glm::min(low, v - moments.about);
+    high = glm::max(high, v - moments.about);
+  }
+  const double step_x = (high.x - low.x) / kLines, step_y = (high.y - low.y) / kLines;
+  std::array<double, kLines> shifts{};
+  for (std::size_t i = 0; i < shifts.size(); ++i) {
+    const double turns = (std::numbers::phi - 1) * (static_cast<double>(i) + 0.5);
+    shifts[i] = turns - std::floor(turns);
+  }
+  LineMoments lines(surface, moments);
+  for (int i = 0; i < kLines; ++i) {
+    for (int k = 0; k < kLines; ++k) {
+      // Shifted from row to row by the golden ratio: a wall along x or y is met everywhere.
+      const Vec3 from(low.x + (i + shifts[static_cast<std::size_t>(k)]) * step_x,
+                      low.y + (k + shifts[static_cast<std::size_t>(i)]) * step_y,
+                      low.z - surface.radius());
+      lines.add(from, high.z - low.z + 2 * surface.radius(), step_x * step_y);
+    }
+  }
+  return moments;
+}
+
+}  // namespace
+
+VolumeMoments moments_of_surface(const Surface& surface, const Pose& pose) {
+  const VolumeMoments own = own_moments(surface);
+  const Mat3 turn = glm::mat3_cast(pose.orientation);
+  return {turn * own.about + pose.position, own.volume, turn * own.first,
+          turn * own.second * glm::transpose(turn)};
 }
 
 MassProperties with_density(const VolumeMoments& moments, double density) {

@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "rendering/surface.h"
 #include "stimuli/convex_mesh.h"
 #include "stimuli/vec.h"
 
@@ -29,6 +30,10 @@ struct PlacedMesh {
 
 /// Of the union of convex parts: what several of them cover counts once. Parts may abut.
 VolumeMoments moments_of_union(std::span<const PlacedMesh> parts);
+
+/// Of what a closed surface bounds. Where its shells overlap, that counts once, too: then by
+/// crossings along 160,000 lines, to some 1e-4.
+VolumeMoments moments_of_surface(const Surface& surface, const Pose& pose);
 
 /// Of a solid of one density throughout, in the frame of its moments.
 struct MassProperties {

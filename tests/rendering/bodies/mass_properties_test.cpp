@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "rendering/bodies/rigid_motion.h"
+#include "stimuli/closed_surface.h"
 #include "stimuli/orientation.h"
 #include "tests/rendering/bodies/body_fixtures.h"
 
@@ -125,6 +126,37 @@ TEST(MassProperties, MassIsSpreadOverAllParts) {
   EXPECT_NEAR(p.centre.x, 0.2, 1e-15);
   EXPECT_NEAR(p.inertia[0][0], 3 * 0.01 / 6, 1e-14);
   EXPECT_NEAR(p.inertia[1][1], 3 * 0.01 / 6 + 3 * 0.15 * 0.15, 1e-14);
+}
+
+Surface surface_of(const std::vector<std::pair<stimuli::PolygonSoup, Pose>>& soups) {
+  std::vector<SurfaceShell> shells;
+  for (const auto& [soup, pose] : soups)
+    shells.push_back(
+        {std::make_shared<const stimuli::ClosedSurface>(stimuli::closed_surface(soup).surface),
+         pose,
+         {}});
+  return Surface(shells);
+}
+
+/// Of a closed surface as of the convex parts that it bounds; shells that overlap count once.
+TEST(MassProperties, OfAClosedSurface) {
+  const Vec3 size_a(0.1, 0.04, 0.06), size_b(0.05, 0.09, 0.03);
+  const Pose far{{3, -2, 1}, glm::normalize(Quat(1, 0.3, -0.2, 0.4))};
+  const Pose beside{{0.5, 0, 0}, {1, 0, 0, 0}}, over{{0.02, 0.015, 0.01}, far.orientation};
+  const Mesh a = box_mesh(size_a), b = box_mesh(size_b);
+  for (const Pose& pose_b : {beside, over}) {
+    const std::vector<PlacedMesh> parts = {{a.get(), stimuli::compose(far, {})},
+                                           {b.get(), stimuli::compose(far, pose_b)}};
+    const MassProperties expected = with_density(moments_of_union(parts), 1000);
+    const MassProperties found = with_density(
+        moments_of_surface(surface_of({{stimuli::box(size_a), {}}, {stimuli::box(size_b), pose_b}}),
+                           far),
+        1000);
+    const double slack = pose_b.position == beside.position ? 1e-11 : 3e-4;
+    EXPECT_NEAR(found.mass / expected.mass, 1, slack);
+    EXPECT_LT(glm::distance(found.centre, expected.centre), slack * 0.1);
+    expect_matrix(found.inertia, expected.inertia, slack * expected.inertia[0][0]);
+  }
 }
 
 }  // namespace
