@@ -30,7 +30,7 @@ constexpr const char* kClose = "; fill holes and orient faces in a modelling pro
 constexpr double kFlatErrors = 4;
 // m, in the same units: corners on open edges nearer than this are meant to be one.
 constexpr double kRimErrors = 8;
-// A surface with more open edges than this is no closed one with flaws.
+// With more open edges than this, a surface is not a closed one with flaws.
 constexpr std::size_t kMostRims = 20000;
 
 std::string counted(std::size_t count, const char* one, const char* many) {
@@ -93,11 +93,11 @@ class Cleaner {
       }
       point_of_[v] = point;
     }
-    // A file of separate triangles gives each corner several times: that says nothing.
+    // Separate triangles repeat every corner anyway, so a note would say nothing.
     const bool numbered = !soup_.names || !soup_.names->vertices.empty();
     if (numbered)
-      note(twice, "corner at the place of another made one with it",
-           "corners at the places of others made one with them");
+      note(twice, "corner merged with another at the same place",
+           "corners merged with others at the same places");
     if (numbered) note(unused, "corner in no face left out", "corners in no face left out");
     Vec3 low(std::numeric_limits<double>::max()), high = -low;
     for (const Vec3& point : points_) {
@@ -154,7 +154,7 @@ class Cleaner {
   // Two triangles back to back enclose nothing.
   void drop_fins() {
     std::vector<char> gone(triangles_.size(), 0);
-    std::vector<std::pair<Triangle, Index>> sorted;  // of those that share all corners with another
+    std::vector<std::pair<Triangle, Index>> sorted;  // with the corners of another
     {
       const SideGroups sides(points_.size(), triangles_);
       sides.for_each_edge([&](const SideGroups::Edge& edge) {
@@ -165,7 +165,7 @@ class Cleaner {
           sorted.emplace_back(key, side.triangle());
         }
       });
-      // Back to back over a whole edge that only the two of them have.
+      // Back to back along a whole edge that no other triangle has.
       sides.for_each_edge([&](const SideGroups::Edge& edge) {
         if (edge.sides.size() != 2) return;
         Triangle a = triangles_[edge.sides[0].triangle()], b = triangles_[edge.sides[1].triangle()];
@@ -218,9 +218,9 @@ class Cleaner {
 
   std::string label(Index point) const { return naming_.label(vertex_[point], points_[point]); }
 
-  /// Of the edges along which more triangles run one way than the other.
+  /// Edges along which more triangles run one way than the other.
   struct Unbalanced {
-    std::size_t open = 0, other = 0;           ///< edges of one triangle; of more
+    std::size_t open = 0, other = 0;           ///< edges of one triangle; of several
     std::vector<SideGroups::Side> sides = {};  ///< of the open ones
   };
 
@@ -245,8 +245,8 @@ class Cleaner {
     return found.open + found.other == 0;
   }
 
-  // Along every edge as many triangles run one way as the other. What prevents it is mended only
-  // where there is one way to do it.
+  // Makes as many triangles run one way as the other along every edge. Mends a fault only where
+  // there is just one way to do so.
   void balance() {
     Unbalanced found = unbalanced();
     if (found.open + found.other == 0) return;
@@ -263,7 +263,7 @@ class Cleaner {
     report_unbalanced();
   }
 
-  // Faces that are given twice, turned the same way.
+  // Drops faces that are given twice, turned the same way.
   bool drop_twins() {
     std::vector<std::pair<Triangle, Index>> sorted;
     for (Index t = 0; t < triangles_.size(); ++t) {
@@ -297,19 +297,19 @@ class Cleaner {
     return rim;
   }
 
-  // For each of them the first that it is welded to.
+  // For each corner of the rim, the first one that it is welded to.
   std::vector<Index> welded(const std::vector<Index>& rim, double within) const {
     std::vector<Vec3> at;
     for (const Index v : rim) at.push_back(points_[v]);
     return weld(at, within);
   }
 
-  // Corners on open edges that differ in the last digits only. \return whether there are some
+  // Welds corners on open edges that differ in the last digits only. \return whether there are any
   bool weld_rims(const Unbalanced& found) {
     const std::vector<Index> rim = rim_points(found);
     const double within = kRimErrors * error_;
     const std::vector<Index> kept = welded(rim, within);
-    // Others that are nearly as near: it could have been meant otherwise.
+    // Other corners are nearly as near, so the intended match is unclear.
     if (kept != welded(rim, 4 * within)) return false;
     std::vector<Index> to(points_.size());
     std::iota(to.begin(), to.end(), Index{0});
@@ -329,15 +329,14 @@ class Cleaner {
     for (std::size_t i = 0; i < triangles.size(); ++i)
       add_triangle({to[triangles[i][0]], to[triangles[i][1]], to[triangles[i][2]]}, faces[i]);
     char text[120];
-    std::snprintf(text, sizeof text,
-                  " on an open edge made one with another that is at most %.2g m from it",
+    std::snprintf(text, sizeof text, " on an open edge merged with another at most %.2g m from it",
                   farthest);
     note(moved, (std::string("corner") + text).c_str(),
          (std::string("corners, each") + text).c_str());
     return true;
   }
 
-  // Open edges on which corners of others lie: they are cut there.
+  // Cuts open edges at corners of other edges that lie on them.
   void split_rims(const Unbalanced& found) {
     if (found.sides.size() > kMostRims) return;
     std::vector<std::pair<double, Index>> along_x;

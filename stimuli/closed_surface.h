@@ -1,5 +1,5 @@
 #pragma once
-// A closed, oriented surface of triangles, as any mesh file gives one: what "inside" means to the
+// A closed, oriented surface of triangles, as any mesh file gives one. It defines "inside" for the
 // renderers. The mesh's own frame, SI units.
 
 #include <array>

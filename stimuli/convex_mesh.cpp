@@ -27,9 +27,8 @@ namespace palpate::stimuli {
 /// convex at every edge, round every vertex and in every facet (van Heijenoort 1952): it must wind
 /// round each just once, for a star that is wound twice has convex edges only. A final check of
 /// every facet for vertices in front of its plane guards against accumulated tolerances.
-/// \param soup_vertex the number of each vertex in the input, for messages with what `naming` calls
-/// it
-/// \param error m, how far a coordinate may be from where it was meant
+/// \param soup_vertex the number of each vertex in the input; messages name it by `naming`
+/// \param error m, error of a coordinate
 void check_convexity(const ConvexMesh& mesh, const std::vector<std::uint32_t>& soup_vertex,
                      const MeshNaming& naming, double error, MeshFaults& faults);
 
@@ -37,8 +36,8 @@ namespace {
 
 using Index = std::uint32_t;
 
-// In errors: how far a corner may be below the hull of all; as far as it may be in front of a
-// facet.
+// In errors: how far a corner may lie below the hull of all corners; a corner may stand as far in
+// front of a facet.
 constexpr double kDeepest = 16 * kCoplanar;
 
 struct Bulk {
@@ -503,11 +502,11 @@ namespace {
 
 // The largest ball (c, r): the linear program "maximise r with n_i.c + r <= d_i for all facets", by
 // the dual simplex method (Lemke 1954). Its basis is four planes that a ball touches on all sides;
-// each round takes in the plane that is violated most and leaves out the one that then must go.
+// each round takes in the plane that is violated most and drops the one that must leave.
 class BallProgram {
  public:
   explicit BallProgram(const ConvexMesh& mesh) : mesh_(mesh) {
-    // A regular tetrahedron far outside, whose planes all must go.
+    // Start from a regular tetrahedron far outside; all its planes must leave the basis.
     const double a = 1 / std::sqrt(3.0), far = 10 * mesh.size();
     basis_ = {Row{{a, a, a, 1}, far}, Row{{a, -a, -a, 1}, far}, Row{{-a, a, -a, 1}, far},
               Row{{-a, -a, a, 1}, far}};
@@ -556,7 +555,7 @@ class BallProgram {
     return least;
   }
 
-  /// The facet that the ball is through most, or (Bland 1977: then no basis comes again) the first.
+  /// The facet that the ball violates most, or the first one (Bland 1977: no basis then repeats).
   std::size_t violated(const Vec3& centre, double radius, double rounding, bool first) const {
     std::size_t worst = kNone;
     double least = -rounding;
@@ -570,7 +569,7 @@ class BallProgram {
     return worst;
   }
 
-  /// False: nothing may go, within rounding.
+  /// \return false: no plane may leave the basis, within rounding
   bool exchange(const Row& enters) {
     Matrix columns{};
     for (int r = 0; r < 4; ++r) {
@@ -617,7 +616,7 @@ class BallProgram {
 
   const ConvexMesh& mesh_;
   std::array<Row, 4> basis_;
-  std::array<double, 4> weight_{};  // of the rows of the basis in the objective, r
+  std::array<double, 4> weight_{};  // of the basis rows in the objective r
 };
 
 }  // namespace

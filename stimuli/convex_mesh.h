@@ -22,10 +22,10 @@ struct PolygonSoup {
   /// m; error of each coordinate (from the digits of a text file, or single precision). 0: double
   /// precision. Tolerances are never smaller.
   double coordinate_error = 0;
-  /// Names of a file's groups of faces, and of each face the number of its group. Empty: none.
+  /// Names of a file's groups of faces, and the group number of each face. Empty: no groups.
   std::vector<std::string> group_names = {};
   std::vector<std::uint32_t> group_of = {};
-  /// What its file calls vertices and faces, for messages. nullptr: numbered from 0.
+  /// Names of vertices and faces in the file, for messages. nullptr: numbered from 0.
   std::shared_ptr<const MeshNames> names = {};
 };
 
@@ -48,7 +48,7 @@ struct Side {
   std::uint32_t across;  ///< the facet beyond this side
 };
 
-/// What lies beyond a side.
+/// The edge and the facet beyond a side.
 struct Neighbour {
   std::uint32_t edge = 0;    ///< index into edges
   std::uint32_t across = 0;  ///< index into facets
@@ -70,7 +70,7 @@ struct alignas(64) Facet {
 struct alignas(64) Edge {
   std::uint32_t v0, v1;
   std::uint32_t left, right;
-  Vec3 from, to;  ///< m; where v0 and v1 are
+  Vec3 from, to;  ///< m; positions of v0 and v1
 };
 
 /// Immutable after construction. Facets, edges and vertices that are close in space are close in
@@ -132,8 +132,8 @@ class PolygonExtent {
 /// The distance by which the corners of two polygons that share a side would have to be moved to
 /// lie in one plane, as a multiple of the error (m) of the corners; negative for a reflex (concave)
 /// edge. Up to kCoplanar in size they are coplanar within the error.
-/// \param side  as it runs in the polygon of `normal` and `extent`; the others are of the one
-/// across
+/// \param side  as it runs in the polygon of `normal` and `extent`; the others belong to the
+/// polygon across
 double plane_deviation(const Vec3& normal, const Vec3& normal_across, const Vec3& side,
                        const PolygonExtent& extent, const PolygonExtent& extent_across,
                        double error);

@@ -36,7 +36,7 @@ std::vector<HalfEdges::Index> coplanar_regions(const HalfEdges& mesh,
                                                const std::vector<FaceShape>& shapes,
                                                HalfEdges::Index& count);
 
-/// The same with nothing merged but degenerate faces.
+/// The same, but merges degenerate faces only.
 std::vector<HalfEdges::Index> single_regions(const HalfEdges& mesh,
                                              const std::vector<FaceShape>& shapes,
                                              HalfEdges::Index& count);
@@ -65,7 +65,7 @@ FacetOutlines facet_outlines(const HalfEdges& mesh, const std::vector<HalfEdges:
 
 // The sides of triangles, grouped by the edge that they run along.
 
-/// In memory of 12 bytes a side and time that grows with their number.
+/// Takes 12 bytes of memory for each side, and time in proportion to their number.
 class SideGroups {
  public:
   /// A side of a triangle, from its corner k to the next.

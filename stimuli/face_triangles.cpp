@@ -70,7 +70,7 @@ class Flattening {
     for (Index t = 0; t < triangles_.size(); ++t) {
       if (flat(triangles_[t])) first.push_back(t);
     }
-    // Some only can be taken out after others.
+    // Some triangles can only be taken out after others.
     std::vector<Index> left = first;
     for (int round = 0; round < 16 && !left.empty(); ++round) {
       last_resort_ = round > 1;
@@ -113,7 +113,7 @@ class Flattening {
     return j;
   }
 
-  // Makes what lies over (t, k) and over (s, j) neighbours of each other.
+  // Makes the triangles over (t, k) and over (s, j) neighbours of each other.
   void join(Index t, Index k, Index s, Index j) {
     const Index a = across_[t][k], b = across_[s][j];
     if (a == s || b == t) return;
@@ -178,7 +178,7 @@ class Flattening {
     std::vector<Index> common;
     std::set_intersection(ring_from.begin(), ring_from.end(), ring_to.begin(), ring_to.end(),
                           std::back_inserter(common));
-    // Else two other edges would become one, of four triangles.
+    // Otherwise two other edges would merge into one edge of four triangles.
     if (common.size() != 2 && !last_resort_) return false;
     const Index end = triangles_[t][(k + 1) % 3], begin = triangles_[t][k];
     if (std::count(ring_from.begin(), ring_from.end(), end) != 1 ||
@@ -306,7 +306,7 @@ class FaceCutter {
         cut(ear.corner);
         --left;
       }
-      if (left == before) {  // crossed: the least turned one
+      if (left == before) {  // crossed: take the least turned ear
         cut(best_corner());
         --left;
       }
@@ -377,7 +377,7 @@ class FaceCutter {
   const Index count_;
   std::vector<Index> next_, previous_;
   std::vector<char> gone_;
-  std::vector<Index> version_, concave_;  // those that were concave: some are no longer
+  std::vector<Index> version_, concave_;  // once concave; some no longer are
   std::priority_queue<Ear> ears_;
   std::vector<Triangle> triangles_;
 };

@@ -31,7 +31,7 @@ struct Face {
 
 // Quickhull (Barber, Dobkin & Huhdanpaa 1996). Departs: heights are exact, so that nothing needs to
 // be merged; a point in the plane of a facet does not see it. Points inside are handed on as well,
-// to tell in the end how deep they are.
+// to find their depth at the end.
 class Hull {
  public:
   explicit Hull(std::vector<GridPoint> grid_points) : points_(std::move(grid_points)) {}
@@ -116,7 +116,7 @@ class Hull {
     return true;
   }
 
-  // Each point to the face since `first` that it is highest above.
+  // Gives each point to the face, from `first` on, that it is highest above.
   void hand_out(const std::vector<Index>& points, Index first) {
     for (const Index point : points) {
       Index best = first;
@@ -139,7 +139,8 @@ class Hull {
     Index from, to, beyond;
   };
 
-  // What `point` sees, from `start` on; the sides between that and the rest.
+  // Removes the faces that `point` sees, from `start` on. Returns the sides between them and the
+  // rest.
   std::vector<Side> remove_seen(Index start, Index point, std::vector<Index>& freed) {
     std::vector<Side> horizon;
     std::vector<Index> border{start};
@@ -213,7 +214,8 @@ GridHull grid_hull(const std::vector<Vec3>& points, double error) {
   }
   const Vec3 extent = high - low, far = glm::max(glm::abs(low), glm::abs(high));
   const double size = std::max({extent.x, extent.y, extent.z});
-  // A power of two, and no finer than doubles are so far from the origin: grid points are doubles.
+  // A power of two, no finer than the spacing of doubles at this distance from the origin, so that
+  // grid points are doubles.
   const double least =
       std::max({error / 8, 2 * size / kMostSteps,
                 std::numeric_limits<double>::epsilon() * std::max({far.x, far.y, far.z})});

@@ -16,14 +16,14 @@ namespace {
 using Index = HalfEdges::Index;
 
 bool is_usable(const Vec3& v) {
-  // NaN is not. Far larger numbers overflow when they are multiplied, and no object is that far
+  // NaN fails the comparison. Larger numbers would overflow in products, and no object is that far
   // away.
   constexpr double kLargest = 1e30;
   return std::abs(v.x) <= kLargest && std::abs(v.y) <= kLargest && std::abs(v.z) <= kLargest;
 }
 
 // Corners that no face uses are left out: they must not make the object seem larger than it is.
-// \return how many are taken for another one that is near, not at the same place.
+// \return how many points were welded to one that is near but not at the same place.
 std::size_t take_points(const PolygonSoup& soup, HalfEdges& mesh, std::vector<Index>& point_of) {
   std::vector<char> used(soup.vertices.size(), 0);
   for (const auto& face : soup.faces) {
@@ -41,8 +41,8 @@ std::size_t take_points(const PolygonSoup& soup, HalfEdges& mesh, std::vector<In
   }
   mesh.size = glm::length(high - low);
   const Vec3 far = glm::max(glm::abs(low), glm::abs(high));
-  // How far corners may be off. A modest 1e-11 of the size allows for the arithmetic of whoever
-  // made the object and still is 1e-5 of the width of a needle a million times longer than wide;
+  // How far corners may be off. 1e-11 of the size allows for the arithmetic of the program that
+  // made the object, and is still 1e-5 of the width of a needle a million times longer than wide;
   // far from the origin the spacing of the coordinates themselves is coarser.
   mesh.error =
       std::max({soup.coordinate_error, 1e-11 * mesh.size,
@@ -241,7 +241,7 @@ HalfEdges link_half_edges(const PolygonSoup& soup, MeshFaults& faults, Pieces pi
       std::snprintf(error, sizeof error, "%.1g", mesh.error);
       return std::to_string(moved) + " vertices cannot be told from others near them, with " +
              "coordinates known to " + error +
-             " m; the faults above may come of that: expected more digits or fewer vertices";
+             " m; the faults above may result from that: expected more digits or fewer vertices";
     });
   }
   if (faults.empty()) check_fans(mesh, faults);

@@ -41,7 +41,7 @@ struct HalfEdges {
   std::string name_edge(Index h) const;    ///< "edge 4-5 of face 3 ..."
 };
 
-/// What messages call a face of a soup, linked or not.
+/// The name of a face of a soup in messages; the soup need not be linked.
 std::string name_of_face(const PolygonSoup& soup, std::size_t face);
 
 /// \throws MeshError where indices or coordinates are unusable: no faces, not finite, too large.
@@ -66,7 +66,7 @@ class PairMap {
   /// `expected`: how many pairs will be kept (a guess; it only saves time).
   explicit PairMap(std::size_t expected) { resize(std::bit_ceil(2 * expected + 16)); }
 
-  /// The value kept for {a, b}, a new one being kNone. a and b must not both be kNone.
+  /// The value kept for {a, b}; kNone for a new pair. a and b must not both be kNone.
   std::uint32_t& operator()(std::uint32_t a, std::uint32_t b) {
     if (2 * count_ >= slots_.size()) grow();
     Slot& slot = find(key_of(a, b));

@@ -18,11 +18,11 @@ using Index = std::uint32_t;
 
 // Of the mesh's size:
 constexpr double kCoordinateError = 1e-11;  // as of every mesh in double precision
-constexpr double kThinnest = 1e-9;          // less counts as nothing
-constexpr double kLeastEdge = 1e-9;         // where shorter ones cannot be told from none
+constexpr double kThinnest = 1e-9;          // a thinner body counts as nothing
+constexpr double kLeastEdge = 1e-9;         // shorter edges count as none
 
-/// Lower triangle L of the points' second moments, L L^T (Cholesky): L^-1 makes them as wide in
-/// every direction.
+/// Lower triangle L of the points' second moments, L L^T (Cholesky): L^-1 makes the points equally
+/// wide in every direction.
 std::array<std::array<double, 3>, 3> spread_of(const std::vector<Vec3>& points) {
   std::array<std::array<double, 3>, 3> m{};
   for (const Vec3& p : points) {
@@ -42,7 +42,7 @@ std::array<std::array<double, 3>, 3> spread_of(const std::vector<Vec3>& points) 
 }
 
 /// A linear map of the points leaves their hull's triangles as they are; the hull's grid is equally
-/// fine in all directions, so that a flat body asks for one that makes it round.
+/// fine in all directions, so a flat body is first made round.
 void make_round(std::vector<Vec3>& points) {
   const auto spread = spread_of(points);
   for (Vec3& p : points) {
@@ -54,8 +54,8 @@ void make_round(std::vector<Vec3>& points) {
 }
 
 /// The point on three planes, by Gaussian elimination with full pivoting. Planes of neighbouring
-/// facets of a fine mesh are nearly parallel: only differences of their equations tell where they
-/// meet, and they are taken in extended precision.
+/// facets of a fine mesh are nearly parallel: only the differences of their equations determine
+/// where they meet, so these are computed in extended precision.
 Vec3 common_point(const std::array<const HalfSpace*, 3>& planes) {
   using Real = long double;
   std::array<std::array<Real, 4>, 3> a{};
@@ -122,8 +122,8 @@ std::vector<std::vector<Index>> fans_of(const PolygonSoup& triangles) {
   return fans;
 }
 
-/// Makes one corner of neighbouring corners nearer than `least` (m), and drops the facets that are
-/// then no polygons.
+/// Merges neighbouring corners nearer than `least` (m) and drops facets that are no longer
+/// polygons.
 PolygonSoup without_short_edges(const PolygonSoup& soup, double least) {
   std::vector<Index> root(soup.vertices.size());
   std::iota(root.begin(), root.end(), Index{0});
@@ -192,7 +192,7 @@ std::shared_ptr<const ConvexMesh> body_behind(const std::vector<HalfSpace>& half
   try {
     return std::make_shared<const ConvexMesh>(soup);
   } catch (const MeshError&) {
-    // A corner of many facets comes apart when they move by little, too little for a mesh.
+    // A corner of many facets splits when they move; the new corners are too close for a mesh.
     return std::make_shared<const ConvexMesh>(without_short_edges(soup, kLeastEdge * size));
   }
 }

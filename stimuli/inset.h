@@ -19,11 +19,10 @@ struct HalfSpace {
   double offset = 0;  ///< m
 };
 
-/// What is behind all planes, which must bound a body. Planes that bound nothing of it are no
-/// facets.
-/// \param inside  m, a point inside, better far from all planes
+/// The body behind all planes. They must bound one; redundant planes give no facet.
+/// \param inside  m, a point inside, preferably far from all planes
 /// \param size    m, about that of the body: its vertices lie on their planes within 1e-11 of it
-/// \throws MeshError where the body is too thin to be told from a plane
+/// \throws MeshError where the body is too thin to distinguish from a plane
 std::shared_ptr<const ConvexMesh> body_behind(const std::vector<HalfSpace>& half_spaces,
                                               const Vec3& inside, double size);
 
@@ -32,9 +31,9 @@ Ball largest_inscribed_ball(const ConvexMesh& mesh);
 
 /// The body behind all planes of the surface when each has moved inwards along its normal by
 /// `depth` (m, above 0); facets that lose their whole area are gone. Its vertices lie on the moved
-/// planes within 1e-11 of the mesh's size. nullptr: nothing is left, since the largest inscribed
-/// ball has no larger radius. \throws MeshError where what is left is too thin to be told from a
-/// plane.
+/// planes within 1e-11 of the mesh's size. nullptr: nothing is left, because the largest inscribed
+/// ball has a radius of at most `depth`. \throws MeshError where the rest is too thin to
+/// distinguish from a plane.
 std::shared_ptr<const ConvexMesh> inset(const ConvexMesh& mesh, double depth);
 
 }  // namespace palpate::stimuli

@@ -56,7 +56,7 @@ MeshFormat format_of(const std::string& path, FileFaults& faults) {
   return MeshFormat::none;
 }
 
-/// The text that a URI's part stands for (RFC 3986, 2.1); nothing where it is malformed.
+/// Decodes a part of a URI (RFC 3986, 2.1); nullopt where it is malformed.
 std::optional<std::string> percent_decoded(std::string_view text) {
   std::string decoded;
   for (std::size_t i = 0; i < text.size(); ++i) {
@@ -74,8 +74,8 @@ std::optional<std::string> percent_decoded(std::string_view text) {
   return decoded;
 }
 
-/// The path of what a .gltf names, from the folder that it lies in; "" with a fault where it leads
-/// elsewhere.
+/// The path of a file that a .gltf names, relative to its folder; "" and a fault where it leads out
+/// of that folder.
 std::string beside(const std::string& path, const std::string& place, const std::string& uri,
                    FileFaults& faults) {
   const std::optional<std::string> name = percent_decoded(uri);
@@ -105,7 +105,7 @@ class BufferFiles {
   std::string contents_of(const std::string& place, const std::string& uri) {
     const std::string path = beside(path_, place, uri, faults_);
     if (path.empty()) return {};
-    // Each naming would add the file once more.
+    // A file named twice would be added twice.
     const auto is_it = [&path](const std::filesystem::path& known) {
       return known.lexically_normal() == std::filesystem::path(path).lexically_normal();
     };
@@ -165,7 +165,7 @@ PolygonSoup read_mesh(const std::string& path, const std::string& bytes) {
   const MeshFormat format = format_of(path, faults);
   faults.throw_if_any();
   std::string_view text = bytes;
-  // Some editors begin a text so. A binary file has no text to begin.
+  // Some editors begin a text with a byte order mark. In a binary file the bytes are data.
   if (text.starts_with("\xEF\xBB\xBF") &&
       (format != MeshFormat::stl || text.substr(3, 5) == "solid"))
     text.remove_prefix(3);

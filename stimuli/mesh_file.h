@@ -10,7 +10,7 @@ namespace palpate::stimuli {
 
 inline constexpr const char* kMeshExtensions = ".obj, .stl, .gltf, .glb, .ply or .off";
 
-/// Whether it ends in one of them.
+/// Whether the path ends in one of them.
 bool is_mesh_file_name(const std::string& path);
 
 /// Reads a Wavefront .obj (v, f, g, o; other statements ignored; negative and v/vt/vn indices), an
@@ -28,8 +28,8 @@ PolygonSoup read_mesh(const std::string& path, const std::string& bytes);
 
 /// A mesh file as it was read.
 struct MeshFileBytes {
-  /// Whatever they are; of a .gltf with the buffers that it names taken in, so that they are all of
-  /// it.
+  /// As in the file. A .gltf has the buffers that it names embedded, so that the bytes are
+  /// complete.
   std::string bytes;
   std::vector<std::string> files;  ///< paths of all that was read: its own, its buffers'
 };

@@ -231,7 +231,7 @@ class ObjReader {
     return text;
   }
 
-  // An o statement begins an object, g a group within it, or goes on with an earlier one.
+  // An o statement begins an object, g a group within it; either may continue an earlier one.
   Index group() {
     const auto [at, is_new] = groups_.try_emplace(std::pair(object_, group_name_),
                                                   static_cast<Index>(soup_.group_names.size()));
@@ -416,7 +416,8 @@ namespace {
 constexpr std::size_t kHeader = 84;    // 80 bytes of anything, the number of triangles
 constexpr std::size_t kTriangle = 50;  // a normal, three corners, two bytes of anything
 
-// A text that begins with "solid" may still be the header of a binary file; no text has a 0.
+// A text that begins with "solid" may still be the header of a binary file; a text has no zero
+// byte.
 bool is_text(std::string_view bytes) {
   const std::vector<std::string_view> words = words_of(bytes.substr(0, 1000));
   if (words.empty() || words[0].size() < 5) return false;
@@ -451,8 +452,7 @@ PolygonSoup read_binary(std::string_view bytes, FileFaults& faults) {
       const double far =
           std::max({std::abs(position.x), std::abs(position.y), std::abs(position.z)});
       if (!std::isfinite(position.x + position.y + position.z)) {
-        faults.add("byte " + std::to_string(at), "three finite coordinates",
-                   "infinity or no number");
+        faults.add("byte " + std::to_string(at), "three finite coordinates", "infinity or NaN");
       }
       largest = std::max(largest, far);
       soup.vertices.push_back(position);
@@ -480,7 +480,7 @@ class AsciiReader {
       } else if (inside_ || soup_.faces.empty()) {
         fault("facet or endsolid");
         skip_facet();
-      } else {  // what follows a solid and is none
+      } else {  // other text between solids
         skip_line();
         advance();
       }

@@ -23,16 +23,16 @@
 
 namespace palpate::stimuli {
 
-// A glTF document: its JSON, of which every value knows its place, and the data of a .glb.
+// A glTF document: its JSON, each value with its place, and the data of a .glb.
 
-/// What reading gives up with.
+/// Thrown to stop reading.
 struct GltfRefused {
   std::string place;  ///< a JSON pointer, a line or a byte; empty: the file
   std::string expected, found;
 };
 
-/// A value of the document, or none, and its place. All that is read of it is checked:
-/// GltfRefused says what was expected there and what was found.
+/// A value of the document, or none, and its place. Every read is checked: GltfRefused says what
+/// was expected there and what was found.
 class GltfValue {
  public:
   /// \param value  nullptr: none; not owned
@@ -72,7 +72,7 @@ class GltfDocument {
 
   GltfValue root() const { return {&root_, ""}; }
   GltfValue list(const char* name) const { return root().member(name); }
-  /// What a value names by its number. \param kind  of the list's entries, "mesh"
+  /// The entry that a value names by its number. \param kind  of the list's entries, "mesh"
   GltfValue named_by(const GltfValue& number, const char* list_name, const char* kind) const;
   /// The data chunk of a .glb.
   const std::optional<std::string_view>& binary() const { return binary_; }
@@ -84,9 +84,9 @@ class GltfDocument {
   nlohmann::json root_;
 };
 
-// The data of a glTF document: buffers, and what accessors read of them.
+// The data of a glTF document: buffers, and accessors that read them.
 
-/// \throws GltfRefused, all of it.
+/// Every function throws GltfRefused.
 class GltfAccessors {
  public:
   explicit GltfAccessors(const GltfDocument& document);
@@ -121,7 +121,7 @@ constexpr std::size_t kFileHeader = 12, kChunkFileHeader = 8;
 
 std::string byte_place(std::size_t at) { return "byte " + std::to_string(at); }
 
-// At most so much of what was found is shown.
+// A message quotes at most this much of the text found.
 constexpr std::size_t kShownBytes = 60;
 
 std::string found_text(const json* value) {
@@ -198,7 +198,7 @@ std::size_t GltfValue::number_of(const char* kind, std::size_t count) const {
   const std::string named = std::string("the number of a") + (vowel ? "n " : " ") + kind;
   const std::optional<std::size_t> value = as_whole();
   if (value && *value < count) return *value;
-  refuse(count == 0 ? named + ", of which there are none"
+  refuse(count == 0 ? named + ", but there are none"
                     : named + " from 0 to " + std::to_string(count - 1));
 }
 
@@ -349,7 +349,7 @@ std::vector<Vec3> GltfAccessors::positions(const GltfValue& number) const {
       const auto value = std::bit_cast<float>(little_endian(all.data, i * all.stride + 4 * axis));
       if (!std::isfinite(value)) {
         throw GltfRefused{source.place(), "finite coordinates",
-                          "infinity or no number at vertex " + std::to_string(i)};
+                          "infinity or NaN at vertex " + std::to_string(i)};
       }
       positions[i][static_cast<int>(axis)] = value;
     }
@@ -388,10 +388,10 @@ using Triangle = std::array<std::uint32_t, 3>;
 
 constexpr int kMostNested = 100;  // nodes within nodes
 // Vertices, and triangles, of all nodes: a file may use a mesh again and again, but must not need
-// memory out of proportion to its size. Data that are named once have fewer than one for each byte.
+// memory out of proportion to its size. Data that are named once give fewer than one for each byte.
 constexpr std::size_t kAlwaysRead = 1U << 17U;
 constexpr std::size_t kLongestName = 256;  // bytes; every primitive is named after its node
-constexpr double kUnitError = 1e-3;        // of a quaternion's length: what a few digits leave
+constexpr double kUnitError = 1e-3;  // of a quaternion's length, for quaternions of few digits
 
 double number_at(const GltfValue& list, std::size_t i) { return list.element(i).number(); }
 
@@ -407,7 +407,7 @@ Matrix given_matrix(const GltfValue& list) {
   return matrix;
 }
 
-/// Of a rotation [x, y, z, w].
+/// The matrix of a rotation [x, y, z, w].
 Mat3 turn_of(const GltfValue& list) {
   if (!list.present()) return Mat3(1);
   list.require_numbers(4);
@@ -491,7 +491,7 @@ class GltfReader {
   }
 
  private:
-  // Without a scene: the nodes that no other has.
+  // Without a scene, the roots are the nodes without a parent.
   void read_roots() {
     const GltfValue nodes = document_.list("nodes");
     std::vector<char> is_child(nodes.size(), 0);
@@ -509,8 +509,7 @@ class GltfReader {
   void read_node(const GltfValue& number, const Matrix& parent, int depth) {
     const GltfValue node = document_.named_by(number, "nodes", "node");
     const std::size_t index = number.number_of("node", reached_.size());
-    if (reached_[index] != 0)
-      number.refuse("a node that has one parent, or none, and is in the scene once");
+    if (reached_[index] != 0) number.refuse("a node with at most one parent, once in the scene");
     enter_node(index, node, parent, depth);
   }
 

@@ -1,5 +1,5 @@
 #pragma once
-// What messages call the vertices and faces of a mesh: what its file calls them.
+// The names of a mesh's vertices and faces in messages, as in its file.
 
 #include <cstddef>
 #include <cstdint>

@@ -1,5 +1,5 @@
 // Stanford polygon files (.ply), ASCII and binary in both byte orders: elements vertex (x, y, z)
-// and face (vertex_indices); whatever else they hold is skipped.
+// and face (vertex_indices); all else is skipped.
 
 #include <algorithm>
 #include <bit>
@@ -40,7 +40,7 @@ struct PlyProperty {
   std::string name;
   PlyType type;
   bool is_list = false;
-  PlyType count = {};  ///< of a list: of its length
+  PlyType count = {};  ///< of a list: type of its length
 };
 
 struct PlyElement {
@@ -58,7 +58,7 @@ struct PlyElement {
 class PlyReader {
  public:
   PlyReader(std::string_view bytes, FileFaults& faults) : bytes_(bytes), faults_(faults) {
-    // As the first line ends, so do the others: a carriage return may be a binary number.
+    // All lines end like the first one; a carriage return elsewhere may be binary data.
     const std::size_t end = bytes.find_first_of("\r\n");
     const bool returns = end < bytes.size() && bytes[end] == '\r' &&
                          (end + 1 == bytes.size() || bytes[end + 1] != '\n');
@@ -73,7 +73,7 @@ class PlyReader {
         return {};
     }
     if (soup_.faces.empty()) faults_.add("", "at least one face", "none");
-    // Of a text, the digits tell; else single precision does.
+    // The error follows from the digits of a text; binary numbers may be in single precision.
     soup_.coordinate_error = encoding_ == PlyEncoding::ascii ? precision_.coordinate_error()
                              : single_                       ? largest_ * 0x1p-24
                                                              : 0;
@@ -154,7 +154,8 @@ class PlyReader {
     if (property.is_list) property.count = ply_type(words[2]);
     if (property.type.size == 0 ||
         (property.is_list && (property.count.size == 0 || property.count.is_float)))
-      return fault("types of PLY: char to double, of a list's length whole ones", words[1]);
+      return fault("a type of PLY, char to double (the length of a list: an integer type)",
+                   words[1]);
     elements_.back().properties.push_back(std::move(property));
     return true;
   }
@@ -384,7 +385,7 @@ class PlyReader {
   void take_coordinate(const PlyType& type, double& coordinate) {
     coordinate = number_at(at_, type);
     if (!std::isfinite(coordinate)) {
-      faults_.add("byte " + std::to_string(at_), "a finite coordinate", "infinity or no number");
+      faults_.add("byte " + std::to_string(at_), "a finite coordinate", "infinity or NaN");
       coordinate = 0;
     }
     if (!type.is_float || type.size == 8) single_ = false;

@@ -26,7 +26,7 @@ Quat uniform_rotation(Random& random) {
   const DiscPoint first = disc_point(random);
   const DiscPoint second = disc_point(random);
   const double scale = std::sqrt((1 - first.squared) / second.squared);
-  // q and -q are one rotation: we give the one with w >= 0.
+  // q and -q are the same rotation; return the one with w >= 0.
   const double sign = first.x < 0 ? -1 : 1;
   return {sign * first.x, sign * first.y, sign * (second.x * scale), sign * (second.y * scale)};
 }

@@ -22,14 +22,13 @@ enum class ShapeKind { sphere, cone, cylinder, cube, box, mesh, compound };
 
 /// A layer of an object: its surface moved inwards, felt beside the surface.
 struct Layer {
-  double depth = 0;      ///< m, by which each plane of the surface is moved inwards
+  double depth = 0;      ///< m; each plane of the surface moves inwards by this
   double stiffness = 0;  ///< N/m
   double damping = 0;    ///< N s/m
-  std::optional<double> break_force =
-      std::nullopt;  ///< N; a greater force makes the layer give way
+  std::optional<double> break_force = std::nullopt;  ///< N; a greater force breaks the layer
 };
 
-/// Mechanical properties of an object. What is 0 or empty is left out of the tick.
+/// Mechanical properties of an object. Terms that are 0 or empty are left out of the tick.
 struct Material {
   double stiffness = 800;       ///< N/m, along the contact normal, from the surface on
   double damping = 0;           ///< N s/m, along the contact normal
@@ -41,23 +40,23 @@ struct Material {
   bool plain_spring() const { return damping == 0 && !has_friction() && layers.empty(); }
 };
 
-/// What makes an object give.
+/// The material of a soft object.
 struct Soft {
   enum class Fixed {
-    base,    ///< the lowest nodes, local frame, at least three; of a sphere a tenth of its height
+    base,    ///< the lowest nodes, local frame, at least three; a tenth of a sphere's height
     none,    ///< it moves freely
     points,  ///< the node nearest to each of `points`
   };
   double young = 20000;   ///< Pa
   double poisson = 0.45;  ///< 0 to 0.495
   double density = 1000;  ///< kg/m^3
-  double damping = 0.01;  ///< s; stress by rate of strain over stress by strain
+  double damping = 0.01;  ///< s; ratio of viscosity to elastic modulus
   Fixed fixed = Fixed::base;
   std::vector<Vec3> points;  ///< m, local frame
   int resolution = 10;       ///< elements along the longest side
 };
 
-/// What makes an object move by itself.
+/// An object that moves as a rigid body.
 struct Body {
   std::optional<double> mass = std::nullopt;     ///< kg; or
   std::optional<double> density = std::nullopt;  ///< kg/m^3
@@ -65,7 +64,7 @@ struct Body {
   Vec3 spin{0, 0, 0};                            ///< rad/s, at first
   double damping = 0;                            ///< 1/s, of velocity and spin
   double restitution = 0.5;  ///< of speed along the normal, in collisions with objects
-  double friction = 0.3;     ///< Coulomb's coefficient, against objects; the probe's: Material
+  double friction = 0.3;     ///< Coulomb's coefficient, against objects; for the probe see Material
 };
 
 /// Local frames: sphere, cube, box and cylinder centred, cylinder axis +z; cone axis +z, apex at
@@ -80,26 +79,27 @@ struct ObjectSpec {
   int segments = 64;      ///< cone, cylinder: corners of the rim
   std::string file_name;  ///< mesh: as the scene or protocol names its file
   std::string file;       ///< mesh: resolved path of a file that mesh_file.h reads
-  /// mesh: paths of all that was read from the disk for it, a .gltf's buffers among them.
+  /// mesh: paths of all files read from the disk for it, including a .gltf's buffers.
   std::vector<std::string> files_read;
-  /// mesh: what the file held when it was named; nullptr: to be read from the disk.
+  /// mesh: the file's contents when the protocol or scene was read; nullptr: read them from the
+  /// disk.
   std::shared_ptr<const std::string> file_bytes;
   std::vector<ObjectSpec> parts;  ///< compound: placed relative to the compound
   Pose pose;
   Material material;
-  std::optional<Body> body = std::nullopt;  ///< it moves; else it stands still
-  std::optional<Soft> soft = std::nullopt;  ///< it gives; else it is rigid
+  std::optional<Body> body = std::nullopt;  ///< nullopt: it stands still
+  std::optional<Soft> soft = std::nullopt;  ///< nullopt: it is rigid
 };
 
 struct ShapeTraits {
   const char* name;                                   ///< in files
-  bool radius = false, height = false, edge = false;  ///< lengths that it has
+  bool radius = false, height = false, edge = false;  ///< the lengths that define it
   bool size = false;                                  ///< three of them
   bool subdivisions = false, segments = false;        ///< how finely it is tessellated
   /// Its surface is known exactly: it has a signed distance and local penetration depths, and the
   /// accuracy study uses it.
   bool analytic = false;
-  /// Simulated participants imagine it by a formula (runner/participants/shape_lines.h); others by
+  /// Simulated participants model it by a formula (runner/participants/shape_lines.h); others by
   /// distances on a grid.
   bool formula = false;
 };
@@ -147,7 +147,8 @@ inline constexpr auto kShapes = [] {
 
 // Poses within poses.
 
-/// The pose in the frame of `outer` of what has the pose `inner` in its own.
+/// The pose, in the frame of the parent of `outer`, of an object that has the pose `inner` in the
+/// frame of `outer`.
 inline Pose compose(const Pose& outer, const Pose& inner) {
   return {outer.orientation * inner.position + outer.position,
           outer.orientation * inner.orientation};

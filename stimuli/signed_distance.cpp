@@ -32,7 +32,7 @@ SurfaceDistance to_box(const Vec3& size, const Vec3& point) {
   return {beyond[nearest], normal};
 }
 
-// A distance in the half plane of a solid of revolution: out from the axis, and along it.
+// A vector in the half plane of a solid of revolution: away from the axis, and along it.
 struct Profile {
   double distance, out, up;
 };

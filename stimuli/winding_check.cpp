@@ -94,7 +94,7 @@ class Tree {
       for (Index i = begin; i < end; ++i) nodes_[self].box.add(box(order_[i]));
       return;
     }
-    // Where the highest bit changes; equal keys are halved.
+    // Split where the highest bit changes; halve equal keys.
     Index middle = begin + (end - begin) / 2;
     const std::uint64_t different = keys[begin].first ^ keys[end - 1].first;
     if (different != 0) {
@@ -118,7 +118,7 @@ class Tree {
 };
 
 // Sign of (b - a) x (q - a) in x and y with q moved by an infinitesimal (e, e^2): never 0 unless a
-// and b are at one place. Exact, so neighbours agree on the side that they share.
+// and b coincide. Exact, so neighbours agree on the side that they share.
 int side_of(const Vec3& a, const Vec3& b, const Vec3& q) {
   const double left = (b.x - a.x) * (q.y - a.y), right = (b.y - a.y) * (q.x - a.x);
   const double det = left - right;
@@ -222,7 +222,7 @@ class WindingCheck {
     }
   }
 
-  // How often the surface winds round a place: signed crossings of a ray along +z.
+  // The winding number of the surface about a place: signed crossings of a ray along +z.
   int winding(const Vec3& q) const {
     int number = 0;
     std::array<Index, 128> stack{};
@@ -252,7 +252,7 @@ class WindingCheck {
     return (height < 0) == (side > 0) ? side : 0;
   }
 
-  // van Oosterom & Strackee 1983, and the distance of every triangle: for a place that is accused.
+  // van Oosterom & Strackee 1983, and the distance to every triangle. Confirms a suspect place.
   bool truly_negative(const Vec3& q) const {
     double angle = 0;
     for (Index t = 0; t < surface_.triangles.size(); ++t) {
@@ -279,7 +279,8 @@ class WindingCheck {
     });
   }
 
-  // Places just outside some triangles of each region that nothing crosses, and of all others.
+  // Examines places just outside some triangles of each region that nothing crosses, and of all
+  // others.
   void check_regions() {
     std::vector<char> seen = crossed_;
     for (Index t = 0; t < seen.size(); ++t) {
@@ -361,7 +362,7 @@ class WindingCheck {
              (h[0] < -near && h[1] < -near && h[2] < -near);
     };
     if (apart(of_t, near_s) || apart(of_s, near_t)) return;
-    // Where the line that both planes share runs through both (Moeller 1997).
+    // Where the common line of both planes runs through both triangles (Moeller 1997).
     const Vec3 along = glm::cross(n, m);
     const double steep = glm::length(along);
     if (steep <= 1e-9 * glm::length(n) * glm::length(m)) {  // in one plane
@@ -383,7 +384,7 @@ class WindingCheck {
     examine(at + sum * (2 * tolerance_ / outside), s, "it passes through itself");
   }
 
-  // The ends of what a plane cuts out of a triangle whose corners have these heights over it.
+  // The ends of the section of a triangle with a plane; the corners have these heights over it.
   bool cut(Index t, const std::array<double, 3>& height, Vec3& low, Vec3& high,
            const Vec3& along) const {
     std::array<Vec3, 6> ends;

@@ -1,5 +1,5 @@
 #pragma once
-// Whether a closed surface nowhere winds round a place a negative number of times.
+// Checks that a closed surface winds round no place a negative number of times.
 
 #include <functional>
 #include <string>

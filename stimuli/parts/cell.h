@@ -1,5 +1,5 @@
 #pragma once
-// A convex cell of space with what lies in it of a solid's surface, and its cutting by planes. SI
+// A convex cell of space with the piece of a solid's surface in it, and its cutting by planes. SI
 // units, the mesh's frame.
 
 #include <array>
@@ -75,7 +75,7 @@ CellBulk bulk_of(const std::vector<CellPolygon>& faces);
 /// An axis-aligned box. Adds its planes to the table.
 Cell box_cell(const Vec3& low, const Vec3& high, PlaneTable& planes);
 
-/// What a plane leaves of a cell on either side; one of them is empty where it does not cross.
+/// The two sides of a cut cell; one is empty where the plane does not cross the cell.
 struct CutCell {
   Cell below, above;
 };

@@ -25,7 +25,7 @@ namespace {
 
 constexpr int kPoints = 256;
 
-// m, how far a point is out of a part; negative inside.
+// m, how far a point is outside a part; negative inside.
 double out_of(const ConvexMesh& part, const Vec3& point) {
   double most = -std::numeric_limits<double>::infinity();
   for (const Facet& facet : part.facets())
@@ -142,8 +142,8 @@ class Subsets {
   }
 
   const PolygonSoup& soup_;
-  std::vector<Index> vertices_;  // of the subset that is being made
-  std::vector<Index> number_;    // of each of them in it
+  std::vector<Index> vertices_;  // of the subset under construction
+  std::vector<Index> number_;    // the subset's number of each vertex
 };
 
 bool is_closed(const PolygonSoup& soup) {
@@ -166,7 +166,7 @@ TriangleSurface triangles_of(const PolygonSoup& soup) {
 struct Solid {
   SolidGroup group;
   TriangleSurface triangles;
-  double volume = 0;     // m^3; 0 where it is none
+  double volume = 0;     // m^3; 0 where it is not a solid
   bool is_void = false;  // all faces are turned
   std::vector<std::size_t> voids = {};
   Vec3 low{std::numeric_limits<double>::max()}, high{-low};
@@ -188,7 +188,7 @@ Solid solid_of(SolidGroup group) {
   return solid;
 }
 
-// Some of the corners: where the two surfaces cross elsewhere, the cutting says so.
+// Tests some corners only: cutting reports surfaces that cross elsewhere.
 bool lies_in(const Solid& inner, const Solid& outer) {
   if (glm::any(glm::lessThan(inner.low, outer.low)) ||
       glm::any(glm::greaterThan(inner.high, outer.high)))
@@ -298,7 +298,7 @@ std::vector<PolygonSoup> soups_of(const std::vector<std::vector<CellPolygon>>& p
   for (const auto& faces : parts) {
     PolygonSoup soup;
     soup.coordinate_error = solid.error;
-    soup.names = std::make_shared<const MeshNames>();  // its numbers are nobody's
+    soup.names = std::make_shared<const MeshNames>();  // messages name no vertex numbers
     for (const CellPolygon& face : faces) {
       std::vector<std::uint32_t> polygon;
       for (std::size_t k = 0; k < face.corners.size(); ++k) {
@@ -371,7 +371,7 @@ std::vector<ConvexMesh> convex_parts(const PolygonSoup& soup) {
     parts.emplace_back(soup);
     return parts;
   } catch (const MeshError&) {
-    // Not convex, or broken: what follows says so.
+    // Not convex, or broken: the steps below report it.
   }
   const std::vector<SolidGroup> groups = solid_groups(soup);
   if (groups.empty()) return cut_into_convex_parts(soup);

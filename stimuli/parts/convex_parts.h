@@ -1,5 +1,5 @@
 #pragma once
-// Any closed solid as convex parts: what the renderers need.
+// Any closed solid as convex parts, as the renderers need them.
 
 #include <optional>
 #include <string>
@@ -12,7 +12,7 @@
 
 namespace palpate::stimuli {
 
-// Whether convex parts are a solid, no more and no less.
+// Checks that convex parts cover a solid exactly.
 
 /// m^3
 double volume_of(const ConvexMesh& mesh);
@@ -29,12 +29,12 @@ struct SolidGroup {
   PolygonSoup soup;  ///< its own vertices only
 };
 
-/// At most so many groups of a file may be closed.
+/// Limit on the closed groups of a file.
 inline constexpr std::size_t kMostClosedGroups = 10000;
 
 /// Each group that is closed by itself, then the faces of all others together. A closed group whose
-/// faces are all turned is a void: it goes with the least of the others that it lies in. Nothing
-/// where no group is closed by itself or the soup has no two groups. \throws MeshError: more than
+/// faces are all turned is a void: it joins the smallest of the others that contain it. Empty where
+/// no group is closed by itself or the soup has no two groups. \throws MeshError: more than
 /// kMostClosedGroups
 std::vector<SolidGroup> solid_groups(const PolygonSoup& soup);
 
@@ -45,20 +45,20 @@ std::vector<SolidGroup> solid_groups(const PolygonSoup& soup);
 /// file; std::invalid_argument for a compound.
 std::vector<ConvexMesh> convex_parts(const ObjectSpec& spec);
 
-/// The same of polygons.
+/// The same for polygons.
 std::vector<ConvexMesh> convex_parts(const PolygonSoup& soup);
 
-/// The same without cutting: nothing where a group, or a file without groups, is not convex, or no
-/// solid at all.
+/// The same without cutting: nullopt where a group, or a file without groups, is not convex or not
+/// a solid.
 std::optional<std::vector<ConvexMesh>> convex_as_it_is(const PolygonSoup& soup);
 
 /// Cuts a closed solid, which may have holes, voids and several pieces, at its concave edges into
-/// convex parts with disjoint interiors. Before it returns, the parts are held against the surface:
-/// their volumes must add up to its volume (divergence theorem) within 1e-9 and the error of the
-/// coordinates times the area, and of 256 points each must lie in as many parts as the surface
-/// winds round it, 0 or 1. \throws MeshError: not closed, turned or crossed faces, a surface that
-/// passes through itself, too many concave edges (kMostConcaveEdges) or parts (kMostParts), parts
-/// that do not add up
+/// convex parts with disjoint interiors. Before it returns, the parts are checked against the
+/// surface: their volumes must add up to its volume (divergence theorem) within 1e-9 and the error
+/// of the coordinates times the area, and of 256 points each must lie in as many parts as the
+/// surface winds round it, 0 or 1. \throws MeshError: not closed, turned or crossed faces, a
+/// surface that passes through itself, too many concave edges (kMostConcaveEdges) or parts
+/// (kMostParts), parts that do not add up
 std::vector<ConvexMesh> cut_into_convex_parts(const PolygonSoup& soup);
 
 }  // namespace palpate::stimuli

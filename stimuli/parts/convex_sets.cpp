@@ -1,5 +1,5 @@
-// A set may go on through one of its faces where all of the face is on another convex part: then
-// the set and what of that part is behind the set's other planes are convex together.
+// A set may grow through a face that lies wholly on another convex part: the set and the piece of
+// that part behind the set's other planes are convex together.
 #include "stimuli/parts/convex_sets.h"
 
 #include <algorithm>
@@ -18,7 +18,7 @@ namespace {
 
 constexpr int kMostSteps = 64;  // of one set
 
-/// Null: what is too thin to matter.
+/// Null: too thin to matter.
 MeshPointer bounded(const std::vector<HalfSpace>& planes, const Vec3& inside, double size) {
   try {
     return body_behind(planes, inside, size);
@@ -58,9 +58,9 @@ SetGrowth::SetGrowth(const std::vector<MeshPointer>& parts, double abuts) : abut
   tolerance_ = abuts * size;
 }
 
-/// The set with what lies beyond a face that is wholly on another part: as far as that part and
-/// its own other planes go. Where the face is all of the set that is on its plane, both together
-/// are convex.
+/// The set grown through a face that lies wholly on another part, as far as that part and the set's
+/// other planes go. Where the set touches the face's plane in that face only, both together are
+/// convex.
 std::optional<ConvexSet> SetGrowth::through(const ConvexSet& set, std::uint32_t f,
                                             const ConvexMesh& beyond) const {
   const Facet& face = set.mesh->facets()[f];
@@ -94,7 +94,7 @@ std::optional<ConvexSet> SetGrowth::through(const ConvexSet& set, std::uint32_t 
   return larger;
 }
 
-/// Gives up what is beside the other part, where the point does not need it.
+/// Gives up the piece of the set beside the other part where the point does not need it.
 std::optional<ConvexSet> SetGrowth::narrowed_through(const ConvexSet& set, std::uint32_t f,
                                                      const ConvexMesh& beyond,
                                                      const Kept& kept) const {
@@ -243,7 +243,7 @@ bool is_closed(const std::vector<std::vector<std::uint32_t>>& polygons) {
   return open.empty();
 }
 
-/// Two polyhedra on either side of a plane as one, without it.
+/// Joins two polyhedra on either side of a plane and removes the plane.
 class Union {
  public:
   Union(const Faces& below, const Faces& above, std::uint32_t plane, const PlaneTable& planes)
@@ -260,7 +260,7 @@ class Union {
     }
   }
 
-  /// Corners are where three facets meet: others were on the plane that is gone.
+  /// Corners are points where three facets meet; the others lay on the removed plane.
   std::optional<Faces> faces() {
     const std::vector<std::uint32_t> kept = weld(points_, 2 * planes_.tolerance());
     std::vector<int> facets_at(points_.size(), 0);
@@ -317,7 +317,7 @@ class Merger {
     for (const CellPolygon& face : parts_[part]) at_[{face.on.plane, face.on.flipped}].erase(part);
   }
 
-  // A part with one of its neighbours, of which the lower number becomes both.
+  // Merges a part with one of its neighbours under the lower number.
   bool merge_some(std::uint32_t part) {
     for (const CellPolygon& face : parts_[part]) {
       const auto across = at_.find({face.on.plane, !face.on.flipped});

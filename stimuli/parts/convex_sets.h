@@ -14,40 +14,40 @@ namespace palpate::stimuli {
 
 using MeshPointer = std::shared_ptr<const ConvexMesh>;
 
-/// m, of a point over the plane that it is farthest out of; negative inside.
+/// m, height of a point over the plane that it is farthest in front of; negative inside.
 double height_over(const ConvexMesh& mesh, const Vec3& p);
 
-/// Of a facet, counter-clockwise.
+/// The corners of a facet, counter-clockwise.
 std::vector<Vec3> corners_of(const ConvexMesh& mesh, std::uint32_t facet);
 
 /// A convex set inside of the union.
 struct ConvexSet {
   MeshPointer mesh;
-  std::vector<HalfSpace> planes;  ///< that bound it; some may bound nothing
+  std::vector<HalfSpace> planes;  ///< the set is behind all; some may be redundant
 };
 
 ConvexSet whole(const MeshPointer& part);
 
-/// What a set must keep when it grows.
+/// What limits the growth of a set.
 struct Kept {
-  std::optional<HalfSpace> plane = std::nullopt;  ///< that it does not grow through
-  std::optional<Vec3> point = std::nullopt;       ///< m; else the set only grows
-  double depth = 0;                               ///< m, of the point behind all that is cut off
+  std::optional<HalfSpace> plane = std::nullopt;  ///< it must not grow through this
+  std::optional<Vec3> point = std::nullopt;       ///< m, to keep; nullopt: only grow
+  double depth = 0;                               ///< m, of the point behind each cut
 };
 
 /// How sets grow from part to part, as far as they stay convex.
 class SetGrowth {
  public:
-  /// \param abuts  of the size of the largest part; parts nearer than this touch
+  /// \param abuts  share of the size of the largest part; parts nearer than this touch
   SetGrowth(const std::vector<MeshPointer>& parts, double abuts);
 
   double tolerance() const { return tolerance_; }  ///< m
 
-  /// The set with what of `others` can be added to it, which are inside of the union. Where a point
-  /// is to be kept, what is beside of it is given up for what is beyond of it.
+  /// The set, grown into `others`, which must be inside the union. Where a point is to be kept, the
+  /// set gives up space beside it to gain space beyond it.
   ConvexSet grown(ConvexSet set, const std::vector<MeshPointer>& others, const Kept& kept) const;
 
-  /// What of the set is behind a plane; none: nothing.
+  /// The piece of the set behind a plane; nullopt: nothing.
   std::optional<ConvexSet> behind(const ConvexSet& set, const HalfSpace& plane) const;
 
  private:

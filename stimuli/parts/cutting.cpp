@@ -25,11 +25,11 @@ class CuttingPlanes {
   /// Adds its planes to the table. `solid` must outlive it.
   CuttingPlanes(const FacetedSolid& solid, PlaneTable& planes);
 
-  /// That which cuts most concave edges of the cell apart and tears fewest others.
+  /// The plane that splits most concave edges of the cell and tears fewest others.
   std::uint32_t best(const Cell& cell) const;
 
-  /// Hands the ridges of a cell that is cut by a plane on to its halves; drops those that are
-  /// convex in both.
+  /// Passes the ridges of a cell cut by a plane on to its halves; drops those that are convex in
+  /// both.
   void divide_ridges(const std::vector<Ridge>& ridges, std::uint32_t plane, CutCell& halves) const;
 
  private:
@@ -44,7 +44,7 @@ class CuttingPlanes {
 
 namespace {
 
-constexpr std::size_t kAllPairs = 96;    // concave edges, up to which every two are tried together
+constexpr std::size_t kAllPairs = 96;    // concave edges; up to so many, try every pair
 constexpr std::size_t kTriedEdges = 48;  // of a cell, whose planes are tried
 constexpr double kRounding = 1e-9;       // of a sine
 constexpr double kThin = 0.03;           // rad; a part with a sharper edge is a last resort
@@ -63,7 +63,7 @@ double least_angle(const ConcaveEdge& edge, const Vec3& into) {
   return std::numbers::pi - std::acos(std::clamp(wider, -1.0, 1.0));
 }
 
-// Of a plane that holds the edge: 1 where it cuts it apart well, 0 where not at all.
+// How well a plane that contains the edge splits it: 1 well, 0 not at all.
 double gain_of(const ConcaveEdge& edge, const Plane& plane) {
   const Vec3 across = glm::normalize(glm::cross(plane.normal, along(edge)));
   const double angle = std::max(least_angle(edge, across), least_angle(edge, -across));
@@ -124,8 +124,8 @@ void CuttingPlanes::add_pair(std::uint32_t a, std::uint32_t b) {
   add(b, plane.normal, {one.from, one.to, other.from, other.to});
 }
 
-// Of a plane that holds the edge. One that was listed for it cuts it apart, if only within the
-// tolerance.
+// The gain of a plane that contains the edge. A plane listed for the edge splits it, if only within
+// the tolerance.
 double CuttingPlanes::gain(std::uint32_t edge, std::uint32_t plane) const {
   const auto& list = through_[edge];
   const bool listed = std::find(list.begin(), list.end(), plane) != list.end();
@@ -155,7 +155,7 @@ std::uint32_t CuttingPlanes::best(const Cell& cell) const {
         score -= kTorn;
       }
     }
-    if (score <= highest) continue;  // torn polygons only cost
+    if (score <= highest) continue;  // torn polygons only add cost
     for (const CellPolygon& polygon : cell.surface) {
       if (polygon.on.plane == candidate) continue;
       bool below = false, above = false;
@@ -329,7 +329,7 @@ class SolidCutter {
     return any;
   }
 
-  // The cell behind all facets that it holds; a cell that holds none is all solid or all empty.
+  // The cell behind all facets in it; a cell without facets is all solid or all empty.
   void finish(Cell&& cell) {
     Cell part;
     part.faces = std::move(cell.faces);

@@ -1,7 +1,6 @@
-// A ball inside of the union lies in some convex set inside of the union. So the union moved
-// inwards is what is left of all such sets when each is moved inwards by itself, and a few large
-// ones do: the parts, each grown through its faces on other parts, and near concave edges those
-// behind planes through the edge.
+// Every ball inside the union lies in a convex set inside the union. So the inset of the union is
+// the union of the insets of all such sets, and a few large ones suffice: the parts, each grown
+// through its faces on other parts, and near concave edges the sets behind planes through the edge.
 
 #include "stimuli/parts/inset_parts.h"
 
@@ -20,7 +19,7 @@
 namespace palpate::stimuli {
 namespace {
 
-constexpr double kAbuts = 1e-6;                 // of the size; nearer is touching
+constexpr double kAbuts = 1e-6;                 // of the size; nearer parts touch
 constexpr double kTurn = std::numbers::pi / 8;  // rad, between planes through a concave edge
 constexpr double kUnderEdge = 1.07;             // of the depth: planes at kTurn do better
 constexpr int kPlaces = 5, kDirections = 200;   // along an edge; about a point
@@ -80,7 +79,7 @@ class UnionInset {
   }
   /// Whether a ball about the point is inside of the union, slits between parts included.
   bool deep(const Vec3& p, double radius) const {
-    for (const MeshPointer& part : parts_) {  // the nearest face tells most
+    for (const MeshPointer& part : parts_) {  // the nearest face decides most
       const Facet& nearest = *std::max_element(
           part->facets().begin(), part->facets().end(), [&](const Facet& a, const Facet& b) {
             return glm::dot(a.normal, p) - a.offset < glm::dot(b.normal, p) - b.offset;
@@ -105,7 +104,8 @@ class UnionInset {
     }
     return done >= 1;
   }
-  /// The share of the way at which it leaves the part; 0 where it is not inside at the share `at`.
+  /// The share of the way at which it leaves the part; 0 where it is outside the part at the share
+  /// `at`.
   double way_inside(const ConvexMesh& part, const Vec3& from, const Vec3& way, double at) const {
     double low = 0, high = 1;
     for (const Facet& facet : part.facets()) {
@@ -187,7 +187,7 @@ class UnionInset {
     }
     if (!(high - low > 10 * tolerance_)) return;
     const Notch notch{at + low * along, at + high * along, left.normal, right.normal};
-    // Outside before both faces, inside behind either, also where it is before the other.
+    // Outside is in front of both faces; inside is behind either of them.
     const Vec3 out = glm::normalize(left.normal + right.normal);
     const Vec3 on_left = glm::normalize(right.normal - cosine * left.normal) - 0.3 * left.normal;
     const Vec3 on_right = glm::normalize(left.normal - cosine * right.normal) - 0.3 * right.normal;
@@ -243,8 +243,8 @@ class UnionInset {
     return points;
   }
 
-  /// A set that holds the point, of a part that is near, or of what of it is behind a plane through
-  /// a concave edge that is near. False: none was found.
+  /// Adds a set that contains the point: grown from a near part, or from its piece behind a plane
+  /// through a near concave edge. \return false: found none
   bool add_around(const Vec3& p) {
     const double near = 2 * depth_;
     for (const MeshPointer& part : parts_) {
@@ -290,11 +290,11 @@ class UnionInset {
   const double tolerance_;  ///< m
   std::vector<Vec3> directions_;
   std::vector<Notch> notches_;
-  std::vector<MeshPointer> beyond_;  ///< what sets grow into: parts, and these as they grew
+  std::vector<MeshPointer> beyond_;  ///< sets grow into these: parts, and grown parts
   std::vector<MeshPointer> out_;
 };
 
-/// What of a convex set lies in a part; nullptr: nothing.
+/// The piece of a convex set inside a part; nullptr: nothing.
 MeshPointer common(const MeshPointer& mesh, const ConvexMesh& part, const SetGrowth& growth) {
   const auto& vertices = mesh->vertices();
   ConvexSet set = whole(mesh);

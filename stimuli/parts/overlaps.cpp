@@ -16,7 +16,7 @@ namespace {
 constexpr double kCoplanar = 1e-9;  // of the size
 constexpr double kNothing = 1e-6;   // of a group's volume
 
-/// What of a plane polygon is behind a plane.
+/// The piece of a plane polygon behind a plane.
 std::vector<Vec3> behind(const std::vector<Vec3>& polygon, const Facet& plane) {
   std::vector<Vec3> kept;
   const auto height = [&](const Vec3& p) { return glm::dot(plane.normal, p) - plane.offset; };
@@ -29,7 +29,7 @@ std::vector<Vec3> behind(const std::vector<Vec3>& polygon, const Facet& plane) {
   return kept;
 }
 
-/// m^3; the cones from `middle` to what of the one's facets lies in the other.
+/// m^3; the cones from `middle` to the pieces of the one's facets inside the other.
 /// \param shared  whether facets of both in one plane, facing the same way, count
 double cones(const ConvexMesh& one, const ConvexMesh& other, const Vec3& middle, bool shared) {
   const double tolerance = kCoplanar * std::max(one.size(), other.size());

@@ -87,7 +87,7 @@ class GmshReader {
     faults_.add_line(number_, expected, found);
     stopped_ = true;
   }
-  /// A line of so many whole numbers. \return false, with a fault: it is none
+  /// Reads a line of `count` whole numbers. \return false and a fault: the line is different
   bool numbers(std::size_t count, const char* what, std::vector<std::uint64_t>& out) {
     out.clear();
     if (!next_line()) {
@@ -95,7 +95,7 @@ class GmshReader {
       return false;
     }
     for (const std::string_view word : line_) {
-      // Tags of entities may be negative; nothing that is used here may.
+      // Tags of entities may be negative; no number used here may.
       const auto value = whole_number(word.starts_with('-') ? word.substr(1) : word);
       if (!value) break;
       out.push_back(*value);
@@ -231,7 +231,7 @@ class GmshReader {
       known_ = true;
       for (std::size_t k = 0; k < (read.quadratic ? 10U : 4U); ++k)
         t[k] = node_of(read.tags[k], read);
-      if (read.quadratic) std::swap(t[8], t[9]);  // Gmsh has edge 23 before 13
+      if (read.quadratic) std::swap(t[8], t[9]);  // Gmsh puts edge 23 before 13
       if (!known_) continue;
       const Vec3 o = mesh_.nodes[t[0]];
       const Vec3 u = mesh_.nodes[t[1]] - o, v = mesh_.nodes[t[2]] - o, w = mesh_.nodes[t[3]] - o;
@@ -241,7 +241,7 @@ class GmshReader {
         faults_.add_line(read.line, "a tetrahedron with a volume", "a flat one");
         continue;
       }
-      if (volume < 0) {  // corners 1 and 2 change places, and with them the edges
+      if (volume < 0) {  // swap corners 1 and 2 and their edges
         std::swap(t[1], t[2]);
         std::swap(t[4], t[6]);
         std::swap(t[8], t[9]);
@@ -261,7 +261,7 @@ class GmshReader {
   FileFaults faults_;
   std::size_t at_ = 0, number_ = 0;
   bool stopped_ = false;
-  bool known_ = true;  ///< all nodes of the tetrahedron in hand
+  bool known_ = true;  ///< all nodes of the current tetrahedron
   std::vector<std::string_view> line_;
   std::vector<Vec3> nodes_;
   std::unordered_map<std::uint64_t, std::size_t> index_;  // by tag, in nodes_
@@ -270,7 +270,7 @@ class GmshReader {
   std::unordered_map<std::uint32_t, std::uint32_t> used_;
   std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t> middles_;
   std::set<std::array<std::uint32_t, 4>> known_elements_;  ///< corners
-  std::map<std::array<std::uint32_t, 3>, int> faces_;      ///< how many elements have them
+  std::map<std::array<std::uint32_t, 3>, int> faces_;      ///< how many elements share it
 };
 
 }  // namespace

@@ -7,14 +7,14 @@
 
 namespace palpate::stimuli {
 
-/// Whether it ends in .msh.
+/// Whether the path ends in .msh.
 bool is_gmsh_file_name(const std::string& path);
 
 /// Reads nodes and tetrahedra of 4 or 10 nodes ($Nodes, $Elements; elements of other dimensions and
-/// other sections are passed over). Tetrahedra of 4 get nodes in the middle of their edges, those
-/// that are inside out are turned. Units are metres as they stand; nodes that no tetrahedron uses
-/// are left out.
-/// \param name  that faults name
+/// other sections are passed over). Tetrahedra of 4 nodes get nodes in the middle of their edges;
+/// inverted ones are turned. Units are metres as they stand; nodes that no tetrahedron uses are
+/// left out.
+/// \param name  named in faults
 /// \throws MeshError with file, line and what was expected, every fault
 SolidMesh read_gmsh(const std::string& name, const std::string& text);
 

@@ -12,10 +12,10 @@ namespace palpate::stimuli {
 namespace {
 
 // Of the radius, half of the side of the block in the middle of a disc or ball; its sides bulge by
-// kBulge of the way to the circle. Chosen so that no element's angle is far from a right one.
+// kBulge of the way to the circle. Chosen so that no angle of an element is far from 90 degrees.
 constexpr double kCore = 0.45, kBulge = 0.35;
 
-/// Puts blocks of hexahedra together: nodes at one place are one node.
+/// Joins blocks of hexahedra: nodes at the same place are merged.
 class BlockBuilder {
  public:
   explicit BlockBuilder(double grid) : grid_(grid) {}
@@ -164,7 +164,7 @@ constexpr int kHexahedronFaces[6][4] = {{0, 3, 2, 1}, {4, 5, 6, 7}, {0, 1, 5, 4}
 constexpr int kTetrahedronFaces[4][6] = {
     {0, 2, 1, 6, 5, 4}, {0, 1, 3, 4, 8, 7}, {1, 2, 3, 5, 9, 8}, {0, 3, 2, 7, 9, 6}};
 
-/// Faces that one element alone has, in the order in which they were added.
+/// Faces of a single element, in the order in which they were added.
 template <std::size_t kNodes>
 class OpenFaces {
  public:

@@ -27,8 +27,8 @@ struct SolidMesh {
 /// Elements along the longest side (of a ball or a disc: along the diameter).
 inline constexpr int kLeastResolution = 2, kMostResolution = 24;
 
-/// Hexahedra of a cube, box, sphere or cylinder; as many elements along each side as its length
-/// asks for, at least two.
+/// Hexahedra of a cube, box, sphere or cylinder; the number of elements along a side follows from
+/// its length, at least two.
 /// \param resolution  kLeastResolution to kMostResolution
 /// \throws std::invalid_argument: another shape
 SolidMesh mesh_of_primitive(const ObjectSpec& spec, int resolution);

@@ -246,7 +246,7 @@ TEST(ClosedSurfaceTest, CornersThatDifferInTheLastDigitAreWeldedOnlyOnOpenEdges)
   const CleanedSurface cleaned = closed_surface(apart);
   expect_closed(cleaned.surface);
   EXPECT_EQ(cleaned.surface.triangles.size(), sphere.faces.size());
-  EXPECT_NE(notes_of(cleaned).find("on an open edge made one with another"), std::string::npos);
+  EXPECT_NE(notes_of(cleaned).find("on an open edge merged with another"), std::string::npos);
 }
 
 TEST(ClosedSurfaceTest, AnEdgeIsCutAtACornerOfANeighbourThatLiesOnIt) {

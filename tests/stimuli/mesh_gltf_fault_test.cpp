@@ -108,7 +108,7 @@ TEST(MeshGltfFaults, BrokenJsonIsNamedByItsLine) {
 TEST(MeshGltfFaults, NodesAreStrictTrees) {
   const auto of_nodes = [](const std::string& nodes) { return refusal_of(document(nodes)); };
   const std::string one_parent =
-      ": expected a node that has one parent, or none, and is in the scene once, found ";
+      ": expected a node with at most one parent, once in the scene, found ";
   EXPECT_EQ(of_nodes("[{\"children\": [0]}]"), "a.gltf: /nodes/0/children/0" + one_parent + "0");
   EXPECT_EQ(of_nodes("[{\"children\": [1, 1]}, {\"mesh\": 0}]"),
             "a.gltf: /nodes/0/children/1" + one_parent + "1");

@@ -154,7 +154,7 @@ TEST_F(PlyFile, HeadersThatSayNothingOfASurfaceAreRefused) {
   EXPECT_NE(fault_in("a.ply", exchanged(text_, "element face", "element facet"))
                 .find("a cloud of points is no surface"),
             std::string::npos);
-  EXPECT_NE(fault_in("a.ply", exchanged(text_, "float y", "real y")).find("types of PLY"),
+  EXPECT_NE(fault_in("a.ply", exchanged(text_, "float y", "real y")).find("a type of PLY"),
             std::string::npos);
   EXPECT_NE(fault_in("a.ply", exchanged(text_, "vertex 8", "vertex 4000000000")).find("2^31"),
             std::string::npos);
