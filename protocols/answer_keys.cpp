@@ -47,7 +47,7 @@ constexpr std::array<std::pair<char32_t, char32_t>, 15> kWritten = {{{U'!', U'9'
                                                                      {0xFF01, 0xFFDC},
                                                                      {0xFFE0, 0xFFEE}}};
 
-/// The only character of a text in UTF-8; none: it has more, or none.
+/// The only character of a text in UTF-8; nullopt: it has none or several.
 std::optional<char32_t> only_character(const std::string& text) {
   if (text.empty()) return std::nullopt;
   const Character first = first_character(text);
@@ -55,7 +55,7 @@ std::optional<char32_t> only_character(const std::string& text) {
   return first.code;
 }
 
-/// Of Latin, Greek and Cyrillic letters, those that keyboards have.
+/// Lower case of the Latin, Greek and Cyrillic letters on keyboards.
 char32_t lower_case(char32_t c) {
   const auto within = [c](char32_t low, char32_t high) { return c >= low && c <= high; };
   if (within(U'A', U'Z') || (within(0xC0, 0xDE) && c != 0xD7) || within(0x391, 0x3A9) ||
@@ -71,7 +71,7 @@ char32_t lower_case(char32_t c) {
   return c;
 }
 
-/// The name that was meant, perhaps: "num_1" is '1', "Return" is 'enter'.
+/// The key name that was probably meant: "num_1" is '1', "Return" is 'enter'.
 std::string meant_by(const std::string& name) {
   std::string lower;
   for (const char c : name) lower += c >= 'A' && c <= 'Z' ? static_cast<char>(c + 0x20) : c;
@@ -110,7 +110,7 @@ std::string key_fault(const std::string& name) {
   if (name == ":") return "expected another key: at a terminal, ':' begins a command";
   if (name == "escape" || name == "Escape" || name == "esc" || name == "F12")
     return "expected another key: Escape and F12 are the emergency";
-  constexpr std::size_t kLongest = 40;  // of names that are looked at for what they mean
+  constexpr std::size_t kLongest = 40;  // names of this length at most get a suggestion
   const std::string meant = name.size() > kLongest ? "" : meant_by(name);
   std::string text = "expected a key that somebody can press: ";
   for (const std::string_view known : kNamed) text += "'" + std::string(known) + "', ";
@@ -151,12 +151,12 @@ std::vector<std::string> answer_events(const Protocol& protocol) {
   return names;
 }
 
-/// Two events of one code could not be told apart in a recording.
+/// Two events with one code would be indistinguishable in a recording.
 void refuse_equal_codes(const EventCodes& given, const EventCodes& all, const std::string& pointer,
                         FaultList& faults) {
   for (const auto& [name, code] : given) {
     for (const auto& [other, same] : all) {
-      // A pair that is given is told once, at the later name.
+      // Report a pair once, at the later name.
       if (same != code || other == name || (given.contains(other) && other > name)) continue;
       faults.add(
           child_pointer(pointer, name),

@@ -1,6 +1,5 @@
 #pragma once
-// What an answer is on the outside: keys of the keyboard by the names that a protocol gives them,
-// and codes of events.
+// Names of the keyboard's keys in protocols, and codes of events.
 
 #include <map>
 #include <string>
@@ -13,10 +12,10 @@ namespace palpate::protocols {
 /// key writes without Shift. \return  "", or why nobody can press such a key
 std::string key_fault(const std::string& name);
 
-/// The same for all names of one key: "A" is the key "a".
+/// One name for each key: "A" is the key "a".
 std::string one_key(const std::string& name);
 
-/// Keys of one object of keys, to find those that are one.
+/// The keys of one JSON object; finds two names of the same key.
 class KeysTaken {
  public:
   /// \return  key_fault(), or that it is the same key as one before; "": neither
@@ -26,21 +25,21 @@ class KeysTaken {
   std::map<std::string, std::string> names_;  ///< by one_key()
 };
 
-// What other recorders get for the events of a session: a byte each.
+// Event codes for other recorders: one byte for each event of a session.
 
 class ObjectReader;
 
 /// By the event's name, "trial_start" or "response:cube"; 1 to 255.
 using EventCodes = std::map<std::string, int>;
 
-/// Of the events that every protocol has.
+/// Codes of the events that every protocol has.
 EventCodes usual_event_codes();
 
 /// Reads `codes` of a protocol whose stimuli, keys and blocks are read already. Events without a
 /// code of their own keep the usual one.
 EventCodes read_event_codes(ObjectReader& reader, const Protocol& protocol);
 
-/// Of a protocol that has no fault, from its text: nobody but a live session asks for them.
+/// Codes of a valid protocol, read from its text; only a live session needs them.
 EventCodes event_codes(const Protocol& protocol);
 
 }  // namespace palpate::protocols

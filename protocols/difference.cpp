@@ -49,8 +49,8 @@ void compare(const json* before, const json* after, const std::string& pointer,
   }
 }
 
-/// A key's answer may be a stimulus, or a stimulus with a label: written alike, the label is a
-/// text.
+/// A key's answer may be a stimulus, or a stimulus with a label: write both alike, so that a label
+/// compares as a text.
 json with_answers_alike(json protocol) {
   const auto response = protocol.find("response");
   if (response == protocol.end() || !response->is_object()) return protocol;

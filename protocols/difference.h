@@ -10,15 +10,15 @@ namespace palpate::protocols {
 struct ProtocolDifference {
   std::vector<std::string> texts;     ///< what participants read, and descriptions
   std::vector<std::string> design;    ///< stimuli, order, trials: what is shown, and when
-  std::vector<std::string> settings;  ///< all else: of trials, stylus, servo, masking noise
+  std::vector<std::string> settings;  ///< all else: stylus, servo, masking noise
 
-  /// Trials, their order and their conditions are the same; only what is read differs.
+  /// Trials, their order and their conditions are the same; only texts differ.
   bool only_texts() const { return design.empty() && settings.empty(); }
   /// No value differs, only the layout: spaces, order of keys, 1 as 1.0.
   bool nothing() const { return only_texts() && texts.empty(); }
 };
 
-/// Of two valid protocols.
+/// Compares two valid protocols.
 ProtocolDifference difference(const std::string& before, const std::string& after);
 
 /// "only texts: /texts/break", "stimuli and order: /seed, /stimuli; other settings: /home/rest_s"

@@ -152,7 +152,7 @@ void ObjectReader::integer(const char* key, std::optional<int>& out, const Numbe
 void ObjectReader::seed(const char* key, std::uint64_t& out) {
   const json* const value = member(key);
   if (value == nullptr) return;
-  constexpr double kExact = 9007199254740992.0;  // 2^53: up to here, 2e3 is as good as 2000
+  constexpr double kExact = 9007199254740992.0;  // 2^53: up to here 2e3 is exact, as 2000 is
   if (value->is_number_unsigned()) {
     out = value->get<std::uint64_t>();
   } else if (value->is_number_float() && value->get<double>() >= 0 &&
@@ -240,7 +240,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr std::size_t kMaxKeyBytes = 256;         // the longest that is known has 20
+constexpr std::size_t kMaxKeyBytes = 256;         // the longest known key has 20
 constexpr std::size_t kMaxValues = 200'000;       // a long list of orientations has 50,000
 constexpr std::uintmax_t kMaxBytes = 16u << 20u;  // a long list of orientations has about 1 MB
 
@@ -337,7 +337,7 @@ class Builder : public nlohmann::json_sax<json> {
   }
 
  private:
-  /// Of "0,5" between keys: what is meant. In a list these are two numbers.
+  /// A hint for "0,5" between keys: a decimal comma. In a list these are two numbers.
   std::string comma_at(std::size_t end) const {
     const std::string_view text = text_;
     const auto in_number = [](char c) { return (c >= '0' && c <= '9') || c == ',' || c == '-'; };
@@ -361,8 +361,8 @@ class Builder : public nlohmann::json_sax<json> {
     return pointer;
   }
 
-  // The last character read may belong to what follows (the end of a number is known from the next
-  // character), so it does not count yet.
+  // The last character read may belong to the next token (a number ends at the next character), so
+  // it does not count yet.
   int line() {
     const char* const end = std::max(counted_, reached_ == text_.data() ? reached_ : reached_ - 1);
     line_ += static_cast<int>(std::count(counted_, end, '\n'));
@@ -483,7 +483,7 @@ void FaultList::throw_if_any() const {
 }
 
 int FaultList::line_of(std::string_view pointer) const {
-  // A missing value has no line; then that of the object that lacks it.
+  // A missing value has no line; use the line of the object that lacks it.
   for (;;) {
     const auto found = lines_.find(PointerHash(pointer).value());
     if (found != lines_.end()) return found->second;

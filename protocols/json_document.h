@@ -1,5 +1,5 @@
 #pragma once
-// A JSON document with what nlohmann-json drops, the line of every value and duplicate keys, and
+// A JSON document with the line of every value and duplicate keys, which nlohmann-json drops, and
 // the reading of its objects.
 
 #include <cstddef>
@@ -19,7 +19,7 @@
 
 namespace palpate::protocols {
 
-/// A name is part of file names, and heads a column.
+/// A name is part of file names and heads a column.
 inline constexpr std::size_t kMaxName = 64;
 
 /// Hash of a JSON pointer: FNV-1a of its characters, continued from that of its parent. A collision
@@ -37,8 +37,7 @@ class PointerHash {
   std::uint64_t value_ = 14695981039346656037U;
 };
 
-/// The faults of one file in the order in which they are found: the first ones in full, the rest as
-/// a count.
+/// The faults of one file in the order found: the first ones in full, the rest as a count.
 class FaultList {
  public:
   explicit FaultList(std::string file) : file_(std::move(file)) {}
@@ -49,7 +48,7 @@ class FaultList {
   void set_line(PointerHash pointer, int line) { lines_[pointer.value()] = line; }
 
   bool empty() const { return faults_.empty(); }
-  /// How many there are so far, to see whether some were added since.
+  /// The number so far; compare later to see whether faults were added.
   std::size_t count() const { return faults_.size() + unlisted_; }
   /// Whether further faults are only counted: then their texts need not be made.
   bool full() const { return faults_.size() >= kMostListed; }

@@ -23,7 +23,8 @@ int latin_square_rows(int n);
 /// \throws std::invalid_argument unless n >= 1 and participant_number >= 1.
 std::vector<int> latin_square_row(int n, int participant_number);
 
-/// How many single draws order_block may spend on rejection sampling before it constructs an order.
+/// The number of draws that order_block may spend on rejection sampling before it constructs an
+/// order.
 std::size_t uniform_draw_budget(std::size_t trials);
 
 /// An order of stimuli 0, 1, ..., each shown counts[i] times. Always satisfies the limits and

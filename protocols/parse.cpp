@@ -53,7 +53,7 @@ json read_answer(const json& value, const std::string& pointer, std::string& lab
 
 /// Labels must differ: two responses that read the same cannot be told apart.
 void check_labels(const Protocol& protocol, const std::string& pointer, FaultList& faults) {
-  std::map<std::string, std::string> key_of;  // by what is read
+  std::map<std::string, std::string> key_of;  // by label
   for (const auto& [key, stimulus] : protocol.response.keys) {
     const std::string& label = answer_label(protocol, stimulus);
     const auto [before, is_new] = key_of.emplace(label, key);

@@ -10,11 +10,11 @@
 
 namespace palpate::protocols {
 
-/// One thing wrong with an input file.
+/// One fault of an input file.
 struct Fault {
   std::string file;
   std::string location;  ///< JSON pointer, or "line L, column C" where the text is not JSON
-  std::string expected;  ///< what is expected there, and what was found
+  std::string expected;  ///< expected and found value
   int line = 0;          ///< of the text, from 1; 0: unknown
 };
 
@@ -36,7 +36,7 @@ using StoredFiles = std::map<std::string, std::string>;
 /// fault.
 Protocol parse_protocol(const std::string& path);
 enum class OtherFiles { read, refuse };
-/// \param stored  contents of files that it names
+/// \param stored  contents of the files that the protocol names
 /// \param others  files that are not stored: read from the folder of `file_name`, or a fault
 Protocol parse_protocol_text(const std::string& text, const std::string& file_name,
                              const StoredFiles& stored = {}, OtherFiles others = OtherFiles::read);
@@ -45,7 +45,7 @@ Protocol parse_protocol_text(const std::string& text, const std::string& file_na
 /// resolved relative to it.
 /// \throws InputError with every fault.
 SceneSpec parse_scene(const std::string& path);
-/// \param file_name  that faults name; mesh files are in its folder
+/// \param file_name  named in faults; mesh files are in its folder
 SceneSpec parse_scene_text(const std::string& text, const std::string& file_name);
 
 }  // namespace palpate::protocols

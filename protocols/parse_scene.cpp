@@ -18,9 +18,10 @@
 
 namespace palpate::protocols {
 
-// Reading of what makes an object give (scene.schema.json), for scenes and protocols.
+// Reading of soft objects (scene.schema.json), for scenes and protocols.
 
-/// The key `soft` of an object whose other keys were read. Faults what cannot be soft.
+/// Reads the key `soft` of an object whose other keys were read. Faults objects that cannot be
+/// soft.
 void read_soft(ObjectReader& reader, stimuli::ObjectSpec& spec);
 
 namespace {
@@ -70,7 +71,7 @@ void check_radius(ObjectReader& reader, const ToolSpec& tool, bool soft) {
   if (soft ? tool.radius == 0 || tool.radius >= kThinnest : tool.radius == 0) return;
   reader.faults().add(
       reader.pointer("tool") + "/radius_m",
-      soft ? "expected 0.0005 to 0.05 m, or 0 for 0.002 m: what touches a soft object has a radius"
+      soft ? "expected 0.0005 to 0.05 m, or 0 for 0.002 m: a tool on a soft object has a radius"
            : "expected 0: objects are rigid, and rigid objects are touched by segments without "
              "thickness");
 }
@@ -116,7 +117,7 @@ void read_body(ObjectReader& reader, std::optional<stimuli::Body>& body) {
     stimuli::Body& read = body.emplace();
     const auto number = [&section](const char* key, std::optional<double>& out,
                                    const NumberRange& range) {
-      if (section.member(key) == nullptr) return;  // known now, for faults of unknown ones
+      if (section.member(key) == nullptr) return;  // so that it counts as known
       double value = 1;
       section.number(key, value, range);
       out = value;
@@ -241,7 +242,7 @@ ParameterGrid read_grid(ObjectReader& reader, const char* key, const GridLimits&
 
 namespace {
 
-// What the coupling of the body's steps with the servo was found stable over (rendering/README.md).
+// The range in which coupling of body steps and servo was found stable (rendering/README.md).
 constexpr NumberRange kYoung{1e3, 1e7, "Pa"};
 constexpr NumberRange kSpring{200, 3000, "N/m, on a soft object"};
 constexpr NumberRange kPoisson{0, 0.495};
@@ -307,7 +308,7 @@ void read_soft(ObjectReader& reader, stimuli::ObjectSpec& spec) {
       spec.shape == stimuli::ShapeKind::mesh && stimuli::is_gmsh_file_name(spec.file);
   if (reader.member("soft") == nullptr) {
     refuse_with(reader, is_gmsh, "file",
-                "expected the key 'soft' beside a .msh file: its tetrahedra are for what gives");
+                "expected the key 'soft' beside a .msh file: only soft objects use its tetrahedra");
     return;
   }
   stimuli::Soft& soft = spec.soft.emplace();
@@ -317,10 +318,10 @@ void read_soft(ObjectReader& reader, stimuli::ObjectSpec& spec) {
     section.number("density_kg_per_m3", soft.density, kSoftDensity);
     section.number("damping_s", soft.damping, kStrainDamping);
     read_fixed(section, soft);
-    soft.resolution = 0;  // the highest that can be stepped
+    soft.resolution = 0;  // the highest whose steps are in time
     section.integer("resolution", soft.resolution, kResolution);
     refuse_with(section, is_gmsh && section.has("resolution"), "resolution",
-                "expected none: a .msh file brings its elements");
+                "expected no resolution: a .msh file has its own elements");
   });
   if (!can_be_soft(spec)) {
     reader.faults().add(
@@ -336,7 +337,7 @@ void read_soft(ObjectReader& reader, stimuli::ObjectSpec& spec) {
   refuse_with(reader, spec.body.has_value(), "body",
               "expected body or soft, not both: a soft object moves by itself with fixed: none");
   refuse_with(reader, spec.material.has_friction(), "friction_static",
-              "expected none on a soft object: friction on what gives is not rendered");
+              "expected none on a soft object: friction on soft objects is not rendered");
   refuse_with(reader, spec.material.damping > 0, "damping_ns_per_m",
               "expected none on a soft object: its damping is soft/damping_s");
   refuse_with(reader, !spec.material.layers.empty(), "layers", "expected none on a soft object");

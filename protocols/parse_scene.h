@@ -1,6 +1,5 @@
 #pragma once
-// Reading of objects, bodies, grids of objects, and what the stylus carries, for scenes and
-// protocols.
+// Reading of objects, bodies, grids of numbers and tools, for scenes and protocols.
 
 #include <cstddef>
 #include <optional>
@@ -17,11 +16,11 @@ namespace palpate::protocols {
 
 /// Reads the keys `tool` and `reach` of a scene or protocol.
 void read_tool(ObjectReader& reader, ToolSpec& tool);
-/// Faults a radius that nothing asks for. \param soft  whether some object gives
+/// Faults a radius that nothing needs. \param soft whether an object is soft
 void check_radius(ObjectReader& reader, const ToolSpec& tool, bool soft);
 void read_reach(ObjectReader& reader, std::optional<ReachSpec>& reach);
 
-// Reading of what makes an object move (scene.schema.json), for scenes and protocols.
+// Reading of moving bodies (scene.schema.json), for scenes and protocols.
 
 /// The key `body` of an object.
 void read_body(ObjectReader& reader, std::optional<stimuli::Body>& body);
@@ -48,7 +47,7 @@ std::vector<double> read_grid_values(ObjectReader& reader, const char* key,
 
 // Reading of scene objects (scene.schema.json), for scenes and protocols.
 
-/// Where the mesh files are that a scene or protocol names.
+/// Where to find the mesh files of a scene or protocol.
 struct MeshFiles {
   std::string folder;       ///< on disk
   StoredFiles stored = {};  ///< contents that were stored with a protocol; these are preferred
@@ -56,7 +55,7 @@ struct MeshFiles {
 };
 
 /// Reads an object with the keys that its shape takes. The caller refuses unknown keys, since a
-/// stimulus has some more of its own.
+/// stimulus has further keys.
 stimuli::ObjectSpec read_object(ObjectReader& reader, const stimuli::Material& default_material,
                                 const MeshFiles& files);
 

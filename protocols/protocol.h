@@ -16,17 +16,17 @@
 
 namespace palpate::protocols {
 
-// A block of trials of one task, as version 2 of a protocol says it: plain values. SI units.
+// A block of trials of one task in version 2 of a protocol: plain values. SI units.
 
 enum class RendererKind;
 
 enum class TaskKind {
-  identify,  ///< which stimulus was it?
+  identify,  ///< which stimulus it was
   compare,   ///< which of two or three intervals held the comparison, or: were they the same?
   detect,    ///< was there anything?
   rate,      ///< a number, or a step of a labelled scale
   adjust,    ///< turns a parameter until the stimulus equals the standard
-  external,  ///< another program says what is shown, and what the answer was (palpate serve)
+  external,  ///< another program chooses the stimulus and reports the answer (palpate serve)
 };
 const char* to_string(TaskKind kind);  ///< "identify", ...
 
@@ -37,7 +37,7 @@ struct LevelTarget {
   bool orientation = false;  ///< pointer is "/orientation"
 };
 
-/// An answer that a key stands for.
+/// The answer that a key gives.
 struct TaskAnswer {
   std::string key;    ///< as in the protocol
   std::string name;   ///< as it is stored: "1", "yes", "same", a stimulus, "turn_up", ...
@@ -56,7 +56,7 @@ struct ConfidenceSpec {
   std::vector<ScaleStep> scale;  ///< from the least; the keys 1, 2, ... in order
 };
 
-/// Practice is over once so many of the last answers were right, at the latest after most_trials.
+/// Practice ends once so many of the last answers were correct, at the latest after most_trials.
 struct PracticeCriterion {
   int correct = 1, of = 1;
   int most_trials = 1;
@@ -69,10 +69,10 @@ struct TaskBlock {
   bool practice = false;  ///< not analysed
   std::string instructions, question;
   std::vector<RendererKind> renderers;
-  /// Indices into Protocol::stimuli: what is identified, compared with the standard, detected,
-  /// rated or adjusted. With `level` each at every level.
+  /// Indices into Protocol::stimuli: the stimuli to identify, to compare with the standard, to
+  /// detect, rate or adjust. With `level`, each at every level.
   std::vector<int> stimuli;
-  /// compare, adjust: what it is compared with; rate: the modulus, felt first. None: rate without.
+  /// compare, adjust: the reference; rate: the modulus, felt first. nullopt: rate without.
   std::optional<int> standard;
   std::optional<RendererKind> standard_renderer;  ///< of the standard; none: the trial's
   std::optional<int> absent;  ///< detect: shown in catch trials; none: nothing at all
@@ -86,8 +86,8 @@ struct TaskBlock {
   // compare
   int intervals = 2;
   bool same_different = false;
-  bool asks_smaller = false;             ///< the interval with the smaller level is asked for
-  double inter_interval = 0.5;           ///< s, forces off and the stylus at rest at home
+  bool asks_smaller = false;    ///< the question asks for the interval with the smaller level
+  double inter_interval = 0.5;  ///< s, forces off and the stylus at rest at home
   std::optional<double> interval_limit;  ///< s, forces on; none: until the participant goes on
 
   std::vector<TaskAnswer> answers;    ///< keys, in order of key; rate: empty, a number is typed
@@ -110,7 +110,7 @@ struct PageItem {
   std::vector<std::string> choices;   ///< choice, and labels of a scale's steps
   std::optional<double> least, most;  ///< number
   bool required = true;
-  std::vector<std::string> shown{};  ///< instead of `choices`, which are what is stored
+  std::vector<std::string> shown{};  ///< on the screen instead of `choices`; `choices` are stored
 };
 /// A PNG file that a page shows.
 struct PagePicture {
@@ -130,8 +130,8 @@ struct PageSpec {
   std::vector<PagePicture> pictures{};  ///< of each screen of the text; at most so many
 };
 
-// What a scene or protocol says besides its objects: the tool on the stylus and the extended probe
-// (the keys: scene.schema.json). SI units.
+// The parts of a scene or protocol besides its objects: the tool on the stylus and the extended
+// probe (keys: scene.schema.json). SI units.
 
 /// One straight piece of a tool, in the frame of the stylus: origin at its tip, +z from tip to
 /// tail. m, of a length above 0.
@@ -139,15 +139,15 @@ struct ToolSegmentSpec {
   Vec3 from, to;
 };
 
-/// What the stylus carries; without segments the plain stylus from tip to tail.
+/// The tool on the stylus; without segments the plain stylus from tip to tail.
 struct ToolSpec {
   static constexpr std::size_t kMostSegments = 16;
   std::vector<ToolSegmentSpec> segments;
   double radius = 0;  ///< m, on soft objects; 0: kSoftRadius. Rigid ones are touched by lines
 };
 
-/// m, of a tool or stylus on soft objects that gives none: a line without thickness would sink into
-/// an elastic solid without end.
+/// m, default for tools and styluses on soft objects: a line without thickness would sink into an
+/// elastic solid without end.
 inline constexpr double kSoftRadius = 0.002;
 
 /// The extended probe: the virtual stylus is the real one stretched by `factor` about a pivot.
@@ -167,7 +167,7 @@ struct SceneSpec {
   std::vector<stimuli::ObjectSpec> objects;
   ToolSpec tool;
   std::optional<ReachSpec> reach;
-  Vec3 gravity{0, 0, 0};  ///< m/s^2, on what moves
+  Vec3 gravity{0, 0, 0};  ///< m/s^2, on moving objects
 };
 
 enum class RendererKind { point, ray };
@@ -176,10 +176,10 @@ const char* to_string(RendererKind kind);  ///< "point", "ray"
 enum class RendererOrder { fixed, counterbalanced, interleaved };
 enum class OrderKind { random, sequential };
 enum class OrientationKind { uniform, fixed, listed };
-/// What is done about a material that the device cannot render passively: refuse the session, or
-/// limit the stiffness.
+/// The reaction to a material that the device cannot render passively: refuse the session, or limit
+/// the stiffness.
 enum class MaterialLimit { refuse, limit };
-/// What becomes of torque on a device that drives force alone.
+/// The treatment of torque on a device that drives force alone.
 enum class TorqueRule { required, left_out };
 
 enum class NoiseKind { white, pink };
@@ -278,7 +278,7 @@ struct Protocol {
   } texts;
   std::optional<MaskingNoise> masking_noise;
   std::optional<Sounds> sounds;  ///< version 2
-  /// Version 2: what stands for a key of the keyboard. "escape" is the emergency.
+  /// Version 2: other inputs that stand for a key of the keyboard. "escape" is the emergency.
   struct Responses {
     std::map<std::string, std::string> joystick;  ///< "button 1", "axis 1 +", "hat 1 up" -> key
     std::map<std::string, std::string> box;       ///< of a serial response box: byte -> key
@@ -292,15 +292,14 @@ struct Protocol {
   std::vector<PageSpec> pages;
   std::vector<std::string> stimulus_texts;  ///< JSON of each stimulus, for its levels
 
-  std::string language;     ///< of a translation of its texts; "": as it is written
-  std::string translation;  ///< the file of that, byte for byte
+  std::string language;     ///< of a translation of its texts; "": not translated
+  std::string translation;  ///< the file of the translation, byte for byte
 
   std::string source_text;  ///< the file as it was read, byte for byte
   std::string sha256;       ///< of source_text, lower-case hexadecimal
 };
 
-/// What the participant reads for a stimulus: its label, else its name. Responses are stored by
-/// name.
+/// The text shown for a stimulus: its label, else its name. Responses are stored by name.
 const std::string& answer_label(const Protocol& protocol, const std::string& stimulus);
 
 }  // namespace palpate::protocols

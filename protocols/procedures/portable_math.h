@@ -1,6 +1,6 @@
 #pragma once
 // Exponential, logarithm and normal distribution of additions, multiplications and divisions alone:
-// libm's differ in the last bit between machines, and which level comes next must not.
+// libm differs in the last bit between machines, and the choice of levels must not.
 
 namespace palpate::protocols {
 

@@ -101,7 +101,7 @@ std::optional<double> StaircaseRun::next_level() const {
       (spec_.stop_reversals.has_value() && reversals >= *spec_.stop_reversals)) {
     return std::nullopt;
   }
-  // The ends as they were written: their places on the scale are rounded.
+  // Return the ends as written: their places on the scale are rounded.
   if (position_ <= low_) return spec_.min;
   if (position_ >= high_) return spec_.max;
   return level_at(spec_.scale, position_);
@@ -150,7 +150,7 @@ Estimate StaircaseRun::estimate() const {
   return result;
 }
 
-/// What stays the same over the trials.
+/// Tables that stay the same over the trials.
 struct QuestPlusTables {
   QuestPlus spec;
   /// F at each level: [level][threshold, slope].
@@ -306,7 +306,7 @@ void QuestPlusRun::record(const Response& response) {
     });
   }
   ++trials_;
-  // An answer that no parameters of the grid allow teaches nothing.
+  // An answer that is impossible for all parameters of the grid is ignored.
   if (!(sum > 0)) return;
   for (double& weight : updated) weight /= sum;
   posterior_ = std::move(updated);
@@ -397,7 +397,7 @@ Procedure procedure_after(const ProcedureSpec& spec, std::uint64_t seed,
 InterleavedTracks::InterleavedTracks(const std::vector<ProcedureSpec>& specs, std::uint64_t seed)
     : seed_(seed) {
   for (std::size_t i = 0; i < specs.size(); ++i) {
-    // A copy has its tables, which are large, in common with the one before, and no use of a seed.
+    // A copy shares its large tables with the one before; it needs no seed.
     const auto same = std::find_if(
         specs.begin(), specs.begin() + static_cast<std::ptrdiff_t>(i),
         [&](const ProcedureSpec& other) { return is_same_quest_plus(other, specs[i]); });

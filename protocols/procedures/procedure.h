@@ -1,6 +1,6 @@
 #pragma once
-// Which level comes next: a pure function of the spec, the seed and the answers so far, the same on
-// every machine and compiler.
+// The choice of the next level: a pure function of the spec, the seed and the answers so far, the
+// same on every machine and compiler.
 
 #include <array>
 #include <cstddef>
@@ -20,7 +20,7 @@ struct Response {
   bool success = false;  ///< correct (forced choice), or "yes"
 };
 
-/// What a procedure makes of the answers so far; a number that it does not estimate is missing.
+/// The estimates from the answers so far; nullopt where a procedure does not estimate the number.
 struct Estimate {
   std::optional<double> threshold;           ///< a level
   std::optional<double> threshold_scale_sd;  ///< on the procedure's scale
@@ -38,7 +38,7 @@ class ConstantStimuliRun {
 
   std::optional<double> next_level() const;
   void record(const Response& response);
-  Estimate estimate() const;  ///< counts only: a threshold is the analysis' business
+  Estimate estimate() const;  ///< counts only: the analysis estimates the threshold
 
  private:
   std::vector<double> order_;
@@ -70,7 +70,7 @@ class LimitsRun {
   int trials_ = 0, unchanged_ = 0;
 };
 
-/// Goes on from the level that was shown, also where it is not the one that was asked for.
+/// Continues from the level shown, even where it differs from the one requested.
 class StaircaseRun {
  public:
   explicit StaircaseRun(Staircase spec);
@@ -97,15 +97,15 @@ class StaircaseRun {
 struct QuestPlusTables;
 
 /// Watson 2017, "QUEST+: A general multidimensional Bayesian adaptive psychometric method".
-/// Departs: the expected entropy is worked out as what is known before less the mutual information
-/// of answer and parameters, so that no logarithm is taken of the posterior. Of levels that are
-/// equally good to 1e-10 bit the first is taken.
+/// Departs: the expected entropy is the prior entropy less the mutual information of answer and
+/// parameters, which needs no logarithm of the posterior. Ties within 1e-10 bit go to the first
+/// level.
 class QuestPlusRun {
  public:
   explicit QuestPlusRun(const QuestPlus& spec);
 
   std::optional<double> next_level() const;
-  /// A level beside the grid counts as what it is.
+  /// A level off the grid counts at its true value.
   void record(const Response& response);
   /// Means of the posterior, the threshold's on the scale.
   Estimate estimate() const;
@@ -124,14 +124,14 @@ class QuestPlusRun {
   int trials_ = 0;
 };
 
-/// A procedure and the answers to it. Copies are independent. The answers of a session that goes on
-/// are recorded again, one by one.
+/// A procedure and the answers to it. Copies are independent. A resumed session records its answers
+/// again, one by one.
 class Procedure {
  public:
-  /// \param spec  as the parser lets it pass
+  /// \param spec  as checked by the parser
   Procedure(const ProcedureSpec& spec, std::uint64_t seed);
 
-  std::optional<double> next_level() const;  ///< nullopt: the procedure is at its end
+  std::optional<double> next_level() const;  ///< nullopt: the procedure has ended
   /// A trial that was not answered is not recorded: its level comes again.
   void record(const Response& response);
   Estimate estimate() const;
@@ -152,13 +152,13 @@ struct TrackLevel {
   double level = 0;
 };
 
-/// Several procedures whose trials are mixed: each round has one trial of every track that is not
-/// at its end, in an order by chance.
+/// Several procedures whose trials are mixed: each round has one trial of every unfinished track,
+/// in random order.
 class InterleavedTracks {
  public:
   InterleavedTracks(const std::vector<ProcedureSpec>& specs, std::uint64_t seed);
 
-  std::optional<TrackLevel> next() const;  ///< nullopt: all are at their ends
+  std::optional<TrackLevel> next() const;  ///< nullopt: all have ended
   /// The answer to a trial of next().track.
   void record(const Response& response);
   const std::vector<Procedure>& tracks() const { return tracks_; }

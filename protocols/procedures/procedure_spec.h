@@ -1,5 +1,5 @@
 #pragma once
-// How the level of each trial is chosen: plain values, as a protocol says them.
+// How the level of each trial is chosen: plain values from the protocol.
 
 #include <cstddef>
 #include <cstdint>
@@ -12,7 +12,7 @@
 
 namespace palpate::protocols {
 
-/// Of a track among several that are mixed. \param seed  of InterleavedTracks
+/// The seed of a track among several that are mixed. \param seed  of InterleavedTracks
 inline std::uint64_t track_seed(std::uint64_t seed, std::size_t track) {
   return Random(seed, {0x17, track}).next();
 }
@@ -69,15 +69,15 @@ struct Limits {
   Easier easier = Easier::higher;
   int series = 8;
   bool ascending_first = true;
-  int jitter_steps = 0;  ///< a series starts up to so many steps inside, by chance
+  int jitter_steps = 0;  ///< a series starts up to so many steps inside, at random
 };
 
 using ProcedureSpec = std::variant<ConstantStimuli, Staircase, QuestPlus, Limits>;
 
 /// Levels that a procedure may ask for: all of them, or (Staircase) its start and the ends of its
-/// range. What cannot be shown at one of these must be refused before the first trial.
+/// range. Refuse a stimulus that a device cannot show at one of these before the first trial.
 std::vector<double> levels_to_check(const ProcedureSpec& spec);
-/// No procedure of this spec has more trials.
+/// Upper limit on the trials of a procedure.
 std::size_t most_trials(const ProcedureSpec& spec);
 
 }  // namespace palpate::protocols

@@ -8,7 +8,7 @@ namespace palpate::protocols {
 /// How levels are spaced: as they are, by their log10, or in dB (20 log10).
 enum class LevelScale { linear, log10, decibel };
 enum class PsychometricShape { logistic, normal, weibull };
-/// Which levels give more successes.
+/// The levels that give more successes.
 enum class Easier { higher, lower };
 
 /// Place of a level on a scale; on a logarithmic one, level 0 is at -infinity.
@@ -56,7 +56,7 @@ struct PsychometricParticipant {
   }
 };
 
-const char* to_string(LevelScale scale);         ///< as protocols say it: "linear", "log", "db"
+const char* to_string(LevelScale scale);         ///< as in protocols: "linear", "log", "db"
 const char* to_string(PsychometricShape shape);  ///< "logistic", ...
 
 }  // namespace palpate::protocols

@@ -17,7 +17,7 @@ struct Recovery {
   double mean_trials = 0;
 };
 
-/// What a procedure aims at for a participant, a level. Staircase: where successes are as frequent
+/// The level that a procedure aims at for a participant. Staircase: where successes are as frequent
 /// as at its convergence point. QuestPlus: the threshold. Limits: where half of the answers are
 /// successes. ConstantStimuli has no estimate of its own: 0.
 double true_threshold(const ProcedureSpec& spec, const PsychometricParticipant& participant);
