@@ -31,7 +31,7 @@ struct Contact {
 // From contacts to the wrench (force and torque) on the hand and its split on two devices: pure
 // functions. World frame, SI units.
 
-/// A contact with what decides its force.
+/// A contact with all data that its force depends on.
 struct LoadedContact {
   Contact contact;
   double probe_fraction = 0;  ///< of the contact point on the probe: 0 at the tip to 1 at the tail

@@ -434,7 +434,7 @@ double depth_along(const stimuli::ObjectSpec& primitive, const LineProbe& probe,
 }
 
 std::vector<LocalDepth> local_depths(const stimuli::ObjectSpec& primitive, const LineProbe& probe) {
-  support(primitive, Vec3());  // refuses what is no primitive
+  support(primitive, Vec3());  // refuses all but primitives
   if (!depths::overlaps(primitive, probe)) return {};
   depths::Collector collector(primitive, probe);
   switch (primitive.shape) {

@@ -196,7 +196,7 @@ struct ContactEstimate {
   Vec3 point;        ///< m, contact point on the ideal probe; NaN where the method gives none
 };
 
-/// One method over one mesh, with what it remembers between ticks.
+/// One method over one mesh, with its state between ticks.
 class ContactMethod {
  public:
   virtual ~ContactMethod() = default;

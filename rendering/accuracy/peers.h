@@ -18,8 +18,8 @@ struct PeerContact {
   Vec3 point;        ///< m, on the mesh: where the probe, moved by depth * normal, touches it
 };
 
-/// One mesh in one library, with what the library remembers between queries. Every library gets its
-/// best settings: double precision, no margins, coordinates scaled to an object of radius 1 (their
+/// One mesh in one library, with the library's state between queries. Every library gets its best
+/// settings: double precision, no margins, coordinates scaled to an object of radius 1 (their
 /// tolerances are absolute), a hull that climbs from near by instead of looking at every vertex,
 /// the probe as an exact segment, and the last normal as the first guess.
 class Peer {

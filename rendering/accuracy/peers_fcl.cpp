@@ -5,7 +5,7 @@
 // enable_signed_distance is. That one is called here a level below, where it takes support
 // functions: a segment is then exact, and the hull can climb. The packaged
 // library is built with assertions, some of which fail on thin objects and would end the program;
-// the same code compiled here without them throws or returns what it has.
+// the same code compiled here without them throws or returns its result so far.
 
 #ifndef NDEBUG
 #define NDEBUG

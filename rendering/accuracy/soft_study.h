@@ -1,5 +1,5 @@
 #pragma once
-// Errors of soft bodies against what is known of them, and what a step costs. Not for the servo.
+// Errors of soft bodies against known solutions, and the cost of a step. Not for the servo.
 
 #include <cstddef>
 #include <functional>

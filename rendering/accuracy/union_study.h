@@ -23,7 +23,7 @@ struct UnionCase {
 /// A kind of case, drawn anew for each seed.
 struct UnionCaseKind {
   const char* name;   ///< "groove of 2 degrees"
-  const char* truth;  ///< what the displacement is known from
+  const char* truth;  ///< source of the exact displacement
   std::function<UnionCase(std::uint64_t seed, std::size_t ticks)> draw;
 };
 std::vector<UnionCaseKind> union_case_kinds();

@@ -40,7 +40,7 @@ bool BodyContacts::may_touch(std::uint32_t body, double within, double extra) {
   return !state_.near_parts.empty();
 }
 
-/// What is awake wakes what it may touch, and all that sleeps with it.
+/// An awake body wakes every body that it may touch, with the whole sleeping group.
 bool BodyContacts::wake_near() {
   if (state_.sleeping == 0) return false;
   const std::size_t before = state_.sleeping;
@@ -213,7 +213,7 @@ void BodyContacts::find_islands() {
   }
 }
 
-/// m/s; what approaches more slowly is not thrown back.
+/// m/s; slower approaches do not bounce.
 double BodyContacts::resting_speed(double step) const {
   return 2 * glm::length(world_.gravity) * step + 1e-9;
 }

@@ -234,7 +234,7 @@ bool has_stopped(const BodyWorld& world, const MovingBody& body, const BodyMotio
          (motion.velocity == Vec3(0) && motion.spin_momentum == Vec3(0));
 }
 
-/// Sets state.island by what touches.
+/// Sets state.island from the contacts.
 void join_touching(const BodyWorld& world, BodyWorldState& state) {
   for (std::uint32_t i = 0; i < state.island.size(); ++i) state.island[i] = i;
   for (bool more = true; more;) {

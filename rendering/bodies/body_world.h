@@ -1,6 +1,6 @@
 #pragma once
-// Bodies that move and collide, without a probe: what is known of them and what changes. World
-// frame, SI units.
+// Bodies that move and collide, without a probe: their constants and their state. World frame, SI
+// units.
 
 #include <cstdint>
 #include <memory>
@@ -63,7 +63,7 @@ struct BodyWorld {
   std::vector<PartPair> part_pairs;
   std::vector<std::uint32_t> first_part;  ///< of each body, and one more: counts of parts before it
   Vec3 gravity{0, 0, 0};
-  bool sleeps = true;  ///< what has come to rest is left alone
+  bool sleeps = true;  ///< bodies at rest are not moved
 
   /// Sets the pairs and first_part from bodies and obstacles.
   void pair_up();

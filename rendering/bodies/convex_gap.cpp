@@ -155,7 +155,7 @@ class Corners {
         inside_b_(b.world_point(b.inside)),
         scale_(scale) {}
   Vec3 between() const { return inside_b_ - inside_a_; }
-  /// Of the parts as they are.
+  /// For the parts in their present poses.
   Vec3 whole(std::uint32_t vertex_a, std::uint32_t vertex_b) const {
     return on_b(vertex_b) - on_a(vertex_a);
   }
@@ -279,7 +279,7 @@ void corners_of(const ConvexPlace& part, std::uint32_t f, std::vector<Vec3>& out
   }
 }
 
-/// Keeps of room.polygon what lies over a facet.
+/// Clips room.polygon to the piece over a facet.
 void clip_to(const ConvexPlace& part, const stimuli::Facet& facet, ClipRoom& room) {
   for (std::uint32_t k = 0; k < facet.side_count; ++k) {
     const stimuli::Side& side = part.mesh->sides()[facet.first_side + k];

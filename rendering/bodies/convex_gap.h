@@ -54,7 +54,7 @@ struct ManifoldPoint {
   double gap = 0;  ///< negative where they overlap
 };
 
-/// Where two parts touch: a face and what of the other part lies over it, or one point.
+/// Where two parts touch: a face and the piece of the other part over it, or one point.
 class Manifold {
  public:
   static constexpr std::size_t kMostPoints = 8;

@@ -75,7 +75,7 @@ Rendering MovingBodies::tick(const Renderer& renderer, RenderState& outer, const
     frame = tool_frame(probe.tail - probe.tip, state.has_last ? &state.last_frame : nullptr,
                        outer.measured_side);
   const bool touches = valid && sided;
-  // A reading that is none: the bodies go on untouched.
+  // An invalid reading: the bodies move on without the probe.
   const LineProbe last = state.has_last || !touches ? state.last : probe;
   const Mat3 last_frame = state.has_last || !touches ? state.last_frame : frame;
   const double time = dt > 0 ? std::min(dt, kLongestTick) : 0;
@@ -149,7 +149,7 @@ void MovingBodies::step(const Renderer& renderer, BodiesState& state, const Stro
   }
   for (std::size_t i = 0; i < world_.bodies.size(); ++i) {
     if (is_finite(state.world.motion[i])) continue;
-    // It stays where it was last, at rest: no number that is none goes on from here.
+    // Keep the last pose, at rest: NaN must not propagate.
     state.world.motion[i] = state.before[i];
     state.world.motion[i].velocity = state.world.motion[i].spin_momentum = Vec3(0);
     if (!is_finite(state.world.motion[i])) state.world.motion[i] = world_.bodies[i].start;
@@ -405,7 +405,7 @@ bool MovingBodies::stays_alone(BodiesState& state, std::size_t body, const Strok
                          stroke.duration * farthest);
 }
 
-/// Gives a body what the probe pushes it with, which are all contacts there are.
+/// Applies the probe's push, the sum over all contacts, to a body.
 void MovingBodies::push_alone(BodiesState& state, std::size_t body, const Stroke& stroke) const {
   ProbeContact& only = state.contacts.front();
   if (state.contacts.size() == 1 && only.spring.damping == 0) {
@@ -635,7 +635,7 @@ void MovingBodies::push_pressed(BodiesState& state, double duration) const {
   }
 }
 
-/// Gives the bodies what the probe pushes them with.
+/// Applies the probe's push to the bodies.
 void MovingBodies::push_held(BodiesState& state, const Stroke& stroke) const {
   const double duration = stroke.duration;
   std::fill(state.chosen.begin(), state.chosen.end(), 0);
@@ -711,7 +711,7 @@ void MovingBodies::push_sideways(BodiesState& state, ProbeContact& contact, doub
 
 // The wrench of all that is touched, bodies with what stands still. Part of moving_bodies.h.
 
-/// Adds what one body does to the hand.
+/// Adds the wrench of one body on the hand.
 void MovingBodies::add_body(const Renderer& renderer, const BodiesState& state, std::size_t body,
                             const LineProbe& probe, Rendering& out) const {
   const Rendering& felt = state.felt[body];

@@ -38,7 +38,7 @@ struct ProbeContact {
   Vec3 offset;             ///< m, along the surface, of friction's spring
   Vec3 tangential;         ///< N, of friction, on the hand
   double force = 0;        ///< N, along the normal, on the hand
-  double felt_depth = 0;   ///< m; what the force is the stiffness times of
+  double felt_depth = 0;   ///< m; force = stiffness times this depth
   double depth_after = 0;  ///< m, at the end of the step; of a spring in closed form
   int segment = 0;
   Vec3 moved;     ///< m, of the place on the virtual probe within the step

@@ -106,7 +106,7 @@ Obstacle make_obstacle(const std::vector<SceneObject>& parts) {
   return obstacle;
 }
 
-/// Limits of what a step of a millisecond can follow.
+/// Limits that a step of a millisecond can follow.
 void check_limits(const MovingBody& body) {
   constexpr double kFastest = 100, kFastestTurn = 1000;  // m/s, rad/s
   constexpr double kLeastTurn = 1e-6;                    // of the largest moment of inertia

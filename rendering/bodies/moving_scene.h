@@ -1,7 +1,7 @@
 #pragma once
-// A scene of which some objects move: each moving object is rendered in its own frame, where it
-// stands still, so the contact law and the ideal tool go with it; what the hand is pushed with, it
-// is pushed back with.
+// A scene with moving objects: each moving object is rendered in its own frame, where it stands
+// still, so the contact law and the ideal tool go with it; what the hand is pushed with, it is
+// pushed back with.
 
 #include <cstddef>
 #include <optional>
@@ -24,7 +24,7 @@ inline constexpr std::size_t kMostBodies = 64;
 
 /// \param parts    of all objects, where they are at first
 /// \param gravity  m/s^2
-/// \param sleeps   what has come to rest is not moved until something comes near
+/// \param sleeps   bodies at rest are not moved until something comes near
 /// \param surfaces  of objects without convex parts of their own surface, where they are at first;
 /// one for each of them
 /// \param solids   the convex parts of objects with surfaces, for collisions alone: the

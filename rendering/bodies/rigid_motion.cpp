@@ -47,7 +47,7 @@ PlacedPart placed_part(const PlacedMesh& placed) {
   return part;
 }
 
-/// Adds what the tetrahedra from the origin to a polygon hold, signed.
+/// Adds the signed moments of the tetrahedra from the origin to a polygon.
 void add_polygon(const Polygon& polygon, VolumeMoments& out) {
   for (std::size_t k = 2; k < polygon.size(); ++k) {
     const Vec3 &a = polygon[0], &b = polygon[k - 1], &c = polygon[k];

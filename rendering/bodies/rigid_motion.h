@@ -31,11 +31,11 @@ struct PlacedMesh {
 /// Of the union of convex parts: what several of them cover counts once. Parts may abut.
 VolumeMoments moments_of_union(std::span<const PlacedMesh> parts);
 
-/// Of what a closed surface bounds. Where its shells overlap, that counts once, too: then by
+/// Of the solid inside a closed surface. Where its shells overlap, the overlap counts once: then by
 /// crossings along 160,000 lines, to some 1e-4.
 VolumeMoments moments_of_surface(const Surface& surface, const Pose& pose);
 
-/// Of a solid of one density throughout, in the frame of its moments.
+/// For a solid of uniform density, in the frame of its moments.
 struct MassProperties {
   double mass = 0;  ///< kg
   Vec3 centre;      ///< m

@@ -68,7 +68,7 @@ class SoftBody {
   /// Nodes of the surface; a surface node is an index into this.
   const std::vector<std::uint32_t>& surface_nodes() const { return surface_nodes_; }
   static constexpr std::uint32_t kInside = 0xffffffff;
-  /// Surface node of a node; kInside: it is none.
+  /// The surface node of a node; kInside: not on the surface.
   std::uint32_t surface_index(std::uint32_t node) const { return surface_index_[node]; }
   bool is_fixed(std::uint32_t node) const { return is_fixed_[node]; }
   std::size_t free_nodes() const { return free_nodes_.size(); }

@@ -139,7 +139,7 @@ class Search {
     keep(contact);
   }
 
-  /// Of the last tick; null: it is new.
+  /// From the last tick; null: new.
   const SoftContact* last(std::uint32_t key) const {
     for (const SoftContact& contact : memory_.contacts) {
       if (contact.key == key) return &contact;

@@ -148,7 +148,7 @@ struct SoftContactMemory {
   double moved = 0;                   ///< m, of the surface by those forces, at most
   bool dropped = false;               ///< there were more places than are kept
 
-  // Of the tick in hand:
+  // Of the current tick:
   struct Node {
     std::uint32_t node;
     Vec3 base;  ///< m, without any force

@@ -35,7 +35,7 @@ void add_impulse(SoftObjectState& state, double dt) {
   }
 }
 
-/// The mean force since the last step is what the next one gets.
+/// The next step gets the mean force since the last one.
 void ask_for_step(SoftObjectState& state) {
   state.mean.clear();
   for (const std::uint32_t node : state.impelled) {

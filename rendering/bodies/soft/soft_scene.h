@@ -1,6 +1,6 @@
 #pragma once
-// A scene of which some objects give. Objects that do not are rendered as ever, in a scene of their
-// own within; the wrenches add up. World frame, SI units.
+// A scene with soft objects. Rigid objects are rendered as usual, in a scene of their own within;
+// the wrenches add up. World frame, SI units.
 
 #include <cstdint>
 #include <memory>
@@ -80,7 +80,7 @@ struct SoftObjectState {
   bool started = false;
   SoftPace pace = SoftPace::when_due;
   SoftStepper* stepper = nullptr;  ///< null: steps are made here, within the tick. Copies have none
-  bool failed = false;  ///< a step gave what is no number, or is far away: no force any more
+  bool failed = false;             ///< a step gave NaN or a far position: no force from now on
 };
 
 /// Whether the step that was asked for, if one was, is due after dt more.
@@ -91,7 +91,7 @@ inline constexpr double kStalledAfter = 0.1;
 bool is_stalled(const SoftObjectState& state) noexcept;
 
 /// One step, and what the servo knows after it. Not by the servo's thread where it has one of its
-/// own. \return false: what came out is no number, or is far away
+/// own. \return false: the result is NaN or far away
 bool step_and_look(const SoftObject& object, SoftState& body, std::span<const NodeForce> forces,
                    SoftView& view) noexcept;
 
@@ -105,10 +105,10 @@ void keep_room(const SoftObjectState& original, SoftObjectState& copy);
 Vec3 advance(const SoftObject& object, SoftObjectState& state, const Vec3& tip,
              const PlacedTool& tool, double step, double dt) noexcept;
 
-// From the description of a soft object to what is rendered: its elements, which of them are held,
-// and the rate of its steps. Not for the servo.
+// From the description of a soft object to its rendering: its elements, which of them are held, and
+// the rate of its steps. Not for the servo.
 
-/// How a soft object is touched, beside what its own description says.
+/// How a soft object is touched, beyond its own description.
 struct SoftTouch {
   double radius = 0.002;  ///< m, of the tool
   Vec3 gravity{0, 0, 0};  ///< m/s^2
@@ -131,7 +131,7 @@ bool coupling_is_stable(const SoftMaterial& material, double rate);
 std::shared_ptr<const SoftObject> build_soft_object(const stimuli::ObjectSpec& spec,
                                                     const Pose& pose, const SoftTouch& touch);
 
-/// A soft object as it is now, to be drawn.
+/// The present state of a soft object, for drawing.
 struct SoftShape {
   int object = 0;                                           ///< index in the scene
   std::span<const Vec3> rest, now;                          ///< m, of the nodes of the surface
@@ -148,8 +148,8 @@ Scene soft_scene(Scene others, std::vector<SceneObject> shown,
 /// Empty where nothing is soft. Valid until the state's next tick, which changes them in place.
 std::vector<SoftShape> soft_shapes(const Scene& scene, const RenderState& state);
 
-/// Every contact with force of the last tick with what gives: place on the ideal tool's axis, m,
-/// and force on the tool, N. No allocation.
+/// Every contact with force between tool and soft object in the last tick: place on the ideal
+/// tool's axis, m, and force on the tool, N. No allocation.
 using SoftContactVisit = void (*)(void* whom, const Vec3& place, const Vec3& force);
 void visit_soft_contacts(const RenderState& state, SoftContactVisit visit, void* whom) noexcept;
 template <class Visit>
