@@ -405,7 +405,7 @@ bool MovingBodies::stays_alone(BodiesState& state, std::size_t body, const Strok
                          stroke.duration * farthest);
 }
 
-/// Applies the probe's push, the sum over all contacts, to a body.
+/// Applies the probe's push to a body that has all of state.contacts.
 void MovingBodies::push_alone(BodiesState& state, std::size_t body, const Stroke& stroke) const {
   ProbeContact& only = state.contacts.front();
   if (state.contacts.size() == 1 && only.spring.damping == 0) {
