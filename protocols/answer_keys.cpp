@@ -126,7 +126,7 @@ std::string one_key(const std::string& name) {
 }
 
 std::string KeysTaken::add(const std::string& name) {
-  const std::string fault = key_fault(name);
+  std::string fault = key_fault(name);
   if (!fault.empty()) return fault;
   const auto [before, is_new] = names_.emplace(one_key(name), name);
   return is_new ? "" : "expected another key: this is the same as '" + before->second + "'";

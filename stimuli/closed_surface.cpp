@@ -212,7 +212,8 @@ class Cleaner {
 
   void drop_gone() {
     std::vector<char> gone(triangles_.size(), 0);
-    for (std::size_t t = 0; t < triangles_.size(); ++t) gone[t] = triangles_[t][0] == kNoPoint;
+    for (std::size_t t = 0; t < triangles_.size(); ++t)
+      gone[t] = static_cast<char>(triangles_[t][0] == kNoPoint);
     drop(gone);
   }
 
@@ -300,6 +301,7 @@ class Cleaner {
   // For each corner of the rim, the first one that it is welded to.
   std::vector<Index> welded(const std::vector<Index>& rim, double within) const {
     std::vector<Vec3> at;
+    at.reserve(rim.size());
     for (const Index v : rim) at.push_back(points_[v]);
     return weld(at, within);
   }
@@ -399,6 +401,7 @@ class Cleaner {
     }
     std::sort(on.begin(), on.end());
     std::vector<Index> corners;
+    corners.reserve(on.size());
     for (const auto& [at, v] : on) corners.push_back(v);
     return corners;
   }

@@ -166,6 +166,7 @@ class Flattening {
 
   std::vector<Index> ring(const std::vector<std::pair<Index, Index>>& around) const {
     std::vector<Index> corners;
+    corners.reserve(around.size());
     for (const auto& [t, k] : around) corners.push_back(triangles_[t][(k + 1) % 3]);
     std::sort(corners.begin(), corners.end());
     return corners;

@@ -86,12 +86,12 @@ TEST(Exclusions, AboveTenPercentAreWarnedOf) {
   };
   EXPECT_TRUE(warns(with_wrong(3), "12.0 % of the trials with point are excluded from the times"));
   EXPECT_TRUE(warns(with_wrong(3), "12.0 % of the trials with ray are excluded from the times"));
-  EXPECT_FALSE(warns(with_wrong(2), "are excluded from the times"));
+  EXPECT_FALSE(warns(with_wrong(2), "are excluded from the times (wrong"));
   const Analysis limit = analysis_with(2, 10, [](int, int i, RawTrial& trial) {
     if (i == 0) answer_wrongly(trial);
     return true;
   });
-  EXPECT_FALSE(warns(limit, "are excluded from the times")) << "10 % itself";
+  EXPECT_FALSE(warns(limit, "are excluded from the times (wrong")) << "10 % itself";
 }
 
 TEST(Exclusions, ThatDifferAreWarnedOfWhicheverHasMore) {
@@ -175,7 +175,7 @@ TEST(TimeOuts, AreSaidOfTheCellThatHasThem) {
   EXPECT_EQ(cone.highest_limit, 60);
   EXPECT_EQ(analysis.time_outs.cells[0][0].n_timeouts, 0U);
   // 7 of 160 trials with the point, 4.4 %: too few over all shapes for a warning.
-  EXPECT_FALSE(warns(analysis, "are excluded from the times"));
+  EXPECT_FALSE(warns(analysis, "are excluded from the times (wrong"));
   EXPECT_TRUE(warns(analysis, "cone 8.8 % with the point (30.0 % in P2) and 0.0 % with the ray"));
   EXPECT_FALSE(warns(analysis, "sphere 0.0 %"));
   ASSERT_EQ(analysis.comparisons[0].censored.size(), 2U);

@@ -81,8 +81,8 @@ TEST(Pattern, ErrorsNameTheirPlaceAndWhatIsExpected) {
     std::size_t place;
     const char* expected;
   };
-  for (const Case& one : {Case{"", 0, "it ends"},
-                          {"cone >", 6, "it ends"},
+  for (const Case& one : {Case{"", 0, "the expression ends"},
+                          {"cone >", 6, "the expression ends"},
                           {"cone", 0, "this is a number"},
                           {"cone > 5 && cube", 12, "this is a number"},
                           {"cone > 5 > 3", 9, "one comparison at a time"},

@@ -62,7 +62,8 @@ DenseTrials draw_trials(std::size_t renderers, std::size_t shapes, std::size_t p
   return out;
 }
 
-// A tall product is summed in blocks that Eigen fits to this machine's caches, unless it is kept from asking.
+// A tall product is summed in blocks that Eigen fits to this machine's caches, unless it is kept
+// from asking.
 TEST(Matrices, AreSummedInTheSameOrderOnEveryMachine) {
   EXPECT_EQ(Eigen::l1CacheSize(), 32 * 1024);
   EXPECT_EQ(Eigen::internal::packet_traits<double>::size, 1);

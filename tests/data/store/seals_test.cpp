@@ -103,7 +103,7 @@ TEST_F(Seals, TheRowThatWasChangedIsNamed) {
   expect_refused("UPDATE runs SET hand = 'left' WHERE id = 2", "session 1, run 2: was changed");
   expect_refused("UPDATE runs SET ended_ns = 9 WHERE id = 2", "session 1, end of run 2: was");
   expect_refused("UPDATE participants SET code = 'P2' WHERE id = 1",
-                 "participant P2, session 1, run 1, or the participant");
+                 "participant P2, session 1, run 1, or its participant");
 }
 
 TEST_F(Seals, EveryColumnIsSealed) {
