@@ -6,6 +6,7 @@
 #include <string_view>
 #include <utility>
 
+#include "data/base/text.h"
 #include "protocols/json_document.h"
 #include "protocols/parse.h"
 
@@ -42,14 +43,8 @@ constexpr std::pair<const char*, StreamField> kFields[] = {
     {"object", StreamField::object},    {"faults", StreamField::faults},
     {"lateness", StreamField::lateness}};
 
-constexpr std::size_t kLongestText = 1000;  // characters of a name, note or reason
+constexpr std::size_t kLongestText = 1000;  // characters, as JSON schemas count them
 constexpr double kMostRate = 1000;          // Hz
-
-/// Of a text in UTF-8, as JSON schemas count them.
-std::size_t characters(const std::string& text) {
-  return static_cast<std::size_t>(std::ranges::count_if(
-      text, [](char byte) { return (static_cast<unsigned char>(byte) & 0xC0) != 0x80; }));
-}
 
 /// The members of one message; what is wrong with them is collected.
 class MemberReader {
@@ -66,7 +61,7 @@ class MemberReader {
   void text(const char* key, std::string& out, bool required, std::size_t most = kLongestText) {
     const json* const value = member(key, required);
     if (value == nullptr) return;
-    if (!value->is_string() || characters(value->get_ref<const std::string&>()) > most)
+    if (!value->is_string() || count_characters(value->get_ref<const std::string&>()) > most)
       return fault(key, "expected a text of at most " + std::to_string(most) + " characters");
     out = value->get<std::string>();
   }
