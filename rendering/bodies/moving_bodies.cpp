@@ -338,8 +338,10 @@ void MovingBodies::settle_shape(BodiesState& state, std::size_t body, const Stro
   if (!shape.has_last) return;
   const Pose frame = pose_of(state, body);
   shape.last = into(frame, stroke.to);
-  if (shape.unions.last.d != Vec3(0) || !shape.unions.pairs.empty())
-    shape.unions.last = into(frame, stroke.to, stroke.frame_to);
+  if (!(shape.unions.last.d != Vec3(0) || !shape.unions.pairs.empty())) return;
+  shape.unions.last = into(frame, stroke.to, stroke.frame_to);
+  // Without a tool all poses have one frame: between two of them the stylus goes by its direction.
+  if (fixed_.tool() == nullptr) shape.unions.last.frame = Mat3(1);
 }
 
 // A body that goes fast at the probe and touches nothing else: steps of its own within a step. Part
