@@ -101,13 +101,13 @@ class Filling {
           if (!out && !(side[0] < 0 && side[1] < 0 && side[2] < 0)) continue;
           const double area = side[0] + side[1] + side[2];
           const double x = (side[1] * v[0].x + side[2] * v[1].x + side[0] * v[2].x) / area;
-          lines[static_cast<std::size_t>(z * count_[1] + y)].push_back({x, out ? -1 : 1});
+          lines[size(z) * size(count_[1]) + size(y)].push_back({x, out ? -1 : 1});
         }
       }
     }
     for (int z = 0; z < count_[2]; ++z) {
       for (int y = 0; y < count_[1]; ++y) {
-        auto& line = lines[static_cast<std::size_t>(z * count_[1] + y)];
+        auto& line = lines[size(z) * size(count_[1]) + size(y)];
         std::sort(line.begin(), line.end(),
                   [](const Crossing& a, const Crossing& b) { return a.x < b.x; });
         int turns = 0;
@@ -320,7 +320,21 @@ DistanceField::DistanceField(const std::vector<PlacedPart>& parts) {
   }
   per_spacing_ = static_cast<float>(1 / spacing_);
   step_ = static_cast<float>(spacing_);
-  nodes_ = Filling(low_, spacing_, count_).run(parts);
+  const std::vector<float> values = Filling(low_, spacing_, count_).run(parts);
+  nodes_.assign(values.begin(), values.end());
+  row_ = count_[0];
+  layer_ = row_ * count_[1];
+  std::size_t i = 0;
+  for (int z = 0; z < count_[2]; ++z) {
+    for (int y = 0; y < count_[1]; ++y) {
+      for (int x = 0; x < count_[0]; ++x) {
+        // |p| is convex, so what holds at the nodes holds between them; beyond the grid the
+        // distance to it is added.
+        const double far = glm::length(low_ + spacing_ * Vec3(x, y, z));
+        reach_ = std::max(reach_, static_cast<float>(far + 1e-5) - nodes_[i++]);
+      }
+    }
+  }
 }
 
 }  // namespace palpate::runner

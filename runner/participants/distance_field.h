@@ -2,15 +2,18 @@
 // Signed distance to any union of convex parts, on a grid: what a simulated participant imagines of
 // a stimulus that has no formula.
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <cstring>
 #include <memory>
 #include <vector>
 
 #include "runner/participants/lane_math.h"
 #include "stimuli/closed_surface.h"
 #include "stimuli/convex_mesh.h"
+#include "stimuli/large_array.h"
 #include "stimuli/vec.h"
 
 namespace palpate::runner {
@@ -54,27 +57,90 @@ class DistanceField {
     float distance;                   ///< m, negative inside
     float slope_x, slope_y, slope_z;  ///< its gradient; of length 1 but for rounding at edges
   };
+
+  /// So many places at once, a multiple of kLanes.
+  static constexpr int kMost = 32, kLanes = 16;
+  struct Places {
+    float x[kMost], y[kMost], z[kMost];  // m
+  };
+  struct Values {
+    float distance[kMost], slope_x[kMost], slope_y[kMost], slope_z[kMost];
+  };
+  /// \param count  of places; those up to the next multiple of kLanes are looked at, too
+  void distances(const Places& places, int count, float* out) const {
+    Cells cells;
+    find_cells(places, count, cells);
+    Four along_x[kMost];
+    for (int i = 0; i < count; ++i) {
+      const Corners corners = corners_of(cells.node[i]);
+      along_x[i] = corners.low + cells.x[i] * (corners.high - corners.low);
+    }
+    for (int first = 0; first < count; first += kLanes) {
+      for (int i = first; i < first + kLanes; ++i) {
+        const Four& at = along_x[i];
+        out[i] = mix(mix(at[0], at[1], cells.y[i]), mix(at[2], at[3], cells.y[i]), cells.z[i]) +
+                 cells.beyond[i];
+      }
+    }
+  }
+  void values(const Places& places, int count, Values& out) const {
+    Cells cells;
+    find_cells(places, count, cells);
+    Four along_x[kMost], step_x[kMost];
+    for (int i = 0; i < count; ++i) {
+      const Corners corners = corners_of(cells.node[i]);
+      step_x[i] = corners.high - corners.low;
+      along_x[i] = corners.low + cells.x[i] * step_x[i];
+    }
+    for (int first = 0; first < count; first += kLanes) {
+      for (int i = first; i < first + kLanes; ++i) {
+        const Four &at = along_x[i], &step = step_x[i];
+        const float y = cells.y[i], z = cells.z[i];
+        const float y0 = mix(at[0], at[1], y), y1 = mix(at[2], at[3], y);
+        out.distance[i] = mix(y0, y1, z) + cells.beyond[i];
+        out.slope_x[i] = mix(mix(step[0], step[1], y), mix(step[2], step[3], y), z) * per_spacing_;
+        out.slope_y[i] = mix(at[1] - at[0], at[3] - at[2], z) * per_spacing_;
+        out.slope_z[i] = (y1 - y0) * per_spacing_;
+      }
+    }
+  }
   float distance(float x, float y, float z) const {
-    const Place at = place(x, y, z);
-    const Corners v = corners(at);
-    const float y0 = mix(mix(v.v000, v.v100, at.x), mix(v.v010, v.v110, at.x), at.y);
-    const float y1 = mix(mix(v.v001, v.v101, at.x), mix(v.v011, v.v111, at.x), at.y);
-    return mix(y0, y1, at.z) + at.beyond;
+    float out[kMost];
+    distances(all_at(x, y, z), 1, out);
+    return out[0];
   }
   Value value(float x, float y, float z) const {
-    const Place at = place(x, y, z);
-    const Corners v = corners(at);
-    const float x00 = mix(v.v000, v.v100, at.x), x10 = mix(v.v010, v.v110, at.x);
-    const float x01 = mix(v.v001, v.v101, at.x), x11 = mix(v.v011, v.v111, at.x);
-    const float y0 = mix(x00, x10, at.y), y1 = mix(x01, x11, at.y);
-    const float dx = mix(mix(v.v100 - v.v000, v.v110 - v.v010, at.y),
-                         mix(v.v101 - v.v001, v.v111 - v.v011, at.y), at.z);
-    const float dy = mix(x10 - x00, x11 - x01, at.z);
-    return {mix(y0, y1, at.z) + at.beyond, dx * per_spacing_, dy * per_spacing_,
-            (y1 - y0) * per_spacing_};
+    Values out;
+    values(all_at(x, y, z), 1, out);
+    return {out.distance[0], out.slope_x[0], out.slope_y[0], out.slope_z[0]};
   }
 
+  /// m; no place is nearer to the solid than its distance from the origin less this.
+  float reach() const { return reach_; }
+
  private:
+  using Two = float __attribute__((vector_size(8)));
+  using Four = float __attribute__((vector_size(16)));
+  /// The values at the corners of a cell: where x is lowest and highest, each at (y, z) lowest, y
+  /// one on, z one on, both.
+  struct Corners {
+    Four low, high;
+  };
+  Corners corners_of(std::int32_t node) const {
+    const float* const at = nodes_.data() + node;
+    const auto pair = [](const float* from) {
+      Two out;
+      std::memcpy(&out, from, sizeof out);
+      return out;
+    };
+    const Two a = pair(at), b = pair(at + row_), c = pair(at + layer_),
+              d = pair(at + layer_ + row_);
+    const Four front = __builtin_shufflevector(a, b, 0, 1, 2, 3);
+    const Four back = __builtin_shufflevector(c, d, 0, 1, 2, 3);
+    return {__builtin_shufflevector(front, back, 0, 2, 4, 6),
+            __builtin_shufflevector(front, back, 1, 3, 5, 7)};
+  }
+
   // Written so that loops over lanes are vectorised: whole numbers of 32 bits, no branches.
   struct Coordinate {
     std::int32_t cell;
@@ -87,24 +153,30 @@ class DistanceField {
     const auto cell = static_cast<std::int32_t>(lane::min(inside, last_[axis] - 1));
     return {cell, inside - static_cast<float>(cell), (steps - inside) * step_};
   }
-  struct Place {
-    std::int32_t node;  // the lowest of its cell
-    float x, y, z;      // fractions within the cell
-    float beyond;       // m, out of the grid
+  struct Cells {
+    std::int32_t node[kMost];            // the lowest of the cell
+    float x[kMost], y[kMost], z[kMost];  // fractions within the cell
+    float beyond[kMost];                 // m, out of the grid
   };
-  Place place(float x, float y, float z) const {
-    const Coordinate a = coordinate(0, x), b = coordinate(1, y), c = coordinate(2, z);
-    return {(c.cell * count_[1] + b.cell) * count_[0] + a.cell, a.fraction, b.fraction, c.fraction,
-            std::sqrt(a.off * a.off + b.off * b.off + c.off * c.off)};
+  void find_cells(const Places& places, int count, Cells& out) const {
+    for (int first = 0; first < count; first += kLanes) {
+      for (int i = first; i < first + kLanes; ++i) {
+        const Coordinate a = coordinate(0, places.x[i]), b = coordinate(1, places.y[i]),
+                         c = coordinate(2, places.z[i]);
+        out.node[i] = (c.cell * count_[1] + b.cell) * count_[0] + a.cell;
+        out.x[i] = a.fraction;
+        out.y[i] = b.fraction;
+        out.z[i] = c.fraction;
+        out.beyond[i] = std::sqrt(a.off * a.off + b.off * b.off + c.off * c.off);
+      }
+    }
   }
-  struct Corners {
-    float v000, v100, v010, v110, v001, v101, v011, v111;
-  };
-  Corners corners(const Place& at) const {
-    const float* const n = nodes_.data();
-    const std::int32_t row = count_[0], up = row * count_[1], i = at.node;
-    return {n[i],      n[i + 1],      n[i + row],      n[i + row + 1],
-            n[i + up], n[i + up + 1], n[i + up + row], n[i + up + row + 1]};
+  static Places all_at(float x, float y, float z) {
+    Places out;
+    std::fill_n(out.x, kLanes, x);
+    std::fill_n(out.y, kLanes, y);
+    std::fill_n(out.z, kLanes, z);
+    return out;
   }
   static float mix(float a, float b, float t) { return a + t * (b - a); }
 
@@ -113,7 +185,9 @@ class DistanceField {
   std::array<std::int32_t, 3> count_{};  // nodes
   std::array<float, 3> origin_{}, last_{};
   float per_spacing_ = 0, step_ = 0;
-  std::vector<float> nodes_;  // m, x fastest
+  float reach_ = 0;                   // m
+  std::int32_t row_ = 0, layer_ = 0;  // nodes, from one to the next in y and in z
+  stimuli::LargeArray<float> nodes_;  // m, x fastest
 };
 
 }  // namespace palpate::runner

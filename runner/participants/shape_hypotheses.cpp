@@ -1,8 +1,11 @@
 #include "runner/participants/shape_hypotheses.h"
 
+#include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <glm/geometric.hpp>
 #include <numbers>
+#include <numeric>
 #include <stdexcept>
 #include <string>
 
@@ -136,6 +139,33 @@ void ShapeHypotheses::append(const stimuli::ObjectSpec& stimulus) {
       }
     }
   }
+  append_order(shape);
+}
+
+/// Along a Z-order curve through the directions of two axes (Morton 1966).
+void ShapeHypotheses::append_order(const Shape& shape) {
+  const auto end = static_cast<std::size_t>(padded_size());
+  for (auto i = static_cast<std::size_t>(shape.first); i < end; ++i)
+    nearby_order_.push_back(static_cast<int>(i));
+  if (!shape.field) return;
+  constexpr int kBits = 4;
+  const auto place_on_curve = [&](int hypothesis) {
+    std::uint32_t place = 0;
+    for (int bit = kBits - 1; bit >= 0; --bit) {
+      for (const std::size_t a : {std::size_t{0}, std::size_t{2}}) {
+        for (std::size_t c = 0; c < 3; ++c) {
+          const float share = 0.5F * (axes_[a][c][static_cast<std::size_t>(hypothesis)] + 1);
+          const auto cell =
+              static_cast<std::uint32_t>(std::clamp(share, 0.0F, 0.999F) * (1 << kBits));
+          place = place << 1U | (cell >> static_cast<unsigned>(bit) & 1U);
+        }
+      }
+    }
+    return place;
+  };
+  const auto from = nearby_order_.begin() + shape.first;
+  std::stable_sort(from, from + shape.count,
+                   [&](int a, int b) { return place_on_curve(a) < place_on_curve(b); });
 }
 
 ShapeHypotheses ShapeHypotheses::one_block_each(const ShapeHypotheses& all) {
@@ -152,6 +182,8 @@ ShapeHypotheses ShapeHypotheses::one_block_each(const ShapeHypotheses& all) {
       }
     }
   }
+  few.nearby_order_.resize(few.axes_[0][0].size());
+  std::iota(few.nearby_order_.begin(), few.nearby_order_.end(), 0);
   return few;
 }
 

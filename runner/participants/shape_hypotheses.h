@@ -54,6 +54,10 @@ class ShapeHypotheses {
 
   int padded_size() const { return static_cast<int>(axes_[0][0].size()); }
 
+  /// The hypotheses once more, each shape's so that those of similar rotations are side by side:
+  /// what looks at the grid of a field in this order finds it in the cache.
+  const int* nearby_order() const { return nearby_order_.data(); }
+
   /// Component c of local axis a (x, y, z: 0, 1, 2) in the world frame, of every hypothesis.
   const float* axis_component(int a, int c) const { return axes_[a][c].data(); }
 
@@ -63,9 +67,11 @@ class ShapeHypotheses {
  private:
   ShapeHypotheses() = default;
   void append(const stimuli::ObjectSpec& stimulus);
+  void append_order(const Shape& shape);
 
   std::vector<Shape> shapes_;
   std::array<std::array<std::vector<float>, 3>, 3> axes_;  // axis, component
+  std::vector<int> nearby_order_;
 };
 
 }  // namespace palpate::runner

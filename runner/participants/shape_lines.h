@@ -84,13 +84,13 @@ class SphereLine {
 class RotatedLine {
  public:
   RotatedLine(const ShapeHypotheses& hypotheses, int first, const Line& line)
-      : hypotheses_(&hypotheses), first_(first) {
+      : hypotheses_(&hypotheses), which_(hypotheses.nearby_order() + first) {
     for (int a = 0; a < 3; ++a) {
-      const float* x = hypotheses.axis_component(a, 0) + first;
-      const float* y = hypotheses.axis_component(a, 1) + first;
-      const float* z = hypotheses.axis_component(a, 2) + first;
+      const float* x = hypotheses.axis_component(a, 0);
+      const float* y = hypotheses.axis_component(a, 1);
+      const float* z = hypotheses.axis_component(a, 2);
       for (int i = 0; i < ShapeHypotheses::kBlock; ++i) {
-        const FloatVec axis{x[i], y[i], z[i]};
+        const FloatVec axis{x[which_[i]], y[which_[i]], z[which_[i]]};
         start_[a][i] = dot(axis, line.start);
         along_[a][i] = dot(axis, line.along);
         direction_[a][i] = dot(axis, line.direction);
@@ -104,9 +104,9 @@ class RotatedLine {
   }
   FloatVec world(int i, const FloatVec& v) const {
     const auto component = [&](int c) {
-      return v.x * hypotheses_->axis_component(0, c)[first_ + i] +
-             v.y * hypotheses_->axis_component(1, c)[first_ + i] +
-             v.z * hypotheses_->axis_component(2, c)[first_ + i];
+      return v.x * hypotheses_->axis_component(0, c)[which_[i]] +
+             v.y * hypotheses_->axis_component(1, c)[which_[i]] +
+             v.z * hypotheses_->axis_component(2, c)[which_[i]];
     };
     return {component(0), component(1), component(2)};
   }
@@ -119,7 +119,7 @@ class RotatedLine {
 
  private:
   const ShapeHypotheses* hypotheses_;
-  int first_;
+  const int* which_;
   float start_[3][ShapeHypotheses::kBlock];
   float along_[3][ShapeHypotheses::kBlock];
   float direction_[3][ShapeHypotheses::kBlock];
@@ -365,6 +365,8 @@ class SolidLine : public RotatedLine {
     const DistanceField::Value v = field_->value(p.x, p.y, p.z);
     return {v.distance, unit({v.slope_x, v.slope_y, v.slope_z})};
   }
+  FloatVec start(int i) const { return at(i, 0); }
+  const DistanceField& field() const { return *field_; }
 
   static FloatVec unit(const FloatVec& v) {
     const float scale = 1.0f / std::sqrt(lane::max(dot(v, v), kTinyLength * kTinyLength));
@@ -374,10 +376,81 @@ class SolidLine : public RotatedLine {
  private:
   const DistanceField* field_;
 };
+static_assert(DistanceField::kMost == ShapeHypotheses::kBlock);
+
+/// Some hypotheses of a block, side by side, so that no work is done for the others.
+class ChosenLines {
+ public:
+  static constexpr int kBlock = ShapeHypotheses::kBlock;
+
+  explicit ChosenLines(const SolidLine& shape) : field_(&shape.field()) {
+    for (int i = 0; i < kBlock; ++i) {
+      const FloatVec start = shape.start(i), along = shape.along(i);
+      which_[i] = i;
+      start_[0][i] = start.x;
+      start_[1][i] = start.y;
+      start_[2][i] = start.z;
+      along_[0][i] = along.x;
+      along_[1][i] = along.y;
+      along_[2][i] = along.z;
+    }
+  }
+
+  int count() const { return count_; }
+  int which(int k) const { return which_[k]; }  ///< of the block's hypotheses
+
+  /// Keeps those for which keep(k); calls move(from, to) for each of them that takes another place.
+  template <class Keep, class Move>
+  void keep_if(const Keep& keep, const Move& move) {
+    int kept = 0;
+    for (int k = 0; k < count_; ++k) {
+      if (!keep(k)) continue;
+      if (kept != k) {
+        which_[kept] = which_[k];
+        for (int a = 0; a < 3; ++a) {
+          start_[a][kept] = start_[a][k];
+          along_[a][kept] = along_[a][k];
+        }
+        move(k, kept);
+      }
+      ++kept;
+    }
+    count_ = kept;
+  }
+
+  /// At the place s[k] of each line.
+  void distances(const float* s, float* out) const {
+    DistanceField::Places places;
+    find_places(s, places);
+    field_->distances(places, count_, out);
+  }
+  void values(const float* s, DistanceField::Values& out) const {
+    DistanceField::Places places;
+    find_places(s, places);
+    field_->values(places, count_, out);
+  }
+
+ private:
+  void find_places(const float* s, DistanceField::Places& places) const {
+    constexpr int kLanes = DistanceField::kLanes;
+    for (int first = 0; first < count_; first += kLanes) {
+      for (int i = first; i < first + kLanes; ++i) {
+        places.x[i] = start_[0][i] + s[i] * along_[0][i];
+        places.y[i] = start_[1][i] + s[i] * along_[1][i];
+        places.z[i] = start_[2][i] + s[i] * along_[2][i];
+      }
+    }
+  }
+
+  const DistanceField* field_;
+  int count_ = kBlock;
+  int which_[kBlock];
+  float start_[3][kBlock], along_[3][kBlock];
+};
 
 /// A solid that is not convex may have several local minima along the line. Steps of at most
 /// `kPlaces` to its length, longer where the distance, which changes by a metre a metre at most,
-/// leaves nothing to be found; then closer around the least. Within 0.5 mm of the minimum. All
+/// leaves nothing to be found; then closer around the least. Within 0.5 mm of the minimum. Many
 /// hypotheses take a step at a time: one would wait for the grid's memory at each.
 inline void find_along_line(const SolidLine& shape, float length, Deepest& out) {
   constexpr int kBlock = ShapeHypotheses::kBlock;
@@ -385,51 +458,84 @@ inline void find_along_line(const SolidLine& shape, float length, Deepest& out) 
   constexpr int kHalvings = 5;
   const float step = length / kPlaces;
   const float end = length + 0.5f * step;
-  float best[kBlock], least[kBlock], next[kBlock];
-  for (int i = 0; i < kBlock; ++i) {
-    best[i] = 0;
-    next[i] = step;
-    least[i] = shape.distance(i, 0);
-  }
-  for (bool more = true; more;) {
-    int going_on = 0;
-    for (int i = 0; i < kBlock; ++i) {
-      const bool within = next[i] < end;
-      const float place = lane::min(next[i], length);
-      const float d = shape.distance(i, place);
-      const bool closer = within && d < least[i];
-      least[i] = closer ? d : least[i];
-      best[i] = closer ? place : best[i];
-      next[i] += lane::max(step, d - least[i]);
-      going_on += next[i] < end ? 1 : 0;
+  float found_best[kBlock], found_least[kBlock];
+  {
+    ChosenLines going_on(shape);
+    float best[kBlock] = {}, least[kBlock], next[kBlock], place[kBlock], d[kBlock];
+    going_on.distances(best, least);
+    std::fill_n(next, kBlock, step);
+    while (going_on.count() > 0) {
+      const int count = going_on.count();
+      for (int i = 0; i < kBlock; ++i) place[i] = lane::min(next[i], length);
+      going_on.distances(place, d);
+      int ended = 0;
+      for (int i = 0; i < kBlock; ++i) {
+        const bool closer = next[i] < end && d[i] < least[i];
+        least[i] = closer ? d[i] : least[i];
+        best[i] = closer ? place[i] : best[i];
+        next[i] += lane::max(step, d[i] - least[i]);
+        ended += i < count && !(next[i] < end) ? 1 : 0;
+      }
+      if (4 * ended < count && ended < DistanceField::kLanes) continue;
+      for (int k = 0; k < count; ++k) {
+        found_best[going_on.which(k)] = best[k];
+        found_least[going_on.which(k)] = least[k];
+      }
+      going_on.keep_if([&](int k) { return next[k] < end; },
+                       [&](int from, int to) {
+                         best[to] = best[from];
+                         least[to] = least[from];
+                         next[to] = next[from];
+                       });
     }
-    more = going_on > 0;
   }
+  const ChosenLines all(shape);
   float reach = 0.5f * step;
   for (int k = 0; k < kHalvings; ++k, reach *= 0.5f) {
+    float before[kBlock], after[kBlock], a[kBlock], b[kBlock];
     for (int i = 0; i < kBlock; ++i) {
-      const float before = lane::max(best[i] - reach, 0.0f);
-      const float after = lane::min(best[i] + reach, length);
-      const float a = shape.distance(i, before), b = shape.distance(i, after);
-      const bool back = a < least[i] && a <= b;
-      const bool on = !back && b < least[i];
-      least[i] = back ? a : on ? b : least[i];
-      best[i] = back ? before : on ? after : best[i];
+      before[i] = lane::max(found_best[i] - reach, 0.0f);
+      after[i] = lane::min(found_best[i] + reach, length);
+    }
+    all.distances(before, a);
+    all.distances(after, b);
+    for (int i = 0; i < kBlock; ++i) {
+      const bool back = a[i] < found_least[i] && a[i] <= b[i];
+      const bool on = !back && b[i] < found_least[i];
+      found_least[i] = back ? a[i] : on ? b[i] : found_least[i];
+      found_best[i] = back ? before[i] : on ? after[i] : found_best[i];
     }
   }
+  DistanceField::Values there;
+  all.values(found_best, there);
   for (int i = 0; i < kBlock; ++i) {
-    const SurfacePoint p = shape.surface(i, best[i]);
+    const FloatVec normal = SolidLine::unit({there.slope_x[i], there.slope_y[i], there.slope_z[i]});
     // Between the ends a contact's normal is perpendicular to the line.
-    const bool between = best[i] > 0 && best[i] < length;
+    const bool between = found_best[i] > 0 && found_best[i] < length;
     const FloatVec u = shape.along(i);
-    const float slope = dot(p.normal, u);
-    const FloatVec across = SolidLine::unit(
-        {p.normal.x - slope * u.x, p.normal.y - slope * u.y, p.normal.z - slope * u.z});
-    const FloatVec n{between ? across.x : p.normal.x, between ? across.y : p.normal.y,
-                     between ? across.z : p.normal.z};
-    out.distance[i] = p.distance;
+    const float slope = dot(normal, u);
+    const FloatVec across =
+        SolidLine::unit({normal.x - slope * u.x, normal.y - slope * u.y, normal.z - slope * u.z});
+    const FloatVec n{between ? across.x : normal.x, between ? across.y : normal.y,
+                     between ? across.z : normal.z};
+    out.distance[i] = there.distance[i];
     out.cosine[i] = shape.cosine(i, n);
-    out.along[i] = best[i];
+    out.along[i] = found_best[i];
+    out.x[i] = n.x;
+    out.y[i] = n.y;
+    out.z[i] = n.z;
+  }
+}
+
+inline void find_at_tip(const SolidLine& shape, Deepest& out) {
+  const float tip[ShapeHypotheses::kBlock] = {};
+  DistanceField::Values there;
+  ChosenLines(shape).values(tip, there);
+  for (int i = 0; i < ShapeHypotheses::kBlock; ++i) {
+    const FloatVec n = SolidLine::unit({there.slope_x[i], there.slope_y[i], there.slope_z[i]});
+    out.distance[i] = there.distance[i];
+    out.cosine[i] = shape.cosine(i, n);
+    out.along[i] = 0.0f;
     out.x[i] = n.x;
     out.y[i] = n.y;
     out.z[i] = n.z;

@@ -66,6 +66,30 @@ void add_torque_cue(const ShapeLine& shape, const Query& query, const Deepest& d
   }
 }
 
+/// The same for the hypotheses alone that the torque can leave above the floor: each distance is a
+/// look into a grid.
+void add_torque_cue(const SolidLine& shape, const Query& query, const Deepest& deepest,
+                    float* log_likelihood) {
+  ChosenLines lines(shape);
+  lines.keep_if([&](int i) { return log_likelihood[i] > query.torque_needed; }, [](int, int) {});
+  float least[kBlock] = {};
+  for (int i = 0; i < lines.count(); ++i) least[i] = deepest.distance[lines.which(i)];
+  float weights[kBlock] = {};
+  float fits[kBlock] = {};
+  for (int k = 0; k < query.positions; ++k) {
+    float position[kBlock], distance[kBlock] = {};
+    std::fill_n(position, kBlock, query.position[k]);
+    lines.distances(position, distance);
+    for (int i = 0; i < kBlock; ++i) {
+      const float weight = lane::exp(-(distance[i] - least[i]) * query.inverse_scale);
+      weights[i] += weight;
+      fits[i] += weight * query.fit[k];
+    }
+  }
+  for (int i = 0; i < lines.count(); ++i)
+    log_likelihood[lines.which(i)] += lane::log(fits[i] / weights[i] + query.torque_floor);
+}
+
 /// Whether some hypothesis of the block is above the floor if the torque fits as well as it can;
 /// else it is the floor for all of them, whatever the torque.
 bool torque_matters(const Query& query, const float* log_likelihood) {
@@ -193,7 +217,7 @@ float log_prior(const ShapeHypotheses& hypotheses, const ShapeHypotheses::Shape&
 
 /// m, about the shape's centre; infinite where it is not known.
 float bounding_radius(const ShapeHypotheses::Shape& shape) {
-  if (shape.field) return std::numeric_limits<float>::infinity();
+  if (shape.field) return shape.field->reach();
   switch (shape.kind) {
     case stimuli::ShapeKind::sphere:
       return shape.radius;
@@ -219,13 +243,15 @@ void update_shape(const ShapeHypotheses& hypotheses, const ShapeHypotheses::Shap
       log_posterior[h] = query.kept * log_posterior[h] + regained;  // likelihood 1
     return;
   }
+  const int* const order = hypotheses.nearby_order();
   for (int first = shape.first; first < shape.first + shape.count; first += kBlock) {
     const ShapeLine line(hypotheses, shape, first, query.line);
     float log_likelihood[kBlock];
     find_log_likelihood(line, query, log_likelihood);
     for (int i = 0; i < kBlock; ++i) {
-      log_posterior[first + i] = query.kept * log_posterior[first + i] + regained +
-                                 query.weight * lane::max(log_likelihood[i], floor);
+      float& posterior = log_posterior[order[first + i]];
+      posterior =
+          query.kept * posterior + regained + query.weight * lane::max(log_likelihood[i], floor);
     }
   }
 }

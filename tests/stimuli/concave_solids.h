@@ -225,7 +225,7 @@ struct Blocks {
         const auto& l = blocks.lines[axis];
         int k = -1;
         while (k + 1 < static_cast<int>(l.size()) &&
-               p[static_cast<int>(axis)] > l[static_cast<std::size_t>(k + 1)])
+               p[static_cast<int>(axis)] > l[static_cast<std::size_t>(k) + 1])
           ++k;
         box[axis] = k;
       }

@@ -109,6 +109,22 @@ TEST(DistanceField, FarAwayItGrowsByAMetreAMetre) {
   test::distance_at(field, Vec3(std::nan(""), 0, std::numeric_limits<double>::infinity()));
 }
 
+// What is farther from the stylus than that is surely not felt, whatever its orientation.
+TEST(DistanceField, NoPlaceIsNearerThanItsReachSays) {
+  stimuli::ObjectSpec box;
+  box.shape = stimuli::ShapeKind::box;
+  box.size = Vec3(0.09, 0.02, 0.05);
+  box.pose.position = Vec3(0.02, 0.01, 0);
+  const DistanceField field(felt_parts(box));
+  EXPECT_NEAR(field.reach(), glm::length(Vec3(0.065, 0.02, 0.025)), 0.004);
+  Random random(6);
+  for (int i = 0; i < 20000; ++i) {
+    const Vec3 out = glm::normalize(Vec3(random.normal(), random.normal(), random.normal()));
+    const double far = 0.3 * random.unit();
+    ASSERT_GE(test::distance_at(field, far * out), far - field.reach() - 1e-6);
+  }
+}
+
 stimuli::ObjectSpec ell_of_boxes() {
   stimuli::ObjectSpec ell;
   ell.shape = stimuli::ShapeKind::compound;

@@ -158,5 +158,27 @@ TEST(ShapeHypotheses, OnlyCentredPlainShapesAreKnownByFormula) {
   EXPECT_EQ(hypotheses.shapes()[2].count, 384) << "as the cube of that edge";
 }
 
+// The order in which they are looked at leaves none out, and has similar rotations side by side.
+TEST(ShapeHypotheses, TheOrderByRotationHasEachOnceNearItsLikes) {
+  const ShapeHypotheses hypotheses({spec(stimuli::ShapeKind::cube), spec(stimuli::ShapeKind::box)});
+  for (const ShapeHypotheses::Shape& shape : hypotheses.shapes()) {
+    const int* const order = hypotheses.nearby_order() + shape.first;
+    std::vector<int> sorted(order, order + shape.count);
+    const auto far = [&](int a, int b) {
+      const Mat3 turn = glm::transpose(hypotheses.rotation(a)) * hypotheses.rotation(b);
+      return std::acos(std::clamp((turn[0][0] + turn[1][1] + turn[2][2] - 1) / 2, -1.0, 1.0));
+    };
+    double by_order = 0, by_index = 0;
+    for (int i = 1; i < shape.count; ++i) {
+      by_order += far(order[i - 1], order[i]);
+      by_index += far(shape.first + i - 1, shape.first + i);
+    }
+    if (shape.field) EXPECT_LT(by_order, 0.7 * by_index);
+    std::sort(sorted.begin(), sorted.end());
+    for (int i = 0; i < shape.count; ++i)
+      ASSERT_EQ(sorted[static_cast<std::size_t>(i)], shape.first + i);
+  }
+}
+
 }  // namespace
 }  // namespace palpate::runner
