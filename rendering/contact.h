@@ -31,12 +31,12 @@ struct Contact {
 // From contacts to the wrench (force and torque) on the hand and its split on two devices: pure
 // functions. World frame, SI units.
 
-/// A contact with all data that its force depends on.
+/// A contact with all data that determine its force.
 struct LoadedContact {
   Contact contact;
   double probe_fraction = 0;  ///< of the contact point on the probe: 0 at the tip to 1 at the tail
   double stiffness = 0;       ///< N/m, at the surface
-  /// m, what this contact adds to the ideal probe's displacement, along its normal (set by load)
+  /// m, this contact's share of the ideal probe's displacement, along its normal (set by load)
   double normal_displacement = 0;
   double force = 0;        ///< N, along the normal, on the hand; never negative (set by load)
   Vec3 tangential_offset;  ///< m, of the ideal probe along the surface (set by apply_friction)
@@ -54,7 +54,7 @@ void load(std::span<LoadedContact, kCount> contacts) {
   }
 }
 
-/// What friction remembers of a contact from tick to tick.
+/// The friction state of a contact between ticks.
 struct FrictionState {
   Vec3 tangential_offset;   ///< m, of the ideal probe along the surface
   bool sliding = false;     ///< else it sticks
@@ -65,8 +65,9 @@ struct FrictionState {
 /// of the ideal probe: the contact sticks while that spring is within the static friction cone
 /// (static coefficient times normal force), else it slides with the dynamic coefficient. Zilles &
 /// Salisbury 1995 (god-object), Harwin & Melder 2002 (friction cone). The offset is projected onto
-/// the surface at each tick, which never adds energy. \param c       loaded; its tangential_offset
-/// is set \param motion  m, of the probe at the contact since the last tick
+/// the surface at each tick, which never adds energy.
+/// \param c       loaded; its tangential_offset is set
+/// \param motion  m, of the probe at the contact since the last tick
 void apply_friction(LoadedContact& c, const stimuli::Material& material, const Vec3& motion,
                     FrictionState& friction);
 
@@ -94,8 +95,8 @@ template <bool kSegment, bool kFriction, bool kAlone>
   loads.force = c.force * c.contact.normal;
   if constexpr (kFriction) loads.force += c.stiffness * c.tangential_offset;
   if constexpr (kSegment) {
-    // The lever is probe_fraction d + shift. The fraction is known last: what it scales comes
-    // first.
+    // The lever is probe_fraction d + shift. The fraction is known last, so compute the vector that
+    // it scales first.
     loads.torque = c.probe_fraction * glm::cross(probe.tail - probe.tip, loads.force);
     if constexpr (kFriction || !kAlone) loads.torque += glm::cross(c.shift, loads.force);
     loads.device2 = c.probe_fraction * loads.force;
@@ -103,9 +104,9 @@ template <bool kSegment, bool kFriction, bool kAlone>
   return loads;
 }
 
-/// Adds up; equations (1), (4) and (5) of Ho, Basdogan & Srinivasan 2000, with the lever from the
-/// tip: F1 = (1 - L1/L) F, F2 = (L1/L) F, with L1/L the probe_fraction of the contact. A probe of
-/// zero length is touched at fraction 0: device 1 takes all.
+/// Sums the loads: equations (1), (4) and (5) of Ho, Basdogan & Srinivasan 2000, with the lever
+/// from the tip: F1 = (1 - L1/L) F, F2 = (L1/L) F, with L1/L the probe_fraction of the contact. A
+/// probe of zero length is touched at fraction 0: device 1 takes the whole force.
 /// \tparam kSegment   false: a point, which has no lever; torque and device 2 are left at zero
 /// \tparam kFriction  false: no contact has a tangential offset
 template <bool kSegment, bool kFriction, std::size_t kCount>

@@ -12,9 +12,9 @@ namespace {
 
 using namespace minkowski;
 
-constexpr int kSteps = 400;         // a longer path is left to the trees (first_contact)
+constexpr int kSteps = 400;         // longer paths are left to the trees (first_contact)
 constexpr double kSameTime = 1e-9;  // of a tick; closer times differ by rounding
-constexpr double kApart = 1e-9;     // of the size; a probe that is farther off does not touch
+constexpr double kApart = 1e-9;     // of the size; a probe farther off does not touch
 constexpr double kNever = HUGE_VAL;
 
 /// Both ends move linearly; time t from 0 to 1, d = tail - tip.
@@ -30,14 +30,14 @@ struct Motion {
   Vec3 d_at(double t) const { return d + t * d_motion; }
 };
 
-/// When a height that is linear in time falls through 0; never, if it ends above.
+/// The time at which a height that is linear in time falls through 0; kNever if it ends above.
 double time_of_fall(double before, double after) {
   if (after >= 0) return kNever;
   return before > 0 ? before / (before - after) : 0;
 }
 
-/// When the probe's line falls through the line of an edge, from time t on: a root of the quadratic
-/// (w(t) x d(t)) . e, whose sign tells on which side the line passes.
+/// The time, from t on, at which the probe's line falls through the line of an edge: a root of the
+/// quadratic (w(t) x d(t)) . e, whose sign gives the side on which the line passes.
 double time_of_fall_on_edge(const stimuli::ConvexMesh& mesh, std::uint32_t index, bool left_ahead,
                             const Motion& m, double t) {
   const stimuli::Edge& edge = mesh.edges()[index];
@@ -57,15 +57,15 @@ double time_of_fall_on_edge(const stimuli::ConvexMesh& mesh, std::uint32_t index
   return std::max(first, t);
 }
 
-/// The facet of M whose plane separates the probe from the object, and from which time on.
+/// The facet of M whose plane separates the probe from the object, and since when.
 struct Separation {
   ContactFeature feature;
   double since = 0;
 };
 
-/// The motion up to where one facet of M no longer separates: the end, or the next separation.
+/// The motion until one facet of M no longer separates: the end, or the next separation.
 struct MotionStep {
-  Approach end;  ///< undecided: goes on with `next`
+  Approach end;  ///< undecided: continue with `next`
   Separation next;
 };
 
@@ -123,7 +123,8 @@ MotionStep over_facet(const stimuli::ConvexMesh& mesh, const Separation& at, con
   return continue_with({Kind::facet, false, side.across}, time);
 }
 
-/// When dot(normal, d) changes its sign from what it is over the edge; never, if it does not.
+/// The time at which dot(normal, d) changes its sign from the one at the edge; kNever if it does
+/// not.
 double turn_time(const Vec3& normal, bool ahead, const Motion& m) {
   const double before = glm::dot(normal, m.d), after = before + glm::dot(normal, m.d_motion);
   if ((after >= 0) == ahead) return kNever;
@@ -139,7 +140,7 @@ MotionStep over_edge(const stimuli::ConvexMesh& mesh, const Separation& at, cons
   const double turns = std::min(left_turns, right_turns);
   const double falls = time_of_fall_on_edge(mesh, index, left_ahead, m, at.since);
   if (turns < falls) {
-    // There the edge's plane has become that facet's.
+    // At that time the edge's plane has become that facet's.
     return continue_with({Kind::facet, false, left_turns < right_turns ? edge.left : edge.right},
                          std::max(turns, at.since));
   }
@@ -164,8 +165,8 @@ MotionStep over_edge(const stimuli::ConvexMesh& mesh, const Separation& at, cons
   return entered(at, time);
 }
 
-/// An entry, if the probe is on the feature at its time; undecided where rounding put it beside or
-/// below: edges nearly parallel to the probe.
+/// An entry, if the probe is on the feature at that time. Undecided if rounding put the probe
+/// beside or below it, as at edges nearly parallel to the probe.
 template <bool kSegment>
 Approach checked(const stimuli::ConvexMesh& mesh, const Approach& entry, const Motion& m) {
   const Vec3 tip = m.tip_at(entry.time), d = m.d_at(entry.time);

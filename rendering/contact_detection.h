@@ -16,7 +16,7 @@
 
 namespace palpate::rendering {
 
-// A probe outside of an object and near it, tracked through one tick of motion from feature to
+// Tracks a probe outside an object, near it, through one tick of motion from feature to
 // neighbouring feature: continuous collision detection without a search. Mesh frame, SI units.
 
 /// How a tick of motion near an object ended.
@@ -30,10 +30,10 @@ struct Approach {
 
 /// Tracks the probe while both ends move linearly from `before` to `after`: the facet of M whose
 /// plane separates it is kept until the probe crosses that plane; there it either enters through
-/// the facet, or is past a side, and the facet of M past that side separates from then on. The
-/// times of crossing only grow, and up to each the probe is proven to be outside: the entry found
-/// is the first one, for any speed. Undecided (rounding, or a long path round the object): ask
-/// first_contact.
+/// the facet, or it is past a side and the facet of M beyond that side separates from then on. The
+/// times of crossing only grow, and the probe is proven to be outside up to each. So the entry
+/// found is the first one, at any speed. Undecided (rounding, or a long path around the object):
+/// use first_contact.
 /// \param start  a feature whose plane separates the probe at `before`
 Approach approach_segment(const stimuli::ConvexMesh& mesh, ContactFeature start,
                           const LineProbe& before, const LineProbe& after);
@@ -46,8 +46,9 @@ Approach approach_point(const stimuli::ConvexMesh& mesh, ContactFeature start,
 
 namespace palpate::rendering::tick {
 
-/// A feature near the probe to track it from, outside of the object: the one of an earlier tick, or
-/// one under the point of the probe that is nearest to the middle. Kind none: none is known.
+/// A feature near a probe outside the object, from which to track it: that of an earlier tick, or
+/// one under the point of the probe that is nearest to the mesh's centre. Kind none: no feature is
+/// known.
 template <class Probe>
 ContactFeature nearby_feature(const ScenePart& part, ContactFeature known, const LineProbe& probe) {
   using Kind = ContactFeature::Kind;
@@ -63,7 +64,7 @@ ContactFeature nearby_feature(const ScenePart& part, ContactFeature known, const
              : under;
 }
 
-/// The probe has left the part: from now on the feature that it left by separates them.
+/// The probe has left the part: from now on the feature by which it left separates them.
 inline void record_separation(PartState& state, const WalkResult& left, const LineProbe& probe) {
   const double lower =
       std::min(glm::dot(left.normal, probe.tip), glm::dot(left.normal, probe.tail));
@@ -71,9 +72,9 @@ inline void record_separation(PartState& state, const WalkResult& left, const Li
   state.nearby = left.separating_feature;
 }
 
-/// For a walk that did not converge, where no separating plane was found: looks at all features.
-/// False when the probe touches the surface at most; else `hit` becomes the feature that holds it,
-/// of several the nearest to where the walk ended. Rare.
+/// Scans all features after a walk that did not converge, if no separating plane was found. False
+/// if the probe at most touches the surface. Otherwise `hit` becomes the feature that holds it; of
+/// several, the nearest to where the walk ended. Rare.
 template <class Probe>
 [[gnu::cold, gnu::noinline]] bool search_all_features(const ScenePart& part, const Vec3& tip,
                                                       const Vec3& d, WalkResult& hit) {
@@ -86,8 +87,8 @@ template <class Probe>
   return true;
 }
 
-/// Looks for a separating plane between the part and the probe, with no history; state.plane.valid
-/// says whether there is one.
+/// Searches for a separating plane between the part and the probe, without history; sets
+/// state.plane.valid.
 inline void search_separating_plane(const ScenePart& part, PartState& state,
                                     const LineProbe& probe) {
   const stimuli::ConvexMesh& mesh = *part.mesh;
@@ -97,15 +98,15 @@ inline void search_separating_plane(const ScenePart& part, PartState& state,
   state.nearby = {ContactFeature::Kind::facet, false, mesh.edges()[edge].left};
 }
 
-/// Over a large mesh, whose facets are not in the processor's caches: goes on to the facet of M
-/// under the probe, takes its plane for no longer separating some ticks before it is crossed, so
-/// that contact is looked for from then on, and asks for the memory that the next tick will need.
+/// Over a large mesh, whose facets are not in the processor's caches: follows the probe to the
+/// facet of M under it, treats its plane as no longer separating some ticks before the crossing, so
+/// that contact detection starts then, and prefetches the memory that the next tick will need.
 /// \param from  the probe at the last tick
 template <class Probe>
 [[gnu::noinline]] void watch_surface(const ScenePart& part, PartState& state, const LineProbe& from,
                                      const LineProbe& probe) {
   constexpr double kTicks = 4;
-  constexpr double kOfSize = 1.0 / 256;  // at least; for a hand that speeds up
+  constexpr double kOfSize = 1.0 / 256;  // at least; a hand may speed up
   const stimuli::ConvexMesh& mesh = *part.mesh;
   const ContactFeature near = nearby_feature<Probe>(part, state.nearby, probe);
   const WalkResult under = Probe::farthest_plane(mesh, near, probe.tip, probe.tail - probe.tip);
@@ -117,7 +118,7 @@ template <class Probe>
   prefetch_neighbours(mesh, state.nearby);
 }
 
-/// After a tick that ended with a separating plane.
+/// Prepares for contact after a tick that ended with a separating plane.
 template <class Probe>
 void expect_contact(const ScenePart& part, PartState& state, const LineProbe& from,
                     const LineProbe& probe) {
@@ -125,7 +126,7 @@ void expect_contact(const ScenePart& part, PartState& state, const LineProbe& fr
     watch_surface<Probe>(part, state, from, probe);
 }
 
-/// Contact of a part that was not in contact at the last tick, of kind none where there is none.
+/// Contact with a part that was not in contact at the last tick; kind none if there is none.
 /// \param before  the probe at the last tick, world frame; null at the first tick of all
 template <class Probe>
 WalkResult detect_contact(const ScenePart& part, PartState& state, const LineProbe* before,
@@ -181,8 +182,8 @@ WalkResult detect_contact(const ScenePart& part, PartState& state, const LinePro
       return {};
     }
     if (state.plane.valid) return {};
-    // Neither a plane nor a crossing: rounding hid the entry, so the least penetration depth
-    // decides. Rare.
+    // No plane and no crossing: rounding hid the entry, so the least penetration depth decides.
+    // Rare.
     hit = Probe::nearest_feature(mesh, probe.tip, d);
     if (hit.feature.kind == Kind::none || hit.depth <= part.tolerance) return {};
   }

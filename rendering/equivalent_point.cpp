@@ -11,9 +11,9 @@ namespace {
 
 using Kind = ContactFeature::Kind;
 
-constexpr int kMostFaces = 12;  // to each side; smaller ones move the point less than their length
+constexpr int kMostFaces = 12;  // to each side; each face moves the point by less than its length
 
-/// Angle of the segment to a face, of the blend angle, -1 to 1; 1: its first end dips.
+/// Angle of the segment to a face as a share of the blend angle, -1 to 1; 1: its first end dips.
 double turned(double slope, double length) {
   if (slope >= tick::kSinBlendAngle * length) return 1;
   if (slope <= -tick::kSinBlendAngle * length) return -1;
@@ -58,15 +58,15 @@ class Faces {
     return out;
   }
 
-  /// By how much `face` and those that follow, towards the end or the beginning, move the point
-  /// from `from`. Counts those within the blend angle.
+  /// By how much `face` and the following ones, towards the end or the beginning, move the point
+  /// from `from`. Counts in `along` the faces within the blend angle.
   /// \param on  the point at `from`, on the surface, world frame
   double way(Face face, double from, const Vec3& on, bool towards_end, int& along) const {
     Face last = face;
     double moved = 0;
     for (int i = 0; i < kMostFaces; ++i) {
-      // A convex surface falls away: once a face is past the blend angle, so are all beyond. But
-      // where it was cut, behind a wall at any angle, another part goes on.
+      // A convex surface falls away: once a face is past the blend angle, so are all beyond it. But
+      // where the solid was cut, another part may continue behind the cut's wall.
       double angle = turned_to(face);
       Crossed at = crossed(face, towards_end);
       const bool past_angle = towards_end ? angle >= 1 : angle <= -1;
@@ -106,7 +106,7 @@ class Faces {
     return parts_[face.part].part->mesh->facets()[face.facet];
   }
 
-  /// What of the segment is over a face, and the face that follows.
+  /// The portion of the segment over a face, and the next face.
   struct Crossed {
     tick::Portion portion;
     Face next;
@@ -116,7 +116,7 @@ class Faces {
     return {portion(face), beyond(face, towards_end)};
   }
 
-  /// As tick::touching_portion has it: it reads facets alone.
+  /// As tick::touching_portion; reads facets only.
   Crossed crossed_triangle(const Face& face, bool towards_end) const {
     const FacedPart& at = parts_[face.part];
     const stimuli::Facet& facet = facet_of(face);
@@ -155,7 +155,7 @@ class Faces {
     return true;
   }
 
-  /// Whether a face of another part goes on where one ends; then `face` is that one.
+  /// Whether a face of another part continues where one ends; if so, sets `face` to it.
   bool continues(Face& face, double from, const Vec3& on, bool towards_end) const {
     const std::size_t own = face.part;
     for (std::size_t k = 0; k < parts_.size(); ++k) {
@@ -167,7 +167,7 @@ class Faces {
       if (glm::dot(from_middle, from_middle) > farthest * farthest) continue;
       const auto takes = [&](std::uint32_t facet) {
         const Face other{k, facet};
-        // Inner walls, where parts abut, stand across.
+        // Skip inner walls, where parts abut: they stand across the segment.
         if (std::abs(turned_to(other)) >= 1 || !is_on(mesh, facet, point)) return false;
         const tick::Portion at = portion(other);
         const double gap = tolerance_ / length_;
@@ -187,7 +187,7 @@ class Faces {
     return false;
   }
 
-  /// The same on a large mesh, among the facets round the one under the point.
+  /// The same on a large mesh, among the facets around the one under the point.
   template <class Takes>
   static bool takes_near(const stimuli::ConvexMesh& mesh, ContactFeature start, const Vec3& point,
                          const Takes& takes) {

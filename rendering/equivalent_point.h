@@ -11,35 +11,35 @@
 
 namespace palpate::rendering {
 
-/// A part as a segment in contact has it. Mesh frame, m.
+/// A part and a segment in contact with it. Mesh frame, m.
 struct FacedPart {
   const ScenePart* part = nullptr;
-  ContactFeature feature;  ///< any near the segment; none is slower
+  ContactFeature feature;  ///< any near the segment; kind none is slower
   Vec3 ideal, d;           ///< the ideal segment from ideal to ideal + d
 };
 
-/// More parts than these have no say.
+/// Further parts are ignored.
 inline constexpr std::size_t kMostFacedParts = 32;
 
 /// Places the contact of a segment on the faces that it lies along. For each face the point of (2)
 /// moves from the beginning of its touching portion to the end while the segment turns through the
-/// face's plane; the ways of all faces add up, from the place that no face changes. One face gives
-/// (2), coplanar ones give (2) over all of them, and nothing jumps from face to face.
+/// face's plane; the shifts of all faces add up, from the point where no face has moved it. One
+/// face gives (2), coplanar faces give (2) over their union, and the point never jumps from face to
+/// face.
 /// \param parts      of the same object; the first carries the contact
 /// \param hit        the contact's feature, measured
 /// \param tolerance  m, between faces that abut
-/// \param c          as (2) over one face has it; changed where two or more are within the blend
+/// \param c          as by (2) over one face; changed if two or more faces are within the blend
 ///                   angle
 void spread_over_faces(std::span<const FacedPart> parts, const WalkResult& hit, double tolerance,
                        LoadedContact& c);
 
-/// Equation (2) where a segment lies along the border of a face, within rounding: the face's
-/// portion of it may be empty then, and the contact at an end of the segment that is far from the
-/// face.
+/// Equation (2) where a segment lies along the border of a face, within rounding. The portion over
+/// the face may then be empty, and the contact would be at an end of the segment far from the face.
 /// \param hit    the contact's feature, measured
 /// \param tip    of the ideal segment, from tip to tip + d, of that length
-/// \param slack  m, by which the face's polygon is larger
-/// \param c      changed where the segment is within the blend angle of the face
+/// \param slack  m, by which the face's polygon is enlarged
+/// \param c      changed if the segment is within the blend angle of the face
 void place_along_border(const stimuli::ConvexMesh& mesh, const WalkResult& hit, const Vec3& tip,
                         const Vec3& d, double length, double slack, LoadedContact& c);
 

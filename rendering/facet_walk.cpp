@@ -16,7 +16,7 @@ using namespace minkowski;
 
 constexpr double kParallelSine = 1e-14;  // of the angle between probe and facet
 constexpr double kOffTolerance = 1e-11;  // of the size; an ideal probe farther off is off the facet
-constexpr std::size_t kFewSteps = 8;     // up to so many need not be compared with the mesh
+constexpr std::size_t kFewSteps = 8;     // up to this many are not compared with the mesh
 constexpr double kDepthRounding = 1e-15;  // of the size; a smaller gain is rounding, not a step
 
 /// From a facet over one of its sides: to the edge where it is a silhouette edge, else to the next
@@ -58,7 +58,7 @@ template <bool kSegment>
       return true;
     }
     if (measure_edge(mesh, other.edge, other.left_ahead, tip, d, next)) return true;
-    // Parallel to the probe: its two facets meet there with the same depth.
+    // The edge is parallel to the probe: both of its facets have the same depth there.
     next = measure_facet<true>(mesh, mesh.edges()[other.edge].left, tip, d);
     return true;
   }
@@ -87,7 +87,7 @@ template <bool kSegment>
   return measure_facet<kSegment>(mesh, start.index, tip, d);
 }
 
-// gcc takes a function that only prefetches for one that does nothing: it must be inlined.
+// gcc drops calls of a function that only prefetches: it must be inlined.
 template <bool kEdges>
 [[gnu::always_inline]] inline void prefetch_beyond(const stimuli::ConvexMesh& mesh,
                                                    std::uint32_t facet) {
@@ -111,7 +111,7 @@ template <bool kEdges>
           .capped = capped};
 }
 
-// Rare. Takes a copy: what has been passed by reference stays in memory for the whole walk.
+// Rare. Takes a copy: a value passed by reference stays in memory for the whole walk.
 template <bool kSegment>
 [[gnu::cold, gnu::noinline]] bool is_off(const stimuli::ConvexMesh& mesh, Measured at,
                                          const Vec3& tip, const Vec3& d) {
@@ -123,7 +123,7 @@ bool parallel_to_facet(double slope, const Vec3& d) {
   return slope * slope <= kParallelSine * kParallelSine * glm::dot(d, d);
 }
 
-/// \tparam kOutside  goes on where a plane separates, while the next one is farther from the probe
+/// \tparam kOutside  continue past a separating plane while the next one is farther from the probe
 template <bool kSegment, bool kOutside = false>
 [[gnu::always_inline]] inline WalkResult walk(const stimuli::ConvexMesh& mesh, ContactFeature start,
                                               const Vec3& tip, const Vec3& d) {

@@ -22,8 +22,8 @@
 
 namespace palpate::rendering {
 
-/// A facet of M, by the feature of the object that it comes from. One word: it is copied at every
-/// step, and a word that was written in parts is slow to read back.
+/// A facet of M, by the feature of the object that it comes from. Packed into one word, because
+/// every step copies it: memory that was written in parts is slow to read back.
 struct ContactFeature {
   enum class Kind : std::uint32_t {
     none,   ///< no contact
@@ -69,16 +69,16 @@ WalkResult walk_segment(const stimuli::ConvexMesh& mesh, ContactFeature start, c
 /// The same walk with the probe shrunk to its tip: facets of the object only.
 WalkResult walk_point(const stimuli::ConvexMesh& mesh, ContactFeature start, const Vec3& tip);
 
-/// From a facet of M whose plane separates the probe over neighbours to one whose plane is farther
-/// from it than theirs: it is under the probe, and the next contact is near.
+/// Walks from a facet of M whose plane separates the probe to one whose plane is farther from the
+/// probe than those of its neighbours. That facet is under the probe; the next contact is near it.
 WalkResult farthest_plane_segment(const stimuli::ConvexMesh& mesh, ContactFeature start,
                                   const Vec3& tip, const Vec3& d);
 WalkResult farthest_plane_point(const stimuli::ConvexMesh& mesh, ContactFeature start,
                                 const Vec3& tip);
 
-/// Prefetches the memory two steps from a feature that the walk has come to; changes nothing. What
-/// is one step away was prefetched one feature before. Neighbours of triangles only: other facets
-/// are few.
+/// Prefetches the memory two steps away from a feature that a walk has reached; changes nothing.
+/// The memory one step away was prefetched at the previous feature. Neighbours of triangles only:
+/// other facets are few.
 void prefetch_neighbours(const stimuli::ConvexMesh& mesh, ContactFeature at);
 
 /// The penetration depth: the least over all facets of M, where there is no history to walk from.
@@ -86,16 +86,16 @@ void prefetch_neighbours(const stimuli::ConvexMesh& mesh, ContactFeature at);
 WalkResult nearest_feature_segment(const stimuli::ConvexMesh& mesh, const Vec3& tip, const Vec3& d);
 WalkResult nearest_feature_point(const stimuli::ConvexMesh& mesh, const Vec3& tip);
 
-/// Of the facets of M that the ideal probe can lie on, the one whose ideal probe is nearest to the
-/// virtual probe moved by `shift`; kind none: there is none. For walks that did not converge. Costs
-/// O(facets + edges).
+/// Among the facets of M that the ideal probe can lie on, finds the one whose ideal probe is
+/// nearest to the virtual probe moved by `shift`. Kind none: there is no such facet. For walks that
+/// did not converge. Costs O(facets + edges).
 WalkResult holding_feature_segment(const stimuli::ConvexMesh& mesh, const Vec3& tip, const Vec3& d,
                                    const Vec3& shift);
 WalkResult holding_feature_point(const stimuli::ConvexMesh& mesh, const Vec3& tip,
                                  const Vec3& shift);
 
-/// Depth below the plane of the feature of the last tick, wherever on it the probe is now: a walk
-/// of no steps.
+/// Depth below the plane of the last tick's feature, wherever the probe is now: a walk without
+/// steps.
 WalkResult same_feature_segment(const stimuli::ConvexMesh& mesh, ContactFeature start,
                                 const Vec3& tip, const Vec3& d);
 WalkResult same_feature_point(const stimuli::ConvexMesh& mesh, ContactFeature start,
@@ -128,8 +128,8 @@ inline bool outside(const stimuli::Side& side, const Vec3& p) {
   return glm::dot(side.inward, p) < side.offset;
 }
 
-/// What p, a point of the plane of a polygon with many sides, lies over: bisection over the fan of
-/// triangles at corner 0, so that a cap of a thousand sides costs ten comparisons.
+/// As beyond_side, for a polygon with many sides: bisection over the fan of triangles at corner 0,
+/// so a cap of a thousand sides costs ten comparisons.
 inline stimuli::Neighbour beyond_many(const stimuli::ConvexMesh& mesh, std::uint32_t index,
                                       const Vec3& p) {
   const stimuli::Facet& facet = mesh.facets()[index];
@@ -151,9 +151,9 @@ inline stimuli::Neighbour beyond_many(const stimuli::ConvexMesh& mesh, std::uint
   return outside(sides[low], p) ? beyond(low) : stimuli::Neighbour{kNone, kNone};
 }
 
-/// The same for a triangle. Past a side is above the plane of the facet there, which a step reads
-/// next anyway. One branch: whether p is past any side can be guessed on a coarse mesh, past which
-/// one on none.
+/// The same for a triangle. A point past a side is above the plane of the facet beyond it, which
+/// the next step reads anyway. One branch: on a coarse mesh the processor can predict whether p is
+/// past any side; on no mesh can it predict which.
 inline stimuli::Neighbour beyond_triangle(const stimuli::ConvexMesh& mesh,
                                           const stimuli::Facet& facet, const Vec3& p) {
   std::array<double, 3> height;
@@ -168,8 +168,8 @@ inline stimuli::Neighbour beyond_triangle(const stimuli::ConvexMesh& mesh,
   return facet.triangle[2 * third + (second & ~third)];
 }
 
-/// What p, a point of the facet's plane, lies over when it is past a side; edge kNone when it is
-/// inside.
+/// The neighbour beyond the side that p, a point of the facet's plane, is past; edge kNone when p
+/// is inside.
 inline stimuli::Neighbour beyond_side(const stimuli::ConvexMesh& mesh, std::uint32_t index,
                                       const Vec3& p) {
   const stimuli::Facet& facet = mesh.facets()[index];
@@ -239,7 +239,7 @@ inline Slopes slopes_at(const stimuli::ConvexMesh& mesh, const stimuli::Edge& ed
                         std::abs(slopes.left) * mesh.facets()[edge.right].normal);
 }
 
-/// False where the edge and the probe are parallel: then it is no contact edge.
+/// False where the edge and the probe are parallel: then it is not a contact edge.
 inline bool measure_edge(const stimuli::ConvexMesh& mesh, std::uint32_t index, bool left_ahead,
                          const Vec3& tip, const Vec3& d, Measured& m) {
   const stimuli::Edge& edge = mesh.edges()[index];
@@ -263,7 +263,7 @@ inline bool measure_edge(const stimuli::ConvexMesh& mesh, std::uint32_t index, b
   m.depth = -glm::dot(m.normal, w);
   // w + depth n + s d = u e, with s and u the fractions, crossed with e and with d
   const double s = glm::dot(glm::cross(w, e), c), u = glm::dot(glm::cross(w, d), c);
-  // Compared before they are divided: whether to step need not wait for a division.
+  // Compare before dividing: the decision to step need not wait for a division.
   m.within = (s >= 0) & (s <= c2) & (u >= 0) & (u <= c2);
   m.probe_fraction = s * inverse;
   m.edge_fraction = u * inverse;
@@ -276,10 +276,10 @@ struct SilhouetteEdge {
   bool left_ahead = false;
 };
 
-/// The other silhouette edge at one end of `from`, which is one: around a vertex the sign of
+/// The other silhouette edge at one end of the silhouette edge `from`: around a vertex the sign of
 /// dot(normal, d) changes exactly twice. Turns about the vertex counter-clockwise, from facet to
-/// facet, until it does. Edge kNone when rounding hides the second one, or where not all facets are
-/// triangles.
+/// facet, until the sign changes. Edge kNone when rounding hides the second one, or where not all
+/// facets are triangles.
 inline SilhouetteEdge turn_about(const stimuli::ConvexMesh& mesh, std::uint32_t from, bool about_v1,
                                  bool left_ahead, const Vec3& d) {
   // Out of the facet on the left the next side starts at v1, out of the one on the right at v0.
@@ -304,7 +304,7 @@ inline SilhouetteEdge turn_about(const stimuli::ConvexMesh& mesh, std::uint32_t 
   return {};
 }
 
-/// The same by looking through the vertex' fan.
+/// The same by a search through the vertex's fan.
 inline SilhouetteEdge search_fan(const stimuli::ConvexMesh& mesh, std::uint32_t from, bool about_v1,
                                  const Vec3& d) {
   const std::uint32_t vertex = about_v1 ? mesh.edges()[from].v1 : mesh.edges()[from].v0;
@@ -337,7 +337,7 @@ double distance_off_facet(const stimuli::ConvexMesh& mesh, const Measured& at, c
   const stimuli::Facet& facet = mesh.facets()[at.index];
   const bool tail = kSegment && at.probe_fraction > 0;
   const Vec3 end = (tail ? tip + d : tip) + at.depth * at.normal;
-  // Inside of a triangle is below the planes beyond its sides, which walks have read already.
+  // A point inside a triangle is below the planes beyond its sides, which walks have read already.
   if (facet.side_count == 3 && beyond_triangle(mesh, facet, end).edge == kNone) return 0;
   const Vec3 along = tail ? -d : d;
   double past = 0, enter = 0, leave = 1;
@@ -366,8 +366,8 @@ inline double distance_off_edge(const stimuli::ConvexMesh& mesh, const Measured&
                   distance_to(v0 + std::clamp(at.edge_fraction, 0.0, 1.0) * e, ideal, d));
 }
 
-/// m, from the ideal probe to the feature that it should touch: above rounding it is off the
-/// facet of M.
+/// m, from the ideal probe to the feature that it should touch. Above rounding, the probe is off
+/// the facet of M.
 template <bool kSegment>
 [[gnu::cold, gnu::noinline]] double distance_off(const stimuli::ConvexMesh& mesh,
                                                  const Measured& at, const Vec3& tip,

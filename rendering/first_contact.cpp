@@ -10,7 +10,7 @@
 namespace palpate::rendering {
 namespace {
 constexpr std::uint32_t kLeaf =
-    4;  // primitives; smaller leaves cost more nodes than they save tests
+    4;  // primitives; smaller leaves add more nodes than they save tests
 }
 
 BoundingTree::BoundingTree(std::span<const Box> boxes) : order_(boxes.size()) {
@@ -49,8 +49,8 @@ void BoundingTree::build(std::span<const Box> boxes, std::uint32_t begin, std::u
 namespace {
 
 // Ho, Basdogan & Srinivasan 2000, 4(a), appendix 7 and 8. Departs: appendix 8 holds for small
-// motions only; here the time of crossing is the root of a quadratic, so a fast hand is caught as
-// well.
+// motions only; here the time of crossing is the root of a quadratic, so fast motions are caught,
+// too.
 
 using Kind = ContactFeature::Kind;
 
@@ -72,8 +72,8 @@ bool segment_meets_box(const Vec3& a, const Vec3& d, const Vec3& low, const Vec3
   return true;
 }
 
-/// Calls visit(primitive) for all primitives whose box the segment a .. a + d can meet while it is
-/// translated by anything between `low_shift` and `high_shift`.
+/// Calls visit(primitive) for all primitives whose box the segment a .. a + d can meet under a
+/// translation between `low_shift` and `high_shift`.
 template <class Visit>
 void visit_near(const BoundingTree* tree, std::size_t primitives, const Vec3& a, const Vec3& d,
                 const Vec3& low_shift, const Vec3& high_shift, Visit visit) {
@@ -125,7 +125,7 @@ void meet_edge(const stimuli::ConvexMesh& mesh, std::uint32_t index, const Movin
   const Vec3& v0 = edge.from;
   const Vec3 e = edge.to - v0;
   const Vec3 w = probe.tip - v0;
-  // (w(t) x d(t)) . e = 0: probe and edge in one plane
+  // (w(t) x d(t)) . e = 0: probe and edge are in one plane
   const double c0 = glm::dot(glm::cross(w, probe.d), e);
   const double c1 =
       glm::dot(glm::cross(probe.tip_motion, probe.d) + glm::cross(w, probe.d_motion), e);
@@ -171,8 +171,8 @@ void meet_polygons(const stimuli::ConvexMesh& mesh, const ContactTrees& trees, c
              [&](std::uint32_t i) { meet_polygon(mesh, i, a, b, tolerance, first); });
 }
 
-/// Whether two faces meet at less than twice the blend angle (kBlendAngle), each of them large:
-/// over smaller ones the equivalent point of (2) moves too little to be felt to jump.
+/// Whether two large faces meet at less than twice the blend angle (kBlendAngle). Over small faces
+/// a jump of the equivalent point of (2) is too short to be felt.
 bool has_shallow_ridges(const stimuli::ConvexMesh& mesh) {
   constexpr double kCosine = 0.99939082701909573;  // of 2 degrees
   constexpr double kLarge = 1.0 / 16;              // of the size

@@ -48,14 +48,15 @@ class BoundingTree {
 };
 
 /// The bounding-volume hierarchies of one mesh: of polygons and of edges, as in section 4(a) of the
-/// paper. A mesh that is small enough to scan has none, and the point renderer needs no edges.
+/// paper. A mesh that is small enough to scan has no trees, and the point renderer needs no tree of
+/// edges.
 class ContactTrees {
  public:
-  /// Facets or edges; up to so many are scanned faster than any tree is descended.
+  /// Facets or edges; a scan of up to so many is faster than any tree.
   static constexpr std::size_t kScanLimit = 64;
 
   /// \param scan_limit  for measurements: up to so many facets or edges get no tree
-  /// \param small_mesh  the same: a mesh of up to so many vertices gets no maps
+  /// \param small_mesh  for measurements: a mesh of up to so many vertices gets no maps
   ContactTrees(const stimuli::ConvexMesh& mesh, bool with_edges,
                std::size_t scan_limit = kScanLimit,
                std::size_t small_mesh = SupportMap::kSmallMesh);
@@ -76,14 +77,15 @@ class ContactTrees {
 
 /// Where and when the probe entered.
 struct FirstContact {
-  ContactFeature feature;  ///< kind none: it did not
+  ContactFeature feature;  ///< kind none: it did not enter
   double time = 2;         ///< time of impact, as a fraction of the tick: 0 to 1
 };
 
 /// The earliest entry while both ends move linearly from `before` to `after`. Exact for any length
 /// of motion and any rotation within the tick: an end point meets a facet's plane at the root of a
 /// linear equation, the segment meets an edge at a root of a quadratic one.
-/// \param tolerance  m; so far past the end of an edge or the side of a polygon counts as on it
+/// \param tolerance  m; a point this far past the end of an edge or the side of a polygon counts as
+/// on it
 FirstContact first_contact_segment(const stimuli::ConvexMesh& mesh, const ContactTrees& trees,
                                    const LineProbe& before, const LineProbe& after,
                                    double tolerance);

@@ -16,8 +16,8 @@ using Kind = ContactFeature::Kind;
 
 }  // namespace
 
-/// Equation (2) over all faces that the segment lies along, of the part that carries it and of
-/// those that abut.
+/// Applies equation (2) over all faces that the segment lies along: those of the part that carries
+/// it and those of abutting parts.
 /// \param tip  of the ideal segment, frame of the part that carries it
 void IdealTool::spread_over_parts(const NearPair& carrying, const WalkResult& hit, const Vec3& tip,
                                   LoadedContact& c) {
@@ -99,12 +99,12 @@ void IdealTool::add_contacts() {
   }
 }
 
-/// What separates the pairs that do not hold the tool.
+/// Remembers the planes that separate the pairs that do not hold the tool.
 void IdealTool::remember_planes() {
   for (const NearPair& near : pairs_.all()) {
     PairState& state = pairs_.state_of(near);
     state.carries = near.carries;
-    // What the next tick may step to is on its way here by then.
+    // Prefetch the facets that the next tick may step to.
     if (!(state.feature == near.came_with) && pairs_.part_of(near).trees->facet_map() != nullptr)
       prefetch_neighbours(*pairs_.part_of(near).mesh, state.feature);
     if (near.carries) state.plane.valid = false;
@@ -118,7 +118,7 @@ void IdealTool::remember_planes() {
   }
 }
 
-/// The mean contact place, about which the tool turns at the next tick.
+/// Remembers the mean contact place, about which the tool turns at the next tick.
 void IdealTool::remember_grasp(std::size_t first_contact) {
   Vec3 grasp(0);
   double weight = 0;
@@ -133,10 +133,10 @@ void IdealTool::remember_grasp(std::size_t first_contact) {
   if (weight > 0) memory_.grasp = grasp / weight;
 }
 
-/// What the next tick needs.
+/// Remembers the state that the next tick needs.
 void IdealTool::remember(std::size_t first_contact) {
   remember_planes();
-  // Mostly it has taken the whole turn.
+  // Usually the ideal tool has taken the whole turn.
   const bool behind = pose_.d != tick_.tool.d || pose_.frame != tick_.tool.frame;
   const double angle = behind ? angle_between(carried_, pose_, tick_.tool) : 0;
   memory_.touching = !planes_.empty() || stuck_ || angle > 0 || at_ != Vec3(0);
@@ -158,18 +158,18 @@ namespace {
 using Kind = ContactFeature::Kind;
 
 constexpr int kRounds = 96;          // of casts in one tick; then the ideal tool stays where it is
-constexpr double kSlidOff = 4;       // skins; a contact farther off its facet has left it,
-constexpr double kOnFacet = 1e-11;   // or farther than this of the size, where the skin is thin
+constexpr double kSlidOff = 4;       // skins; a contact farther off its facet has left it
+constexpr double kOnFacet = 1e-11;   // of the size, added to that for thin skins
 constexpr double kAtRest = 2e-12;    // of the size: the same without the skin
 constexpr double kExact = 1e-5;      // of the skin; smaller distances are rounding
-constexpr double kRounding = 0.125;  // of the skin; so much less of it is a skin
-constexpr double kLessSkin = 0.25;   // of the skin, in a gap where two do not fit, and so on
-constexpr double kInTheWay = 0.25;   // of rounding; what a tool at rest is deeper in holds it
+constexpr double kRounding = 0.125;  // of the skin; tolerance in keeping it
+constexpr double kLessSkin = 0.25;   // factor on the skin where two do not fit, repeated
+constexpr double kInTheWay = 0.25;   // of a part's tolerance; a deeper tool at rest is held
 constexpr double kSamePlace = 8;     // skins; within it a contact that comes back never left
 
 }  // namespace
 
-/// Takes up the planes that held the tool at the last tick, where it is still beyond them.
+/// Resumes the planes that held the tool at the last tick if it is still beyond them.
 void IdealTool::resume_planes() {
   planes_.remove_if([](const Plane& plane) { return plane.multiplier <= 0; });
   for (NearPair& near : pairs_.all()) near.carries = false;
@@ -190,7 +190,7 @@ bool IdealTool::next_hit(const Vec3& goal, std::uint32_t& hit, PairCast& first) 
   const Vec3 way = goal - at_;
   for (std::uint32_t i = 0; i < pairs_.size(); ++i) {
     NearPair& near = pairs_[i];
-    if (near.carries) continue;  // convex, and behind a plane that the way stays beyond
+    if (near.carries) continue;  // convex, and behind a plane that the way does not cross
     if (apart(near, at_, goal) ||
         pairs_.part_by_sphere(near, pairs_.posed(near, at_), pairs_.posed(near, goal)))
       continue;
@@ -206,7 +206,7 @@ bool IdealTool::next_hit(const Vec3& goal, std::uint32_t& hit, PairCast& first) 
   return first.time <= 1;
 }
 
-/// Whether the tool, on its way and a skin away, is past the facet.
+/// Whether the tool, moving and a skin away, is past the facet.
 bool IdealTool::slid_off(const Plane& plane) const {
   const NearPair& near = pairs_[plane.near];
   const stimuli::ConvexMesh& mesh = *pairs_.part_of(near).mesh;
@@ -214,8 +214,8 @@ bool IdealTool::slid_off(const Plane& plane) const {
   return distance_off(mesh, plane.feature, pairs_.local(near, at_), near.d) > slack;
 }
 
-/// The same where it rests, without the skin.
-/// \param slack  of the size; all else is rounding
+/// The same for the tool at rest, without the skin.
+/// \param slack  of the size; smaller distances are rounding
 bool IdealTool::slid_off_at_rest(const Plane& plane, double slack) const {
   const NearPair& near = pairs_[plane.near];
   const ScenePart& part = pairs_.part_of(near);
@@ -224,8 +224,9 @@ bool IdealTool::slid_off_at_rest(const Plane& plane, double slack) const {
   return distance_off(*part.mesh, plane.feature, tip, near.true_d) > slack;
 }
 
-/// Goes on to the plane of the next facet of M where the tool, a skin away, is over that facet.
-/// Then the way to wherever that plane holds it is free: it stays beyond the plane.
+/// Replaces the plane by that of the next facet of M if the tool, a skin away, is over that facet.
+/// The way to the place where the new plane holds the tool is then free: it does not cross the
+/// plane.
 bool IdealTool::slide_on(Plane& plane) {
   const NearPair& near = pairs_[plane.near];
   const ContactFeature next =
@@ -239,7 +240,7 @@ bool IdealTool::slide_on(Plane& plane) {
   return true;
 }
 
-/// Whether the pair let go of the ideal tool where that is now, within rounding.
+/// Whether the pair let go of the ideal tool at its present place, within rounding.
 bool IdealTool::parted_here(const NearPair& near) const {
   const double same = kSamePlace * group_.skin;
   const Vec3 apart = at_ - near.parted_at;
@@ -255,7 +256,7 @@ void IdealTool::let_go_of_idle_planes() {
   });
 }
 
-/// Lets go of planes whose facet the tool has slid off. True when there are some.
+/// Lets go of planes whose facet the tool has slid off. True if there are any.
 bool IdealTool::let_go_of_slid_planes(bool at_rest) {
   bool slid = false;
   planes_.remove_if([&](Plane& plane) {
@@ -272,14 +273,15 @@ bool IdealTool::let_go_of_slid_planes(bool at_rest) {
   return slid;
 }
 
-/// Where the tool rests without the skin; sets the multipliers. False where rounding hides it.
+/// Finds where the tool rests without the skin; sets the multipliers. False if rounding hides it.
 bool IdealTool::find_exact_place() {
   return planes_.nearest(Vec3(0), 0, kExact * group_.skin, exact_) ||
          planes_.nearest(Vec3(0), 0, kRounding * group_.skin, exact_);
 }
 
-/// Whether planes hold the tool, a skin away, on facets of which it is past one without the skin:
-/// those of a groove may end between the two, and leave a gap that is too narrow for the skin.
+/// Whether the tool, without the skin, is past one of the facets that hold it a skin away. The
+/// facets of a groove may end between the two places and leave a gap that is too narrow for the
+/// skin.
 bool IdealTool::past_a_facet_at_rest() const {
   const std::span<const Plane> all = planes_.all();
   const auto past = [&](const Plane& plane) {
@@ -289,8 +291,8 @@ bool IdealTool::past_a_facet_at_rest() const {
   return std::any_of(all.begin(), all.end(), past) && std::none_of(all.begin(), all.end(), off);
 }
 
-/// Whether the tool, without the skin that keeps it off what holds it, is in another part, which it
-/// was less than the skin away from; then the plane that keeps it out.
+/// Whether the tool, without the skin, is inside another part that it was less than a skin away
+/// from. If so, sets the plane that keeps it out.
 bool IdealTool::in_the_way_at_rest(Plane& plane) {
   for (std::uint32_t i = 0; i < pairs_.size(); ++i) {
     const NearPair& near = pairs_[i];
@@ -311,7 +313,7 @@ bool IdealTool::in_the_way_at_rest(Plane& plane) {
   return false;
 }
 
-/// Puts the plane of a pair that has none in use.
+/// Puts a plane in use; its pair has no other in use.
 void IdealTool::take_plane(const Plane& plane) {
   if (planes_.full()) let_go_of_idle_planes();
   stuck_ = planes_.full();
@@ -324,7 +326,7 @@ void IdealTool::take_plane(const Plane& plane) {
 
 void IdealTool::move_to_hit(const Vec3& goal, std::uint32_t index, const PairCast& hit) {
   Plane plane = plane_of(index, hit.feature);
-  // It stops a skin before the plane.
+  // Stop a skin before the plane.
   const Vec3 way = goal - at_;
   const double rate = glm::dot(plane.normal, way);
   const double height = glm::dot(plane.normal, at_) - plane.depth;
@@ -338,8 +340,9 @@ void IdealTool::move_to_hit(const Vec3& goal, std::uint32_t index, const PairCas
   take_plane(plane);
 }
 
-/// The point nearest to the virtual tool a skin off the planes. In a gap narrower than two skins
-/// the tool keeps a share of the skin, or else what it has. False where rounding hides it.
+/// Finds the point nearest to the virtual tool, a skin off the planes. In a gap narrower than two
+/// skins the tool keeps a share of the skin, or else its present distances. False if rounding hides
+/// the point.
 bool IdealTool::find_goal(Vec3& goal) {
   const double skin = group_.skin;
   in_crack_ = false;
@@ -351,7 +354,7 @@ bool IdealTool::find_goal(Vec3& goal) {
   return planes_.nearest_from(at_, skin, kRounding * skin, kExact * skin, goal);
 }
 
-/// Moves the ideal tool as near to the virtual one as the parts let it.
+/// Moves the ideal tool as near to the virtual one as the parts allow.
 void IdealTool::translate() {
   for (int round = 0; round < kRounds && !stuck_; ++round) {
     Vec3 goal;
@@ -378,13 +381,13 @@ namespace {
 
 using Kind = ContactFeature::Kind;
 
-constexpr int kPushRounds = 12;          // to get out of what a turn brought the tool into
-constexpr double kLeastTurn = 1.0 / 16;  // of a turn that fails; then it waits for the next tick
-constexpr double kFarPush = 8;           // times the turn's own motion; farther is no way out
+constexpr int kPushRounds = 12;          // to leave parts that a turn brought the tool into
+constexpr double kLeastTurn = 1.0 / 16;  // of a turn; less waits for the next tick
+constexpr double kFarPush = 8;           // times the turn's own motion; a longer push fails
 
 }  // namespace
 
-/// Puts the plane of a pair in use, in place of the one it had. False where there is no room.
+/// Puts the plane of a pair in use and replaces the pair's previous one. False if there is no room.
 bool IdealTool::put_plane(std::uint32_t index, ContactFeature feature) {
   const Plane plane = plane_of(index, feature);
   pairs_.state_of(pairs_[index]).feature = plane.feature;
@@ -400,8 +403,9 @@ bool IdealTool::put_plane(std::uint32_t index, ContactFeature feature) {
 }
 
 /// Turns the ideal tool as the virtual one has turned, about where it touches, as far as the parts
-/// let it.
-/// \param most  of the turn \return what it took of it, 0 to 1
+/// allow.
+/// \param most  share of the turn to try
+/// \return the share taken, 0 to 1
 double IdealTool::turn(const ToolPose& from, double most) {
   PlacedTool& before = all_.before;
   pairs_.place(from, before);
@@ -440,7 +444,7 @@ double IdealTool::turn(const ToolPose& from, double most) {
   return 0;
 }
 
-/// Whether a turned tool, oriented, gets out of all parts near where it is; then it is there.
+/// Moves a turned, oriented tool out of all parts near it. False if it finds no such place.
 bool IdealTool::settle(const ToolPose& from, const PlacedTool& placed_from, const ToolPose& to,
                        double most_push) {
   planes_.clear();
@@ -469,7 +473,7 @@ bool IdealTool::settle(const ToolPose& from, const PlacedTool& placed_from, cons
   return planes_.empty() || push_out(at_, most_push);
 }
 
-/// Moves the tool out of the parts whose planes are in use, and of those that it comes into then.
+/// Moves the tool out of the parts whose planes are in use and of those that it enters on the way.
 bool IdealTool::push_out(const Vec3& from, double most_push) {
   for (int round = 0; round < kPushRounds; ++round) {
     if (!planes_.nearest(from, group_.skin, group_.skin / 8, at_)) return false;

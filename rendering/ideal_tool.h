@@ -11,7 +11,7 @@
 
 namespace palpate::rendering {
 
-/// Faces nearer to each other than so many skins abut.
+/// Faces abut if they are closer to each other than this many skins.
 inline constexpr double kAbutting = 4;
 
 /// The ideal tool of one group, in one tick. Translations are relative to the virtual tool's tip.
@@ -29,7 +29,7 @@ class IdealTool {
   void follow();
 
  private:
-  /// Of a point fixed to the tool, from the tip; `grasp` as in GroupState.
+  /// m, from the tip to a point fixed to the tool; `grasp` as in GroupState.
   Vec3 turned(const Vec3& grasp, const ToolPose& pose) const {
     return carried_ != nullptr ? pose.frame * grasp : grasp.z * pose.d;
   }
@@ -79,11 +79,11 @@ class IdealTool {
   NearPairs pairs_;
   const Tool* carried_;
   ToolPose pose_;  ///< its orientation; the tip is the virtual one plus at_
-  Vec3 at_;        ///< m, from the virtual tip to the ideal one, a skin off what it rests on
+  Vec3 at_;        ///< m, from the virtual tip to the ideal one, a skin off its contacts
   Vec3 exact_;     ///< m, the same without the skin, once it rests
   Planes planes_;
   bool stuck_ = false;
-  bool in_crack_ = false;  ///< opposite planes leave it less than a skin
+  bool in_crack_ = false;  ///< opposite planes leave the tool less than a skin
 };
 
 }  // namespace palpate::rendering

@@ -21,14 +21,14 @@ using namespace minkowski;
 constexpr double kPoint = 1e-12;  // of the size; a shorter segment is a point
 constexpr double kOnBorder =
     1e-11;                        // of the size; a segment that is no farther off is on the facet
-constexpr int kStalledSteps = 8;  // without a later time: rounding; every facet is looked at
+constexpr int kStalledSteps = 8;  // without a later time: rounding; scan all facets
 
 bool is_point(const stimuli::ConvexMesh& mesh, const Vec3& d) {
   const double least = kPoint * mesh.size();
   return glm::dot(d, d) <= least * least;
 }
 
-/// A feature that the segment was at, for the point that it has shrunk to: no edge.
+/// A feature to start from. For a point, an edge is replaced by its left facet.
 template <bool kSegment>
 ContactFeature usable(const stimuli::ConvexMesh& mesh, ContactFeature feature) {
   if (kSegment || feature.kind != Kind::edge) return feature;
@@ -63,7 +63,7 @@ WalkResult walked(const stimuli::ConvexMesh& mesh, ContactFeature start, const V
   return walk_point(mesh, start, tip);
 }
 
-/// Every facet of M, for lines that rounding does not let step on.
+/// Scans every facet of M, for lines whose steps rounding stops.
 template <bool kSegment>
 PairCast scan(const CastMesh& part, const Vec3& tip, const Vec3& d, const Vec3& motion) {
   ++part.full_scans;
@@ -100,8 +100,8 @@ PairCast scan(const CastMesh& part, const Vec3& tip, const Vec3& d, const Vec3& 
   return out;
 }
 
-/// What is adjacent to an edge where the segment is past one of its ends, or past an end of the
-/// edge. False where it is on it, or where rounding hides what comes next.
+/// The facet of M adjacent to an edge where the segment is past one of its own ends or an end of
+/// the edge. False if it is past neither, or if rounding hides the facet.
 bool beyond_edge(const stimuli::ConvexMesh& mesh, const Measured& at, const Vec3& tip,
                  const Vec3& d, Measured& next) {
   const stimuli::Edge& edge = mesh.edges()[at.index];
@@ -138,8 +138,8 @@ bool beyond(const stimuli::ConvexMesh& mesh, const Measured& at, const Vec3& tip
   return true;
 }
 
-/// Whether the segment is no farther past the facet of M than a few more of its kind are wide:
-/// then stepping there is less than looking elsewhere.
+/// Whether the segment is past the facet of M by no more than a few facets' widths: then stepping
+/// there is cheaper than a search.
 template <bool kSegment>
 bool is_near(const stimuli::ConvexMesh& mesh, const Measured& at, const Vec3& tip, const Vec3& d) {
   constexpr double kWidths = 4;
@@ -182,8 +182,8 @@ Measured facing(const CastMesh& part, ContactFeature start, const Vec3& tip, con
   return measure_facet<kSegment>(mesh, best, tip, d);
 }
 
-/// The facet of M through which the way from its middle to the segment leaves M: its plane
-/// separates the segment if any does. False where rounding hides it.
+/// The facet through which the line from the middle of M to the segment leaves M: its plane
+/// separates the segment if any does. False if rounding hides it.
 template <bool kSegment>
 bool outward_facet(const CastMesh& part, ContactFeature start, const Vec3& tip, const Vec3& d,
                    Measured& at) {
@@ -191,7 +191,7 @@ bool outward_facet(const CastMesh& part, ContactFeature start, const Vec3& tip, 
   const Vec3 middle = part.inside - 0.5 * d;
   const Vec3 way = tip - middle;
   at = facing<kSegment>(part, start, tip, d, way);
-  double time = 1;  // of the way; falls from facet to facet
+  double time = 1;  // of the line; falls from facet to facet
   Vec3 at_tip = tip;
   int stalled = 0;
   const std::size_t most = mesh.facets().size() + mesh.edges().size();
@@ -203,7 +203,7 @@ bool outward_facet(const CastMesh& part, ContactFeature start, const Vec3& tip, 
     if (earlier < 1 && step > 0 && !(earlier < time) && ++stalled > kStalledSteps) return false;
     time = earlier;
     if (time < 1) {
-      // It leaves before the segment: this plane separates already.
+      // The line leaves M before the segment: this plane separates already.
       at = measured<kSegment>(mesh, feature_of(at), tip, d);
       return true;
     }
@@ -251,7 +251,7 @@ WalkResult located(const CastMesh& part, ContactFeature start, const Vec3& tip, 
     outward = measured<kSegment>(part.mesh, nearest.feature, tip, d);
   }
   if (outward.depth < 0) return separating(outward);
-  // Inside: the facet on whose side it was holds it.
+  // Inside: walk from `start`, so the facet on whose side the segment was holds it.
   WalkResult at =
       walked<kSegment>(part.mesh, start.kind != Kind::none ? start : feature_of(outward), tip, d);
   if (at.not_converged || at.capped) [[unlikely]]
@@ -271,7 +271,7 @@ PairCast cast(const CastMesh& part, ContactFeature start, const Vec3& tip, const
   Measured at = measured<kSegment>(mesh, from.separating_feature, tip, d);
   if (part.trees.facet_map() != nullptr && glm::dot(at.normal, motion) < at.depth &&
       !is_near<kSegment>(mesh, at, tip, d)) {
-    // A plane that has separated them for long may be far from where they are now.
+    // A plane that has separated them for long may now be far away from them.
     Measured under;
     if (outward_facet<kSegment>(part, {}, tip, d, under) && under.depth < 0) at = under;
   }
@@ -290,7 +290,7 @@ PairCast cast(const CastMesh& part, ContactFeature start, const Vec3& tip, const
     }
     Measured next;
     if (!beyond<kSegment>(mesh, at, at_tip, d, next)) return {true, time, feature_of(at)};
-    // On the border of two facets rounding says of each that the line is past it.
+    // On the border of two facets, rounding may put the line past each of them.
     if (stalled > 1 && minkowski::distance_off<kSegment>(mesh, at, at_tip, d) <=
                            kOnBorder * (mesh.size() + glm::length(d)))
       return {true, time, feature_of(at)};
@@ -318,7 +318,7 @@ double distance_off(const stimuli::ConvexMesh& mesh, ContactFeature feature, con
     return minkowski::distance_off<false>(mesh, measured<false>(mesh, feature, tip, Vec3(0)), tip,
                                           Vec3(0));
   const Measured at = measured<true>(mesh, feature, tip, d);
-  // Between the ends of both: the two meet, but for rounding.
+  // Between the ends of both, the two meet within rounding.
   if (at.edge && at.within && !at.nearly_parallel) return 0;
   return minkowski::distance_off<true>(mesh, at, tip, d);
 }
@@ -346,7 +346,7 @@ namespace {
 
 using Kind = ContactFeature::Kind;
 
-/// m, of a segment, the tool's tip where it is, above a plane.
+/// m, of a segment above a plane, with the tool's tip at `tip`.
 double height_above(const Vec3& normal, double offset, const Vec3& tip,
                     const PlacedSegment& segment) {
   return glm::dot(normal, tip + segment.from) - offset +
@@ -518,14 +518,14 @@ bool NearPairs::virtual_inside() {
 
 namespace {
 
-/// A segment, to which many points are compared.
+/// A segment whose distance to many points is computed.
 struct Line {
   Line() = default;
   Line(const Vec3& start, const Vec3& d) : from(start), along(d) {
     const double length2 = glm::dot(d, d);
     per_length2 = length2 > 0 ? 1 / length2 : 0;
   }
-  /// m^2, of its nearest point.
+  /// m^2, from p to the segment.
   double distance2(const Vec3& p) const {
     const Vec3 to = p - from;
     const double t = std::clamp(per_length2 * glm::dot(to, along), 0.0, 1.0);
@@ -542,7 +542,7 @@ bool in_contact(const RenderState& state, std::uint32_t part) {
   return state.parts[part].feature.kind != ContactFeature::Kind::none;
 }
 
-/// Lists a part, or lets it bound the clearance.
+/// Lists a part if it is in reach; otherwise it bounds the clearance.
 template <class Distance2>
 void consider(const Scene& scene, RenderState& state, const Distance2& distance2, double step,
               std::uint32_t index) {
@@ -555,13 +555,13 @@ void consider(const Scene& scene, RenderState& state, const Distance2& distance2
   }
 }
 
-/// m, that a part may come nearer before it is near.
+/// m, by which the part may approach before it counts as near.
 double room_before(const ScenePart& part, double gap) {
   return gap - kReachShare * part.sphere_radius;
 }
 
-/// Lists the parts that may come near within `room`, m, and how much of it the others have. Spheres
-/// of parts that have more than both are passed over.
+/// Lists the parts that may come near within `room`, m, and computes the room of the others. Skips
+/// spheres all of whose parts have more than both.
 template <class Distance2>
 void search_tree(const Scene& scene, NearbyParts& nearby, const Distance2& distance2, double room) {
   struct Open {
@@ -602,8 +602,8 @@ void search_tree(const Scene& scene, NearbyParts& nearby, const Distance2& dista
 
 /// \param distance2  from a point to the probe, m^2
 /// \param step       m, how far the probe may have moved past a part
-/// \param moved      m, how far any point of the probe is from where the nearby parts were listed
-/// \return whether these were listed anew
+/// \param moved      m, of any point of the probe at most, since the nearby parts were listed
+/// \return whether the nearby parts were listed anew
 template <class Distance2>
 bool list_near_parts(const Scene& scene, RenderState& state, const Distance2& distance2,
                      double step, double moved) {
@@ -618,7 +618,8 @@ bool list_near_parts(const Scene& scene, RenderState& state, const Distance2& di
     }
     return false;
   }
-  // A leap lists too many, and so may a crowd: for no longer than it takes to list fewer.
+  // A leap lists too many parts, and so may a crowd: keep such a list only until a shorter one is
+  // possible.
   const double mean = scene.mean_radius(), soon = kReachShare * mean;
   const bool leaps = step > soon;
   double others = state.nearby.room - moved;  // m, at least, of every part that is not nearby
@@ -647,7 +648,7 @@ void update_near_parts(const Scene& scene, RenderState& state, const LineProbe& 
   if (state.clearance == std::numeric_limits<double>::infinity()) return;
   UnionMemory& memory = state.unions;
   const Tool* const carried = sides ? scene.tool() : nullptr;
-  // The tool moves no farther than its tip and what its size makes of the turn of its frame.
+  // Bounds the tool's motion by that of its tip plus its size times the turn of its frame.
   const auto moved = [&](const ToolPose& a, const ToolPose& b) {
     double out = glm::length(a.tip - b.tip);
     if (carried == nullptr) return std::max(out, glm::length(a.tip + a.d - b.tip - b.d));
@@ -677,7 +678,7 @@ void update_near_parts(const Scene& scene, RenderState& state, const LineProbe& 
 }
 
 void rebuild_near_parts(const Scene& scene, RenderState& state, const LineProbe& probe) {
-  // How far the probe moved in this tick: what it may have passed counts as near.
+  // The probe's motion in this tick: parts that it may have passed count as near.
   const double step = state.has_last ? std::max(glm::length(probe.tip - state.last.tip),
                                                 glm::length(probe.tail - state.last.tail))
                                      : 0;

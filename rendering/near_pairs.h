@@ -1,7 +1,7 @@
 #pragma once
-// The parts and segments that an ideal tool can bring together within a tick, and where a motion of
-// the tool first enters one of them. Internal to the contact law of unions (union_contact.h). World
-// frame, SI units.
+// The pairs of part and segment that an ideal tool can bring together within a tick, and where a
+// motion of the tool first enters a part. Internal to the contact law of unions (union_contact.h).
+// World frame, SI units.
 
 #include <cstddef>
 #include <cstdint>
@@ -16,21 +16,21 @@
 
 namespace palpate::rendering {
 
-// One convex part C and one segment S of a tool, whose orientation stays as it is: where the
-// segment lies to M = C (+) (-S), and where a translation of it first meets M. The same steps from
-// facet to neighbouring facet of M as the walk (facet_walk.h). Mesh frame, m.
+// One convex part C and one segment S of a tool of fixed orientation: where the segment lies
+// relative to M = C (+) (-S), and where a translation of it first meets M. Steps from facet to
+// neighbouring facet of M, as the walk does (facet_walk.h). Mesh frame, m.
 
-/// A part with what finds its way on it.
+/// A part and its search structures.
 struct CastMesh {
   const stimuli::ConvexMesh& mesh;
   const ContactTrees& trees;
   Vec3 inside;  ///< m, a point well inside of it
-  /// Counts the looks at every facet of M, which rounding asks for now and then.
+  /// Counts scans of all facets of M, which rounding sometimes makes necessary.
   std::uint64_t& full_scans;
 };
 
 /// The facet of M that holds the segment, or whose plane separates it (WalkResult::depth < 0).
-/// \param start  any feature, at best near the one in question; none: begins under the segment
+/// \param start  any feature, preferably near the result; none: begins under the segment
 /// \param d      the segment from tip to tip + d; zero or below rounding: a point
 WalkResult locate(const CastMesh& part, ContactFeature start, const Vec3& tip, const Vec3& d);
 
@@ -38,7 +38,7 @@ WalkResult locate(const CastMesh& part, ContactFeature start, const Vec3& tip, c
 struct PairCast {
   bool hit = false;
   double time = 1;         ///< hit: of the motion, 0 to 1, never too late
-  ContactFeature feature;  ///< hit: the facet of M that is entered; else one that separates at last
+  ContactFeature feature;  ///< hit: the facet of M entered; else one that separates at the end
 };
 
 /// The line is clipped by planes of facets of M: that of a facet seen from the line's beginning is
@@ -50,17 +50,17 @@ struct PairCast {
 PairCast cast(const CastMesh& part, ContactFeature start, const Vec3& tip, const Vec3& d,
               const Vec3& motion);
 
-/// m; how far the segment, moved along the feature's normal onto it, is off the feature itself.
+/// m, from the feature to the segment moved along the feature's normal onto its plane.
 double distance_off(const stimuli::ConvexMesh& mesh, ContactFeature feature, const Vec3& tip,
                     const Vec3& d);
 
-/// The facet of M past the side of the feature that the segment, moved along the feature's normal
-/// onto it, is past. Of kind none where it is past none.
+/// Moves the segment along the feature's normal onto its plane and returns the facet of M beyond
+/// the side that the segment is then past. Kind none: it is past no side.
 ContactFeature feature_beyond(const stimuli::ConvexMesh& mesh, ContactFeature feature,
                               const Vec3& tip, const Vec3& d);
 
-/// The same feature, measured wherever the segment is; one that is no facet of M any more since the
-/// segment has turned gives way to the facet that its normal has become.
+/// Measures the same feature wherever the segment is. If the segment has turned so that the feature
+/// is no longer a facet of M, measures the facet of the mesh whose normal it has reached.
 WalkResult measure(const stimuli::ConvexMesh& mesh, ContactFeature feature, const Vec3& tip,
                    const Vec3& d);
 
@@ -115,13 +115,13 @@ class NearPairs {
   /// The virtual tool.
   const PlacedTool& now() const { return all_.now; }
 
-  /// Sets the pairs that the tool can touch while it comes from `from` and then stays within
+  /// Collects the pairs that the tool can touch while it comes from `from` and then stays within
   /// `reach` of the virtual tool.
   /// \param motion  m, of any point of the tool from there to the virtual tool
   void collect(const ToolPose& from, const PlacedTool& placed_from, double motion, double reach);
 
-  /// Puts the pairs' segments where the tool of this orientation has them.
-  /// \param oriented  stays in use
+  /// Places the pairs' segments for this orientation of the tool.
+  /// \param oriented kept by reference
   void orient(const PlacedTool& oriented);
   const PlacedTool& oriented() const { return *oriented_; }
 
@@ -130,22 +130,22 @@ class NearPairs {
     return near.tip + part_of(near).shrink * part_of(near).local_vector(y);
   }
 
-  /// The segment in the part's frame, seen smaller by the part's margin.
+  /// The segment in the part's frame, scaled down by the part's margin.
   LineProbe shrunk(const NearPair& near, const Vec3& tip, const PlacedSegment& segment) const;
 
-  /// A segment whose ends move linearly: where it first enters the part. Remembers what separates
-  /// them where it does not.
+  /// Where a segment whose ends move linearly first enters the part. If it does not enter,
+  /// remembers the plane that separates them.
   Entry sweep(NearPair& near, const LineProbe& before, const LineProbe& after);
 
-  /// Whether a plane that touches the part's bounding sphere parts the two at both poses, and so
-  /// all the way between; then it is remembered. Much less than a cast.
+  /// Whether a plane that touches the part's bounding sphere separates the two at both poses, and
+  /// so all the way between. If so, remembers it. Much cheaper than a cast.
   bool part_by_sphere(NearPair& near, const PosedSegment& from, const PosedSegment& to);
-  /// Where the tool of a pose has the pair's segment.
+  /// The pair's segment at a pose of the tool.
   static PosedSegment posed(const NearPair& near, const Vec3& tip, const PlacedTool& tool) {
     const PlacedSegment& segment = tool.segments[near.segment];
     return {tip + segment.from, segment.along};
   }
-  /// The same of the oriented tool, moved by y.
+  /// The same for the oriented tool, moved by y.
   PosedSegment posed(const NearPair& near, const Vec3& y) const {
     return posed(near, tick_.tool.tip + y, *oriented_);
   }

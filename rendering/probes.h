@@ -1,6 +1,6 @@
 #pragma once
-// What touches: the tip alone (point-based rendering) or the whole segment (ray-based). Mesh frame.
-// Included by what instantiates ticks.
+// The touching part of the probe: the tip alone (point-based rendering) or the whole segment
+// (ray-based). Mesh frame. Included only where ticks are instantiated.
 
 #include <algorithm>
 #include <array>
@@ -61,15 +61,14 @@ struct PointProbe {
     return first_contact_point(mesh, trees, before.tip, after.tip, tolerance);
   }
 
-  /// Type of the contact; it is at the tip.
+  /// Sets the type of the contact, which is at the tip.
   static void classify(const stimuli::ConvexMesh&, const WalkResult&, const Vec3&, const Vec3&,
                        double, LoadedContact& c) {
     c.contact.type = ContactType::point_polygon;
   }
 };
 
-// The whole segment as what touches, tip and side: ray-based rendering. Mesh frame. Included by
-// what instantiates ticks.
+// Ray-based rendering: the whole segment touches, tip and side. Mesh frame.
 
 // rad, epsilon of equation (2), within which a contact is segment-face: 1 degree, as in the paper.
 inline constexpr double kBlendAngle = std::numbers::pi / 180;
@@ -85,10 +84,10 @@ inline double small_asin(double x) {
 struct Portion {
   double enter = 0, leave = 1;
 
-  /// Keeps what has height + (t - at) slope >= 0. Branch-free: on a fine mesh the signs change from
-  /// tick to tick, and a mispredicted branch costs more than the whole clip.
+  /// Keeps the t with height + (t - at) slope >= 0. Branch-free: on a fine mesh the signs change
+  /// from tick to tick, and a mispredicted branch costs more than the whole clip.
   void clip(double height, double slope, double at = 0) {
-    const double t = at - height / slope;  // of a slope of 0 infinite or NaN, and not selected
+    const double t = at - height / slope;  // of a slope of 0 infinite or NaN: not selected
     const double from = slope > 0 ? t : 0.0;
     const double to = slope < 0 ? t : 1.0;
     enter = from > enter ? from : enter;
@@ -98,14 +97,14 @@ struct Portion {
   }
 };
 
-/// The portion of a probe lying on a facet that is over its polygon; enter > leave when rounding
-/// leaves nothing of it.
+/// The portion over the facet's polygon of a probe that lies on the facet; enter > leave if
+/// rounding leaves nothing of it.
 inline Portion touching_portion(const stimuli::ConvexMesh& mesh, std::uint32_t index,
                                 const Vec3& ideal_tip, const Vec3& d) {
   const stimuli::Facet& facet = mesh.facets()[index];
   Portion portion;
   if (facet.side_count == 3) {
-    // Within the facet's plane, inside of a side is below the plane of the facet beyond it.
+    // Within the facet's plane, the inside of a side is below the plane of the facet beyond it.
     const Vec3 a = ideal_tip - (glm::dot(facet.normal, ideal_tip) - facet.offset) * facet.normal;
     const Vec3 along = d - glm::dot(facet.normal, d) * facet.normal;
     for (const stimuli::Neighbour& next : facet.triangle) {
@@ -124,8 +123,8 @@ inline Portion touching_portion(const stimuli::ConvexMesh& mesh, std::uint32_t i
 /// The same for a probe that crosses an edge of the facet, a triangle: there it enters or leaves.
 /// The other two sides are measured from the crossing, which is known sooner than the ideal tip.
 /// Branch-free, as above.
-/// \param on_left  whether the facet is the one on the edge's left; \param slope  dot(its normal,
-/// d)
+/// \param on_left  whether the facet is the one on the edge's left
+/// \param slope    dot(its normal, d)
 inline Portion portion_from_edge(const stimuli::ConvexMesh& mesh, const WalkResult& hit,
                                  bool on_left, double slope, const Vec3& d) {
   const stimuli::Edge& edge = mesh.edges()[hit.feature.index];
@@ -191,7 +190,7 @@ struct SegmentProbe {
     return first_contact_segment(mesh, trees, before, after, tolerance);
   }
 
-  /// Type of the contact, and where on the probe it is.
+  /// Sets the type of the contact and its place on the probe.
   [[gnu::always_inline]] static void classify(const stimuli::ConvexMesh& mesh,
                                               const WalkResult& hit, const Vec3& tip, const Vec3& d,
                                               double length, LoadedContact& c) {
@@ -202,7 +201,7 @@ struct SegmentProbe {
     double slope = 0;
     bool on_left = false;
     if (edge) {
-      // Of its two facets the one that the probe is closer to parallel with.
+      // Choose the facet of the edge that is more nearly parallel to the probe.
       const stimuli::Edge& e = mesh.edges()[hit.feature.index];
       const double left = glm::dot(mesh.facets()[e.left].normal, d);
       const double right = glm::dot(mesh.facets()[e.right].normal, d);

@@ -10,7 +10,7 @@
 namespace palpate::rendering {
 namespace {
 
-/// Forgets what rested on the k-th part of a group.
+/// Forgets the contacts with the k-th part of a group.
 void forget_part(UnionTick& tick, const PartGroup& group, std::size_t k) {
   const std::size_t segments = tick.scene.segments();
   for (std::size_t j = 0; j < segments; ++j) {
@@ -21,7 +21,7 @@ void forget_part(UnionTick& tick, const PartGroup& group, std::size_t k) {
   }
 }
 
-/// Forgets what the group's ideal tool rested on: from now on it is the virtual one.
+/// Forgets the contacts of the group's ideal tool: from now on it is the virtual one.
 void forget_contacts(UnionTick& tick, std::uint32_t index) {
   const PartGroup& group = tick.scene.groups()[index];
   tick.state.unions.groups[index].touching = false;
@@ -64,7 +64,7 @@ void switch_off(UnionTick& tick, std::uint32_t object) {
   }
 }
 
-/// s; a clock that does not run counts as one of a kilohertz.
+/// s; 1 ms where the clock does not run.
 double step_of(const UnionTick& tick) { return tick.dt > 0 ? tick.dt : 1e-3; }
 
 void release_hooked(UnionTick& tick) {
@@ -90,7 +90,7 @@ BreakState* breaking_of(UnionTick& tick, const PlacedContact& contact) {
   return index == ScenePart::kHolds ? nullptr : &tick.state.unions.breaking[index];
 }
 
-/// Parts whose force has gone hold the ideal tool no longer.
+/// Parts whose force has faded no longer hold the ideal tool.
 void remove_parts(UnionTick& tick, std::uint32_t breaking) {
   const std::uint32_t index = tick.scene.breaking()[breaking].group;
   const PartGroup& group = tick.scene.groups()[index];
@@ -109,8 +109,8 @@ Vec3 force_of(const UnionMemory& all, std::uint32_t group) {
   return force;
 }
 
-/// What the tool comes upon where parts of its layer went takes over smoothly: it may be deep in
-/// it by then.
+/// When parts of a layer have gone, their neighbours' force rises smoothly: the tool may be deep in
+/// them by then.
 void raise_forces(UnionTick& tick) {
   UnionMemory& all = tick.state.unions;
   for (std::uint32_t g = 0; g < all.groups.size(); ++g) {
@@ -126,7 +126,7 @@ void raise_forces(UnionTick& tick) {
   }
 }
 
-/// Layers whose force exceeds what they bear begin to give way.
+/// Layers whose force exceeds their break force begin to break.
 void break_layers(UnionTick& tick) {
   UnionMemory& all = tick.state.unions;
   for (BreakState& parts : all.breaking) parts.force = Vec3(0);
@@ -176,8 +176,8 @@ void update_objects(UnionTick& tick) {
   for (std::size_t i = 0; i < all.breaking.size(); ++i) {
     const std::uint32_t object = tick.scene.breaking()[i].object_state;
     if (!all.breaking[i].giving_way) continue;
-    // A tick later, so that the ideal tool comes from outside; it may be in them where the virtual
-    // one has gone right through the object.
+    // Restore them a tick later, so that the ideal tool comes from outside. It may be inside them
+    // if the virtual one has passed right through the object.
     if (all.breaking[i].was_left) {
       restore(tick, i);
     } else {

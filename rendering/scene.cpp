@@ -10,7 +10,7 @@
 namespace palpate::rendering {
 namespace {
 
-/// Parts of one surface or layer stand side by side; the order in which they come first stays.
+/// Makes the parts of one surface or layer contiguous. Keeps the order if they already are.
 void bring_together(std::vector<SceneObject>& objects) {
   const auto key = [](const SceneObject& o) { return std::pair(o.object, o.layer); };
   std::vector<std::pair<int, int>> seen;
@@ -28,9 +28,9 @@ void bring_together(std::vector<SceneObject>& objects) {
                    [&](const SceneObject& a, const SceneObject& b) { return key(a) < key(b); });
 }
 
-/// The margin by which the law sees a part larger.
+/// Sets the margin by which the law enlarges a part.
 void add_margin(ScenePart& part) {
-  // Above what rounding can do to a plane here, and below 1e-6 of the size, however thin the part.
+  // Above the rounding of a plane here, and below 1e-6 of the size, however thin the part.
   constexpr double kOfSize = 1e-12, kRoundings = 64, kMostScale = 1e-6;
   const stimuli::ConvexMesh& mesh = *part.mesh;
   Vec3 sum(0);
@@ -116,7 +116,7 @@ void Scene::group_parts() {
   for (const PartGroup& group : groups_) parts_of_object[group.object_state] += group.part_count;
   for (const BreakingParts& parts : breaking_) ++parts_of_object[parts.object_state];
   for (PartGroup& group : groups_) {
-    // The walk knows one part that never gives way.
+    // The walk alone handles one part that never breaks.
     group.by_law = tool() != nullptr || !group.felt || parts_of_object[group.object_state] > 1;
     if (group.by_law) prepare_for_law(group);
   }
@@ -170,7 +170,7 @@ void Scene::add_surfaces(std::vector<SceneSurface> surfaces, TickFeatures& featu
     groups_.push_back(group);
     surfaces_.push_back(std::move(surface));
   }
-  // What was a single part, for the walk alone, shares its object with a surface.
+  // A single part for the walk alone now shares its object with a surface.
   for (PartGroup& group : groups_) {
     const auto shares = [&](const PlacedSurface& s) {
       return groups_[s.group].object_state == group.object_state;

@@ -21,8 +21,8 @@
 
 namespace palpate::rendering {
 
-/// The layer of what is nowhere felt itself, but bounds an object that has layers: who is inside of
-/// it has not left the object.
+/// The layer of parts without force that bound an object with layers: a tool inside them has not
+/// left the object.
 inline constexpr int kNotFelt = -1;
 
 /// One convex part to be put into a scene.
@@ -31,12 +31,12 @@ struct SceneObject {
   Pose pose;
   stimuli::Material material;
   int object =
-      0;  ///< index of the object in the scene; the parts of a compound share it, side by side
+      0;  ///< index of the object in the scene; the parts of a compound share it and are contiguous
   std::shared_ptr<const ContactTrees> trees;  ///< built by the scene when empty
-  /// 0: the object's surface; 1 and on: its layers, each felt on its own.
+  /// 0: the object's surface; 1 and up: its layers, each with its own ideal tool.
   int layer = 0;
-  /// N; of a layer. Parts of equal bounds that bear more together give way until the object has
-  /// been left.
+  /// N; of a layer. Parts of equal break force whose total force exceeds it break, until the object
+  /// has been left.
   double break_force = std::numeric_limits<double>::infinity();
 };
 
@@ -55,25 +55,25 @@ struct ScenePart {
   Vec3 position;             ///< m, of the mesh frame's origin
   Vec3 sphere_centre;        ///< m
   double sphere_radius = 0;  ///< m
-  double tolerance = 0;      ///< m; shorter is rounding, at this size and distance from the origin
+  double tolerance = 0;      ///< m; shorter is rounding at this size and distance from the origin
   stimuli::Material material;
   int object = 0;
-  bool shallow_ridges = false;  ///< equation (2) goes over several faces (equivalent_point.h)
+  bool shallow_ridges = false;  ///< equation (2) covers several faces (equivalent_point.h)
 
   int layer = 0;
   double break_force = std::numeric_limits<double>::infinity();  ///< N; of its layer
   std::uint32_t group = 0;                                       ///< index in Scene::groups()
   static constexpr std::uint32_t kHolds = std::numeric_limits<std::uint32_t>::max();
-  std::uint32_t breaking = kHolds;  ///< index in Scene::breaking(); kHolds: it never gives way
+  std::uint32_t breaking = kHolds;  ///< index in Scene::breaking(); kHolds: never breaks
 
-  // For unions and tools (union_contact.h): the law sees the part larger by a margin, far above
-  // rounding and far below what is felt, so that parts that abut leave no crack. Instead of the
-  // part the probe is scaled, about a point inside.
+  // For unions and tools (union_contact.h): the law enlarges the part by a margin, far above
+  // rounding and far below perception, so that abutting parts leave no crack. Instead of enlarging
+  // the part, it shrinks the probe about a point inside.
   Vec3 inside;        ///< mesh frame, m
   double shrink = 1;  ///< of the probe; 1 / (1 + margin)
   double margin = 0;  ///< m, of the vertex that it moves most
 
-  // Inlined: a tick turns three to five vectors, at ten instructions each.
+  // Inlined: a tick rotates three to five vectors, at ten instructions each.
   [[gnu::always_inline]] Vec3 local_point(const Vec3& world) const {
     return local_vector(world - position);
   }
@@ -86,11 +86,11 @@ struct ScenePart {
   }
 };
 
-/// What a tick over a scene does beyond one convex part that is a plain spring. A tick is compiled
-/// for each combination, so that what is not needed costs nothing.
+/// The features that a tick needs beyond one convex part with a plain spring. A tick is compiled
+/// for each combination, so unused features cost nothing.
 struct TickFeatures {
   bool several_parts = false;  ///< broad phase, a list of contacts, sums over it
-  bool damping = false;        ///< some material has it; so the others
+  bool damping = false;        ///< some material has it; so for the others
   bool friction = false;
   /// Objects of several parts, layers, or a tool: the law of union_contact.h; or closed surfaces.
   bool unions = false;
@@ -106,34 +106,35 @@ struct TickFeatures {
   constexpr bool plain_springs() const { return !damping && !friction; }
 };
 
-/// What is remembered of one part from tick to tick.
+/// The state of one part between ticks.
 struct PartState {
-  ContactFeature feature;     ///< in contact: that the ideal probe is on; kind none: no contact
+  ContactFeature feature;     ///< in contact: the ideal probe is on it; kind none: no contact
   SeparatingPlane plane;      ///< mesh frame; where valid, the last pose was beyond it
   ContactFeature nearby;      ///< not in contact: the feature of a recent separating plane, if any
-  std::uint32_t support = 0;  ///< vertex that the last search for a separating plane ended on
+  std::uint32_t support = 0;  ///< result of the last search for a separating plane
   bool started_inside = false;  ///< the trial began inside: no force until the probe has left once
   FrictionState friction;       ///< where the material has friction
 };
 
-/// Of many parts, those around the probe, from which the near ones are chosen; in any order.
+/// In a scene of many parts: those around the probe, in any order. The near parts are chosen from
+/// them.
 struct NearbyParts {
   std::vector<std::uint32_t> parts;
-  LineProbe pose;   ///< the probe when they were listed; of a tool see UnionMemory
+  LineProbe pose;   ///< the probe when they were listed; for a tool see UnionMemory
   double room = 0;  ///< m; the others are out of reach until the probe has moved so far
 };
 
 /// A renderer's whole memory between ticks. Copy it to replay from here.
 struct RenderState {
   std::vector<PartState> parts;
-  std::vector<std::uint32_t> near_parts;  ///< in order; the others are out of reach for now
+  std::vector<std::uint32_t> near_parts;  ///< in order; all others are out of reach for now
   LineProbe near_parts_pose;              ///< the probe when near_parts was last rebuilt
-  double clearance = 0;  ///< m; within it of near_parts_pose the other parts are out of reach
+  double clearance = 0;  ///< m; moved by less from near_parts_pose, the probe reaches no others
   NearbyParts nearby;    ///< empty where the scene has no tree of parts
   LineProbe last;        ///< last valid pose
   bool has_last = false;
-  /// Of the tool, world frame, where the caller senses it: written before a tick. Its part at right
-  /// angles to the stylus is +x. Zero: +x is carried along by the smallest rotation.
+  /// The tool's side, world frame, if the caller senses it; written before a tick. Its component at
+  /// right angles to the stylus is +x. Zero: +x is carried along by the smallest rotation.
   Vec3 measured_side;
   UnionMemory unions;                   ///< empty where the scene has none
   std::vector<LoadedContact> contacts;  ///< of the last tick; with room for one of each part
@@ -143,42 +144,41 @@ struct RenderState {
 /// Immutable; shared by the servo and the display.
 class Scene {
  public:
-  /// \param side_contact  false leaves out what only a segment needs (the tree of edges)
-  /// \param tool          what the stylus carries; empty: nothing but itself
-  /// \param motion        what moves, of objects that stand at first where they are here; null:
-  /// nothing
+  /// \param side_contact  false: leaves out the tree of edges, which only a segment needs
+  /// \param tool          what the stylus carries; empty: the plain stylus
+  /// \param motion        the moving objects, whose first place is given here; null: none
   explicit Scene(std::vector<SceneObject> objects, bool side_contact = true, Tool tool = {},
                  std::shared_ptr<const SceneMotion> motion = nullptr,
                  std::vector<SceneSurface> surfaces = {});
 
-  /// Where they stand, at first where they move.
+  /// At their place; moving parts at their first place.
   const std::vector<ScenePart>& parts() const { return parts_; }
   const std::vector<PlacedSurface>& surfaces() const { return surfaces_; }
-  /// Of a contact's part; those of surfaces follow after the convex parts.
+  /// Of a contact's part; surfaces' materials follow those of the convex parts.
   const stimuli::Material& material_of(std::uint32_t part) const {
     return part < parts_.size() ? parts_[part].material : materials_[part - parts_.size()];
   }
   const SceneMotion* motion() const { return motion_.get(); }
-  /// Selects the tick that a renderer runs; beyond TickFeatures::kCount it is that of motion().
+  /// Selects the tick that a renderer runs; from TickFeatures::kCount on, that of motion().
   TickFeatures features() const { return TickFeatures::of(features_index_); }
   std::size_t features_index() const { return features_index_; }
-  /// Parts of one group stand side by side.
+  /// Parts of one group are contiguous.
   const std::vector<PartGroup>& groups() const { return groups_; }
   const std::vector<BreakingParts>& breaking() const { return breaking_; }
-  /// What the stylus carries; null: nothing but itself.
+  /// What the stylus carries; null: the plain stylus.
   const Tool* tool() const { return tool_.segments.empty() ? nullptr : &tool_; }
   /// m, from the tip to the farthest point of the tool.
   double tool_reach() const { return tool_reach_; }
-  static constexpr std::size_t kFewParts = 32;  ///< up to so many have no tree
-  /// Of the parts' bounding spheres.
+  static constexpr std::size_t kFewParts = 32;  ///< up to so many parts get no tree
+  /// Over the parts' bounding spheres.
   const BoundingTree& part_tree() const { return part_tree_; }
   struct Sphere {
     Vec3 centre;        ///< m
     double radius = 0;  ///< m
   };
-  /// About all parts of each node of the tree.
+  /// The bounding sphere of all parts below each node of the tree.
   const std::vector<Sphere>& node_spheres() const { return node_spheres_; }
-  double mean_radius() const { return mean_radius_; }  ///< m, of the parts' spheres
+  double mean_radius() const { return mean_radius_; }  ///< m, of the parts' bounding spheres
   std::size_t segments() const { return tool_.segments.empty() ? 1 : tool_.segments.size(); }
   RenderState initial_state() const;
 
@@ -204,7 +204,7 @@ class Scene {
   double mean_radius_ = 0;
 };
 
-/// Of the radius: room to move before the list of near parts must be rebuilt.
+/// Share of a part's radius: room to move before the list of near parts must be rebuilt.
 inline constexpr double kReachShare = 0.25;
 
 /// Broad phase: whether the probe can touch the part soon, or may have passed it in this tick.
@@ -214,7 +214,7 @@ inline bool in_reach(const ScenePart& part, double gap, double step) {
   return gap - step <= kReachShare * part.sphere_radius;
 }
 
-/// The same for a tool, whose ideal one may be up to `reach` away from it.
+/// The same for a tool, whose ideal tool may be up to UnionMemory::reach away.
 /// \param tool  the virtual tool at this tick
 void update_near_parts(const Scene& scene, RenderState& state, const LineProbe& probe,
                        const ToolPose& tool, bool sides);

@@ -2,9 +2,9 @@
 // One tick of the servo: from the pose of the virtual probe to the force on the hand. The path of a
 // force: renderer.cpp > tick.h > facet_walk.cpp.
 //
-// A template over what touches (the tip or the whole segment: probes.h) and
-// over what the scene needs (TickFeatures). World frame, SI units. Nothing here throws, allocates,
-// locks or does I/O. Included by what instantiates ticks.
+// A template over the probe (tip or whole segment: probes.h) and over the features that the scene
+// needs (TickFeatures). World frame, SI units. Nothing here throws, allocates, locks or does I/O.
+// Included only where ticks are instantiated.
 
 #include <algorithm>
 #include <cmath>
@@ -22,10 +22,9 @@
 
 namespace palpate::rendering::tick {
 
-// What materials add to plain springs: damping, friction. Included by tick.h and by what
-// measures it.
+// Material forces beyond plain springs: damping and friction.
 
-/// What the material of a contact makes of its force.
+/// Applies the contact's material to its force.
 /// \param motion  m, of the probe at the contact since the last tick
 /// \param rate    1/s, ticks; 0 when unknown: no damping
 template <TickFeatures kFeatures>
@@ -40,7 +39,7 @@ template <TickFeatures kFeatures>
   if (kFeatures.friction && material.has_friction()) apply_friction(c, material, motion, friction);
 }
 
-/// Changes the loaded contacts' forces by what the materials of their parts ask for.
+/// Applies damping and friction of the parts' materials to the loaded contacts' forces.
 /// \param probe  the virtual probe, world frame
 template <TickFeatures kFeatures>
 [[gnu::always_inline]] inline void apply_material_forces(const Scene& scene, RenderState& state,
@@ -63,8 +62,8 @@ template <TickFeatures kFeatures>
   }
 }
 
-/// The same for contacts of the law of unions. A pair of part and segment that takes over the
-/// contact from another of its group, at the seam between them, takes over its friction as well.
+/// The same for contacts of the law of unions. When one pair of part and segment takes over the
+/// contact from another of its group, at a seam, it takes over the friction state as well.
 template <TickFeatures kFeatures>
 void apply_material_forces(const Scene& scene, RenderState& state,
                            std::span<PlacedContact> contacts, double rate) {
@@ -99,7 +98,7 @@ constexpr double kFarthest = 1e6;
 
 inline bool within_range(const Vec3& v) { return glm::dot(v, v) <= kFarthest * kFarthest; }
 
-/// Contact of one part, followed from the last tick or newly detected; of kind none where there is
+/// Contact with one part, followed from the last tick or newly detected; kind none if there is
 /// none. Mesh frame.
 /// \param before  the probe at the last tick, world frame; null at the first tick of all
 /// \param tip     m
@@ -112,7 +111,7 @@ template <class Probe>
   const stimuli::ConvexMesh& mesh = *part.mesh;
   const bool in_contact = state.feature.kind != Kind::none;
   // In free space the separating plane of an earlier tick mostly still holds. Written so that the
-  // result is built in its place: a copy costs as much as a dot product or five.
+  // result is built in place: a copy costs as much as up to five dot products.
   WalkResult hit = in_contact ? Probe::walk(mesh, state.feature, tip, d)
                    : state.plane.separates(tip, tip + d)
                        ? WalkResult()
@@ -141,8 +140,8 @@ struct SpreadPoint {
   ContactType type;
 };
 
-/// Equation (2) over the faces of a part with shallow ridges. Takes copies: what is passed by
-/// reference stays in memory for the whole tick.
+/// Equation (2) over the faces of a part with shallow ridges. Takes copies: values passed by
+/// reference stay in memory for the whole tick.
 // NOLINTBEGIN(performance-unnecessary-value-param)
 [[gnu::cold, gnu::noinline]] inline SpreadPoint spread_over_ridges(const ScenePart& part,
                                                                    WalkResult hit, Vec3 tip, Vec3 d,
@@ -170,7 +169,7 @@ struct Tick {
 
   const LineProbe* last() const { return state.has_last ? &state.last : nullptr; }
 
-  /// Contact of one part. True when it is in contact; then `c` is filled in.
+  /// Finds the contact with one part. True if there is one; then fills in `c`.
   [[gnu::always_inline]] bool contact_of(std::uint32_t index, LoadedContact& c) {
     const ScenePart& part = scene.parts()[index];
     PartState& memory = state.parts[index];
@@ -199,13 +198,14 @@ struct Tick {
     state.contacts.clear();
     for (const std::uint32_t index : state.near_parts) {
       LoadedContact found;
-      // There is room for a contact of every part (Scene::initial_state): nothing is allocated.
+      // Scene::initial_state reserved room for one contact of each part: no allocation.
       if (contact_of(index, found)) state.contacts.push_back(found);
     }
   }
 
   /// Puts the point of a loaded contact on the ideal probe.
-  /// \param shift  m, from the virtual to the ideal probe, without friction \return with friction
+  /// \param shift  m, from the virtual to the ideal probe, without friction
+  /// \return the shift with friction
   template <bool kFriction>
   Vec3 place_on_ideal_probe(LoadedContact& c, Vec3 shift) const {
     if constexpr (kFriction) shift += c.tangential_offset;
@@ -275,7 +275,7 @@ template <class Probe, bool kFriction>
   return make_result(tick, loads, contact, shift, 1);
 }
 
-/// The contacts of a scene of which some objects are unions or the stylus carries a tool.
+/// The contacts of a scene with unions or with a tool on the stylus.
 template <class Probe, TickFeatures kFeatures>
 void add_placed_contacts(UnionTick& tick, Tick<Probe>& plain) {
   const Scene& scene = tick.scene;
@@ -338,7 +338,7 @@ Rendering render_unions(const Scene& scene, RenderState& state, const LineProbe&
   return sum_unions(tick, probe);
 }
 
-/// One tick that does what kFeatures says and no more.
+/// One tick with exactly the features of kFeatures.
 /// \param dt  s since the last tick; only damping needs it
 template <class Probe, TickFeatures kFeatures>
 Rendering render_tick(const Scene& scene, RenderState& state, const LineProbe& probe,

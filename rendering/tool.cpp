@@ -6,7 +6,7 @@
 namespace palpate::rendering {
 namespace {
 
-/// The world axis least along `axis`.
+/// The world axis that is least aligned with `axis`.
 Vec3 least_along(const Vec3& axis) {
   int least = 0;
   for (int k = 1; k < 3; ++k) {
@@ -21,12 +21,12 @@ Vec3 least_along(const Vec3& axis) {
 Vec3 carried(const Vec3& v, const Vec3& from, const Vec3& to) {
   constexpr double kOpposite = 1e-9;
   const double cosine = glm::dot(from, to);
-  if (!(1 + cosine > kOpposite)) return v;  // any half turn is the smallest: about v itself
+  if (!(1 + cosine > kOpposite)) return v;  // all half turns are equally small: about v
   const Vec3 axis = glm::cross(from, to);
   return v + glm::cross(axis, v) + glm::cross(axis, glm::cross(axis, v)) / (1 + cosine);
 }
 
-/// The unit part of `v` at right angles to `axis`; false where there is next to none.
+/// The unit vector of v's component at right angles to `axis`; false if that is almost zero.
 bool perpendicular(const Vec3& v, const Vec3& axis, Vec3& out) {
   constexpr double kAlong = 1e-6;
   const Vec3 part = v - glm::dot(v, axis) * axis;
@@ -36,7 +36,7 @@ bool perpendicular(const Vec3& v, const Vec3& axis, Vec3& out) {
   return true;
 }
 
-/// Turned by the smallest rotation, its length changing in proportion.
+/// Interpolates by the smallest rotation; the length changes linearly.
 Vec3 turned_between(const Vec3& from, const Vec3& to, double fraction) {
   const double length = glm::length(from), other = glm::length(to);
   const Vec3 across = glm::cross(from, to);

@@ -10,8 +10,8 @@
 namespace palpate::rendering {
 namespace {
 
-/// Where no contact has force, an ideal tool that is behind in turning is not the virtual one: that
-/// may be inside of a part.
+/// Where no contact has force, show an ideal tool that lags behind in turning: the virtual one may
+/// be inside a part.
 void show_behind(const UnionMemory& all, bool tool, const Vec3& tip, Rendering& out) {
   if (!(all.most_lag > 0)) return;
   const GroupState& group = all.groups[all.most_behind];
@@ -84,7 +84,7 @@ Rendering sum_unions(const UnionTick& tick, const LineProbe& probe) {
 
 namespace {
 
-/// m; how far any point of the tool is from one pose to another at most.
+/// m, the farthest that any point of the tool moves from one pose to another.
 double motion_of(const ToolPose& from, const PlacedTool& placed_from, const ToolPose& to,
                  const PlacedTool& placed_to) {
   double most = 0;
@@ -100,8 +100,8 @@ double motion_of(const ToolPose& from, const PlacedTool& placed_from, const Tool
 
 }  // namespace
 
-/// The pose at which a tool that comes from free space meets the first part; the virtual one where
-/// it meets none.
+/// The pose at which a tool that comes from free space meets the first part; the virtual pose if it
+/// meets none.
 ToolPose IdealTool::first_contact(const ToolPose& from, bool& entered) {
   PlacedTool& before = all_.before;
   pairs_.place(from, before);
@@ -122,7 +122,7 @@ ToolPose IdealTool::first_contact(const ToolPose& from, bool& entered) {
   entered = at != nullptr;
   if (!entered) return tick_.tool;
   ToolPose pose = between(from, tick_.tool, first.time);
-  // It turns on about where it touches.
+  // The rest of the turn is about the contact.
   const PlacedSegment segment = pairs_.placed(pose, at->segment);
   const LineProbe local = pairs_.shrunk(*at, pose.tip, segment);
   const WalkResult contact =
@@ -153,7 +153,7 @@ void IdealTool::follow() {
     from = first_contact(tick_.state.has_last ? all_.last : tick_.tool, entered);
     if (!entered) return;
   }
-  // A turn that leads into a crack, or to no rest, is halved.
+  // Halve a turn that leads into a crack or finds no rest.
   double most = 1;
   do {
     most = 0.5 * turn(from, most);

@@ -20,13 +20,13 @@
 
 namespace palpate::rendering {
 
-/// An ideal tool that is farther behind the stylus in turning (5 degrees, in rad) for longer than
-/// this (s) is hooked, and is let go of. Less is a wedge that is passed or a rattle; more would be
-/// a tool that shows another direction than the hand feels.
+/// An ideal tool that lags behind the stylus by more than this angle (5 degrees, in rad) for longer
+/// than this time (s) is hooked and is let go of. Below these limits it passes a wedge or rattles;
+/// above them the tool would show another direction than the hand feels.
 inline constexpr double kMostLag = 0.0872664625997165;
 inline constexpr double kMostLagTime = 0.01;
 
-/// What a tick asks of the law.
+/// The input of the law in one tick.
 struct UnionTick {
   const Scene& scene;
   RenderState& state;
@@ -36,15 +36,17 @@ struct UnionTick {
   std::uint32_t faults = 0;
 };
 
-/// The wrench of all placed contacts, its split on two devices, and the ideal tool of the deepest.
+/// The wrench of all placed contacts, its split on two devices, and the ideal tool of the deepest
+/// contact.
 Rendering sum_unions(const UnionTick& tick, const LineProbe& probe);
 
-/// The force for the device at the tail, where contacts may be off the stylus' axis: with u the
-/// unit vector from tip to tail and T the torque about the tip, L u x F2 must be T but for torsion
-/// about u, so F2 across u is (T x u) / L; along u it is by (4) and (5), with r_i the contact's
-/// lever along u, which is r_i may be negative or beyond L.
-/// \param torque  N m, about the tip \param along  N m, sum of each contact's lever along the
-/// stylus times its force along it \param d  tail - tip, m
+/// The force for the device at the tail, where contacts may be off the stylus's axis. With u the
+/// unit vector from tip to tail and T the torque about the tip, L u x F2 must be T except for
+/// torsion about u. So F2 across u is (T x u) / L. Along u, (4) and (5) hold with r_i, the
+/// contact's lever along u, which may be negative or beyond L.
+/// \param torque  N m, about the tip
+/// \param along   N m, sum of each contact's lever along the stylus times its force along it
+/// \param d       tail - tip, m
 Vec3 tail_force(const Vec3& torque, double along, const Vec3& d);
 
 /// Follows the ideal tool of one group and appends its contacts, with spring forces, to

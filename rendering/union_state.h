@@ -1,6 +1,6 @@
 #pragma once
-// What the contact law of unions (union_contact.h) knows of a scene, and what it remembers between
-// ticks. World frame and SI units unless said otherwise.
+// The contact law of unions (union_contact.h): its view of a scene, and its state between ticks.
+// World frame and SI units unless said otherwise.
 
 #include <algorithm>
 #include <array>
@@ -21,33 +21,33 @@
 namespace palpate::rendering {
 
 // The nearest point that several half-spaces allow: where an ideal tool rests on up to three planes
-// at once, and what share of the way each of them holds. Any frame, m.
+// at once, and each plane's share of the displacement. Any frame, m.
 
-/// What the points with dot(normal, p) >= bound belong to.
+/// The half-space of points p with dot(normal, p) >= bound.
 struct PlaneBound {
   Vec3 normal;       ///< unit, out of the obstacle
   double bound = 0;  ///< m
 };
 
-/// More planes than these never hold the ideal tool at once; three do in the end.
+/// At most so many planes hold the ideal tool at once; at rest, at most three do.
 inline constexpr std::size_t kMostPlanes = 8;
 
 /// The point nearest to the origin, as the sum of multiplier * normal over the half-spaces, with
-/// multipliers >= 0 of which at most three are positive.
+/// multipliers >= 0, at most three of them positive.
 struct ConstrainedPoint {
   Vec3 point;
   std::array<double, kMostPlanes> multipliers{};  ///< m
   bool found = false;                             ///< the half-spaces have points in common
 };
 
-/// In closed form: a face, then an edge, then a vertex of the intersection is tried, so that of
-/// planes that agree within the tolerance the fewest carry.
+/// In closed form: tries a face, then an edge, then a vertex of the intersection, so that of planes
+/// that agree within the tolerance the fewest carry.
 /// \param half_spaces  up to kMostPlanes
 /// \param tolerance    m; a half-space that is violated by no more than this is satisfied
 ConstrainedPoint constrained_point(std::span<const PlaneBound> half_spaces, double tolerance);
 
-// What the law of surfaces (surface_contact.h) knows of a closed surface in a scene, and what it
-// remembers between ticks.
+// The law of surfaces (surface_contact.h): its view of a closed surface in a scene, and its state
+// between ticks.
 
 /// A closed surface as the tick uses it. World frame, m.
 struct PlacedSurface {
@@ -60,7 +60,7 @@ struct PlacedSurface {
   double skin = 0;       ///< the ideal tool keeps this distance from what it rests on
   int object = 0;
   std::uint32_t group = 0;           ///< index in Scene::groups()
-  std::uint32_t first_material = 0;  ///< of its first shell, in Scene::material_of
+  std::uint32_t first_material = 0;  ///< of the first shell, in Scene::material_of
 
   Vec3 local_vector(const Vec3& world) const {
     return {glm::dot(to_world[0], world), glm::dot(to_world[1], world),
@@ -72,22 +72,22 @@ struct PlacedSurface {
   }
 };
 
-/// A triangle near a segment of the tool, and what of it the two can bring together.
+/// A triangle near a segment of the tool, and the features of the two that can meet.
 struct NearTriangle {
   std::uint32_t triangle = 0;
   std::uint8_t segment = 0;
   std::uint8_t what = 0;  ///< bits of surface_pair
 };
 
-/// A patch near the tool as it is turned in this tick.
+/// A patch near the tool in this tick's orientation.
 struct NearPatch {
   PatchPlane plane;
   SurfacePatch patch;
 };
 
-/// What is remembered of a surface. Local frame, m.
+/// A surface's state between ticks. Local frame, m.
 struct SurfaceState {
-  std::array<SurfacePatch, kMostPlanes> carrying;  ///< that held the ideal tool at the last tick
+  std::array<SurfacePatch, kMostPlanes> carrying;  ///< held the ideal tool at the last tick
   std::size_t carrying_count = 0;
   /// All triangles within `room` of the tool where it was at `listed`.
   std::vector<NearTriangle> near;
@@ -95,8 +95,8 @@ struct SurfaceState {
   double room = 0;
   double wanted_room = 0;  ///< for the next list
   bool has_list = false;
-  std::vector<NearPatch> patches;  ///< of the tick in hand
-  /// Of the contacts of the last tick, whose friction is in UnionMemory::pairs.
+  std::vector<NearPatch> patches;  ///< of this tick
+  /// The contacts of the last tick; their friction is in UnionMemory::pairs.
   struct Rubbed {
     Vec3 normal;
     std::uint32_t segment = 0;
@@ -105,7 +105,7 @@ struct SurfaceState {
   std::array<Rubbed, kMostPlanes> rubbed;
 };
 
-/// Triangles of a list at most; where there are more the tree is asked each time.
+/// The longest list of triangles; where there are more, each tick queries the tree.
 inline constexpr std::size_t kMostNear = 1024, kMostPatches = 2 * kMostNear;
 
 // The planes that hold an ideal tool. Internal to the contact law of unions (union_contact.h).
@@ -113,9 +113,9 @@ inline constexpr std::size_t kMostNear = 1024, kMostPatches = 2 * kMostNear;
 /// Sine of half the opening of the narrowest groove that a tool turns into.
 inline constexpr double kNarrowest = 5e-5;
 
-/// In a groove as narrow two planes hold so many times what pushes the tool in. Where they hold
-/// more, it is clamped, and what pushes it is felt as one contact: opposite forces of 1e5 times as
-/// much would be rounding, and their torque would be no hand's.
+/// In the narrowest groove, each of two planes bears this many times the force that pushes the tool
+/// in. Where planes would bear more, the tool is clamped and the push is felt as one contact:
+/// opposite forces 1e5 times the push would be mostly rounding, and so would their torque.
 inline constexpr double kMostLeverage = 0.5 / kNarrowest;
 
 /// A plane that holds an ideal tool. Translations are relative to the virtual tool's tip.
@@ -125,17 +125,17 @@ struct Plane {
   Vec3 normal;            ///< world, out of the part
   double depth = 0;       ///< m, of the virtual tool below it: dot(normal, y) >= depth outside
   double multiplier = 0;  ///< m, of the normal in the way from the virtual to the ideal tool
-  bool stays = false;     ///< came back where it had let go: rounding, it is not let go there again
+  bool stays = false;     ///< returned where it had let go (rounding): do not let go there again
 };
 
-/// Those in use, at most kMostPlanes.
+/// The planes in use, at most kMostPlanes.
 /// \tparam Held  has the normal, depth and multiplier of Plane
 template <class Held>
 class PlanesOf {
  public:
   std::span<Held> all() { return {planes_.data(), count_}; }
   std::span<const Held> all() const { return {planes_.data(), count_}; }
-  /// Null where there is none.
+  /// Null if there is no plane.
   const Held* most_loaded() const {
     const Held* most = nullptr;
     for (const Held& plane : all()) {
@@ -147,7 +147,7 @@ class PlanesOf {
   bool empty() const { return count_ == 0; }
   void clear() { count_ = 0; }
   void add(const Held& plane) { planes_[count_++] = plane; }
-  /// In order; `drop` may change what it keeps.
+  /// Keeps the order; `drop` may change the planes that it keeps.
   template <class Drop>
   void remove_if(const Drop& drop) {
     std::size_t kept = 0;
@@ -159,9 +159,9 @@ class PlanesOf {
     count_ = kept;
   }
 
-  /// Whether the planes, all of which hold the tool, leave it room: not where they are a crack.
+  /// Whether the planes, all of which hold the tool, leave it room: false in a crack.
   bool leave_room() const {
-    // In narrower ones the apex is lost in rounding; between parts that abut a tool would turn for
+    // Rounding hides the apex of a narrower groove; between abutting parts a tool would turn for
     // ever.
     if (count_ < 2) return true;
     if (count_ == 2) {
@@ -175,7 +175,7 @@ class PlanesOf {
     return out.found && glm::dot(out.point, out.point) * (kNarrowest * kNarrowest) < 1;
   }
 
-  /// Whether two of them face each other as the sides of a crack do.
+  /// Whether two planes face each other as the sides of a crack do.
   bool are_a_crack() const {
     for (std::size_t a = 0; a < count_; ++a) {
       for (std::size_t b = a + 1; b < count_; ++b) {
@@ -195,8 +195,8 @@ class PlanesOf {
     return solve(spaces, tolerance, origin, point);
   }
 
-  /// The same to the virtual tool, from `at`: no plane asks for more than is there, and none that
-  /// `at` is above is crossed, but for `rounding`.
+  /// The same nearest to the virtual tool, from `at`: keeps no more than the present distance from
+  /// each plane, and crosses no plane that `at` is above, except by `rounding`.
   bool nearest_from(const Vec3& at, double skin, double tolerance, double rounding, Vec3& point) {
     std::array<PlaneBound, kMostPlanes> spaces;
     for (std::size_t i = 0; i < count_; ++i) {
@@ -224,31 +224,31 @@ class PlanesOf {
 
 using Planes = PlanesOf<Plane>;
 
-/// What has one ideal tool: the convex parts of an object's surface or of one of its layers, side
-/// by side, or a closed surface.
+/// Shares one ideal tool: the convex parts of an object's surface or of one of its layers,
+/// contiguous in the scene, or a closed surface.
 struct PartGroup {
-  std::uint32_t first_part = 0, part_count = 0;  ///< in the scene, side by side
+  std::uint32_t first_part = 0, part_count = 0;  ///< in the scene, contiguous
   std::uint32_t first_pair = 0;  ///< of part k and segment j: first_pair + k * segments + j
   std::uint32_t object_state = 0;
   int object = 0;
   bool by_law = false;  ///< else a single part without a tool, which the walk alone renders
-  bool felt = true;     ///< false: it has no force and only says what is inside of the object
+  bool felt = true;     ///< false: no force; it only bounds the inside of the object
   double skin = 0;      ///< m; the ideal tool keeps this distance from what it rests on
   static constexpr std::uint32_t kParts = 0xffffffff;
-  std::uint32_t surface = kParts;  ///< index in Scene::surfaces(); kParts: it is of convex parts
+  std::uint32_t surface = kParts;  ///< index in Scene::surfaces(); kParts: convex parts
 };
 
-/// Parts of one group that give way together: a layer, or in a compound what has equal bounds of
-/// it.
+/// Parts of one group that break together: a layer, or in a compound the layer's parts of equal
+/// break force.
 struct BreakingParts {
   std::uint32_t object_state = 0;
-  double force = 0;  ///< N; what they bear
+  double force = 0;  ///< N; more breaks them
   std::uint32_t group = 0;
 };
 
 /// One part and one segment of the tool.
 struct PairState {
-  ContactFeature feature;  ///< facet of M that separated the two at last, or carries the ideal tool
+  ContactFeature feature;  ///< facet of M that last separated the two, or carries the ideal tool
   SeparatingPlane plane;   ///< mesh frame; the part is behind it
   bool carries = false;    ///< the ideal tool rested on the feature at the last tick
   FrictionState friction;
@@ -260,58 +260,58 @@ struct GroupState {
   Vec3 grasp;      ///< m, mean contact place in the tool's frame; about it the tool turns
   bool touching = false;
   Vec3 shift;      ///< m, at the last tick, from the virtual to the ideal tool, without the skin
-  double lag = 0;  ///< rad, by which it is behind the virtual tool in turning
-  double strength = 1;      ///< of what is left to hold it since parts that gave way have gone
-  double last_force = 0;    ///< N, of all contacts with the group when they went
+  double lag = 0;  ///< rad, between its orientation and the virtual tool's
+  double strength = 1;      ///< 0 to 1, of the remaining parts' force after others broke
+  double last_force = 0;    ///< N, of all contacts with the group when parts broke
   bool parts_went = false;  ///< at the last tick
 };
 
-/// What is remembered of BreakingParts.
+/// The state of BreakingParts between ticks.
 struct BreakState {
   bool giving_way = false;  ///< they broke: their force falls, until the object is left
   bool was_left = false;    ///< at the last tick: they are whole from now on
-  double strength = 1;      ///< what is left of their force; 0: they are not there
+  double strength = 1;      ///< share of their force that is left; 0: they are gone
   Vec3 force;               ///< N, of this tick's contacts with them
 };
 
-/// What the ideal tools of one object share.
+/// State that the ideal tools of one object share.
 struct ObjectState {
   bool off = false;             ///< no force until the object has been left once
-  bool started_inside = false;  ///< that is why it is off
+  bool started_inside = false;  ///< the reason why it is off
   bool just_left = false;       ///< in this tick: its ideal tools begin at the virtual one
   bool releasing = false;       ///< hooked: its force falls
-  double strength = 1;          ///< what is left of its force
-  double lag = 0;               ///< rad, of its ideal tools at the last tick, the largest
-  double lagging = 0;           ///< s, since when that is too far
+  double strength = 1;          ///< share of its force that is left
+  double lag = 0;               ///< rad, the largest of its ideal tools at the last tick
+  double lagging = 0;           ///< s, for how long that has been too much
 };
 
 /// A pair that the ideal tool can reach in this tick.
 struct NearPair {
   std::uint32_t part = 0, pair = 0;  ///< indices in the scene and in RenderState::pairs
   std::uint32_t segment = 0;
-  /// The segment where the tip of the tool is the virtual tip. Mesh frame, in which the part is
-  /// larger by its margin (ScenePart::shrink), m.
+  /// The segment of a tool whose tip is the virtual tip. Mesh frame, in which the part is larger by
+  /// its margin (ScenePart::shrink), m.
   Vec3 tip, d;
   Vec3 true_tip, true_d;  ///< the same without the margin
-  /// World frame: the plane of an earlier tick, where there is one. With its tip at the virtual one
-  /// plus y, the segment is dot(normal, y) + height above it, m, and apart where that is positive.
+  /// World frame: the plane of an earlier tick, if any. With the tool's tip at the virtual tip plus
+  /// y, the segment is dot(normal, y) + height, m, above the plane; positive: apart.
   Vec3 normal;
   double offset = 0, height = 0;
   bool has_plane = false;
   bool was_apart = false;    ///< by that plane, at the pose that the tool comes from
-  bool was_cast = false;     ///< the plane did not do: it is renewed
+  bool was_cast = false;     ///< the plane did not separate them: renew it
   Vec3 parted_at;            ///< m, where it last let go of the ideal tool in this tick
-  bool parted = false;       ///< it did
+  bool parted = false;       ///< it let go in this tick
   bool carries = false;      ///< has a plane in use
   ContactFeature came_with;  ///< the pair's feature at the last tick
 };
 
-/// A contact of several, with where it is.
+/// One of several contacts, with its place.
 struct PlacedContact {
   LoadedContact loaded;
   Vec3 shift;   ///< m, from the virtual to the ideal tool, without friction
   Vec3 place;   ///< m, on the ideal tool, world frame
-  Vec3 motion;  ///< m, of that place of the virtual tool since the last tick
+  Vec3 motion;  ///< m, of that place on the virtual tool since the last tick
   std::uint32_t group = 0;
   std::uint32_t pair = 0;  ///< by_law groups only
   int segment = 0;
@@ -323,26 +323,26 @@ struct RubbedPair {
   std::uint32_t group = 0, pair = 0;
 };
 
-/// Memory of the law beside that of single parts.
+/// State of the law between ticks, beside that of single parts.
 struct UnionMemory {
   std::vector<PairState> pairs;
   std::vector<GroupState> groups;
   std::vector<ObjectState> objects;
   std::vector<BreakState> breaking;
   std::vector<SurfaceState> surfaces;
-  std::vector<NearPair> near;           ///< of the group in hand
+  std::vector<NearPair> near;           ///< of the current group
   std::vector<PlacedContact> contacts;  ///< of the last tick
   std::vector<RubbedPair> rubbed;       ///< at the last tick
   PlacedTool now;                       ///< the virtual tool at this tick
-  PlacedTool before, turned;            ///< the ideal tool in hand, before it turns and turned
+  PlacedTool before, turned;            ///< the current ideal tool, before and after its turn
   ToolPose last;                        ///< the virtual tool at the last tick
-  ToolPose near_pose;                   ///< the same when the list of near parts was rebuilt
-  ToolPose nearby_pose;                 ///< the same of the nearby parts
-  bool exceptions = false;              ///< some object is off or behind, or some layer broken
+  ToolPose near_pose;                   ///< the same, when near_parts was rebuilt
+  ToolPose nearby_pose;                 ///< the same, when nearby was listed
+  bool exceptions = false;              ///< some object is off or lags, or a layer broke
   double reach = 0;                     ///< m, from the virtual tool to the farthest ideal tool
   double most_lag = 0;                  ///< rad, of the ideal tools of this tick
-  std::uint32_t most_behind = 0;        ///< the group whose lag that is
-  std::uint64_t full_scans = 0;         ///< looks at all facets of a part, for rounding
+  std::uint32_t most_behind = 0;        ///< the group with that lag
+  std::uint64_t full_scans = 0;         ///< scans of all facets of a part, due to rounding
 };
 
 }  // namespace palpate::rendering
