@@ -1,4 +1,4 @@
-// Stages of the tick in isolation, over recorded ticks: those that explain() can state a cost of.
+// Stages of the tick in isolation, over recorded ticks: those whose cost explain() can state.
 #include "rendering/verification/explain.h"
 
 #include <algorithm>
@@ -32,7 +32,7 @@ struct RecordedTick {
 struct Recording {
   std::vector<LineProbe> poses;
   RenderState start;           ///< before the first pose
-  std::vector<bool> touching;  ///< at each pose, whatever part
+  std::vector<bool> touching;  ///< at each pose, any part
   std::vector<RecordedTick> contact, free, entry;
 };
 
@@ -211,7 +211,7 @@ class StageTimings {
         });
   }
 
-  /// What one material adds, by the tick's own code.
+  /// The cost of one material, by the tick's own code.
   template <TickFeatures kFeatures>
   void add_material(const char* name) {
     const auto state = std::make_shared<RenderState>();
@@ -346,7 +346,7 @@ void add_parts(const Scene& scene, std::vector<TickStage>& stages) {
 
 void add_materials(const TickFeatures& features, std::vector<TickStage>& stages) {
   const auto add = [&](const char* name, bool runs, const char* what) {
-    stages.push_back({name, StageTime::contact, runs, runs ? what : "no material asks for it"});
+    stages.push_back({name, StageTime::contact, runs, runs ? what : "no material has it"});
   };
   add("damping", features.damping, "against the normal speed, never pulling");
   add("friction", features.friction, "Coulomb's, by the ideal probe's tangential offset");
@@ -377,7 +377,7 @@ std::vector<TickStage> explain(const Scene& scene, const Renderer& renderer) {
   stages.push_back({"pose check", StageTime::tick, true,
                     "no force where a coordinate is not finite or beyond 1000 km"});
   add_parts(scene, stages);
-  stages.push_back({"frame of the part", StageTime::tick, true, "the pose as the mesh sees it"});
+  stages.push_back({"frame of the part", StageTime::tick, true, "the pose in the mesh's frame"});
   stages.push_back({"separating plane", StageTime::free, true,
                     "while the plane of an earlier tick separates them, nothing else is computed"});
   stages.push_back({"first contact", StageTime::entry, true,

@@ -1,6 +1,6 @@
 #pragma once
-// The stages of a tick over a scene, which of them are left out and why, and what each costs: read
-// off the compiled scene. Not for the servo.
+// The stages of a tick over a scene: which run, which are left out and why, and their costs. Read
+// from the compiled scene. Not for the servo.
 
 #include <cstddef>
 #include <functional>
@@ -21,27 +21,27 @@ struct TickStage {
   std::string name;
   StageTime time = StageTime::tick;
   bool runs = false;  ///< false: left out
-  std::string why;    ///< what it does, or why it is not needed
+  std::string why;    ///< its purpose, or why it is not needed
 };
 
-/// All stages there are, in the order in which they run. A stage runs if and only if the renderer's
-/// tick over this scene contains it: Scene::features(), the trees that were built, the renderer.
+/// All stages, in the order in which they run. A stage runs if and only if the renderer's tick over
+/// this scene contains it: Scene::features(), the trees that were built, the renderer.
 std::vector<TickStage> explain(const Scene& scene, const Renderer& renderer);
 
 /// A stage of explain(), or a whole tick, as a function to be timed in isolation over recorded
 /// ticks.
 struct StageTiming {
   std::string name;               ///< TickStage::name; kTickInContact or kTickInFreeSpace
-  std::size_t calls = 0;          ///< of the stage in one run; 0: it did not happen on the path
+  std::size_t calls = 0;          ///< of the stage in one run; 0: it did not occur on the path
   std::function<void()> prepare;  ///< before each run
-  std::function<double()> run;    ///< the value only keeps the work from being optimised away
+  std::function<double()> run;    ///< the value only keeps the compiler from removing the work
 };
 
 inline constexpr const char* kTickInContact = "whole tick in contact";
 inline constexpr const char* kTickInFreeSpace = "whole tick in free space";
 
 /// Records a hand that strokes the scene's first part (SurfaceStroke). Scene and renderer must
-/// outlive what is returned. Stages that cannot be told apart from others, and building trees, are
+/// outlive the result. Stages that cannot be separated from others, and the building of trees, are
 /// not timed. Empty for a scene without parts.
 std::vector<StageTiming> stage_timings(const Scene& scene, const Renderer& renderer);
 

@@ -21,8 +21,7 @@
 
 namespace palpate::rendering::extremes {
 
-// What the extreme cases share: a scene whose every tick is audited. Included by extreme_*.cpp
-// alone.
+// Shared by the extreme cases: a scene whose every tick is audited.
 
 using MeshPointer = std::shared_ptr<const stimuli::ConvexMesh>;
 
@@ -32,7 +31,7 @@ inline MeshPointer solid(const stimuli::PolygonSoup& soup) {
 
 inline constexpr double kStylus = 0.12;  // m
 inline constexpr double kRounding =
-    1e-9;  // of the object's size: smaller errors of lengths are none
+    1e-9;  // of the object's size; smaller errors of lengths are rounding
 inline constexpr const char* kLengthError = "worst error of a length, sizes of the object";
 
 /// One object under a renderer, every tick compared with the reference.
@@ -62,7 +61,7 @@ class AuditedScene {
     const TickAudit audit = audit_tick(scene_, renderer_, world, r, kRounding);
     ++result_.ticks;
     result_.in_contact += r.contacts > 0;
-    // The rounding that a distance from the origin and a long probe add does not count.
+    // Do not count the rounding that distance from the origin and a long probe add.
     const double rounding = audit.tolerance - kRounding * mesh_->size();
     const double error = std::max({audit.missed, audit.penetrates, audit.floats, audit.shallow});
     result_.worst = std::max(result_.worst, std::max(0.0, error - rounding) / mesh_->size());
@@ -70,8 +69,8 @@ class AuditedScene {
       std::ostringstream out;
       out << renderer_.name() << ", tick " << result_.ticks << ": missed " << audit.missed
           << " m, penetrates " << audit.penetrates << " m, floats " << audit.floats
-          << " m, too shallow by " << audit.shallow << " m, force off by " << audit.force
-          << " of it, fault bits " << r.faults << (audit.finite ? "" : ", not finite") << "; size "
+          << " m, too shallow by " << audit.shallow << " m, relative error of force " << audit.force
+          << ", fault bits " << r.faults << (audit.finite ? "" : ", not finite") << "; size "
           << mesh_->size() << " m";
       result_.detail = out.str();
     }
@@ -151,13 +150,13 @@ ExtremeResult closed_paths_lossy(const Renderer& renderer);
 ExtremeResult closed_paths_in_the_blend(const Renderer& renderer);
 
 // Extreme cases by energy: the work of the renderer on the hand over closed paths. A virtual wall
-// must be passive: it gives back what was put in, or less, never more.
+// must be passive: it returns at most the energy put in.
 
 namespace {
 
 constexpr double kBlend = std::numbers::pi / 180;  // rad; equation (2)
-constexpr double kExtrapolated = 1e-6;  // of the stored energy: error of the extrapolation
-constexpr double kDepth = 1e-3;         // m, about which a cycle goes
+constexpr double kExtrapolated = 1e-6;  // of the stored energy; error of the extrapolation
+constexpr double kDepth = 1e-3;         // m, the middle of a cycle
 
 /// tip = middle + across sin(turn) + along (1 - cos(turn)), and the tail likewise; periodic.
 struct Cycle {
@@ -175,11 +174,11 @@ struct Cycle {
 
 struct Lap {
   double work = 0;      ///< J, done on the hand
-  double wound_up = 0;  ///< J, by which the friction spring's energy grew
+  double wound_up = 0;  ///< J, growth of the friction spring's energy
   double stored = 0;    ///< J, at the deepest
   double force = 0;     ///< N, the largest
   double rocking = 0;   ///< m, travel of one end against the other along z in the blend of (2)
-  double jumps = 0;     ///< J, error bound of the sum where the force jumps, from facet to facet
+  double jumps = 0;     ///< J, error bound of the sum where the force jumps between facets
   int ticks = 0, in_contact = 0, in_blend = 0;
   bool one_facet = true;  ///< held by one facet of M all the way
   bool upwards = true;    ///< its normal within some degrees of +z
@@ -209,9 +208,9 @@ class ClosedPathBench {
     return now;
   }
 
-  /// Once round, continuing from the last tick. Over a period the sum of force times speed at equal
-  /// steps converges faster than any power of their number where the force is smooth; where the lap
-  /// is not periodic (friction drifts) its ends are weighted as in the trapezium rule.
+  /// One lap, continuing from the last tick. Over a period, the sum of force times speed at equal
+  /// steps converges faster than any power of their number if the force is smooth. If the lap is
+  /// not periodic (friction drifts), its ends are weighted as in the trapezium rule.
   Lap lap(const Cycle& cycle, int ticks) {
     Lap lap;
     const double step = 2 * std::numbers::pi / ticks, power_before = power_;
@@ -244,7 +243,7 @@ class ClosedPathBench {
   }
 
  private:
-  /// Of the spring that holds a sticking contact, J.
+  /// J, of the spring that holds a sticking contact.
   double friction_energy() const {
     const Vec3& offset = state_.parts[0].friction.tangential_offset;
     return stiffness_ * glm::dot(offset, offset) / 2;
@@ -286,7 +285,7 @@ Cycle cycle_anywhere(Random& random, ClosedPathBench& bench) {
 /// A stylus nearly flat on the top of the cube, rocking through the blend of equation (2).
 Cycle cycle_over_a_flat(Random& random, ClosedPathBench& bench) {
   const double turn = 2 * std::numbers::pi * random.unit();
-  // The ends of the full length are past the face; those of a short one over it.
+  // The ends of the full length are past the face; those of a short stylus are over it.
   const double length = random.unit() < 0.5 ? kStylus : 0.3 * kStylus;
   const Vec3 d = length * Vec3(std::cos(turn), std::sin(turn), 0);
   const double fraction = random.unit();
@@ -295,7 +294,7 @@ Cycle cycle_over_a_flat(Random& random, ClosedPathBench& bench) {
   cycle.middle = bench.press({centre - fraction * d, centre + (1 - fraction) * d}, {0, 0, -1}, 0.1);
   cycle.across = small(random, 1e-3);
   cycle.along = small(random, 5e-4);
-  // The rise of one end over the other at 2 degrees, less what the ends move besides.
+  // The rise of one end over the other at 2 degrees, less the ends' other motion.
   const double rock = 2 * random.unit() * length * std::sin(kBlend);
   cycle.across.tip.z = -0.5 * rock;
   cycle.across.tail.z = 0.5 * rock;
@@ -355,7 +354,7 @@ Lap lossy_lap(const Renderer& renderer, std::uint64_t round, int ticks) {
   }
   ClosedPathBench bench(renderer, shape(round / 3), material);
   const Cycle cycle = cycle_anywhere(random, bench);
-  bench.lap(cycle, ticks);  // the first begins with a jump, and winds friction's spring up
+  bench.lap(cycle, ticks);  // the first begins with a jump and stretches friction's spring
   return bench.lap(cycle, ticks);
 }
 
@@ -391,8 +390,8 @@ ExtremeResult closed_paths_in_the_blend(const Renderer& renderer) {
     bench.lap(cycle, 4000);  // the first begins with a jump
     const Lap lap = bench.lap(cycle, 4000);
     if (!lap.upwards) continue;
-    // Equation (2) applies the force of the deeper end at a point between the ends, so it does work
-    // of at most the force times what one end moves against the other meanwhile.
+    // Equation (2) applies the force of the deeper end at a point between the ends, so its work is
+    // at most the force times the relative motion of the ends.
     const double bound = lap.force * lap.rocking + lap.jumps + kRounding * lap.stored;
     ExtremeResult result;
     count(result, lap);
@@ -409,7 +408,7 @@ ExtremeResult closed_paths_in_the_blend(const Renderer& renderer) {
 
 namespace {
 
-/// 0, or so small that rounding may take it for 0, or a little more.
+/// 0, values small enough that rounding may hide them, and slightly larger ones.
 constexpr double kTiny[] = {0, 1e-17, 1e-15, 1e-13, 1e-11, 1e-9, 1e-7, 1e-5, 1e-3};
 
 }  // namespace
@@ -455,7 +454,7 @@ ExtremeResult parallel_edge(const Renderer& renderer) {
     for (const double beside : kTiny) {
       for (int round = 0; round < 12; ++round) {
         AuditedScene scene(renderer, box);
-        // Along the edge at y = z = 0.03, coming from above or from the corner, then round the
+        // Approaches the edge at y = z = 0.03 from above or from the corner, then moves around the
         // edge, along it and off its end.
         Vec3 u = Vec3(round % 2 ? 1 : -1, 0, 0) + tilt * random_direction(random);
         u = glm::normalize(u);
@@ -501,7 +500,7 @@ ExtremeResult through_vertices(const Renderer& renderer) {
 }
 
 ExtremeResult zero_length(const Renderer& renderer) {
-  // A probe without length is a point: force as of the point renderer, none of it on device 2.
+  // A probe without length is a point: the force of the point renderer, and no force on device 2.
   const MeshPointer mesh = solid(stimuli::icosphere(0.03, 2));
   AuditedScene scene(renderer, mesh), point(point_renderer(), mesh);
   Random random(6);
@@ -520,8 +519,8 @@ ExtremeResult zero_length(const Renderer& renderer) {
 }
 
 ExtremeResult tiny_length(const Renderer& renderer) {
-  // Lengths below the rounding of coordinates exist near the mesh's origin alone: meshes whose
-  // surface passes there.
+  // Lengths below the rounding of coordinates exist only near the mesh's origin, so use meshes
+  // whose surface passes through it.
   const stimuli::PolygonSoup shapes[] = {stimuli::icosphere(0.03, 1), stimuli::cube(0.06)};
   CombinedResult all;
   for (const stimuli::PolygonSoup& shape : shapes) {
@@ -594,7 +593,7 @@ ExtremeResult teleports(const Renderer& renderer) {
       AuditedScene scene(renderer, mesh);
       scene.audited_tick({Vec3(0, 0, 1), Vec3(0, 0, 1 + kStylus)});
       for (int i = 0; i < 200; ++i) {
-        // Near, far, very far; along the axes as often as not.
+        // Near, far, very far; about half of them along the axes.
         const double reach = i % 5 == 0 ? 1e5 : i % 5 == 1 ? 1 : 0.05;
         const Vec3 tip = reach * random.unit() * random_direction(random);
         const Vec3 axes[] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
@@ -704,14 +703,14 @@ ExtremeResult paths_over(const Renderer& renderer, const MeshPointer& mesh, cons
                                                 renderer.side_contact(), ticks)) {
         scene.audited_tick(probe);
       }
-      all.add(scene.result());  // one path may pass a needle by, all together may not
+      all.add(scene.result());  // one path may miss a needle; all together may not
     }
   }
   return all.result();
 }
 
 ExtremeResult sliver(const Renderer& renderer) {
-  // A blade, and a tetrahedron of which every face is a sliver: 1 to 1,000,000.
+  // A blade, and a tetrahedron whose every face is a sliver of 1 to 1,000,000.
   const MeshPointer blade = solid(stretched(stimuli::cube(0.1), {1, 1e-6, 1}));
   stimuli::PolygonSoup wedge;
   wedge.vertices = {{-0.05, 0, 0}, {0.05, 0, 0}, {0, -5e-8, 1e-7}, {0, 5e-8, 1e-7}};
@@ -760,11 +759,11 @@ ExtremeResult far_object(const Renderer& renderer) {
 }
 
 ExtremeResult million_triangles(const Renderer& renderer) {
-  // 1,310,720 triangles; their edges are 0.1 mm long in the mean.
+  // 1,310,720 triangles with edges of 0.1 mm on average.
   const MeshPointer mesh = solid(stimuli::icosphere(0.0216, 8));
   AuditedScene scene(renderer, mesh);
   Random random(5);
-  // The reference looks at every triangle: few ticks, from free space to sliding at 0.1 m/s.
+  // The reference scans every triangle, so take few ticks, from free space to sliding at 0.1 m/s.
   const Vec3 axis = stimuli::uniform_rotation(random) * Vec3(0, 0, 1);
   const Vec3 across = glm::normalize(glm::cross(axis, Vec3(1, 0, 0)));
   for (int i = 0; i < 60; ++i) {

@@ -13,20 +13,20 @@ struct ExtremeResult {
   bool passed = false;
   double worst = 0;         ///< the measure, in the case's unit
   double limit = 0;         ///< largest allowed
-  std::uint64_t ticks = 0;  ///< that were compared with the reference
+  std::uint64_t ticks = 0;  ///< compared with the reference
   std::uint64_t in_contact = 0;
-  std::string detail;  ///< what is wrong, with numbers; empty when it passed
+  std::string detail;  ///< the error, with numbers; empty if it passed
 };
 
 struct ExtremeCase {
   const char* name;     ///< "sliver"; letters, digits and -
-  const char* title;    ///< what is done, in one line
-  const char* measure;  ///< what `worst` is, with its unit
+  const char* title;    ///< the case in one line
+  const char* measure;  ///< meaning of `worst`, with its unit
   ExtremeResult (*run)(const Renderer& renderer);
 };
 
-/// All of them. Each takes well below a second, but for "million-triangles" (some seconds, most of
-/// them to build the mesh).
+/// All cases. Each takes well below a second, except "million-triangles": some seconds, mostly to
+/// build the mesh.
 std::span<const ExtremeCase> extreme_cases();
 
 }  // namespace palpate::rendering

@@ -50,18 +50,18 @@ std::optional<EntryFeature> entry_feature(const stimuli::ConvexMesh& mesh, const
   };
   for (std::uint32_t i = 0; i < mesh.facets().size(); ++i) consider(false, i);
   for (std::uint32_t i = 0; i < mesh.edges().size(); ++i) consider(true, i);
-  // Where another depth is this near, rounding decides.
+  // Where another depth is this close, rounding decides.
   if (second - least < kNeighbouringDepths * mesh.size()) return std::nullopt;
   return best;
 }
 
 namespace {
 
-// Planes whose normals span less than this (squared sine, or the squared volume of three) meet in
-// no point or line that rounding leaves in place.
+// Planes whose normals span less than this (squared sine, or the squared volume of three) have no
+// intersection that is stable under rounding.
 constexpr double kDependent = 1e-13;
 
-/// The multipliers with which `from` comes to lie on all the planes chosen.
+/// The multipliers that move `from` onto all chosen planes.
 bool on_planes(const Vec3& from, std::span<const HalfSpace> planes,
                std::span<const std::size_t> chosen, std::array<double, 3>& multipliers) {
   // A plane that is not chosen is replaced by an equation of its own: multiplier = 0.
@@ -81,7 +81,7 @@ bool on_planes(const Vec3& from, std::span<const HalfSpace> planes,
   return true;
 }
 
-/// Newton's step of the same system takes out what rounding left.
+/// A Newton step of the same system removes rounding errors.
 Vec3 displaced(const Vec3& from, std::span<const HalfSpace> planes,
                std::span<const std::size_t> chosen, std::array<double, 3>& multipliers) {
   Vec3 at = from;
@@ -123,8 +123,8 @@ std::optional<NearestPoint> nearest_point(const Vec3& from, std::span<const Half
       nearest->multipliers[chosen[i]] = multipliers[i];
     }
   };
-  // Of what satisfies the conditions of Kuhn and Tucker there is one point only; where planes
-  // coincide within the tolerance, several sets of them give it, and any will do.
+  // Only one point satisfies the Karush-Kuhn-Tucker conditions. Where planes coincide within the
+  // tolerance, several sets of them give it; any will do.
   try_on({});
   const std::size_t n = planes.size();
   for (std::size_t a = 0; a < n; ++a) try_on(std::array{a});
@@ -141,18 +141,18 @@ std::optional<NearestPoint> nearest_point(const Vec3& from, std::span<const Half
 
 namespace {
 
-/// Normals that span a line, a plane or the space, with what gives a vector's multiple of each:
-/// its product with `up`.
+/// Normals that span a line, a plane or the space. A vector's multiple of each normal is its
+/// product with `up`.
 struct Generators {
   std::array<Vec3, 3> normals, up;
   std::size_t count = 0;
 
-  /// m; what the non-negative multiples leave of the vector; infinity where one is negative, or so
-  /// large that what is left is rounding.
+  /// m, the residual of the vector after its non-negative multiples; infinity if a multiple is
+  /// negative, or so large that the residual is rounding.
   double rest(const Vec3& vector, double most_multiple) const {
     Vec3 left = vector;
     std::array<double, 3> multiples{};
-    for (int step = 0; step < 2; ++step) {  // the second takes out the rounding of the first
+    for (int step = 0; step < 2; ++step) {  // the second removes the rounding of the first
       const Vec3 before = left;
       for (std::size_t i = 0; i < count; ++i) {
         const double more = glm::dot(up[i], before);

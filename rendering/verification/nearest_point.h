@@ -1,6 +1,6 @@
 #pragma once
-// The point nearest to a given one among those above some planes, by trying every vertex, edge and
-// face that they can form. For checks, not for the servo.
+// The point above some planes that is nearest to a given one, found by trying every vertex, edge
+// and face that the planes can form. For checks, not for the servo.
 
 #include <cstdint>
 #include <optional>
@@ -25,11 +25,11 @@ bool separated_by_facet_plane(const stimuli::ConvexMesh& mesh, const LineProbe& 
                               const LineProbe& after);
 
 /// Outward normal and depth of one facet of M (a facet of the mesh with the deeper end, or an edge)
-/// for a probe; edges that are no silhouette edges have none. Mesh frame.
+/// for a probe; edges that are not silhouette edges have none. Mesh frame.
 std::optional<ReferenceDepth> measure_feature(const stimuli::ConvexMesh& mesh, bool is_edge,
                                               std::uint32_t i, const LineProbe& probe);
 
-/// The facet of M through which the probe enters, where that is unambiguous.
+/// The facet of M through which the probe enters, if it is unambiguous.
 struct EntryFeature {
   bool is_edge = false;
   std::uint32_t index = 0;
@@ -48,13 +48,13 @@ struct NearestPoint {
   std::vector<double> multipliers;
 };
 
-/// \param tolerance  how far below a plane is still above it
-/// \return empty when no point is above all of them, or none can be told from rounding
+/// \param tolerance  a point this far below a plane still counts as above it
+/// \return empty when no point is above all of them, or rounding hides it
 std::optional<NearestPoint> nearest_point(const Vec3& from, std::span<const HalfSpace> planes,
                                           double tolerance);
 
-/// m; how far a vector is from all sums of non-negative multiples of the normals. In 3 dimensions
-/// the nearest of them has at most three terms, which are all tried.
+/// m, from a vector to the cone of non-negative sums of the normals. In 3 dimensions the nearest
+/// sum has at most three terms; all such sums are tried.
 /// \param normals        unit
 /// \param most_multiple  of a normal, in lengths of the vector: beyond 1e5 opposite normals hold
 ///                       anything across them

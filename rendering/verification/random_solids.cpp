@@ -128,7 +128,7 @@ struct PathBuilder {
 
   void plunges() {
     while (!full()) {
-      // Through a mixture of corners, which is inside.
+      // Through a weighted mean of corners, which is inside.
       Vec3 at = mesh.vertices()[0];
       for (int i = 1; i < 5; ++i) {
         at = glm::mix(at, mesh.vertices()[random.below(mesh.vertices().size())], random.unit());
@@ -253,8 +253,8 @@ struct Block {
   stimuli::PolygonSoup soup;
   std::vector<Plane> planes;
 
-  /// Removes what is above the plane. Corners on it count as below, so the plane must not go
-  /// through one: random planes do not.
+  /// Removes what is above the plane. Corners on it count as below, so it must not pass through
+  /// one; random planes do not.
   void cut(const Plane& plane) {
     const auto height = [&](Index v) {
       return glm::dot(plane.normal, soup.vertices[v]) - plane.offset;
@@ -411,7 +411,7 @@ stimuli::ConvexMesh random_solid(Random& random) {
     try {
       return stimuli::ConvexMesh(turned_and_moved(std::move(soup), turn, scale, to));
     } catch (const stimuli::MeshError&) {
-      // Too thin to be told from a flat one: another.
+      // Indistinguishable from flat; redraw.
     }
   }
 }

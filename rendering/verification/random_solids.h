@@ -10,7 +10,7 @@
 
 namespace palpate::rendering {
 
-// Random numbers as the searches and cases draw them.
+// Random draws of the searches and cases.
 
 /// Uniform from low to high.
 inline double between(Random& random, double low, double high) {
@@ -27,8 +27,8 @@ inline Vec3 random_direction(Random& random) {
 
 enum class PathKind {
   smooth,   ///< a hand that wanders in and out, 1e-4 to 0.03 sizes a tick
-  sliding,  ///< near the surface all the time, from just outside to beyond the middle
-  fast,     ///< straight past and through, 5 m/s or 0.01 to 3 sizes a tick, turning on the way
+  sliding,  ///< always near the surface, from just outside to beyond the middle
+  fast,     ///< straight past and through, 5 m/s or 0.01 to 3 sizes a tick, turning
   plunges,  ///< from outside, by 1e-16 to 1 sizes, straight in and out again
   jumps,    ///< an unrelated pose at every tick
   aligned,  ///< along edges, in planes of facets, through corners: exactly or nearly
@@ -36,9 +36,9 @@ enum class PathKind {
 inline constexpr int kPathKinds = 6;
 const char* to_string(PathKind kind);
 
-/// Starts far outside (its first pose); 1 kHz.
+/// The first pose is far outside; 1 kHz.
 /// \param length  m, of the probe
-/// \param side    false: the tip is led over the surface, not the side
+/// \param side    false: the tip moves over the surface, not the side
 std::vector<LineProbe> random_path(Random& random, PathKind kind, const stimuli::ConvexMesh& mesh,
                                    double length, bool side, std::size_t ticks);
 

@@ -9,8 +9,8 @@ namespace palpate::rendering {
 
 namespace {
 
-// An edge this nearly parallel to the probe is no contact edge: the parallelogram that it spans
-// with the probe has no width.
+// An edge this nearly parallel to the probe is not a contact edge: the parallelogram that the two
+// span has no width.
 constexpr double kParallelSine = 1e-9;
 
 // Depths up to this fraction of the object's size count as touching, not as penetrating: an ideal
@@ -25,7 +25,7 @@ double point_segment_distance(const Vec3& p, const Vec3& a, const Vec3& b) {
 }
 
 // Every candidate is a distance between two points of the segments, so rounding in the nearly
-// parallel case can only make a candidate useless, never the result too small.
+// parallel case can make a candidate useless, but never the result too small.
 double segment_distance(const Vec3& a0, const Vec3& a1, const Vec3& b0, const Vec3& b1) {
   double nearest =
       std::min({point_segment_distance(a0, b0, b1), point_segment_distance(a1, b0, b1),
@@ -43,7 +43,7 @@ double segment_distance(const Vec3& a0, const Vec3& a1, const Vec3& b0, const Ve
   return nearest;
 }
 
-// The part of the segment that lies in every half-space of the mesh is not empty.
+// Whether some part of the segment lies in every half-space of the mesh.
 bool overlaps(const stimuli::ConvexMesh& mesh, const LineProbe& probe) {
   double enters = 0;
   double leaves = 1;
@@ -92,8 +92,8 @@ ReferenceDepth reference_depth(const stimuli::ConvexMesh& mesh, const LineProbe&
     const Vec3& v0 = edge.from;
     const Vec3 e = edge.to - v0;
     if (glm::length(glm::cross(e, d)) <= kParallelSine * glm::length(e) * glm::length(d)) continue;
-    // The direction e x d, turned outside, as the mixture of the two facet normals that is at right
-    // angles to d: it cannot leave the arc between them, however small e x d is.
+    // The outward direction of e x d, computed as the mixture of the two facet normals that is at
+    // right angles to d. It stays on the arc between them, however small e x d is.
     const Vec3 normal = glm::normalize(std::abs(right_slope) * left + std::abs(left_slope) * right);
     const double depth = glm::dot(normal, v0) - glm::dot(normal, probe.tip);
     if (depth < least.depth) least = {depth, normal};

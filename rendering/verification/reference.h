@@ -1,7 +1,7 @@
 #pragma once
 // Brute-force reference: penetration depth, distance and time of impact over all facets and edges.
-// Deliberately independent of facet_walk: it shares the mesh and nothing else. For checks, not for
-// the servo. Mesh frame, SI units.
+// Deliberately independent of facet_walk: it shares only the mesh. For checks, not for the servo.
+// Mesh frame, SI units.
 
 #include <optional>
 
@@ -11,8 +11,8 @@
 namespace palpate::rendering {
 
 /// Penetration depth of the segment in the mesh: the shortest translation that separates them, over
-/// all facets of M = mesh (+) (-segment) (facet_walk.h). Negative when they do not touch: then only
-/// the sign counts. For a point, pass tip == tail.
+/// all facets of M = mesh (+) (-segment) (facet_walk.h). Negative when they do not touch; then only
+/// the sign is meaningful. For a point, pass tip == tail.
 struct ReferenceDepth {
   double depth = 0;  ///< m
   Vec3 normal;       ///< unit, of the facet of M that attains it

@@ -26,7 +26,7 @@ bool all_finite(const Rendering& r) {
          std::isfinite(r.deepest.along) && finite(r.ideal.tip) && finite(r.ideal.tail);
 }
 
-/// Relative to the contact's force; levers relative to the lengths that they were computed from.
+/// Relative to the contact's force; levers relative to the lengths from which they were computed.
 double force_error(const Renderer& renderer, const LineProbe& probe, const Rendering& r,
                    double stiffness, double size) {
   const double full = stiffness * r.deepest.depth;
@@ -160,7 +160,7 @@ class Walk {
     last_held_ = held;
   }
 
-  /// The tick began in free space: what a hundredth of it shows, by brute force.
+  /// Checks a tick that began in free space in a hundred steps by brute force.
   void from_free_space(const LineProbe& local, const Rendering& r, bool held, double tolerance) {
     counts_.entries += held;
     if (held) count_fallback(local);
@@ -173,7 +173,7 @@ class Walk {
     }
     // A start at the surface is within rounding of any facet there.
     if (reference_gap(*mesh_, last_) < kAtSurface * mesh_->size()) return;
-    // It entered. Where its feature of entry holds it at every step, the contact must be there.
+    // The probe entered. If its feature of entry holds it at every step, the contact must be there.
     const auto entry = entry_feature(*mesh_, interpolated(last_, local, *time));
     if (!entry) return;
     ReferenceDepth at_end;
@@ -195,7 +195,7 @@ class Walk {
       counts_.turned_elsewhere += elsewhere;
       return;
     }
-    // A step may have led through a thin part and past it: then another feature holds the probe.
+    // A step may have passed right through a thin part: then another feature holds the probe.
     if (elsewhere && !is_outside_until(local, *time)) return;
     ++counts_.passages;
     if (elsewhere) {
@@ -205,12 +205,12 @@ class Walk {
     }
   }
 
-  /// Whether the probe is outside until it enters, at a fraction of the tick: at all times it is
-  /// farther away than it moves until one at which its distance was measured. False also where
-  /// that would take too many looks.
+  /// Whether the probe is outside until its entry at a fraction of the tick. Proves it by
+  /// bisection: each interval's middle must be farther away than the probe moves within half the
+  /// interval. False also if that takes too many measurements.
   bool is_outside_until(const LineProbe& local, double entry) const {
     constexpr int kMostLooks = 100'000;
-    constexpr double kAtEntry = 1e-6;  // of the tick; so long before it nothing is told
+    constexpr double kAtEntry = 1e-6;  // of the tick; not checked so shortly before the entry
     const double motion =
         std::max(glm::length(local.tip - last_.tip), glm::length(local.tail - last_.tail));
     std::vector<std::pair<double, double>> left{{0, entry}};
@@ -242,8 +242,8 @@ class Walk {
     return true;
   }
 
-  /// A contact that began although no step shows the probe inside: it must at least come as near as
-  /// it moves in one step.
+  /// A contact that began although no step shows the probe inside: the probe must come at least as
+  /// near as it moves in one step.
   void expect_touch(const LineProbe& local, double tolerance) {
     const double step =
         std::max(glm::length(local.tip - last_.tip), glm::length(local.tail - last_.tail)) /
@@ -267,7 +267,7 @@ class Walk {
     counts_.fallbacks += first.feature.kind == ContactFeature::Kind::none;
   }
 
-  /// How far the probe has turned in the tick, rad.
+  /// rad, by which the probe turned in the tick.
   double turned(const LineProbe& local) const {
     const Vec3 a = last_.tail - last_.tip, b = local.tail - local.tip;
     return std::atan2(glm::length(glm::cross(a, b)), glm::dot(a, b));
@@ -296,7 +296,7 @@ class Walk {
   PathKind kind_;
   Scene scene_;
   RenderState state_;
-  LineProbe last_;  // at the last tick, as it can touch; mesh frame
+  LineProbe last_;  // the part that can touch, at the last tick; mesh frame
   bool has_last_ = false, last_held_ = false;
   double depth_ = 0;  // m, of the contact under audit
   SearchFault fault_;

@@ -14,21 +14,22 @@ namespace palpate::rendering {
 // Errors of one tick of a renderer over a scene of one convex part, against the brute-force
 // reference. For checks, not for the servo.
 
-/// What can touch, in the frame of the part's mesh: for the point renderer the tip alone.
+/// The part of the probe that can touch, in the frame of the part's mesh: for the point renderer
+/// the tip alone.
 LineProbe felt_probe(const Scene& scene, const Renderer& renderer, const LineProbe& probe);
 
-/// Errors of one tick, each 0 where all is right. Lengths in m.
+/// Errors of one tick, each 0 in a correct tick. Lengths in m.
 struct TickAudit {
   double depth = 0;       ///< of the virtual probe by the reference; negative: outside
   double missed = 0;      ///< depth of a probe without contact
   double penetrates = 0;  ///< depth of the ideal probe
   double floats = 0;      ///< gap between the ideal probe and the object, in contact
-  double shallow = 0;     ///< by how much a contact is shallower than the reference
-  /// Relative; how far force, torque and the devices' forces are from those of a spring at the
-  /// contact. In free space N and N m.
+  double shallow = 0;     ///< difference by which a contact is shallower than the reference
+  /// Relative error of force, torque and the devices' forces against a spring at the contact. In
+  /// free space N and N m.
   double force = 0;
   bool finite = true;  ///< all numbers of the rendering
-  /// m, what counts as rounding at this size and distance: errors of lengths up to it are none.
+  /// m, rounding at this size and distance; shorter errors of lengths do not count.
   double tolerance = 0;
 
   bool good() const {
@@ -37,9 +38,9 @@ struct TickAudit {
   }
 };
 
-/// \param rounding  fraction of the object's size that counts as rounding; what its distance from
-/// the origin and the probe's length add is in the tolerance as well \pre  the scene has one part,
-/// of a plain spring
+/// \param rounding  fraction of the object's size that counts as rounding. The tolerance also
+/// includes rounding due to the distance from the origin and the probe's length.
+/// \pre the scene has one part with a plain spring
 TickAudit audit_tick(const Scene& scene, const Renderer& renderer, const LineProbe& probe,
                      const Rendering& rendering, double rounding = 1e-9);
 
@@ -50,20 +51,20 @@ inline constexpr std::uint64_t kTicksPerWalk = 500;
 /// it.
 struct SearchFault {
   std::uint64_t seed = 0, walk = 0, tick = 0;
-  std::string what;  ///< renderer, object, and what is wrong, with numbers
+  std::string what;  ///< renderer, object and error, with numbers
 };
 
-/// What a search covered, and what it found wrong.
+/// The coverage of a search and the errors that it found.
 struct SearchCounts {
   std::uint64_t walks = 0, ticks = 0;
   std::uint64_t in_contact = 0;  ///< ticks in contact
-  std::uint64_t entries = 0;     ///< contacts that began
-  /// Ticks from free space that were repeated in a hundred steps by brute force.
+  std::uint64_t entries = 0;     ///< contacts begun
+  /// Ticks from free space repeated in a hundred steps by brute force.
   std::uint64_t walked_finely = 0;
-  /// Of those: the probe entered through a feature that holds it at all further steps.
+  /// Those of them in which the probe entered through a feature that holds it at all further steps.
   std::uint64_t passages = 0;
 
-  // Wrong ticks; all of these must be 0.
+  // Wrong ticks: all of these must be 0.
   std::uint64_t missed = 0;  ///< inside by more than 1e-9 of the size, without contact
   /// Passages without contact on the side of entry: a thin plate, passed through.
   std::uint64_t passed_through = 0;
@@ -77,21 +78,22 @@ struct SearchCounts {
   std::uint64_t endless = 0;  ///< facet walks that reached their limit of steps
   std::uint64_t faulted = 0;  ///< other fault bits
 
-  /// Not wrong, but counted: entries without a crossing, so that all features were searched.
+  /// Not wrong, but counted: entries without a crossing, after which all features were searched.
   std::uint64_t fallbacks = 0;
   /// Not wrong, but counted: passages of a probe that turned by more than 0.1 rad within the tick
-  /// (100 rad/s, faster than any hand), held on another side or lost. It may enter more than once.
+  /// (100 rad/s, faster than any hand), held on another side or lost. Such a probe may enter more
+  /// than once.
   std::uint64_t turned_elsewhere = 0;
   double worst_penetration = 0;  ///< of the ideal probe, in sizes of the object
 
-  std::vector<SearchFault> faults;  ///< the first ones, at most kFaultsKept
+  std::vector<SearchFault> faults;  ///< the first, at most kFaultsKept
 
   static constexpr std::size_t kFaultsKept = 10;
   std::uint64_t wrong() const {
     return missed + passed_through + phantom + penetrating + floating + shallow + wrong_force +
            not_finite + endless + faulted;
   }
-  /// Adds another's. Summed in the order of walks, the result does not depend on threads.
+  /// Adds the other's counts. Summed in the order of walks, the result does not depend on threads.
   SearchCounts& operator+=(const SearchCounts& other);
 };
 

@@ -1,6 +1,6 @@
 #pragma once
-// A seeded hand that strokes any object by what it feels, for measurements: the same poses for all
-// that are compared. World frame, SI units.
+// A seeded hand that strokes any object by feel, for measurements: the same poses for all compared
+// methods. World frame, SI units.
 
 #include <algorithm>
 #include <cmath>
@@ -14,7 +14,7 @@ namespace palpate::rendering {
 
 struct SurfaceStrokeSettings {
   Vec3 centre;                ///< m, of the object's bounding sphere
-  double radius = 0.03;       ///< m, of it; below 30 mm depth and speed shrink with it
+  double radius = 0.03;       ///< m, of that sphere; below 30 mm depth and speed shrink with it
   double length = 0.12;       ///< m, of the stylus
   bool side = true;           ///< the contact wanders between tip and side; else at the tip
   double lifted = 0;          ///< fraction of the time that the hand hovers 1 to 2 mm off
@@ -33,7 +33,7 @@ class SurfaceStroke {
         radius_(settings.radius + std::min(0.5 * settings.radius, 0.015)) {}
 
   /// The distance from the centre follows the penetration depth (m) at the last tick, so that the
-  /// path keeps to the surface of any object; negative: above it; 0: off it, unknown how far.
+  /// path keeps to the surface of any object. Negative: above it; 0: off it at an unknown distance.
   LineProbe next(double depth) {
     const double scale = std::min(1.0, settings_.radius / 0.03);
     const double step = 1e-4 * scale;  // m, of a tick

@@ -14,8 +14,8 @@
 namespace palpate::rendering {
 namespace {
 
-// Compilers choose the order of a call's arguments: every draw is a statement of its own, or a walk
-// would not be the same everywhere.
+// Compilers choose the order of a call's arguments: make every draw a statement of its own, so that
+// a walk is the same everywhere.
 
 Vec3 vector_between(Random& random, double low, double high) {
   Vec3 drawn;
@@ -97,7 +97,7 @@ Vec3 groove_displacement(double opening, const Vec3& virtual_tip) {
   const double below_right = -glm::dot(right, virtual_tip);
   const double below_left = -glm::dot(left, virtual_tip);
   const double c = glm::dot(left, right);
-  // On one wall alone, where the other one is not in the way there.
+  // On one wall alone, if the other one is not in the way there.
   if (below_right > 0 && below_left <= c * below_right) return below_right * right;
   if (below_left > 0 && below_right <= c * below_left) return below_left * left;
   if (below_right <= 0 && below_left <= 0) return Vec3(0);
@@ -136,7 +136,7 @@ OracleParts cut_to_pieces(const stimuli::PolygonSoup& solid, int cuts, Random& r
 
 OracleParts random_cluster(Random& random, int parts) {
   OracleParts cluster;
-  Vec3 corner(-0.02);  // of the next box that abuts the one before
+  Vec3 corner(-0.02);  // of the next box, which abuts the previous one
   while (static_cast<int>(cluster.size()) < parts) {
     if (random.below(3) == 0) {
       const Vec3 size = vector_between(random, 0.01, 0.03);
@@ -183,7 +183,7 @@ std::vector<OraclePose> random_tool_path(Random& random, const OracleParts& part
     const Vec3 direction = random_direction(random);
     return between(random, 0.3, 1.2) * radius * direction - turned * led;
   };
-  // It comes in straight, from just off the object.
+  // Comes in straight, from just off the object.
   const UnionOracle oracle(parts, tool);
   const Vec3 first = next_tip(orientation);
   const Vec3 outwards = random_direction(random);

@@ -12,39 +12,39 @@
 
 namespace palpate::rendering {
 
-// Steepest descent of a point towards another one outside of convex sums, each given by all of its
-// planes. Of union_oracle.cpp alone.
+// Steepest descent of a point towards another one outside convex sums, each given by all of its
+// planes.
 
-/// Fraction of what counts as touching by which a goal may lie below a plane.
+/// Fraction of the touching distance by which a goal may lie below a plane.
 inline constexpr double kRoundingOfTouching = 1e-2;
 
-/// Where the tip would go next.
+/// The next goal of the tip.
 struct Choice {
   std::vector<const OracleSum*> touched;
-  std::vector<HalfSpace> planes;  ///< a facet of each
-  NearestPoint goal;              ///< above them
+  std::vector<HalfSpace> planes;  ///< one facet of each touched sum
+  NearestPoint goal;              ///< above the planes
   bool on_one_facet_each = true;  ///< no sum is touched on an edge
 };
 
-/// Steepest descent of the distance from the virtual tip. Near the tip the free space is what lies
-/// above one touched facet of every touched sum, any of them: of all the choices that is steepest
-/// whose nearest point to the virtual tip is nearest.
+/// Steepest descent of the distance from the virtual tip. Near the tip, the free space is the
+/// union, over all choices of one touched facet of every touched sum, of the space above those
+/// facets. The steepest choice is the one whose nearest point is closest to the virtual tip.
 class Descent {
  public:
   /// \param touching  m; sums no further away are touched
   Descent(const std::vector<OracleSum>& sums, const Vec3& virtual_tip, double touching)
       : sums_(sums), virtual_tip_(virtual_tip), touching_(touching) {}
 
-  /// Where the tip would go if the facets that it touches had no end and nothing else were in the
-  /// way. \return false when rounding leaves no such point
+  /// The tip's goal if the touched facets were infinite and nothing else were in the way.
+  /// \return false if rounding leaves no such point
   bool goal(const Vec3& tip, Choice& best);
 
-  /// m; what of the way from the virtual tip is no sum of non-negative multiples of the normals of
-  /// facets that are touched, each at most `most_multiple` times as long as the way.
+  /// m, the residual of the way from the virtual tip after non-negative multiples of the normals of
+  /// touched facets, each at most `most_multiple` times as long as the way.
   double unbalanced(const Vec3& tip, double most_multiple) const;
 
-  /// How much of the straight way to the goal lies outside all sums, with the facets of the choice
-  /// bounding those that are touched. In [0, 1].
+  /// The share of the straight way to the goal that lies outside all sums, 0 to 1. The facets of
+  /// the choice bound the touched sums.
   double free_way(const Vec3& tip, const Vec3& goal) const;
 
  private:
@@ -68,10 +68,10 @@ namespace {
 
 constexpr double kUnbounded = std::numeric_limits<double>::infinity();
 
-// Sine of half the opening of the narrowest groove that a tool can be in.
+// Sine of half the opening of the narrowest groove that can hold a tool.
 constexpr double kNarrowest = 1e-5;
 
-/// The facets of the sum that the tip touches; empty where it does not touch the sum.
+/// The facets of the sum that the tip touches; empty if it touches none.
 std::vector<std::size_t> touched_facets(const OracleSum& sum, const Vec3& tip, double touching) {
   const double height = sum.height(tip);
   std::vector<std::size_t> facets;
@@ -82,8 +82,8 @@ std::vector<std::size_t> touched_facets(const OracleSum& sum, const Vec3& tip, d
   return facets;
 }
 
-/// Between two parts that abut, the plane of their common face is above a facet of both: a crack
-/// without room is not free space.
+/// Whether the choice leaves free space. Between two abutting parts, the plane of their common face
+/// is above a facet of both, but a crack without room is not free space.
 bool leaves_room(const std::vector<HalfSpace>& planes) {
   std::vector<HalfSpace> raised;  // the cone of directions, out of each plane by 1
   raised.reserve(planes.size());
@@ -92,7 +92,7 @@ bool leaves_room(const std::vector<HalfSpace>& planes) {
   return out && glm::length(out->point) < 1 / kNarrowest;
 }
 
-/// Where the way enters a sum from outside; 1 where it does not.
+/// Fraction of the way at which it enters a sum from outside; 1 if it does not.
 double entry(const OracleSum& sum, const Vec3& tip, const Vec3& goal) {
   double enters = 0, leaves = kUnbounded;
   for (const OraclePlane& plane : sum.planes) {
@@ -120,7 +120,7 @@ bool Descent::goal(const Vec3& tip, Choice& best) {
   in_crack_ = false;
   choose(0, planes, best);
   if (best_distance_ < kUnbounded) return true;
-  in_crack_ = true;  // a tool that fits exactly into a gap can move in it
+  in_crack_ = true;  // a tool that fits a gap exactly can move in it
   choose(0, planes, best);
   return best_distance_ < kUnbounded;
 }
@@ -174,13 +174,14 @@ double Descent::free_way(const Vec3& tip, const Vec3& goal) const {
   return way;
 }
 
-/// Where the way leaves the touched facets of a sum over a side; 1 where it does not.
+/// Fraction of the way at which it leaves the touched facets of a sum over a side; 1 if it does
+/// not.
 double Descent::slides_off(const OracleSum& sum, const Vec3& tip, const Vec3& goal) const {
   double way = 1;
   for (const OraclePlane& plane : sum.planes) {
     const double before = plane.height(tip), after = plane.height(goal);
     if (before >= -touching_) {
-      if (after > touching_) return 1;  // it leaves the sum
+      if (after > touching_) return 1;  // it moves off the sum
     } else if (after > 0) {
       way = std::min(way, before / (before - after));
     }
@@ -195,14 +196,14 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // An edge this nearly parallel to the segment spans no facet with it.
 constexpr double kParallelSine = 1e-9;
 
-// Fraction of the largest length in play that counts as touching.
+// Touching distance, as a fraction of the largest length involved.
 constexpr double kTouching = 1e-13;
 
-// Of the thinnest part: the turn is cut into steps in which no point of the tool moves further, and
-// pushing the turned tool out may not move it further either, or it could come out elsewhere.
+// Of the thinnest part. The turn is cut into steps in which no point of the tool moves farther than
+// this. Pushing the turned tool out may not move it farther either, or it could come out elsewhere.
 constexpr double kStep = 0.25;
 constexpr int kMostSteps = 1000;  // of a turn
-constexpr int kHalvings = 8;      // of the step at which the turn gets stuck
+constexpr int kHalvings = 8;      // of the step in which the turn gets stuck
 
 constexpr int kMostRounds = 5000;  // of a descent
 
@@ -296,7 +297,7 @@ std::vector<OracleSum> UnionOracle::sums(const Mat3& axes) const {
         const double deeper = std::min(glm::dot(facet.normal, from), glm::dot(facet.normal, to));
         sum.planes.push_back({facet.normal, facet.offset - deeper});
       }
-      for (const Solid::Edge& edge : solid.edges) {  // with the segment, where it is a silhouette
+      for (const Solid::Edge& edge : solid.edges) {  // with the segment, if it is a silhouette edge
         const Vec3 &left = solid.planes[edge.left].normal, &right = solid.planes[edge.right].normal;
         const double left_rate = glm::dot(left, along), right_rate = glm::dot(right, along);
         if ((left_rate >= 0) == (right_rate >= 0)) continue;
@@ -319,7 +320,7 @@ double UnionOracle::depth(const OraclePose& tool) const {
   return deepest;
 }
 
-/// \return false when it could not be turned the whole way
+/// \return false if the whole turn was not possible
 bool UnionOracle::turn(OraclePose& ideal, const Mat3& to) const {
   const double angle = angle_between(ideal.axes, to);
   const double steps =
@@ -406,7 +407,7 @@ OracleAudit UnionOracle::audit(const OraclePose& ideal, const Vec3& virtual_tip,
 
 bool UnionOracle::held_in_gap(const OraclePose& ideal, const Vec3& virtual_tip, double touching,
                               double least) const {
-  constexpr double kMostLeverage = 1e9;  // beyond it facets that are parallel are not, by rounding
+  constexpr double kMostLeverage = 1e9;  // more: rounding tilts parallel facets
   const std::vector<OracleSum> all = sums(ideal.axes);
   return Descent(all, virtual_tip, touching).unbalanced(ideal.tip, kMostLeverage) <= least;
 }

@@ -3,8 +3,8 @@
 // of convex parts: for a fixed orientation the tool is one point, its tip, outside every Minkowski
 // sum M_ij = C_i (+) (-S_j) of part i and mirrored segment j. All half-spaces of all sums are
 // written out at every tick; the point descends to the virtual tip by steepest descent in the free
-// space. Independent of the contact law, the walk and the trees: it shares the mesh with them and
-// nothing else. For checks, not for the servo. World frame and SI units unless said otherwise.
+// space. Independent of the contact law, the walk and the trees: it shares only the mesh with them.
+// For checks, not for the servo. World frame and SI units unless said otherwise.
 
 #include <memory>
 #include <vector>
@@ -24,7 +24,7 @@ struct OracleSegment {
   Vec3 from, to;
 };
 
-/// Where the tool is.
+/// The pose of the tool.
 struct OraclePose {
   Vec3 tip;      ///< m
   Mat3 axes{1};  ///< rotation from the tool's frame
@@ -53,31 +53,31 @@ struct OracleContact {
   int part = 0, segment = 0;
   Vec3 normal;
   double share = 0;  ///< m: the displacement of the ideal tool is the sum of share * normal
-  /// m, along the segment from its first end: where it touches the part; equal where it touches at
-  /// a point
+  /// m, along the segment from its first end: the portion that touches the part; equal if it
+  /// touches at a point
   double first = 0, last = 0;
 };
 
 struct OracleTick {
   OraclePose ideal;
   std::vector<OracleContact> contacts;
-  /// Every sum that is touched carries a share, and is touched on one facet: there is no other way
-  /// to split the displacement.
+  /// Every touched sum carries a share and is touched on one facet: the displacement splits in one
+  /// way only.
   bool unique_shares = true;
   bool lagged = false;  ///< the ideal tool could not take the whole turn
-  bool failed = false;  ///< no descent ended within the limit of rounds: ideal is not one
+  bool failed = false;  ///< no descent ended within the limit of rounds: `ideal` is invalid
   int rounds = 0;
 };
 
-/// How an ideal tool keeps to the definition. Lengths in m; all are 0 where it does.
+/// Deviations of an ideal tool from the definition. Lengths in m, all 0 where it complies.
 struct OracleAudit {
-  double penetration = 0;  ///< the deepest that the ideal tip is inside a sum
-  /// Of the displacement, what is no sum of non-negative multiples of the normals of touched
+  double penetration = 0;  ///< the greatest depth of the ideal tip in a sum
+  /// The residual of the displacement after non-negative multiples of the normals of touched
   /// facets.
   double unbalanced = 0;
-  /// How far steepest descent would move it at once: 0 at a local minimum of its distance from the
-  /// virtual tip. On an edge exactly, what one facet holds may slide off along the other: there it
-  /// is not 0, although nothing is unbalanced.
+  /// The next move of steepest descent: 0 at a local minimum of the distance from the virtual tip.
+  /// Exactly on an edge, a tool held by one facet may slide off along the other: there it is not 0,
+  /// although nothing is unbalanced.
   double descent = 0;
 };
 
@@ -87,15 +87,17 @@ class UnionOracle {
 
   /// Every M_ij at this orientation of the tool.
   std::vector<OracleSum> sums(const Mat3& axes) const;
-  /// m; of the tool in the deepest part, along the nearest facet of a sum; negative outside all.
+  /// m, of the tool in the part that it is deepest in, to the nearest facet of the sum; negative
+  /// outside all.
   double depth(const OraclePose& tool) const;
-  /// From an ideal tool outside all parts: turns it as far as it goes to the orientation of the
-  /// virtual one, then descends.
+  /// From an ideal tool outside all parts: turns it towards the orientation of the virtual one as
+  /// far as possible, then descends.
   OracleTick tick(const OraclePose& last_ideal, const OraclePose& virtual_tool) const;
   /// \param touching  m; sums no further away count as touched
   OracleAudit audit(const OraclePose& ideal, const Vec3& virtual_tip, double touching) const;
-  /// Whether facets that are no further away hold the ideal tool if a groove of opposite facets may
-  /// clamp it with any leverage that rounding leaves. \param least  m; less is no rest
+  /// Whether facets within `touching` (m) hold the ideal tool if a groove of opposite facets may
+  /// clamp it with any leverage above rounding.
+  /// \param least  m; a smaller residual counts as balanced
   bool held_in_gap(const OraclePose& ideal, const Vec3& virtual_tip, double touching,
                    double least) const;
 
@@ -114,13 +116,13 @@ class UnionOracle {
   };
 
   bool turn(OraclePose& ideal, const Mat3& to) const;
-  /// Sets first and last: the part of the segment that lies in the part, but for rounding.
+  /// Sets first and last: the portion of the segment that lies in the part, within rounding.
   void touching_portion(const OraclePose& ideal, OracleContact& contact) const;
 
   std::vector<Solid> solids_;
   std::vector<OracleSegment> tool_;
   double size_ = 0, thickness_ = 0, reach_ = 0;
-  double touch_ = 0;  // m; what counts as touching: rounding at this size and distance
+  double touch_ = 0;  // m; rounding at this size and distance counts as touching
 };
 
 }  // namespace palpate::rendering

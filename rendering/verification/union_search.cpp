@@ -42,7 +42,7 @@ std::vector<OraclePose> aligned_path(Random& random, const OracleParts& parts, s
   return path;
 }
 
-/// Takes numbers from bytes; 0 when they are used up.
+/// Takes numbers from bytes; 0 once all are used.
 class Bytes {
  public:
   explicit Bytes(std::span<const std::uint8_t> bytes) : bytes_(bytes) {}
@@ -64,7 +64,7 @@ OraclePart grid_part(Bytes& bytes) {
   Vec3 size;
   for (int k = 2; k >= 0; --k) size[k] = kGrid * (1 + bytes.below(4));
   for (Vec3& v : soup.vertices) v = low + (v + Vec3(0.5)) * size;
-  if (bytes.below(3) == 0) {  // its upper side moved along x: slopes
+  if (bytes.below(3) == 0) {  // shift its upper side along x: slopes
     for (Vec3& v : soup.vertices) {
       if (v.z > low.z + 0.5 * size.z) v.x += kGrid;
     }
@@ -104,8 +104,8 @@ UnionWalk grid_walk(std::span<const std::uint8_t> data, std::size_t most_ticks) 
     const Vec3 from = bytes.grid_point(2), to = bytes.grid_point(2);
     walk.tool.push_back({from, from == to ? from + Vec3(kGrid, 0, 0) : to});
   }
-  // From far above; the tip goes along the axes from one multiple of 5 mm to another, by steps of
-  // whole millimetres.
+  // Starts far above; the tip moves along the axes from one multiple of 5 mm to another, in steps
+  // of whole millimetres.
   std::array<int, 3> place{0, 0, 300};  // mm
   Quat turned(1, 0, 0, 0);
   const auto add = [&] {
@@ -219,7 +219,7 @@ class Walk {
   }
 
  private:
-  /// \return false where the walk can not go on
+  /// \return false if the walk cannot continue
   bool tick(const OraclePose& pose) {
     const LineProbe probe = union_probe(walk_, pose, state_);
     const Rendering r = renderer_.tick(scene_, state_, probe, 1e-3);
@@ -232,7 +232,7 @@ class Walk {
     const bool released = (r.faults & render_fault::kReleased) != 0;
     counts_.capped += capped;
     counts_.released += released;
-    if (released) return true;  // it is no ideal tool until it has left
+    if (released) return true;  // not an ideal tool until it has left
     const bool held = r.contacts > 0;
     const bool lagged = glm::length(ideal_.axes[2] - pose.axes[2]) > kTurned ||
                         glm::length(ideal_.axes[0] - pose.axes[0]) > kTurned;
@@ -285,7 +285,8 @@ class Walk {
     const double aside = distance_to_segment(r.deepest.point, from, to);
     const UnionOracle place(walk_.parts, {{Vec3(0), Vec3(0)}});
     const double above = -place.depth({r.deepest.point, Mat3(1)});
-    // (2) is no single place, but it is over a face that the segment lies along.
+    // Equation (2) does not give a single place, but its point is over a face that the segment lies
+    // along.
     const double most_above =
         r.deepest.type == ContactType::segment_face ? kSinBlend * glm::length(to - from) : 0;
     const double off = std::max({aside, above - most_above, -above});
