@@ -101,11 +101,12 @@ void BodyContacts::place_parts(std::uint32_t body) {
     *centre++ = axes * part.centre + state_.motion[body].centre;
 }
 
-/// m; no point of the pair's bodies has moved more since their distances were looked at.
+/// m, at most, that any point of the pair's bodies has moved since their distances were measured.
 double BodyContacts::moved_since(const BodyPair& pair, const PairPlaces& measured) const {
   const auto moved = [this](std::uint32_t body, const Vec3& centre, const Quat& orientation) {
     const BodyMotion& motion = state_.motion[body];
-    // Unit quaternions: a chord of a turn by t is 2 sin(t/4), one of a point 2 radius sin(t/2).
+    // Unit quaternions: the chord of a turn by t is 2 sin(t/4), that of a point's path 2 radius
+    // sin(t/2).
     const Quat turn = motion.orientation - orientation;
     return glm::distance(motion.centre, centre) +
            2 * world_.bodies[body].radius * std::sqrt(glm::dot(turn, turn));
@@ -142,7 +143,8 @@ void BodyContacts::find_in_pair(std::uint32_t index, double within, double extra
   }
 }
 
-/// The gap of two parts and, where they are within reach, the places where they touch or may.
+/// Measures the gap of two parts and, if they are within reach, finds the places where they touch
+/// or may touch.
 void BodyContacts::measure_parts(std::uint32_t index, std::uint32_t parts_index, double reach,
                                  bool places) {
   const BodyPair& pair = world_.pairs[index];
@@ -198,7 +200,7 @@ void BodyContacts::set_velocities(double step) {
   }
 }
 
-/// Bodies that contacts connect. A spring holds one body and connects none.
+/// Joins bodies that contacts connect. A spring holds one body and connects none.
 void BodyContacts::find_islands() {
   for (std::uint32_t i = 0; i < state_.island.size(); ++i) state_.island[i] = i;
   for (bool more = true; more;) {

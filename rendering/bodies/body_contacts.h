@@ -10,41 +10,46 @@ namespace palpate::rendering {
 
 class BodyContacts {
  public:
-  /// m; parts that are so near touch. Above rounding, below what is seen or felt.
+  /// m; closer parts touch. Above rounding, below perception.
   static constexpr double kTouching = 1e-8;
-  /// m; parts that are found to meet are as near as this or nearer, so that they still touch when
-  /// they are looked at again, rounded otherwise.
+  /// m; parts that meet are at most this far apart, so that they still touch when measured again
+  /// with other rounding.
   static constexpr double kMet = 0.75 * kTouching;
-  /// Of a step; what meets so soon after the parts touched, as the far end of an edge that lies
-  /// almost flat, bounces with them.
+  /// Share of a step; contacts this soon after a first one, as at the far end of an edge that lies
+  /// almost flat, bounce together with it.
   static constexpr double kAtOnce = 4e-3;
 
   BodyContacts(const BodyWorld& world, BodyWorldState& state) : world_(world), state_(state) {}
 
-  /// Sets state.near, near_parts and contacts: what touches or may meet within a time, s.
-  /// \param extra  m; farther away by this as well \param chosen  bodies; empty: all
+  /// Sets state.near, near_parts and contacts: parts that touch or may meet.
+  /// \param within  s, the time in which they may meet
+  /// \param extra   m, added to their reach
+  /// \param chosen  bodies; empty: all
   void find(double within, double extra = 0, std::span<const char> chosen = {});
-  /// The same without contacts, and with one of the parts of each pair that are near.
+  /// The same without contacts, and with one near pair of parts for each pair of bodies.
   void find_near(double within, double extra);
 
-  /// Whether anything is as near to a body that is awake as for find_near. Wakes nothing.
+  /// Whether anything is near an awake body, as by find_near. Wakes nothing.
   bool may_touch(std::uint32_t body, double within, double extra);
 
-  /// Bodies that touch and approach each other part again, with the restitution of the pair.
-  /// \param left  s, of the step \param step  s, the whole of it, of which kAtOnce is
-  /// \return whether some did
+  /// Makes bodies that touch and approach each other bounce, with the restitution of the pair.
+  /// \param left  s, of the step
+  /// \param step  s, the whole step, for kAtOnce
+  /// \return whether any bounced
   bool bounce(double left, double step);
 
-  /// s, until the next pair meets, at most `most`. Says of state.near_parts which do not meet until
-  /// then; those that rest on each other do.
+  /// s, until the next pair meets, at most `most`. Sets NearParts::apart: not meeting until then.
+  /// Parts that rest on each other are not apart.
   double time_to_next(double most);
 
-  /// Impulses that keep all contacts from closing by more than their gap within a step. Groups of
-  /// bodies of which none meets another by time_to_next move freely. Sets state.push, twist and
-  /// pushed. \param springs  that press \param chosen  bodies; empty: all
+  /// Computes impulses that keep every contact from closing by more than its gap within a step.
+  /// Groups of bodies without a meeting by time_to_next move freely. Sets state.push, twist and
+  /// pushed.
+  /// \param springs  springs that press
+  /// \param chosen   bodies; empty: all
   void hold_apart(double step, std::span<PressingSpring> springs, std::span<const char> chosen);
 
-  /// Those impulses, on one body.
+  /// Adds those impulses to one body.
   void add_impulses(std::size_t body);
 
  private:

@@ -114,7 +114,7 @@ Vec3 angular_momentum(const BodyWorld& world, const BodyWorldState& state) {
 
 namespace {
 
-constexpr int kMostEvents = 32;  // in a step; then what meets is held apart without a bounce
+constexpr int kMostEvents = 32;  // in a step; later meetings are held apart without a bounce
 
 Vec3 velocity_after(const BodyWorld& world, const MovingBody& body, const Vec3& velocity,
                     double duration) {
@@ -124,7 +124,7 @@ Vec3 velocity_after(const BodyWorld& world, const MovingBody& body, const Vec3& 
   return motion.velocity;
 }
 
-/// A body moved on by the velocity that impulses have given it.
+/// Moves a body by the velocity that impulses have given it.
 void move_pushed(const MovingBody& body, double duration, BodyMotion& motion) {
   motion.centre += duration * motion.velocity;
   motion.orientation =
@@ -153,7 +153,7 @@ void move_all(const BodyWorld& world, BodyWorldState& state, double duration) {
     }
     if (contacts.bounce(left, duration)) contacts.find(left);
     const double next = event < kMostEvents ? contacts.time_to_next(left) : left;
-    // Impulses act on the velocities as they will be; what they do not push moves freely.
+    // Impulses act on the velocities at the end of the step; bodies without impulses move freely.
     contacts.hold_apart(next, {}, {});
     for (std::size_t i = 0; i < world.bodies.size(); ++i) {
       if (state.sleep[i].asleep) continue;
@@ -182,7 +182,7 @@ void step_bodies(const BodyWorld& world, BodyWorldState& state, double duration)
 void step_pressed(const BodyWorld& world, BodyWorldState& state, std::span<const char> chosen,
                   std::span<PressingSpring> springs, double duration) {
   BodyContacts contacts(world, state);
-  double deepest = 0;  // no spring pushes farther than that
+  double deepest = 0;  // no spring pushes farther
   for (const PressingSpring& spring : springs) deepest = std::max(deepest, spring.depth);
   contacts.find(duration, deepest, chosen);
   contacts.hold_apart(duration, springs, chosen);
@@ -304,8 +304,8 @@ namespace {
 
 constexpr double kUnbounded = 1e300;
 
-/// m/s; the least speed of separation that a contact asks for: it may close its gap, and what
-/// overlaps comes apart slowly.
+/// m/s; the least speed of separation at a contact: it may close its gap, and overlapping parts
+/// separate slowly.
 double least_speed_of(double gap, double step) {
   constexpr double kShare = 0.2, kFastest = 0.05;
   return gap >= 0 ? -gap / step : std::min(kShare * -gap / step, kFastest);
@@ -355,7 +355,7 @@ void BodyContacts::add_friction(const BodyContact& contact, int leader, double f
                        glm::cross(state_.spin[body], contact.place - state_.motion[body].centre));
   }
   sliding -= glm::dot(sliding, contact.normal) * contact.normal;
-  // One direction is that of sliding: the box of bounds then is a cone's where it matters.
+  // One direction is that of sliding: there the box of bounds equals the cone.
   const Vec3& n = contact.normal;
   Vec3 first = sliding;
   if (!(glm::dot(sliding, sliding) > 1e-20))
@@ -402,8 +402,8 @@ void BodyContacts::solve_rows(std::span<PressingSpring> springs, double step) {
   if (!problem.solve()) ++state_.not_converged;
 }
 
-/// Whether the impulses of a bounce give the bodies energy, above rounding: half the sum of
-/// impulses times the speeds before and after.
+/// Whether the impulses of a bounce add energy above rounding: half the sum of impulses times the
+/// speeds before and after.
 bool BodyContacts::makes_energy() const {
   const ComplementarityProblem& problem = state_.problem;
   double sum = 0, scale = 0;
@@ -418,11 +418,11 @@ bool BodyContacts::makes_energy() const {
   return sum > 1e-12 * scale;
 }
 
-/// Newton's restitution with Coulomb's friction can make energy where friction turns the sliding
-/// round (Kane & Levinson 1985). Then less friction acts; without any none is made.
+/// Newton's restitution with Coulomb's friction can add energy where friction reverses the sliding
+/// (Kane & Levinson 1985). In that case, less friction acts; without friction no energy is added.
 void BodyContacts::solve_bounce() {
   constexpr int kMostShares = 4;
-  constexpr std::size_t kMostRefinedRows = 240;  // in all rounds: of many contacts less is known
+  constexpr std::size_t kMostRefinedRows = 240;  // in all rounds; with many contacts, refine less
   ComplementarityProblem& problem = state_.problem;
   const auto refine = [&] {
     double least = 0;
@@ -465,9 +465,9 @@ void BodyContacts::add_impulses(std::size_t body) {
   state_.motion[body].spin_momentum += state_.twist[body];
 }
 
-/// Impacts go through a group of touching bodies one after another, as through a row of balls:
-/// those that approach part, then those that approach then (Smith, Kaufman, Vouga, Tamstorf &
-/// Grinspun 2012, Reflections on simultaneous impact).
+/// Impacts pass through a group of touching bodies one after another, as through a row of balls:
+/// pairs that approach separate, then the pairs that approach because of that (Smith, Kaufman,
+/// Vouga, Tamstorf & Grinspun 2012, Reflections on simultaneous impact).
 bool BodyContacts::bounce(double left, double step) {
   constexpr int kMostRounds = 24;
   const double resting = resting_speed(left);
@@ -557,7 +557,7 @@ void BodyContacts::hold_apart(double step, std::span<PressingSpring> springs,
 
 namespace {
 
-// m; the gap that is looked for. One up to kMet will do.
+// m; the gap that the search aims at; any up to kMet is accepted.
 constexpr double kSought = 0.5 * BodyContacts::kTouching;
 
 }  // namespace
@@ -566,8 +566,8 @@ double BodyContacts::time_to_next(double most) {
   const double resting = resting_speed(most);
   double next = most;
   for (auto& parts : state_.near_parts) parts.apart = !parts.touches;
-  // What touches and parts again, as after a bounce, may meet elsewhere. What overlaps by more than
-  // it parts does not come out.
+  // Parts that touch and separate, as after a bounce, may meet elsewhere. Parts that overlap by
+  // more than they separate do not come free.
   for (const BodyContact& contact : state_.contacts) {
     const double speed = separation_speed(contact);
     if (contact.gap <= kTouching && speed > resting && contact.gap + most * speed > kTouching)
@@ -598,8 +598,8 @@ Gap BodyContacts::gap_after(const BodyWorldState::NearParts& near, double time, 
                      memory);
 }
 
-/// Conservative advancement (Mirtich 1996): as far as the pair can not meet, again and again. Where
-/// that is slow, as for bodies that turn, the time is found between there and the end by false
+/// Conservative advancement (Mirtich 1996): repeatedly advances by a time in which the pair cannot
+/// meet. If that is slow, as for bodies that turn, finds the time in the rest of the step by false
 /// position (Illinois).
 double BodyContacts::meeting_time(const BodyWorldState::NearParts& near, double most) {
   constexpr int kMostAdvances = 6;
@@ -609,7 +609,7 @@ double BodyContacts::meeting_time(const BodyWorldState::NearParts& near, double 
       (pair.obstacle ? 0 : glm::length(state_.spin[pair.b]) * world_.bodies[pair.b].radius);
   GapMemory memory = state_.gaps[near.parts];
   const double falling = pair.obstacle ? glm::length(world_.gravity) : 0;
-  // What find() knows is the first round's.
+  // The first round uses the results of find().
   Vec3 closing =
       state_.motion[pair.a].velocity - (pair.obstacle ? Vec3(0) : state_.motion[pair.b].velocity);
   Gap gap;
@@ -619,7 +619,7 @@ double BodyContacts::meeting_time(const BodyWorldState::NearParts& near, double 
   for (int round = 0; round < kMostAdvances; ++round) {
     const double left = most - time;
     if (round > 0) {
-      // From farther away they do not meet.
+      // From a larger distance they do not meet.
       const double enough = kSought + left * (glm::length(closing) + turning + 2 * falling * most);
       gap = gap_after(near, time, enough, memory, closing);
     }
@@ -637,8 +637,9 @@ double BodyContacts::meeting_time(const BodyWorldState::NearParts& near, double 
   return meeting_between(near, low, high, memory);
 }
 
-/// Of parts that touch and come apart. The time before which they are apart is looked for from the
-/// end on: what is in contact for longer than a thousandth of `most` is held apart instead.
+/// The same for parts that touch and separate. Searches backwards from the end for a time at which
+/// they are apart; parts that touch at all times tried, down to a thousandth of `most`, are held
+/// apart instead.
 double BodyContacts::meeting_again(BodyWorldState::NearParts& near, double most) {
   GapMemory memory = state_.gaps[near.parts];
   Vec3 closing(0);
@@ -677,7 +678,7 @@ double BodyContacts::meeting_between(const BodyWorldState::NearParts& near, Time
 
 namespace {
 
-/// s, until a freely growing depth is 0 coming from below; infinite where it is not.
+/// s, until a freely growing depth reaches 0 from below; infinite if it does not.
 double time_to_entry(double depth, double speed, double growth) {
   if (depth >= 0 && (speed > 0 || (speed == 0 && growth > 0) || depth > 0)) return 0;
   // depth + speed t + growth t^2 / 2 = 0, the first root after 0.
@@ -727,7 +728,7 @@ SpringPass pass_spring(const SpringStart& start, double duration) {
   pass.depth = depth;
   pass.speed = speed;
   if (!met) return pass;
-  // The free depth less the real one is what the spring pushed.
+  // The spring's push is the free depth less the real one.
   const double free_speed = start.speed + duration * start.growth;
   const double free_depth = start.depth + duration * (start.speed + 0.5 * duration * start.growth);
   pass.impulse = start.mass * (free_speed - speed);

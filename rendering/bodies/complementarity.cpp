@@ -6,7 +6,7 @@
 namespace palpate::rendering {
 namespace {
 
-/// Four sums at a time: one would wait for itself.
+/// Four sums at a time, so that additions do not wait for each other.
 double dot_product(const double* a, const double* b, std::size_t count) {
   double s0 = 0, s1 = 0, s2 = 0, s3 = 0;
   std::size_t k = 0;
@@ -66,7 +66,7 @@ void ComplementarityProblem::set_bounds(std::size_t row) {
   lower_[row] = leader < 0 ? 0 : -upper_[row];
 }
 
-/// Rows of the factor from a position on.
+/// Recomputes the rows of the factor from a position on.
 void ComplementarityProblem::refactor(std::size_t from) {
   constexpr double kRaise = 1e-14;
   for (std::size_t i = from; i < free_.size(); ++i) {
@@ -97,7 +97,7 @@ void ComplementarityProblem::bind_row(std::size_t position) {
   refactor(position);
 }
 
-/// What the free rows answer to a unit of x of one row: A_ff out = -A_f,column.
+/// The response of the free rows to a unit of x of one row: A_ff out = -A_f,column.
 void ComplementarityProblem::solve_free(std::size_t column, double* out) const {
   const std::size_t n = free_.size();
   for (std::size_t i = 0; i < n; ++i) {
@@ -112,7 +112,7 @@ void ComplementarityProblem::solve_free(std::size_t column, double* out) const {
   }
 }
 
-/// Of the slack of every row, by a unit of x of one row and what the free ones answer.
+/// Rates of every row's slack by a unit of x of one row and the free rows' response.
 void ComplementarityProblem::find_rates(std::size_t row) {
   std::copy_n(&matrix_[row * count_], count_, rate_.begin());
   for (std::size_t k = 0; k < free_.size(); ++k) {
@@ -123,7 +123,7 @@ void ComplementarityProblem::find_rates(std::size_t row) {
   }
 }
 
-/// Brings one row in. False: no pivots are left.
+/// Lets one row enter. False: no pivots are left.
 bool ComplementarityProblem::drive(std::size_t row, int& pivots_left) {
   x_[row] = 0;
   w_[row] = slack(row);
@@ -133,7 +133,7 @@ bool ComplementarityProblem::drive(std::size_t row, int& pivots_left) {
     const bool holds = std::abs(w_[row]) <= 1e-15 * scale || (w_[row] > 0 && at_lower) ||
                        (w_[row] < 0 && at_upper);
     if (holds) {
-      // In between it must be free, or what comes next would move its slack.
+      // Between its bounds it must be free, or later rows would move its slack.
       if (!at_lower && !at_upper)
         free_row(row);
       else
@@ -145,7 +145,7 @@ bool ComplementarityProblem::drive(std::size_t row, int& pivots_left) {
     solve_free(row, change_.data());
     find_rates(row);
     const double own_rate = direction * rate_[row];
-    // A row that the free ones already say does not answer: it may go to its bound.
+    // A row that depends on the free ones does not respond: it may go to its bound.
     const bool answers = std::abs(own_rate) > 1e-12 * std::abs(a(row, row));
     double step = answers ? -w_[row] / own_rate : HUGE_VAL;
     enum class Stop { zero, bound, bind, release } stop = answers ? Stop::zero : Stop::bound;
@@ -170,7 +170,7 @@ bool ComplementarityProblem::drive(std::size_t row, int& pivots_left) {
     for (std::size_t k = 0; k < done_.size(); ++k) {
       const std::size_t i = done_[k];
       const double rate = direction * rate_[i];
-      // At the lower bound slack may not fall below 0, at the upper not rise above.
+      // At the lower bound slack must not fall below 0, at the upper not rise above 0.
       const bool low = x_[i] <= lower_[i], high = x_[i] >= upper_[i];
       if (low && high) continue;
       if (low ? rate >= 0 : rate <= 0) continue;
@@ -214,7 +214,7 @@ bool ComplementarityProblem::drive(std::size_t row, int& pivots_left) {
   }
 }
 
-/// Projected Gauss-Seidel, where pivoting met its limit.
+/// Projected Gauss-Seidel, used if pivoting reached its limit.
 void ComplementarityProblem::sweep() {
   constexpr int kSweeps = 200;
   for (int round = 0; round < kSweeps; ++round) {

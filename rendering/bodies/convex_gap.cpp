@@ -15,7 +15,7 @@ namespace palpate::rendering {
 
 // The point of a simplex nearest to the origin, for GJK. Internal to convex_gap.cpp.
 
-/// Corners of the difference of two parts, with the points that they are differences of.
+/// Corners of the difference of two parts, with the points of both parts that give them.
 struct GapSimplex {
   struct Corner {
     Vec3 point;  ///< on_b - on_a
@@ -33,7 +33,7 @@ struct GapSimplex {
   }
 };
 
-/// Leaves the corners that hold the nearest point, with their weights. False: the origin is inside.
+/// Keeps the corners that hold the nearest point, with their weights. False: the origin is inside.
 bool reduce_to_nearest(GapSimplex& simplex);
 
 namespace {
@@ -59,7 +59,7 @@ void nearest_of_segment(GapSimplex& s) {
   s.weights = {1 - t, t, 0, 0};
 }
 
-/// Ericson, Real-Time Collision Detection 2005, 5.1.5, of the origin.
+/// Ericson, Real-Time Collision Detection 2005, 5.1.5, for the origin.
 void nearest_of_triangle(GapSimplex& s) {
   const Vec3 &a = s.corners[0].point, &b = s.corners[1].point, &c = s.corners[2].point;
   const Vec3 ab = b - a, ac = c - a;
@@ -124,7 +124,7 @@ bool reduce_to_nearest(GapSimplex& simplex) {
 
 namespace {
 
-/// m; of two parts along a direction, with the corners that bound it.
+/// The slab of two parts along a direction, m, with the corners that bound it.
 struct Slab {
   double distance = 0;
   Vec3 corner_a, corner_b;  // world
@@ -145,7 +145,7 @@ Slab slab_along(const ConvexPlace& a, const ConvexPlace& b, const Vec3& normal, 
   return slab;
 }
 
-/// A corner of the difference of two parts made smaller.
+/// Corners of the difference of the two shrunk parts.
 class Corners {
  public:
   Corners(const ConvexPlace& a, const ConvexPlace& b, double scale)
@@ -155,7 +155,7 @@ class Corners {
         inside_b_(b.world_point(b.inside)),
         scale_(scale) {}
   Vec3 between() const { return inside_b_ - inside_a_; }
-  /// For the parts in their present poses.
+  /// A corner of the difference of the whole parts.
   Vec3 whole(std::uint32_t vertex_a, std::uint32_t vertex_b) const {
     return on_b(vertex_b) - on_a(vertex_a);
   }
@@ -178,8 +178,7 @@ class Corners {
   double scale_;
 };
 
-/// The simplex that was nearest last, where it is now. Empty: there is none, or it holds the
-/// origin.
+/// The last nearest simplex at its present place. Empty: there is none, or it holds the origin.
 GapSimplex simplex_of(const GapMemory& memory, const Corners& corners, double least) {
   GapSimplex simplex;
   for (; simplex.count < memory.nearest_count; ++simplex.count) {
@@ -197,7 +196,7 @@ void remember(const GapSimplex& simplex, GapMemory& memory) {
     memory.nearest[i] = {simplex.corners[i].vertex_a, simplex.corners[i].vertex_b};
 }
 
-/// GJK of both parts scaled. Empty: they overlap still.
+/// GJK of both parts, scaled. Empty: they still overlap.
 /// \param enough  m; a direction along which the whole parts are farther apart ends the search
 std::optional<GapSimplex> nearest_simplex(const ConvexPlace& a, const ConvexPlace& b, double scale,
                                           double size, double enough, GapMemory& memory) {
@@ -245,7 +244,7 @@ std::optional<GapSimplex> nearest_simplex(const ConvexPlace& a, const ConvexPlac
   return simplex;
 }
 
-/// The point on the whole part of one on the smaller.
+/// The point of the whole part for a point of the shrunk part.
 Vec3 made_whole(const ConvexPlace& part, const Vec3& point, double scale) {
   const Vec3 inside = part.world_point(part.inside);
   return inside + (point - inside) / scale;
@@ -256,7 +255,8 @@ struct BestFacet {
   double cosine = -2;
 };
 
-/// The facet at a vertex that faces a direction most. \param direction  mesh frame, unit
+/// The facet at a vertex that faces a direction most.
+/// \param direction  mesh frame, unit
 BestFacet facet_at(const stimuli::ConvexMesh& mesh, std::uint32_t vertex, const Vec3& direction) {
   BestFacet best;
   for (std::uint32_t k = mesh.fan_first()[vertex]; k < mesh.fan_first()[vertex + 1]; ++k) {
@@ -301,7 +301,7 @@ void clip_to(const ConvexPlace& part, const stimuli::Facet& facet, ClipRoom& roo
   }
 }
 
-/// Few points that hold as much as all: the nearest, and those farthest to four sides.
+/// Chooses a few points that support as well as all: the nearest, and the farthest to four sides.
 void choose_points(const ClipRoom& room, const Vec3& normal, Manifold& out) {
   const std::vector<ManifoldPoint>& all = room.points;
   if (all.size() <= 4) {
@@ -310,7 +310,7 @@ void choose_points(const ClipRoom& room, const Vec3& normal, Manifold& out) {
   }
   const Vec3 least = std::abs(normal.x) < 0.6 ? Vec3(1, 0, 0) : Vec3(0, 1, 0);
   const Vec3 u = glm::normalize(glm::cross(normal, least)), v = glm::cross(normal, u);
-  // Turned by what no regular polygon is symmetric to.
+  // Rotated by an angle that is no symmetry of a regular polygon.
   const Vec3 first = 0.9 * u + 0.4359 * v, second = glm::cross(normal, first);
   const auto nearest = std::min_element(all.begin(), all.end(),
                                         [](const auto& a, const auto& b) { return a.gap < b.gap; });
@@ -351,7 +351,7 @@ Gap gap_between(const ConvexPlace& a, const ConvexPlace& b, double enough, GapMe
   for (const double scale : kScales) {
     const std::optional<GapSimplex> nearest = nearest_simplex(a, b, scale, size, enough, memory);
     if (!nearest) {
-      // It ended with directions that have nothing to do with the gap.
+      // The search ended with directions unrelated to the gap.
       memory.support_a = support_a;
       memory.support_b = support_b;
       continue;

@@ -12,7 +12,7 @@ namespace palpate::rendering {
 namespace {
 
 constexpr double kLongestStep = 1.5e-3;  // s
-constexpr double kLongestTick = 1;       // s; time beyond it is lost to what moves
+constexpr double kLongestTick = 1;       // s; bodies do not move in the time beyond it
 constexpr double kFarthestPose = 1e6;    // m
 
 bool in_range(const Vec3& v) { return glm::dot(v, v) <= kFarthestPose * kFarthestPose; }
@@ -41,7 +41,7 @@ std::unique_ptr<MotionState> MovingBodies::initial_state() const {
   auto state = std::make_unique<BodiesState>();
   state->fixed = fixed_.initial_state();
   std::size_t contacts = 0;
-  state->shapes.reserve(shapes_.size());  // growing would copy them, and copies lose their room
+  state->shapes.reserve(shapes_.size());  // growth would copy them without working memory
   for (const Scene& shape : shapes_) {
     state->shapes.push_back(shape.initial_state());
     contacts += std::max<std::size_t>(1, state->shapes.back().unions.contacts.capacity());
@@ -94,7 +94,7 @@ Rendering MovingBodies::tick(const Renderer& renderer, RenderState& outer, const
   return fixed;
 }
 
-/// One of so many parts of a stroke, equally long.
+/// One of `parts` equally long parts of a stroke.
 MovingBodies::Stroke MovingBodies::part_of(const Stroke& stroke, int part, int parts) const {
   if (parts == 1) return stroke;
   const auto at = [&](int k) {
@@ -157,7 +157,7 @@ void MovingBodies::step(const Renderer& renderer, BodiesState& state, const Stro
   settle(state, stroke);
 }
 
-/// A critically damped spring of the same period for every mass.
+/// Pulls a body by a critically damped spring, of the same period for every mass.
 void MovingBodies::draw(BodiesState& state, double duration) const {
   constexpr double kRate = 20, kMost = 100;  // rad/s; m/s^2
   for (std::uint32_t i = 0; i < world_.bodies.size(); ++i) {
@@ -182,7 +182,7 @@ void MovingBodies::draw(BodiesState& state, double duration) const {
   }
 }
 
-/// Renders a body in its frame, where it will be unless the probe holds it up.
+/// Renders a body in its frame, at its place without the probe's push.
 void MovingBodies::feel(const Renderer& renderer, BodiesState& state, std::size_t body,
                         const Stroke& stroke) const {
   const Pose frame = state.shown[body] = pose_of(state, body);
@@ -233,9 +233,9 @@ void MovingBodies::find_probe_contacts(BodiesState& state, std::size_t body,
   }
 }
 
-/// The contact of the last step, where the probe is beyond its plane at the end of this one: within
-/// the step it still presses. A probe that is still below the plane and not about to come out has
-/// gone past the border of what it touched: the plane ends there, and so does the contact.
+/// Continues the contact of the last step if the probe is above its plane at the end of this one:
+/// within the step it still presses. A probe that is still below the plane and not about to leave
+/// it has passed the border of the touched face: the plane ends there, and so does the contact.
 void MovingBodies::go_on(BodiesState& state, const Stroke& stroke, std::size_t body) const {
   const BodiesState::Held& held = state.held[body];
   ProbeContact contact = held.contact;
@@ -258,14 +258,14 @@ void MovingBodies::go_on(BodiesState& state, const Stroke& stroke, std::size_t b
   state.held[body].holds = false;
 }
 
-/// Remembers the spring that a body ends the step with, for go_on.
+/// Remembers a body's spring at the end of the step, for go_on.
 void MovingBodies::hold(BodiesState& state, const Stroke& stroke,
                         const ProbeContact& contact) const {
   const std::uint32_t body = contact.spring.body;
   BodiesState::Held& held = state.held[body];
   held.holds = contact.depth_after > 0;
   if (!held.holds) return;
-  // In the frame in which the renderer saw the body: there the surface is where it was touched.
+  // Use the frame in which the body was rendered: there the surface is at the touched place.
   const Pose& frame = state.shown[body];
   const Quat back = glm::conjugate(frame.orientation);
   held.contact = contact;
@@ -299,9 +299,9 @@ void MovingBodies::place_contact(BodiesState& state, const Stroke& stroke, const
     const Vec3 spin = spin_of(world_.bodies[spring.body].inertia, motion);
     spring.closing =
         glm::dot(spring.normal, velocity_at(spin, motion, spring.place) - moved / stroke.duration);
-    // What nobody has pressed holds no energy: two parts that the probe is jammed between can move
-    // the ideal tool by centimetres where they have come nearer by micrometres. What hardly moves
-    // for it has its force nonetheless.
+    // A depth that nobody has pressed must not hold energy: two parts that jam the probe between
+    // them can move the ideal tool by centimetres when they approach by micrometres. A body that
+    // the force hardly moves gets the full force.
     constexpr double kCreep = 0.01, kHardly = 0.01;  // m/s; m/s^2
     const double way = (spring.closing > 0 ? 2 : 1) * spring.closing + kCreep;
     const double pressed = state.held[spring.body].deepest + way * stroke.duration;
@@ -314,7 +314,7 @@ void MovingBodies::place_contact(BodiesState& state, const Stroke& stroke, const
   if (spring.stiffness > 0 || spring.damping > 0) state.contacts.push_back(contact);
 }
 
-/// What is shown and remembered of the bodies where they have come to.
+/// Updates the bodies' shown poses and remembered states.
 void MovingBodies::settle(BodiesState& state, const Stroke& stroke) const {
   for (std::size_t i = 0; i < world_.bodies.size(); ++i) {
     const BodyMotion& motion = state.world.motion[i];
@@ -332,7 +332,7 @@ void MovingBodies::settle(BodiesState& state, const Stroke& stroke) const {
   }
 }
 
-/// From there the next step's motion counts.
+/// The next step's motion counts from here.
 void MovingBodies::settle_shape(BodiesState& state, std::size_t body, const Stroke& stroke) const {
   RenderState& shape = state.shapes[body];
   if (!shape.has_last) return;
@@ -344,8 +344,8 @@ void MovingBodies::settle_shape(BodiesState& state, std::size_t body, const Stro
   if (fixed_.tool() == nullptr) shape.unions.last.frame = Mat3(1);
 }
 
-// A body that goes fast at the probe and touches nothing else: steps of its own within a step. Part
-// of moving_bodies.h.
+// A body that moves fast against the probe and touches nothing else makes steps of its own within a
+// step. Part of moving_bodies.h.
 
 namespace {
 
@@ -354,9 +354,9 @@ constexpr int kMostSteps = 20;
 
 }  // namespace
 
-/// Steps that a body makes within a step, so that against the probe none of its points goes farther
-/// in one than levers and normals stay what they are; 1 where the probe is far or slow, or where it
-/// may touch something else: then it goes with the others.
+/// Number of steps that a body makes within a step, so that in each none of its points moves so far
+/// against the probe that levers and normals change. 1 if the probe is far or slow, or if the body
+/// may touch something else: then it moves with the others.
 int MovingBodies::inner_steps(const BodiesState& state, std::size_t body,
                               const Stroke& stroke) const {
   const double duration = stroke.duration;
@@ -387,8 +387,8 @@ int MovingBodies::inner_steps(const BodiesState& state, std::size_t body,
   return 1;
 }
 
-/// Whether it touches nothing else in a step, however the probe may strike it: in the probe's frame
-/// it has no more energy afterwards than it came with.
+/// Whether a body touches nothing else in a step, however the probe strikes it: in the probe's
+/// frame it never has more energy afterwards than before.
 bool MovingBodies::stays_alone(BodiesState& state, std::size_t body, const Stroke& stroke) const {
   const BodyMotion& motion = state.world.motion[body];
   const MovingBody& of = world_.bodies[body];
@@ -407,7 +407,7 @@ bool MovingBodies::stays_alone(BodiesState& state, std::size_t body, const Strok
                          stroke.duration * farthest);
 }
 
-/// Applies the probe's push to a body that has all of state.contacts.
+/// Applies the probe's push to the one body that all of state.contacts belong to.
 void MovingBodies::push_alone(BodiesState& state, std::size_t body, const Stroke& stroke) const {
   ProbeContact& only = state.contacts.front();
   if (state.contacts.size() == 1 && only.spring.damping == 0) {
@@ -488,20 +488,20 @@ void MovingBodies::step_finely(const Renderer& renderer, BodiesState& state, std
   state.felt[body].faults = faults;
 }
 
-// What the probe gives bodies and gets back. Part of moving_bodies.h.
+// Impulses between the probe and bodies. Part of moving_bodies.h.
 
-/// One spring on a body that touches nothing else: its impulse in closed form, given to the body as
-/// a blow at the mean time of that impulse, with the normal and the lever as they are then; before
-/// and after it the body moves freely. A bounce within a step so keeps the energy to rounding,
-/// however far the body turns in it: where speed, lever and inertia are of different times, it
-/// would not. Changes the body's motion.
+/// Applies one spring to a body that touches nothing else. Its impulse, in closed form, acts as a
+/// blow at the mean time of that impulse, with the normal and lever of that time. Before and after
+/// the blow the body moves freely. So a bounce within a step keeps the energy to rounding, however
+/// far the body turns; with speed, lever and inertia of different times, it would not. Changes the
+/// body's motion.
 void MovingBodies::push_freely(BodiesState& state, ProbeContact& contact, double duration) const {
   PressingSpring& spring = contact.spring;
   const MovingBody& body = world_.bodies[spring.body];
   const BodyMotion& before = state.before[spring.body];
   BodiesState::Held& held = state.held[spring.body];
   BodyMotion& motion = state.world.motion[spring.body];
-  // As it was at the beginning of the step.
+  // The contact at the beginning of the step.
   const Rendering& felt = state.felt[spring.body];
   constexpr double kSame = 1 - 2e-4;  // cosine; beyond it another feature is touched
   const bool known =
@@ -566,8 +566,8 @@ void MovingBodies::push_freely(BodiesState& state, ProbeContact& contact, double
   struck.centre -=
       (pass.double_impulse - pass.impulse * (duration - when)) * body.inertia.per_mass * normal;
   motion = struck;
-  // Where the spring is in touch over several steps, its depth is exact but for the body's turning
-  // in them: of what the spring does along the body's way, the share that normal and lever turn by.
+  // If the spring touches over several steps, the body's turn during them is the only error of its
+  // depth: of the spring's work along the body's way, the share by which normal and lever turn.
   const double spin = std::max(glm::length(spin_of(body.inertia, before)),
                                glm::length(spin_of(body.inertia, motion)));
   const double speed = std::max(glm::length(before.velocity), glm::length(motion.velocity)) +
@@ -576,14 +576,14 @@ void MovingBodies::push_freely(BodiesState& state, ProbeContact& contact, double
   balance(state, contact, moment, duration);
 }
 
-/// On its way off the probe a body's energy, with the spring's, has to be what it came with and
-/// what hand and weight have given it since. What steps of finite length have lost or won of it
-/// (some 1e-4, where the body turns on the probe) the impulse makes good, but no more than that:
-/// what else the sum is off by comes from the hand's way over edges and corners, and to give that
-/// to a heavy body, which hardly moves, would take the whole force of a tick.
+/// Corrects the energy of a body that leaves the probe. Its energy, with the spring's, must be its
+/// initial one plus the work of the hand and of weight since. The impulse corrects the errors of
+/// finite steps (some 1e-4, if the body turns on the probe), but no more: further differences come
+/// from the hand's path over edges and corners, and to correct those on a heavy body, which hardly
+/// moves, would take the whole force of a tick.
 void MovingBodies::balance(BodiesState& state, ProbeContact& contact, const Vec3& moment,
                            double duration) const {
-  constexpr double kMostShare = 1e-2;  // of the speed: more is no rounding of steps
+  constexpr double kMostShare = 1e-2;  // of the speed: more is not an error of steps
   PressingSpring& spring = contact.spring;
   BodiesState::Held& held = state.held[spring.body];
   if (contact.tangential != Vec3(0)) held.balanced = false;
@@ -609,7 +609,7 @@ void MovingBodies::balance(BodiesState& state, ProbeContact& contact, const Vec3
   motion.spin_momentum -= impulse * moment;
 }
 
-/// What presses on a body in a step that holds it apart from other things, too.
+/// Adds the springs on a body for a step that also holds it apart from other things.
 void MovingBodies::add_springs(BodiesState& state, std::size_t first, std::size_t end,
                                double duration) const {
   const std::uint32_t body = state.contacts[first].spring.body;
@@ -627,7 +627,7 @@ void MovingBodies::add_springs(BodiesState& state, std::size_t first, std::size_
   }
 }
 
-/// Moves the chosen bodies on from where they began, with the springs.
+/// Moves the chosen bodies from their places at the beginning of the step, with the springs.
 void MovingBodies::push_pressed(BodiesState& state, double duration) const {
   step_pressed(world_, state.world, state.chosen, state.springs, duration);
   std::size_t next = 0;
@@ -651,7 +651,7 @@ void MovingBodies::push_held(BodiesState& state, const Stroke& stroke) const {
     if (alone) {
       push_freely(state, only, duration);
       state.held[body].holds = false;
-      // With that it must not meet anything: seen from where it began.
+      // With that push the body must not meet anything on its way from the beginning of the step.
       const double way = glm::distance(state.world.motion[body].centre, state.ahead[body].centre);
       const BodyMotion pushed = state.world.motion[body];
       std::swap(state.world.motion, state.before);
@@ -687,8 +687,8 @@ void MovingBodies::remember_depth(BodiesState& state, std::size_t body) const {
   }
 }
 
-/// The mean force of the step, and friction's share of it. Friction is a spring along the surface;
-/// it yields as the body would within the step, so that a light body does not ring.
+/// Sets the mean force of the step and friction's share of it. Friction is a spring along the
+/// surface; it yields as the body would within the step, so that a light body does not ring.
 void MovingBodies::push_sideways(BodiesState& state, ProbeContact& contact, double duration) const {
   const PressingSpring& spring = contact.spring;
   const MovingBody& body = world_.bodies[spring.body];
@@ -711,7 +711,7 @@ void MovingBodies::push_sideways(BodiesState& state, ProbeContact& contact, doub
   motion.spin_momentum -= impulse * moment;
 }
 
-// The wrench of all that is touched, bodies with what stands still. Part of moving_bodies.h.
+// The wrench of all touched bodies and obstacles. Part of moving_bodies.h.
 
 /// Adds the wrench of one body on the hand.
 void MovingBodies::add_body(const Renderer& renderer, const BodiesState& state, std::size_t body,

@@ -33,16 +33,16 @@ inline Vec3 out_of(const Pose& frame, const Vec3& local) {
 /// A contact of the probe with a body, world frame.
 struct ProbeContact {
   PressingSpring spring;
-  Vec3 on_probe;           ///< m; the place on the virtual probe
-  double along = 0;        ///< that, as a fraction of the way from tip to tail
+  Vec3 on_probe;           ///< m; the contact's place on the virtual probe
+  double along = 0;        ///< its fraction of the way from tip to tail
   Vec3 offset;             ///< m, along the surface, of friction's spring
   Vec3 tangential;         ///< N, of friction, on the hand
   double force = 0;        ///< N, along the normal, on the hand
   double felt_depth = 0;   ///< m; force = stiffness times this depth
-  double depth_after = 0;  ///< m, at the end of the step; of a spring in closed form
+  double depth_after = 0;  ///< m, at the end of the step, for a spring in closed form
   int segment = 0;
-  Vec3 moved;     ///< m, of the place on the virtual probe within the step
-  Vec3 pressing;  ///< unit; the mean normal of the step, of a spring in closed form
+  Vec3 moved;     ///< m, motion of the place on the virtual probe within the step
+  Vec3 pressing;  ///< unit; the mean normal of the step, for a spring in closed form
 };
 
 class BodiesState final : public MotionState {
@@ -51,33 +51,33 @@ class BodiesState final : public MotionState {
   std::span<const BodyPose> bodies() const override { return poses; }
   void pull(const BodyPull& by) noexcept override { drawn = by; }
 
-  RenderState fixed;                ///< of what stands still
+  RenderState fixed;                ///< of obstacles
   std::vector<RenderState> shapes;  ///< of each body, in its frame
   BodyWorldState world;
   std::vector<BodyPose> poses;
   std::vector<BodyMotion> before;  ///< at the beginning of the step
-  std::vector<BodyMotion> ahead;   ///< at its end, were there no probe
+  std::vector<BodyMotion> ahead;   ///< at its end if there were no probe
   std::vector<Rendering> felt;     ///< of each body, in its frame
   std::vector<Pose> shown;         ///< that frame
   std::vector<char> chosen;
-  /// Of each body: the spring that it had at the end of the last step, to be gone on with where the
-  /// probe is out of it at the end of the next, in the body's frame.
+  /// Of each body, in its frame: the spring at the end of the last step. The next step continues it
+  /// if the probe has left the body by its end.
   struct Held {
     bool holds = false;
     ProbeContact contact;
     Vec3 on_tool;  ///< m, of the place on the probe, in the frame of the tool
     ContactType type = ContactType::none;
-    double deepest = 0;     ///< m; of all springs that pressed at the end of the last step
-    bool balanced = false;  ///< the next two are known
-    double energy = 0;      ///< J, that the body has to have when it leaves the probe
-    double leeway = 0;      ///< J, that steps may have lost or won of it and is not yet mended
+    double deepest = 0;     ///< m; of the springs that pressed at the end of the last step
+    bool balanced = false;  ///< the next two values are known
+    double energy = 0;      ///< J, the body's due energy when it leaves the probe
+    double leeway = 0;      ///< J, possible errors of steps not yet corrected
   };
   std::vector<Held> held;
   std::size_t most_contacts = 0;
   std::vector<ProbeContact> contacts;
   std::vector<PressingSpring> springs;
-  std::vector<int> inner;  ///< of each body: steps that it makes of its own in a step; or 1
-  std::vector<ProbeContact> means;  ///< of bodies with such steps, over them
+  std::vector<int> inner;           ///< of each body: number of its own steps within a step; or 1
+  std::vector<ProbeContact> means;  ///< of bodies with such steps: means over them
   BodyPull drawn;
   LineProbe last;
   Mat3 last_frame = Mat3(1);
@@ -93,12 +93,12 @@ class MovingBodies final : public SceneMotion {
   const BodyWorld& world() const { return world_; }
 
  private:
-  /// A step of the bodies with the probe, from one pose to the next.
+  /// A step of the bodies with the probe, from one of its poses to the next.
   struct Stroke {
     LineProbe from, to;
     Mat3 frame_from, frame_to;
     double duration = 0;
-    bool touches = true;  ///< false: the probe is not where it can be
+    bool touches = true;  ///< false: the probe's pose is invalid
   };
   void step(const Renderer& renderer, BodiesState& state, const Stroke& stroke) const;
   void draw(BodiesState& state, double duration) const;

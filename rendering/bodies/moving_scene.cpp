@@ -32,11 +32,11 @@ CollidingPart colliding(const SceneObject& part, const Pose& in_frame) {
   return out;
 }
 
-/// What a scene has of one object, where it is at first.
+/// The parts of one object in a scene, at their first places.
 struct OwnParts {
   std::vector<SceneObject> felt;
   std::vector<SceneSurface> surfaces;
-  std::vector<SceneObject> solid;  ///< what of it collides
+  std::vector<SceneObject> solid;  ///< its colliding parts
 };
 
 MovingBody make_body(const MovingObject& moving, const OwnParts& own) {
@@ -55,7 +55,8 @@ MovingBody make_body(const MovingObject& moving, const OwnParts& own) {
     solids.push_back({part.mesh.get(), stimuli::compose(to_object, part.pose)});
   if (solids.empty() && own.surfaces.empty())
     refuse(moving.object, "expected an object with a surface");
-  // Parts of a rounded file abut with steps, which their union would count as outer faces.
+  // Parts of a file with rounded coordinates abut with steps, which their union would count as
+  // outer faces.
   const VolumeMoments moments =
       own.surfaces.empty()
           ? moments_of_union(solids)
@@ -141,7 +142,7 @@ void check_masses(const BodyWorld& world) {
   refuse(lightest->object, text.str());
 }
 
-/// What overlaps at first would fly apart.
+/// Bodies that overlap at the start would fly apart.
 void check_overlaps(const BodyWorld& world) {
   constexpr double kMostOverlap = 1e-4;  // m; less comes apart slowly
   for (const BodyPair& pair : world.pairs) {
@@ -161,7 +162,7 @@ void check_overlaps(const BodyWorld& world) {
     std::ostringstream text;
     text << "is " << 1e3 * overlap << " mm inside of object "
          << (pair.obstacle ? world.obstacles[pair.b].object : world.bodies[pair.b].object)
-         << " at first; expected at most " << 1e3 * kMostOverlap << " mm";
+         << " at the start; expected at most " << 1e3 * kMostOverlap << " mm";
     refuse(a.object, text.str());
   }
 }
@@ -202,7 +203,7 @@ Scene moving_scene(std::vector<SceneObject> parts, const std::vector<MovingObjec
   const auto is_of = [](int object) {
     return [object](const auto& part) { return part.object == object; };
   };
-  std::vector<SceneObject> collide;  // the convex parts of all that has some
+  std::vector<SceneObject> collide;  // the convex parts of all objects that have some
   std::copy_if(parts.begin(), parts.end(), std::back_inserter(collide),
                [&](const SceneObject& part) {
                  return part.layer <= 0 &&

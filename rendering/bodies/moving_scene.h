@@ -1,7 +1,7 @@
 #pragma once
 // A scene with moving objects: each moving object is rendered in its own frame, where it stands
-// still, so the contact law and the ideal tool go with it; what the hand is pushed with, it is
-// pushed back with.
+// still, so the contact law and the ideal tool move with it. The force on the hand acts on the
+// object in the opposite direction.
 
 #include <cstddef>
 #include <optional>
@@ -19,29 +19,28 @@ struct MovingObject {
   Pose pose;  ///< of the object's frame
 };
 
-/// Bodies of a scene at most: a step's cost grows with the square of those that are near.
+/// Bodies of a scene at most: a step's cost grows with the square of the number of near bodies.
 inline constexpr std::size_t kMostBodies = 64;
 
-/// \param parts    of all objects, where they are at first
+/// \param parts    of all objects, at their first places
 /// \param gravity  m/s^2
 /// \param sleeps   bodies at rest are not moved until something comes near
-/// \param surfaces  of objects without convex parts of their own surface, where they are at first;
-/// one for each of them
-/// \param solids   the convex parts of objects with surfaces, for collisions alone: the
-/// hand feels the surface. Without them such an object meets nothing but the hand
-/// \throws std::invalid_argument naming the object and the limit that is passed
+/// \param surfaces  of objects whose surface has no convex parts, at their first places; one each
+/// \param solids   convex parts of objects with surfaces, for collisions alone: the hand feels the
+/// surface. Without them such an object touches only the hand
+/// \throws std::invalid_argument naming the object and the exceeded limit
 Scene moving_scene(std::vector<SceneObject> parts, const std::vector<MovingObject>& moving,
                    const Vec3& gravity, bool side_contact = true, const Tool& tool = {},
                    bool sleeps = true, std::vector<SceneSurface> surfaces = {},
                    std::vector<SceneObject> solids = {});
 
-/// What of a scene moves, in numbers.
+/// Numbers of a scene's moving objects.
 struct MovingSummary {
   std::size_t bodies = 0, obstacles = 0;
   std::size_t part_pairs = 0;         ///< of convex parts that may meet
   double lightest = 0, heaviest = 0;  ///< kg
 };
-/// Empty where nothing moves as a rigid body, or something gives besides.
+/// Empty if nothing moves as a rigid body, or if the scene has soft objects.
 std::optional<MovingSummary> moving_summary(const Scene& scene);
 
 }  // namespace palpate::rendering

@@ -61,7 +61,8 @@ void add_polygon(const Polygon& polygon, VolumeMoments& out) {
   }
 }
 
-/// Divides a polygon by a plane. \return what is outside; `polygon` keeps the rest
+/// Divides a polygon by a plane.
+/// \return the piece outside; `polygon` keeps the rest
 Polygon cut_off(Polygon& polygon, const CutPlane& plane) {
   Polygon outside, inside;
   for (std::size_t k = 0; k < polygon.size(); ++k) {
@@ -104,7 +105,8 @@ class UnionSurface {
     return extent;
   }
 
-  /// \param of  the part that the polygon is of. \param from  the first part it is held against
+  /// \param of  the part that the polygon belongs to
+  /// \param from  the first part that it is compared with
   void add(Polygon polygon, const Vec3& normal, std::size_t of, std::size_t from) {
     while (from < parts_.size() && (from == of || is_beyond(polygon, normal, of, from))) ++from;
     if (from == parts_.size()) {
@@ -120,8 +122,8 @@ class UnionSurface {
     }
   }
 
-  /// Whether one plane has all of the polygon on its outer side. Where two facets coincide, the
-  /// first part's counts; where two parts abut, none.
+  /// Whether one plane has the whole polygon on its outer side. Of two coinciding facets, the first
+  /// part's counts; of two abutting ones, neither.
   bool is_beyond(const Polygon& polygon, const Vec3& normal, std::size_t of,
                  std::size_t other) const {
     const PlacedPart& part = parts_[other];
@@ -171,7 +173,7 @@ VolumeMoments moments_of_union(std::span<const PlacedMesh> parts) {
 
 namespace {
 
-/// Whether a region is covered twice that some of up to 4,096 triangles lie about.
+/// Whether some region just below one of up to 4,096 triangles is covered twice.
 bool covers_twice(const Surface& surface) {
   constexpr std::size_t kAsked = 4096;
   constexpr double kBelow = 1e-7;  // of the size
@@ -187,12 +189,13 @@ bool covers_twice(const Surface& surface) {
   return false;
 }
 
-/// What of one line along z, of so much area about it, is inside.
+/// Adds the inside portions of a line along z that represents an area around it.
 class LineMoments {
  public:
   LineMoments(const Surface& surface, VolumeMoments& out) : surface_(surface), out_(out) {}
 
-  /// \param from  below the surface, relative to `about`. \param length  m, to above it
+  /// \param from  below the surface, relative to `about`
+  /// \param length  m, to above the surface
   void add(const Vec3& from, double length, double area) {
     crossings_.clear();
     const Vec3 way(0, 0, length);
@@ -242,7 +245,7 @@ class LineMoments {
   std::vector<Crossing> crossings_;
 };
 
-/// Of the surface in its own frame, about its centre.
+/// Moments of the surface in its own frame, about its centre.
 VolumeMoments own_moments(const Surface& surface) {
   VolumeMoments moments;
   moments.about = surface.centre();
@@ -270,7 +273,7 @@ VolumeMoments own_moments(const Surface& surface) {
   LineMoments lines(surface, moments);
   for (int i = 0; i < kLines; ++i) {
     for (int k = 0; k < kLines; ++k) {
-      // Shifted from row to row by the golden ratio: a wall along x or y is met everywhere.
+      // Shift rows by the golden ratio, so that lines sample a wall along x or y at all places.
       const Vec3 from(low.x + (i + shifts[static_cast<std::size_t>(k)]) * step_x,
                       low.y + (k + shifts[static_cast<std::size_t>(i)]) * step_y,
                       low.z - surface.radius());
@@ -299,8 +302,8 @@ MassProperties with_mass(const VolumeMoments& moments, double mass) {
 
 namespace {
 
-/// Of an orientation whose spin is that of the momentum, times its length: stages of Runge-Kutta
-/// are not of unit length.
+/// Rate of an orientation for the spin of the momentum, times the quaternion's length: stages of
+/// Runge-Kutta do not have unit length.
 Quat rate_of_turn(const BodyInertia& inertia, const Vec3& spin_momentum, const Quat& q) {
   const double per_length2 = 1 / glm::dot(q, q);
   const Vec3 v(q.x, q.y, q.z);
@@ -318,7 +321,7 @@ Quat runge_kutta(const BodyInertia& inertia, const Vec3& momentum, const Quat& q
   return glm::normalize(q + step / 6 * (a + 2.0 * b + 2.0 * c + d));
 }
 
-/// By a rotation vector, rad.
+/// Rotation by a rotation vector, rad.
 Quat rotation_by(const Vec3& turn) {
   const double half = 0.5 * glm::length(turn);
   const double share = half > 0 ? 0.5 * std::sin(half) / half : 0.5;
@@ -440,8 +443,7 @@ void move_freely(const BodyInertia& inertia, const Vec3& gravity, double damping
     const double effective = -std::expm1(-damping * duration) / damping;
     motion.centre += terminal * (duration - effective) + motion.velocity * effective;
     motion.velocity = terminal + left * (motion.velocity - terminal);
-    // A momentum that shrinks in place turns the body as the momentum of the start does in the
-    // shortened time.
+    // A momentum that decays turns the body as the initial momentum would in a shorter time.
     motion.orientation =
         turned_freely(inertia, motion.spin_momentum, motion.orientation, effective);
     motion.spin_momentum *= left;

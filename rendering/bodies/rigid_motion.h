@@ -1,6 +1,6 @@
 #pragma once
 // Free motion of a rigid body: the state is position, velocity, orientation and angular momentum,
-// so that without torque both momenta stay as they are to the bit. World frame, SI units.
+// so that without torque both momenta stay the same to the bit. World frame, SI units.
 
 #include <span>
 #include <vector>
@@ -13,8 +13,8 @@ namespace palpate::rendering {
 
 // Mass, centre and inertia of solids from their surfaces, exactly (divergence theorem).
 
-/// Integrals over a solid, of places from a point near it: squares of a far origin's distance would
-/// eat the digits.
+/// Integrals over a solid, of places relative to a point near it: squares of the distance to a far
+/// origin would lose digits.
 struct VolumeMoments {
   Vec3 about;             ///< m; that point
   double volume = 0;      ///< m^3
@@ -22,17 +22,17 @@ struct VolumeMoments {
   Mat3 second = Mat3(0);  ///< m^5; integral of place times place transposed
 };
 
-/// A convex part where it stands in its object.
+/// A convex part at its place in its object.
 struct PlacedMesh {
   const stimuli::ConvexMesh* mesh = nullptr;
   Pose pose;
 };
 
-/// Of the union of convex parts: what several of them cover counts once. Parts may abut.
+/// Of the union of convex parts: regions that several of them cover count once. Parts may abut.
 VolumeMoments moments_of_union(std::span<const PlacedMesh> parts);
 
-/// Of the solid inside a closed surface. Where its shells overlap, the overlap counts once: then by
-/// crossings along 160,000 lines, to some 1e-4.
+/// Of the solid inside a closed surface. If its shells overlap, the overlap counts once: then
+/// computed from crossings along 160,000 lines, to some 1e-4.
 VolumeMoments moments_of_surface(const Surface& surface, const Pose& pose);
 
 /// For a solid of uniform density, in the frame of its moments.
@@ -45,24 +45,24 @@ struct MassProperties {
 MassProperties with_density(const VolumeMoments& moments, double density);  ///< kg/m^3
 MassProperties with_mass(const VolumeMoments& moments, double mass);        ///< kg
 
-/// What of a body does not change.
+/// The constants of a body.
 struct BodyInertia {
   double mass = 1;              ///< kg
   double per_mass = 1;          ///< 1/kg
   Mat3 inertia;                 ///< kg m^2, about the centre of mass, in the body's axes
   Mat3 per_inertia;             ///< its inverse
-  double most_per_inertia = 1;  ///< 1/(kg m^2); its trace: no axis has more
+  double most_per_inertia = 1;  ///< 1/(kg m^2); its trace, a bound for every axis
   /// Two principal moments are equal to 1e-10, or all three: it turns freely in closed form.
   bool symmetric = false;
-  Vec3 axis{0, 0, 1};     ///< of the third, where it is symmetric
-  double per_across = 1;  ///< 1/(kg m^2); by the two that are equal
-  double per_along = 1;   ///< by the third
+  Vec3 axis{0, 0, 1};     ///< of the third moment, if symmetric
+  double per_across = 1;  ///< 1/(kg m^2); of the two equal moments
+  double per_along = 1;   ///< of the third
 };
 
 /// \throws std::invalid_argument: mass or inertia is not positive
 BodyInertia inertia_of(const MassProperties& properties);
 
-/// A body on its way.
+/// The motion of a body.
 struct BodyMotion {
   Vec3 centre;         ///< m, of mass
   Quat orientation;    ///< from the body's axes to the world's
@@ -80,13 +80,14 @@ double kinetic_energy(const BodyInertia& inertia, const BodyMotion& motion);
 /// m/s; of a point that moves with the body.
 Vec3 velocity_at(const Vec3& spin, const BodyMotion& motion, const Vec3& point);
 
-/// Turns by a rotation vector. \param turn  rad, world frame
+/// Turns by a rotation vector.
+/// \param turn  rad, world frame
 Quat turned(const Quat& orientation, const Vec3& turn);
 
-/// Moves a body for a time in which nothing but gravity and damping acts. Gravity and linear
-/// damping in closed form; orientation, too, where two moments of inertia are equal, else by
-/// classical Runge-Kutta 4 with the angular momentum held, in steps of at most 0.02 rad: its error
-/// is of fourth order, that of momentum nothing.
+/// Moves a body for a time in which only gravity and damping act. Gravity and linear damping are in
+/// closed form. So is orientation if two moments of inertia are equal; otherwise classical
+/// Runge-Kutta 4 with constant angular momentum, in steps of at most 0.02 rad: the error of
+/// orientation is of fourth order, that of momentum zero.
 /// \param damping  1/s, of velocity and spin. \param duration  s
 void move_freely(const BodyInertia& inertia, const Vec3& gravity, double damping, double duration,
                  BodyMotion& motion);

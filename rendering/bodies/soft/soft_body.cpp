@@ -126,7 +126,7 @@ SoftState SoftBody::rest() const {
   return state;
 }
 
-/// b becomes the displacements by the forces b.
+/// Replaces forces b by the displacements that they cause.
 void SoftBody::solve(SoftState& state, std::vector<Vec3>& b) const noexcept {
   for (std::size_t i = 0; i < free_nodes_.size(); ++i) {
     for (int c = 0; c < 3; ++c)
@@ -146,7 +146,7 @@ void SoftBody::look_ahead(SoftState& state) const noexcept {
   solve(state, state.ahead);
 }
 
-/// Puts the forces in place of the last load; what changes is added to `ahead` and `by_load`.
+/// Replaces the last load by the forces; adds the effect of the change to `ahead` and `by_load`.
 void SoftBody::add_forces(SoftState& state, std::span<const NodeForce> forces) const noexcept {
   std::vector<Vec3>& change = state.step;
   for (std::size_t i = 0; i < state.load.size(); ++i) change[i] = -state.load[i];
@@ -171,8 +171,8 @@ void SoftBody::add_forces(SoftState& state, std::span<const NodeForce> forces) c
   }
 }
 
-/// J, of inertia, gravity and load from the step's start to x. \param gradient  it is added to;
-/// null: not wanted
+/// J, of inertia, gravity and load from the step's start to x.
+/// \param gradient  receives the sum; null: not wanted
 double SoftBody::work_against(const SoftState& state, std::span<const Vec3> x,
                               Vec3* gradient) const {
   const double h = settings_.step;
@@ -187,8 +187,8 @@ double SoftBody::work_against(const SoftState& state, std::span<const Vec3> x,
   return change;
 }
 
-/// Incremental potential at the trial less that at the step's start. What the next step begins
-/// with, if this one ends there, comes with it.
+/// Incremental potential at the trial less that at the step's start. Also computes the next step's
+/// initial values, in case this step ends there.
 double SoftBody::change_at_trial(SoftState& state) const noexcept {
   const Solid::Potential there =
       solid_.potential(state.trial, state.strains, settings_.material.damping / settings_.step,
@@ -198,7 +198,7 @@ double SoftBody::change_at_trial(SoftState& state) const noexcept {
   return there.damped - state.energy + work_against(state, state.trial, nullptr);
 }
 
-/// Of the incremental potential.
+/// Sets the gradient of the incremental potential at the trial.
 void SoftBody::find_trial_gradient(SoftState& state) const noexcept {
   solid_.energy(state.trial, state.strains, settings_.material.damping / settings_.step,
                 state.trial_gradient.data());
@@ -209,11 +209,11 @@ void SoftBody::find_trial_gradient(SoftState& state) const noexcept {
 
 namespace {
 
-constexpr double kArmijo = 1e-4;  // of the decrease that the slope promises
+constexpr double kArmijo = 1e-4;  // of the decrease predicted by the slope
 constexpr int kHalvings = 30;
-constexpr double kRounding = 1e-14;  // of the energy: less is no increase
-// Where a whole step lowers the potential by this share of what the quadratic model says, or less
-// than 1 / it, the model does not hold, and another iteration is worth its time.
+constexpr double kRounding = 1e-14;  // of the energy: less is not an increase
+// The quadratic model is trusted if a whole step lowers the potential by between this share of the
+// predicted decrease and 1 / it. Otherwise another iteration is worth its time.
 constexpr double kTrusted = 0.9;
 
 double longest(const std::vector<Vec3>& ways) {
@@ -230,8 +230,8 @@ double dot(const std::vector<Vec3>& a, const std::vector<Vec3>& b) {
 
 }  // namespace
 
-/// m, that the body moves in a step as a whole, if nothing holds it: no search for the least
-/// potential may take its momentum.
+/// m, motion of the whole body in a step if nothing holds it: the minimisation must not remove its
+/// momentum.
 Vec3 SoftBody::rigid_way(const SoftState& state) const noexcept {
   if (free_nodes_.size() < state.x.size()) return Vec3(0);
   Vec3 momentum(0);
@@ -243,13 +243,14 @@ Vec3 SoftBody::rigid_way(const SoftState& state) const noexcept {
   return settings_.step * (momentum / mass + settings_.step * settings_.gravity);
 }
 
-/// From state.trial along state.step to what lowers the potential, which is put into state.trial.
-/// \param change  the potential at the trial; changed with it
+/// Searches from state.trial along state.step for a lower potential; sets state.trial to it.
+/// \param change  the potential at the trial; updated with it
 SoftBody::LineSearch SoftBody::search_line(SoftState& state, double& change) const noexcept {
   const double slope = dot(state.trial_gradient, state.step);
   const double rounding = kRounding * (std::abs(state.energy) + std::abs(change));
   if (!(-slope > rounding)) return LineSearch::stays;
-  // Where elements are inside out the stiffness at rest may promise ways of many times the body.
+  // Where elements are inside out, the stiffness at rest may predict motions of many times the
+  // body's size.
   const double most = longest(state.step);
   double part = most > extent_ ? extent_ / most : 1;
   for (int halving = 0; halving <= kHalvings; ++halving, part *= 0.5) {
@@ -313,7 +314,7 @@ namespace {
 
 constexpr std::size_t kClusterTriangles = 16;
 
-/// Cuts a list of things with places in halves along their longest extent.
+/// Halves a list of items with places along their longest extent.
 void halve(std::vector<std::uint32_t>& order, std::size_t from, std::size_t to,
            const std::vector<Vec3>& places, std::vector<std::size_t>& ends) {
   if (to - from <= kClusterTriangles) {

@@ -1,12 +1,12 @@
 #pragma once
-// A body that gives: an implicit step of its motion, and how its surface answers to forces. Pure:
-// the state is an argument. World frame, SI units.
+// A soft body: an implicit step of its motion, and its surface's compliance. Pure: the state is an
+// argument. World frame, SI units.
 //
 // A step minimises the incremental potential of implicit Euler by quasi-Newton steps with a matrix
-// that is factorised once (Liu, Bouaziz & Kavan 2017, "Quasi-Newton methods for real-time
-// simulation of hyperelastic materials", ACM Trans. Graph. 36(3)); departs: the matrix is mass and
-// stiffness at rest, not a Laplacian. Guarded: it starts from the last positions, and accepts only
-// what lowers the potential, so a step cannot diverge, whatever the forces.
+// factorised once (Liu, Bouaziz & Kavan 2017, "Quasi-Newton methods for real-time simulation of
+// hyperelastic materials", ACM Trans. Graph. 36(3)); departs: the matrix is mass and stiffness at
+// rest, not a Laplacian. Guarded: it starts from the last positions and accepts only trials that
+// lower the potential, so a step cannot diverge, whatever the forces.
 
 #include <array>
 #include <cstddef>
@@ -25,7 +25,7 @@ struct SoftSettings {
   double step = 0.004;     ///< s
   Vec3 gravity{0, 0, 0};   ///< m/s^2
   int iterations = 1;      ///< quasi-Newton iterations of a step, at most
-  bool compliance = true;  ///< surface_compliance() is worked out; it takes nodes^2 of memory
+  bool compliance = true;  ///< compute the compliance; its memory grows with nodes^2
 };
 
 /// A force on a node of the surface.
@@ -40,12 +40,12 @@ struct SoftState {
   double energy = 0;           ///< J, elastic
   std::vector<Vec3> gradient;  ///< N, of the elastic energy
   std::vector<Vec3> load;      ///< N, on the nodes in the last step
-  std::vector<Vec3> ahead;     ///< m, where one more step with that load goes, by the linear model
-  std::vector<Vec3> by_load;   ///< m, the part of `ahead` that is that load's
-  std::vector<double> pack, work;  ///< of solving
+  std::vector<Vec3> ahead;     ///< m, motion in one more step with that load, by the linear model
+  std::vector<Vec3> by_load;   ///< m, the part of `ahead` due to that load
+  std::vector<double> pack, work;  ///< working memory for solving
   std::vector<Vec3> trial, step, trial_gradient;
-  std::uint64_t steps = 0, shortened = 0;  ///< so far; iterations that the guard cut short
-  // Elastic, of the last trial, which become the state's own where it is accepted:
+  std::uint64_t steps = 0, shortened = 0;  ///< so far; iterations that the guard shortened
+  // Elastic values of the last trial; the state takes them over if the trial is accepted:
   std::vector<Vec3> next_gradient;
   Strains next_strains;
   double next_energy = 0;
@@ -57,7 +57,7 @@ class SoftBody {
  public:
   /// \param mesh   world frame, at rest
   /// \param fixed  nodes that do not move, in any order
-  /// \throws std::invalid_argument: a flat element; nodes that belong to no element
+  /// \throws std::invalid_argument: a flat element, or nodes that belong to no element
   SoftBody(stimuli::SolidMesh mesh, const std::vector<std::uint32_t>& fixed,
            const SoftSettings& settings);
 
@@ -75,10 +75,10 @@ class SoftBody {
   std::size_t factor_entries() const { return factor_.entries(); }
 
   SoftState rest() const;
-  /// One step. Does not allocate or throw. Forces that are not finite are taken as none.
+  /// One step. Does not allocate or throw. Forces that are not finite count as 0.
   void step(SoftState& state, std::span<const NodeForce> forces) const noexcept;
 
-  /// m/N, row-major 3 x 3: how a step moves surface node `a` for a force on surface node `b`.
+  /// m/N, row-major 3 x 3: motion of surface node `a` in a step by a force on surface node `b`.
   const float* compliance(std::uint32_t a, std::uint32_t b) const {
     return compliance_.data() + 9 * (std::size_t{a} * surface_nodes_.size() + b);
   }
@@ -108,19 +108,19 @@ class SoftBody {
   std::vector<float> compliance_;
 };
 
-// The surface of a soft body as a tool meets it: triangles, edges and corners that move. World
+// The moving surface of a soft body, for contact with a tool: triangles, edges and corners. World
 // frame, m.
 
-/// What a servo knows of a soft body between two of its steps; all by surface node. With the load
-/// of the last step held, a node goes from x to x + ahead within a step.
+/// A servo's view of a soft body between two of its steps; all by surface node. With the load of
+/// the last step held, a node moves from x to x + ahead within a step.
 struct SoftView {
   std::vector<Vec3> x, ahead;
-  std::vector<Vec3> by_load;  ///< the part of where a node is that is the load's, by the compliance
-  std::vector<Vec3> normals;  ///< of the triangles, outwards, unit; zero where one is flat
+  std::vector<Vec3> by_load;  ///< the part of a node's place due to the load, by the compliance
+  std::vector<Vec3> normals;  ///< of the triangles, outwards, unit; zero for a flat one
   struct Box {
     Vec3 low, high;
   };
-  std::vector<Box> boxes;  ///< of the clusters, at x and two steps on
+  std::vector<Box> boxes;  ///< of the clusters, at x and two steps later
 };
 
 /// Immutable.
@@ -129,7 +129,7 @@ class SoftSurface {
   struct Edge {
     std::array<std::uint32_t, 2> nodes;      ///< surface nodes
     std::array<std::uint32_t, 2> triangles;  ///< on both sides
-    std::array<bool, 2> owns;                ///< its ends that no other edge stands for
+    std::array<bool, 2> owns;                ///< whether contacts at its ends count for this edge
   };
   /// Edges and triangles that are near each other.
   struct Cluster {
@@ -143,7 +143,7 @@ class SoftSurface {
   const std::vector<Cluster>& clusters() const { return clusters_; }
 
   SoftView first_view(const SoftBody& body, const SoftState& state) const;
-  /// Does not allocate where the view is of this surface.
+  /// Does not allocate if the view is of this surface.
   void look(const SoftBody& body, const SoftState& state, SoftView& view) const noexcept;
 
  private:

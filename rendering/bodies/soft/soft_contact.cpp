@@ -9,8 +9,8 @@
 namespace palpate::rendering {
 namespace {
 
-constexpr double kBehind = 0.5;    // of the radius: deeper behind the surface it is another side
-constexpr double kSettled = 1e-7;  // of the largest force: a sweep that changes less is the last
+constexpr double kBehind = 0.5;    // of the radius; deeper points are another side's
+constexpr double kSettled = 1e-7;  // of the largest force; stop after a smaller change
 constexpr std::uint32_t kEndKey = 0x80000000;
 
 class Search {
@@ -74,7 +74,7 @@ class Search {
       const SoftSurface::Edge& edge = moment_.surface.edges()[e];
       const Vec3 a = node(edge.nodes[0]).now, b = node(edge.nodes[1]).now;
       const NearestOnSegments at = nearest_on_segments(axis, {a, b - a});
-      // A corner is the business of the edge that owns it.
+      // A corner belongs to the edge that owns it.
       if ((at.other <= 0 && !edge.owns[0]) || (at.other >= 1 && !edge.owns[1])) continue;
       SoftContact contact;
       contact.key = e | static_cast<std::uint32_t>(segment) << 24;
@@ -113,9 +113,9 @@ class Search {
     const Vec3 off = on_axis - place;
     const double distance = glm::length(off), radius = settings_.radius;
     if (distance > radius + margin_) return;
-    // A contact goes on by where the tool was, so that no fold of the surface throws it across. A
-    // new one begins from outside: from within, another side is not met, save where it is held, as
-    // by a table.
+    // A known contact keeps the tool's side, so that a fold of the surface does not push the tool
+    // across. A new contact begins from outside: from within, it is ignored unless its nodes are
+    // fixed, as on a table.
     const SoftContact* const known = last(contact.key);
     bool behind = glm::dot(off, known != nullptr ? known->normal : outward) < 0;
     if (known == nullptr && behind) {
@@ -170,12 +170,12 @@ class Search {
   const SoftContactSettings& settings_;
   const Vec3& tip_;
   const PlacedTool& tool_;
-  const double margin_;   // m; a contact may become one within this tick
-  const double surface_;  // m; by forces, the surface may be that far from where the view has it
+  const double margin_;   // m; contacts may arise within this distance in a tick
+  const double surface_;  // m; forces may move the surface this far from the view
   SoftContactMemory& memory_;
 };
 
-/// How contact i opens by a force of 1 N at contact j.
+/// m/N; opening of contact i by a force at contact j.
 double opening(const SoftBody& body, const SoftContact& i, const SoftContact& j, double spring) {
   double sum = spring * glm::dot(i.normal, j.normal);
   for (std::uint32_t a = 0; a < i.count; ++a) {
@@ -196,7 +196,7 @@ void prepare(const SoftBody& body, double spring, SoftContactMemory& memory) {
     Vec3 base(0);
     for (std::uint32_t a = 0; a < contact.count; ++a)
       base += contact.weights[a] * memory.local[memory.slot[contact.nodes[a]]].base;
-    // Along the normal the axis is one radius and the gap away from the surface.
+    // Along the normal, the axis is one radius plus the gap away from the surface.
     Vec3 now(0);
     for (std::uint32_t a = 0; a < contact.count; ++a)
       now += contact.weights[a] * memory.local[memory.slot[contact.nodes[a]]].now;

@@ -1,11 +1,11 @@
 #pragma once
-// Contact of a tool that has a radius with a soft body, at the servo's rate: where the body is
-// between two of its steps, and what gives way there. World frame, SI units. Nothing here throws or
-// allocates, but for the memory's construction.
+// Contact of a tool with a radius and a soft body, at the servo's rate: the body's place and
+// compliance between two of its steps. World frame, SI units. Nothing here throws or allocates,
+// except construction of the memory.
 //
 // The ideal tool is the virtual one, moved (not turned) by a spring of the contact stiffness. Every
-// edge of the surface near a segment of the tool, and every triangle near an end of it, must stay
-// outside of the tool's radius: gap_i = g_i + sum of W_ij F_j >= 0, F_i >= 0, gap_i F_i = 0. W is
+// edge of the surface near a segment of the tool, and every triangle near an end of the tool, must
+// stay outside the tool's radius: gap_i = g_i + sum of W_ij F_j >= 0, F_i >= 0, gap_i F_i = 0. W is
 // the body's compliance at those places within a step (Saupin, Duriez & Cotin 2008, "Contact model
 // for haptic medical simulations") with the spring in series, so the number of places changes no
 // stiffness. Solved by projected Gauss-Seidel.
@@ -34,8 +34,8 @@ struct NearestOnSegments {
   double own = 0, other = 0;  ///< 0 to 1, on each
 };
 
-/// Where two segments are nearest to each other; of parallel ones in the middle of where they are
-/// side by side. Ericson 2005, "Real-time collision detection", 5.1.9.
+/// Where two segments are nearest to each other; for parallel ones, the middle of their common
+/// length. Ericson 2005, "Real-time collision detection", 5.1.9.
 inline NearestOnSegments nearest_on_segments(const Segment& own, const Segment& other) {
   const Vec3 r = own.from - other.from;
   const double a = glm::dot(own.along, own.along), e = glm::dot(other.along, other.along);
@@ -64,7 +64,8 @@ inline NearestOnSegments nearest_on_segments(const Segment& own, const Segment& 
   return {s, t};
 }
 
-/// Weights of the corners for the foot of p's perpendicular; false: it is outside of the triangle.
+/// Weights of the corners for the foot of p's perpendicular; false: the foot is outside the
+/// triangle.
 inline bool foot_in_triangle(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c,
                              std::array<double, 3>& weights) {
   const Vec3 u = b - a, v = c - a, w = p - a, n = glm::cross(u, v);
@@ -76,7 +77,7 @@ inline bool foot_in_triangle(const Vec3& p, const Vec3& a, const Vec3& b, const 
   return weights[0] > 0 && beta > 0 && gamma > 0;
 }
 
-/// Whether the segment goes through the triangle; touching counts.
+/// Whether the segment crosses the triangle; touching counts.
 inline bool crosses(const Segment& s, const Vec3& a, const Vec3& b, const Vec3& c) {
   const Vec3 n = glm::cross(b - a, c - a);
   const double before = glm::dot(s.from - a, n), after = before + glm::dot(s.along, n);
@@ -106,7 +107,7 @@ inline double distance_to_triangle(const Segment& s, const Vec3& a, const Vec3& 
   return least;
 }
 
-/// Signed; positive where the triangle is seen from behind (its normal points away). Van Oosterom &
+/// Signed; positive if p sees the triangle from behind (its normal points away). Van Oosterom &
 /// Strackee 1983, "The solid angle of a plane triangle".
 inline double solid_angle(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c) {
   const Vec3 u = a - p, v = b - p, w = c - p;
@@ -115,48 +116,48 @@ inline double solid_angle(const Vec3& p, const Vec3& a, const Vec3& b, const Vec
                         x * y * z + glm::dot(u, v) * z + glm::dot(v, w) * x + glm::dot(w, u) * y);
 }
 
-/// One place where a segment of the tool meets the surface.
+/// One contact place of a segment of the tool with the surface.
 struct SoftContact {
-  std::uint32_t key = 0;  ///< edge or triangle with the segment's end, to know it again
+  std::uint32_t key = 0;  ///< edge, or triangle and segment end; identifies the contact
   int segment = 0;
-  std::array<std::uint32_t, 3> nodes{};  ///< surface nodes that carry the force
+  std::array<std::uint32_t, 3> nodes{};  ///< surface nodes that bear the force
   std::array<double, 3> weights{};
   std::uint32_t count = 0;  ///< of nodes
   Vec3 normal;              ///< unit, from the surface to the tool's axis
   Vec3 axis_point;          ///< m, on the axis of the virtual segment
   double along = 0;         ///< of the segment: 0 to 1
   double gap = 0;           ///< m, without any force
-  double now = 0;           ///< m, the gap by the last forces
+  double now = 0;           ///< m, the gap with the last forces
   double force = 0;         ///< N
 };
 
 struct SoftContactSettings {
   double radius = 0.002;   ///< m, of the tool
   double stiffness = 800;  ///< N/m, of the spring between virtual and ideal tool
-  std::size_t most = 64;   ///< contacts at once; beyond it the deepest are kept
+  std::size_t most = 64;   ///< contacts at once; of more, the deepest are kept
   int sweeps = 60;         ///< of Gauss-Seidel, at most
 };
 
-/// What is remembered from tick to tick.
+/// State between ticks.
 struct SoftContactMemory {
   SoftContactMemory() = default;
   SoftContactMemory(const SoftBody& body, const SoftContactSettings& settings);
 
   Vec3 shift{0, 0, 0};                ///< m, from the virtual to the ideal tool
-  std::vector<SoftContact> contacts;  ///< of the last tick; some have no force
+  std::vector<SoftContact> contacts;  ///< of the last tick; some without force
   std::vector<NodeForce> forces;      ///< on the body, of the last tick
-  double moved = 0;                   ///< m, of the surface by those forces, at most
-  bool dropped = false;               ///< there were more places than are kept
+  double moved = 0;                   ///< m, motion of the surface by those forces, at most
+  bool dropped = false;               ///< there were more contacts than are kept
 
   // Of the current tick:
   struct Node {
     std::uint32_t node;
     Vec3 base;  ///< m, without any force
-    Vec3 now;   ///< m, with the last ones
+    Vec3 now;   ///< m, with the last forces
   };
   std::vector<SoftContact> found;
   std::vector<Node> local;
-  std::vector<std::uint32_t> slot;  ///< by surface node; valid where local[slot].node is it
+  std::vector<std::uint32_t> slot;  ///< by surface node; valid if local[slot].node equals it
   std::vector<double> matrix;
 };
 
@@ -168,14 +169,15 @@ struct SoftMoment {
   double fraction = 0;  ///< of a step since the view
 };
 
-/// Moves the ideal tool on.
-/// \param tip   m, of the virtual tool. \param tool  its segments, relative to it
+/// Moves the ideal tool.
+/// \param tip   m, of the virtual tool
+/// \param tool  its segments, relative to the tip
 /// \param step  m, by which the virtual tool moved since the last call, at most
 /// \return the force on the tool, N
 Vec3 follow_surface(const SoftMoment& moment, const SoftContactSettings& settings, const Vec3& tip,
                     const PlacedTool& tool, double step, SoftContactMemory& memory) noexcept;
 
-/// Whether the tool's axis is inside of the surface, or nearer to it than its radius.
+/// Whether the tool's axis is inside the surface, or closer to it than the tool's radius.
 bool is_inside(const SoftMoment& moment, double radius, const Vec3& tip,
                const PlacedTool& tool) noexcept;
 

@@ -23,7 +23,7 @@ namespace palpate::rendering {
 namespace {
 
 constexpr double kEarly = 1e-9;        // s; sums of ticks fall short of a step by rounding
-constexpr double kFarthestAhead = 2;   // steps beyond the view: clusters' boxes reach so far
+constexpr double kFarthestAhead = 2;   // steps beyond the view, covered by clusters' boxes
 constexpr double kFarthestNode = 1e3;  // m
 
 void add_impulse(SoftObjectState& state, double dt) {
@@ -35,7 +35,7 @@ void add_impulse(SoftObjectState& state, double dt) {
   }
 }
 
-/// The next step gets the mean force since the last one.
+/// Requests a step with the mean force since the last one.
 void ask_for_step(SoftObjectState& state) {
   state.mean.clear();
   for (const std::uint32_t node : state.impelled) {
@@ -57,7 +57,7 @@ void take_step(const SoftObject& object, SoftObjectState& state) {
   state.waiting = false;
 }
 
-/// Where one may come in this tick.
+/// Takes a due step if one may arrive in this tick.
 void take_due_step(const SoftObject& object, SoftObjectState& state) {
   if (state.pace == SoftPace::hold || !state.waiting || !step_is_due(object, state, 0)) return;
   take_step(object, state);
@@ -134,7 +134,7 @@ Vec3 advance(const SoftObject& object, SoftObjectState& state, const Vec3& tip,
   }
   if (!state.off) force = follow_surface(moment, object.contact, tip, tool, step, state.contact);
   add_impulse(state, dt);
-  // A step that is late is waited for: the next one gets the mean force of all that time.
+  // Wait for a late step: the next one gets the mean force of the whole time.
   if (!state.waiting && state.since_step >= h - kEarly) {
     ask_for_step(state);
     if (object.delay * h <= kEarly) take_due_step(object, state);
@@ -146,8 +146,8 @@ namespace {
 
 constexpr double kShare = 0.25;                                  // of the time between two steps
 constexpr std::array kRates{1000.0, 500.0, 250.0, 125.0, 62.5};  // Hz
-// A body that is stepped more slowly goes on swinging under a stiff spring or a thick tool, however
-// long it is held: rendering/README.md has the map.
+// At a lower rate a body keeps swinging under a stiff spring or a thick tool, however long it is
+// held; rendering/README.md has the map.
 struct LeastRate {
   double below_young;       // Pa
   double damped, undamped;  // Hz
@@ -155,10 +155,10 @@ struct LeastRate {
 constexpr std::array kLeastRates{LeastRate{1e4, 400, 400}, LeastRate{2e4, 200, 200},
                                  LeastRate{1e6, 100, 200}};
 constexpr double kHardlyDamped = 0.01;             // s; less than that
-constexpr double kLeastFill = 20;                  // by nodes^(4/3), of solids as long as high
+constexpr double kLeastFill = 20;                  // times nodes^(4/3), of solids as long as high
 constexpr double kBase = 0.01, kBallBase = 0.1;    // of the height
 constexpr double kShortest = 0.001, kLongest = 2;  // m, of an object
-constexpr int kPlainResolution = 10;               // where a description gives none
+constexpr int kPlainResolution = 10;               // if a description gives none
 
 stimuli::SolidMesh mesh_of(const stimuli::ObjectSpec& spec, int resolution) {
   if (spec.shape != stimuli::ShapeKind::mesh) return stimuli::mesh_of_primitive(spec, resolution);
@@ -168,7 +168,7 @@ stimuli::SolidMesh mesh_of(const stimuli::ObjectSpec& spec, int resolution) {
 
 [[noreturn]] void refuse(const std::string& fault) { throw stimuli::MeshError({fault}); }
 
-/// Of m in mm, of s in ms.
+/// Converts m to mm, s to ms.
 std::string in_thousandths(double value) {
   std::array<char, 32> text{};
   const auto end = std::to_chars(text.data(), text.data() + text.size(), 1000 * value,
@@ -176,7 +176,7 @@ std::string in_thousandths(double value) {
   return {text.data(), end.ptr};
 }
 
-/// Longest side of the box about the nodes, m.
+/// m, the longest side of the nodes' bounding box.
 double extent(const std::vector<Vec3>& nodes) {
   Vec3 low(std::numeric_limits<double>::infinity()), high = -low;
   for (const Vec3& p : nodes) {
@@ -193,7 +193,7 @@ void check_extent(const stimuli::SolidMesh& mesh) {
          in_thousandths(kShortest) + " to " + in_thousandths(kLongest) + " mm (files are in m)");
 }
 
-/// Whether three of them make a triangle: fewer hold a body as a hinge does.
+/// Whether three of the nodes form a triangle: nodes on a line hold a body like a hinge.
 bool span_a_plane(const std::vector<Vec3>& nodes, const std::vector<std::uint32_t>& which) {
   constexpr double kFlat = 1e-6;  // of the longest side's square
   if (which.size() < 3) return false;
@@ -207,7 +207,7 @@ bool span_a_plane(const std::vector<Vec3>& nodes, const std::vector<std::uint32_
   });
 }
 
-/// The lowest nodes, up to a share of the height, or higher until they hold the body.
+/// The lowest nodes, up to a share of the height or as high as needed to hold the body.
 std::vector<std::uint32_t> base_of(const std::vector<Vec3>& nodes, double share) {
   std::vector<std::uint32_t> upwards(nodes.size());
   std::iota(upwards.begin(), upwards.end(), 0U);
@@ -217,7 +217,7 @@ std::vector<std::uint32_t> base_of(const std::vector<Vec3>& nodes, double share)
   std::vector<std::uint32_t> base;
   for (const std::uint32_t i : upwards) {
     const double rise = nodes[i].z - low;
-    // Nodes at one height belong together, whatever the rounding.
+    // Keep nodes of one height together, despite rounding.
     const bool level = !base.empty() && nodes[i].z <= nodes[base.back()].z + 1e-9 * height;
     if (rise > share * height && !level && span_a_plane(nodes, base)) break;
     base.push_back(i);
@@ -235,7 +235,7 @@ std::vector<std::uint32_t> fixed_nodes(const stimuli::ObjectSpec& spec,
     fixed.insert(base.begin(), base.end());
   }
   if (spec.soft->fixed == stimuli::Soft::Fixed::points) {
-    // An element's side, of one that is as long as high.
+    // The side of an element that is as long as high.
     const double reach =
         extent(nodes) /
         std::cbrt(static_cast<double>(mesh.hexahedra.size() + mesh.tetrahedra.size()));
@@ -256,13 +256,13 @@ std::vector<std::uint32_t> fixed_nodes(const stimuli::ObjectSpec& spec,
   return {fixed.begin(), fixed.end()};
 }
 
-/// Of a mesh with what is fixed: the rate of its steps, or why it has none.
+/// The rate of steps of a mesh with fixed nodes, or why it has none.
 struct Rate {
   double rate = 0;    ///< Hz; 0: none
   std::string fault;  ///< without the place
 };
 
-/// Hz, of those at which the coupling is stable.
+/// Hz, the lowest rate at which the coupling is stable.
 double least_rate(const SoftMaterial& material) {
   double least = kRates.front();
   for (const double rate : kRates) {
@@ -281,7 +281,8 @@ Rate rate_of(const stimuli::SolidMesh& mesh, const std::vector<std::uint32_t>& f
                    " ms, a quarter of the time at " + in_thousandths(least / 1000) +
                    " Hz, the lowest rate at which such a material comes to rest under a tool"};
   };
-  // No factor of so many nodes has fewer entries: the largest meshes are not worth one.
+  // No factor of so many nodes has fewer entries, so reject the largest meshes without computing
+  // one.
   const double few = kLeastFill * std::pow(static_cast<double>(mesh.nodes.size()), 4.0 / 3);
   const double at_least = step_cost(hexahedra, tetrahedra, static_cast<std::size_t>(few));
   if (at_least > kShare / least) return too_slow(at_least);
@@ -305,13 +306,13 @@ Meshed mesh_at(const stimuli::ObjectSpec& spec, int resolution, const SoftSettin
   check_extent(out.mesh);
   out.fixed = fixed_nodes(spec, out.mesh);
   if (out.fixed.size() == out.mesh.nodes.size())
-    refuse("/soft/fixed: expected something left to move");
+    refuse("/soft/fixed: expected at least one node free to move");
   out.rate = rate_of(out.mesh, out.fixed, settings);
   return out;
 }
 
-/// At the resolution that was asked for; where none was, the highest up to kPlainResolution of
-/// which the steps have a rate.
+/// Meshes at the requested resolution; without one, at the highest up to kPlainResolution that has
+/// a rate of steps.
 Meshed meshed(const stimuli::ObjectSpec& spec, const SoftSettings& settings) {
   const bool is_file = spec.shape == stimuli::ShapeKind::mesh;
   const int asked = spec.soft->resolution;
@@ -363,10 +364,10 @@ std::shared_ptr<const SoftObject> build_soft_object(const stimuli::ObjectSpec& s
 
 namespace {
 
-constexpr double kLongestTick = 0.001;   // s; longer ones are cut, the hand moving evenly
-constexpr double kStride = 0.5;          // of the radius that the tool moves in a piece of a tick
-constexpr int kMostPieces = 10'000;      // so that a gap of more than 10 s in a path counts as 10 s
-constexpr int kMostPiecesOfServo = 256;  // which gets a step a tick at most, however long
+constexpr double kLongestTick = 0.001;   // s; longer ticks are split, with the hand moving evenly
+constexpr double kStride = 0.5;          // of the radius; the tool's motion in a piece of a tick
+constexpr int kMostPieces = 10'000;      // a gap of more than 10 s in a path counts as 10 s
+constexpr int kMostPiecesOfServo = 256;  // the servo gets at most one step a tick
 constexpr double kFarthestPose = 1e6;    // m; a reading beyond it is a fault, as for other objects
 
 class SoftMotionState final : public MotionState {
@@ -389,7 +390,7 @@ class SoftMotionState final : public MotionState {
 
 bool is_pose(const Vec3& v) { return glm::dot(v, v) <= kFarthestPose * kFarthestPose; }
 
-/// m, that the tool's segments move at most from one pose to the other.
+/// m, motion of the tool's segments from one pose to the other, at most.
 double way(const PlacedTool& from, const Vec3& tip, const PlacedTool& to, const Vec3& to_tip) {
   double most = 0;
   for (std::size_t k = 0; k < from.count; ++k) {
@@ -447,7 +448,7 @@ class SoftMotion final : public SceneMotion {
   std::unique_ptr<MotionState> initial_state() const override {
     auto state = std::make_unique<SoftMotionState>();
     state->others = others_.initial_state();
-    state->soft.reserve(soft_.size());  // growing would copy them, and copies lose their room
+    state->soft.reserve(soft_.size());  // growth would copy them without their capacity
     for (const auto& object : soft_) state->soft.push_back(rendering::initial_state(*object));
     return state;
   }
@@ -496,7 +497,8 @@ class SoftMotion final : public SceneMotion {
   }
 
  private:
-  /// Which steps come in in a tick of dt. \return kSoftLate: some are due, and none will
+  /// Decides which steps arrive in a tick of dt.
+  /// \return kSoftLate: some are due, and none arrives
   std::uint32_t pace(SoftMotionState& state, double dt) const noexcept {
     bool due = false, late = state.hold;
     for (std::size_t i = 0; i < soft_.size(); ++i) {
@@ -511,7 +513,7 @@ class SoftMotion final : public SceneMotion {
     return render_fault::kSoftLate;
   }
 
-  /// The hand moves evenly from the last pose to this one.
+  /// Advances all bodies while the hand moves evenly from the last pose to this one.
   void follow(SoftMotionState& state, const ToolPose& to, const Tool* tool, bool sides,
               double dt) const noexcept {
     const ToolPose from = state.has_last ? state.last : to;
@@ -530,7 +532,7 @@ class SoftMotion final : public SceneMotion {
     }
   }
 
-  static constexpr double kLongestStride = 0.002;  // m; of tools that are thicker than elements
+  static constexpr double kLongestStride = 0.002;  // m; for tools thicker than elements
 
   Scene others_;
   std::vector<std::shared_ptr<const SoftObject>> soft_;

@@ -13,9 +13,9 @@
 
 namespace palpate::rendering::elements {
 
-// Shape functions of the elements, and where they are integrated. The room's own.
+// Shape functions of the elements and their integration points.
 
-/// Derivatives of the shape functions by the element's own coordinates, at a point of integration.
+/// Derivatives of the shape functions by the element's own coordinates, at an integration point.
 template <int kNodes>
 struct Derivatives {
   double value[kNodes];
@@ -130,7 +130,7 @@ void Factor::solve_sides(double* b, double* work) const {
   }
   for (const Panel& panel : panels_) {
     double* const own = work + std::size_t{panel.first_column} * kSides;
-    // A force at a few places leaves most of the columns out of its way to the root.
+    // For a force at a few places, most columns are zero on the way to the root.
     if (std::all_of(own, own + panel.columns * kSides, [](double x) { return x == 0; })) continue;
     const std::size_t rows = panel.rows;
     std::fill(gathered, gathered + rows * kSides, 0.0);
@@ -234,7 +234,7 @@ void green_strain(const Matrices<kPoints>& f, double (&green)[6][kPoints]) {
   }
 }
 
-/// Gradient of the deformation at every point of integration.
+/// Gradient of the deformation at every integration point.
 template <int kNodes, int kPoints, class Shape>
 void deformation(const Shape& shape, const std::array<std::uint32_t, kNodes>& nodes,
                  std::span<const Vec3> x, Matrices<kPoints>& f) {

@@ -10,7 +10,7 @@
 //   E = sum of elements [ integral mu/2 (|F|^2 - 3) - mu (J - 1) + mu/2 (J - 1)^2
 //                         + volume lambda/2 (mean J - 1)^2 ]
 // Damping is the same quadratic form in the change of Green's strain (and of the mean dilatation),
-// so a turn of the whole body is not damped.
+// so a rotation of the whole body is not damped.
 
 #include <cstdint>
 #include <span>
@@ -20,8 +20,8 @@
 
 namespace palpate::rendering {
 
-// A symmetric positive definite sparse matrix, factorised once (Cholesky, approximate minimum
-// degree order: Eigen's) and solved with often. Pure.
+// A symmetric positive definite sparse matrix, factorised once (Eigen's Cholesky, approximate
+// minimum degree order) for many solutions. Pure.
 
 /// An entry of a sparse matrix; several at one place are added up.
 struct MatrixEntry {
@@ -41,14 +41,14 @@ class Factor {
   void solve(std::span<double> b, std::span<double> work) const;
 
   static constexpr std::size_t kTogether = 16;
-  /// For kTogether right-hand sides at once, side by side: row by row.
+  /// For kTogether right-hand sides at once, interleaved row by row.
   void solve_several(std::span<double> b, std::span<double> work) const;
 
  private:
   template <std::size_t kSides>
   void solve_sides(double* b, double* work) const;
 
-  /// Columns side by side with the same rows below them (a supernode).
+  /// Adjacent columns with the same rows below them (a supernode).
   struct Panel {
     std::uint32_t first_column = 0, columns = 0;
     std::uint32_t first_row = 0, rows = 0;  ///< below the triangle; in rows_
@@ -72,7 +72,7 @@ struct SoftMaterial {
 
 /// Strains of every element at some time.
 struct Strains {
-  std::vector<double> green;     ///< six for each point of integration
+  std::vector<double> green;     ///< six for each integration point
   std::vector<double> dilation;  ///< mean J of each element
 };
 
@@ -86,15 +86,17 @@ class Solid {
   const std::vector<double>& masses() const { return masses_; }  ///< kg, of the nodes
   double volume() const { return volume_; }                      ///< m^3, at rest
 
-  /// J. \param gradient  N, one of each node; null: not wanted
+  /// J.
+  /// \param gradient  N, one for each node; null: not wanted
   double energy(std::span<const Vec3> x, Vec3* gradient) const;
-  /// The same, with the strains there (resized where they are not of this solid).
+  /// The same, and sets the strains (resized if they are not of this solid).
   double energy(std::span<const Vec3> x, Vec3* gradient, Strains& strains) const;
   /// J, with the incremental potential of damping over a step.
-  /// \param before  strains at its start. \param rate  damping / duration of the step
+  /// \param before  strains at its start
+  /// \param rate  damping / duration of the step
   double energy(std::span<const Vec3> x, const Strains& before, double rate, Vec3* gradient) const;
-  /// What a step needs of where it may end, in one go: J, elastic, with its gradient (N, one of
-  /// each node) and the strains there (resized where they are not of this solid).
+  /// A step's values at a trial, all at once: elastic energy, J, with its gradient (N, one for each
+  /// node) and strains (resized if they are not of this solid).
   struct Potential {
     double elastic = 0;  ///< J
     double damped = 0;   ///< J, with the incremental potential of damping
@@ -104,8 +106,8 @@ class Solid {
   /// m^3, of the deformed solid.
   double volume(std::span<const Vec3> x) const;
 
-  /// A 3 x 3 block of the stiffness matrix at rest, N/m; row-major. The same block comes several
-  /// times, to be added up.
+  /// A 3 x 3 block of the stiffness matrix at rest, N/m; row-major. A block may occur several
+  /// times; add them up.
   struct Block {
     std::uint32_t row = 0, column = 0;  ///< nodes
     double value[9] = {};
