@@ -11,7 +11,7 @@
 namespace palpate::rendering {
 namespace {
 
-/// What a bonded layer gives under a wave of pressure, of what a half-space gives.
+/// Deformation of a bonded layer under a wave of pressure, as a share of a half-space's.
 /// \param a  wave number times thickness, above 0
 double share_of_half_space(double a, double poisson) {
   constexpr double kThick = 40;
@@ -24,7 +24,7 @@ double share_of_half_space(double a, double poisson) {
 }  // namespace
 
 double line_depth(const LineContact& contact, double half_width) {
-  // Over wave numbers times a, by Simpson's rule; beyond the last, 1e-6 of it.
+  // Integrate over wave numbers times a by Simpson's rule; the rest beyond kLast is 1e-6 of it.
   constexpr int kPoints = 4000;
   constexpr double kLast = 100;
   const double h = kLast / kPoints, thick = contact.thickness / half_width;
@@ -53,11 +53,11 @@ double line_force(const LineContact& contact, double depth) {
 namespace {
 
 constexpr double kStrokeTick = 1e-3;  // s
-constexpr double kStroked = 0.03;     // m from the middle: where the speed is meant
+constexpr double kStroked = 0.03;     // m from the middle, where the speed applies
 constexpr double kTurnSd = 0.02;      // rad a tick
-constexpr double kOutside = 0.3;      // m; farther out than any touch
+constexpr double kOutside = 0.3;      // m; farther out than any contact
 constexpr double kApproach = 3e-3;    // m
-constexpr double kPlaced = 1e-9;      // m; how exactly the depth is kept
+constexpr double kPlaced = 1e-9;      // m; accuracy of the depth
 
 class StrokingHand {
  public:
@@ -94,7 +94,7 @@ class StrokingHand {
     return middle + (settings_.deep - middle) * std::sin(wave(3, 0.7));
   }
 
-  /// How far out the stylus is as deep as wanted. From outside in, the depth rises.
+  /// The distance at which the stylus has this depth. The depth rises from outside inwards.
   double distance_for(double depth) const {
     double in = 0, beyond = kOutside;
     if (last_ > 0 && deeper(last_ - 1e-3, depth) && !deeper(last_ + 1e-3, depth)) {
@@ -125,7 +125,7 @@ class StrokingHand {
   Vec3 level_;  // carried along without turning about out_
   double phase_[4] = {};
   double time_ = 0;
-  mutable double last_ = 0;  // where the last search ended: the next one begins near it
+  mutable double last_ = 0;  // result of the last search; the next begins near it
 };
 
 }  // namespace

@@ -8,7 +8,7 @@
 namespace palpate::rendering {
 namespace {
 
-/// Our own, as a scene with a probe that is far from all.
+/// Our own engine, as a scene with a probe far from all bodies.
 class OwnBodies final : public BodyEngine {
  public:
   explicit OwnBodies(const BodyCase& of) : scene_(scene_of(of)), state_(scene_.initial_state()) {
@@ -44,7 +44,7 @@ class OwnBodies final : public BodyEngine {
       object.body.friction = box.friction;
       moving.push_back(object);
     }
-    // A body that sleeps would be right for nothing.
+    // Without sleep: a sleeping body would keep its place without being computed.
     return moving_scene(std::move(parts), moving, of.gravity, false, {}, false);
   }
 

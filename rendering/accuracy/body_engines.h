@@ -1,5 +1,5 @@
 #pragma once
-// The engines of body_study.h. Those of other libraries are there where CMake finds them.
+// The engines of body_study.h. Those of other libraries exist if CMake finds the libraries.
 
 #include <memory>
 #include <string>

@@ -49,7 +49,7 @@ class BulletBodies final : public BodyEngine {
     const Quat& q = box.pose.orientation;
     info.m_startWorldTransform =
         btTransform(btQuaternion(q.x, q.y, q.z, q.w), bullet_vector(box.pose.position));
-    info.m_restitution = std::sqrt(box.restitution);  // it multiplies those of a pair
+    info.m_restitution = std::sqrt(box.restitution);  // Bullet multiplies those of a pair
     info.m_friction = std::sqrt(box.friction);
     info.m_linearSleepingThreshold = info.m_angularSleepingThreshold = 0;
     bodies_.push_back(std::make_unique<btRigidBody>(info));

@@ -86,8 +86,8 @@ class OdeBodies final : public BodyEngine {
     bodies_.push_back(body);
   }
 
-  /// The library is set up once for the program. What it has to say of contacts that it does not
-  /// solve is in its error.
+  /// Sets up the library once for the program. Silences its messages on unsolved contacts: they
+  /// show in its error.
   struct Library {
     Library() {
       dSetMessageHandler([](int, const char*, va_list) {});

@@ -44,7 +44,7 @@ BodyCase tumbling(bool quick) {
   return c;
 }
 
-/// A square coin: the axis is back after each turn about the momentum.
+/// A square coin: the axis returns after each turn about the momentum.
 BodyCase coin() {
   BodyCase c;
   c.name = "spinning coin's precession";
@@ -53,7 +53,7 @@ BodyCase coin() {
   box.spin = {2, 0, 30};
   const Vec3 moments = box_moments(box.size, box.mass);
   const double rate = glm::length(moments * box.spin) / moments.x;
-  // A whole number of steps is not a whole number of turns: the axis is where it must be by then.
+  // A whole number of steps is not a whole number of turns: compute the exact axis at the end.
   c.duration = 1;
   const Vec3 along = glm::normalize(moments * box.spin), axis(0, 0, 1);
   const Vec3 expected = glm::angleAxis(rate * c.duration, along) * axis;
@@ -137,7 +137,7 @@ BodyCase cradle() {
 
 BodyBox ground() { return {{1, 1, 0.1}, 0, {{0, 0, -0.05}, kUpright}, {}, {}, 0.5, 0.3}; }
 
-/// Corner after corner, now one, now two at once: nothing takes energy out.
+/// The box hits corner after corner, sometimes two at once; energy is conserved.
 BodyCase tumbling_bounces(bool quick) {
   BodyCase c;
   c.name = "tumbling on a floor, restitution 1";
@@ -157,8 +157,8 @@ BodyCase tumbling_bounces(bool quick) {
   return c;
 }
 
-/// A plank lands on an edge askew and goes on sliding. Newton's restitution with
-/// Coulomb's friction in closed form, in the plane of the fall.
+/// A tilted plank lands on an edge and slides on. Newton's restitution with Coulomb's friction in
+/// closed form, in the plane of the fall.
 BodyCase plank() {
   BodyCase c;
   c.name = "plank on its edge, with friction";
@@ -354,7 +354,7 @@ BodyTickCost body_tick_cost(bool quick, const std::function<double()>& now) {
   const int ticks = quick ? 2000 : 20000;
   std::vector<double> costs;
   for (int i = 0; i < ticks; ++i) {
-    // The hand goes after one of them and pushes it on.
+    // The hand follows one body and pushes it.
     const BodyPose& body =
         state.motion.bodies()[static_cast<std::size_t>(i / 400) % state.motion.bodies().size()];
     const double phase = (i % 400) / 400.0;

@@ -1,6 +1,6 @@
 #pragma once
 // Bodies that move and collide, against known answers: error and run time of our own step, beside
-// Bullet and ODE where they are found. World frame, SI units.
+// Bullet and ODE if they are found. World frame, SI units.
 
 #include <functional>
 #include <span>
@@ -11,7 +11,7 @@
 
 namespace palpate::rendering {
 
-/// A box, which every engine has.
+/// A box, a shape that every engine supports.
 struct BodyBox {
   Vec3 size;
   double mass = 0;  ///< kg; 0: it stands still
@@ -20,7 +20,7 @@ struct BodyBox {
   double restitution = 1, friction = 0;
 };
 
-/// Where a box has come to; its centre is that of its mass.
+/// The present motion of a box; `centre` is its centre of mass.
 struct BoxMotion {
   Vec3 centre;
   Quat orientation;
@@ -32,11 +32,11 @@ struct BodyCase {
   Vec3 gravity{0, 0, 0};
   std::vector<BodyBox> boxes;
   double duration = 0;  ///< s
-  /// Of the boxes that move, in order; the largest over all steps counts where `always`.
+  /// Error of the moving boxes, in order. With `always`, the largest over all steps counts.
   std::function<double(std::span<const BoxMotion>)> error;
   bool always = false;
 };
-/// \param quick  shorter ones
+/// \param quick  shorter cases
 std::vector<BodyCase> body_cases(bool quick);
 
 /// Steps boxes of a case.
@@ -53,12 +53,13 @@ struct BodyRow {
   double us_per_step = 0;
 };
 
-/// All cases, steps of 1 ms. \param now  a clock, ns
+/// All cases, in steps of 1 ms.
+/// \param now  a clock, ns
 std::vector<BodyRow> body_study(bool quick, const std::function<double()>& now,
                                 const std::function<void(double)>& progress);
 
-/// What a tick of the ray renderer costs with eleven bodies, ten dumbbells and a rocket of nine
-/// parts, that the probe pushes among each other. us.
+/// us, cost of a tick of the ray renderer while the probe pushes eleven bodies into each other: ten
+/// dumbbells and a rocket of nine parts.
 struct BodyTickCost {
   double median = 0, p99 = 0, most = 0;
   std::size_t ticks = 0;

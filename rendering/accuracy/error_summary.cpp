@@ -50,7 +50,8 @@ void ErrorTally::add(const LineProbe& probe, const std::vector<LocalDepth>& trut
       *std::max_element(truth.begin(), truth.end(), [&](const LocalDepth& a, const LocalDepth& b) {
         return glm::dot(a.normal, estimate.normal) < glm::dot(b.normal, estimate.normal);
       });
-  // Equal within rounding counts as the least: an edge's two facets have one direction there.
+  // Depths equal within rounding count as the least: there an edge's two facets have the same
+  // direction.
   counts_.deeper += held.depth > truth.front().depth + 1e-12 ? 1 : 0;
   const Vec3 exact_force = kStiffness * held.depth * held.normal;
   const Vec3 force = kStiffness * estimate.depth * estimate.normal;

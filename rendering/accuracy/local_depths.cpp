@@ -14,7 +14,7 @@
 
 namespace palpate::rendering::depths {
 
-// What the local penetration depths of all shapes share. Included by local_depths*.cpp alone.
+// Shared by the local penetration depths of all shapes.
 
 inline constexpr double kRightAngle = std::numbers::pi / 2;
 
@@ -75,8 +75,7 @@ class Collector {
   std::vector<LocalDepth> found_;
 };
 
-// Local penetration depths in the analytic shapes with rims, cylinder and cone. Included by
-// local_depths*.cpp alone.
+// Local penetration depths in the analytic shapes with rims: cylinder and cone.
 
 /// Outward normal of the cone's side in the half plane of the horizontal unit vector `out`.
 Vec3 cone_normal(const stimuli::ObjectSpec& cone, const Vec3& out);
@@ -106,7 +105,7 @@ std::vector<LocalDepth> local_depths(const stimuli::ConvexMesh& mesh, const Line
     const bool tail = glm::dot(facet.normal, d) < 0;
     const Vec3& end = tail ? probe.tail : probe.tip;
     const double depth = facet.offset - glm::dot(facet.normal, end);
-    if (depth < 0) return {};  // a plane between them
+    if (depth < 0) return {};  // a plane separates them
     const Vec3 foot = end + depth * facet.normal;
     bool over = true;
     for (std::uint32_t i = 0; over && i < facet.side_count; ++i) {
@@ -165,7 +164,7 @@ void cross_line(Collector& collector, const Vec3& normal, const Vec3& start, con
   const Vec3 w = collector.probe.tip + depth * normal - start;  // w + fraction d = along line
   const Vec3 c = glm::cross(line, collector.d);
   const double c2 = glm::dot(c, c);
-  if (c2 == 0) return;  // parallel: the ends and rims have it
+  if (c2 == 0) return;  // parallel: the ends and rims cover this case
   const double along = glm::dot(glm::cross(w, collector.d), c) / c2;
   if (along < 0 || along > 1) return;
   collector.add_side(normal, depth, glm::dot(glm::cross(w, line), c) / c2,
@@ -242,7 +241,7 @@ void depths_in_cylinder(Collector& collector) {
     if (tail && collector.is_point()) break;
     for (const double sign : {-1.0, 1.0}) {
       const Vec3 n(0, 0, sign);
-      // Out past an end: on the disc only where the end of the probe is above it.
+      // Beyond an end of the cylinder: on its disc only if the end of the probe is above the disc.
       if (std::hypot(p.x, p.y) <= radius)
         collector.add_end(tail, n, h - sign * p.z, angle_to_plane(collector.u, n));
     }
@@ -316,7 +315,7 @@ void depths_in_sphere(Collector& collector) {
       -glm::dot(collector.probe.tip, collector.d) / (collector.length * collector.length);
   const Vec3 foot = collector.probe.tip + fraction * collector.d;
   const double from = glm::length(foot);
-  // A probe through the centre: any direction across it.
+  // For a probe through the centre, take any direction across it.
   const Vec3 normal = from > 1e-12 * radius ? foot / from
                       : std::abs(collector.u.z) < 0.9
                           ? glm::normalize(glm::cross(collector.u, Vec3(0, 0, 1)))
@@ -343,7 +342,7 @@ void depths_in_box(Collector& collector) {
           collector.add_end(tail, normal, h[axis] - sign * p[axis], flat);
       }
       if (collector.is_point()) continue;
-      // The edges along this axis: the normal chooses which.
+      // The edges along this axis; the normal selects one.
       Vec3 line;
       line[axis] = 1;
       const Vec3 c = sign * glm::cross(line, collector.u);
@@ -394,7 +393,8 @@ double outside_by(const stimuli::ObjectSpec& s, const Vec3& p) {
   throw std::invalid_argument("local_depths: a mesh or compound is no analytic primitive");
 }
 
-/// Some point of the probe is within the shape: the least of a convex function by thirds.
+/// Whether some point of the probe is within the shape: minimises a convex function by ternary
+/// search.
 bool overlaps(const stimuli::ObjectSpec& shape, const LineProbe& probe) {
   const auto at = [&](double t) {
     return outside_by(shape, probe.tip + t * (probe.tail - probe.tip));

@@ -70,7 +70,7 @@ class WarmWalk final : public ContactMethod {
                       : first_contact_segment(mesh_, trees_, last_, probe, tolerance_).feature;
       if (first.kind != Kind::none) hit = walk_.walk(first, probe.tip, d);
       if (hit.feature.kind == Kind::none) {
-        // Perhaps lost to rounding: then there is no separating plane.
+        // If contact was lost to rounding, there is no separating plane.
         find_separating_plane(mesh_, probe.tip, probe.tail, tolerance_, plane_, support_);
         if (!plane_.valid) hit = nearest_feature_segment(mesh_, probe.tip, d);
       }

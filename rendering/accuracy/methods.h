@@ -19,8 +19,8 @@
 
 namespace palpate::rendering {
 
-// The walk of facet_walk.h written again, as plainly as possible, in any floating-point precision:
-// what single precision would cost and save. Not for the servo.
+// The walk of facet_walk.h, rewritten as plainly as possible for any floating-point precision, to
+// measure the cost and gain of single precision. Not for the servo.
 
 template <class Real>
 class PlainWalk {
@@ -51,7 +51,7 @@ class PlainWalk {
   /// As walk_segment; the result is widened to double.
   WalkResult walk(ContactFeature start, const Vec3& tip, const Vec3& d) const {
     const Vector t(tip), v(d);
-    // As many last places as the walk in double precision allows for.
+    // Allow for as many units in the last place as the walk in double precision.
     const Real gain = Real(4.5) * std::numeric_limits<Real>::epsilon() * size_;
     At at = resume(start, t, v);
     for (std::size_t steps = 0; at.depth >= 0 && steps < facets_.size() + edges_.size(); ++steps) {
@@ -193,7 +193,7 @@ struct ContactEstimate {
   bool touching = false;
   double depth = 0;  ///< m; NaN: the method gave up
   Vec3 normal;       ///< unit, out of the object
-  Vec3 point;        ///< m, contact point on the ideal probe; NaN where the method gives none
+  Vec3 point;        ///< m, contact point on the ideal probe; NaN if the method gives none
 };
 
 /// One method over one mesh, with its state between ticks.
@@ -206,14 +206,14 @@ class ContactMethod {
 struct MethodDefinition {
   std::string name;          ///< "walk", ...
   std::string description;   ///< a line for a legend
-  bool has_history = false;  ///< must get every tick of a path, in order
+  bool has_history = false;  ///< needs every tick of a path, in order
   bool keeps_side = false;   ///< a god-object: stays on the side by which it entered
   bool visits_all = false;   ///< every facet, at every tick: slow on fine meshes
   std::unique_ptr<ContactMethod> (*make)(const stimuli::ConvexMesh& mesh, bool segment) = nullptr;
 };
 
-/// All methods of this build. The mesh must outlive what `make` returns.
-/// `segment` false: the probe is its tip alone.
+/// All methods of this build. The mesh must outlive the result of `make`. `segment` false: the
+/// probe is its tip alone.
 std::vector<MethodDefinition> contact_methods();
 
 }  // namespace palpate::rendering

@@ -15,8 +15,8 @@ namespace {
 constexpr double kPaperTick = 1e-3;    // s
 constexpr double kPaperStylus = 0.12;  // m
 constexpr int kFine = 100;             // brute-force steps a tick
-constexpr int kAfterwards = 20;        // ticks in which it may still be found
-constexpr double kDeepest = 1e-9;      // of the size: less is touching
+constexpr int kAfterwards = 20;        // ticks in which a missed contact may still be found
+constexpr double kDeepest = 1e-9;      // of the size; less is touching
 
 /// Where two segments are nearest, as fractions along them.
 struct Nearest {
@@ -24,7 +24,7 @@ struct Nearest {
   Vec3 apart;  ///< from the edge to the probe
 };
 
-/// Appendix 6. The ends are where a fraction is clamped.
+/// Appendix 6. A clamped fraction is at an end.
 Nearest nearest(const Vec3& c, const Vec3& e, const LineProbe& probe) {
   const Vec3 d = probe.tail - probe.tip, w = probe.tip - c;
   const double ee = glm::dot(e, e), dd = glm::dot(d, d), ed = glm::dot(e, d);
@@ -64,11 +64,11 @@ bool enters(const stimuli::ConvexMesh& mesh, const LineProbe& before, const Line
   return false;
 }
 
-/// The first tick that ends after the probe has entered, of a motion that starts off the object.
+/// The first tick that ends after the probe's entry, for a motion that starts off the object.
 std::optional<int> entry_tick(const stimuli::ConvexMesh& mesh, const Motion& motion, int ticks) {
   for (int tick = 1; tick <= ticks; ++tick) {
     const LineProbe before = motion.at(tick - 1), after = motion.at(tick);
-    // Too far apart to touch within the tick: not worth a hundred steps.
+    // Too far apart to touch within the tick: skip the hundred steps.
     const double moved =
         std::max(glm::length(after.tip - before.tip), glm::length(after.tail - before.tail));
     if (reference_gap(mesh, before) > moved) continue;
@@ -134,8 +134,8 @@ FirstContactLoss first_contact_loss(const stimuli::ConvexMesh& mesh, double spee
     motion.fraction = random.unit();
     const Vec3 heading = random_direction(random);
     motion.velocity = speed * heading;
-    // Back along the motion from a point within the object until the probe is off it, then some
-    // ticks more: the same number of ticks in free space at every speed.
+    // Go back along the motion from a point within the object until the probe is off it, then some
+    // ticks more, so that every speed has the same number of ticks in free space.
     const Vec3 aim = mesh.centre() + 0.8 * mesh.radius() * random.unit() * random_direction(random);
     motion.start = aim;
     if (!inside(mesh, motion.at(0))) continue;

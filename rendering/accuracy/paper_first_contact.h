@@ -1,6 +1,6 @@
 #pragma once
-// First contact exactly as in Ho, Basdogan & Srinivasan 2000, to measure which contacts that test
-// misses. Not used by any renderer.
+// First contact exactly as in Ho, Basdogan & Srinivasan 2000, to measure the contacts that this
+// test misses. Not used by any renderer.
 
 #include <cstdint>
 
@@ -17,12 +17,12 @@ bool crosses_polygon(const stimuli::ConvexMesh& mesh, std::uint32_t facet, const
 
 /// Appendix 8, to the letter: with D the vector of nearest distance from the edge to the probe (6),
 /// the probe has crossed the edge between the ticks when (1) D before and D after point against
-/// each other, (2) the nearest points are no ends of the edge, and (3, 4) no ends of the probe.
+/// each other, (2) the nearest points are not ends of the edge, and (3, 4) not ends of the probe.
 /// "For this method to be valid, the translation and rotation [...] should be very small."
 bool crosses_edge(const stimuli::ConvexMesh& mesh, std::uint32_t edge, const LineProbe& before,
                   const LineProbe& after);
 
-/// Section 4(a): either end crosses a polygon, or the probe an edge. All are tried.
+/// Section 4(a): either end crosses a polygon, or the probe crosses an edge. All are tried.
 bool paper_first_contact(const stimuli::ConvexMesh& mesh, const LineProbe& before,
                          const LineProbe& after);
 

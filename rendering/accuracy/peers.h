@@ -1,7 +1,7 @@
 #pragma once
-// Other collision libraries (Bullet, FCL) on the renderer's question: penetration depth and
-// direction of a segment in a convex mesh. For comparisons, not for the servo: they allocate, and
-// they do not keep to a side. Optional: built where CMake finds them (PALPATE_PEERS).
+// Other collision libraries (Bullet, FCL) for the renderer's task: penetration depth and direction
+// of a segment in a convex mesh. For comparisons, not for the servo: they allocate and do not keep
+// to a side. Optional: built if CMake finds them (PALPATE_PEERS).
 
 #include <memory>
 #include <span>
@@ -14,14 +14,14 @@ namespace palpate::rendering {
 /// A library's result. Mesh frame.
 struct PeerContact {
   double depth = 0;  ///< m; negative: the distance between them; NaN: the library gave up
-  Vec3 normal;       ///< unit, out of the mesh; undefined where the depth is NaN
+  Vec3 normal;       ///< unit, out of the mesh; undefined if the depth is NaN
   Vec3 point;        ///< m, on the mesh: where the probe, moved by depth * normal, touches it
 };
 
 /// One mesh in one library, with the library's state between queries. Every library gets its best
 /// settings: double precision, no margins, coordinates scaled to an object of radius 1 (their
-/// tolerances are absolute), a hull that climbs from near by instead of looking at every vertex,
-/// the probe as an exact segment, and the last normal as the first guess.
+/// tolerances are absolute), a hull that climbs from nearby instead of scanning every vertex, the
+/// probe as an exact segment, and the last normal as the first guess.
 class Peer {
  public:
   virtual ~Peer() = default;
@@ -35,11 +35,11 @@ using MakePeer = std::unique_ptr<Peer> (*)(const stimuli::ConvexMesh& mesh);
 struct PeerLibrary {
   const char* name;     ///< "bullet", "fcl"
   const char* version;  ///< "3.24"; empty when absent
-  const char* method;   ///< what is asked of it
-  MakePeer make;        ///< null when this build is without it
+  const char* method;   ///< the algorithm used
+  MakePeer make;        ///< null if this build lacks it
 };
 
-/// All that are known, those absent from this build included.
+/// All known libraries, including those absent from this build.
 std::span<const PeerLibrary> peer_libraries();
 
 }  // namespace palpate::rendering

@@ -1,4 +1,4 @@
-// Bullet: GJK, and EPA where it finds an overlap. https://pybullet.org, zlib licence.
+// Bullet: GJK, and EPA if it finds an overlap. https://pybullet.org, zlib licence.
 
 #include <BulletCollision/CollisionShapes/btConvexInternalShape.h>
 #include <BulletCollision/NarrowPhaseCollision/btGjkEpa2.h>
@@ -14,7 +14,7 @@ namespace {
 btVector3 to_bullet(const Vec3& v) { return {v.x, v.y, v.z}; }
 Vec3 from_bullet(const btVector3& v) { return {v.x(), v.y(), v.z()}; }
 
-/// A convex shape that is nothing but a support function.
+/// A convex shape given only by a support function.
 template <class Body>
 class Shape final : public btConvexInternalShape {
  public:

@@ -1,11 +1,11 @@
 // The Flexible Collision Library: the GJK and EPA behind its signed distance (Drake's choice).
 // https://github.com/flexible-collision-library/fcl, BSD licence.
 //
-// Its collide() asks libccd's MPR, which is not the least penetration; distance() with
-// enable_signed_distance is. That one is called here a level below, where it takes support
-// functions: a segment is then exact, and the hull can climb. The packaged
-// library is built with assertions, some of which fail on thin objects and would end the program;
-// the same code compiled here without them throws or returns its result so far.
+// Its collide() uses libccd's MPR, which does not give the least penetration; distance() with
+// enable_signed_distance does. This file calls the latter one level below, with support functions:
+// a segment is then exact, and the hull can climb. The packaged library is built with assertions,
+// some of which fail on thin objects and would end the program. The same code, compiled here
+// without them, throws or returns its result so far.
 
 #ifndef NDEBUG
 #define NDEBUG
@@ -21,15 +21,15 @@
 namespace palpate::rendering::peers {
 namespace {
 
-constexpr int kMaxSupports = 20000;  // its EPA has no limit of its own
+constexpr int kMaxSupports = 20000;  // FCL's EPA has no limit
 
 Vec3 from_ccd(const ccd_vec3_t& v) { return {v.v[0], v.v[1], v.v[2]}; }
 void to_ccd(const Vec3& v, ccd_vec3_t* out) { ccdVec3Set(out, v.x, v.y, v.z); }
 
 struct HullBody {
   Hull hull;
-  Vec3 first;            ///< direction that GJK begins with
-  mutable int left = 0;  ///< supports until we give up
+  Vec3 first;            ///< initial direction of GJK
+  mutable int left = 0;  ///< queries left until we give up
 };
 
 void support_hull(const void* body, const ccd_vec3_t* direction, ccd_vec3_t* out) {

@@ -1,6 +1,5 @@
 #pragma once
-// What the adaptors of the libraries share: mesh and probe in the libraries' units. Included by
-// peers_*.cpp alone.
+// Shared by the libraries' adaptors: mesh and probe in the libraries' units.
 
 #include <cstdint>
 #include <glm/geometric.hpp>
@@ -22,15 +21,15 @@ struct Scale {
   double radius;
 };
 
-/// The mesh as a support function: climbs from the start that a map has for the direction, so that
-/// a direction asked twice gets the same vertex twice, ties included: Bullet asks again for its
-/// witness points.
+/// The mesh as a support function. Climbs from a start that depends on the direction alone, so that
+/// a repeated query gives the same vertex, ties included: Bullet repeats queries for its witness
+/// points.
 class Hull {
  public:
   explicit Hull(const stimuli::ConvexMesh& mesh) : mesh_(mesh), scale_(mesh), map_(mesh, 0, 1) {}
   const Scale& scale() const { return scale_; }
   Vec3 support(const Vec3& direction) const {
-    // Libraries may ask for no direction at all.
+    // Libraries may pass a zero direction.
     const Vec3 asked = glm::dot(direction, direction) > 0 ? direction : Vec3(1, 0, 0);
     const std::uint32_t vertex = support_vertex(mesh_, asked, map_.near_support(asked));
     return scale_.to_unit(mesh_.vertices()[vertex]);

@@ -98,7 +98,8 @@ struct PressedSlab {
   double step_ns = 0;
 };
 
-/// \param half  m, of the slab's height. \param goal  m; the virtual tool is that deep
+/// \param half  m, of the slab's height
+/// \param goal  m, depth of the virtual tool
 PressedSlab press_slab(stimuli::SolidMesh mesh, double half, double poisson,
                        const SoftContactSettings& contact, const PlacedTool& tool,
                        const Vec3& above, double goal, const Clock& now) {
@@ -162,7 +163,7 @@ PressedSlab lying(int resolution, const Clock& now) {
                     now);
 }
 
-/// Hertz's cylinder. Poisson's ratio 0: then sides that are free are in plane strain.
+/// Hertz's cylinder. With a Poisson's ratio of 0, free sides are in plane strain.
 /// \param resolution  elements over the slab's width
 SoftRow line(int resolution, const Clock& now) {
   constexpr double kWide = 0.16, kLong = 0.02;
@@ -182,7 +183,8 @@ SoftRow line(int resolution, const Clock& now) {
   return row;
 }
 
-/// A cylinder lying across, pressed by a fifth of the thickness; the truth is the finest mesh's.
+/// A cylinder lying across, pressed in by a fifth of the thickness; the truth is the finest mesh's
+/// result.
 void add_cylinder(bool quick, const Clock& now, std::vector<SoftRow>& rows) {
   const std::vector<int> resolutions = quick ? std::vector{4} : std::vector{6, 10};
   const int finest = quick ? 8 : 14;
@@ -223,7 +225,7 @@ void add_pressed(const Clock& now, std::vector<SoftRow>& rows) {
   volume.step_ns = spent;
   rows.push_back(volume);
 
-  // The same equilibrium with every step solved to the end.
+  // The same equilibrium with every step fully solved.
   SoftSettings exact = body.settings();
   exact.iterations = 20;
   const SoftBody solved(mesh, held, exact);
@@ -236,7 +238,7 @@ void add_pressed(const Clock& now, std::vector<SoftRow>& rows) {
   for (std::size_t i = 0; i < mesh.nodes.size(); ++i)
     off = std::max(off, glm::distance(state.x[i], mesh.nodes[i]));
   SoftRow rest = row_of("rest shape, let go", "shape at rest", mesh, 1e6 * off, 0, "um");
-  rest.error = off / 0.06;  // of its length
+  rest.error = off / 0.06;  // of the body's length
   rows.push_back(rest);
 }
 

@@ -8,14 +8,14 @@
 
 namespace palpate::rendering {
 
-/// One solid, one question.
+/// One measured quantity of one solid.
 struct SoftRow {
   std::string name, truth;
   std::size_t nodes = 0, elements = 0;
   double value = 0, reference = 0;  ///< in `unit`; the error is their difference
   std::string unit;
-  double error = 0;    ///< share of the reference; of the last two cases as `unit` says
-  double step_ns = 0;  ///< of a step of the body; 0: none was made
+  double error = 0;    ///< share of the reference; in `unit` for the last two cases
+  double step_ns = 0;  ///< of a step of the body; 0: no step
 };
 
 /// \param quick  without the meshes that take seconds to build

@@ -14,7 +14,7 @@ namespace palpate::rendering {
 namespace {
 
 constexpr double kPi = 3.14159265358979324;
-const Vec3 kBox(0.08, 0.06, 0.04);  // m; no two sides alike, or it would be the cube again
+const Vec3 kBox(0.08, 0.06, 0.04);  // m; all sides differ, unlike the cube's
 
 std::vector<stimuli::ShapeKind> analytic_shapes() {
   std::vector<stimuli::ShapeKind> all;
@@ -57,7 +57,7 @@ class MethodRun {
 
   void over(const TestStroke& stroke, int timings) {
     const std::size_t begin = stroke.path.approach, end = stroke.path.poses.size();
-    // What visits everything has no history: it is run at the ticks that are compared only.
+    // Methods that visit everything have no history: run them only at compared ticks.
     const std::size_t step = kind_.visits_all ? stride_ : 1;
     std::vector<ContactEstimate> estimates;
     double fastest = pass(stroke, step, &estimates);
@@ -84,9 +84,9 @@ class MethodRun {
   }
 
  private:
-  static constexpr double kMostTime = 2e8;  // ns; timed again only while the total is below
+  static constexpr double kMostTime = 2e8;  // ns; repeat timing only while the total is below
 
-  /// The approach untimed, then the contact. Returns ns.
+  /// Runs the approach untimed, then the contact. Returns ns.
   double pass(const TestStroke& stroke, std::size_t step,
               std::vector<ContactEstimate>* estimates) const {
     const auto method = kind_.make(mesh_, segment_);
@@ -147,7 +147,7 @@ std::vector<stimuli::ObjectSpec> tessellations(stimuli::ShapeKind shape, int mos
     spec.shape = shape;
     spec.size = kBox;
     spec.subdivisions = level;
-    // Steps of 2 where labs choose, then of 4.
+    // Factors of 2 in the range that labs use, then of 4.
     spec.segments = level < 5 ? 8 << level : 128 << (2 * (level - 4));
     if (triangles_of(spec) > most_triangles && !all.empty()) break;
     all.push_back(spec);

@@ -17,10 +17,10 @@ struct AccuracySettings {
   int contact_ticks = 1000;  ///< of each path
   double length = 0.12;      ///< m, of the stylus
   int most_triangles = 327680;
-  /// Budget of facets and edges visited by what looks at all of them (the exact polyhedron, and the
-  /// methods that scan); where all ticks would take more, every n-th is compared.
+  /// Budget of visited facets and edges for the exact polyhedron and the methods that scan. If all
+  /// ticks would exceed it, every n-th tick is compared.
   double visits = 2e8;
-  int timings = 3;  ///< of which the fastest counts
+  int timings = 3;  ///< the fastest counts
 };
 
 /// One method on one tessellation with one probe.
@@ -54,8 +54,8 @@ struct ErrorLimits {
 };
 constexpr double kNoLimit = 1e9;
 
-/// Triangles of the coarsest tessellation from which on (the finer ones included) both renderers
-/// keep the limits and lose no contact; 0 when none is fine enough.
+/// Triangles of the coarsest tessellation that, like all finer ones, keeps both renderers within
+/// the limits without a lost contact; 0 if none is fine enough.
 int triangles_for(const std::vector<AccuracyRow>& rows, const std::string& shape,
                   const ErrorLimits& limits);
 

@@ -40,7 +40,7 @@ class Sway {
   Wave waves_[2];
 };
 
-/// Down from above to where the path begins, 0.5 mm a tick.
+/// Comes down from above to the beginning of the path, 0.5 mm a tick.
 void come_down(std::vector<OraclePose>& path, const Vec3& from, const OraclePose& to) {
   const double steps = std::ceil(glm::length(from - to.tip) / 5e-4);
   for (double step = 0; step < steps; ++step) {
@@ -52,7 +52,7 @@ void by_closed_form(UnionCase& one, const std::function<Vec3(const Vec3&)>& disp
   for (const OraclePose& pose : one.path) one.displacement.push_back(displacement(pose.tip));
 }
 
-/// By the oracle over these parts, which may be others that make the same body.
+/// Sets the truth by the oracle over these parts, which may be another division of the same body.
 void by_oracle(UnionCase& one, const OracleParts& parts) {
   const UnionOracle oracle(parts, one.tool);
   OraclePose ideal = one.path[0];
@@ -62,7 +62,7 @@ void by_oracle(UnionCase& one, const OracleParts& parts) {
   }
 }
 
-/// Over both walls and the valley, up to 3 mm below it.
+/// A path over both walls and the valley, up to 3 mm below it.
 UnionCase groove_case(double opening, std::uint64_t seed, std::size_t ticks) {
   Random random(seed, {1});
   const Sway x(random), y(random), z(random);
@@ -70,7 +70,7 @@ UnionCase groove_case(double opening, std::uint64_t seed, std::size_t ticks) {
   const auto tip = [&](std::size_t i) {
     return Vec3(2e-3 * x(i), 0.02 * y(i), -1e-3 + 2e-3 * z(i));
   };
-  // The way in leads down the middle of the groove and then to the first place.
+  // The path leads down the middle of the groove, then to the first place.
   come_down(one.path, {0, 0, 0.058}, {{0, 0, 1e-4}, Mat3(1)});
   come_down(one.path, {0, 0, 1e-4}, {tip(0), Mat3(1)});
   for (std::size_t i = 0; one.path.size() < ticks; ++i) one.path.push_back({tip(i), Mat3(1)});
@@ -138,11 +138,11 @@ UnionCase cluster_case(int segments, std::uint64_t seed, std::size_t ticks) {
   return one;
 }
 
-/// A hook of three segments is lowered behind a beam, pulled up against it, rocked and let down.
+/// A hook of three segments is lowered behind a beam, pulled up against it, rocked and lowered.
 UnionCase hook_case(std::uint64_t seed, std::size_t ticks) {
   Random random(seed, {6});
   const Sway x(random), z(random), turn(random);
-  // Below the beam runs the short arm; the long one stands beside it.
+  // The short arm is below the beam; the long one stands beside it.
   UnionCase one{{box_part({-0.01, -0.05, -0.01}, {0.01, 0.05, 0.01})},
                 {{Vec3(0), Vec3(0, 0, 0.08)},
                  {Vec3(0), Vec3(-0.03, 0, 0)},
@@ -209,7 +209,7 @@ constexpr double kCarrier = 0.12;  // m, length of a stylus that carries a tool
 /// One tick of a method.
 struct UnionEstimate {
   Vec3 force;        // N
-  OraclePose ideal;  // of those that have one
+  OraclePose ideal;  // for methods that have one
 };
 
 class UnionRun {

@@ -1,6 +1,6 @@
 #pragma once
 // Contact with objects of several convex parts and tools of several segments: the error of the
-// contact law against closed forms and the brute-force oracle, beside two simpler ways to do it.
+// contact law against closed forms and the brute-force oracle, beside two simpler methods.
 
 #include <cstdint>
 #include <functional>
@@ -28,18 +28,18 @@ struct UnionCaseKind {
 };
 std::vector<UnionCaseKind> union_case_kinds();
 
-/// A way to find force and torque on unions.
+/// A method that finds force and torque on unions.
 struct UnionMethod {
   const char* name;
   const char* description;
-  bool one_ideal_tool;  ///< it has one ideal tool, of which it can be asked whether it is inside
+  bool one_ideal_tool;  ///< it has one ideal tool, which can be checked for penetration
 };
 const std::vector<UnionMethod>& union_methods();
 
 struct UnionSettings {
   int seeds = 4;             ///< of each case: 1, 2, ...
   std::size_t ticks = 1500;  ///< of each
-  int timings = 3;           ///< of which the fastest counts
+  int timings = 3;           ///< the fastest counts
 };
 
 /// One method over one kind of case.
@@ -50,7 +50,8 @@ struct UnionRow {
   double ns_per_tick = 0;  ///< mean over all ticks
   std::size_t ticks = 0;
   std::size_t in_contact = 0;  ///< by the truth
-  /// Ticks with the ideal tool in a part by more than 1e-12 of its size; 0 for what has none.
+  /// Ticks with the ideal tool in a part by more than 1e-12 of the part's size; 0 for methods
+  /// without an ideal tool.
   std::size_t inside = 0;
   bool one_ideal_tool = false;
   std::size_t off_by_a_tenth = 0;  ///< ticks in contact with the force more than 10 % off
