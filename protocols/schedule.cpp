@@ -34,7 +34,7 @@ int part_size(long long total, int parts, int index) {
 
 std::uint64_t code(RendererKind renderer) { return renderer == RendererKind::point ? 0 : 1; }
 
-/// Separates the streams of groups; the interleaved group has a code of its own.
+/// Separates the streams of groups; the interleaved group has its own code.
 std::uint64_t code(const Group& group) { return group.size() == 1 ? code(group.front()) : 2; }
 
 std::vector<std::string> names_of(const Protocol& protocol) {
@@ -69,7 +69,8 @@ void mix_renderers(const Protocol& protocol, const Group& group, std::vector<Tri
       if (trial.stimulus == stimulus) shown.push_back(&trial);
     }
     std::vector<RendererKind> renderers;
-    // A sequential order shows all stimuli with one renderer, then with the next; random: any.
+    // A sequential order shows all stimuli with one renderer, then with the next; a random order
+    // mixes them.
     for (std::size_t i = 0; i < shown.size(); ++i) renderers.push_back(group[i % group.size()]);
     if (protocol.order.kind == OrderKind::random && group.size() > 1) random.shuffle(renderers);
     for (std::size_t i = 0; i < shown.size(); ++i) shown[i]->renderer = renderers[i];
@@ -191,7 +192,7 @@ std::vector<Block> main_blocks(const Protocol& protocol, int participant_number,
   return blocks;
 }
 
-/// Whole blocks for each session where there are enough of them; else the trials are divided
+/// Gives each session whole blocks if there are enough of them; otherwise divides the trials
 /// evenly.
 std::vector<Block> into_sessions(const Protocol& protocol, std::vector<Block> blocks) {
   const int sessions = protocol.sessions.count;

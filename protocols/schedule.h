@@ -24,7 +24,7 @@ struct Interval {
   int stimulus = 0;  ///< index into Protocol::stimuli; -1: nothing
   RendererKind renderer = RendererKind::point;
   std::optional<double> level = std::nullopt;  ///< none: the stimulus as it is
-  bool standard = false;                       ///< what the other interval is compared with
+  bool standard = false;                       ///< the other interval is compared with it
 };
 
 /// One scheduled presentation. Numbers count from 1; `trial` counts within the session.
@@ -34,12 +34,12 @@ struct Trial {
   int stimulus = 0;  ///< index into Protocol::stimuli
   Quat orientation{1, 0, 0, 0};
   bool practice = false;  ///< practice or warm-up: excluded from analysis
-  // Version 2; stimulus and renderer are then those of what is asked about.
+  // Version 2; stimulus and renderer are then those of the judged interval.
   int task_block = -1;                         ///< index into Protocol::blocks; -1: version 1
   int track = 0;                               ///< 1, 2, ...: stimulus, renderer and procedure
-  std::optional<double> level = std::nullopt;  ///< adjust: where it starts
+  std::optional<double> level = std::nullopt;  ///< adjust: the starting level
   bool catch_trial = false;
-  std::vector<Interval> intervals = {};  ///< in the order in which they are felt
+  std::vector<Interval> intervals = {};  ///< in order of presentation
 };
 
 /// The limits on the order of trials cannot be satisfied; what() says why and what can be changed.
@@ -49,19 +49,22 @@ class ScheduleError : public std::runtime_error {
 
 /// Version 1: the trials of participant number 1, 2, ... in order. Depends on the protocol's seed
 /// and the number alone; in version 2 answers count, too (tasks/task_plan.h). Practice appears
-/// once, as its first round. \throws ScheduleError where the constraints have no solution,
-/// std::invalid_argument for a participant number below 1.
+/// once, as its first round.
+/// \throws ScheduleError if the constraints have no solution, std::invalid_argument for a
+/// participant number below 1.
 std::vector<Trial> schedule(const Protocol& protocol, int participant_number);
 
 /// Round 1, 2, ... of practice with a renderer; round 1 is the one in schedule(). For an
 /// interleaved protocol, a round mixes all renderers and `renderer` does not matter. Trials count
-/// from 1 within the round, session and block are left at 1: the session that shows a further round
-/// numbers it. \throws as schedule().
+/// from 1 within the round, session and block stay 1: the session that shows a further round
+/// numbers it.
+/// \throws as schedule()
 std::vector<Trial> practice_round(const Protocol& protocol, int participant_number,
                                   RendererKind renderer, int round);
 
 /// A block of trials for analysis without numbers and orientations: `repetitions` of each stimulus
-/// with each renderer of `group`, mixed. \param number  from 0, of the blocks of such renderers.
+/// with each renderer of `group`, mixed.
+/// \param number  from 0, among the blocks of these renderers
 /// \throws ScheduleError
 std::vector<Trial> block_of_trials(const Protocol& protocol, int participant_number,
                                    const std::vector<RendererKind>& group, int number,
@@ -70,7 +73,7 @@ std::vector<Trial> block_of_trials(const Protocol& protocol, int participant_num
 void draw_orientations(const Protocol& protocol, int participant_number,
                        const std::vector<Trial*>& trials);
 
-/// After how many successive participant numbers the orders of renderers repeat.
+/// The number of successive participant numbers after which the orders of renderers repeat.
 int renderer_orders(const Protocol& protocol);
 
 /// Trials for analysis, without practice and warm-up, in all sessions of a participant.

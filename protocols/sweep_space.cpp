@@ -27,7 +27,7 @@ double normal_value(double share) {
   return -std::numbers::sqrt2 * boost::math::erfc_inv(2 * share);
 }
 
-// Beyond, a tail has no digits left in double precision: 6e-300 of the distribution.
+// Beyond this, a tail (6e-300 of the distribution) has no digits left in double precision.
 constexpr double kFarthestSd = 37;
 
 /// Standard deviations between the mean and the nearer limit; 0: the mean lies within.
@@ -35,13 +35,14 @@ double sd_from_mean(const SweepParameter& p) {
   return std::max({(p.low - p.mean) / p.sd, (p.mean - p.high) / p.sd, 0.0});
 }
 
-/// Of a normal distribution that is cut off at both limits. Shares near 1 have no digits left:
-/// there, what lies above is counted instead.
+/// Value of a normal distribution truncated at both limits. Shares near 1 have no digits left, so
+/// they are computed from the upper tail instead.
 double cut_normal_value(const SweepParameter& p, double u) {
   if (u <= 0) return p.low;
   if (u >= 1) return p.high;
   const double low = (p.low - p.mean) / p.sd, high = (p.high - p.mean) / p.sd;
-  // So narrow that shares within cannot be told apart; the density is constant to 1e-7.
+  // The limits are so close that shares between them are indistinguishable; the density is constant
+  // to 1e-7.
   if ((high - low) * std::max({1.0, std::fabs(low), std::fabs(high)}) < 1e-7)
     return std::clamp(p.low + u * (p.high - p.low), p.low, p.high);
   const auto from_below = [&](double from, double to, double part) {
@@ -56,7 +57,7 @@ double cut_normal_value(const SweepParameter& p, double u) {
   return std::clamp(p.mean + p.sd * (mirrored ? -z : z), p.low, p.high);
 }
 
-/// The ratio, if it is a number: a plan's points stay the same to the bit.
+/// Uses the ratio if it is finite, so that the points of existing plans stay the same to the bit.
 double log_uniform_value(const SweepParameter& p, double u) {
   const double ratio = p.high / p.low;
   const double value = std::isfinite(ratio)
@@ -137,7 +138,7 @@ void read_limits(ObjectReader& reader, SweepParameter& out) {
   }
 }
 
-/// Where all four numbers are in order by themselves.
+/// Checks the limits if each of the four numbers is valid.
 void check_normal(ObjectReader& reader, const SweepParameter& p) {
   for (const char* const key : {"low", "high", "mean", "sd"}) {
     const json* const value = reader.member(key);
@@ -188,7 +189,7 @@ SweepParameter read_parameter(ObjectReader& reader) {
   return out;
 }
 
-/// Whether one pointer leads into what another one replaces, or is the same.
+/// Whether the pointers are the same, or one leads into the value that the other replaces.
 bool overlap(const std::string& a, const std::string& b) {
   const std::string &shorter = a.size() < b.size() ? a : b, &longer = a.size() < b.size() ? b : a;
   return longer.starts_with(shorter) &&

@@ -1,6 +1,6 @@
 #pragma once
-// The space of a sweep: which numbers and words of the simulated participant and of the protocol
-// vary, each with its distribution. Meaning of the keys: sweep_space.schema.json.
+// The space of a sweep: the varied values of the simulated participant and of the protocol, each
+// with its distribution. Meaning of the keys: sweep_space.schema.json.
 
 #include <nlohmann/json.hpp>
 #include <string>
@@ -17,22 +17,22 @@ struct SweepParameter {
   SweptDocument of = SweptDocument::participant;
   std::vector<std::string> paths;  ///< JSON pointers; all get the same value
   DistributionKind distribution = DistributionKind::uniform;
-  double low = 0, high = 1;            ///< limits; normal: it is cut off there, not clipped
-  double mean = 0, sd = 1;             ///< normal, before it is cut off; a limit within 37 sd
+  double low = 0, high = 1;            ///< limits; normal: truncated there, not clipped
+  double mean = 0, sd = 1;             ///< normal, before truncation; a limit within 37 sd
   std::vector<nlohmann::json> values;  ///< choice: numbers, words, true or false; equally likely
 
-  /// The value below which a share `u` of the distribution lies, 0 <= u <= 1. choice: the value
-  /// whose part of [0, 1) holds u.
+  /// The quantile for a share `u` of the distribution, 0 <= u <= 1. choice: the value whose part of
+  /// [0, 1) contains u.
   nlohmann::json value_at(double u) const;
 };
 
 struct SweepSpace {
   int version = 1;
   std::vector<SweepParameter> parameters;  ///< at least one
-  std::string source_text;                 ///< the file as it was read, byte for byte
+  std::string source_text;                 ///< the file, byte for byte
 };
 
-/// Reads and checks a space. Whether its pointers lead anywhere is not known here.
+/// Reads and checks a space. Does not check that its pointers lead anywhere.
 /// \throws InputError with every fault.
 SweepSpace parse_sweep_space(const std::string& path);
 SweepSpace parse_sweep_space_text(const std::string& text, const std::string& file_name);

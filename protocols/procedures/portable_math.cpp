@@ -37,8 +37,8 @@ double portable_exp(double x) {
   if (x < -745.2) return 0;
   const double k = std::floor(x * kLog2E + 0.5);
   const double r = (x - k * kLn2High) - k * kLn2Low;
-  // Taylor series, |r| <= ln(2) / 2: the term after the last is below 1e-19.
-  // Even and odd terms apart: neither waits for the other.
+  // Taylor series, |r| <= ln(2) / 2: the term after the last is below 1e-19. Even and odd terms are
+  // summed apart: neither sum waits for the other.
   const double r2 = r * r;
   double even = kReciprocalFactorials[14], odd = kReciprocalFactorials[15];
   for (int n = 12; n >= 2; n -= 2) {
@@ -71,8 +71,8 @@ double portable_normal_cdf(double x) {
   if (std::isnan(x)) return x;
   if (x < -8.5) return 0;
   if (x > 8.5) return 1;
-  // Marsaglia 2004, "Evaluating the normal distribution", section 3: the series of
-  // (Phi(x) - 1/2) / phi(x), until nothing is added any more.
+  // Marsaglia 2004, "Evaluating the normal distribution", section 3: the series of (Phi(x) - 1/2) /
+  // phi(x), until the sum no longer changes.
   double term = x, sum = x, before = 0;
   for (int n = 3; sum != before; n += 2) {
     before = sum;

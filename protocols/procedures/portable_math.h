@@ -1,6 +1,6 @@
 #pragma once
-// Exponential, logarithm and normal distribution of additions, multiplications and divisions alone:
-// libm differs in the last bit between machines, and the choice of levels must not.
+// Exponential, logarithm and normal distribution computed only with additions, multiplications and
+// divisions: libm differs in the last bit between machines, but the choice of levels must not.
 
 namespace palpate::protocols {
 

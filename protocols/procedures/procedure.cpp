@@ -150,7 +150,7 @@ Estimate StaircaseRun::estimate() const {
   return result;
 }
 
-/// Tables that stay the same over the trials.
+/// Tables that are constant over the trials.
 struct QuestPlusTables {
   QuestPlus spec;
   /// F at each level: [level][threshold, slope].

@@ -20,15 +20,15 @@ struct Response {
   bool success = false;  ///< correct (forced choice), or "yes"
 };
 
-/// The estimates from the answers so far; nullopt where a procedure does not estimate the number.
+/// The estimates from the answers so far; nullopt if a procedure does not estimate the value.
 struct Estimate {
   std::optional<double> threshold;           ///< a level
   std::optional<double> threshold_scale_sd;  ///< on the procedure's scale
   std::optional<double> slope, guess, lapse;
   int trials = 0;
   int reversals = 0;
-  /// Trials at an end of the range (Staircase), series without a change (Limits): where there are
-  /// many, the threshold lies outside.
+  /// Trials at an end of the range (Staircase), series without a change (Limits): many of them mean
+  /// that the threshold lies outside the range.
   int at_limit = 0;
 };
 
@@ -54,7 +54,8 @@ class LimitsRun {
 
   std::optional<double> next_level() const;
   void record(const Response& response);
-  /// Threshold: mean on the scale over the series with a change, each half a step before it.
+  /// Threshold: mean on the scale over the series with a change, each taken half a step before the
+  /// change.
   Estimate estimate() const;
 
  private:
@@ -80,7 +81,7 @@ class StaircaseRun {
   /// Threshold: mean on the scale of an even number of reversals after the discarded ones; of an
   /// odd number the first is left out, too, so that peaks and valleys balance (Levitt 1971).
   Estimate estimate() const;
-  /// Levels at which the track turned.
+  /// Levels at which the direction reversed.
   std::vector<double> reversal_levels() const;
 
  private:
@@ -132,7 +133,7 @@ class Procedure {
   Procedure(const ProcedureSpec& spec, std::uint64_t seed);
 
   std::optional<double> next_level() const;  ///< nullopt: the procedure has ended
-  /// A trial that was not answered is not recorded: its level comes again.
+  /// Do not record an unanswered trial: its level is repeated.
   void record(const Response& response);
   Estimate estimate() const;
   const std::vector<Response>& history() const { return history_; }
@@ -146,7 +147,7 @@ class Procedure {
 Procedure procedure_after(const ProcedureSpec& spec, std::uint64_t seed,
                           const std::vector<Response>& history);
 
-/// A level and the track that asks for it.
+/// A level and the track that requests it.
 struct TrackLevel {
   std::size_t track = 0;
   double level = 0;
@@ -159,7 +160,7 @@ class InterleavedTracks {
   InterleavedTracks(const std::vector<ProcedureSpec>& specs, std::uint64_t seed);
 
   std::optional<TrackLevel> next() const;  ///< nullopt: all have ended
-  /// The answer to a trial of next().track.
+  /// Records the answer to a trial of next().track.
   void record(const Response& response);
   const std::vector<Procedure>& tracks() const { return tracks_; }
 

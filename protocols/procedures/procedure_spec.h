@@ -1,5 +1,5 @@
 #pragma once
-// How the level of each trial is chosen: plain values from the protocol.
+// The procedures that choose the level of each trial: plain values from the protocol.
 
 #include <cstddef>
 #include <cstdint>
@@ -12,13 +12,14 @@
 
 namespace palpate::protocols {
 
-/// The seed of a track among several that are mixed. \param seed  of InterleavedTracks
+/// The seed of a track among several mixed ones.
+/// \param seed  of InterleavedTracks
 inline std::uint64_t track_seed(std::uint64_t seed, std::size_t track) {
   return Random(seed, {0x17, track}).next();
 }
 
-/// Method of constant stimuli: every level equally often. Each round of all levels has an order of
-/// its own.
+/// Method of constant stimuli: every level equally often. Each round of all levels has its own
+/// order.
 struct ConstantStimuli {
   std::vector<double> levels;
   int repetitions = 1;
@@ -46,13 +47,13 @@ double convergence_point(const Staircase& spec);
 /// target^down / (1 - target^down).
 double step_ratio_for(double target, int down);
 
-/// Values that a parameter may have and how likely they are before the first trial.
+/// Values of a parameter and their prior probabilities.
 struct ParameterGrid {
   std::vector<double> values;
   std::vector<double> weights;  ///< > 0; empty: equally likely
 };
 
-/// QUEST+ (Watson 2017): the level of the smallest expected entropy of the parameters.
+/// QUEST+ (Watson 2017): chooses the level with the smallest expected entropy of the parameters.
 struct QuestPlus {
   PsychometricFunction function;
   std::vector<double> levels;
@@ -74,7 +75,7 @@ struct Limits {
 
 using ProcedureSpec = std::variant<ConstantStimuli, Staircase, QuestPlus, Limits>;
 
-/// Levels that a procedure may ask for: all of them, or (Staircase) its start and the ends of its
+/// Levels that a procedure may request: all of them, or (Staircase) its start and the ends of its
 /// range. Refuse a stimulus that a device cannot show at one of these before the first trial.
 std::vector<double> levels_to_check(const ProcedureSpec& spec);
 /// Upper limit on the trials of a procedure.

@@ -35,7 +35,8 @@ struct PsychometricParameters {
   double lapse = 0;      ///< share of failures at the easiest; guess + lapse < 1
 };
 
-/// F, without guess and lapse, at a distance from the threshold on the scale towards the easier.
+/// F, without guess and lapse, at a distance from the threshold on the scale, positive towards the
+/// easier levels.
 double psychometric_share(const PsychometricFunction& function, double distance, double slope);
 /// F at a level.
 double psychometric_core(const PsychometricFunction& function, double level, double threshold,

@@ -1,5 +1,5 @@
 #pragma once
-// How well a procedure finds the threshold of simulated participants whose threshold is known.
+// The accuracy of a procedure's estimates for simulated participants of known threshold.
 
 #include <cstdint>
 
@@ -17,9 +17,9 @@ struct Recovery {
   double mean_trials = 0;
 };
 
-/// The level that a procedure aims at for a participant. Staircase: where successes are as frequent
-/// as at its convergence point. QuestPlus: the threshold. Limits: where half of the answers are
-/// successes. ConstantStimuli has no estimate of its own: 0.
+/// The level that a procedure aims at for a participant. Staircase: the level with the success rate
+/// of its convergence point. QuestPlus: the threshold. Limits: the level with half successes.
+/// ConstantStimuli has no estimate of its own: 0.
 double true_threshold(const ProcedureSpec& spec, const PsychometricParticipant& participant);
 
 Recovery simulate_recovery(const ProcedureSpec& spec, const PsychometricParticipant& participant,

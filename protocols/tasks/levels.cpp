@@ -18,7 +18,7 @@ namespace {
 
 using nlohmann::json;
 
-/// What its mesh files hold, by name.
+/// Adds the contents of an object's mesh files, by name.
 void add_files(const stimuli::ObjectSpec& object, StoredFiles& files) {
   if (object.file_bytes) files.emplace(object.file_name, *object.file_bytes);
   for (const stimuli::ObjectSpec& part : object.parts) add_files(part, files);
@@ -31,7 +31,7 @@ json number_of(double level) {
   return level;
 }
 
-/// The folder is of no matter: what a stimulus's files hold was read with the protocol.
+/// The folder does not matter: the contents of a stimulus's files were read with the protocol.
 stimuli::ObjectSpec read_again(const json& value, const Protocol& protocol,
                                const stimuli::ObjectSpec& before, const std::string& name) {
   MeshFiles files{before.file.empty() ? "" : folder_of(before.file), {}};
@@ -78,7 +78,7 @@ StimulusSpec at_level(const Protocol& protocol, const TaskBlock& block, int stim
     value[json::json_pointer(block.level->pointer)] = number_of(level);
   } catch (const json::exception&) {
     throw InputError({{"stimulus '" + plain.name + "'", block.level->pointer,
-                       "expected a number of the stimulus: it has no such place", 0}});
+                       "expected a number of the stimulus; it has none here", 0}});
   }
   varied.object = read_again(value, protocol, plain.object, plain.name);
   return varied;
@@ -120,7 +120,7 @@ std::vector<double> levels_of(const TaskBlock& block) {
 }
 
 std::string unit_of_level(const std::string& of) {
-  std::string path = of;  // without the places in a list: /size_m/0
+  std::string path = of;  // without list indices: /size_m/0
   while (!path.empty() && path.back() >= '0' && path.back() <= '9') path.pop_back();
   if (path.ends_with('/')) path.pop_back();
   if (path.ends_with("/orientation")) return "deg";

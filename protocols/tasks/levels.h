@@ -1,5 +1,5 @@
 #pragma once
-// A stimulus at a level, where one number of it is another, and how a participant judges it.
+// A stimulus at a level (with one of its numbers replaced), and a participant's judgement of it.
 
 #include <string>
 #include <vector>
@@ -8,36 +8,37 @@
 
 namespace palpate::protocols {
 
-/// Stimulus `stimulus` of the protocol with the block's varied number at `level`; named
-/// "NAME at LEVEL". \throws InputError: the stimulus cannot have it.
+/// Stimulus `stimulus` of the protocol with the block's varied number at `level`; named "NAME at
+/// LEVEL".
+/// \throws InputError: the stimulus cannot have that level
 StimulusSpec at_level(const Protocol& protocol, const TaskBlock& block, int stimulus, double level);
 
-/// Levels that a block may show: what cannot be shown at one of them is refused before the first
-/// trial. Ascending, each once; empty: nothing is varied.
+/// Levels that a block may show; a stimulus that cannot have one of them is refused before the
+/// first trial. Ascending, each once; empty: nothing is varied.
 std::vector<double> levels_of(const TaskBlock& block);
 
-/// The level that a stimulus has by itself; none: the number has no place in it.
+/// A stimulus's own level; none: it lacks that number.
 std::optional<double> own_level(const Protocol& protocol, const TaskBlock& block, int stimulus);
 
-/// Where the levels of a comparison of two intervals stand: 1, -1: all above, below that of the
-/// standard (or at it); 0: on both sides, or nothing is compared.
+/// The side of the standard on which the levels of a comparison of two intervals lie: 1: all at or
+/// above it, -1: all at or below it, 0: on both sides, or no comparison.
 int side_of_levels(const Protocol& protocol, const TaskBlock& block);
 
-/// The protocol with a stimulus more for every level of every block; version 1: as it is.
+/// The protocol with an additional stimulus for every level of every block; version 1: unchanged.
 Protocol with_all_levels(const Protocol& protocol);
 
-/// "m", "N/m", "deg", ...: the unit of a varied number, of the end of its name; "1" without one.
+/// "m", "N/m", "deg", ...: the unit of a varied number, from the end of its name; "1": no unit.
 /// \param path  JSON pointer
 std::string unit_of_level(const std::string& path);
 
-/// A level as it is printed: the shortest text that reads back as it.
+/// The shortest text that reads back as the same level.
 std::string level_text(double level);
 
 /// A level for people: rounded to four digits, with the unit of the block's varied number.
 std::string level_in_words(const TaskBlock& block, double level);
 
-// A simulated participant for a block whose levels are chosen by answers: a psychometric function
-// made to measure, that of nobody.
+// A simulated participant for a block with adaptive levels: a generic psychometric function fitted
+// to the block's range, not a model of a person.
 
 struct TypicalSettings {
   double place = 0.5;    ///< of the threshold, as a share of the levels' range, from the hard end
@@ -47,13 +48,13 @@ struct TypicalSettings {
 };
 
 /// Cumulative normal on the scale of the block's first adaptive procedure, with its easier levels.
-/// compare: guesses 1 / intervals; with levels on both sides of the standard they are lapses as
-/// well, as many as at the other end, and the threshold is at the standard. \param block  with
-/// levels
+/// compare: the guess rate is 1 / intervals; with levels on both sides of the standard, guess and
+/// lapse rates are equal and the threshold is at the standard.
+/// \param block  with levels
 PsychometricParticipant typical_participant(const Protocol& protocol, const TaskBlock& block,
                                             const TypicalSettings& settings = {});
 
-/// The harder and easier end of a procedure's levels; constant stimuli tell neither: nullopt.
+/// The direction in which a procedure's levels get easier; nullopt for constant stimuli.
 std::optional<Easier> easier_of(const ProcedureSpec& spec);
 LevelScale procedure_scale(const ProcedureSpec& spec);  ///< constant stimuli: linear
 

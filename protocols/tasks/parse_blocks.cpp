@@ -22,10 +22,10 @@
 
 namespace palpate::protocols {
 
-// Reading of what a participant can answer in a block.
+// Reads the possible answers in a block.
 
 /// Reads keys, scale or range, and confidence of a block whose task has been read. Every answer of
-/// the task has one key; keys that the block does not say are 1, 2, ... in order.
+/// the task has one key; by default 1, 2, ... in order.
 void read_answers(ObjectReader& reader, const Protocol& protocol, TaskBlock& block);
 
 namespace {
@@ -35,7 +35,7 @@ using nlohmann::json;
 constexpr std::size_t kMostSteps = 11;  // of a scale
 constexpr std::size_t kMostLabel = 80;
 constexpr NumberRange kScaleNumber{-1e9, 1e9};
-// Keys that mean the same in every task.
+// Keys with the same meaning in every task.
 constexpr const char* kGoOn[] = {"space", "enter"};
 
 bool is_label(const std::string& text, std::size_t most) {
@@ -54,7 +54,7 @@ void read_label(ObjectReader& reader, const char* key, std::string& label, Prese
                                                found_text(*value));
 }
 
-/// The answers of a task, in the order of their keys where a block names none.
+/// The answers of a task, in the order of their default keys.
 std::vector<TaskAnswer> answers_of(const Protocol& protocol, const TaskBlock& block) {
   std::vector<TaskAnswer> answers;
   const auto add = [&](const std::string& name, const std::string& label = "") {
@@ -108,7 +108,7 @@ std::vector<ScaleStep> read_scale_steps(ObjectReader& reader, const char* key, P
   return steps;
 }
 
-/// 1, 2, ..., 9, 0, then letters: a key of its own for each step.
+/// 1, 2, ..., 9, 0, then letters: a separate key for each step.
 std::string step_key(std::size_t i) {
   return i < 9    ? std::to_string(i + 1)
          : i == 9 ? "0"
@@ -129,7 +129,7 @@ void read_rating(ObjectReader& reader, TaskBlock& block) {
     reader.faults().add(reader.pointer("max"), "expected more than min");
 }
 
-/// A key's answer: its name, or an object of answer and label.
+/// A key's answer: its name, or an object with answer and label.
 std::string read_answer_name(const json& value, const std::string& pointer, std::string& label,
                              FaultList& faults) {
   if (value.is_string()) return value.get<std::string>();
@@ -147,7 +147,7 @@ void read_key(const std::string& key, const json& value, const std::string& poin
               FaultList& faults) {
   const bool goes_on = std::find(std::begin(kGoOn), std::end(kGoOn), key) != std::end(kGoOn);
   const std::string fault =
-      goes_on ? "expected another key: '" + key + "' goes on in every task" : taken.add(key);
+      goes_on ? "expected another key: '" + key + "' continues in every task" : taken.add(key);
   if (!fault.empty()) faults.add(pointer, fault);
   std::string label;
   const std::size_t before = faults.count();
@@ -175,7 +175,7 @@ void read_answer_keys(ObjectReader& reader, const Protocol& protocol, TaskBlock&
   const std::string pointer = reader.pointer("keys");
   if (!keys->is_object()) {
     reader.faults().add(pointer,
-                        "expected an object of an answer for each key" + found_text(*keys));
+                        "expected an object with an answer for each key" + found_text(*keys));
     return;
   }
   std::set<std::string> given;
@@ -190,7 +190,7 @@ void read_answer_keys(ObjectReader& reader, const Protocol& protocol, TaskBlock&
             [](const TaskAnswer& a, const TaskAnswer& b) { return a.key < b.key; });
 }
 
-/// What another program may say; without a list the names of the stimuli.
+/// Reads the answers that another program may give; by default the names of the stimuli.
 void read_external_answers(ObjectReader& reader, const Protocol& protocol, TaskBlock& block) {
   constexpr std::size_t kMostAnswers = 100;
   const json* const list = reader.array("answers", 1, kMostAnswers);
@@ -213,7 +213,7 @@ void read_external_answers(ObjectReader& reader, const Protocol& protocol, TaskB
   }
 }
 
-/// The key that says what the answers are.
+/// The key that defines the answers.
 const char* answers_key(TaskKind task) {
   if (task == TaskKind::rate) return "scale";
   return task == TaskKind::external ? "answers" : "keys";
@@ -237,7 +237,7 @@ void read_answers(ObjectReader& reader, const Protocol& protocol, TaskBlock& blo
           "expected a label of its own for each answer, found '" + answer.label + "' again");
     }
   }
-  if (block.task == TaskKind::external) return;  // the program asks for it, if it wants to
+  if (block.task == TaskKind::external) return;  // the program may ask for it
   reader.section("confidence", [&](ObjectReader& section) {
     ConfidenceSpec& confidence = block.confidence.emplace();
     section.text("question", confidence.question);
@@ -245,7 +245,7 @@ void read_answers(ObjectReader& reader, const Protocol& protocol, TaskBlock& blo
   });
 }
 
-// Whether the blocks of a protocol can be shown as they stand.
+// Checks that the blocks of a protocol can be shown.
 
 namespace {
 
@@ -265,7 +265,7 @@ void check_levels_of(const Protocol& protocol, const TaskBlock& block, const std
         const std::string text =
             "expected a level that '" + protocol.stimuli[static_cast<std::size_t>(stimulus)].name +
             "' can have: at " + level_text(level) + ", " + fault.location + ": " + fault.expected;
-        // One level of a kind tells it.
+        // Report each kind of fault for one level only.
         if (told.insert(protocol.stimuli[static_cast<std::size_t>(stimulus)].name + fault.location)
                 .second)
           faults.add(pointer + "/level/path", text);
@@ -274,8 +274,8 @@ void check_levels_of(const Protocol& protocol, const TaskBlock& block, const std
   }
 }
 
-/// Which levels have more successes of two intervals follows from what is asked. \return nullopt:
-/// the task does not tell
+/// The levels with more successes in two intervals, which follow from the question.
+/// \return nullopt: the task does not determine them
 std::optional<Easier> expected_easier(const Protocol& protocol, const TaskBlock& block) {
   if (block.task != TaskKind::compare || block.same_different || block.intervals > 2)
     return std::nullopt;
@@ -300,8 +300,8 @@ void check_easier(const Protocol& protocol, const TaskBlock& block, const std::s
         place + "/easier",
         std::string("expected '") + (*expected == Easier::higher ? "higher" : "lower") +
             (one_side ? "': all levels lie on one side of the standard, farther ones are easier"
-                      : "': levels lie on both sides of the standard, and what counts is that "
-                        "the comparison is chosen"));
+                      : "': levels lie on both sides of the standard, and a success is an answer "
+                        "that chooses the comparison"));
   }
 }
 
@@ -376,7 +376,7 @@ void read_stimulus_names(ObjectReader& reader, const Protocol& protocol, TaskBlo
   }
 }
 
-/// \param none  null is allowed and means none
+/// \param none  null is allowed and means no stimulus
 std::optional<int> read_one_stimulus(ObjectReader& reader, const char* key,
                                      const Protocol& protocol, Presence presence, bool none) {
   const json* const value = reader.member(key, presence);
@@ -455,7 +455,7 @@ void read_variation(ObjectReader& reader, TaskBlock& block) {
                  procedural ? Presence::optional : Presence::required);
   if (procedural && reader.has("repetitions")) {
     reader.faults().add(reader.pointer("repetitions"),
-                        "expected no repetitions beside a procedure, which says how many trials");
+                        "expected no repetitions: the procedure determines the number of trials");
   }
 }
 
@@ -515,7 +515,7 @@ void read_adjust(ObjectReader& reader, const Protocol& protocol, TaskBlock& bloc
   }
 }
 
-/// The levels that a program may ask for.
+/// Reads the levels that a program may ask for.
 void read_external(ObjectReader& reader, TaskBlock& block) {
   reader.integer("trials", block.repetitions, kManyTimes, Presence::required);
   read_level(reader, block);
@@ -557,7 +557,7 @@ void read_task_keys(ObjectReader& reader, const Protocol& protocol, TaskBlock& b
   }
 }
 
-/// Whether it is practice, or until when.
+/// Whether the block is practice, and its criterion.
 void read_practice(ObjectReader& reader, TaskBlock& block) {
   const json* const value = reader.member("practice");
   if (value == nullptr) return;
@@ -590,14 +590,15 @@ void check_practice(ObjectReader& reader, const TaskBlock& block) {
   if (!block.criterion) return;
   if (block.task == TaskKind::external) {
     reader.faults().add(reader.pointer("practice"),
-                        "expected no criterion: the program says how many trials there are");
+                        "expected no criterion: the program determines the number of trials");
   } else if (block.task == TaskKind::rate || block.task == TaskKind::adjust) {
     reader.faults().add(reader.pointer("practice"),
                         "expected no criterion: no answer to this task is right or wrong");
   } else if (is_adaptive(block)) {
-    reader.faults().add(reader.pointer("practice"),
-                        "expected no criterion with an adaptive procedure, which keeps the share "
-                        "of right answers where it is");
+    reader.faults().add(
+        reader.pointer("practice"),
+        "expected no criterion with an adaptive procedure, which keeps the share of right answers "
+        "constant");
   }
 }
 
@@ -613,7 +614,7 @@ TaskBlock read_block(ObjectReader& reader, const Protocol& protocol) {
                                           {"adjust", TaskKind::adjust},
                                           {"external", TaskKind::external}},
                                          Presence::required);
-  if (!task) return block;  // its other keys depend on it
+  if (!task) return block;  // the other keys depend on it
   block.task = *task;
   reader.integer("session", block.session, {1, 1000});
   read_practice(reader, block);
@@ -662,7 +663,7 @@ void check_sessions(const Protocol& protocol, FaultList& faults) {
     } else if (next != session && next != session + 1) {
       faults.add(block_pointer(i) + "/session", "expected session " + std::to_string(session) +
                                                     " or " + std::to_string(session + 1) +
-                                                    ", as the block before it stands in session " +
+                                                    ", as the previous block is in session " +
                                                     std::to_string(session));
     }
     session = next;

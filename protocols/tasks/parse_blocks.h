@@ -1,5 +1,5 @@
 #pragma once
-// Reading of what version 2 of a protocol has besides: blocks of tasks, and pages.
+// Reads the additions of protocol version 2: blocks of tasks, and pages.
 
 #include <optional>
 
@@ -10,19 +10,21 @@
 
 namespace palpate::protocols {
 
-/// Reads {"kind": "staircase", ...}; the keys stand in README.md. nullopt where something is at
-/// fault. Unknown keys become faults.
+/// Reads {"kind": "staircase", ...}; README.md lists the keys. nullopt if there are faults. Unknown
+/// keys become faults.
 std::optional<ProcedureSpec> read_procedure(ObjectReader& reader);
 
 /// Reads blocks, which refer to the renderers and stimuli of the protocol, and block_order.
 void read_blocks(ObjectReader& reader, Protocol& protocol);
 /// Reads `procedure` of a block: one, or a list of them.
 void read_procedures(ObjectReader& block, std::vector<ProcedureSpec>& procedures);
-/// Reads pages, which refer to the blocks. \param files  where their pictures are
+/// Reads pages, which refer to the blocks.
+/// \param files  source of their pictures
 void read_pages(ObjectReader& reader, Protocol& protocol, const MeshFiles& files);
-/// Reads sounds and responses: what is heard and pressed beside screen and keyboard.
+/// Reads sounds and responses: audio and input devices beside screen and keyboard.
 void read_periphery(ObjectReader& reader, Protocol& protocol);
-/// Every stimulus can have every level that a block may show, and the blocks have an order.
+/// Checks that every stimulus can have every level that a block may show, and that the blocks'
+/// trials have an order.
 void check_blocks(const Protocol& protocol, FaultList& faults);
 
 }  // namespace palpate::protocols

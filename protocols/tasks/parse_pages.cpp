@@ -1,4 +1,4 @@
-// Reading of what version 2 of a protocol says of sounds, joysticks and response boxes.
+// Reads the sounds, joysticks and response boxes of protocol version 2.
 
 #include <algorithm>
 #include <array>
@@ -17,7 +17,7 @@ namespace {
 
 using nlohmann::json;
 
-/// A whole number from 1 to `most` at the begin of `text`, which goes on behind it; 0: none.
+/// Removes a whole number from 1 to `most` from the beginning of `text`; 0: there is none.
 int number_at(std::string_view& text, int most) {
   int number = 0;
   std::size_t digits = 0;
@@ -50,7 +50,7 @@ bool is_box_byte(std::string_view name) {
   return name.size() == 4 && name.starts_with("0x") && hexadecimal(name[2]) && hexadecimal(name[3]);
 }
 
-/// "0x41" and "A" are one byte, of which nobody could say what it stands for.
+/// Faults a byte given twice, as "0x41" and "A": its meaning would be ambiguous.
 void check_bytes(ObjectReader& reader, const std::map<std::string, std::string>& box) {
   std::map<int, std::string> seen;
   for (const auto& [name, key] : box) {
@@ -69,7 +69,8 @@ void read_mapping(ObjectReader& reader, const char* key, std::map<std::string, s
   if (value == nullptr) return;
   const std::string pointer = reader.pointer(key);
   if (!value->is_object() || value->empty()) {
-    reader.faults().add(pointer, "expected an object of a key for each input" + found_text(*value));
+    reader.faults().add(pointer,
+                        "expected an object with a key for each input" + found_text(*value));
     return;
   }
   for (const auto& [input, meaning] : value->items()) {
@@ -203,11 +204,12 @@ std::uint64_t number_in(const std::string& bytes, std::size_t at) {
   return number;
 }
 
-/// Why a file that begins as PNG would not be shown: its chunks (length, kind, data, checksum) do
-/// not lead to IEND, or it needs too much memory. Empty: it would.
+/// The reason why a file that begins as PNG cannot be shown: its chunks (length, kind, data,
+/// checksum) do not lead to IEND, or it needs too much memory. Empty: it can.
 std::string png_fault(const std::string& bytes) {
   constexpr std::uint64_t kMostPixels = 32'000'000;
-  constexpr std::size_t kFrame = 12, kHeader = 8;  // bytes of a chunk without data; before it
+  // Bytes: a chunk without its data; the file's header.
+  constexpr std::size_t kFrame = 12, kHeader = 8;
   std::size_t at = kPngBegins.size();
   for (bool first = true; bytes.size() - at >= kFrame; first = false) {
     const std::uint64_t length = number_in(bytes, at);
@@ -220,14 +222,14 @@ std::string png_fault(const std::string& bytes) {
       if (wide * high == 0) break;
       if (wide * high > kMostPixels)
         return "has " + std::to_string(wide) + " x " + std::to_string(high) +
-               " pixels, of which 32 million are possible";
+               " pixels; at most 32 million are possible";
     }
     at += kFrame + length;
   }
   return "is damaged or cut off";
 }
 
-/// Its bytes; none and a fault where it is no picture.
+/// The picture's bytes; null and a fault if it is not a picture.
 std::shared_ptr<const std::string> read_picture(const std::string& name, const std::string& pointer,
                                                 const MeshFiles& files, FaultList& faults) {
   std::string bytes;
@@ -246,10 +248,10 @@ std::shared_ptr<const std::string> read_picture(const std::string& name, const s
     }
   }
   if (!bytes.starts_with(kPngBegins)) {
-    faults.add(pointer, "expected a PNG file; '" + name + "' is none");
+    faults.add(pointer, "expected a PNG file; '" + name + "' is not one");
     return nullptr;
   }
-  // Of what is on record, nothing is refused any more.
+  // Do not refuse pictures that are already on record.
   const std::string fault = files.stored.contains(name) ? "" : png_fault(bytes);
   if (!fault.empty()) {
     faults.add(pointer, "expected a PNG file; '" + name + "' " + fault);
@@ -265,9 +267,8 @@ void read_pictures(ObjectReader& reader, const MeshFiles& files, PageSpec& page)
   if (list == nullptr) return;
   if (list->size() > screens) {
     reader.faults().add(reader.pointer("pictures"),
-                        "expected at most one picture for each screen of the text, of which there "
-                        "are " +
-                            std::to_string(screens));
+                        "expected at most " + std::to_string(screens) +
+                            ", one picture for each screen of the text");
   }
   for (std::size_t i = 0; i < list->size(); ++i) {
     const json& value = (*list)[i];

@@ -22,7 +22,7 @@ constexpr NumberRange kRun{1, 10};
 constexpr NumberRange kShare{0, 1};
 constexpr std::size_t kMostLevels = 1000;
 constexpr double kMostSeriesLevels = 1000;
-// 32 MB of tables and some ms for a trial; Watson's examples have a tenth.
+// 32 MB of tables and some ms a trial; Watson's examples need a tenth.
 constexpr double kMostCells = 4e6;
 
 const NumberRange& level_range(LevelScale scale) {
@@ -47,7 +47,7 @@ ConstantStimuli read_constant(ObjectReader& reader) {
   return spec;
 }
 
-/// `target` is another way to say step_ratio.
+/// `target` is an alternative to step_ratio.
 void read_weights(ObjectReader& reader, Staircase& spec) {
   reader.number("step_ratio", spec.step_ratio, {0.01, 100});
   double target = 0;
@@ -55,10 +55,10 @@ void read_weights(ObjectReader& reader, Staircase& spec) {
   if (!reader.has("target") || target == 0) return;
   if (reader.has("step_ratio")) {
     reader.faults().add(reader.pointer("target"),
-                        "expected target or step_ratio, not both: one says the other");
+                        "expected target or step_ratio, not both: each follows from the other");
   } else if (spec.up != 1) {
     reader.faults().add(reader.pointer("target"),
-                        "expected up = 1 with a target; say step_ratio otherwise");
+                        "expected up = 1 with a target; use step_ratio otherwise");
   } else {
     spec.step_ratio = step_ratio_for(target, spec.down);
   }
@@ -114,7 +114,7 @@ void read_quest_stop(ObjectReader& reader, QuestPlus& spec) {
       Presence::required);
 }
 
-/// What no single key shows to be wrong.
+/// Checks faults that involve several keys.
 void check_quest(ObjectReader& reader, const QuestPlus& spec) {
   FaultList& faults = reader.faults();
   if (spec.function.shape == PsychometricShape::weibull &&

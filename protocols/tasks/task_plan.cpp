@@ -20,24 +20,28 @@ namespace palpate::protocols {
 
 // The trials of a block whose levels do not follow from the answers.
 
-/// In an order by chance under the limits of the block. \param index  of the block
-/// \param round  of practice with a criterion, from 0. \throws ScheduleError
+/// In a random order under the limits of the block.
+/// \param index  of the block
+/// \param round  of practice with a criterion, from 0
+/// \throws ScheduleError
 std::vector<Trial> fixed_trials(const Protocol& protocol, int participant, int index,
                                 std::uint64_t round = 0);
 
-/// Identification as version 1 has it, whose order it then has: whatever is the same in two
-/// protocols gives the same trials. Limits on the order of several renderers are of other things.
+/// Whether the block is identification as in version 1 and so has its order: the same design in two
+/// protocols gives the same trials. Limits on the order of several renderers differ from version 1.
 bool has_order_of_version_1(const TaskBlock& block);
-/// What of a protocol of version 1 an order follows from. \param block  none: all stimuli
+/// The protocol of version 1 that determines an order.
+/// \param block  null: all stimuli
 Protocol version_1_view(const Protocol& protocol, const TaskBlock* block);
-/// Practice has its orientations, main trials get theirs from version_1_view of the whole.
+/// Practice trials have their orientations; main trials get theirs from version_1_view of all
+/// blocks.
 std::vector<Trial> trials_of_version_1(const Protocol& protocol, int participant, int index,
                                        int round = 0);
 
-// What the trials of a block are made of: its tracks, their intervals, and streams of chance.
+// The elements of a block's trials: its tracks, their intervals, and random streams.
 
-// Of random streams: part of the meaning of a seed, never to be renumbered. schedule.cpp has 1
-// to 4.
+// Numbers of random streams, part of the meaning of a seed: never renumber them. schedule.cpp uses
+// 1 to 4.
 enum TaskUse : std::uint64_t {
   kTaskOrder = 1,
   kTaskPosition = 2,
@@ -45,22 +49,23 @@ enum TaskUse : std::uint64_t {
   kTaskCatch = 4,
   kTaskTracks = 5
 };
-/// \param seed  of the protocol. \param block  its index
+/// \param seed  of the protocol
+/// \param block  its index
 Random task_stream(std::uint64_t seed, int participant, std::uint64_t block, TaskUse use,
                    std::uint64_t number = 0);
 
-/// What a track varies the level of.
+/// The stimulus, renderer and procedure of a track.
 struct BlockTrack {
   int stimulus = 0;
   RendererKind renderer = RendererKind::point;
   const ProcedureSpec* procedure = nullptr;  ///< of the block; nullptr: none
 };
 
-/// In the order of their numbers, which begin with 1: the procedure varies fastest.
+/// The tracks in order of their numbers, from 1: the procedure varies fastest.
 std::vector<BlockTrack> tracks_of(const TaskBlock& block);
-/// The number of trials with catch trials among them.
+/// The number of trials with catch trials included.
 long long with_catch_trials(const TaskBlock& block, long long trials);
-/// The intervals of a trial whose stimulus, renderer and level are set.
+/// Sets the intervals of a trial whose stimulus, renderer and level are set.
 /// \param position  of the comparison, from 0
 void set_intervals(const TaskBlock& block, int position, Trial& trial);
 
@@ -106,7 +111,7 @@ std::vector<Category> categories_of(const Protocol& protocol, const TaskBlock& b
   for (const Category& category : categories) trials += category.count;
   const auto catch_trials = static_cast<int>(with_catch_trials(block, trials) - trials);
   if (catch_trials == 0) return categories;
-  // Shown as evenly as they go with every track.
+  // Catch trials are spread as evenly as possible over the tracks.
   const int tracks = number;
   for (int t = 0; t < tracks; ++t) {
     const BlockTrack track = tracks_of(block)[static_cast<std::size_t>(t)];
@@ -138,7 +143,7 @@ std::vector<int> ordered_categories(const std::vector<Category>& categories, con
   return order_block(counts, order, names, random);
 }
 
-/// Where the comparison stands in each of `count` trials: everywhere equally often, by chance.
+/// The comparison's interval in each of `count` trials: each equally often, in random order.
 std::vector<int> positions(int count, int intervals, Random& random) {
   std::vector<int> all, places;
   for (int i = 0; i < intervals; ++i) places.push_back(i);
@@ -156,7 +161,7 @@ std::vector<int> positions(int count, int intervals, Random& random) {
 std::vector<Trial> fixed_trials(const Protocol& protocol, int participant, int index,
                                 std::uint64_t round) {
   const TaskBlock& block = protocol.blocks[static_cast<std::size_t>(index)];
-  if (block.task == TaskKind::external) {  // each until somebody says what it is
+  if (block.task == TaskKind::external) {  // placeholders until the program chooses
     Trial trial;
     trial.stimulus = block.stimuli.front();
     trial.renderer = block.renderers.front();
@@ -177,7 +182,7 @@ std::vector<Trial> fixed_trials(const Protocol& protocol, int participant, int i
            categories, block, task_stream(protocol.seed, participant, number, kTaskOrder, round))) {
     const auto c = static_cast<std::size_t>(which);
     Trial trial = categories[c].trial;
-    // Starts in turn; the next participant begins with the next one.
+    // Take the starts in turn; the next participant begins with the next start.
     if (block.task == TaskKind::adjust)
       trial.level = block.starts[shown[c]++ % block.starts.size()];
     set_intervals(block, left[c].back(), trial);
@@ -293,7 +298,7 @@ void set_intervals(const TaskBlock& block, int position, Trial& trial) {
       if (block.standard) trial.intervals.insert(trial.intervals.begin(), standard);
       break;
     case TaskKind::adjust:
-      trial.intervals = {asked, standard};  // in turn, as the participant wants it
+      trial.intervals = {asked, standard};  // alternating as often as the participant likes
       break;
   }
   if (trial.catch_trial) trial.level.reset();
@@ -371,7 +376,8 @@ Quat drawn_orientation(const Protocol& protocol, Random random) {
   return Quat(1, 0, 0, 0);
 }
 
-/// Of the main trials of a block, which are drawn over all blocks of a participant.
+/// Draws the orientations of a block's main trials, together with those of all blocks of the
+/// participant.
 void draw_orientations_of_version_1(const Protocol& protocol, int participant, int index,
                                     std::vector<Trial>& trials) {
   std::vector<std::vector<Trial>> others;

@@ -1,12 +1,12 @@
 #pragma once
-// The trials of a session of version 2, one after the other: a pure function of protocol, session,
+// The trials of a session of version 2, one at a time: a pure function of protocol, session,
 // participant number and the answers so far, the same on every machine and compiler.
 //
-// Identification without levels has the order and orientations that version 1 gives the same design
-// (schedule.h): one renderer a block, or several without limits on the order. Other blocks without
-// adaptive procedures have their trials in an order by chance under the limits of the block; those
-// of adaptive ones are mixed in rounds, one trial of each track. Catch trials of an adaptive block
-// are spread by chance over every 20 trials.
+// Identification without levels has the order and orientations of version 1 for the same design
+// (schedule.h), if a block has one renderer, or several without limits on the order. Other blocks
+// without adaptive procedures have a random order under the limits of the block. The tracks of
+// adaptive blocks are mixed in rounds, one trial of each track. Catch trials of an adaptive block
+// are spread at random over every 20 trials.
 
 #include <cstdint>
 #include <map>
@@ -19,7 +19,7 @@
 
 namespace palpate::protocols {
 
-/// How the levels of a block were chosen.
+/// The procedures that chose a block's levels.
 struct BlockProcedures {
   std::uint64_t protocol_seed = 0;
   std::uint64_t index = 0;           ///< of the block in its protocol
@@ -27,27 +27,29 @@ struct BlockProcedures {
   bool asks_smaller = false;         ///< compare: the interval with the smaller level
   std::string level_unit{};          ///< "N/m", ...; "1" without one, "": nothing is varied
 
-  /// Of a track, from 1. \pre specs is not empty
+  /// The spec of a track, from 1.
+  /// \pre specs is not empty
   const ProcedureSpec& spec_of(int track) const;
   /// A track before its first answer, as TaskPlan begins it.
   Procedure begin(int participant_number, int track) const;
 };
 
-/// Of each block of a protocol of version 2 by its name, without the files that its stimuli need:
-/// what a study that is analysed long after was shown by. Empty: version 1. \throws InputError
+/// The procedures of each block, by its name, of a protocol of version 2, without the files that
+/// its stimuli need: for the analysis of an old study. Empty: version 1.
+/// \throws InputError
 std::map<std::string, BlockProcedures> procedures_of_blocks(const std::string& text,
                                                             const std::string& file_name);
 
-/// What became of a trial, as far as the next ones depend on it.
+/// The outcome of a trial, as far as the next ones depend on it.
 struct TrialOutcome {
   bool correct = false;
-  bool success = false;  ///< of what is asked about: the comparison chosen, "yes", "different"
-  bool answered = true;  ///< false: a time-out; an adaptive level comes again
-  /// At which it was shown, where that was not the plan's; none: the plan's.
+  bool success = false;  ///< the comparison chosen, "yes", "different"
+  bool answered = true;  ///< false: a time-out; an adaptive level is repeated
+  /// The level shown, if not the plan's; none: the plan's.
   std::optional<double> level = std::nullopt;
 };
 
-/// What is shown in a trial of an external block.
+/// The stimulus of a trial of an external block.
 struct TrialChoice {
   int stimulus = 0;  ///< index into Protocol::stimuli, one of the block's
   RendererKind renderer = RendererKind::point;
@@ -63,16 +65,17 @@ class TaskPlan {
   bool finished() const { return !next_.has_value(); }
   const Trial& next() const { return *next_; }  ///< \pre not finished()
   std::size_t done() const { return done_; }
-  std::size_t size() const;  ///< at most, as far as is known now
+  std::size_t size() const;  ///< at most, as far as known now
   int last_block() const { return first_block_ + static_cast<int>(order_.size()) - 1; }
   bool block_begins() const { return shown_ == 0; }
-  /// The next trial is shown at another level, which the procedure takes note of with the answer.
-  /// \pre it is one of an adaptive block, and no catch trial
+  /// Shows the next trial at another level, which the procedure records with the answer.
+  /// \pre it belongs to an adaptive block and is not a catch trial
   void propose(double level);
-  /// Another program says what the next trial is. \pre it is one of an external block
+  /// Sets the next trial as another program chose it.
+  /// \pre it belongs to an external block
   void choose(const TrialChoice& choice);
   void answered(const TrialOutcome& outcome);
-  /// The tracks of an adaptive block under way.
+  /// The tracks of an adaptive block in progress.
   const std::optional<InterleavedTracks>& tracks() const { return tracks_; }
 
  private:
@@ -88,12 +91,12 @@ class TaskPlan {
   const Protocol* protocol_;
   int participant_number_, session_;
   std::vector<int> order_;            ///< of the session's blocks: indices into Protocol::blocks
-  int first_block_ = 1;               ///< number of the first
+  int first_block_ = 1;               ///< number of the first block
   std::size_t at_ = 0;                ///< into order_
   std::size_t done_ = 0, shown_ = 0;  ///< in the session, in the block
   std::size_t unanswered_ = 0;        ///< in an adaptive block
-  std::vector<Trial> fixed_;          ///< of the block so far as is known; empty: adaptive
-  std::uint64_t rounds_ = 0;          ///< that fixed_ has; more than one where practice goes on
+  std::vector<Trial> fixed_;          ///< of the block as far as known; empty: adaptive
+  std::uint64_t rounds_ = 0;          ///< rounds in fixed_; more than one if practice continues
   std::vector<bool> right_;           ///< answers to the block
   std::optional<InterleavedTracks> tracks_;
   std::optional<Trial> next_;
@@ -101,14 +104,14 @@ class TaskPlan {
 
 /// The blocks of a session in the order in which a participant gets them: indices.
 std::vector<int> blocks_in_order(const Protocol& protocol, int participant_number, int session);
-/// Whether another program says what is shown: only `palpate serve` has one.
+/// Whether another program chooses the stimuli: only `palpate serve` allows one.
 bool is_external(const Protocol& protocol);
-/// Whether answers choose its levels.
+/// Whether answers choose the block's levels.
 bool is_adaptive(const TaskBlock& block);
-/// No participant has more trials in it, but for those that are not answered.
+/// The most trials of a participant in a block, not counting unanswered ones.
 long long most_trials_of(const TaskBlock& block);
-/// So many trials of an adaptive block without an answer, whose levels come again, end it: nobody
-/// is there. A quarter of most_trials_of, at least 10.
+/// An adaptive block ends after this many unanswered trials, whose levels are repeated: nobody is
+/// there. A quarter of most_trials_of, at least 10.
 std::size_t most_unanswered(const TaskBlock& block);
 /// \throws ScheduleError: the limits on the order of its trials cannot be met
 void check_order(const Protocol& protocol, int block);

@@ -15,7 +15,7 @@ using nlohmann::json;
 
 constexpr std::size_t kLongestLabel = 80;  // bytes
 
-/// A text of the protocol; a label stands under a key, in one line.
+/// A text of the protocol; a label is shown below a key, in one line.
 struct TextPlace {
   std::string key;
   std::string* text;
@@ -99,7 +99,7 @@ bool is_one_line(const std::string& text) {
          });
 }
 
-/// The part of a key before its last dot: answers side by side have it in common.
+/// The part of a key before its last dot, which answers of one question share.
 std::string group_of(const std::string& key) { return key.substr(0, key.rfind('.')); }
 
 void check_translation(const TextPlace& place, const json& value, FaultList& faults) {
@@ -130,7 +130,7 @@ std::string texts_json(const Protocol& protocol) {
 
 namespace {
 
-/// Which of the program's own texts a participant gets to read at all.
+/// The program's own texts that a participant may read.
 struct TextsRead {
   explicit TextsRead(const Protocol& protocol) : tasks(protocol.version == 2) {
     for (const TaskBlock& block : protocol.blocks) {
@@ -149,7 +149,7 @@ struct TextsRead {
     typed |= numbers;
   }
   bool of(const std::string& key) const {
-    if (key == "texts.go") return !tasks;  // a question stands there
+    if (key == "texts.go") return !tasks;  // a question replaces it
     if (key == "texts.next_interval") return intervals;
     if (key == "texts.answer_now") return no_question;
     if (key == "texts.type_number") return numbers;
@@ -162,10 +162,10 @@ struct TextsRead {
        numbers_of_pages = false, typed = false, consent = false;
 };
 
-/// Names of answers that are words of the program, not of the protocol.
+/// Whether an answer's name is a word of the program, not of the protocol.
 bool is_built_in_answer(const TaskBlock& block, const TaskAnswer& answer) {
   if (block.task == TaskKind::identify || block.task == TaskKind::rate) return false;
-  return answer.label == answer.name && answer.name.size() > 1;  // 1, 2 and 3 are of any language
+  return answer.label == answer.name && answer.name.size() > 1;  // 1, 2 and 3 fit any language
 }
 
 }  // namespace
@@ -191,7 +191,7 @@ std::vector<std::string> built_in_texts(const Protocol& protocol) {
     const bool is_built_in =
         answers.contains(key) || (same != built_in.end() && same->second == text);
     if (is_built_in && read.of(key)) found.push_back(key);
-    // An answer without a label is the name of a stimulus, of whatever language.
+    // An answer without a label is the name of a stimulus, in any language.
     has_words |= !is_built_in && text.size() > 1 && text != key.substr(key.rfind('.') + 1);
   }
   return has_words ? found : std::vector<std::string>();

@@ -20,7 +20,7 @@ struct AccuracySettings {
   /// Budget of visited facets and edges for the exact polyhedron and the methods that scan. If all
   /// ticks would exceed it, every n-th tick is compared.
   double visits = 2e8;
-  int timings = 3;  ///< the fastest counts
+  int timings = 3;  ///< repetitions; the fastest counts
 };
 
 /// One method on one tessellation with one probe.

@@ -39,7 +39,7 @@ const std::vector<UnionMethod>& union_methods();
 struct UnionSettings {
   int seeds = 4;             ///< of each case: 1, 2, ...
   std::size_t ticks = 1500;  ///< of each
-  int timings = 3;           ///< the fastest counts
+  int timings = 3;           ///< repetitions; the fastest counts
 };
 
 /// One method over one kind of case.
