@@ -26,8 +26,8 @@ void expect_held(const std::vector<PlaneBound>& planes, double narrow) {
   EXPECT_LE(glm::length(sum - nearest.point), 1e-15 * most + 1e-16) << narrow;
 }
 
-// Planes that are nearly antiparallel hold the point between them, some 2 cm away, with shares of
-// up to kilometres that all but cancel.
+// Nearly antiparallel planes hold the point between them, some 2 cm away, with shares of up to
+// kilometres that almost cancel.
 TEST(ActivePlanes, HoldThePointExactlyInNarrowWedges) {
   for (int k = 0; k < 400; ++k) {
     const double narrow = std::pow(10, -1 - 0.0125 * k);  // rad

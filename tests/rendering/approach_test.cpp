@@ -22,7 +22,7 @@ struct Counts {
   int entered = 0, separated = 0, undecided = 0;
 };
 
-/// One random motion near the mesh, from wherever a walk finds the probe outside. `turn`: rad.
+/// One random motion near the mesh, from a place where a walk finds the probe outside. `turn`: rad.
 void check_motion(const stimuli::ConvexMesh& mesh, const ContactTrees& trees, Random& random,
                   bool segment, double way, double turn, Counts& counts) {
   const double size = mesh.size();
@@ -41,7 +41,7 @@ void check_motion(const stimuli::ConvexMesh& mesh, const ContactTrees& trees, Ra
                            static_cast<std::uint32_t>(random.below(mesh.facets().size())));
   const WalkResult was = segment ? walk_segment(mesh, any, before.tip, before.tail - before.tip)
                                  : walk_point(mesh, any, before.tip);
-  if (was.feature.kind != Kind::none || was.depth > -1e-9 * size) return;  // inside, or all but
+  if (was.feature.kind != Kind::none || was.depth > -1e-9 * size) return;  // inside, or almost
   const Approach way_in = segment ? approach_segment(mesh, was.separating_feature, before, after)
                                   : approach_point(mesh, was.separating_feature, before, after);
   const double tolerance = 1e-12 * size;

@@ -1,4 +1,4 @@
-// Random objects, random ways over them: what must hold at every tick.
+// Random objects and random paths over them: properties that must hold at every tick.
 
 #include <gtest/gtest.h>
 
@@ -83,8 +83,8 @@ TEST_P(EveryTick, Jumping) {
   EXPECT_GT(check.in_contact, check.ticks / 10);
 }
 
-// A rim of n corners is a ring of n silhouette edges on about n facets: the longest way that a walk
-// can have. Jumps make it walk halfway round.
+// A rim of n corners is a ring of n silhouette edges on about n facets: the longest path of a walk.
+// Jumps make it walk halfway around.
 TEST_P(EveryTick, JumpingOverRims) {
   PathCheck check;
   for (std::uint64_t seed = 0; seed < 120; ++seed) {

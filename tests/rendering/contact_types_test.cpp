@@ -21,7 +21,7 @@ Bench cube_bench(const Renderer& renderer) {
                              testing::triangulated(stimuli::cube(2 * kHalfEdge))));
 }
 
-/// Comes down onto the cube from 10 mm above where it ends.
+/// Comes down onto the cube from 10 mm above the final place.
 Rendering lowered(Bench& bench, const LineProbe& end) {
   bench.tick(testing::moved(end, Vec3(0, 0, 0.01)));
   return bench.tick(end);
@@ -126,7 +126,7 @@ TEST(SegmentFace, ContactFollowsEquationTwo) {
       const double theta = share * kBlendAngle;
       Bench bench = cube_bench(ray_renderer());
       LineProbe probe = tilted(stick, theta);
-      // The same depth under the top wherever the stick is tilted: none of it is above the top.
+      // The same depth under the top at every tilt: no part of the stick is above the top.
       probe = testing::moved(probe, {0, 0, -0.003});
       const Rendering r = lowered(bench, probe);
       ASSERT_EQ(r.contacts, 1);
@@ -195,8 +195,8 @@ TEST(SegmentFace, ContactMovesWithoutJumpsThroughTheBlend) {
   }
 }
 
-/// Where the line of the ideal probe enters and leaves a triangle that it is held at, looked at in
-/// the triangle's plane; from the triangle's corners. Fractions of the probe.
+/// Fractions of the probe at which the line of the ideal probe enters and leaves the triangle that
+/// holds it, computed in the triangle's plane from its corners.
 std::pair<double, double> over_triangle(const stimuli::ConvexMesh& mesh,
                                         const stimuli::Facet& facet, const LineProbe& ideal) {
   double enter = 0, leave = 1;
@@ -216,7 +216,7 @@ std::pair<double, double> over_triangle(const stimuli::ConvexMesh& mesh,
   return {enter, leave};
 }
 
-/// The side slides over a sphere of 30 mm, now and then parallel to it within the blend's angle.
+/// The side slides over a sphere of 30 mm, sometimes parallel to it within the blend angle.
 testing::ProbePath along_sphere(Random& random, int ticks) {
   const testing::Wave3 place(random), turn(random);
   testing::ProbePath path;

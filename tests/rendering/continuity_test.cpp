@@ -1,14 +1,13 @@
 // Force and torque are continuous where the physics is.
 //
-// Let m be the larger of the two ends' ways in a tick. Within one facet of M the depth changes by m
-// at most: for a face it is offset - n.end; for an edge its rate is -n.((1 - place) tip' + place
-// tail'), as n stays at right angles to edge and probe. Over the ridge between two facets of M
-// whose normals are phi apart, the ideal probe slides on, its shift goes from depth n to depth
-// cos(phi) n': a jump of depth sin(phi), along the surface. So over a tick from one facet to an
-// adjacent one
-//   |change of force| <= k (m + depth sin(phi)),
-// and where normals do not change, k m. The normal of an edge turns with the probe: by
-// |change of d| / (|d| sin(e, d)) at most, within one facet.
+// Let m be the larger of the two ends' motions in a tick. Within one facet of M the depth changes
+// by m at most: for a face it is offset - n.end; for an edge its rate is -n.((1 - place) tip' +
+// place tail'), as n stays at right angles to edge and probe. Over the ridge between two facets of
+// M with an angle phi between their normals, the ideal probe slides on; its shift changes from
+// depth n to depth cos(phi) n', a jump of depth sin(phi) along the surface. So over a tick from one
+// facet to an adjacent one
+//   |change of force| <= k (m + depth sin(phi)), and k m where normals do not change. The normal of
+//   an edge turns with the probe: by |change of d| / (|d| sin(e, d)) at most, within one facet.
 
 #include <gtest/gtest.h>
 
@@ -58,7 +57,7 @@ bool adjacent(const stimuli::ConvexMesh& mesh, ContactFeature a, ContactFeature 
   return e.v0 == f.v0 || e.v0 == f.v1 || e.v1 == f.v0 || e.v1 == f.v1;
 }
 
-/// Slides over the mesh and bounds every change of force between ticks in contact.
+/// Slides over the mesh and checks the bound of every change of force between ticks in contact.
 void slide_and_bound(const Renderer& renderer,
                      const std::shared_ptr<const stimuli::ConvexMesh>& mesh,
                      const testing::ProbePath& path, Seen& seen) {
@@ -150,7 +149,7 @@ TEST(ContinuityOfTorque, ThroughSegmentFaceOnEachSideOfEpsilon) {
                   std::make_shared<const stimuli::ConvexMesh>(stimuli::cube(2 * kHalf)));
       const auto probe_at = [&](double theta) {
         const Vec3 u(std::cos(theta), 0, std::sin(theta));
-        // Turned about its middle; the depth of what is over the top is kSunk at theta = 0.
+        // Turned about its middle; the depth of the portion over the top is kSunk at theta = 0.
         const Vec3 middle(start + length / 2, 0.004, kHalf - kSunk);
         return LineProbe{middle - length / 2 * u, middle + length / 2 * u};
       };

@@ -35,7 +35,7 @@ LineProbe across(double tilt) {
   return {Vec3(0, 0, -0.001) - half, Vec3(0, 0, -0.001) + half};
 }
 
-/// m, where along the stylus the contact is while it is tilted from one side to the other.
+/// m, places of the contact along the stylus while it is tilted from one side to the other.
 template <class Visit>
 void rock(const Scene& scene, double most, const Visit& visit) {
   constexpr double kStep = 2e-5;  // rad
@@ -55,7 +55,7 @@ TEST(EquivalentPoint, MovesWithoutJumpsOverAShallowRidge) {
     rock(ridge(angle), angle / 2 + 1.5 * kBlendAngle, [&](double tilt, const Rendering& r) {
       ASSERT_EQ(r.contacts, 1);
       const double at = r.deepest.along;
-      // Nowhere faster than (2) moves it over one face of the whole block: 60 mm in 2 epsilon.
+      // Never faster than (2) over one face as long as the block: 60 mm in 2 epsilon.
       if (last >= 0) {
         ASSERT_LE(std::abs(at - last), 2e-5 * 0.06 / kBlendAngle + 1e-6)
             << degrees << " degrees, tilt " << tilt;
@@ -98,7 +98,7 @@ TEST(EquivalentPoint, AFaceFarFromTheRidgeHasEquationTwoAlone) {
   }
 }
 
-TEST(EquivalentPoint, ASlabThatIsCutHasThatOfTheWhole) {
+TEST(EquivalentPoint, ACutSlabHasThePointOfTheWhole) {
   const Scene whole(
       testing::object_of({testing::box_soup({-0.05, -0.05, -0.04}, {0.05, 0.05, 0})}));
   const Scene cut(testing::object_of({testing::box_soup({-0.05, -0.05, -0.04}, {-0.01, 0.05, 0}),

@@ -1,5 +1,5 @@
-// Where walks over a large mesh begin: near the place that they look for on any shape, and so that
-// nothing but time depends on it.
+// The starts of walks over a large mesh: near the sought place on any shape, and without effect on
+// anything but time.
 
 #include <gtest/gtest.h>
 
@@ -35,7 +35,7 @@ Mesh stretched_ball(const Vec3& by, int subdivisions) {
 /// Round, flat, long, and all three at once.
 const Vec3 kStretches[] = {Vec3(1), Vec3(1, 1, 0.05), Vec3(1, 0.05, 0.05), Vec3(1, 0.3, 0.1)};
 
-/// The facet whose plane a ray out of the inside meets first: the definition.
+/// By definition, the facet whose plane a ray from the inside meets first.
 std::uint32_t exit_facet(const stimuli::ConvexMesh& mesh, const Vec3& from, const Vec3& along) {
   std::uint32_t first = 0;
   double earliest = HUGE_VAL;
@@ -52,7 +52,7 @@ std::uint32_t exit_facet(const stimuli::ConvexMesh& mesh, const Vec3& from, cons
   return first;
 }
 
-/// Steps over sides from one facet to the other; `most` + 1 where there are more.
+/// Steps over sides from one facet to the other; `most` + 1 if there are more.
 int steps_between(const stimuli::ConvexMesh& mesh, std::uint32_t from, std::uint32_t to, int most) {
   std::set<std::uint32_t> reached{from};
   for (int steps = 0; steps <= most; ++steps) {
@@ -78,7 +78,7 @@ TEST(FacetMap, IsAsNearToWhereARayLeavesOnAnyShapeAndFineness) {
       double sum = 0;
       constexpr int kRays = 200;
       for (int i = 0; i < kRays; ++i) {
-        // Over the surface, not over directions, of which most meet a plate in its middle.
+        // Sample the surface, not directions: most directions meet a plate in its middle.
         const Vec3 at = by * testing::random_direction(random);
         const std::uint32_t exit = exit_facet(*mesh, Vec3(0), at);
         const int steps = steps_between(*mesh, map.facet_under(kRadius * at), exit, kNear);
@@ -99,12 +99,12 @@ TEST(FacetMap, IsUnderThePointOfASegmentThatIsNearest) {
     const Vec3 along = glm::normalize(glm::cross(out, testing::random_direction(random)));
     const Vec3 tip = 1.1 * kRadius * out - uniform(random, 0, 0.12) * along;
     const stimuli::Facet& under = mesh->facets()[map.facet_under(tip, 0.12 * along)];
-    // Of a ball, to which the segment is a tangent.
+    // For a ball to which the segment is a tangent.
     EXPECT_GT(glm::dot(under.normal, out), std::cos(0.06));
   }
 }
 
-TEST(FacetMap, OfWhatIsNoDirectionTheFacetIsAny) {
+TEST(FacetMap, AnInvalidDirectionGivesAnyFacet) {
   const Mesh mesh = stretched_ball(Vec3(1), 5);
   const FacetMap map(*mesh, 0);
   for (const double bad : {HUGE_VAL, -HUGE_VAL, 1e308, std::nan("")}) {

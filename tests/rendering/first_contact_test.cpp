@@ -1,4 +1,4 @@
-// No contact is missed, however fast the hand, and it is felt on the side where the probe came in.
+// No contact is missed at any speed of the hand, and each is felt on the side of entry.
 
 #include <gtest/gtest.h>
 
@@ -33,7 +33,7 @@ TEST_P(FirstContact, FasterThanAPlateIsThickHoldsOnTheSideOfEntry) {
   }
 }
 
-TEST_P(FirstContact, APlateIsNotPassedWhateverTheWay) {
+TEST_P(FirstContact, APlateIsNotCrossedOnAnyPath) {
   for (std::uint64_t seed = 0; seed < 3000; ++seed) {
     Random random(seed, {11});
     const double size = 2e-4 * std::pow(1e5, random.unit());
@@ -67,14 +67,14 @@ TEST_P(FirstContact, APlateIsNotPassedWhateverTheWay) {
   }
 }
 
-TEST(FirstContactOfTheSide, AStickIsNotWhippedThroughANeedle) {
+TEST(FirstContactOfTheSide, AFastStylusDoesNotPassThroughANeedle) {
   for (std::uint64_t seed = 0; seed < 3000; ++seed) {
     Random random(seed, {12});
     const double size = 2e-4 * std::pow(1e5, random.unit());
     const double width = size * std::pow(10, uniform(random, -4, -1));
     Bench bench(ray_renderer(), shared(testing::needle(size, width)),
                 testing::random_pose(random, size));
-    // The needle lies along z, the stick along y, and it is swept along x; both ends of each are
+    // The needle lies along z; the stick lies along y and is swept along x. Both ends of each are
     // far from the crossing.
     const double from = width + size * uniform(random, 1e-6, 2);
     const double to = -width - size * uniform(random, 0.001, 2);
@@ -97,7 +97,7 @@ struct Tally {
   int entered = 0, stayed = 0, clipped = 0, held_by_face = 0;
 };
 
-// Walks the tick's motion in a hundred steps by the reference.
+// Follows the tick's motion in a hundred steps by the reference.
 void check_against_fine_steps(Bench& bench, const testing::ProbePath& local_path, Tally& tally) {
   LineProbe last;
   bool was_free = false;
@@ -118,8 +118,8 @@ void check_against_fine_steps(Bench& bench, const testing::ProbePath& local_path
       } else {
         ++tally.clipped;
       }
-      // It came in through a face, and at the end of the tick still stands under that face: the
-      // ideal probe stays on it.
+      // It entered through a face and is still under that face at the end of the tick: the ideal
+      // probe stays on it.
       const Vec3 entry = reference_depth(mesh, testing::mixed(last, felt, *time)).normal;
       for (const stimuli::Facet& facet : mesh.facets()) {
         if (glm::length(facet.normal - entry) > 1e-12) continue;
@@ -170,7 +170,7 @@ TEST_P(FirstContact, ByTheNearestSideIsAsDeepAsTheReference) {
       const ReferenceDepth goal = reference_depth(*mesh, deep);
       if (goal.depth < 1e-4 * mesh->size()) continue;
       ++plunges;
-      // Straight in against the normal of the nearest side: all the way it stays the nearest.
+      // Straight in against the normal of the nearest side, which stays the nearest all the way.
       const double start = goal.depth + 0.1 * mesh->size();
       const int ticks = 1 + static_cast<int>(random.below(20));
       for (int i = 0; i <= ticks; ++i) {

@@ -1,4 +1,4 @@
-// Turning and moving object and probe together turns the forces and nothing else.
+// Rotating and moving object and probe together rotates the forces and changes nothing else.
 
 #include <gtest/gtest.h>
 
@@ -22,7 +22,7 @@ void compare(const Renderer& renderer, const std::shared_ptr<const stimuli::Conv
     const LineProbe probe = testing::to_world(there, path[i]);
     const Rendering b = away.tick(probe);
     const double depth_error = 1e-9 * a.deepest.depth + length_error;
-    // Where the difference of frames decides between touching and not, the force is next to none.
+    // Where the difference of frames decides whether they touch, the force is close to zero.
     ASSERT_LE(std::abs(a.deepest.depth - b.deepest.depth), depth_error) << "tick " << i;
     ASSERT_LE(glm::length(there.orientation * a.force - b.force),
               2 * home.stiffness() * depth_error)

@@ -1,5 +1,4 @@
-// Friction remembers a contact while it lasts, and nothing of one that has been left: in every kind
-// of scene.
+// Friction remembers a contact while it lasts and forgets it when it ends, in every kind of scene.
 
 #include <gtest/gtest.h>
 
@@ -58,7 +57,7 @@ class Hand {
       : scene_(scene), renderer_(renderer), state_(scene.initial_state()), tip_(tip) {
     move_to(tip_, 1);
   }
-  /// \return what is felt at the end
+  /// \return the rendering at the end
   Rendering move_to(const Vec3& to, int ticks) {
     Rendering felt;
     const Vec3 from = tip_;
@@ -89,11 +88,11 @@ TEST(FrictionMemory, ATipThatComesDownAgainIsPushedStraightUp) {
         Rendering felt = hand.move_to(in, 24);
         EXPECT_NEAR(felt.force.z, 1.6, 1e-9) << what;
         EXPECT_NEAR(std::hypot(felt.force.x, felt.force.y), 0, 1e-9) << what;
-        // Aside within the cone of friction: a spring holds it back.
+        // Moved aside within the friction cone: a spring holds it back.
         felt = hand.move_to(in + Vec3(5e-4, 3e-4, 0), 10);
         EXPECT_NEAR(felt.force.x, -800 * 5e-4, 1e-9) << what;
         EXPECT_NEAR(felt.force.y, -800 * 3e-4, 1e-9) << what;
-        // Far aside: it slides, with the dynamic coefficient, against the way it goes.
+        // Moved far aside: it slides, with the dynamic coefficient, against the motion.
         felt = hand.move_to(in + Vec3(5e-3, 3e-4, 0), 90);
         EXPECT_NEAR(std::hypot(felt.force.x, felt.force.y), 0.4 * 1.6, 1e-6) << what;
         EXPECT_LT(felt.force.x, 0) << what;

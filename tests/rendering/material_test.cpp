@@ -1,4 +1,4 @@
-// What materials add to plain springs: damping, friction.
+// Material forces beyond plain springs: damping and friction.
 
 #include <gtest/gtest.h>
 
@@ -82,7 +82,7 @@ TEST(Friction, SticksBelowTheStaticAndSlidesAtTheDynamicCoefficient) {
     r = block.tick(depth, 0.001 + 1e-4 * i);
     EXPECT_NEAR(r.force.x, -0.3 * normal, 1e-9) << i;
   }
-  // Turned round, it sticks until the spring has been wound the other way.
+  // After a reversal it sticks until the spring is stretched the other way.
   r = block.tick(depth, 0.0029 - 0.0006);
   EXPECT_NEAR(r.force.x, 0, 1e-9);
   r = block.tick(depth, 0.0023 - 0.0009);
@@ -104,7 +104,7 @@ TEST(Friction, IsIsotropicAndLiesInTheSurface) {
   EXPECT_NEAR(r.force.z, 0.8, 1e-9);
 }
 
-TEST(Friction, LetsGoWithTheContact) {
+TEST(Friction, EndsWithTheContact) {
   Block block(frictional(0.5, 0.5));
   block.tick(0.002);
   EXPECT_LT(block.tick(0.002, 0.0005).force.x, -0.3);
@@ -152,7 +152,7 @@ TEST(Friction, NeverGivesEnergyOverClosedPathsOnAFace) {
                     kTop - 0.001 + c * std::sin(3 * turn));
       const Rendering r = block.tick(kTop - at.z, at.x, at.y);
       ASSERT_GT(r.contacts, 0);
-      // The first lap winds the spring up.
+      // The first lap stretches the spring.
       if (i > kTicks) work += glm::dot(0.5 * (r.force + last_force), at - last);
       last_force = r.force;
       last = at;
@@ -161,7 +161,7 @@ TEST(Friction, NeverGivesEnergyOverClosedPathsOnAFace) {
   }
 }
 
-TEST(Friction, GoesOnOverASeam) {
+TEST(Friction, ContinuesOverASeam) {
   // Two halves of a block side by side: felt as one.
   std::vector<SceneObject> halves;
   for (const double x : {-kTop, kTop}) {

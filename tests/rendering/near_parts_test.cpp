@@ -1,4 +1,4 @@
-// Broad phase over many parts: what is out of reach is left out, nothing else is.
+// Broad phase over many parts: leaves out exactly the parts out of reach.
 
 #include <gtest/gtest.h>
 
@@ -21,7 +21,7 @@ Vec3 any_within(Random& random, double radius) {
   return radius * Vec3(2 * random.unit() - 1, 2 * random.unit() - 1, 2 * random.unit() - 1);
 }
 
-/// Objects of a ball, a box and another that overlap, 10 to 30 mm, anywhere in a cube.
+/// Objects of a ball and two boxes that overlap, 10 to 30 mm, anywhere in a cube.
 /// \param half   m, half the cube's edge
 /// \param floor  a ball of 3 m below them
 Scene crowd(std::uint64_t seed, std::size_t count, double half, Tool tool = {},
@@ -48,7 +48,7 @@ Scene crowd(std::uint64_t seed, std::size_t count, double half, Tool tool = {},
   return Scene(std::move(objects), true, std::move(tool));
 }
 
-/// Glides, and leaps now and then.
+/// Glides, with occasional leaps.
 class Hand {
  public:
   explicit Hand(std::uint64_t seed) : random_(seed, {1}) {}

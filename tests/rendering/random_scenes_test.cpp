@@ -1,6 +1,6 @@
-// Random scenes: several objects of overlapping parts, layers that may give way, tools of up to 16
+// Random scenes: several objects of overlapping parts, layers that may break, tools of up to 16
 // segments, from a thousandth of a desk to a thousand desks wide, under hands that glide, rush and
-// jump. What must hold of every tick, by definition.
+// jump. Checks properties of every tick that hold by definition.
 
 #include <gtest/gtest.h>
 
@@ -18,7 +18,7 @@ namespace {
 constexpr std::uint32_t kMayBe =
     render_fault::kReleased | render_fault::kContactCapped | render_fault::kStartedInside;
 
-/// A scene and the way of a hand through it.
+/// A scene and the path of a hand through it.
 struct DrawnScene {
   std::uint64_t seed = 0;
   double scale = 1;  ///< 1: objects of some centimetres
@@ -27,7 +27,7 @@ struct DrawnScene {
   testing::ProbePath path;
 };
 
-/// One to three clusters, of which some have a second surface within.
+/// One to three clusters, some with a second surface inside.
 DrawnScene random_scene(std::uint64_t seed) {
   Random random(seed, {71});
   DrawnScene out;
@@ -108,8 +108,8 @@ class RandomScene : public ::testing::Test {
     }
   }
 
-  /// The ideal tool is outside of all parts, and the multipliers of what holds it are its way
-  /// there.
+  /// The ideal tool is outside all parts, and the multipliers of the planes that hold it add up to
+  /// its displacement.
   void expect_ideal(const Scene& scene, const RenderState& state, const LineProbe& probe,
                     std::uint32_t index, bool sides, double scale) {
     const PartGroup& group = scene.groups()[index];
@@ -127,7 +127,7 @@ class RandomScene : public ::testing::Test {
     const bool breaks =
         std::any_of(scene.breaking().begin(), scene.breaking().end(),
                     [&](const BreakingParts& parts) { return parts.group == index; });
-    if (breaks) return;  // what has given way is in nobody's way
+    if (breaks) return;  // broken parts do not hold the tool
     ++checked_;
     if (held > 0) {
       ASSERT_LE(glm::length(way - own.shift), 1e-9 * held + 1e-13 * scale);
@@ -154,7 +154,7 @@ TEST_F(RandomScene, NoIdealToolIsInsideAndForcesAreInBalance) {
         << "seed " << seed << " tick " << ticks_ << " scale " << drawn.scale << " parts "
         << drawn.parts.size() << " segments " << drawn.tool.segments.size();
   }
-  // It has been where things can go wrong.
+  // The path has covered the critical situations.
   EXPECT_GT(in_contact_, ticks_ / 5);
   EXPECT_GT(several_, ticks_ / 20);
   EXPECT_GT(checked_, ticks_ / 5);

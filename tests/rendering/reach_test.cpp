@@ -1,4 +1,4 @@
-// The extended probe: what the hand gets does the work that the contact does, to rounding.
+// The extended probe: the force on the hand does the same work as the contact, to rounding.
 
 #include "rendering/reach.h"
 
@@ -54,7 +54,8 @@ TEST(Reach, IsUndoneByItsInverse) {
   }
 }
 
-/// The motion of the virtual stylus for one of the real: its map is linear but for the fixed point.
+/// The motion of the virtual stylus for one of the real stylus: the map is linear except for the
+/// fixed point.
 LineProbe virtual_motion(Reach reach, const LineProbe& motion) {
   reach.point = Vec3(0);
   return stretched(reach, motion);
@@ -78,7 +79,8 @@ TEST(Reach, ForcesDoTheSameWorkForEveryMotionOfTheEnds) {
   }
 }
 
-// A cube far from the hand, pressed by the side of a stylus of 0.6 m that is really one of 0.12 m.
+// A cube far from the hand, pressed by the side of a virtual stylus of 0.6 m; the real one has 0.12
+// m.
 TEST(Reach, AContactsForceDoesTheSameWorkAtItsPlaceAndAtTheHand) {
   std::vector<SceneObject> objects(1);
   objects[0].mesh = std::make_shared<const stimuli::ConvexMesh>(stimuli::cube(0.05));
@@ -124,8 +126,8 @@ TEST(Reach, TheGainIsTheSquareOfTheLever) {
     const Reach reach = some_reach(random);
     const double along = random.unit(), k = 700;
     const Vec3 n = glm::normalize(vector(random));
-    // The stiffest that the ends feel: K = g g^T with g the forces on the ends of a unit force, and
-    // its only eigenvalue above 0 is k g.g.
+    // The greatest stiffness that the ends feel: K = k g g^T, with g the forces on the ends by a
+    // unit force; its only positive eigenvalue is k g.g.
     const EndForces g = felt(reach, EndForces{(1 - along) * n, along * n});
     EXPECT_NEAR(k * (glm::dot(g.tip, g.tip) + glm::dot(g.tail, g.tail)),
                 k * stiffness_gain(reach, along), 1e-9 * k);

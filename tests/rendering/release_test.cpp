@@ -1,5 +1,4 @@
-// Layers under a surface, layers that break, and hooks: what an object lets go of
-// (rendering/release.h).
+// Layers under a surface, layers that break, and hooks (rendering/release.h).
 
 #include "rendering/release.h"
 
@@ -68,7 +67,7 @@ TEST_P(Layers, EachAddsItsSpringFromItsDepthOn) {
   }
 }
 
-TEST_P(Layers, ALayersDampingActsInIt) {
+TEST_P(Layers, LayerDampingActsInsideTheLayer) {
   const Scene scene(layered_cube(100, {{0.001, 500, 4, {}}}, GetParam()));
   RenderState state = scene.initial_state();
   ray_renderer().tick(scene, state, at_depth(-0.001), kTick);
@@ -126,7 +125,7 @@ TEST_P(Layers, ABrokenLayerHoldsNothing) {
   EXPECT_EQ(r.contacts, 0);
   EXPECT_EQ(r.force, Vec3(0));
   EXPECT_EQ(r.ideal.tip, at_depth(0.004).tip);
-  // Right through the cube, out below, and back in from there: whole.
+  // Right through the cube, out below and back in from there: the layer is whole.
   for (double depth = 0.004; depth < 0.0601; depth += 1e-4)
     EXPECT_EQ(ray_renderer().tick(scene, state, at_depth(depth), kTick).contacts, 0) << depth;
   for (double depth = -0.11; depth > -0.102; depth -= 1e-4)
@@ -136,8 +135,8 @@ TEST_P(Layers, ABrokenLayerHoldsNothing) {
   EXPECT_NEAR(r.force.z, 500 * 0.0005, 6e-3);
 }
 
-/// A slab that bears 1 N on a block that holds, both of one layer.
-TEST(PartsOfALayer, WhatLiesUnderOneThatBrokeTakesOverWithoutAStep) {
+/// A slab that breaks at 1 N on a block that does not break, both of one layer.
+TEST(PartsOfALayer, APartUnderABrokenOneTakesOverSmoothly) {
   constexpr double kTop = 0.03, kSeam = 0.026, kSpring = 500;  // m, m, N/m
   std::vector<SceneObject> parts{
       testing::placed_object(testing::mesh_of(box_soup(Vec3(-kTop), Vec3(kTop))), {}, 0, 0),
@@ -157,15 +156,15 @@ TEST(PartsOfALayer, WhatLiesUnderOneThatBrokeTakesOverWithoutAStep) {
     double depth = -0.001, last = 0;
     const auto tick = [&] {
       const Rendering r = ray_renderer().tick(scene, state, at_depth(depth), kTick);
-      EXPECT_LE(std::abs(r.force.z - last), 0.35) << depth;  // of 5 N in 20 ms, and the way
+      EXPECT_LE(std::abs(r.force.z - last), 0.35) << depth;  // fade of 5 N in 20 ms, motion
       last = r.force.z;
       return r;
     };
-    // Fast enough to be 10 mm in the block when the slab has gone.
+    // Fast enough to be 10 mm inside the block when the slab is gone.
     for (; depth < 0.014; depth += 6e-4) tick();
     for (int i = 0; i < 60; ++i) tick();
     EXPECT_NEAR(last, kSpring * (depth - (kTop - kSeam)), 1e-9);
-    // The block holds it from above although its ideal tool is where the slab was.
+    // The block holds it from above although the ideal tool is at the slab's former place.
     for (; depth > 0.001; depth -= 1e-4) tick();
     EXPECT_EQ(tick().contacts, 0);
     for (; depth > -0.002; depth -= 1e-4) tick();
@@ -174,7 +173,7 @@ TEST(PartsOfALayer, WhatLiesUnderOneThatBrokeTakesOverWithoutAStep) {
   }
 }
 
-TEST_P(Layers, WhoBeginsBetweenSurfaceAndLayerFeelsNeitherUntilTheObjectHasBeenLeft) {
+TEST_P(Layers, StartingBetweenSurfaceAndLayerGivesNoForceUntilItHasLeft) {
   const Scene scene(layered_cube(100, {{0.005, 500, 0, {}}}, GetParam()));
   RenderState state = scene.initial_state();
   for (const double depth : {0.002, 0.006, 0.008, 0.001}) {
@@ -220,7 +219,7 @@ class Hook : public ::testing::Test {
   RenderState state_;
 };
 
-TEST_F(Hook, ATurnThatThePartsLockIsBoundedAndLetGoOfSmoothly) {
+TEST_F(Hook, ALockedTurnIsBoundedAndReleasedSmoothly) {
   go_in();
   Rendering r = tick(kPulled, -kIn, 0);
   const double held = kSpring * (kPulled - kSlot);
@@ -240,11 +239,11 @@ TEST_F(Hook, ATurnThatThePartsLockIsBoundedAndLetGoOfSmoothly) {
   EXPECT_NEAR(fading * kTick, kFadeTime, 2 * kTick);
   EXPECT_EQ(r.faults, render_fault::kReleased);
   EXPECT_EQ(r.force, Vec3(0));
-  // The slot lets it turn by 0.1 rad; then it is behind by the largest lag for as long as it may
-  // be, and while the force fades.
+  // The slot lets it turn by 0.1 rad; then it lags by more than the limit for the allowed time, and
+  // while the force fades.
   EXPECT_GT(worst_lag, kMostLag);
   EXPECT_LE(worst_lag, kMostLag + (kMostLagTime + kFadeTime + 3 * kTick) / kTick * kTurn);
-  // Once out of the object it is felt again.
+  // Once the tool has left the object, it is felt again.
   tick(0, 0.05, 0.5);
   EXPECT_EQ(tick(0, 0.05, 0).faults, 0u);
   go_in();
@@ -253,7 +252,7 @@ TEST_F(Hook, ATurnThatThePartsLockIsBoundedAndLetGoOfSmoothly) {
   EXPECT_EQ(r.faults, 0u);
 }
 
-TEST_F(Hook, WhatIsHeldStillBehindByLessIsNotLetGo) {
+TEST_F(Hook, ASmallerConstantLagIsNotReleased) {
   go_in();
   const double roll = 0.1 + 0.8 * kMostLag;
   for (double turned = 0; turned < roll; turned += 2e-3) tick(kPulled, -kIn, turned);

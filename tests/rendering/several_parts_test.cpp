@@ -190,9 +190,9 @@ TEST_P(SeveralParts, ACompoundBesideOthersFeelsAsAlone) {
   }
 }
 
-// Where the probe stood exactly on the surface, rounding says on which side: it goes in all the
-// same.
-TEST_P(SeveralParts, WhatWasTouchedExactlyIsFeltOnceItIsPushed) {
+// Where the probe stood exactly on the surface, rounding decides the side; it must still be felt
+// when it goes in.
+TEST_P(SeveralParts, ASurfaceTouchedExactlyIsFeltOncePushed) {
   constexpr double kPressed = 1e-3;  // m
   Random random(9);
   for (int i = 0; i < 2000; ++i) {
@@ -200,7 +200,7 @@ TEST_P(SeveralParts, WhatWasTouchedExactlyIsFeltOnceItIsPushed) {
                     stimuli::uniform_rotation(random)};
     const Scene scene({placed_object(box({-0.05, -0.05, -0.04}, {0, 0.05, 0}), pose, kSpring, 0),
                        placed_object(box({0, -0.05, -0.04}, {0.05, 0.05, 0}), pose, kSpring, 0)});
-    // Near the seam (in it is a crack as wide as rounding), or over one of the parts.
+    // Near the seam (which is a crack as wide as rounding), or over one of the parts.
     const double x = (i % 3 == 0 ? 1e-6 : 0.08) * (random.unit() - 0.5);
     const double y = 0.08 * (random.unit() - 0.5);
     const auto at = [&](double z) {
@@ -274,7 +274,8 @@ TEST_P(SeveralParts, NoPartOfAClusterIsEnteredUnfelt) {
       const Rendering r = tick(scene, state, probe);
       in_contact += r.contacts > 0;
       if (r.contacts > 0) continue;
-      if ((r.faults & render_fault::kReleased) != 0) {  // hooked for too long: no force until left
+      if ((r.faults & render_fault::kReleased) !=
+          0) {  // hooked for too long: no force until it left
         ++released;
         continue;
       }
@@ -304,8 +305,8 @@ TEST(SeveralPartsOfTheSide, StickAcrossASeamFeelsOneForce) {
   }
 }
 
-/// Small boxes here and there; a stylus comes down on one of them with its side, however far from
-/// its tip and however little it moves: as if that one were alone.
+/// Scattered small boxes: a stylus comes down on one of them with its side, at any distance from
+/// its tip and with any motion. The force is that of this box alone.
 TEST(SeveralPartsOnTheSide, EachIsFoundWhereverOnTheStylusItIs) {
   const auto at = [](double x, int object) {
     return placed_object(box({x - 0.004, -0.004, -0.008}, {x + 0.004, 0.004, 0}), {}, kSpring,

@@ -29,7 +29,7 @@ class SingleMesh(unittest.TestCase):
         scene = json.loads((scenes / f"{name}.json").read_text())
         del scene["$schema"]
         source = (scenes / scene["objects"][0]["file"]).resolve()
-        scene["objects"][0].pop("body", None)  # it stands still: the law is the same, the way not yet another one
+        scene["objects"][0].pop("body", None)  # a fixed object, so that the path is the same
         with tempfile.TemporaryDirectory() as scratch:
             folder = pathlib.Path(scratch)
             lines = source.read_text().splitlines(True)

@@ -1,5 +1,5 @@
-// What a tick promises the servo: no allocation, the same bits again, faults as bits, and no force
-// from an object that the probe began in.
+// The guarantees of a tick to the servo: no allocation, repeatable bits, faults as bits, and no
+// force from an object in which the probe began.
 
 #include <gtest/gtest.h>
 
@@ -57,7 +57,7 @@ class Tick : public ::testing::TestWithParam<const Renderer*> {
 TEST_P(Tick, AllocatesNothing) {
   if (!runner::counts_allocations()) GTEST_SKIP() << "sanitizers bring their own operator new";
   const std::uint64_t probe_count = runner::allocations();
-  int* volatile kept = new int(1);  // volatile: else the compiler may leave the pair out
+  int* volatile kept = new int(1);  // volatile: else the compiler may remove the pair
   delete kept;
   ASSERT_EQ(runner::allocations(), probe_count + 1) << "the counter does not count";
   int in_contact = 0;
@@ -93,7 +93,7 @@ TEST_P(Tick, SamePathSameBits) {
       ASSERT_TRUE(same_bits(GetParam()->tick(again, state_again, path[i], kTick), recorded[i]))
           << "seed " << seed << " tick " << i;
     }
-    // A copied memory goes on where it was copied.
+    // A copied state continues where it was copied.
     for (std::size_t i = path.size() / 2; i < path.size(); ++i) {
       ASSERT_TRUE(same_bits(GetParam()->tick(scene, halfway, path[i], kTick), recorded[i]))
           << "seed " << seed << " tick " << i;
@@ -178,7 +178,7 @@ TEST_P(Tick, BadPosesGiveNoForceAndTheNextGoodOneRecovers) {
   }
 }
 
-TEST_P(Tick, ABadPoseFirstIsNoStartInside) {
+TEST_P(Tick, AFirstBadPoseIsNotAStartInside) {
   Bench bench(*GetParam(), small_cube());
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const LineProbe above{{0.002, 0.003, kHalf + 0.01}, {0.01, 0.02, 0.1}};
@@ -209,7 +209,7 @@ TEST_P(Tick, HugeAndTinyPosesStayFiniteAndAreForgotten) {
     if (bench.tick(above).contacts == 0) {
       ASSERT_EQ(bench.tick(pressed).contacts, 1) << "seed " << seed;
     }
-    // Once round the cube, so that every side that may have held the probe lets it go.
+    // Once around the cube, so that every side that may have held the probe releases it.
     for (const Vec3& at : {Vec3(1, 0, 0), Vec3(0, 1, 0), Vec3(0, 0, 1), Vec3(-1, 0, 0),
                            Vec3(0, -1, 0), Vec3(0, 0, -1), Vec3(1, 0, 0), Vec3(0, 0, 1)}) {
       bench.tick({at, at + Vec3(0.001, 0.001, 0.001)});

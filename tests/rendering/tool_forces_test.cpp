@@ -31,7 +31,7 @@ TEST(ToolForces, AreSplitOnTwoDevicesAndTurnTheHand) {
       ASSERT_GE(r.segment, 0);
       ASSERT_LT(r.segment, static_cast<int>(segments));
       ASSERT_NEAR(glm::length(r.ideal_side), 1, 1e-9);
-      // The two devices' moment about any point of the stylus, as the contacts' save torsion.
+      // The two devices' moment about any point of the stylus equals the contacts', except torsion.
       const Vec3 axis = glm::normalize(probe.tail - probe.tip);
       for (const double share : {-0.5, 0.0, 0.4, 1.0}) {
         const Vec3 hand = probe.tip + share * (probe.tail - probe.tip);

@@ -1,5 +1,5 @@
-// The contact law of unions (rendering/union_contact.h) on random clusters of parts: what must hold
-// of every tick.
+// The contact law of unions (rendering/union_contact.h) on random clusters of parts: properties
+// that must hold at every tick.
 
 #include <gtest/gtest.h>
 
@@ -24,7 +24,7 @@ class UnionCluster : public ::testing::TestWithParam<const Renderer*> {
   }
 };
 
-/// m; how deep the ideal tool of the only group is inside of any part: by definition.
+/// m, depth of the only group's ideal tool inside any part, by definition.
 double deepest_inside(const Scene& scene, const RenderState& state, bool sides) {
   const GroupState& group = state.unions.groups[0];
   const ToolPose& pose = group.touching ? group.ideal : state.unions.last;
@@ -83,14 +83,15 @@ TEST_P(UnionCluster, ThePartsOrderPlaceAndSizeDoNotMatter) {
                 d = large.initial_state();
     Random random(seed, {56});
     for (const LineProbe& probe : cluster_path(random, 300, 0.2)) {
-      // The tool's side is measured, or a turned world would choose another.
+      // The tool's side is measured; otherwise a rotated world would choose another.
       a.measured_side = b.measured_side = d.measured_side = Vec3(1, 0.2, 0.1);
       c.measured_side = pose.orientation * a.measured_side;
       const Rendering of_a = tick(plain, a, probe), of_b = tick(reversed, b, probe),
                       of_c = tick(moved, c, testing::to_world(pose, probe)),
                       of_d = tick(large, d, {scale * probe.tip, scale * probe.tail});
       ++ticks;
-      // Where two ways are equally near, rounding may choose, and the ways then part; that is rare.
+      // Where two places are equally near, rounding may choose, and the paths then diverge; that is
+      // rare.
       same_order += glm::length(of_a.force - of_b.force) <= 1e-9;
       same_place += glm::length(pose.orientation * of_a.force - of_c.force) <= 1e-9;
       same_size += glm::length(scale * of_a.force - of_d.force) <= 1e-8;
@@ -140,7 +141,7 @@ TEST_P(UnionCluster, NothingIsAllocatedAndNoNaNGetsThrough) {
     const double nan = std::numeric_limits<double>::quiet_NaN();
     path[100].tip.x = nan;
     path[200].tail.z = HUGE_VAL;
-    path[300].tail = path[300].tip;  // a stylus of no length
+    path[300].tail = path[300].tip;  // a stylus of length 0
     std::vector<Rendering> out(path.size());
     const std::uint64_t before = runner::allocations();
     for (std::size_t i = 0; i < path.size(); ++i) {

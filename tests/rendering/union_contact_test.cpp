@@ -1,5 +1,5 @@
-// The contact law of unions: any tool on any object of convex parts (rendering/union_contact.h),
-// by what must hold of it.
+// The contact law of unions: any tool on any object of convex parts (rendering/union_contact.h), by
+// properties that it must have.
 
 #include "rendering/union_contact.h"
 
@@ -80,13 +80,13 @@ TEST_P(UnionContact, GroovesOfAnyOpeningHoldTheTipInTheirApex) {
     const auto at = [&](const LineProbe& probe) { return tick(scene, state, probe); };
     Rendering r = press({1e-5, 0, -0.002}, 0.05, at);
     EXPECT_LE(glm::length(r.force - Vec3(-0.01, 0, 2)), 1e-6) << degrees;
-    // Along the groove the tip slides, and nothing pops.
+    // Along the groove the tip slides without jumps.
     for (int i = 0; i < 60; ++i) {
       r = at(standing_at({1e-5, 5e-5 * i, -0.002}));
       EXPECT_LE(glm::length(r.force - Vec3(-0.01, 0, 2)), 1e-6) << degrees;
     }
     EXPECT_EQ(r.faults, 0u) << degrees;
-    // Up again it has left, whatever it rested on.
+    // Moved up again, it has left its contacts.
     for (double z = -0.002; z < 0.05; z += 1e-4) r = at(standing_at({0, 0, z}));
     if (degrees > 20) {
       EXPECT_EQ(r.contacts, 0) << degrees;
@@ -158,7 +158,7 @@ TEST_P(UnionContact, CuttingAPartInTwoChangesNothing) {
   EXPECT_GT(in_contact, compared / 2);
 }
 
-TEST_P(UnionContact, WhatBeginsInsideIsFeltOnceItHasBeenLeft) {
+TEST_P(UnionContact, AStartInsideIsFeltOnceItHasLeft) {
   const Scene scene(object_of(
       {box_soup({-0.05, -0.05, -0.04}, {0, 0.05, 0}), box_soup({0, -0.05, -0.04}, {0.05, 0.05, 0})},
       {}, kStiffness));

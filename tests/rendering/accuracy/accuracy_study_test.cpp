@@ -54,7 +54,7 @@ TEST(AccuracyStudy, MeasuresEveryMethodOnEveryTessellationWithBothProbes) {
     EXPECT_GT(row.shape_errors.ticks, 0u);
     EXPECT_GT(row.polyhedron_errors.ticks, 0u);
     EXPECT_LE(row.polyhedron_errors.ticks, row.shape_errors.ticks);
-    // One look at the clock before and one after: 1000 ns over the ticks between.
+    // The clock is read once before and once after: 1000 ns over the ticks between.
     EXPECT_DOUBLE_EQ(row.ns_per_tick, 1000.0 / static_cast<double>(row.shape_errors.ticks));
   }
   // 2 spheres, 3 cones, 2 cylinders, 1 cube, 1 box.
@@ -76,7 +76,8 @@ TEST(AccuracyStudy, EveryNthTickGivesTheSameAnswersThere) {
   EXPECT_TRUE(fewer);
 }
 
-/// Every look at the polyhedron visits all its facets and edges; each path may end within a stride.
+/// Every comparison with the polyhedron visits all its facets and edges; a path may end within a
+/// stride.
 TEST(AccuracyStudy, KeepsToTheBudgetOfVisitsAndUsesIt) {
   AccuracySettings settings = tiny();
   settings.paths = 3;
@@ -118,7 +119,7 @@ TEST(AccuracyStudy, ChoosesTheCoarsestThatIsGoodEnoughForBothProbes) {
   EXPECT_EQ(triangles_for(rows, "sphere", {3e-5, kNoLimit}), 1280);
   EXPECT_EQ(triangles_for(rows, "sphere", {1e-6, kNoLimit}), 0);
   EXPECT_EQ(triangles_for(rows, "cube", {1, 1}), 0);
-  // A finer one that fails: chance, so the coarser does not count either.
+  // A finer one fails: the coarser passed by chance, so it does not count either.
   rows.push_back(row(5120, "ray", 2e-3, 0.01, 0));
   rows.push_back(row(20480, "ray", 1e-6, 0.001, 0));
   EXPECT_EQ(triangles_for(rows, "sphere", {1e-3, 0.2}), 20480);

@@ -1,5 +1,5 @@
-// The numbers of `palpate accuracy`: the paths are what they say, the sums are right, and the
-// methods' errors behave as theory says.
+// The numbers of `palpate accuracy`: the paths are as described, the sums are right, and the
+// methods' errors behave as theory predicts.
 
 #include <gtest/gtest.h>
 
@@ -59,7 +59,7 @@ TEST(AnalyticStroke, ComesFromOutsideAndStaysAtItsDepth) {
       EXPECT_LE(most, 2e-3 + 1e-9);
       EXPECT_LT(least, 1.01e-3);
       EXPECT_GT(most, 1.99e-3);
-      // A hand: the ends of the stylus move by less than 1 mm a tick, and they move.
+      // As a hand would: the ends of the stylus move, by less than 1 mm a tick.
       EXPECT_LT(farthest, 1e-3);
       EXPECT_GT(farthest, 3e-5);
     }
@@ -108,7 +108,7 @@ TEST(ErrorTally, SumsUpByHand) {
   tally.add(probe, truth, {false, 0, Vec3(), Vec3()});                                    // lost
   tally.add(probe, truth,
             {true, std::numeric_limits<double>::quiet_NaN(), Vec3(), Vec3()});  // gave up
-  tally.add(probe, truth, {true, 3e-3, Vec3(1, 0, 0), Vec3(3e-3, 0, 0)});       // other way
+  tally.add(probe, truth, {true, 3e-3, Vec3(1, 0, 0), Vec3(3e-3, 0, 0)});       // other side
   tally.add(probe, {}, {true, 1e-4, Vec3(0, 0, 1), exact});                     // phantom
   tally.add(probe, {}, {false, 0, Vec3(), Vec3()});                             // right
   const ErrorSummary s = tally.summary();
@@ -173,8 +173,8 @@ TEST(PlainWalk, InDoubleIsTheWalk) {
   }
 }
 
-/// Errors of every method over three short paths: against the shape and against the polyhedron. Of
-/// one alone: against the shape.
+/// Errors of every method over three short paths, against the shape and against the polyhedron; of
+/// a single method, against the shape.
 std::map<std::string, std::pair<ErrorSummary, ErrorSummary>> errors(const stimuli::ObjectSpec& spec,
                                                                     const std::string& only = "") {
   std::map<std::string, std::pair<ErrorSummary, ErrorSummary>> result;
@@ -218,7 +218,7 @@ TEST(Accuracy, OursIsExactOnThePolyhedron) {
       EXPECT_LE(s.torque.worst, 1e-12) << name;
     }
     EXPECT_EQ(all.at("scan").second.deeper, 0u);
-    // Single precision: 30 mm to 24 bits is 2 nm. It shows, and that is all.
+    // Single precision: 30 mm to 24 bits is 2 nm. The error is of that order and not larger.
     const ErrorSummary& single = all.at("walk-float").second;
     EXPECT_GT(single.depth.rms, 1e-10);
     EXPECT_LT(single.depth.worst, 1e-6);
@@ -256,8 +256,8 @@ TEST(Accuracy, FallsAsTheSquareOfTheTriangles) {
   }
 }
 
-TEST(Accuracy, OfASphereItIsTheSagitta) {
-  // Between its corners and the middles of its facets an icosphere is 0 to the sagitta too low.
+TEST(Accuracy, TheErrorOfASphereIsTheSagitta) {
+  // From its corners to the middles of its facets, an icosphere is too low by 0 to the sagitta.
   const stimuli::ObjectSpec spec = primitive(stimuli::ShapeKind::sphere, 4);
   const stimuli::ConvexMesh mesh(stimuli::polygons_of(spec));
   double sagitta = 0;

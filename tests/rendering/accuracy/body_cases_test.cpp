@@ -1,5 +1,5 @@
-// The cases by which engines of rigid bodies are measured: their errors are nothing for the motion
-// that mechanics gives, and what they say for one that is off; and what the study makes of them.
+// The cases that measure rigid-body engines: their errors are zero for the motion given by
+// mechanics and have the stated size for a wrong one; and the study's rows over them.
 
 #include <gtest/gtest.h>
 
@@ -29,7 +29,7 @@ BodyCase case_of(const std::string& part) {
   throw std::invalid_argument("no case of " + part);
 }
 
-/// The boxes that move, as the case begins.
+/// The moving boxes at the beginning of the case.
 std::vector<BoxMotion> beginning(const BodyCase& one) {
   std::vector<BoxMotion> at;
   for (const BodyBox& box : one.boxes) {
@@ -54,7 +54,7 @@ TEST(BodyCases, HaveNamesMeasuresAndBoxesThatMove) {
   }
 }
 
-TEST(BodyCases, WhatIsConservedIsSoInTheBeginning) {
+TEST(BodyCases, ConservedQuantitiesHaveNoErrorAtTheStart) {
   for (const BodyCase& one : body_cases(true)) {
     const bool kept = one.measure.find("energy") != std::string::npos ||
                       one.measure.find("momentum") != std::string::npos ||
@@ -69,7 +69,7 @@ TEST(BodyCases, EnergyIsOfMotionSpinAndHeight) {
   std::vector<BoxMotion> at = beginning(turning);
   at[0].spin *= std::sqrt(1.5);
   EXPECT_NEAR(turning.error(at), 0.5, 1e-12);
-  // The same spin about the box's own axes, wherever it has turned to.
+  // The same spin about the box's own axes, in any orientation.
   at = beginning(turning);
   at[0].orientation = glm::angleAxis(0.7, glm::normalize(Vec3(1, 2, 3)));
   at[0].spin = at[0].orientation * at[0].spin;
@@ -95,7 +95,7 @@ TEST(BodyCases, EqualBodiesExchangeTheirVelocities) {
   EXPECT_NEAR(five.error(at), 1, 1e-12);
   std::swap(at[0].velocity, at[4].velocity);
   EXPECT_NEAR(five.error(at), 0, 1e-12);
-  // Side by side without a gap, but for the first, which comes from the left.
+  // Side by side without a gap, except the first, which comes from the left.
   const double edge = five.boxes[0].size.x;
   for (std::size_t i = 1; i < 4; ++i) EXPECT_NEAR(at[i + 1].centre.x - at[i].centre.x, edge, 1e-12);
   EXPECT_LT(at[0].centre.x, at[1].centre.x - edge);
@@ -103,7 +103,7 @@ TEST(BodyCases, EqualBodiesExchangeTheirVelocities) {
       << "it gets there in time";
 }
 
-TEST(BodyCases, AWallTurnsTheSpeedTowardsItRound) {
+TEST(BodyCases, AWallReversesTheNormalSpeed) {
   const BodyCase wall = case_of("against a wall");
   std::vector<BoxMotion> at = beginning(wall);
   EXPECT_NEAR(wall.error(at), 2 * at[0].velocity.x, 1e-12);
@@ -111,15 +111,15 @@ TEST(BodyCases, AWallTurnsTheSpeedTowardsItRound) {
   EXPECT_NEAR(wall.error(at), 0, 1e-12);
 }
 
-/// Elastic, without friction: energy, momentum and the moment of momentum are kept.
-TEST(BodyCases, AStruckRodKeepsWhatThereWas) {
+/// Elastic, without friction: energy, momentum and angular momentum are conserved.
+TEST(BodyCases, AStruckRodConservesEnergyAndMomenta) {
   const BodyCase rod = case_of("rod");
   std::vector<BoxMotion> at = beginning(rod);
   const double m1 = rod.boxes[0].mass, m2 = rod.boxes[1].mass, speed = -at[1].velocity.y;
   const double arm = at[1].centre.x;
   const Vec3 size = rod.boxes[0].size;
   const double moment = m1 / 12 * (size.x * size.x + size.y * size.y);
-  // The impulse is the one other than zero that keeps the energy.
+  // The impulse is the nonzero one that keeps the energy.
   const double impulse = 2 * speed / (1 / m1 + 1 / m2 + arm * arm / moment);
   at[0].velocity = {0, -impulse / m1, 0};
   at[0].spin = {0, 0, -impulse * arm / moment};
@@ -132,7 +132,7 @@ TEST(BodyCases, AStruckRodKeepsWhatThereWas) {
   EXPECT_NEAR(rod.error(at), 0.1, 1e-12) << "of the speed before";
 }
 
-TEST(BodyCases, MomentumIsRelativeToAllThereIsInTheBeginning) {
+TEST(BodyCases, MomentumErrorIsRelativeToTheInitialMomentum) {
   const BodyCase six = case_of("six that fly");
   std::vector<double> masses;
   double all = 0;  // kg m/s
@@ -147,7 +147,7 @@ TEST(BodyCases, MomentumIsRelativeToAllThereIsInTheBeginning) {
   }
 }
 
-TEST(BodyCases, WhatRestsIsOffItsPlaceByMillimetres) {
+TEST(BodyCases, ErrorsAtRestAreInMillimetres) {
   for (const char* name : {"10 kg", "stack"}) {
     const BodyCase one = case_of(name);
     for (std::size_t i = 0; i < beginning(one).size(); ++i) {
@@ -155,7 +155,7 @@ TEST(BodyCases, WhatRestsIsOffItsPlaceByMillimetres) {
       at[i].centre.z -= 0.003;
       EXPECT_NEAR(one.error(at), 3, 1e-9) << name << ", " << i;
     }
-    // Each stands on the one before.
+    // Each stands on the previous one.
     double top = 0;
     for (const BodyBox& box : one.boxes) {
       if (box.mass == 0) continue;
@@ -176,14 +176,14 @@ TEST(BodyStudy, HasARowForEachCaseAndEngineAndOursKeepsTheClosedForms) {
     EXPECT_EQ(row.measure, case_of(row.name).measure);
     EXPECT_GT(row.us_per_step, 0) << row.name;
     EXPECT_TRUE(std::isfinite(row.error));
-    // In no library do boxes fall through each other.
+    // Boxes fall through each other in no library.
     if (row.name.find("head-on") != std::string::npos) {
       EXPECT_LT(row.error, 0.2) << row.engine;
     } else if (row.name.find("stack") != std::string::npos) {
       EXPECT_LT(row.error, 5) << row.engine << ", mm";
     }
     if (row.engine != "palpate") continue;
-    // Rest is a matter of millimetres, the rest of rounding and of steps of a bounce.
+    // Cases at rest are judged to millimetres, the others to rounding and to steps of a bounce.
     const bool rests = row.measure.find("mm") != std::string::npos;
     EXPECT_LT(row.error, rests ? 0.05 : 1e-6) << row.name;
   }

@@ -1,4 +1,4 @@
-// What a tick with moving bodies costs in `palpate accuracy`: the figures of times that are known.
+// The cost of a tick with moving bodies in `palpate accuracy`: its figures for known times.
 
 #include <gtest/gtest.h>
 
@@ -11,7 +11,7 @@ namespace {
 namespace body_costs {
 
 TEST(BodyTickCost, IsTheMedianThe99thPercentileAndTheMostOfItsTicks) {
-  // Ticks take 1, 2, ... 2000 us, in another order; what happens between them takes longer.
+  // Ticks take 1, 2, ... 2000 us, in another order; the work between them takes longer.
   double clock = 0;
   std::size_t looks = 0;
   const BodyTickCost cost = body_tick_cost(true, [&] {

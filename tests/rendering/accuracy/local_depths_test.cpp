@@ -70,7 +70,7 @@ TEST(LocalDepths, NoDirectionIsShorterThanTheLeast) {
   }
 }
 
-TEST(LocalDepths, EachIsALocalMinimumWithTheDepthItSays) {
+TEST(LocalDepths, AreLocalMinimaOfTheReportedDepth) {
   Random random(2);
   for (const stimuli::ShapeKind shape : kShapes) {
     const stimuli::ObjectSpec spec = primitive(shape);
@@ -96,8 +96,8 @@ TEST(LocalDepths, EachIsALocalMinimumWithTheDepthItSays) {
 }
 
 TEST(LocalDepths, AreThoseOfAFinePolyhedron) {
-  // Each has its like among the polyhedron's, both ways round, but for a few that are about to be
-  // born or to vanish.
+  // Each has a counterpart among the polyhedron's and vice versa, except for a few that are about
+  // to appear or vanish.
   for (const stimuli::ShapeKind shape : kShapes) {
     stimuli::ObjectSpec spec = primitive(shape);
     spec.subdivisions = 4;
@@ -118,7 +118,7 @@ TEST(LocalDepths, AreThoseOfAFinePolyhedron) {
       const auto analytic = local_depths(spec, probe);
       const auto polyhedral = local_depths(mesh, probe, Vec3(0, 0, 1), 4);
       for (const LocalDepth& local : analytic) made_up += alone(local, polyhedral);
-      // Near the middle a fine polyhedron has a local minimum through every other facet.
+      // Near the middle, a fine polyhedron has a local minimum at every other facet.
       for (const LocalDepth& local : polyhedral)
         missing += local.depth < 5e-3 ? alone(local, analytic) : 0;
       all += static_cast<int>(analytic.size());
@@ -145,7 +145,7 @@ TEST(LocalDepths, OfAPointTheLeastIsTheSignedDistance) {
 }
 
 TEST(LocalDepths, SegmentsThatStayOutHaveNone) {
-  // The reference on a fine mesh inside of the shape says who overlaps for certain.
+  // The reference on a fine mesh inside the shape finds the probes that certainly overlap.
   Random random(7);
   for (const stimuli::ShapeKind shape : kShapes) {
     stimuli::ObjectSpec spec = primitive(shape);
@@ -161,7 +161,7 @@ TEST(LocalDepths, SegmentsThatStayOutHaveNone) {
       if (depth > 0) {
         EXPECT_TRUE(inside);
       }
-      // Between mesh and shape there are at most 0.02 mm.
+      // Mesh and shape are at most 0.02 mm apart.
       if (inside && local_depths(spec, probe).front().depth > 5e-5) {
         EXPECT_GT(depth, 0);
       }
@@ -188,7 +188,7 @@ TEST(LocalDepths, OfAPolyhedronTheLeastIsTheReference) {
       ASSERT_FALSE(near.empty());
       EXPECT_NEAR(glm::dot(near.front().normal, reference.normal), 1, 1e-12);
       for (const LocalDepth& local : all) {
-        // Moved out it touches: it neither penetrates nor floats.
+        // Moved out, the probe touches: it neither penetrates nor floats.
         const LineProbe ideal = testing::moved(probe, local.depth * local.normal);
         EXPECT_LE(reference_depth(mesh, ideal).depth, 1e-14);
         EXPECT_LE(reference_gap(mesh, ideal), 1e-14);
@@ -216,7 +216,7 @@ TEST(LocalDepths, OfCubesAndBoxesThePolyhedronAndTheAnalyticShapeAgree) {
   }
 }
 
-TEST(LocalDepths, RefusesWhatIsNoPrimitive) {
+TEST(LocalDepths, RefuseMeshesAndCompounds) {
   EXPECT_THROW(local_depths(primitive(stimuli::ShapeKind::mesh), LineProbe()),
                std::invalid_argument);
   EXPECT_THROW(local_depths(primitive(stimuli::ShapeKind::compound), LineProbe()),

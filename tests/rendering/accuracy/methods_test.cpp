@@ -1,5 +1,5 @@
-// What is said of each method holds: whether it needs every tick, keeps its side, and how deep the
-// probe is.
+// The declared properties of each method hold: whether it needs every tick, whether it keeps its
+// side, and the depth of the probe.
 
 #include "rendering/accuracy/methods.h"
 
@@ -41,16 +41,16 @@ TEST(Methods, HaveNamesAndDescriptionsOfTheirOwn) {
   EXPECT_TRUE(names.contains("tick") && names.contains("brute-force"));
 }
 
-TEST(Methods, AGodObjectKeepsTheSideThatItEnteredByAndOthersTakeTheNearest) {
+TEST(Methods, GodObjectsKeepTheEntrySideAndOthersTakeTheNearest) {
   const stimuli::ConvexMesh cube(stimuli::cube(2 * kHalf));
   for (const MethodDefinition& method : contact_methods()) {
-    if (method.name == "walk-cold") continue;  // any facet that its walk ends at
+    if (method.name == "walk-cold") continue;  // its walk may end at any facet
     const auto made = method.make(cube, false);
     ContactEstimate last;
     for (const LineProbe& probe : way_down(0)) last = made->tick(probe);
     ASSERT_TRUE(last.touching) << method.name;
-    // 25 mm below the top, by which it came; 5 mm beside the nearest face, the whole stylus as
-    // well.
+    // 25 mm below the top, through which it came; 5 mm from the nearest face, and so is the whole
+    // stylus.
     EXPECT_NEAR(last.depth, method.keeps_side ? 0.025 : 0.005, 1e-6) << method.name;
     EXPECT_NEAR(last.normal.z, method.keeps_side ? 1 : 0, 1e-6) << method.name;
     EXPECT_NEAR(last.normal.x, method.keeps_side ? 0 : 1, 1e-6) << method.name;
@@ -65,7 +65,7 @@ TEST(Methods, ThoseWithoutHistoryNeedNoTickBefore) {
     const ContactEstimate alone = used->tick(tip_at(0.003, 0.02));
     const ContactEstimate free = used->tick(tip_at(0.003, 0.026));
     EXPECT_EQ(used->tick(tip_at(0.003, 0.02)).depth, alone.depth) << method.name;
-    if (method.name == "walk-cold") continue;  // any facet that its walk ends at
+    if (method.name == "walk-cold") continue;  // its walk may end at any facet
     ASSERT_TRUE(alone.touching) << method.name;
     EXPECT_NEAR(alone.depth, 0.005, 1e-9) << method.name;
     EXPECT_NEAR(alone.normal.z, 1, 1e-9) << method.name;
@@ -73,10 +73,10 @@ TEST(Methods, ThoseWithoutHistoryNeedNoTickBefore) {
   }
 }
 
-TEST(Methods, WhatKeepsItsSideHasAHistory) {
+TEST(Methods, MethodsThatKeepASideHaveAHistory) {
   for (const MethodDefinition& method : contact_methods()) {
     EXPECT_TRUE(method.has_history || !method.keeps_side) << method.name;
-    // Other libraries begin where they were the last time; these begin anew.
+    // Other libraries start from their last result; these start anew.
     const bool peer = method.name == "bullet" || method.name == "fcl";
     const bool anew = method.name == "walk-cold" || method.visits_all;
     if (!peer && !anew) continue;

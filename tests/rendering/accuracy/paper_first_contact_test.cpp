@@ -34,7 +34,7 @@ TEST(PaperFirstContact, AnEdgeIsCrossedByASmallMotion) {
   EXPECT_FALSE(crosses_edge(mesh, edge, over_edge(0.002), over_edge(0.001)));
   // Past the edge's end: appendix 8 (2).
   EXPECT_FALSE(crosses_edge(mesh, edge, over_edge(0.001, 1.1), over_edge(-0.001, 1.1)));
-  // It misses a crossing that begins past the edge's end, although the way crosses the edge.
+  // It misses a crossing that begins past the edge's end, although the path crosses the edge.
   EXPECT_FALSE(crosses_edge(mesh, edge, over_edge(0.001, 1.001), over_edge(-0.1, 0.9)));
 }
 

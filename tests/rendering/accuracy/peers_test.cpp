@@ -1,5 +1,5 @@
-// The adaptors of other people's libraries, held against the reference: a comparison with a peer
-// that was wired up wrongly would flatter us.
+// The adaptors of other libraries against the reference: a wrongly connected peer would make our
+// results look better than they are.
 
 #include "rendering/accuracy/peers.h"
 
@@ -23,7 +23,7 @@ struct Tally {
   int answers = 0, silent = 0, wrong = 0;
   void expect_nearly_all_right(const std::string& what) const {
     EXPECT_GT(answers, 100) << what;
-    // They do give up or go astray now and then, mostly at a bare touch.
+    // They sometimes give up or fail, mostly at a bare touch.
     EXPECT_LE(silent + wrong, answers / 50)
         << what << ": " << silent << " silent, " << wrong << " wrong of " << answers;
   }
@@ -38,10 +38,10 @@ bool right(const stimuli::ConvexMesh& mesh, const LineProbe& probe, const PeerCo
   }
   if (!(std::abs(answer.depth - reference.depth) <= tolerance)) return false;
   if (std::abs(glm::length(answer.normal) - 1) > 1e-9) return false;
-  // Its normal takes the probe out, whichever of two equal ways it is.
+  // Its normal leads the probe out, by either of two equal ways.
   const LineProbe out = testing::moved(probe, answer.depth * answer.normal);
   if (reference_depth(mesh, out).depth > tolerance) return false;
-  // Its point is on the mesh and on the probe moved out.
+  // Its point is on the mesh and on the probe once moved out.
   if (std::abs(reference_depth(mesh, {answer.point, answer.point}).depth) > tolerance) return false;
   const Vec3 d = out.tail - out.tip;
   const double length = glm::length(d);

@@ -1,5 +1,5 @@
 // The rows of soft bodies: each number under its name, errors by their definition, and bounds that
-// follow from what the rows compare with.
+// follow from the references.
 
 #include "rendering/accuracy/soft_study.h"
 
@@ -36,7 +36,7 @@ TEST(SoftStudy, RowsSayWhatTheyCompareAndStepsTakeTheirTime) {
       EXPECT_NEAR(row.error, std::abs(row.value - row.reference) / row.reference, 1e-12)
           << row.name;
     }
-    // Nothing is stepped for forces alone, and no step is timed twice.
+    // Rows of forces alone make no steps, and no step is timed twice.
     const bool timed =
         row.name != "patch test" && row.name.find("depth") != 0 && row.name.find("rest") != 0;
     EXPECT_EQ(row.step_ns > 0, timed) << row.name;
@@ -57,7 +57,7 @@ TEST(SoftStudy, RowsSayWhatTheyCompareAndStepsTakeTheirTime) {
       << "Poisson's ratio 0.49 lets the volume change by 2 % of strain";
 }
 
-/// 1/Pa m: how far the top of a bonded layer gives under a pressure of cos(k x), by Navier's
+/// m/Pa: deflection of the top of a bonded layer under a pressure of cos(k x), by Navier's
 /// equations across it. State: the displacements along (of sin) and outwards (of cos), and the
 /// stresses on planes of equal depth, along and outwards.
 double layer_gives(double k, const LineContact& layer) {
@@ -81,17 +81,17 @@ double layer_gives(double k, const LineContact& layer) {
     }
     return s;
   };
-  // Two tractions at the base, so that the top has no shear and a stress of -1.
+  // Two tractions at the base, chosen so that the top has no shear and a stress of -1.
   const State one = across({0, 0, 1, 0}), two = across({0, 0, 0, 1});
   const double det = one[2] * two[3] - two[2] * one[3];
   return (one[2] * two[1] - two[2] * one[1]) / det;
 }
 
-/// N/m: a parabola pressed into that layer, by strips of even pressure, none of which pulls.
+/// N/m, of a parabola pressed into that layer, by strips of even pressure without tension.
 double pressed_strips(const LineContact& layer, double depth, double wide) {
   constexpr int kStrips = 60, kSweeps = 4000;
   const double strip = wide / kStrips, h = 0.02 / wide;
-  std::array<double, kStrips> gives{};  // of the middle of a strip so many strips away
+  std::array<double, kStrips> gives{};  // deflection of the middle of a strip this many strips away
   for (int i = 0; i < 20000; ++i) {
     const double k = i > 0 ? h * i : 1e-3 * h, part = i > 0 ? h : h / 2;
     const double thick = k * layer.thickness;

@@ -1,5 +1,5 @@
-// Contact with unions of convex parts in `palpate accuracy`: the cases are what they say, the exact
-// displacements are ideal tools by definition, and the errors are those of their definition.
+// Contact with unions of convex parts in `palpate accuracy`: the cases are as described, the exact
+// displacements are those of ideal tools by definition, and the errors follow their definition.
 
 #include "rendering/accuracy/union_study.h"
 
@@ -16,7 +16,7 @@
 namespace palpate::rendering {
 namespace {
 
-// Whatever it is known from, a closed form included: outside of all parts, at a local minimum.
+// Whatever the source of the truth, closed forms included: outside all parts, at a local minimum.
 TEST(UnionStudy, TheExactDisplacementsAreThoseOfIdealTools) {
   for (const UnionCaseKind& kind : union_case_kinds()) {
     for (std::uint64_t seed = 1; seed <= 2; ++seed) {
@@ -38,7 +38,8 @@ TEST(UnionStudy, TheExactDisplacementsAreThoseOfIdealTools) {
   }
 }
 
-/// What rendering/README.md has figures of: the table's words, and how many cases they are.
+/// The cases with figures in rendering/README.md: the table's words, and the number of cases of
+/// each.
 TEST(UnionStudy, HasTheCasesOfTheReadme) {
   std::ifstream in(PALPATE_SOURCE_DIR "/rendering/README.md");
   const std::string readme{std::istreambuf_iterator<char>(in), {}};
@@ -83,7 +84,7 @@ TEST(UnionStudy, MeasuresEveryMethodOnEveryCase) {
   for (const UnionRow& row : rows) {
     EXPECT_TRUE(seen.insert({row.name, row.method}).second);
     EXPECT_EQ(row.ticks, 800u);
-    // One look at the clock before and one after each seed.
+    // The clock is read once before and once after each seed.
     EXPECT_DOUBLE_EQ(row.ns_per_tick, 2 * 1000.0 / 800);
     EXPECT_EQ(row.force.count, row.ticks);
     EXPECT_LE(row.off_by_a_tenth, row.in_contact);
@@ -94,10 +95,10 @@ TEST(UnionStudy, MeasuresEveryMethodOnEveryCase) {
     const UnionRow& law = *methods.at("law");
     EXPECT_EQ(law.inside, 0u) << name;
     if (law.truth != "oracle") {
-      EXPECT_LE(law.force.worst, 1e-6 * kStiffness * 1e-3) << name;  // 1e-6 of that of 1 mm
+      EXPECT_LE(law.force.worst, 1e-6 * kStiffness * 1e-3) << name;  // 1e-6 of the force of 1 mm
     }
   }
-  // What a sum of contacts gets wrong.
+  // The errors of a sum of contacts.
   for (const char* method : {"one per part", "penalties"}) {
     EXPECT_GT(by.at("16 boxes that abut").at(method)->off_by_a_tenth, 50u) << method;
     EXPECT_GT(by.at("groove of 90 degrees").at(method)->off_by_a_tenth, 50u) << method;

@@ -1,4 +1,4 @@
-// Bodies among themselves, against known answers.
+// Contacts between bodies, against known answers.
 
 #include <gtest/gtest.h>
 
@@ -24,7 +24,7 @@ stimuli::Body& elastic(stimuli::Body& body) {
   return body;
 }
 
-TEST(BodyContact, HeadOnTheFirstRestsAndTheSecondGoesOn) {
+TEST(BodyContact, HeadOnTheFirstStopsAndTheSecondMoves) {
   BodyScene s;
   const Mesh cube = box_mesh(Vec3(0.05));
   elastic(s.moves(cube, {{0, 0, 0}, {1, 0, 0, 0}}, 0.2)).velocity = {1, 0, 0};
@@ -36,7 +36,7 @@ TEST(BodyContact, HeadOnTheFirstRestsAndTheSecondGoesOn) {
   EXPECT_NEAR(glm::length(bodies[0].velocity), 0, 1e-12);
   EXPECT_NEAR(glm::distance(bodies[1].velocity, Vec3(1, 0, 0)), 0, 1e-12);
   EXPECT_NEAR(glm::length(bodies[1].spin), 0, 1e-9);
-  // Where they met, to the time of meeting.
+  // The place of meeting follows from the time of meeting.
   EXPECT_NEAR(bodies[0].centre.x, 0.0737, 1e-7);
   EXPECT_NEAR(bodies[1].centre.x, 0.1237 + 0.2 - 0.0737, 1e-7);
 }
@@ -59,7 +59,7 @@ TEST(BodyContact, HeadOnUnequalMassesAndRestitution) {
   }
 }
 
-/// Balls as polyhedra that meet face to face: normals are known, friction is off.
+/// Balls as polyhedra that meet face to face: known normals, no friction.
 TEST(BodyContact, ObliqueTheSpeedAlongTheFaceStays) {
   BodyScene s;
   const Mesh cube = box_mesh(Vec3(0.05));
@@ -172,8 +172,8 @@ TEST(BodyContact, AStackOfTenRests) {
   }
 }
 
-/// On a slope it stays where friction's coefficient is above the tangent, else it slides with
-/// g (sin - mu cos).
+/// On a slope a body stays if the friction coefficient is above the tangent; else it slides with g
+/// (sin - mu cos).
 TEST(BodyContact, SlopeAndFriction) {
   const double angle = 0.35;
   for (const double friction : {0.0, 0.2, 0.6}) {
@@ -192,7 +192,7 @@ TEST(BodyContact, SlopeAndFriction) {
   }
 }
 
-/// Whatever happens among bodies, their momentum stays, and energy does not grow.
+/// Contacts between bodies conserve momentum and do not increase energy.
 TEST(BodyContact, MomentumStaysWhateverHappens) {
   Random random(11);
   for (int trial = 0; trial < 12; ++trial) {
@@ -232,9 +232,9 @@ TEST(BodyContact, MomentumStaysWhateverHappens) {
   }
 }
 
-/// Distances that were looked at long ago, and where the search for them ended, hide nothing: what
-/// is found near is what a state that remembers nothing finds.
-TEST(BodyContact, WhatIsRememberedOfDistancesHidesNothing) {
+/// Old remembered distances and old ends of searches hide no contact: the near parts are those that
+/// a state without memory finds.
+TEST(BodyContact, RememberedDistancesHideNoContact) {
   Random random(21);
   const Mesh ball = mesh_of(stimuli::icosphere(0.015, 2)), bar = box_mesh({0.06, 0.01, 0.01});
   std::size_t found = 0;

@@ -24,7 +24,7 @@ inline Mesh mesh_of(const stimuli::PolygonSoup& soup) {
 }
 inline Mesh box_mesh(const Vec3& size) { return mesh_of(stimuli::box(size)); }
 
-/// Objects that are added one after another; then a scene.
+/// Collects objects one by one, then builds a scene.
 class BodyScene {
  public:
   Vec3 gravity{0, 0, 0};

@@ -12,7 +12,7 @@ namespace {
 
 constexpr Quat kUprightBody{1, 0, 0, 0};
 
-/// Ten cubes of 5 cm one upon another on a floor.
+/// A stack of ten cubes of 5 cm on a floor.
 BodyScene stack_of_ten() {
   BodyScene s;
   s.gravity = {0, 0, -9.81};
@@ -38,7 +38,7 @@ double processor_seconds() {
   return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
 
-TEST(BodySleep, AStackThatRestsFallsAsleepWhereItIsAndStays) {
+TEST(BodySleep, AStackAtRestFallsAsleepAndStaysInPlace) {
   const Scene scene = stack_of_ten().scene();
   RenderState state = scene.initial_state();
   run(scene, state, 0.3);
@@ -55,7 +55,8 @@ TEST(BodySleep, AStackThatRestsFallsAsleepWhereItIsAndStays) {
   }
 }
 
-/// A twentieth of what it costs awake (found: a two hundredth). Processor time, the least of some.
+/// At most a twentieth of the cost awake (found: a two hundredth). Processor time, the least of
+/// several runs.
 TEST(BodySleep, AllAsleepCostsNearlyNothing) {
   BodyScene restless = stack_of_ten();
   restless.sleeps = false;
@@ -74,25 +75,25 @@ TEST(BodySleep, AllAsleepCostsNearlyNothing) {
   EXPECT_LT(least[0], 0.05 * least[1]);
 }
 
-TEST(BodySleep, WhatFallsOnThemWakesThem) {
+TEST(BodySleep, AFallingBodyWakesSleepers) {
   BodyScene s = stack_of_ten();
   s.moves(box_mesh(Vec3(0.03)), {{0.01, 0, 6}, kUprightBody}, 0.5);
   const Scene scene = s.scene();
   RenderState state = scene.initial_state();
   run(scene, state, 1.0);
   EXPECT_EQ(sleeping(state), 10U);
-  run(scene, state, 0.15);  // 5.5 m take 1.05 s
+  run(scene, state, 0.15);  // a fall of 5.5 m takes 1.05 s
   EXPECT_EQ(sleeping(state), 0U);
   EXPECT_GT(farthest_off(state), 1e-4);
 }
 
-TEST(BodySleep, TheProbeWakesWhatItTouchesAndAllAboveAndBelow) {
+TEST(BodySleep, TheProbeWakesTheTouchedBodyAndItsWholeStack) {
   const Scene scene = stack_of_ten().scene();
   RenderState state = scene.initial_state();
   LineProbe probe{{0.1, 0, 0.275}, {0.22, 0, 0.275}};
   run(scene, state, 1.0, 1e-3, probe);
   ASSERT_EQ(sleeping(state), 10U);
-  // Slowly against the sixth, and away again before it moves.
+  // Slowly against the sixth cube, and away again before it moves.
   double touched = 0;
   for (int i = 0; i < 800; ++i) {
     probe.tip.x = probe.tail.x - 0.12;
@@ -109,8 +110,8 @@ TEST(BodySleep, TheProbeWakesWhatItTouchesAndAllAboveAndBelow) {
   EXPECT_LE(glm::length(state.motion.bodies()[9].velocity), 0);
 }
 
-/// Slower than a probe can feel, but it moves.
-TEST(BodySleep, WhatFloatsOnForEverDoesNotSleep) {
+/// Slower than can be felt, but moving.
+TEST(BodySleep, ADriftingBodyDoesNotSleep) {
   BodyScene s;
   s.moves(box_mesh(Vec3(0.05)), {{0, 0, 0}, kUprightBody}, 0.1).velocity = {1e-8, 0, 0};
   s.moves(box_mesh(Vec3(0.05)), {{0, 1, 0}, kUprightBody}, 0.1);
@@ -122,7 +123,7 @@ TEST(BodySleep, WhatFloatsOnForEverDoesNotSleep) {
   EXPECT_NEAR(state.motion.bodies()[0].centre.x, 3e-8, 1e-15);
 }
 
-TEST(BodySleep, ACopyOfThoseAsleepWakesAlike) {
+TEST(BodySleep, ACopyOfASleepingStateWakesTheSame) {
   BodyScene s = stack_of_ten();
   s.moves(box_mesh(Vec3(0.03)), {{0.01, 0, 6}, kUprightBody}, 0.5);
   const Scene scene = s.scene();

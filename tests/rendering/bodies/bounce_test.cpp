@@ -27,11 +27,11 @@ double energy_of(const Scene& scene, const RenderState& state) {
   return kinetic_energy(body_world_of(scene), body_state_of(state));
 }
 
-/// A body that a place of it strikes a plane with; all in the plane of z = 0, normal and tangent as
-/// axes.
+/// A body that strikes a plane with one of its points; all in the plane z = 0, with normal and
+/// tangent as axes.
 struct PlanarImpact {
   double mass = 1, moment = 1;     ///< kg, kg m^2
-  double normal = 0, tangent = 0;  ///< m, of the place from the centre
+  double normal = 0, tangent = 0;  ///< m, from the centre to the point
   double restitution = 1, friction = 0;
 };
 
@@ -89,7 +89,7 @@ TEST(Bounce, APlankOnItsEdgeFollowsNewtonAndCoulomb) {
               0.5 * mass *
                   (expected.normal * expected.normal + expected.tangent * expected.tangent) +
               0.5 * moment * expected.spin * expected.spin;
-          // Where the law itself would make energy, less friction acts.
+          // Where the law itself would add energy, less friction acts.
           if (after > 0.5 * mass * (1 + sliding * sliding) * (1 + 1e-9)) continue;
           EXPECT_NEAR(now.velocity.y, expected.normal, 1e-6)
               << friction << " " << restitution << " " << angle << " " << sliding;
@@ -102,13 +102,13 @@ TEST(Bounce, APlankOnItsEdgeFollowsNewtonAndCoulomb) {
   }
 }
 
-/// Boxes that turn meet a wall with one corner after another; each time the energy stays.
+/// Turning boxes meet a wall with one corner after another; each impact keeps the energy.
 void expect_energy_stays(std::uint64_t seed) {
   Random random(seed);
   for (int trial = 0; trial < 40; ++trial) {
     BodyScene s;
     s.stands(box_mesh({0.1, 2, 2}), {{0.2, 0, 0}, kAsItIs});
-    // Almost flat ones meet it with the far edge some tenths of a millisecond after the near one.
+    // Almost flat boxes meet it with the far edge some tenths of a millisecond after the near one.
     const Quat turn = trial % 2 == 0 ? turned_anyhow(random)
                                      : glm::angleAxis(drawn(random, -2e-3, 2e-3), Vec3(0, 0, 1));
     stimuli::Body& body = s.moves(box_mesh({0.05, 0.2, 0.08}), {{0, 0, 0}, turn}, 0.3);
@@ -134,16 +134,17 @@ void expect_energy_stays(std::uint64_t seed) {
   }
 }
 
-/// With 126 to 147 a meeting was once found a rounding too far away to bounce, or two corners met
-/// within a microsecond and one of them was only held. With 1522 a box that another drives against
-/// the wall bounces nine times in one tick, with 1941 two corners meet 13 ns before its end.
-TEST(Bounce, WithoutFrictionAndWithRestitutionOneEnergyStays) {
+/// Seeds 126 to 147 once had a meeting that rounding put too far away to bounce, or two corners
+/// that met within a microsecond, one of them only held. With seed 1522 a box driven against the
+/// wall by another bounces nine times in one tick; with 1941 two corners meet 13 ns before the
+/// tick's end.
+TEST(Bounce, ElasticFrictionlessBouncesKeepEnergy) {
   for (const std::uint64_t seed : {5, 126, 142, 146, 147, 1522, 1941}) expect_energy_stays(seed);
 }
 
-/// Friction turns sliding round where a body strikes with its mass behind the place: Newton's law
-/// would make energy there.
-TEST(Bounce, FrictionMakesNoEnergy) {
+/// Friction reverses sliding where a body strikes with its mass behind the point: Newton's law
+/// would add energy there.
+TEST(Bounce, FrictionAddsNoEnergy) {
   Random random(9);
   int struck = 0;
   for (int trial = 0; trial < 200; ++trial) {
@@ -179,7 +180,7 @@ struct TipResult {
   int ticks_in_contact = 0;
 };
 
-/// A box flies against the tip, off its middle, until it is away again.
+/// A box flies off-centre against the tip, until it has left.
 TipResult bounce_on_tip(const TipBounce& of, double dt) {
   BodyScene s;
   s.stiffness = of.stiffness;
@@ -198,12 +199,12 @@ TipResult bounce_on_tip(const TipBounce& of, double dt) {
   int away = 0;
   for (int i = 1; i < 3.0 / dt && away * dt < 0.01; ++i) {
     const Rendering r = ray_renderer().tick(scene, state, probe(i), dt);
-    // The hand feels a force held for the tick, and moves evenly within it.
+    // The force on the hand is constant over a tick, and the hand moves evenly within it.
     result.work -= dt * glm::dot(r.force, of.hand);
     result.momentum_given -= dt * r.force;
     result.ticks_in_contact += r.contacts > 0 ? 1 : 0;
     away = r.contacts > 0 || result.ticks_in_contact == 0 ? 0 : away + 1;
-    if (of.speed < 1) {  // a fast one turns over, onto its side
+    if (of.speed < 1) {  // a fast one turns over onto its side
       EXPECT_GE(r.force.x, -1e-12);
     }
   }
@@ -214,7 +215,7 @@ TipResult bounce_on_tip(const TipBounce& of, double dt) {
   return result;
 }
 
-TEST(Bounce, OffTheMiddleOnTheTipEnergyStays) {
+TEST(Bounce, AnOffCentreBounceOnTheTipKeepsEnergy) {
   for (const double mass : {1e-3, 0.1, 10.0}) {
     for (const double stiffness : {200.0, 3000.0, 5e4}) {
       if (mass > 1 && stiffness < 1000) continue;  // it would go through the box
@@ -230,8 +231,8 @@ TEST(Bounce, OffTheMiddleOnTheTipEnergyStays) {
   }
 }
 
-/// A light one goes through a good part of itself and turns far within a millisecond.
-TEST(Bounce, FastOnTheTipItGetsNoEnergyAndTheHandItsMomentum) {
+/// The tip passes through much of a light body, which turns far within a millisecond.
+TEST(Bounce, AFastBodyOnTheTipGainsNoEnergyAndGivesItsMomentum) {
   for (const double mass : {1e-3, 0.03, 1.0}) {
     for (const double stiffness : {3e3, 1e4, 5e4}) {
       for (const double speed : {1.0, 3.0, 10.0}) {
@@ -253,9 +254,9 @@ TEST(Bounce, FastOnTheTipItGetsNoEnergyAndTheHandItsMomentum) {
   }
 }
 
-/// A stylus that still comes between the balls of a dumbbell that turns: where both meet it, from
-/// opposite sides, the ideal stylus is centimetres away although nobody has pressed it so far.
-TEST(Bounce, DumbbellsThatTurnOnAStylusGetLittleEnergy) {
+/// A still stylus comes between the balls of a turning dumbbell. When both meet it, from opposite
+/// sides, the ideal stylus is centimetres away although nobody has pressed it so far.
+TEST(Bounce, DumbbellsThatTurnOnAStylusGainLittleEnergy) {
   Random random(105);
   const Mesh ball = mesh_of(stimuli::icosphere(0.02, 3));
   const Mesh bar = mesh_of(stimuli::cylinder(0.008, 0.06, 24));
@@ -288,9 +289,9 @@ TEST(Bounce, DumbbellsThatTurnOnAStylusGetLittleEnergy) {
   EXPECT_GT(touched, 80);
 }
 
-/// What lies on a wall does not fly: however fast the hand comes, it gets the force of where it is,
-/// not the mean of where it was, which would be half a tick late and no longer passive.
-TEST(Bounce, WhatLiesOnAWallGivesAFastHandTheForceOfWhereItIs) {
+/// A body on a wall does not fly off: at any speed, the hand gets the force of its present place,
+/// not the mean over the tick, which would be half a tick late and not passive.
+TEST(Bounce, ABodyOnAWallGivesTheForceOfItsPresentPlace) {
   BodyScene s;
   s.stiffness = 1000;
   s.stands(box_mesh({0.1, 1, 1}), {{-0.05, 0, 0}, kAsItIs});
@@ -307,8 +308,8 @@ TEST(Bounce, WhatLiesOnAWallGivesAFastHandTheForceOfWhereItIs) {
   }
 }
 
-/// What a hand that goes to meet it gives it, it has afterwards.
-TEST(Bounce, OnATipThatMovesItGetsTheWorkOfTheHand) {
+/// A body has afterwards the energy that the approaching hand gave it.
+TEST(Bounce, ABodyOnAMovingTipGainsTheWorkOfTheHand) {
   for (const double mass : {1e-3, 0.1}) {
     for (const double stiffness : {1000.0, 5e4}) {
       const TipResult r = bounce_on_tip({mass, stiffness, 0.03, Vec3(0), {-0.2, 0, 0}}, 1e-3);
@@ -318,8 +319,9 @@ TEST(Bounce, OnATipThatMovesItGetsTheWorkOfTheHand) {
   }
 }
 
-/// Where it goes, not its energy alone: steps of a millisecond against steps of ten microseconds.
-TEST(Bounce, OffTheMiddleOnTheTipItGoesWhereFineStepsSendIt) {
+/// Compares the motion, not only the energy: steps of a millisecond against steps of ten
+/// microseconds.
+TEST(Bounce, AnOffCentreBounceOnTheTipMatchesFineSteps) {
   for (const double off : {0.01, 0.04}) {
     const TipBounce of{0.1, 3000, off, Vec3(0.3, 1, 0.2)};
     const TipResult coarse = bounce_on_tip(of, 1e-3), fine = bounce_on_tip(of, 1e-5);
@@ -328,7 +330,7 @@ TEST(Bounce, OffTheMiddleOnTheTipItGoesWhereFineStepsSendIt) {
   }
 }
 
-/// A body that is nearly out of a spring while something pushes it in: the spring's rest is deeper.
+/// A body almost out of a spring while something pushes it in: the spring's rest is deeper.
 TEST(Bounce, ASpringIsLeftFromAboveItsRest) {
   const SpringStart start{5e-5, -0.29, 0.77, 10, 5e4};
   double depth = start.depth, speed = start.speed, impulse = 0;

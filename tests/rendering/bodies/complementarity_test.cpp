@@ -40,8 +40,8 @@ TEST(Complementarity, HoldsByDefinition) {
   }
 }
 
-/// Contacts of a face that say more than there is to say: four of one body that can do three.
-TEST(Complementarity, TooManyContactsAreNoHarm) {
+/// Redundant contacts of a face: four contacts of a body with three degrees of freedom.
+TEST(Complementarity, RedundantContactsAreHarmless) {
   const double places[4][2] = {{1, 1}, {1, -1}, {-1, 1}, {-1, -1}};
   ComplementarityProblem p;
   for (std::size_t i = 0; i < 4; ++i) p.add_row(1, 1e300);
@@ -57,7 +57,7 @@ TEST(Complementarity, TooManyContactsAreNoHarm) {
 
 TEST(Complementarity, FrictionIsAtMostItsShareOfTheNormal) {
   ComplementarityProblem p;
-  // A unit mass that falls with 1 and slides with 2.
+  // A unit mass that falls with speed 1 and slides with speed 2.
   p.add_row(1, 1e300);
   p.add_row(2, 0.3, 0);
   p.a(0, 0) = p.a(1, 1) = 1;

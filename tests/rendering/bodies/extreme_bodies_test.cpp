@@ -1,4 +1,4 @@
-// Bodies under hands that no person has: whatever happens, the hand gives the energy.
+// Bodies under superhuman hands: all energy comes from the hand.
 
 #include <gtest/gtest.h>
 
@@ -27,12 +27,12 @@ struct Rough {
 
 struct RoughResult {
   double most_work = 0;  ///< J, of the hand so far
-  double most_gain = 0;  ///< J, by which the bodies had more than that
+  double most_gain = 0;  ///< J, by which the bodies' energy exceeded that
   bool finite = true;
 };
 
-/// A closed room of 0.3 m in which cubes of 1 g, 10 kg and masses between fly about and a tip goes
-/// to and fro at random, through what it meets.
+/// A closed room of 0.3 m in which cubes of 1 g to 10 kg fly about and a tip moves to and fro at
+/// random, through everything it meets.
 RoughResult go_rough(const Rough& of, std::uint64_t seed) {
   Random random(seed);
   BodyScene s;
@@ -85,8 +85,8 @@ TEST(ExtremeBodies, TheyNeverHaveMoreEnergyThanTheHandGave) {
           const RoughResult r = go_rough({stiffness, speed, bodies, elastic, elastic ? 0.0 : 0.3},
                                          static_cast<std::uint64_t>(bodies) + 7);
           EXPECT_TRUE(r.finite);
-          // At 10 m/s the tip goes through a quarter of a cube in a tick: 0.1 % here, by other
-          // seeds and another compiler's rounding up to 5 %.
+          // At 10 m/s the tip passes through a quarter of a cube in a tick: 0.1 % here, up to 5 %
+          // with other seeds and another compiler's rounding.
           EXPECT_LE(r.most_gain, (speed < 1 ? 0.01 : 0.06) * r.most_work)
               << stiffness << " N/m, " << speed << " m/s, " << bodies << " bodies";
           touched += r.most_work > 0 ? 1 : 0;
@@ -97,7 +97,7 @@ TEST(ExtremeBodies, TheyNeverHaveMoreEnergyThanTheHandGave) {
   EXPECT_GE(touched, 18) << "all at 10 m/s";
 }
 
-/// 1 g between 10 kg and a wall, under 50 kN/m, pressed and let go again and again.
+/// 1 g between 10 kg and a wall, under 50 kN/m, pressed and released repeatedly.
 TEST(ExtremeBodies, AGramBetweenTenKilogramsAndAWallIsHeld) {
   BodyScene s;
   s.stiffness = 5e4;
@@ -118,7 +118,7 @@ TEST(ExtremeBodies, AGramBetweenTenKilogramsAndAWallIsHeld) {
   EXPECT_NEAR(strongest, 50, 1);
 }
 
-TEST(ExtremeBodies, WhatOverlapsAtFirstIsRefused) {
+TEST(ExtremeBodies, OverlapAtTheStartIsRefused) {
   BodyScene s;
   s.moves(box_mesh(Vec3(0.05)), {{0, 0, 0}, {1, 0, 0, 0}}, 1);
   s.moves(box_mesh(Vec3(0.05)), {{0.049, 0, 0}, {1, 0, 0, 0}}, 1);
@@ -136,7 +136,7 @@ TEST(ExtremeBodies, WhatOverlapsAtFirstIsRefused) {
   touching.scene();
 }
 
-/// A wall of 32 touching cubes has more contacts than a tick can hold apart: it says so.
+/// A wall of 32 touching cubes has more contacts than a tick can hold apart, and reports it.
 TEST(ExtremeBodies, ContactsThatAreDroppedAreAFault) {
   for (const int across : {2, 8}) {
     BodyScene s;

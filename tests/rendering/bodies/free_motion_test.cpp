@@ -36,8 +36,8 @@ TEST(FreeMotion, TumblingKeepsMomentumToTheBitAndEnergyTo1e9) {
   EXPECT_NEAR(glm::distance(m.centre, 10.0 * m.velocity), 0, 1e-11);
 }
 
-/// A coin's axis goes around its momentum at L / I, I its moment across the axis: twice as fast as
-/// it spins, for a thin one and a small angle.
+/// A coin's axis precesses about its momentum at L / I, with I the moment across the axis: twice
+/// the spin rate, for a thin coin and a small angle.
 TEST(FreeMotion, CoinPrecessesAtMomentumByMomentAcross) {
   const Mesh coin = mesh_of(stimuli::cylinder(0.012, 0.002, 64));
   const PlacedMesh part{coin.get(), {}};
@@ -92,7 +92,7 @@ TEST(SpringPass, BouncesWithTheSpeedItCameWith) {
   }
 }
 
-/// Against small steps, with a weight that presses.
+/// Against small steps, under a constant load.
 TEST(SpringPass, AgreesWithManySmallSteps) {
   const SpringStart start{-0.0002, 0.3, 9.81, 0.01, 2000};
   double depth = start.depth, speed = start.speed, impulse = 0;
@@ -110,7 +110,7 @@ TEST(SpringPass, AgreesWithManySmallSteps) {
   EXPECT_NEAR(pass.impulse, impulse, 1e-7);
 }
 
-TEST(SpringPass, WhatIsNotMetIsNotPushed) {
+TEST(SpringPass, AnUnmetSpringDoesNotPush) {
   for (const SpringStart& start :
        {SpringStart{-0.01, 0.5, 0, 1, 1000}, SpringStart{-0.01, -0.5, -9.81, 1, 1000},
         SpringStart{0, -1, 0, 1, 1000}}) {

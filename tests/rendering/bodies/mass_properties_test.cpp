@@ -64,8 +64,8 @@ TEST(MassProperties, FarFromTheOriginAndTurnedTheyAreTheSame) {
                 1e-12 * here.inertia[0][0]);
 }
 
-/// A cube that is cut, overlapped, or covered with itself is the cube.
-TEST(MassProperties, WhatSeveralPartsCoverCountsOnce) {
+/// A cube cut into parts, overlapping itself or covered by itself has the cube's properties.
+TEST(MassProperties, RegionsOfSeveralPartsCountOnce) {
   const Mesh cube = box_mesh(Vec3(0.1)), slab = box_mesh({0.06, 0.1, 0.1});
   const MassProperties expected = whole(cube);
   const std::vector<std::vector<PlacedMesh>> covers = {
@@ -88,7 +88,7 @@ TEST(MassProperties, WhatSeveralPartsCoverCountsOnce) {
   expect_matrix(p.inertia, expected.inertia, 1e-15);
 }
 
-/// Against points of a grid, for crossed boxes of which one is turned.
+/// Against points of a grid, for crossed boxes, one of them turned.
 TEST(MassProperties, UnionOfTurnedBoxesAgreesWithCounting) {
   const Vec3 size_a(0.1, 0.04, 0.06), size_b(0.05, 0.09, 0.03);
   const Mesh a = box_mesh(size_a), b = box_mesh(size_b);
@@ -116,7 +116,7 @@ TEST(MassProperties, UnionOfTurnedBoxesAgreesWithCounting) {
   EXPECT_NEAR(glm::distance(m.first + m.volume * m.about, first), 0, 2e-3 * volume * 0.05);
 }
 
-/// The parallel axis theorem, by two cubes that make a box.
+/// The parallel axis theorem, with two cubes that form a box.
 TEST(MassProperties, MassIsSpreadOverAllParts) {
   const Mesh cube = box_mesh(Vec3(0.1));
   const std::vector<PlacedMesh> parts = {{cube.get(), {{0.35, 0, 0}, {1, 0, 0, 0}}},
@@ -138,7 +138,8 @@ Surface surface_of(const std::vector<std::pair<stimuli::PolygonSoup, Pose>>& sou
   return Surface(shells);
 }
 
-/// Of a closed surface as of the convex parts that it bounds; shells that overlap count once.
+/// A closed surface has the properties of the convex parts that it bounds; overlapping shells count
+/// once.
 TEST(MassProperties, OfAClosedSurface) {
   const Vec3 size_a(0.1, 0.04, 0.06), size_b(0.05, 0.09, 0.03);
   const Pose far{{3, -2, 1}, glm::normalize(Quat(1, 0.3, -0.2, 0.4))};

@@ -1,4 +1,4 @@
-// The probe on bodies.
+// Contact of the probe with bodies.
 
 #include "rendering/bodies/moving_scene.h"
 
@@ -19,8 +19,8 @@ namespace {
 
 LineProbe pointing(const Vec3& tip) { return {tip, tip + Vec3(0.12, 0, 0)}; }
 
-/// A cube flies against the tip, held still, and comes back with its speed; the hand gets the
-/// change of its momentum.
+/// A cube flies against the tip, held still, and returns with its speed; the hand gets the change
+/// of its momentum.
 TEST(MovingScene, ACubeComesBackFromTheTipWithItsEnergy) {
   for (const double mass : {1e-3, 0.1, 10.0}) {
     for (const double stiffness : {200.0, 3000.0, 5e4}) {
@@ -44,7 +44,7 @@ TEST(MovingScene, ACubeComesBackFromTheTipWithItsEnergy) {
   }
 }
 
-/// Off its middle it turns as well; what it gives the hand, it loses.
+/// Struck off-centre it also turns; it loses the momentum that it gives the hand.
 TEST(MovingScene, PushedOffItsMiddleItTurnsAndMomentaBalance) {
   BodyScene s;
   s.moves(box_mesh({0.05, 0.1, 0.05}), {{-0.05, 0, 0}, {1, 0, 0, 0}}, 0.1);
@@ -69,12 +69,13 @@ TEST(MovingScene, PushedOffItsMiddleItTurnsAndMomentaBalance) {
   EXPECT_NEAR(glm::distance(angular_momentum(body_world_of(scene), inner), -moment), 0, 1e-5);
 }
 
-/// What strikes a stylus fast makes steps of its own within a tick. The ideal stylus is the virtual
-/// one moved out of the body, not turned, however the body is turned.
-TEST(MovingScene, WhatStrikesFastDoesNotTurnTheIdealStylus) {
+/// A body that strikes a stylus fast makes steps of its own within a tick. The ideal stylus is the
+/// virtual one moved out of the body and not turned, whatever the body's orientation.
+TEST(MovingScene, AFastBodyDoesNotTurnTheIdealStylus) {
   for (const double angle : {0.0, 0.4, 1.2, 2.5}) {
     BodyScene s;
-    // About an axis that is not the stylus': else its direction is the same in the body's frame.
+    // About an axis other than the stylus's; else its direction would be the same in the body's
+    // frame.
     s.moves(box_mesh(Vec3(0.05)), {{-0.06, 0, 0}, {std::cos(angle / 2), 0, 0, std::sin(angle / 2)}},
             0.05)
         .velocity = {1.5, 0, 0};
@@ -119,7 +120,7 @@ TEST(MovingScene, BetweenTipAndWallForceIsStiffnessTimesDepth) {
   }
 }
 
-/// A body that nothing acts on feels as one that stands still does.
+/// A heavy body at rest feels like a fixed one.
 TEST(MovingScene, AHeavyBodyFeelsLikeAWall) {
   const Mesh mesh = mesh_of(stimuli::icosphere(0.03, 3));
   const Quat q = glm::normalize(Quat(1, 0.2, 0.3, 0.4));
@@ -143,7 +144,7 @@ TEST(MovingScene, AHeavyBodyFeelsLikeAWall) {
   EXPECT_GT(most, 1);
 }
 
-TEST(MovingScene, ATailOfNoNumberReachesNeitherHandNorBody) {
+TEST(MovingScene, ANaNTailReachesNeitherHandNorBody) {
   BodyScene s;
   s.moves(box_mesh(Vec3(0.05)), {{0, 0, 0}, {1, 0, 0, 0}}, 0.1).velocity = {0.1, 0, 0};
   const Scene scene = s.scene();
@@ -161,7 +162,7 @@ TEST(MovingScene, ATailOfNoNumberReachesNeitherHandNorBody) {
   }
 }
 
-TEST(MovingScene, WhatPassesALimitIsRefusedWithIt) {
+TEST(MovingScene, ScenesBeyondALimitAreRefusedWithTheLimit) {
   BodyScene s;
   s.moves(box_mesh(Vec3(0.05)), {{0, 0, 0}, {1, 0, 0, 0}}, 1e-3);
   s.moves(box_mesh(Vec3(0.05)), {{1, 0, 0}, {1, 0, 0, 0}}, 1e4);
@@ -173,7 +174,7 @@ TEST(MovingScene, WhatPassesALimitIsRefusedWithIt) {
   }
 }
 
-TEST(MovingScene, ACopiedStateGoesOnAlike) {
+TEST(MovingScene, ACopiedStateContinuesTheSame) {
   BodyScene s;
   s.gravity = {0, 0, -9.81};
   s.stands(box_mesh({1, 1, 0.1}), {{0, 0, -0.05}, {1, 0, 0, 0}});
@@ -187,7 +188,7 @@ TEST(MovingScene, ACopiedStateGoesOnAlike) {
   EXPECT_LT(glm::distance(a.motion.bodies()[0].centre, b.motion.bodies()[0].centre), 1e-6);
 }
 
-/// An L of two boxes, as parts and as a surface; rounded: as a file of single precision has it.
+/// An L of two boxes, as parts and as a surface; rounded: as in a file of single precision.
 struct Angle {
   std::vector<SceneObject> parts;
   SceneSurface surface;
@@ -236,8 +237,8 @@ MovingObject heavy(double mass, const Vec3& spin, int object = 0) {
   return moving;
 }
 
-/// What is felt of a concave mesh that moves is its closed surface: the same as of its convex
-/// parts, where those are exact.
+/// A moving concave mesh is felt by its closed surface: the same as its convex parts, where those
+/// are exact.
 TEST(MovingScene, AConcaveBodyIsFeltByItsSurfaceAsByItsParts) {
   const Angle angle = angle_of(Quat(1, 0, 0, 0), false);
   const std::vector<MovingObject> moving = {heavy(40, {0.1, 0.05, 0.3})};
@@ -291,8 +292,8 @@ TEST(MovingScene, TheFirstTouchOfATurnedBodyIsAsDeepAsTheTipIs) {
   }
 }
 
-/// Rounded as in a file of single precision, turning under the probe: the ideal tip is never inside
-/// of what it touches.
+/// Rounded as in a file of single precision and turning under the probe: the ideal tip is never
+/// inside the body.
 TEST(MovingScene, TheIdealTipStaysOutOfARoundedConcaveBody) {
   for (int seed = 0; seed < 12; ++seed) {
     const Quat turn = glm::normalize(Quat(1, 0.3 * seed, 0.7 - 0.2 * seed, 0.11 * seed));
@@ -322,7 +323,7 @@ TEST(MovingScene, TheIdealTipStaysOutOfARoundedConcaveBody) {
   }
 }
 
-/// Where it may collide its convex parts do so, and the hand feels the surface.
+/// Its convex parts collide, and the hand feels the surface.
 TEST(MovingScene, AConcaveBodyCollidesByItsParts) {
   const Angle angle = angle_of(Quat(1, 0, 0, 0), false);
   SceneObject floor;

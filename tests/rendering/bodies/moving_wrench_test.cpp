@@ -1,5 +1,5 @@
-// What a body gives the hand, with a tool of several segments: as what stands still gives it, and
-// split on two devices so that their moments are those of the contacts.
+// The wrench of a body on the hand, with a tool of several segments: the same as that of a fixed
+// body, and split on two devices so that their moments are those of the contacts.
 
 #include <gtest/gtest.h>
 
@@ -21,7 +21,8 @@ Tool fork() {
            {Vec3(0, 0, 0.04), Vec3(0.01, 0, 0.04)}}};
 }
 
-/// Across an upper edge of a box of 60 x 60 x 40 mm about the origin, pressed 0 to 2 mm into it.
+/// A tool across an upper edge of a box of 60 x 60 x 40 mm about the origin, pressed 0 to 2 mm into
+/// it.
 LineProbe pressed(int i) {
   const double t = i * 1e-3;
   const Vec3 axis = glm::normalize(Vec3(1, 0.3 * std::sin(5 * t), 0.1 + 0.05 * std::cos(7 * t)));
@@ -30,9 +31,9 @@ LineProbe pressed(int i) {
   return {tip, tip + 0.12 * axis};
 }
 
-/// 1000 t: what pushes it, it does not follow. Bodies meet the probe where it comes from within the
-/// tick, so up to a tick's motion.
-TEST(MovingWrench, OfAHeavyBodyIsThatOfOneThatStandsStill) {
+/// 1000 t: the push does not move it. A body meets the probe within the tick, so the wrenches agree
+/// up to a tick's motion.
+TEST(MovingWrench, OfAHeavyBodyIsThatOfAFixedOne) {
   for (const Tool& tool : {Tool{}, fork()}) {
     BodyScene moving, still;
     const Mesh mesh = box_mesh({0.06, 0.06, 0.04});
@@ -69,13 +70,13 @@ Vec3 drawn_vector(Random& random) {
   return {2 * random.unit() - 1, 2 * random.unit() - 1, 2 * random.unit() - 1};
 }
 
-/// A straight stroke at 0.1 m/s, from 2 mm outside of an edge or a corner of the box into
-/// it, out again, and a rest of three ticks at the end of each way.
+/// A straight stroke at 0.1 m/s, from 2 mm outside an edge or a corner of the box into it and out
+/// again, with a rest of three ticks at each end.
 struct DrawnStroke {
   static constexpr int kWay = 100, kRest = 3;
   LineProbe start;
-  Vec3 each{0, 0, 0};  ///< m; way of a tick
-  Vec3 back{0, 0, 0};  ///< m; that of the way out
+  Vec3 each{0, 0, 0};  ///< m; motion in a tick
+  Vec3 back{0, 0, 0};  ///< m; motion in a tick on the way out
 
   LineProbe at(int tick) const {
     const int in = std::min(tick, kWay), out = std::clamp(tick - kWay - kRest, 0, kWay);
@@ -91,7 +92,7 @@ DrawnStroke drawn_stroke(Random& random, const Vec3& half, bool corner) {
   Vec3 place = half;
   for (int axis = 0; axis < 3; ++axis) place[axis] *= outward[axis] < 0 ? -1 : 1;
   if (!corner) place[along] *= 0.6 * random.unit();
-  // Across the way in: so it passes over the edge, and a part of it touches that is not the tip.
+  // Across the way in, so that the stylus passes over the edge and touches with its side.
   const Vec3 way = glm::normalize(outward);
   const Vec3 axis = glm::normalize(glm::cross(way, drawn_vector(random)) + 0.3 * way);
   const Vec3 sideways = glm::cross(way, drawn_vector(random));
@@ -104,11 +105,11 @@ DrawnStroke drawn_stroke(Random& random, const Vec3& half, bool corner) {
 }
 
 struct StrokeCounts {
-  int exact = 0, changes = 0, left = 0;  ///< ticks; strokes that end away
+  int exact = 0, changes = 0, left = 0;  ///< ticks; strokes that end outside
 };
 
-/// The force of a tick is the mean over it, with several contacts that of its end. Where what is
-/// touched stays the same, and at rest, that is known from the body that stands still.
+/// The force of a tick is the mean over it; with several contacts, that of its end. While the same
+/// feature is touched, and at rest, it follows from the fixed body's force.
 void expect_that_of_one_that_stands_still(const Tool& tool, const Pose& pose,
                                           const DrawnStroke& stroke, StrokeCounts& counts) {
   const Mesh mesh = box_mesh({0.06, 0.06, 0.04});
@@ -127,7 +128,7 @@ void expect_that_of_one_that_stands_still(const Tool& tool, const Pose& pose,
     if (i == 0 && rb.contacts > 0) return;
     const double moved = glm::distance(in_body.tip, last.tip);
     const double step = glm::distance(rb.force, before.force);
-    // 20,000 t yield by some nanometres after all.
+    // 20,000 t still yield by some nanometres.
     const BodyPose& now = sa.motion.bodies()[0];
     const Quat turn = glm::conjugate(pose.orientation) * now.orientation;
     const double yielded = glm::distance(now.centre, pose.position) +
@@ -150,7 +151,7 @@ void expect_that_of_one_that_stands_still(const Tool& tool, const Pose& pose,
   counts.left += before.contacts == 0 ? 1 : 0;
 }
 
-TEST(MovingWrench, OfAHeavyBodyIsThatOfOneThatStandsStillOverEdgesAndCorners) {
+TEST(MovingWrench, OfAHeavyBodyIsThatOfAFixedOneOverEdgesAndCorners) {
   Tool prongs = fork();
   prongs.segments.pop_back();
   for (const std::uint64_t seed : {3, 17}) {
@@ -171,7 +172,7 @@ TEST(MovingWrench, OfAHeavyBodyIsThatOfOneThatStandsStillOverEdgesAndCorners) {
   }
 }
 
-/// Their moment about any point of the stylus is the contacts', save torsion about it.
+/// Their moment about any point of the stylus is that of the contacts, except torsion about it.
 TEST(MovingWrench, IsSplitOnTwoDevices) {
   for (const double mass : {0.05, 1.0, 1e4}) {
     for (const Tool& tool : {Tool{}, fork()}) {

@@ -1,4 +1,4 @@
-// A step of the bodies that springs press on: gravity, damping and springs, in closed form.
+// A step of bodies under pressing springs: gravity, damping and springs, in closed form.
 
 #include <gtest/gtest.h>
 
@@ -20,7 +20,7 @@ BodyWorldState state_of(const Scene& scene) {
   return body_state_of(initial);
 }
 
-/// Nothing touches: what is chosen falls, what is not stays.
+/// Nothing touches: chosen bodies fall, others stay.
 TEST(PressedStep, WithoutSpringsIsAFall) {
   BodyScene s;
   s.gravity = {0, 0, -9.81};
@@ -38,7 +38,7 @@ TEST(PressedStep, WithoutSpringsIsAFall) {
   const std::vector<char> chosen{1, 0};
   for (int i = 0; i < 200; ++i) step_pressed(world, state, chosen, {}, kStep);
   EXPECT_NEAR(glm::distance(state.motion[0].velocity, Vec3(0.3, 0, 1 - 9.81 * 0.2)), 0, 1e-12);
-  // Steps take the speed at their end: half a step's more than the parabola.
+  // Steps use the speed at their end: half a step more than the parabola.
   EXPECT_NEAR(state.motion[0].centre.z, 0.2 - 9.81 / 2 * 0.2 * 0.2, 9.81 / 2 * 0.2 * kStep + 1e-12);
   EXPECT_NEAR(state.motion[0].centre.x, 0.06, 1e-12);
   EXPECT_EQ(state.motion[0].spin_momentum, momentum);
@@ -63,8 +63,8 @@ TEST(PressedStep, DampsSpeedAndSpin) {
   EXPECT_NEAR(state.motion[0].spin_momentum.z / momentum.z, std::exp(-1.5), 1e-12);
 }
 
-/// Held against a wall by the probe, without friction, it slides down as it would fall.
-TEST(PressedStep, WhatIsHeldAgainstASmoothWallSlidesDown) {
+/// Held against a wall by the probe, without friction, a body slides down as in free fall.
+TEST(PressedStep, ABodyPressedOnASmoothWallSlidesDown) {
   BodyScene s;
   s.gravity = {0, 0, -9.81};
   const Mesh cube = box_mesh(Vec3(0.05));

@@ -1,4 +1,4 @@
-// Soft bodies torn into shapes, shaken and struck: they stay finite and come back.
+// Soft bodies deformed into extreme shapes, shaken and struck: they stay finite and return.
 
 #include <gtest/gtest.h>
 
@@ -35,7 +35,7 @@ class AbusedSoftBody : public testing::TestWithParam<Abuse> {
             {.material = {.young = young, .damping = 0.02}, .step = step, .compliance = false}};
   }
 
-  /// After 60 steps of it, of which each must give a number.
+  /// The state after 60 steps, each of which must be finite.
   static SoftState abused(const SoftBody& body) {
     const double step = body.settings().step;
     SoftState state = body.rest();
@@ -82,8 +82,9 @@ INSTANTIATE_TEST_SUITE_P(All, AbusedSoftBody,
                          testing::Values(Abuse::sudden, Abuse::twist, Abuse::inversion,
                                          Abuse::shake, Abuse::strike, Abuse::no_number));
 
-/// Where the stiffness at rest promises ways of a thousand times the body, it must not hang.
-TEST(SoftSolid, WhatIsScatteredAtRandomComesBack) {
+/// Where the stiffness at rest predicts motions of a thousand times the body's size, the step must
+/// not hang.
+TEST(SoftSolid, RandomlyScatteredNodesReturn) {
   for (const double size : {0.001, 1.0}) {
     for (const double poisson : {0.3, 0.495}) {
       const stimuli::SolidMesh mesh = stimuli::mesh_of_box({size, size, size}, {3, 3, 3});
@@ -107,7 +108,7 @@ TEST(SoftSolid, WhatIsScatteredAtRandomComesBack) {
         for (int i = 0; i < (poisson < 0.4 ? 4000 : 500); ++i) body.step(state, {});
         if (poisson < 0.4) {
           EXPECT_LT(farthest(state.x, mesh.nodes), 1e-6 * std::max(1.0, size / 0.03));
-        } else {  // nearly incompressible it unfolds slowly, by steps that the guard cuts
+        } else {  // a nearly incompressible body unfolds slowly: the guard shortens steps
           EXPECT_LT(later, 0.01 * scattered);
           EXPECT_LT(state.energy, 0.995 * later);
         }
@@ -124,7 +125,7 @@ TEST(SoftSolid, NoStepRaisesTheIncrementalPotential) {
   SoftState state = body.rest();
   set_abused_shape(Abuse::twist, state);
   state.energy = body.solid().energy(state.x, state.gradient.data(), state.strains);
-  double last = state.energy;  // with the kinetic energy: implicit Euler never gains any
+  double last = state.energy;  // with kinetic energy: implicit Euler never gains energy
   for (int i = 0; i < 200; ++i) {
     body.step(state, {});
     double now = state.energy;

@@ -1,4 +1,4 @@
-// A tool on a soft body: Hertz, several contacts, the two rates, what a servo may not do.
+// A tool on a soft body: Hertz, several contacts, the two rates, and the rules of a servo.
 
 #include "rendering/bodies/soft/soft_contact.h"
 
@@ -99,18 +99,18 @@ TEST(SoftContact, ForceIsTheSpringsBetweenVirtualAndIdealTool) {
   EXPECT_LT(glm::length(force + on_body), 1e-12);
 }
 
-TEST(SoftContact, TheBodyHoldsWhatTheHandFeelsAndTheToolRestsOnIt) {
+TEST(SoftContact, TheBodyBearsTheFeltForceAndTheToolRestsOnIt) {
   const SoftObject object = slab(20000, 250, {});
   Press press(object, one_segment(Vec3(0, 0, 0.1)), {0.0003, 0.0002, 0});
   const Vec3 force = press.to_depth(0.004, 1500);
-  // The body's own equilibrium: what the fixed nodes bear is what the tool presses with.
+  // The body's own equilibrium: the fixed nodes bear the tool's force.
   const SoftState& body = press.state().body;
   Vec3 held(0);
   for (std::size_t i = 0; i < body.x.size(); ++i) {
     if (object.body->mesh().nodes[i].z < -0.01499) held += body.gradient[i];
   }
   EXPECT_LT(glm::length(held - force), 1e-4 * glm::length(force));
-  // No edge of the surface is inside of the ideal tool by more than 1 % of its radius.
+  // No edge of the surface is inside the ideal tool by more than 1 % of its radius.
   const Vec3 tip = Vec3(0.0003, 0.0002, 0.013) + press.state().contact.shift;
   for (const auto& [a, b, c] : object.body->surface()) {
     EXPECT_GT(distance_to_triangle({tip, Vec3(0, 0, 0.1)}, body.x[a], body.x[b], body.x[c]),
@@ -118,8 +118,8 @@ TEST(SoftContact, TheBodyHoldsWhatTheHandFeelsAndTheToolRestsOnIt) {
   }
 }
 
-/// Force of a ball pressed into a slab, over that of Hertz with the slab's thickness (Dimitriadis
-/// et al. 2002, bonded, incompressible).
+/// Force of a ball pressed into a slab, divided by that of Hertz with the slab's thickness
+/// (Dimitriadis et al. 2002, bonded, incompressible).
 double ball_against_theory(int resolution) {
   constexpr double kRadius = 0.02;
   const SoftObject object =
@@ -182,7 +182,7 @@ void press_through(double thickness, double radius, double stiffness, double spe
     const Vec3 force = advance(object, state, at, one_segment(Vec3(0, 0, 0.1)), -step, 0.001);
     ASSERT_GE(force.z, -1e-9) << "pulled in at " << at.z;
     ASSERT_LE(std::hypot(force.x, force.y), 0.25 * force.z + 0.05) << "at " << at.z;
-    // A spring pushed by a step, and what the body gives back within a tick.
+    // A spring pushed by a step, plus the body's response within a tick.
     ASSERT_LE(glm::length(force - last), stiffness * fall + 0.08 * glm::length(force) + 0.05);
     ASSERT_GE(at.z + state.contact.shift.z, 0.98 * radius - thickness / 2) << "through the base";
     last = force;
@@ -212,7 +212,7 @@ TEST(SoftContact, SeveralSegmentsOfOneToolPressAtOnce) {
   Press alone(object, one_segment(Vec3(0, 0, 0.05)), {0.0003, 0.0002, 0});
   const double one = alone.to_depth(0.003, 800).z;
   EXPECT_GT(all.z, 1.2 * one);
-  EXPECT_LT(all.z, 3 * one);  // each sinks the body for the others
+  EXPECT_LT(all.z, 3 * one);  // each lowers the surface for the others
 }
 
 TEST(SoftContact, ATrialThatBeginsInsideHasNoForceUntilItHasLeft) {
@@ -229,7 +229,7 @@ TEST(SoftContact, ATrialThatBeginsInsideHasNoForceUntilItHasLeft) {
   EXPECT_GT(force_at(0.014), 0);
 }
 
-TEST(SoftContact, ATickNeitherAllocatesNorGivesWhatIsNoNumber) {
+TEST(SoftContact, ATickNeitherAllocatesNorGivesNaN) {
   const SoftObject object = slab(5000, 250, {.most = 16});
   SoftObjectState state = initial_state(object);
   const PlacedTool tool = one_segment(Vec3(0.06, 0.01, 0.0));

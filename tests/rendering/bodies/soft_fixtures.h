@@ -1,5 +1,5 @@
 #pragma once
-// Nodes of soft bodies: which to hold, and how far they have gone.
+// Nodes of soft bodies: which to fix, and how far they have moved.
 
 #include <algorithm>
 #include <cstddef>
@@ -20,7 +20,7 @@ inline std::vector<std::uint32_t> nodes_below(const stimuli::SolidMesh& mesh, do
   return below;
 }
 
-/// The longest way between nodes of one number, m.
+/// m, the greatest distance between nodes of equal number.
 inline double farthest(const std::vector<Vec3>& a, const std::vector<Vec3>& b) {
   double most = 0;
   for (std::size_t i = 0; i < a.size(); ++i) most = std::max(most, glm::distance(a[i], b[i]));

@@ -1,4 +1,5 @@
-// At which rates soft bodies may be stepped: the map in rendering/README.md, and what a step costs.
+// The rates at which soft bodies may be stepped: the map in rendering/README.md, and the cost of a
+// step.
 
 #include <gtest/gtest.h>
 
@@ -49,7 +50,7 @@ TEST(SoftRates, AreThoseOfTheMapInTheReadme) {
     EXPECT_EQ(lowest(row.young, 0.00999), row.undamped) << row.young << " Pa";
     EXPECT_EQ(lowest(row.young, 0), row.undamped) << row.young << " Pa";
   }
-  // From there on every higher rate will do.
+  // Every higher rate is stable, too.
   for (const double young : {1e3, 1e4, 1e5, 1e6}) {
     for (const double rate : kRates)
       EXPECT_EQ(coupling_is_stable({.young = young, .damping = 0.01}, rate),
@@ -67,8 +68,8 @@ TEST(SoftRates, TheirLimitsAre10And20KilopascalAndAMegapascal) {
   EXPECT_EQ(lowest(just_below(1e6), 0), lowest(1e5, 0));
 }
 
-/// Steps take a quarter of their time at most, and would not at twice the rate.
-TEST(SoftRates, OfABodyIsTheHighestAtWhichAQuarterOfTheTimeIsEnough) {
+/// Steps take at most a quarter of their time, and would take more at twice the rate.
+TEST(SoftRates, ABodyHasTheHighestRateAtWhichAQuarterOfTheTimeIsEnough) {
   for (const double young : {2e4, 3e6}) {
     for (int resolution = 2; resolution <= (young < 1e5 ? 8 : 10); ++resolution) {
       stimuli::ObjectSpec spec;

@@ -63,7 +63,7 @@ TEST(SoftScene, PointAndUprightRayFeelTheSameForce) {
     EXPECT_EQ(r.faults, 0U);
     EXPECT_LT(glm::length(r.force - 800 * r.deepest.depth * r.deepest.normal), 1e-9);
     EXPECT_LT(glm::length(r.device1 + r.device2 - r.force), 1e-12);
-    // Torque about the tip, and the moment of the device forces about it, save torsion.
+    // Torque about the tip equals the moment of the device forces about it, except torsion.
     const Vec3 axis(0, 0, 1), moment = glm::cross(0.12 * axis, r.device2);
     EXPECT_LT(glm::length(moment - (r.torque - glm::dot(r.torque, axis) * axis)), 1e-12);
   }
@@ -174,7 +174,7 @@ TEST(SoftScene, FixedPointsAreOnTheObject) {
   }
 }
 
-TEST(SoftScene, ACopyOfTheStateGoesOnTheSameAndNoNumberIsNoForce) {
+TEST(SoftScene, ACopiedStateContinuesTheSameAndNaNGivesNoForce) {
   const Scene scene = two_cubes(true);
   RenderState state = scene.initial_state();
   press(ray_renderer(), scene, state, 0.002, 0.003);
@@ -206,7 +206,7 @@ TEST(SoftScene, ShapesToBeDrawnMoveUnderTheTool) {
           .empty());
 }
 
-/// Steps made elsewhere: asked for and taken there, and no view but what comes from there.
+/// A stepper elsewhere: steps are requested and taken there, and every view comes from there.
 class CountingStepper final : public SoftStepper {
  public:
   void ask(std::span<const NodeForce> forces) noexcept override {
@@ -222,7 +222,7 @@ class CountingStepper final : public SoftStepper {
   int asked = 0, forced = 0, taken = 0;
 };
 
-TEST(SoftScene, StepsAreMadeWhereTheyWereGivenTo) {
+TEST(SoftScene, StepsAreMadeByTheGivenStepper) {
   stimuli::ObjectSpec spec = soft_cube(20000);
   Pose aside;
   aside.position.y = 0.2;
@@ -244,7 +244,7 @@ TEST(SoftScene, StepsAreMadeWhereTheyWereGivenTo) {
   EXPECT_NEAR(before - soft_shapes(scene, state)[0].now[0].z, 1e-6 * first.taken, 1e-12);
 }
 
-TEST(SoftScene, WhatCannotBeSteppedInTimeIsRefused) {
+TEST(SoftScene, BodiesThatCannotBeSteppedAreRefused) {
   stimuli::ObjectSpec fine = soft_cube(20000);
   fine.soft->resolution = 18;
   EXPECT_THROW(build_soft_object(fine, Pose{}, {}), stimuli::MeshError);

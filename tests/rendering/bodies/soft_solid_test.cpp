@@ -27,7 +27,7 @@ stimuli::SolidMesh soft_mesh(ShapeKind shape, int resolution) {
   return stimuli::mesh_of_primitive(spec, resolution);
 }
 
-/// A tetrahedron of ten nodes with its middles off the straight edges.
+/// A tetrahedron of ten nodes whose mid-edge nodes are off the straight edges.
 stimuli::SolidMesh one_tetrahedron() {
   stimuli::SolidMesh mesh;
   mesh.nodes = {{0, 0, 0}, {0.02, 0, 0}, {0, 0.02, 0}, {0, 0, 0.02}};
@@ -121,7 +121,7 @@ TEST(SoftSolid, TheStiffnessIsTheSlopeOfTheGradientAtRest) {
     EXPECT_LT(glm::length((high[i] - low[i]) / (2 * kStep) - by_matrix[i]), 1e-2);  // of 1e3 N/m
 }
 
-// Elements of any shape hold an even strain exactly: forces inside cancel.
+// Elements of any shape represent a uniform strain exactly: inner forces cancel.
 TEST(SoftSolid, PatchTest) {
   Random random(7);
   stimuli::SolidMesh mesh = stimuli::mesh_of_box({0.03, 0.03, 0.03}, {4, 4, 4});
@@ -146,7 +146,7 @@ TEST(SoftSolid, PatchTest) {
   EXPECT_LT(within, 1e-12 * outside);
 }
 
-TEST(SoftSolid, ATurnIsNoStrain) {
+TEST(SoftSolid, ARotationIsNotAStrain) {
   const stimuli::SolidMesh mesh = soft_mesh(ShapeKind::sphere, 4);
   const Solid solid(mesh, {});
   const Quat turn = glm::angleAxis(2.0, glm::normalize(Vec3(1, 2, -1)));
@@ -195,7 +195,7 @@ TEST(SoftSolid, ACantileverBendsByBeamTheory) {
   EXPECT_LT(std::abs(fine - 1), 0.4 * std::abs(coarse - 1));  // of second order: a quarter
 }
 
-/// Presses the upper face of a box by `depth` of its height, and lets go.
+/// Presses the upper face of a box by `depth` of its height, then releases it.
 struct Pressed {
   SoftBody body;
   SoftState state;
@@ -260,7 +260,7 @@ TEST(SoftSolid, ASmallBodyFallsAsFastAsALargeOne) {
 }
 
 TEST(SoftSolid, ABodyThatWasPushedKeepsItsMomentum) {
-  // Of a milligram's thirtieth, which the guard often stops.
+  // A body of a thirtieth of a milligram, whose steps the guard often shortens.
   const stimuli::SolidMesh mesh = stimuli::mesh_of_box({0.001, 0.001, 0.0003}, {10, 10, 3});
   const SoftBody body(
       mesh, {}, {.material = {.young = 1e5, .density = 100}, .step = 0.004, .compliance = false});

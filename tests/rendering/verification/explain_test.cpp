@@ -1,4 +1,4 @@
-// What explain() says follows the scene as it was compiled: each feature changes its line alone.
+// explain() follows the compiled scene: each feature changes only its own line.
 
 #include "rendering/verification/explain.h"
 
@@ -24,7 +24,7 @@ Scene scene_of(std::vector<SceneObject> objects, const Renderer& renderer) {
   return Scene(std::move(objects), renderer.side_contact());
 }
 
-/// Counts apart, which follow every change of the scene.
+/// Without counts, which follow every change of the scene.
 std::string without_digits(std::string text) {
   std::erase_if(text, [](char c) { return c >= '0' && c <= '9'; });
   return text;
@@ -109,17 +109,17 @@ TEST_P(Explain, TreesFollowTheMesh) {
             (Names{"support map", "facet map"}));
 }
 
-TEST(ExplainRenderers, ThePointLeavesOutWhatIsTheSides) {
+TEST(ExplainRenderers, ThePointLeavesOutStagesOfTheSide) {
   const SceneObject object = sphere(1);
   const Scene with_sides({object}, true), without({object}, false);
   EXPECT_EQ(changed(explain(with_sides, ray_renderer()), explain(without, point_renderer())),
             (Names{"tree of edges", "side contact", "torque and second device"}));
-  // It tells what was built, not what should have been.
+  // It reports what was built, not what should have been built.
   EXPECT_EQ(changed(explain(with_sides, point_renderer()), explain(without, point_renderer())),
             Names{"tree of edges"});
 }
 
-TEST_P(Explain, StagesThatRunAreRehearsedAndOthersAreNot) {
+TEST_P(Explain, RunningStagesAreTimedAndOthersAreNot) {
   const Renderer& renderer = *GetParam();
   SceneObject object = sphere(2), other = sphere(1, 1, {0.2, 0, 0});
   for (const bool all : {false, true}) {
@@ -149,7 +149,7 @@ TEST_P(Explain, StagesThatRunAreRehearsedAndOthersAreNot) {
   }
 }
 
-TEST_P(Explain, AnEmptySceneHasNothingToRehearse) {
+TEST_P(Explain, AnEmptySceneHasNothingToTime) {
   const Scene scene({}, GetParam()->side_contact());
   EXPECT_TRUE(stage_timings(scene, *GetParam()).empty());
   EXPECT_FALSE(explain(scene, *GetParam()).empty());

@@ -1,4 +1,4 @@
-// Every extreme of the list, with both renderers; and a broken renderer fails it.
+// Every extreme case, with both renderers; a broken renderer fails it.
 
 #include "rendering/verification/extreme_cases.h"
 
@@ -25,7 +25,7 @@ TEST_P(Extreme, WithTheRay) {
   EXPECT_GT(result.in_contact, 20u);
 }
 
-/// Drops every seventh contact; gives force before the probe has left and at invalid poses.
+/// Drops every seventh contact, and gives force before the probe has left and at invalid poses.
 class ContactDropper final : public Renderer {
  public:
   const char* name() const override { return "drops contacts"; }
@@ -49,7 +49,7 @@ class ContactDropper final : public Renderer {
 };
 
 TEST_P(Extreme, OfARendererThatDropsContactsFails) {
-  // One million triangles take long, and show what the others show.
+  // Skip the million triangles: they take long and add nothing here.
   if (GetParam().name == std::string("million-triangles")) return;
   const ExtremeResult result = GetParam().run(ContactDropper());
   EXPECT_FALSE(result.passed);

@@ -1,4 +1,4 @@
-// The solvers that the oracle rests on, by what characterises their answers.
+// The oracle's solvers, by the properties that characterise their results.
 
 #include "rendering/verification/nearest_point.h"
 
@@ -16,9 +16,9 @@
 namespace palpate::rendering {
 namespace {
 
-// What characterises the nearest point of a convex set: it lies in it, and the way to it is a sum
-// of non-negative multiples of the normals of planes that it lies on.
-TEST(NearestPoint, IsTheOneOfKuhnAndTucker) {
+// The nearest point of a convex set lies in it, and the displacement to it is a sum of non-negative
+// multiples of the normals of planes that it lies on.
+TEST(NearestPoint, SatisfiesTheKuhnTuckerConditions) {
   int found = 0;
   for (std::uint64_t seed = 0; seed < 2000; ++seed) {
     Random random(seed);
@@ -47,7 +47,7 @@ TEST(NearestPoint, IsTheOneOfKuhnAndTucker) {
   EXPECT_GT(found, 1500);
 }
 
-TEST(NearestPoint, OfNothingIsNone) {
+TEST(NearestPoint, WithoutCommonPointsIsEmpty) {
   const std::array<HalfSpace, 2> apart{HalfSpace{{0, 0, 1}, 1}, HalfSpace{{0, 0, -1}, 1}};
   EXPECT_FALSE(nearest_point(Vec3(0), apart, 1e-14).has_value());
 }
@@ -59,7 +59,7 @@ TEST(DistanceToCone, IsThatOfTheNearestPoint) {
   EXPECT_EQ(distance_to_cone({1, 2, -3}, corner), 3);
   EXPECT_EQ(distance_to_cone({-3, 2, -4}, corner), 5);
   EXPECT_EQ(distance_to_cone({-3, 0, -4}, {}), 5);
-  // Moreau: what is left is the nearest point of the polar cone.
+  // Moreau: the residual is the nearest point of the polar cone.
   for (std::uint64_t seed = 0; seed < 500; ++seed) {
     Random random(seed, {4});
     std::vector<Vec3> normals;

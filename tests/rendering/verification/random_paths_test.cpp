@@ -1,4 +1,4 @@
-// Random paths keep what their kinds promise: length of the probe, number of ticks, a start
+// Random paths have the properties of their kinds: length of the probe, number of ticks, a start
 // outside, steps.
 
 #include <gtest/gtest.h>
@@ -53,7 +53,7 @@ TEST(RandomPaths, KeepLengthTicksAndPlaceAndComeBackToEachSeed) {
         const auto path = path_of(kind, mesh, side, 3), same = path_of(kind, mesh, side, 3),
                    other = path_of(kind, mesh, side, 4);
         ASSERT_EQ(path.size(), kTicks) << to_string(kind);
-        // Not near the middle at least.
+        // At least not near the middle.
         EXPECT_GT(distance_to_middle(path[0]), 0.1 * mesh.size()) << to_string(kind);
         std::size_t alike = 0;
         for (std::size_t i = 0; i < path.size(); ++i) {
@@ -79,7 +79,7 @@ TEST(RandomPaths, ASmoothHandMovesByLessThanAFewHundredthsOfTheSizeATickAndJumps
 }
 
 TEST(RandomPaths, AlignedOnesTouchTheSurfaceExactlyWhereTheyAreMeantTo) {
-  // Of a cube: many poses have a coordinate of an end or of the direction exactly on a face's
+  // On a cube, many poses have a coordinate of an end or of the direction exactly on a face's
   // plane.
   const stimuli::ConvexMesh cube(stimuli::cube(0.05));
   std::size_t exact = 0, all = 0;

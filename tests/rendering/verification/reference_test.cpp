@@ -112,8 +112,8 @@ TEST(ReferenceFirstContact, SeesAsFinelyAsItsSteps) {
   EXPECT_NEAR(*time, 0.295, 1e-9);
 }
 
-// What a penetration depth is, stated without facets: no direction needs a shorter translation to
-// separate.
+// The definition of penetration depth without facets: no direction separates by a shorter
+// translation.
 double way_out(const stimuli::ConvexMesh& mesh, const LineProbe& probe, const Vec3& direction) {
   double support = -std::numeric_limits<double>::infinity();
   for (const Vec3& v : mesh.vertices()) support = std::max(support, glm::dot(direction, v));
@@ -148,7 +148,7 @@ TEST(ReferenceProperties, DepthIsTheShortestWayOut) {
       const double tolerance = 1e-12 * (mesh.size() + glm::length(probe.tail - probe.tip));
       ASSERT_NEAR(way_out(mesh, probe, found.normal), found.depth, tolerance) << "seed " << seed;
       for (int i = 0; i < 50; ++i) {
-        // Half of the directions close to the one found: a slightly better one is there if any is.
+        // Half of the directions are close to the one found, where a slightly better one would be.
         Vec3 direction = testing::random_direction(random);
         if (i % 2) direction = glm::normalize(found.normal + 0.05 * random.unit() * direction);
         ASSERT_GE(way_out(mesh, probe, direction), found.depth - tolerance) << "seed " << seed;

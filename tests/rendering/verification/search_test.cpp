@@ -1,5 +1,5 @@
-// The randomised search for wrong ticks: it finds none in the renderers, and it finds those of
-// broken ones.
+// The randomised search for wrong ticks finds none in the renderers, and finds those of broken
+// ones.
 
 #include "rendering/verification/search.h"
 
@@ -28,9 +28,9 @@ std::string told(const SearchCounts& counts) {
   return text;
 }
 
-// Rounding near edges almost parallel to the probe once took a motion that passed by for an entry,
-// or for one through a facet that it was already below.
-TEST(Search, FindsNothingWrongWhereItOnceDid) {
+// Near edges almost parallel to the probe, rounding once turned a passing motion into an entry, or
+// into an entry through a facet that the probe was already below.
+TEST(Search, FindsNoErrorInFormerlyWrongWalks) {
   struct Place {
     std::uint64_t seed, walk;
   };
@@ -46,7 +46,7 @@ TEST(Search, FindsNothingWrong) {
   const SearchCounts counts = search_ticks(100'000, 1);
   EXPECT_EQ(counts.wrong(), 0u) << told(counts);
   EXPECT_EQ(counts.ticks, 100'000u);
-  // And it has covered what can go wrong.
+  // The search has covered the critical situations.
   EXPECT_GT(counts.in_contact, 30'000u);
   EXPECT_GT(counts.entries, 3'000u);
   EXPECT_GT(counts.walked_finely, 5'000u);
@@ -55,7 +55,7 @@ TEST(Search, FindsNothingWrong) {
   EXPECT_LT(counts.fallbacks, 100u);
 }
 
-TEST(Search, DoesNotDependOnWhoWalks) {
+TEST(Search, DoesNotDependOnTheDivisionOfWalks) {
   const SearchCounts whole = search_ticks(20'000, 7);
   SearchCounts shared = search_walks(7, 0, 13);
   shared += search_walks(7, 13, 20'000 / kTicksPerWalk - 13);
@@ -66,7 +66,7 @@ TEST(Search, DoesNotDependOnWhoWalks) {
   EXPECT_NE(search_ticks(20'000, 8).in_contact, whole.in_contact);
 }
 
-TEST(Search, CountsAddUpEachWithItsOwn) {
+TEST(Search, CountsAddUpFieldByField) {
   const auto counters = [](SearchCounts& c) {
     return std::array{&c.walks,      &c.ticks,           &c.in_contact,     &c.entries,
                       &c.missed,     &c.phantom,         &c.walked_finely,  &c.passages,
@@ -96,7 +96,7 @@ TEST(Search, CountsAddUpEachWithItsOwn) {
                              one.endless + one.faulted);
 }
 
-/// A renderer that goes wrong now and then.
+/// A renderer with occasional errors.
 class Broken final : public Renderer {
  public:
   enum class How { missing, sunk, floating, infinite, weak, endless, blind_to_motion, phantom };
@@ -106,7 +106,7 @@ class Broken final : public Renderer {
   bool side_contact() const override { return true; }
   Rendering tick(const Scene& scene, RenderState& state, const LineProbe& probe,
                  double dt) const noexcept override {
-    // Sees where it is, but not the way there.
+    // Sees the pose, but not the motion to it.
     if (how_ == How::blind_to_motion && state.has_last) state.last = probe;
     Rendering r = ray_renderer().tick(scene, state, probe, dt);
     const double size = scene.parts()[0].mesh->size();
@@ -177,7 +177,7 @@ TEST(Search, FindsIdealProbesThatFloat) {
   EXPECT_GT(search_with(Broken::How::floating).floating, 20u);
 }
 
-TEST(Search, FindsWhatIsNotFinite) {
+TEST(Search, FindsNonFiniteResults) {
   EXPECT_GT(search_with(Broken::How::infinite).not_finite, 50u);
 }
 
@@ -191,9 +191,7 @@ TEST(Search, FindsPlatesThatAreCrossed) {
   EXPECT_GT(search_with(Broken::How::blind_to_motion).passed_through, 20u);
 }
 
-TEST(Search, FindsContactsOutOfNowhere) {
-  EXPECT_GT(search_with(Broken::How::phantom).phantom, 20u);
-}
+TEST(Search, FindsPhantomContacts) { EXPECT_GT(search_with(Broken::How::phantom).phantom, 20u); }
 
 TEST(Search, SaysWhereToLook) {
   const Broken broken(Broken::How::missing);

@@ -1,4 +1,4 @@
-// The hand of measurements does what it says: speed, depth, place along the stylus, pauses.
+// The hand of measurements moves as described: speed, depth, place along the stylus, pauses.
 
 #include "rendering/verification/surface_stroke.h"
 
@@ -12,11 +12,11 @@ namespace palpate::rendering {
 namespace {
 namespace surface_stroke {
 
-/// What a stroke over a ball has been, tick by tick.
+/// Statistics of a stroke over a ball.
 struct Ticks {
   int touching = 0, lifted = 0, deep_enough = 0;
   double along_least = 1, along_most = 0;  ///< m, of the place on the stylus, while touching
-  double farthest = 0;                     ///< m, of that place's way along the surface in a tick
+  double farthest = 0;  ///< m, of that place's motion along the surface in a tick
   double nearest = 1;
   double most_turn = 0;  ///< rad, of the stylus in a tick
   double coverage = 0;   ///< the least cosine between two places' directions

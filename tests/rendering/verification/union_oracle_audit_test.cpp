@@ -1,5 +1,5 @@
-// The oracle of contact with unions of convex parts, by the definition of an ideal tool, and the
-// audit that holds it and the renderers against that.
+// The oracle of contact with unions of convex parts, against the definition of an ideal tool, and
+// the audit that checks it and the renderers against that definition.
 
 #include <gtest/gtest.h>
 
@@ -56,7 +56,7 @@ TEST(UnionOracleAudit, IsAtALocalMinimumOutsideOfRandomClusters) {
   EXPECT_LT(covered.lagged, covered.in_contact / 50);
 }
 
-TEST(UnionOracleAudit, IsAtALocalMinimumWhereWhatCanCoincideDoes) {
+TEST(UnionOracleAudit, IsAtALocalMinimumOnGridWalks) {
   Covered covered;
   for (std::uint64_t seed = 0; seed < 60; ++seed) {
     Random random(seed, {5});
@@ -70,8 +70,8 @@ TEST(UnionOracleAudit, IsAtALocalMinimumWhereWhatCanCoincideDoes) {
   EXPECT_LT(covered.lagged, covered.in_contact / 50);
 }
 
-// And the audit sees what is not.
-TEST(UnionOracleAudit, TheAuditSeesWhatIsWrong) {
+// The audit detects deviations.
+TEST(UnionOracleAudit, TheAuditDetectsErrors) {
   const UnionOracle oracle(groove(std::numbers::pi / 2), {{Vec3(0), Vec3(0)}});
   const Vec3 virtual_tip(0.001, 0, -0.003);
   const double touching = 1e-11 * oracle.size();
@@ -82,7 +82,7 @@ TEST(UnionOracleAudit, TheAuditSeesWhatIsWrong) {
   EXPECT_NEAR(audit({0, 0, 1e-6}).descent, glm::length(Vec3(1e-3, 0, -3.001e-3)), 1e-9);  // floats
   EXPECT_NEAR(audit({1e-6, 0, -1e-6}).penetration, 1e-6, 1e-15);  // to the seam
   EXPECT_NEAR(audit({3e-6, 0, -1e-6}).penetration, 4e-6 * std::sqrt(0.5), 1e-15);
-  // On one wall, from where it slides down.
+  // On one wall, from which it slides down.
   EXPECT_GT(audit({0.01, 0, 0.01}).descent, 0.01);
 }
 

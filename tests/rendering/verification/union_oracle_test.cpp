@@ -25,14 +25,14 @@ const OracleTool kPoint{{Vec3(0), Vec3(0)}};
 
 OracleTool stylus(double length) { return {{Vec3(0), Vec3(0, 0, length)}}; }
 
-/// An axis system with this +z.
+/// A frame with this +z.
 Mat3 axes_along(const Vec3& z) {
   const Vec3 aside = std::abs(z.x) < 0.5 ? Vec3(1, 0, 0) : Vec3(0, 1, 0);
   const Vec3 x = glm::normalize(glm::cross(aside, z));
   return {x, glm::cross(z, x), z};
 }
 
-/// An ideal tool led along a path from outside.
+/// Leads an ideal tool along a path from outside.
 class Led {
  public:
   Led(const UnionOracle& oracle, const OraclePose& start) : oracle_(oracle), ideal_(start) {
@@ -46,7 +46,8 @@ class Led {
     return tick;
   }
 
-  /// In equal steps, without turning. \return the displacement at the end
+  /// In equal steps, without turning.
+  /// \return the displacement at the end
   Vec3 straight_to(const Vec3& tip, int steps) {
     const Vec3 from = ideal_.tip;
     for (int i = 1; i <= steps; ++i) to({from + i / double(steps) * (tip - from), ideal_.axes});
@@ -181,7 +182,7 @@ TEST(UnionOracle, InTheCornerOfAStair) {
     led.straight_to({edge + 0.01, 0, tread + 0.005}, 3);
     const Vec3 in(edge - 0.004, 0.001, tread - 0.003);
     expect_near(led.straight_to(in, 20), {0.004, 0, 0.003}, 1e-16, "step", step);
-    // Up along the riser and onto the tread above: down from there it is that tread's.
+    // Up along the riser and onto the tread above: pressed down there, that tread holds it.
     led.straight_to({edge - 0.004, 0, tread + 0.015}, 20);
     expect_near(led.straight_to({edge - 0.004, 0, tread + 0.008}, 20), {0, 0, 0.002}, 1e-16,
                 "above step", step);
@@ -201,8 +202,8 @@ TEST(UnionOracle, InThePlaneOfAWallItIsNotPushedSideways) {
   }
 }
 
-// A bar across the stylus lies on a cube beside which the tip hangs; the tip alone then bears the
-// push from the side.
+// A bar across the stylus lies on a cube, and the tip hangs beside the cube; the tip alone then
+// bears the push from the side.
 TEST(UnionOracle, AToolOfTwoSegmentsRestsOnBoth) {
   const OracleParts block{box_part({-0.03, -0.03, -0.06}, {0.03, 0.03, 0})};
   const OracleTool tool{{Vec3(0), Vec3(0, 0, 0.1)}, {Vec3(0, 0, 0.02), Vec3(-0.02, 0, 0.02)}};
@@ -228,7 +229,7 @@ TEST(UnionOracle, AToolOfTwoSegmentsRestsOnBoth) {
   }
 }
 
-// Whatever is cut, a whole solid is felt; deep in it as well.
+// However a solid is cut, the whole one is felt, also deep inside.
 TEST(UnionOracle, CutSolidsEqualWholeOnes) {
   long in_contact = 0;
   for (std::uint64_t seed = 0; seed < 60; ++seed) {
@@ -245,7 +246,7 @@ TEST(UnionOracle, CutSolidsEqualWholeOnes) {
     for (const OraclePose& pose : path) {
       const OracleTick a = of_whole.tick(last, pose), b = of_cut.tick(last, pose);
       ASSERT_FALSE(a.failed || b.failed) << seed;
-      // Cut open, the steps of a turn may be smaller; where it needed none they are equal.
+      // For a cut solid, the steps of a turn may be smaller; without a turn they are equal.
       if (a.lagged || b.lagged) break;
       ASSERT_LE(glm::length(a.ideal.tip - b.ideal.tip), 1e-12 * of_whole.size())
           << "seed " << seed << ", " << cut.size() << " pieces, " << tool.size() << " segments";

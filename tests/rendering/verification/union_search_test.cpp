@@ -1,5 +1,5 @@
-// The search over unions of convex parts: it finds nothing wrong in the renderer, and it finds what
-// is wrong in broken ones.
+// The search over unions of convex parts finds no error in the renderer, and finds the errors of
+// broken ones.
 
 #include "rendering/verification/union_search.h"
 
@@ -26,12 +26,12 @@ TEST(UnionSearch, FindsNothingWrong) {
   const UnionCounts counts = search_unions(1, 0, 60);
   EXPECT_EQ(counts.wrong(), 0u) << told(counts);
   EXPECT_GT(counts.ticks, 50 * kTicksPerWalk);
-  // And it has covered what can go wrong.
+  // The search has covered the critical situations.
   EXPECT_GT(counts.in_contact, counts.ticks / 5);
   EXPECT_GT(counts.several, counts.ticks / 20);
   EXPECT_GT(counts.torques, counts.ticks / 20);
   EXPECT_LE(counts.worst_penetration, 1e-12);
-  // What is not wrong, but should be rare.
+  // Not wrong, but should be rare.
   EXPECT_LE(100 * counts.lagged, counts.in_contact);
   EXPECT_LE(1000 * counts.capped, counts.in_contact);
   EXPECT_LE(200 * counts.released, counts.in_contact);
@@ -54,35 +54,37 @@ TEST(UnionSearch, IdealToolsInNarrowWedgesAreExact) {
   expect_nothing_wrong(3, 3507);
 }
 
-TEST(UnionSearch, WhatIsNearerThanTheSkinIsNotEnteredWithoutIt) {
-  // The tool rests a skin off what holds it; another part is in the last bit of the way.
+TEST(UnionSearch, PartsCloserThanTheSkinAreNotEntered) {
+  // The tool rests a skin off the part that holds it; another part lies within the skin.
   expect_nothing_wrong(1401, 83);
   expect_nothing_wrong(1401, 4623);
-  // A facet that is touched exactly is not in the way.
+  // A facet touched exactly is not in the way.
   EXPECT_EQ(search_union(ray_renderer(), 1, 60).capped, 0u);
 }
 
 TEST(UnionSearch, AGapNarrowerThanTwoSkinsIsNeitherEnteredNorALimit) {
-  // Turning closes a wedge between two parts down to less than two skins; then it goes along it.
-  // In the other a slit of 0.17 skins has a second facet on one side, 0.05 skins higher.
+  // In the first walk, turning closes a wedge between two parts to less than two skins; then the
+  // tool moves along it. In the other, a slit of 0.17 skins has a second facet on one side, 0.05
+  // skins higher.
   for (const std::uint64_t walk : {7208, 11395}) {
     const UnionCounts counts = search_union(ray_renderer(), 1407, walk);
     EXPECT_EQ(counts.wrong(), 0u) << told(counts);
     EXPECT_EQ(counts.capped, 0u);
   }
-  // From free space it comes onto parts that abut, between which there is no room at all.
+  // From free space the tool meets abutting parts without any room between them.
   expect_nothing_wrong(1407, 1026);
   EXPECT_EQ(search_union(ray_renderer(), 1408, 4350).capped, 0u);
 }
 
-TEST(UnionSearch, AGrooveThatEndsBeforeTheToolAtRestIsClosedWhereItsSkinIs) {
-  // Facets 0.02 degrees from antiparallel end 1e-7 m before where the tool would rest without skin.
+TEST(UnionSearch, AGrooveThatEndsBeforeTheRestingToolIsClosed) {
+  // Facets 0.02 degrees from antiparallel end 1e-7 m before the place where the tool would rest
+  // without skin.
   const UnionCounts counts = search_union(ray_renderer(), 1407, 9371);
   EXPECT_EQ(counts.wrong(), 0u) << told(counts);
   EXPECT_EQ(counts.capped, 0u);
 }
 
-TEST(UnionSearch, WhatIsBehindInTurningIsShownWithoutForceToo) {
+TEST(UnionSearch, ALaggingToolIsShownWithoutForceToo) {
   // The virtual tool has turned into a part; the ideal one, at the same tip, has not.
   expect_nothing_wrong(2, 2979);
   expect_nothing_wrong(3, 2904);
@@ -91,7 +93,8 @@ TEST(UnionSearch, WhatIsBehindInTurningIsShownWithoutForceToo) {
 }
 
 TEST(UnionSearch, NoToolTurnsIntoACrackBetweenPartsThatAbut) {
-  // Two walls back to back: half of the turn into their common plane, then half of the rest.
+  // Two walls back to back: half of the turn towards their common plane, then half of the rest, and
+  // so on.
   expect_nothing_wrong(1, 1836);
   expect_nothing_wrong(2, 2865);
   expect_nothing_wrong(3, 3401);
@@ -100,7 +103,8 @@ TEST(UnionSearch, NoToolTurnsIntoACrackBetweenPartsThatAbut) {
 }
 
 TEST(UnionSearch, AGapNarrowerThanTwoSkinsMayBeClosed) {
-  // 3e-11 m between parts: held by facets that far off, which the strict definition does not see.
+  // 3e-11 m between parts: facets at that distance hold the tool, which the strict definition does
+  // not allow.
   std::uint64_t in_gap = 0;
   for (const auto& [seed, walk] : {std::pair{22, 7293}, {23, 17513}, {23, 19555}}) {
     const UnionCounts counts = search_union(ray_renderer(), static_cast<std::uint64_t>(seed),
@@ -112,14 +116,14 @@ TEST(UnionSearch, AGapNarrowerThanTwoSkinsMayBeClosed) {
 }
 
 TEST(UnionSearch, AGrooveTooNarrowToMeasureClampsWithoutLeverage) {
-  // A segment over one part and under another, 1e-8 off their common plane: two facets hold what
-  // pushes it with 1e6 times as much, against each other. Force is that of the displacement.
+  // A segment over one part and under another, 1e-8 off their common plane: two facets hold it
+  // against each other with 1e6 times the push. Force is that of the displacement.
   expect_nothing_wrong(24, 14891);
   expect_nothing_wrong(26, 7812);
 }
 
-TEST(UnionSearch, WhatIsLeftByLessThanTheSkinIsLeft) {
-  // The virtual tool passes an edge of a facet, exactly but for what the ideal one is behind.
+TEST(UnionSearch, AFacetLeftByLessThanTheSkinIsLeft) {
+  // The virtual tool passes an edge of a facet exactly, except for the lag of the ideal one.
   expect_nothing_wrong(1, 1325);
   expect_nothing_wrong(1, 4253);
   expect_nothing_wrong(3, 37);
@@ -127,7 +131,7 @@ TEST(UnionSearch, WhatIsLeftByLessThanTheSkinIsLeft) {
 }
 
 TEST(UnionSearch, AToolOnACornerIsHeldByTheFacetItIsOn) {
-  // Another segment's facet there is nearly parallel.
+  // Another segment's facet at that corner is nearly parallel.
   expect_nothing_wrong(1, 3071);
 }
 
@@ -140,9 +144,9 @@ TEST(UnionSearch, AContactAlongTheBorderOfAFaceIsOnTheFace) {
   expect_nothing_wrong(3, 3281);
 }
 
-TEST(UnionSearch, WhatWasLetGoOfComesBackOutside) { expect_nothing_wrong(1, 4418); }
+TEST(UnionSearch, AReleasedToolComesBackOutside) { expect_nothing_wrong(1, 4418); }
 
-TEST(UnionSearch, DoesNotDependOnWhoWalks) {
+TEST(UnionSearch, DoesNotDependOnTheDivisionOfWalks) {
   const UnionCounts whole = search_unions(7, 0, 9);
   UnionCounts shared = search_unions(7, 0, 4);
   shared += search_unions(7, 4, 5);
@@ -152,7 +156,7 @@ TEST(UnionSearch, DoesNotDependOnWhoWalks) {
   EXPECT_NE(search_unions(8, 0, 9).in_contact, whole.in_contact);
 }
 
-TEST(UnionSearch, CountsNothingOfNoWalks) {
+TEST(UnionSearch, CountsNothingWithoutWalks) {
   const UnionCounts none = search_unions(7, 0, 0);
   for (const std::uint64_t count :
        {none.walks, none.ticks, none.in_contact, none.several, none.inside, none.not_minimal,
@@ -193,7 +197,7 @@ TEST(UnionSearch, DrawsAllKindsOfWalks) {
   EXPECT_GT(fastest, 4e-3);
 }
 
-/// A renderer that goes wrong in contact.
+/// A renderer with errors in contact.
 class Broken final : public Renderer {
  public:
   enum class How { sunk, floating, weak, twisted, aside, infinite, apart };
@@ -210,7 +214,7 @@ class Broken final : public Renderer {
         move(r, -1e-10);
         break;
       case How::floating:
-        move(r, 1e-9);  // more than it keeps from things
+        move(r, 1e-9);  // more than the skin
         break;
       case How::weak:
         r.force *= 1 - 1e-7;
@@ -277,7 +281,7 @@ TEST(UnionSearch, SaysWhereToLook) {
   EXPECT_EQ(fault.seed, 3u);
   EXPECT_EQ(fault.walk, walk);
   EXPECT_LT(fault.tick, counts.ticks);
-  // The walk cut off before that tick has nothing wrong, and with it the same.
+  // The walk shortened to end before that tick has no error; including it, the same one.
   UnionWalk drawn = random_union_walk(3, walk, kTicksPerWalk);
   drawn.path.resize(fault.tick);
   EXPECT_EQ(search_union(broken, drawn).wrong(), 0u);
@@ -290,7 +294,7 @@ TEST(UnionSearch, SaysWhereToLook) {
   EXPECT_EQ(again.faults[0].walk, 9u);
 }
 
-TEST(UnionSearch, FindsWhatIsNotFinite) {
+TEST(UnionSearch, FindsNonFiniteResults) {
   EXPECT_GT(search_with(Broken::How::infinite).not_finite, 3u);
 }
 
