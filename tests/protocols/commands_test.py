@@ -114,7 +114,7 @@ class Recover(unittest.TestCase):
             self.assertAlmostEqual(one["true_threshold"], truth, places=6)
             self.assertEqual(one["guess"], 0.5)
             self.assertAlmostEqual(one["bias_se"] * 200 ** 0.5 / one["spread"], 1, delta=0.01)
-            self.assertLess(one["without_estimate"], 10)  # who has fewer than four reversals in 40 trials
+            self.assertLess(one["without_estimate"], 10)  # those with fewer than four reversals in 40 trials
             self.assertLess(abs(one["bias"]), one["spread"])
             self.assertLessEqual(one["mean_trials"], 40)
         quest, = json.loads(self.recovered("size-questplus.json", "--format", "json"))["procedures"]

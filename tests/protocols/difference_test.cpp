@@ -16,7 +16,7 @@ const json kProtocol = json::parse(R"({"version": 1, "name": "p", "renderers": [
   "repetitions": 4, "texts": {"break": "rest", "a/b": "x"}, "seed": 1,
   "response": {"keys": {"1": "ball", "2": "box"}, "time_out_s": 30}})");
 
-/// Of the protocol and what `patch` makes of it (RFC 7386).
+/// Between the protocol and its version after `patch` (RFC 7386).
 ProtocolDifference after(const char* patch) {
   json changed = kProtocol;
   changed.merge_patch(json::parse(patch));
@@ -28,13 +28,13 @@ ProtocolDifference after(const char* patch) {
   return there;
 }
 
-TEST(ProtocolDifference, LayoutIsNone) {
+TEST(ProtocolDifference, LayoutIsNotADifference) {
   const ProtocolDifference same = after(R"({"seed": 1.0})");
   EXPECT_TRUE(same.nothing());
   EXPECT_EQ(in_words(same), "only its layout");
 }
 
-TEST(ProtocolDifference, TextsAreWhatIsReadOnly) {
+TEST(ProtocolDifference, TextsAreReportedApart) {
   const ProtocolDifference texts = after(
       R"({"title": "new", "description": "d", "$schema": "s", "texts": {"break": "sit", "end": "!"},
           "response": {"keys": {"1": {"stimulus": "ball", "label": "Kugel"}}}})");
@@ -46,7 +46,7 @@ TEST(ProtocolDifference, TextsAreWhatIsReadOnly) {
   EXPECT_EQ(after(R"({"texts": {"a/b": "y"}})").texts, Pointers{"/texts/a~1b"});
 }
 
-TEST(ProtocolDifference, WhatIsShownAndWhenIsDesign) {
+TEST(ProtocolDifference, StimuliAndOrderAreDesign) {
   for (const auto& [patch, pointer] : std::map<const char*, const char*>{
            {R"({"seed": 2})", "/seed"},
            {R"({"repetitions": 5})", "/repetitions"},

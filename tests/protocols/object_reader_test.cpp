@@ -1,5 +1,5 @@
-// Members of a JSON object by kind: what is taken, what leaves the variable as it was, and what a
-// fault says and where.
+// Members of a JSON object by kind: accepted values, values that leave the variable unchanged, and
+// the text and place of faults.
 
 #include <gtest/gtest.h>
 
@@ -16,7 +16,7 @@ namespace palpate::protocols {
 namespace {
 namespace reading {
 
-/// Reads one member; its faults.
+/// Reads one member and returns its faults.
 template <class Read>
 std::vector<Fault> faults_when(const std::string& text, Read read) {
   FaultList found("file.json");
@@ -83,7 +83,7 @@ TEST(ObjectReader, NumbersKeepToTheirRange) {
             "/at/x: expected a number from -2 to 5 m, found true");
 }
 
-TEST(ObjectReader, IntegersMayBeWrittenWithAFractionOfNothing) {
+TEST(ObjectReader, IntegersMayBeWrittenWithAZeroFraction) {
   const auto integer_of = [](const std::string& written) {
     int number = 7;
     const auto faults = faults_when("{\"n\": " + written + "}", [&](ObjectReader& reader) {
@@ -98,7 +98,7 @@ TEST(ObjectReader, IntegersMayBeWrittenWithAFractionOfNothing) {
     EXPECT_EQ(integer_of(wrong), std::pair(7, std::size_t{1})) << wrong;
 }
 
-TEST(ObjectReader, NullIsNoNumberWhereThereMayBeNone) {
+TEST(ObjectReader, NullMeansAMissingOptionalNumber) {
   std::optional<double> number = 3;
   std::optional<int> integer = 4;
   const auto read = [&](ObjectReader& reader) {
@@ -162,7 +162,7 @@ TEST(ObjectReader, VectorsAndRotationsHaveTheirNumbersInOrder) {
   EXPECT_EQ(faults_when(R"({"q": [1.0000011, 0, 0, 0]})", read).size(), 1U);
 }
 
-TEST(ObjectReader, TextsAndTruthsAreNotTakenFromOtherKinds) {
+TEST(ObjectReader, TextsAndBooleansAreNotConverted) {
   std::string text = "before";
   bool truth = false;
   const auto read = [&](ObjectReader& reader) {

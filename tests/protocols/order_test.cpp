@@ -27,7 +27,7 @@ Protocol::Order limits(std::optional<int> max_run, std::optional<int> min_distan
   return order;
 }
 
-/// Whether a whole sequence holds the limits; written from their definition.
+/// Whether a whole sequence keeps the limits, from their definition.
 bool valid(const Sequence& sequence, const Protocol::Order& order) {
   int run = 0;
   for (std::size_t i = 0; i < sequence.size(); ++i) {
@@ -60,7 +60,7 @@ std::vector<Sequence> all_valid(const Counts& counts, const Protocol::Order& ord
   return found;
 }
 
-/// Every way of giving `stimuli` stimuli counts that sum up to at most `total`.
+/// Every assignment of counts to `stimuli` stimuli with a sum of at most `total`.
 void for_each_counts(int stimuli, int total, const std::function<void(const Counts&)>& visit) {
   Counts counts(static_cast<std::size_t>(stimuli), 0);
   const std::function<void(std::size_t, int)> fill = [&](std::size_t i, int left) {
@@ -84,7 +84,7 @@ std::vector<Protocol::Order> all_limits() {
   return all;
 }
 
-// Feasibility, and that both ways of drawing find a valid order whenever there is one.
+// Checks feasibility, and that both methods of drawing find a valid order whenever there is one.
 TEST(Order, AgreesWithBruteForceOnEverySmallCase) {
   int solvable = 0, unsolvable = 0;
   Random random(1);
@@ -111,7 +111,7 @@ TEST(Order, AgreesWithBruteForceOnEverySmallCase) {
   EXPECT_GT(unsolvable, 1000);
 }
 
-// Every valid order can come up when it is constructed: nothing is cut off besides the invalid.
+// Construction can give every valid order: it excludes only invalid ones.
 TEST(Order, ConstructionReachesEveryValidOrder) {
   Random random(2);
   for (const auto& order : {limits(1), limits(2), limits({}, 3)}) {
@@ -128,13 +128,13 @@ TEST(Order, ConstructionReachesEveryValidOrder) {
 TEST(Order, HoldsTightLimits) {
   Random random(3);
   for (int i = 0; i < 50; ++i) {
-    // One valid order only.
+    // Only one valid order.
     EXPECT_EQ(order_block({5, 4}, limits(1), kNames, random),
               (Sequence{0, 1, 0, 1, 0, 1, 0, 1, 0}));
     EXPECT_TRUE(valid(order_block({3, 3, 3}, limits({}, 3), kNames, random), limits({}, 3)));
     EXPECT_TRUE(valid(order_block({7, 2}, limits(3), kNames, random), limits(3)));
     EXPECT_TRUE(valid(order_block({4, 4, 4, 1}, limits({}, 3), kNames, random), limits({}, 3)));
-    // Solvable, but only by holding back the two frequent ones in turn.
+    // Solvable, but only by delaying the two frequent ones alternately.
     EXPECT_TRUE(valid(order_block({50, 49, 1}, limits(1), kNames, random), limits(1)));
   }
 }
@@ -146,7 +146,7 @@ TEST(Order, HoldsLimitsInBigBlocks) {
        {limits(1), limits(2), limits(3), limits({}, 2), limits({}, 3), limits({}, 4)}) {
     const Sequence sequence = order_block(counts, order, kNames, random);
     ASSERT_EQ(sequence.size(), 10000u);
-    // valid() looks at all pairs; the distances here are at most 4, so windows do.
+    // valid() checks all pairs; the distances here are at most 4, so windows suffice.
     for (std::size_t i = 0; i + 8 <= sequence.size(); ++i) {
       ASSERT_TRUE(valid({sequence.begin() + static_cast<std::ptrdiff_t>(i),
                          sequence.begin() + static_cast<std::ptrdiff_t>(i) + 8},
@@ -177,14 +177,14 @@ TEST(Order, RefusalSaysWhyAndWhatWouldHelp) {
   EXPECT_NE(refusal({4}, limits({}, 2)).find("at most 1"), std::string::npos);
 }
 
-// Each trial of a long block has its share of the draws, or limits would no longer be met
+// The number of draws grows with the trials of a block; otherwise long blocks would not be drawn
 // uniformly.
 TEST(Order, TheBudgetOfDrawsGrowsWithTheBlock) {
   EXPECT_EQ(uniform_draw_budget(2'000'000), 2 * uniform_draw_budget(1'000'000));
-  EXPECT_GE(uniform_draw_budget(1), 200u);  // one plain order in 200 is to be found in any block
+  EXPECT_GE(uniform_draw_budget(1), 200u);  // must find an order of probability 1 / 200
 }
 
-TEST(Order, SequentialGoesRound) {
+TEST(Order, SequentialRepeatsTheList) {
   Random random(6);
   Protocol::Order order = limits(1);
   order.kind = OrderKind::sequential;
@@ -223,7 +223,7 @@ void expect_equally_likely(const Case& c, std::uint64_t seed, std::size_t budget
       << ::testing::PrintToString(c.counts);
 }
 
-// A session that goes on with a newer program must meet the order that it began with.
+// A session resumed with a newer program must keep its order.
 TEST(Order, StaysTheSameFromOneVersionOfTheProgramToTheNext) {
   Random one(5), two(5), three(5);
   EXPECT_EQ(order_block({6, 6, 6}, limits(1), kNames, one, 0),
@@ -243,8 +243,8 @@ TEST(Order, EveryValidOrderIsEquallyLikely) {
   }
 }
 
-// Constructed orders come from a biased draw (without the swaps it is 10 to 21 % of the draws that
-// a uniform one would have to exchange in these cases); after the swaps no bias is seen.
+// Constructed orders come from a biased draw (without the swaps, 10 to 21 % of the draws deviate
+// from uniform in these cases); after the swaps no bias is seen.
 TEST(Order, ConstructedOrdersAreEquallyLikelyInSmallCases) {
   for (const Case& c :
        {Case{{2, 2, 2}, limits(1)}, Case{{3, 3, 2}, limits(1)}, Case{{3, 3, 2}, limits(2)},

@@ -1,4 +1,4 @@
-// Bounds of what gives, as the published schema has them: taken at both ends, refused beyond.
+// Bounds of soft objects, as in the published schema: accepted at both ends, refused beyond.
 
 #include <gtest/gtest.h>
 

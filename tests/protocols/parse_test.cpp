@@ -58,7 +58,7 @@ TEST(Parse, AcceptsThePublishedProtocols) {
   }
 }
 
-// Beside every bad file stand the places of its faults: all of them, and no others.
+// Every bad file has a list of its faults' places: all of them, and no others.
 TEST(Parse, NamesEveryFaultOfBadFiles) {
   const std::vector<fs::path> files = json_files(kFolder + "bad");
   EXPECT_GE(files.size(), 40u);
@@ -117,7 +117,7 @@ TEST(Parse, ReadsEveryKey) {
   EXPECT_EQ(hat.material.damping, 0.5);  // the protocol's
   EXPECT_EQ(p.stimuli[2].object.shape, stimuli::ShapeKind::cylinder);
   EXPECT_EQ(p.stimuli[2].object.material.damping, 2);
-  EXPECT_EQ(p.stimuli[2].object.material.friction_static, 0.125);  // one given serves for both
+  EXPECT_EQ(p.stimuli[2].object.material.friction_static, 0.125);  // one value serves for both
   EXPECT_EQ(p.stimuli[2].object.material.friction_dynamic, 0.125);
   EXPECT_TRUE(p.stimuli[3].object.material.layers.empty());
   EXPECT_EQ(p.stimuli[2].object.material.stiffness, 400);
@@ -178,7 +178,7 @@ TEST(Parse, ReadsEveryKey) {
   EXPECT_EQ(p.sha256, checksum_hex(text_of(file)));
 }
 
-TEST(Parse, LeavesDefaultsAlone) {
+TEST(Parse, KeepsDefaults) {
   const Protocol p = parse_protocol(kFolder + "good/minimal.json");
   EXPECT_EQ(p.renderer_order, RendererOrder::counterbalanced);
   EXPECT_EQ(p.orientation, OrientationKind::uniform);
@@ -232,9 +232,9 @@ TEST(Parse, ReadsASceneWithToolReachAndLayers) {
   const SceneSpec scene = parse_scene(kFolder + "good/scene-tool.json");
   ASSERT_EQ(scene.objects.size(), 1u);
   const stimuli::Material& material = scene.objects[0].material;
-  EXPECT_EQ(material.stiffness, 0);  // felt underneath only
+  EXPECT_EQ(material.stiffness, 0);  // felt only below the surface
   ASSERT_EQ(material.layers.size(), 2u);
-  EXPECT_EQ(material.layers[0].break_force, std::nullopt);  // null: it holds
+  EXPECT_EQ(material.layers[0].break_force, std::nullopt);  // null: it does not break
   EXPECT_EQ(material.layers[1].break_force, 2.5);
   ASSERT_EQ(scene.tool.segments.size(), 2u);
   EXPECT_EQ(scene.tool.segments[1].to, Vec3(0.02, 0, -0.01));
@@ -278,7 +278,7 @@ TEST(Parse, KeysCannotBreakTheListOfFaults) {
   }
 }
 
-/// Peak of what reading the text adds; it is refused, in few words.
+/// Peak memory added by reading the text, which is refused with a short message.
 std::size_t peak_of_refusing(const std::string& text) {
   const auto peak = peak_memory([&] {
     try {
@@ -298,7 +298,7 @@ std::string repeated(const std::string& piece, int times) {
   return text;
 }
 
-// Small texts that would grow: each value with the keys around it, each fault with its place.
+// Small texts that would grow: values store the keys around them, faults store their places.
 TEST(Parse, MemoryIsInProportionToTheText) {
   constexpr std::size_t kMost = 32U << 20U;
   const std::string key(200'000, 'k'), fair(250, 'k');
@@ -314,7 +314,7 @@ TEST(Parse, MemoryIsInProportionToTheText) {
   EXPECT_LT(peak_of_refusing("[" + repeated("1", 4'000'000) + "]"), kMost);
 }
 
-TEST(Parse, SaysWhatIsTooMuch) {
+TEST(Parse, NamesExceededLimits) {
   const auto first = [](const std::string& text) { return faults_of(text).at(0); };
   const Fault key = first("{\n\"" + std::string(300, 'k') + "\": 1}");
   EXPECT_EQ(key.location, "/");
@@ -333,7 +333,7 @@ TEST(Parse, UnreadableFilesAreInputErrors) {
   EXPECT_THROW(parse_scene(kFolder + "nowhere.json"), InputError);
 }
 
-// Damaged files are refused or accepted, and nothing else happens.
+// Damaged files are refused or accepted; nothing else may happen.
 TEST(Parse, SurvivesDamage) {
   const std::string good = text_of(kFolder + "good/everything.json");
   const std::string pieces = "{}[]\",:0-1e9.\\\xff\n truenull";

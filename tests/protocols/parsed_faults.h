@@ -1,5 +1,5 @@
 #pragma once
-// What is found wrong with the protocols and scenes of tests.
+// The faults of the protocols and scenes of tests.
 
 #include <filesystem>
 #include <string>
@@ -9,7 +9,7 @@
 
 namespace palpate::protocols {
 
-/// Whether a file of the tests is a scene; else it is a protocol.
+/// Whether a test file is a scene; else it is a protocol.
 inline bool is_scene(const std::filesystem::path& path) {
   return path.filename().string().rfind("scene", 0) == 0;
 }
@@ -23,7 +23,7 @@ inline void parse_file(const std::filesystem::path& path) {
   }
 }
 
-/// The faults of the InputError that `parse` throws; none where it throws none.
+/// The faults of the InputError that `parse` throws; empty if it does not throw.
 template <class Parse>
 std::vector<Fault> faults_when(Parse&& parse) {
   try {

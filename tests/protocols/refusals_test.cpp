@@ -1,4 +1,4 @@
-// What a refusal says: what would do there, in whole sentences, and in some cases why.
+// Refusals state the expectation in whole sentences, and in some cases the reason.
 
 #include <gtest/gtest.h>
 
@@ -20,7 +20,7 @@ std::vector<Fault> faults_of_scene(const std::string& text) {
   return faults_when([&] { parse_scene_text(text, "s.json"); });
 }
 
-TEST(Refusals, AreWholeSentencesThatSayWhatWouldDo) {
+TEST(Refusals, AreWholeSentencesWithAnExpectation) {
   int count = 0;
   for (const auto& entry : fs::directory_iterator(PALPATE_SOURCE_DIR "/tests/protocols/bad")) {
     if (entry.path().extension() != ".json") continue;
@@ -30,7 +30,7 @@ TEST(Refusals, AreWholeSentencesThatSayWhatWouldDo) {
       SCOPED_TRACE(entry.path().filename().string() + " " + fault.location + ": " + text);
       ASSERT_GE(text.size(), 12U);
       EXPECT_EQ(palpate::testing::flaw_of(text), "");
-      // What would do there, or which of the keys; else a sentence, with a verb.
+      // The expectation, or the key concerned; else a sentence with a verb.
       bool says = false;
       for (const char* word : {"expected ", "missing; ", "unknown key; ", "at most ", "cannot be ",
                                " needs ", "no key for ", "is the same "})
@@ -41,7 +41,7 @@ TEST(Refusals, AreWholeSentencesThatSayWhatWouldDo) {
   EXPECT_GT(count, 250);
 }
 
-TEST(Refusals, AThickToolNeedsSomethingSoftAndWhatIsSoftAThickTool) {
+TEST(Refusals, AThickToolNeedsASoftObjectAndASoftObjectAThickTool) {
   const auto refusal = [](double radius, const std::string& object) {
     const std::vector<Fault> faults =
         faults_of_scene(R"({"objects": [{"shape": "cube", "edge_m": 0.05)" + object +

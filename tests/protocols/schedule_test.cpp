@@ -31,7 +31,7 @@ std::string text_of(const std::vector<Trial>& trials) {
   return text;
 }
 
-/// The stimuli of each block, or one more field of its trials.
+/// The stimuli of each block, or another field of its trials.
 template <class Field>
 auto by_block(const std::vector<Trial>& trials, Field field) {
   std::map<int, std::vector<decltype(field(trials[0]))>> blocks;
@@ -48,7 +48,7 @@ int longest_run(const std::vector<int>& stimuli) {
   return longest;
 }
 
-// Whoever changes this changes the meaning of every published seed.
+// A change here changes the meaning of every published seed.
 TEST(Schedule, GoldenHo2000) {
   std::string text;
   for (int participant = 1; participant <= 7; ++participant) {
@@ -227,13 +227,13 @@ TEST(Schedule, SessionsGetWholeBlocksWhereThereAreEnough) {
   EXPECT_EQ(main, (std::map<int, int>{{1, 3 * 76}, {2, 3 * 76}, {3, 2 * 76}}));
   EXPECT_EQ(warm_up, (std::map<int, int>{{2, 6}, {3, 6}}));
   EXPECT_EQ(trials.back().block, 10);
-  // Warmed up with what comes next: the second session goes on with the point renderer's last
+  // The warm-up uses the next stimuli: the second session continues with the point renderer's last
   // block.
   EXPECT_EQ(trials[3 * 76].renderer, RendererKind::point);
   EXPECT_EQ(trials[6 * 76 + 6].renderer, RendererKind::ray);
 }
 
-TEST(Schedule, MoreSessionsThanBlocksCutTheTrialsEvenly) {
+TEST(Schedule, MoreSessionsThanBlocksDivideTheTrialsEvenly) {
   Protocol protocol = ho2000();
   protocol.blocks_per_renderer = 1;
   protocol.sessions.count = 3;
@@ -264,7 +264,7 @@ TEST(Schedule, ListedOrientationsAreUsedEvenly) {
   }
   EXPECT_EQ(used.size(), 2u * 4 * 5);
   for (const auto& [what, times] : used) EXPECT_TRUE(times == 15 || times == 16) << times;
-  // Which of them comes once more is a matter of chance.
+  // The one that is used once more is random.
   std::set<double> once_more;
   for (const auto& [what, times] : used) {
     if (times == 16) once_more.insert(std::get<2>(what));
@@ -280,7 +280,7 @@ TEST(Schedule, FixedOrientationIsNone) {
   for (const Trial& trial : schedule(protocol, 1)) EXPECT_EQ(trial.orientation, Quat(1, 0, 0, 0));
 }
 
-TEST(Schedule, RefusesWhatCannotBe) {
+TEST(Schedule, RefusesImpossibleArguments) {
   Protocol protocol = ho2000();
   EXPECT_THROW(schedule(protocol, 0), std::invalid_argument);
   EXPECT_THROW(practice_round(protocol, 1, RendererKind::ray, 0), std::invalid_argument);

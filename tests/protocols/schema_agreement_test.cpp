@@ -1,6 +1,6 @@
-// The parser agrees with the published schemas, value by value. A key that is left out has the
-// documented default: written out it gives the same values, another one does not. Every number is
-// taken up to the documented bounds and no farther.
+// The parser agrees with the published schemas, value by value. A missing key has the documented
+// default: writing the default gives the same values, another value does not. Every number is
+// accepted up to the documented bounds and not beyond.
 
 #include <gtest/gtest.h>
 
@@ -25,8 +25,8 @@ json schema(const std::string& name) {
   return json::parse(stream);
 }
 
-/// What the schema says of each key of an object, by the key's place; of an array's elements, those
-/// of the first. \param root  what "#/..." refers to
+/// The schema of each key of an object, by the key's place; for arrays, that of the first element.
+/// \param root  the target of "#/..."
 void collect(const json& object, const json& root, const std::string& place,
              std::map<std::string, json>& out) {
   const auto resolved = [&root](const json& value) {
@@ -65,7 +65,7 @@ std::map<std::string, json> keys_of_a_protocol() {
   return keys;
 }
 
-/// As keys of a stimulus that has them: see kShapes.
+/// As keys of a stimulus that has them; see kShapes.
 std::map<std::string, json> keys_of_an_object() {
   const json root = schema("scene.schema.json");
   std::map<std::string, json> keys, out;
@@ -200,7 +200,7 @@ void expect_default(const std::string& place, const json& key) {
   json missing = kShapes, written = kShapes, other = kShapes;
   written[pointer] = key["default"];
   other[pointer] = other_value(key);
-  missing[pointer] = 0;  // so that the section is there
+  missing[pointer] = 0;  // so that the section exists
   missing[pointer.parent_pointer()].erase(pointer.back());
   if (pointer.back() == "repetitions") missing.erase("practice");
   EXPECT_EQ(parsed(missing), parsed(written)) << place << " is not " << key["default"];
@@ -234,7 +234,7 @@ TEST(Defaults, OfToolAndReachAreTheSchemas) {
   EXPECT_GE(expect_defaults(keys_of_tool_and_reach()), 1);
 }
 
-TEST(Defaults, OfASectionThatIsLeftOutAreThoseOfAnEmptyOne) {
+TEST(Defaults, OfAMissingSectionAreThoseOfAnEmptyOne) {
   for (const char* section : {"order", "sessions", "breaks", "stylus", "workspace", "material",
                               "servo", "home", "texts"}) {
     json empty = kShapes;
@@ -250,11 +250,10 @@ TEST(Defaults, PracticeWithACriterionHasFiveRoundsElseOne) {
   EXPECT_EQ(parse_protocol_text(document.dump(), "p.json").practice.max_rounds, 5);
 }
 
-/// What the parser says of this value at this place (of three numbers, of the first); none: it
-/// takes it.
+/// The parser's fault for this value at this place (of three numbers, the first); none: accepted.
 std::optional<std::string> refusal(const std::string& place, const json& value) {
   json document = kShapes;
-  document["no such key"] = 1;  // so that nothing is looked at but the values themselves
+  document["no such key"] = 1;  // so that only the values themselves are checked
   document["stylus"] = {{"length_m", 10}};
   const json::json_pointer pointer(place);
   const bool element = pointer.back() == "0" && value.is_number();
@@ -272,7 +271,7 @@ std::optional<std::string> refusal(const std::string& place, const json& value) 
   return std::nullopt;
 }
 
-/// The unit that a key's name ends with.
+/// The unit at the end of a key's name.
 std::string unit_of(const std::string& place) {
   const std::pair<const char*, const char*> units[] = {{"_m_per_s/0", " m/s"},
                                                        {"_rad_per_s/0", " rad/s"},

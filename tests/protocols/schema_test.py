@@ -1,4 +1,4 @@
-"""Holds the published JSON Schemas against the same good and bad files as the parser.
+"""Checks the published JSON Schemas with the same good and bad files as the parser.
 
 Usage: schema_test.py SOURCE_DIR
 """
@@ -9,8 +9,8 @@ import sys
 
 import jsonschema
 
-# Beyond JSON Schema: it cannot compare values with each other, count across the file or look for
-# files, and the JSON reader drops keys that are given twice. The program refuses these.
+# Beyond JSON Schema, which cannot compare values, count across the file or look for files; and the JSON reader drops
+# duplicate keys. The program refuses these.
 PROGRAM_ONLY = {
     "codes-alike", "compounds-too-deep", "friction-static-below-dynamic", "grip-off-the-stylus", "key-for-unknown",
     "keys-that-are-one", "keys-that-are-one-elsewhere",
@@ -23,7 +23,7 @@ PROGRAM_ONLY = {
     "v2-renderer-not-of-the-protocol", "v2-same-different-of-three", "v2-scale-falls", "v2-sessions-in-order",
     "v2-first-session", "v2-no-time-to-answer", "v2-picture-damaged", "v2-picture-files", "v2-practice-counts", "v2-standard-without-the-number", "v2-too-many-trials", "v2-two-keys", "v2-unknown-stimuli",
 }
-# The same, of sweep spaces and of studies.
+# The same for sweep spaces and studies.
 SPACES_PROGRAM_ONLY = {"limits-in-order", "names-twice", "normal-far-away", "values-set-twice"}
 STUDIES_PROGRAM_ONLY = {"keys-given-twice", "orcid-digit"}
 
@@ -91,7 +91,7 @@ def keys(value):
 
 
 def failures_of(schema, files, program_only, more_good=()):
-    """Of a schema that stands alone, against the folders good and bad in `files`."""
+    """Faults of a standalone schema, with the folders good and bad in `files`."""
     validator = jsonschema.Draft202012Validator(read(schema))
     validator.check_schema(validator.schema)
     good, bad = [*sorted((files / "good").glob("*.json")), *more_good], sorted((files / "bad").glob("*.json"))
@@ -144,7 +144,7 @@ def main(source):
     unused = properties(read(study)) - keys(read(tests / "studies" / "good" / "everything.json"))
     if unused:
         failures.append(f"everything.json of the studies lacks {sorted(unused)}")
-    # The parser accepts everything.json: so it knows every key that the schema names.
+    # The parser accepts everything.json, so it knows every key that the schema names.
     unused = properties(protocol.schema) - keys(read(tests / "good" / "everything.json"))
     unused -= {"objects"}  # of scenes
     if unused:

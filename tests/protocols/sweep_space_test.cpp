@@ -77,8 +77,8 @@ TEST(SweepSpace, SharesBecomeValues) {
   EXPECT_EQ(log_uniform.value_at(1), 1.0);
 }
 
-// A share of a normal distribution that is cut off at both ends, by numerical integration.
-TEST(SweepSpace, NormalDistributionsAreCutOff) {
+// A share of a normal distribution truncated at both ends, by numerical integration.
+TEST(SweepSpace, NormalDistributionsAreTruncated) {
   for (const auto& [low, high] : {std::pair(5.0, 30.0), std::pair(14.0, 15.5),
                                   std::pair(35.0, 60.0), std::pair(-40.0, -25.0)}) {
     SweepParameter one = with_limits(DistributionKind::normal, low, high);
@@ -104,12 +104,12 @@ TEST(SweepSpace, NormalDistributionsAreCutOff) {
   }
 }
 
-/// The share of a standard normal distribution cut off at `low` and `high` that lies below z, from
-/// logarithms of the density at steps of its own width: no tail is too far.
+/// The share below z of a standard normal distribution truncated at `low` and `high`, from
+/// logarithms of the density at steps of its own width, so that no tail is too far.
 double cut_share(double low, double high, double z) {
   const double peak = low > 0 ? low : high < 0 ? high : 0;
   const auto density = [&](double x) { return std::exp((peak - x) * (peak + x) / 2); };
-  // Beyond 40 widths of the peak there is nothing.
+  // Beyond 40 widths of the peak the density is zero.
   const double width = 40 / std::max(1.0, std::abs(peak));
   const double from = std::max(low, peak - width), to = std::min(high, peak + width);
   constexpr int kSteps = 100000;
@@ -135,12 +135,12 @@ TEST(SweepSpace, TailsOfNormalDistributionsFarFromTheMeanAreRight) {
       EXPECT_NEAR(cut_share(-high, -low, below.value_at(1 - share).get<double>()), 1 - share, 2e-5);
     }
   }
-  // The last share below 1 is not the limit.
+  // The last share below 1 does not give the limit.
   const SweepParameter wide = with_limits(DistributionKind::normal, -1, 1000);
   EXPECT_NEAR(wide.value_at(1 - 0x1p-53).get<double>(), 8.2, 0.2);
 }
 
-// A logarithm that is uniform: equal shares are equal ratios, whatever the ratio of the limits.
+// A uniform logarithm: equal shares are equal ratios, whatever the ratio of the limits.
 TEST(SweepSpace, LogUniformLimitsMayBeAnyNumberOfDecadesApart) {
   for (const double low : {1e-3, 1e-300, 1e-310}) {
     const SweepParameter one = with_limits(DistributionKind::log_uniform, low, 1e12);

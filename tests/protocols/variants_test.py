@@ -1,4 +1,4 @@
-"""Every key of the good files, spoiled: the program refuses what the published schema refuses, and where.
+"""Spoils every key of the good files: the program refuses what the published schema refuses, at the same place.
 
 Usage: variants_test.py PALPATE SOURCE_DIR
 """
@@ -19,7 +19,7 @@ from schema_test import load_schemas, load_version_2, read
 SOURCE = pathlib.Path(sys.argv.pop()) if len(sys.argv) > 2 else None
 PALPATE = sys.argv.pop() if len(sys.argv) > 1 else None
 GOOD = SOURCE / "tests" / "protocols" / "good" if SOURCE else None
-STRANGE = "no_such_key"  # in each file: so that it is refused before meshes and schedules are built
+STRANGE = "no_such_key"  # in each file, so that it is refused before meshes and schedules are built
 # Names that the file chooses, not the schema.
 OWN_NAMES = re.compile(r"/(keys|box|joystick|texts|feedback_sounds)$")
 
@@ -29,7 +29,7 @@ def escaped(key):
 
 
 def nodes(value, pointer="", path=()):
-    """(pointer, path, value) of all that is in a document."""
+    """(pointer, path, value) of every value in a document."""
     yield pointer, path, value
     members = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
     for key, member in members:
@@ -49,7 +49,7 @@ def changed(document, path, value=None, delete=False):
 
 
 def variants(document):
-    """(what was done, pointer, document): another type, too small or large, an unknown key, one key fewer."""
+    """(change, pointer, document): another type, too small or large, an unknown key, a missing key."""
     for pointer, path, value in nodes(document):
         if path and isinstance(value, dict) and not OWN_NAMES.search(pointer):
             yield "unknown key", f"{pointer}/{STRANGE}", changed(document, path + (STRANGE,), 1)
@@ -57,7 +57,7 @@ def variants(document):
             continue
         if isinstance(path[-1], str):
             yield "left out", pointer, changed(document, path, delete=True)
-        # One of these, for time: each kind of value stands in many places.
+        # One of these, to save time: each kind of value occurs in many places.
         others = [one for one in ("?!", 0.5, [], {}, True) if not isinstance(value, type(one)) or one == "?!"]
         if isinstance(value, (int, float)) and not isinstance(value, bool):
             others += [-1e12, 1e12]
@@ -75,7 +75,7 @@ class Variants(unittest.TestCase):
                 (self.folder / file.name).symlink_to(file)
 
     def refused(self, number, document):
-        """{pointer: what is said}"""
+        """{pointer: message}"""
         file = self.folder / f"{number}.json"
         document[STRANGE] = 1
         file.write_text(json.dumps(document))
@@ -103,12 +103,12 @@ class Variants(unittest.TestCase):
             found = self.refused(index, one)
             # The schema leaves the keys of a procedure to protocols/README.md.
             bad = bad or (what == "unknown key" and "/procedure" in pointer)
-            if not bad:  # if it is refused, then for what it means beside other values
+            if not bad:  # if it is refused, then because of its relation to other values
                 said = found.get(pointer, "")
                 if said.startswith(("missing", "unknown key")) and "/procedure/" not in pointer:
                     return f"{what} {pointer}: the schema allows it, but: {said}"
                 return None
-            # Told at the place itself or within it, beside it, or of the whole that it stands in.
+            # Reported at the place itself, within it, beside it, or for the whole that contains it.
             above = pointer.rsplit("/", 1)[0]
             if any(place.startswith(above + "/") or (above + "/").startswith(place + "/") for place in found):
                 return None

@@ -274,8 +274,7 @@ TEST_P(SeveralParts, NoPartOfAClusterIsEnteredUnfelt) {
       const Rendering r = tick(scene, state, probe);
       in_contact += r.contacts > 0;
       if (r.contacts > 0) continue;
-      if ((r.faults & render_fault::kReleased) !=
-          0) {  // hooked for too long: no force until it left
+      if ((r.faults & render_fault::kReleased) != 0) {  // hooked: no force until it has left
         ++released;
         continue;
       }

@@ -1,5 +1,4 @@
-// Convex cells that planes cut: volumes, areas and closed surfaces, by closed forms and by
-// property.
+// Convex cells cut by planes: volumes, areas and closed surfaces, by closed forms and by property.
 
 #include "stimuli/parts/cell.h"
 
@@ -35,8 +34,8 @@ Vec3 twice_area_of(const CellPolygon& face) {
   return sum;
 }
 
-/// Faces in their planes and the right way round, no corner twice, and each side of a face is a
-/// side of one other, the other way round: to the bit.
+/// Faces lie in their planes with the right orientation and without repeated corners, and each side
+/// of a face is the reversed side of one other face, to the bit.
 void expect_closed(const Cell& cell, const PlaneTable& planes) {
   std::map<std::array<double, 6>, int> sides;
   const auto side = [](const Vec3& a, const Vec3& b) {
@@ -73,7 +72,7 @@ TEST(Cell, OfABoxHasItsMeasures) {
   EXPECT_EQ(bulk_of(Cell().faces).area, 0);
 }
 
-/// The mean of all faces' corners, each as often as faces meet there.
+/// The mean of all faces' corners, each weighted by the number of faces that meet there.
 TEST(Cell, MiddleOfAPyramidIsTheMeanOfItsFacesCorners) {
   const Vec3 a(0, 0, 0), b(2, 0, 0), c(2, 2, 0), d(0, 2, 0), top(1, 1, 3), off(5, 6, 7);
   std::vector<CellPolygon> faces{{{d, c, b, a}, {}},
@@ -111,8 +110,8 @@ TEST(Cell, IsCutAcrossWhereThePlaneIs) {
   }
 }
 
-/// Corners of a plane's cut that other faces have as well are still one each: a cube through four
-/// of its edges, and through three corners.
+/// Corners of a cut that other faces share stay single: a cube cut through four of its edges, and
+/// through three corners.
 TEST(Cell, IsCutThroughItsCorners) {
   for (const bool corner : {false, true}) {
     PlaneTable planes(kTolerance);
@@ -173,8 +172,8 @@ TEST(Cell, StaysClosedHoweverOftenItIsCut) {
   }
 }
 
-/// A plane at most the tolerance inside a face leaves the cell whole; a little more cuts a slice
-/// off.
+/// A plane inside a face by at most the tolerance leaves the cell whole; slightly more cuts off a
+/// slice.
 TEST(Cell, IsLeftWholeByAPlaneWithinTheTolerance) {
   for (const double inside : {-1.0, 0.0, 0.9, 1.1}) {
     for (const double side : {-1.0, 1.0}) {
@@ -182,7 +181,7 @@ TEST(Cell, IsLeftWholeByAPlaneWithinTheTolerance) {
       Cell cell = box_cell(Vec3(-0.01), Vec3(0.01), planes);
       cell.surface.push_back({{{0, 0, 0}, {0.001, 0, 0}, {0, 0.001, 0}}, {0, false}});
       const Vec3 on(side * (0.01 - inside * kTolerance), 0, 0);
-      // Not by number(): near enough it is the face's own plane.
+      // Not by number(), which would give the face's own plane.
       PlaneTable two(kTolerance);
       for (std::uint32_t i = 0; i < planes.size(); ++i) {
         const Vec3 n = planes[i].normal, far = 0.01 * n;
@@ -205,7 +204,7 @@ TEST(Cell, IsLeftWholeByAPlaneWithinTheTolerance) {
   }
 }
 
-TEST(Cell, SurfaceGoesWithItsSideAndIsGoneInThePlane) {
+TEST(Cell, SurfaceStaysOnItsSideAndIsRemovedInThePlane) {
   PlaneTable planes(kTolerance);
   Cell cell = box_cell(Vec3(-1), Vec3(1), planes);
   const std::uint32_t cutting =
@@ -226,7 +225,7 @@ TEST(Cell, SurfaceGoesWithItsSideAndIsGoneInThePlane) {
   EXPECT_EQ(halves.above.surface[0].corners, triangle(0.1, 0.2));
   EXPECT_EQ(halves.above.surface[2].corners, triangle(0, 0.5));
   EXPECT_EQ(halves.below.surface[0].corners, triangle(-0.1, -0.2));
-  // A quarter of the way along both rising sides.
+  // A quarter of the length along both rising sides.
   const CellPolygon &lower = halves.below.surface[1], &upper = halves.above.surface[1];
   EXPECT_EQ(lower.corners, (std::vector<Vec3>{{0, 0, -0.25}, {0.125, 0, 0}, {0, 0.125, 0}}));
   EXPECT_EQ(upper.corners,
@@ -251,7 +250,7 @@ TEST(PlaneTable, NumbersAPlaneOnceFromEitherSide) {
   EXPECT_EQ(back.plane, 0U);
   EXPECT_TRUE(back.flipped);
   EXPECT_EQ(planes.size(), 1U);
-  // A point a little farther off than the tolerance makes it another plane.
+  // A point slightly farther off than the tolerance makes it another plane.
   for (const double off : {0.9e-6, -0.9e-6, 1.1e-6, -1.1e-6}) {
     std::vector<Vec3> moved = points;
     moved[2].z += off;
@@ -262,7 +261,7 @@ TEST(PlaneTable, NumbersAPlaneOnceFromEitherSide) {
     EXPECT_FALSE(side.flipped);
     EXPECT_EQ(table.size(), std::abs(off) > 1e-6 ? 2U : 1U);
   }
-  // Corners of a small polygon lie on it, but it looks another way.
+  // Corners of a small polygon lie on the plane, but its normal differs.
   const std::vector<Vec3> small{{0, 0, 2}, {1e-7, 0, 2}, {0, 0, 2 + 1e-7}};
   EXPECT_EQ(planes.number({Vec3(0, -1, 0), 0}, small).plane, 1U);
   EXPECT_EQ(planes[1].normal, Vec3(0, -1, 0));

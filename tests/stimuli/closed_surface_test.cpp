@@ -32,7 +32,7 @@ TriangleSurface places_of(const ClosedSurface& surface) {
   return triangles;
 }
 
-// What the header promises of every surface.
+// The header's guarantees for every surface.
 void expect_closed(const ClosedSurface& surface) {
   std::vector<char> used(surface.vertices.size(), 0);
   ASSERT_EQ(surface.across.size(), surface.triangles.size());
@@ -96,7 +96,7 @@ PolygonSoup turned_over(PolygonSoup soup) {
   return soup;
 }
 
-TEST(ClosedSurfaceTest, ASurfaceOfTrianglesIsTakenAsItStands) {
+TEST(ClosedSurfaceTest, ASurfaceOfTrianglesIsKeptUnchanged) {
   const PolygonSoup sphere = icosphere(0.03, 2);
   const CleanedSurface cleaned = closed_surface(sphere);
   EXPECT_EQ(notes_of(cleaned), "");
@@ -127,7 +127,7 @@ TEST(ClosedSurfaceTest, FacesOfAnyOutlineAreCutIntoTrianglesOfTheSameVolume) {
     expect_closed(cleaned.surface);
     EXPECT_EQ(cleaned.surface.triangles.size(), 4 * corners - 4);
     EXPECT_NEAR(volume_in(cleaned.surface), solid.volume, 1e-12 * 0.04);
-    // Each triangle is turned as its face is: no part of a cap is counted twice.
+    // Each triangle has its face's orientation: no part of a cap counts twice.
     double sides = 0;
     for (std::size_t k = 0; k < outline.size(); ++k) {
       const auto &from = outline[k], &to = outline[(k + 1) % outline.size()];
@@ -147,7 +147,7 @@ TEST(ClosedSurfaceTest, BentFacesAreCutNotRefused) {
 }
 
 // A face with a bridge to its hole visits two corners twice.
-TEST(ClosedSurfaceTest, AFaceWithABridgeToAHoleIsTaken) {
+TEST(ClosedSurfaceTest, AFaceWithABridgeToAHoleIsAccepted) {
   PolygonSoup soup;
   for (const double z : {0.0, 0.01}) {
     for (const double r : {0.03, 0.01}) {
@@ -167,7 +167,7 @@ TEST(ClosedSurfaceTest, AFaceWithABridgeToAHoleIsTaken) {
   EXPECT_NEAR(volume_in(cleaned.surface), 0.01 * (0.06 * 0.06 - 0.02 * 0.02), 1e-15);
 }
 
-TEST(ClosedSurfaceTest, TrianglesWithoutAreaAreTakenOutAndTheSurfaceStaysClosed) {
+TEST(ClosedSurfaceTest, TrianglesWithoutAreaAreRemovedAndTheSurfaceStaysClosed) {
   Random random(9);
   for (int i = 0; i < 100; ++i) {
     // A corner on the middle of an edge belongs to a triangle without area on one side of it.
@@ -177,7 +177,7 @@ TEST(ClosedSurfaceTest, TrianglesWithoutAreaAreTakenOutAndTheSurfaceStaysClosed)
       const std::size_t f = random.below(soup.faces.size());
       const std::vector<std::uint32_t> face = soup.faces[f];
       const auto middle = static_cast<std::uint32_t>(soup.vertices.size());
-      // Now and then close to an end.
+      // Sometimes close to an end.
       const double at = random.below(4) == 0 ? 1e-13 : 0.5;
       soup.vertices.push_back(soup.vertices[face[0]] * (1 - at) + soup.vertices[face[1]] * at);
       soup.faces[f] = {face[0], middle, face[2]};
@@ -220,7 +220,7 @@ TEST(ClosedSurfaceTest, CornersAreWeldedByPlaceNotByDistance) {
     apart.faces.push_back({n - 3, n - 2, n - 1});
   }
   EXPECT_EQ(closed_surface(apart).surface.vertices.size(), 8U);
-  // A tetrahedron that is less than the digits' error across is a thing of its own size.
+  // A tetrahedron smaller than the digits' error is judged at its own size.
   const PolygonSoup tiny = placed(soup, Quat(1, 0, 0, 0), 1e-6, Vec3(0));
   EXPECT_EQ(closed_surface(tiny).surface.vertices.size(), 8U);
 }
@@ -252,7 +252,7 @@ TEST(ClosedSurfaceTest, CornersThatDifferInTheLastDigitAreWeldedOnlyOnOpenEdges)
 TEST(ClosedSurfaceTest, AnEdgeIsCutAtACornerOfANeighbourThatLiesOnIt) {
   Random random(13);
   for (int i = 0; i < 50; ++i) {
-    // One face of a cube in two halves; its neighbours do not know of the corners between.
+    // One face of a cube in two halves; its neighbours lack the corners between.
     PolygonSoup soup = cube(0.04);
     const std::vector<std::uint32_t> face = soup.faces[2];
     const auto n = static_cast<std::uint32_t>(soup.vertices.size());
@@ -285,7 +285,8 @@ TEST(ClosedSurfaceTest, ShellsMayOverlapAbutAndTouch) {
   }
 }
 
-// Solid must lie between neighbours, or a segment passes through an edge that two shells share.
+// Solid must lie between neighbours; otherwise a segment could pass through an edge that two shells
+// share.
 TEST(ClosedSurfaceTest, AtAnEdgeOfTwoShellsNeighboursHaveSolidBetweenThem) {
   PolygonSoup soup = cube(0.04);
   add_shell(soup, shifted(cube(0.04), Vec3(0.04, 0.04, 0)));
@@ -301,7 +302,7 @@ TEST(ClosedSurfaceTest, AtAnEdgeOfTwoShellsNeighboursHaveSolidBetweenThem) {
   }
 }
 
-TEST(ClosedSurfaceTest, ACavityIsTakenAndAShellTurnedOverElsewhereIsRefused) {
+TEST(ClosedSurfaceTest, ACavityIsAcceptedAndAnInvertedShellElsewhereIsRefused) {
   PolygonSoup cavity = cube(0.04);
   add_shell(cavity, turned_over(cube(0.02)));
   EXPECT_NEAR(volume_in(closed_surface(cavity).surface), 0.000064 - 0.000008, 1e-15);
@@ -320,7 +321,7 @@ TEST(ClosedSurfaceTest, ACavityIsTakenAndAShellTurnedOverElsewhereIsRefused) {
             std::string::npos);
 }
 
-// A dent that is pushed out through the far side leaves a region that is wound round backwards.
+// A dent pushed out through the far side leaves a region of negative winding.
 TEST(ClosedSurfaceTest, ASmallRegionOfNegativeWindingIsFoundInALargeMesh) {
   PolygonSoup sphere = icosphere(0.03, 4);
   EXPECT_EQ(refusal_of(sphere), "");
@@ -331,7 +332,7 @@ TEST(ClosedSurfaceTest, ASmallRegionOfNegativeWindingIsFoundInALargeMesh) {
   EXPECT_NE(refusal_of(sphere).find("negative: face "), std::string::npos);
 }
 
-TEST(ClosedSurfaceTest, WhatIsNoClosedSurfaceIsRefusedWithThePlaceAndAdvice) {
+TEST(ClosedSurfaceTest, SurfacesThatAreNotClosedAreRefusedWithPlaceAndAdvice) {
   PolygonSoup soup = cube(0.04);
   soup.faces.pop_back();
   const std::string open = refusal_of(soup);
@@ -360,7 +361,7 @@ TEST(ClosedSurfaceTest, WhatIsNoClosedSurfaceIsRefusedWithThePlaceAndAdvice) {
   EXPECT_NE(refusal_of(soup).find("flat: expected a solid"), std::string::npos) << refusal_of(soup);
 }
 
-TEST(ClosedSurfaceTest, AGapIsToldFromAHole) {
+TEST(ClosedSurfaceTest, AGapIsDistinguishedFromAHole) {
   PolygonSoup soup = cube(0.04);
   soup.vertices.push_back(soup.vertices[soup.faces[0][0]] + Vec3(1e-7, 0, 0));
   soup.faces[0][0] = 8;

@@ -1,6 +1,6 @@
 #pragma once
-// Closed solids that are not convex, made from their definition: what they are made of says what
-// volume they have and which points they hold.
+// Closed solids that are not convex, built from a definition that gives their volume and the points
+// inside.
 
 #include <array>
 #include <cmath>
@@ -140,8 +140,8 @@ inline Solid torus(double ring, double tube, int around, int corners) {
   return solid;
 }
 
-/// Boxes of an irregular grid, chosen by `filled`; faces between a filled one and an empty one.
-/// Only where no edge has four faces and no corner several rings: `simple` says so.
+/// Boxes of an irregular grid, chosen by `filled`, with faces between filled and empty ones. Only
+/// for grids without an edge of four faces or a corner of several rings; see `simple`.
 struct Blocks {
   std::array<std::vector<double>, 3> lines;  ///< m
   std::set<std::array<int, 3>> filled;
@@ -154,7 +154,8 @@ struct Blocks {
     for (int x = 0; x < nx; ++x) {
       for (int y = 0; y < ny; ++y) {
         for (int z = 0; z < nz; ++z) {
-          // The eight boxes round a grid corner: filled and empty ones each hang together by faces.
+          // The eight boxes around a grid corner: filled and empty ones are each connected by
+          // faces.
           for (const bool kind : {false, true}) {
             std::vector<std::array<int, 3>> some;
             for (int k = 0; k < 8; ++k) {
@@ -318,7 +319,7 @@ inline Solid moved(Solid solid, const Quat& turn, double scale, const Vec3& by) 
   return solid;
 }
 
-/// Polygons as triangles that all run from the first corner: only of convex ones.
+/// Polygons as triangle fans from the first corner; convex ones only.
 inline void split_polygons(PolygonSoup& soup) {
   std::vector<std::vector<std::uint32_t>> triangles;
   for (const auto& face : soup.faces) {

@@ -32,7 +32,7 @@ bool mentions(const std::vector<std::string>& faults, const std::string& text) {
   });
 }
 
-/// The corners, sorted, of the two facets that a dent is between.
+/// The corners, sorted, of the two facets on either side of a dent.
 std::vector<std::vector<std::uint32_t>> facets_of_the_dent(const std::vector<std::string>& faults) {
   std::vector<std::vector<std::uint32_t>> named(1);
   for (const std::string& fault : faults) {
@@ -66,7 +66,7 @@ void append(PolygonSoup& soup, const PolygonSoup& other) {
   }
 }
 
-// A solid over the star polygon {5/2}: all its edges are convex, but it winds round twice.
+// A solid over the star polygon {5/2}: all its edges are convex, but it winds twice.
 std::vector<Vec3> pentagram_corners(double z) {
   std::vector<Vec3> corners;
   for (int k = 0; k < 5; ++k) {
@@ -157,8 +157,8 @@ TEST(ConvexMeshFaults, NamesBodiesThatTouchInACorner) {
   EXPECT_FAULT(soup, "separate pieces");
 }
 
-TEST(ConvexMeshFaults, SaysThatVerticesAreTooNearToBeToldApart) {
-  // An octahedron of which two opposite corners are 1 mm apart.
+TEST(ConvexMeshFaults, NamesVerticesTooNearToDistinguish) {
+  // An octahedron with two opposite corners 1 mm apart.
   PolygonSoup soup{
       {{5e-4, 0, 0}, {0, 0.03, 0}, {-5e-4, 0, 0}, {0, -0.03, 0}, {0, 0, 0.03}, {0, 0, -0.03}},
       {{0, 1, 4}, {1, 2, 4}, {2, 3, 4}, {3, 0, 4}, {1, 0, 5}, {2, 1, 5}, {3, 2, 5}, {0, 3, 5}}};
@@ -182,8 +182,8 @@ TEST(ConvexMeshFaults, NamesAVertexWhereTheSurfaceMeetsItself) {
   EXPECT_FAULT(soup, "shared vertex: vertex 3");
 }
 
-// A hollow of so many strips that every fold between them is within the error of the corners.
-TEST(ConvexMeshFaults, SeesAHollowOfFoldsTooFineToSee) {
+// A hollow of so many strips that each fold between them is within the error of the corners.
+TEST(ConvexMeshFaults, FindsAHollowWhoseFoldsAreWithinTheError) {
   constexpr std::uint32_t kStrips = 200;
   PolygonSoup soup;
   soup.coordinate_error = 1e-6;
@@ -206,7 +206,7 @@ TEST(ConvexMeshFaults, SeesAHollowOfFoldsTooFineToSee) {
   soup.faces.push_back({0, 4 + 2 * kStrips, 5 + 2 * kStrips, 3});
   EXPECT_FAULT(soup, "form a dent");
   EXPECT_FALSE(mentions(faults_of(soup), "not convex: edge"));
-  // The facets that are named meet in an edge.
+  // The named facets meet in an edge.
   const auto named = facets_of_the_dent(faults_of(soup));
   ASSERT_EQ(named.size(), 2U);
   EXPECT_EQ(named[0].size(), 4U);
@@ -217,7 +217,7 @@ TEST(ConvexMeshFaults, SeesAHollowOfFoldsTooFineToSee) {
   EXPECT_EQ(shared.size(), 2U) << ::testing::PrintToString(named);
 }
 
-TEST(ConvexMeshFaults, SeesThroughConvexEdgesThatWindRoundTwice) {
+TEST(ConvexMeshFaults, FindsConvexEdgesThatWindTwice) {
   EXPECT_FAULT(double_star_pyramids(), "wound vertex");
   EXPECT_FAULT(star_prism(), "wound facet");
   Random random(1);
@@ -228,8 +228,8 @@ TEST(ConvexMeshFaults, SeesThroughConvexEdgesThatWindRoundTwice) {
   }
 }
 
-// What is wrong with a face or a corner is found whichever comes first.
-TEST(ConvexMeshFaults, LooksAtEveryFacetAndVertex) {
+// Faults of faces and corners are found in any order.
+TEST(ConvexMeshFaults, ChecksEveryFacetAndVertex) {
   PolygonSoup prism = star_prism();
   for (std::size_t i = 0; i < prism.faces.size(); ++i) {
     std::rotate(prism.faces.begin(), prism.faces.begin() + 1, prism.faces.end());
@@ -242,7 +242,7 @@ TEST(ConvexMeshFaults, LooksAtEveryFacetAndVertex) {
   }
 }
 
-TEST(ConvexMeshFaults, NamesPlacesThatAreNone) {
+TEST(ConvexMeshFaults, NamesCoordinatesThatAreNotFinite) {
   for (const double bad :
        {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity(), 1e200}) {
     PolygonSoup soup = cube(0.06);
@@ -305,7 +305,7 @@ TEST(ConvexMeshFaults, ListsEveryKindButOnlyTheFirstOfEach) {
   EXPECT_LE(faults.size(), 20U);
 }
 
-// Any soup either becomes a mesh or is refused: nothing else.
+// Any soup either becomes a mesh or is refused; nothing else may happen.
 TEST(ConvexMeshFaults, RandomSoupsNeverCrash) {
   Random random(2);
   for (int i = 0; i < 3000; ++i) {

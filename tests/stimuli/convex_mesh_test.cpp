@@ -92,7 +92,7 @@ TEST(ConvexMesh, DuplicateVerticesAreWelded) {
     soup.faces.push_back({});
     for (const std::uint32_t v : face) {
       soup.faces.back().push_back(static_cast<std::uint32_t>(soup.vertices.size()));
-      // As much apart as arithmetic makes them.
+      // Apart by rounding of arithmetic.
       const double jitter = 1e-16 * (random.unit() - 0.5);
       soup.vertices.push_back(whole.vertices[v] + Vec3(jitter, -jitter, jitter));
     }
@@ -115,7 +115,7 @@ TEST(ConvexMesh, CollapsedFacesAreDropped) {
   expect_counts(soup, {8, 12, 6});
 }
 
-// A vertex on the middle of an edge that only one of the two faces knows of is often bridged by a
+// A vertex in the middle of an edge that only one of the two faces has is often bridged by a
 // triangle without area.
 TEST(ConvexMesh, TrianglesWithoutAreaJoinTheirNeighbour) {
   PolygonSoup soup = cube(2);
@@ -129,7 +129,7 @@ TEST(ConvexMesh, TrianglesWithoutAreaJoinTheirNeighbour) {
   }
 }
 
-TEST(ConvexMesh, RandomPolyhedraKeepEveryPromise) {
+TEST(ConvexMesh, RandomPolyhedraSatisfyEveryInvariant) {
   Random random(5);
   for (int i = 0; i < 200; ++i) {
     const int points = 4 + i % 40;
@@ -202,7 +202,7 @@ TEST(ConvexMesh, SinglePrecisionCoordinatesKeepTheFacets) {
 TEST(ConvexMesh, CutHullsInSinglePrecisionAreNotRefused) {
   Random random(10);
   for (int i = 0; i < 300; ++i) {
-    // One after the other: compilers differ in the order of arguments.
+    // In separate statements: compilers differ in the order of arguments.
     const double thin = 0.03 + 0.97 * random.unit(), flat = 0.03 + 0.97 * random.unit();
     const Quat turn = uniform_rotation(random);
     const PolygonSoup hull = testing::random_polyhedron(random, 5 + i % 30, Vec3(1, flat, thin));
@@ -214,8 +214,8 @@ TEST(ConvexMesh, CutHullsInSinglePrecisionAreNotRefused) {
   }
 }
 
-// Where neighbours are one plane within what is known of them but the whole is round, merging must
-// end somewhere: facets stay within a few errors of the surface.
+// Where neighbours are coplanar within their error but the whole is round, merging must end: facets
+// stay within a few errors of the surface.
 TEST(ConvexMesh, SurfacesFinerThanTheirErrorStayRound) {
   PolygonSoup soup = cylinder(1, 1, 2000);
   soup.coordinate_error = 2e-6;
@@ -230,7 +230,7 @@ TEST(ConvexMesh, SurfacesFinerThanTheirErrorStayRound) {
 }
 
 // Where corners crowd together, the error of their coordinates hides the folds between some faces
-// and not between others: what is merged may be no polygon, but the faces are a solid.
+// but not others. The merged region may not be a polygon, but the faces form a solid.
 TEST(ConvexMesh, HullsOfCrowdedPointsAreNotRefused) {
   for (const double spread : {0.03, 0.01, 3e-3, 1e-3, 3e-4, 1e-4, 1e-5}) {
     for (std::uint64_t seed = 1; seed < 4; ++seed) {
@@ -253,8 +253,8 @@ TEST(ConvexMesh, HullsOfCrowdedPointsAreNotRefused) {
   }
 }
 
-// Digits of a file round the corners of a crowd: some faces are dents then, too fine to be told
-// from flats, and the hull of the corners is what is meant.
+// A file's digits round the corners of a crowd. Some faces then are dents, indistinguishable from
+// flat, and the hull of the corners is meant.
 TEST(ConvexMesh, HullsOfCrowdedAndRoundedPointsAreNotRefused) {
   for (const double spread : {0.1, 0.03, 0.01, 3e-3, 1e-3}) {
     for (std::uint64_t seed = 1; seed < 6; ++seed) {
@@ -287,8 +287,8 @@ TEST(ConvexMesh, HullsOfCrowdedAndRoundedPointsAreNotRefused) {
   }
 }
 
-// Facets that follow each other in memory are near each other: most neighbours of a facet of a
-// large sphere are within the same small part of the array.
+// Facets that are consecutive in memory are close in space: most neighbours of a facet of a large
+// sphere lie within the same small part of the array.
 TEST(ConvexMesh, NeighboursInSpaceAreNeighboursInMemory) {
   PolygonSoup soup = icosphere(0.03, 5);
   Random(9).shuffle(soup.faces);

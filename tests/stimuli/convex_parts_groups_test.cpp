@@ -22,7 +22,7 @@ using checks::out_of;
 using checks::refusal;
 using checks::volume;
 
-// An .obj of several boxes, each a group; `faces` of the first that are left out.
+// An .obj of several boxes, each a group; `faces` of the first one are left out.
 std::string boxes_text(const std::vector<Vec3>& at, const char* statement, int left_out = 0) {
   std::string text;
   for (std::size_t b = 0; b < at.size(); ++b) {
@@ -62,7 +62,8 @@ TEST(ConvexPartsOfGroups, AnOpenGroupBesideClosedOnesIsNamed) {
   EXPECT_NE(text.find("not closed by themselves: open: edge"), std::string::npos) << text;
 }
 
-/// A cube as a group of a soup. \param turned  all its faces, as of a void
+/// A cube as a group of a soup.
+/// \param turned  all its faces, as for a void
 void add_cube(PolygonSoup& soup, const std::string& name, double edge, const Vec3& at,
               bool turned = false) {
   const PolygonSoup box = cube(edge);
@@ -77,8 +78,8 @@ void add_cube(PolygonSoup& soup, const std::string& name, double edge, const Vec
   soup.group_names.push_back(name);
 }
 
-TEST(ConvexPartsOfGroups, AVoidThatIsAGroupGoesWithTheGroupRoundIt) {
-  // In either order; within a shell in a void of a larger shell it goes with the inner one.
+TEST(ConvexPartsOfGroups, AVoidThatIsAGroupBelongsToTheGroupAroundIt) {
+  // In either order; in a shell inside a void of a larger shell, it belongs to the inner shell.
   for (const bool void_first : {false, true}) {
     PolygonSoup soup;
     if (void_first) add_cube(soup, "cavity", 0.02, Vec3(0.005, 0, 0), true);
@@ -100,7 +101,7 @@ TEST(ConvexPartsOfGroups, AVoidThatIsAGroupGoesWithTheGroupRoundIt) {
   }
 }
 
-TEST(ConvexPartsOfGroups, AVoidInTheShellThatOtherGroupsMakeGoesWithIt) {
+TEST(ConvexPartsOfGroups, AVoidInAShellOfSeveralGroupsBelongsToIt) {
   PolygonSoup soup;
   add_cube(soup, "sides", 0.06, Vec3(0));
   add_cube(soup, "cavity", 0.02, Vec3(0), true);
@@ -109,8 +110,8 @@ TEST(ConvexPartsOfGroups, AVoidInTheShellThatOtherGroupsMakeGoesWithIt) {
   EXPECT_NEAR(volume(convex_parts(soup)), 0.06 * 0.06 * 0.06 - 8e-6, 1e-15);
 }
 
-TEST(ConvexPartsOfGroups, AVoidInNothingIsNamed) {
-  for (const Vec3& at : {Vec3(0.1, 0, 0), Vec3(0.03, 0, 0)}) {  // beside it; half in it
+TEST(ConvexPartsOfGroups, AVoidOutsideASolidIsNamed) {
+  for (const Vec3& at : {Vec3(0.1, 0, 0), Vec3(0.03, 0, 0)}) {  // beside the solid; half inside it
     PolygonSoup soup;
     add_cube(soup, "shell", 0.06, Vec3(0));
     add_cube(soup, "cavity", 0.02, at, true);
@@ -155,7 +156,7 @@ TEST(ConvexPartsOfGroups, FacesOfAGroupKeepTheirNumbersInMessages) {
   EXPECT_TRUE(named) << text;
 }
 
-TEST(ConvexPartsOfGroups, GroupsThatAreOnlyPaintAreOneSolid) {
+TEST(ConvexPartsOfGroups, GroupsOfOneSurfaceAreOneSolid) {
   PolygonSoup soup = solids::l_shape().soup;
   soup.group_names = {"ends", "sides"};
   for (std::size_t f = 0; f < soup.faces.size(); ++f) soup.group_of.push_back(f < 2 ? 0 : 1);

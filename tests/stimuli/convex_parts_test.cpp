@@ -20,8 +20,8 @@ using checks::out_of;
 using checks::refusal;
 using checks::volume;
 
-// Points of the bounding box that are in another number of parts than they should be: 1 inside the
-// solid, 0 outside.
+// Points of the bounding box that lie in a wrong number of parts: it must be 1 inside the solid, 0
+// outside.
 int wrong_points(const solids::Solid& solid, const std::vector<ConvexMesh>& parts, double near) {
   Vec3 low(1e300), high(-1e300);
   for (const Vec3& vertex : solid.soup.vertices) {
@@ -208,7 +208,7 @@ TEST(ConvexParts, ABrokenSolidIsRefusedWithTheReason) {
       refusal(together(cube(0.06), cube(0.06), Vec3(0.02, 0.01, 0.03), false));
   EXPECT_NE(crossed.find("winds round 2.00 times"), std::string::npos) << crossed;
 
-  // A star drawn without lifting the pen winds round its middle twice.
+  // A star drawn in one stroke winds twice around its middle.
   solids::Outline star;
   for (int k = 0; k < 5; ++k) {
     const double angle = 4 * std::numbers::pi * k / 5;

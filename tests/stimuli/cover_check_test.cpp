@@ -30,7 +30,7 @@ TriangleSurface surface_of(const PolygonSoup& soup) {
   return surface;
 }
 
-/// What is found wrong with these boxes as parts of a cube of 0.1 m.
+/// The faults of these boxes as parts of a cube of 0.1 m.
 std::string found(const std::vector<PolygonSoup>& boxes, double slack = 0) {
   std::vector<ConvexMesh> parts;
   for (const PolygonSoup& soup : boxes) parts.emplace_back(soup);
@@ -59,12 +59,12 @@ TEST(CoverCheck, AGapAndAnOverlapAreFoundByTheVolume) {
     EXPECT_NE(fault.find("expected convex parts of 0.001 m^3 in all"), std::string::npos) << fault;
     EXPECT_NE(fault.find("in 2 parts"), std::string::npos) << fault;
   }
-  // Corners that are off by that much may be so.
+  // Accepted if corners may be off by that much.
   EXPECT_EQ(found({left, box_at({0.025, 0, 0}, {0.05, 0.1, 0.1 - 1e-9})}, 1e-8), "");
 }
 
 TEST(CoverCheck, PartsOfTheRightVolumeAtTheWrongPlaceAreFoundByPoints) {
-  // Half of the points are in both, half in none.
+  // Half of the points are in both parts, half in neither.
   const std::string twice =
       found({box_at({-0.025, 0, 0}, {0.05, 0.1, 0.1}), box_at({-0.025, 0, 0}, {0.05, 0.1, 0.1})});
   EXPECT_NE(twice.find("of the convex parts, but the surface winds round it 1.00 times"),

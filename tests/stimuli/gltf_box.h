@@ -62,7 +62,7 @@ inline std::string document(const std::string& nodes = R"([{"mesh": 0}])") {
   return document(nodes, data_uri(box_buffer()));
 }
 
-/// `text` with the first `from` in it replaced; empty where there is none.
+/// `text` with the first `from` replaced; empty if there is none.
 inline std::string changed(std::string text, const std::string& from, const std::string& to) {
   const std::size_t at = text.find(from);
   return at == std::string::npos ? "" : text.replace(at, from.size(), to);

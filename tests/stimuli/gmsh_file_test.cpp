@@ -11,7 +11,8 @@
 namespace palpate::stimuli {
 namespace {
 
-/// Two tetrahedra on both sides of a triangle; the second is inside out. Node 9 is nobody's.
+/// Two tetrahedra on both sides of a triangle; the second is inside out. Node 9 belongs to no
+/// element.
 std::string two_tetrahedra() {
   return "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n"
          "$PhysicalNames\n1\n3 1 \"organ\"\n$EndPhysicalNames\n"
@@ -89,7 +90,7 @@ TEST(GmshFile, ElementsFillSpaceOnce) {
   expect_fault(with(two_tetrahedra(), "2 6 1 9", "2 5 1 9"), "line 23", "5 nodes");
 }
 
-TEST(GmshFile, NoCutOfAFileIsMoreThanAFault) {
+TEST(GmshFile, ATruncatedFileGivesFaultsOnly) {
   const std::string good = two_tetrahedra();
   for (std::size_t length = 0; length + 2 < good.size(); ++length)
     EXPECT_THROW(read_gmsh("cut.msh", good.substr(0, length)), MeshError) << length;

@@ -44,7 +44,7 @@ TEST(GridHull, HoldsEveryPointAndIsClosed) {
   }
 }
 
-TEST(GridHull, TellsHowDeepPointsAre) {
+TEST(GridHull, GivesTheDepthOfPoints) {
   std::vector<Vec3> points;
   for (const double x : {-1.0, 1.0}) {
     for (const double y : {-1.0, 1.0}) {
@@ -60,7 +60,7 @@ TEST(GridHull, TellsHowDeepPointsAre) {
   EXPECT_EQ(grid_hull(points, 1e-9).soup.faces.size(), 12U);
 }
 
-TEST(GridHull, OfWhatIsNoSolidIsEmpty) {
+TEST(GridHull, OfFlatPointsIsEmpty) {
   std::vector<Vec3> points{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
   EXPECT_TRUE(grid_hull(points, 1e-9).soup.faces.empty());
   points.emplace_back(1, 1, 0);

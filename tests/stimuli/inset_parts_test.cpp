@@ -1,4 +1,4 @@
-// Concave solids moved inwards, held against distances to their true surface.
+// Insets of concave solids, against distances to their true surface.
 
 #include "stimuli/parts/inset_parts.h"
 
@@ -86,11 +86,11 @@ class Surface {
 };
 
 struct LayerPoints {
-  int in = 0, out = 0, round = 0;  // points in the layer, not in it, and where either is right
+  int in = 0, out = 0, round = 0;  // points in the layer, outside it, and where either is right
 };
 
-/// Random points of the solid: those in what was made are at least as deep, and what is deeper is
-/// in it: exactly under faces, within kInsetWithin under concave edges.
+/// Random points of the solid: points in the layer are at least as deep as the inset, and deeper
+/// points are in the layer: exactly under faces, within kInsetWithin under concave edges.
 LayerPoints compare(const solids::Solid& solid, const std::vector<MeshPointer>& parts, double depth,
                     int points) {
   const Surface surface(solid.soup);
@@ -130,7 +130,7 @@ LayerPoints compare_cut(const solids::Solid& solid, double depth, int points = 3
   return compare(solid, pointers(cut_into_convex_parts(solid.soup)), depth, points);
 }
 
-TEST(InsetUnion, OfCutSolidsIsWhatIsDeeper) {
+TEST(InsetUnion, OfCutSolidsHoldsTheDeeperPoints) {
   for (const double depth : {0.0005, 0.002, 0.005}) {
     const LayerPoints l = compare_cut(solids::l_shape(), depth);
     EXPECT_GT(l.in, 500);
@@ -148,7 +148,7 @@ TEST(InsetUnion, OfATorusIsATorus) {
   }
 }
 
-TEST(InsetUnion, OfStarsWithSharpNotchesIsWhatIsDeeper) {
+TEST(InsetUnion, OfStarsWithSharpNotchesHoldsTheDeeperPoints) {
   Random random(9);
   int made = 0;
   for (int i = 0; i < 12; ++i) {
@@ -170,7 +170,7 @@ PolygonSoup box(const Vec3& low, const Vec3& high) {
   return soup;
 }
 
-TEST(InsetUnion, PartsThatOverlapOrAbutAreTheSolidTheyMakeInAnyOrder) {
+TEST(InsetUnion, PartsThatOverlapOrAbutAreOneSolidInAnyOrder) {
   const solids::Solid l = solids::l_shape();
   const std::vector<std::vector<PolygonSoup>> ways{
       {box({0, 0, 0}, {0.02, 0.06, 0.03}), box({0.02, 0, 0}, {0.06, 0.02, 0.03})},
@@ -188,7 +188,7 @@ TEST(InsetUnion, PartsThatOverlapOrAbutAreTheSolidTheyMakeInAnyOrder) {
   }
 }
 
-TEST(InsetUnion, OfABoxThatIsCutIsThatOfTheBoxWhole) {
+TEST(InsetUnion, OfACutBoxIsThatOfTheWholeBox) {
   const auto whole = std::make_shared<const ConvexMesh>(box({-0.03, -0.02, 0}, {0.03, 0.02, 0.03}));
   const std::vector<MeshPointer> halves{
       std::make_shared<const ConvexMesh>(box({-0.03, -0.02, 0}, {0.004, 0.02, 0.03})),
@@ -201,7 +201,7 @@ TEST(InsetUnion, OfABoxThatIsCutIsThatOfTheBoxWhole) {
   for (const Vec3& v : one[0]->vertices()) EXPECT_TRUE(holds(two, v, 1e-12));
 }
 
-TEST(InsetUnion, PartsThatStandApartAreMovedEachByItself) {
+TEST(InsetUnion, SeparatePartsAreInsetSeparately) {
   const std::vector<MeshPointer> apart{
       std::make_shared<const ConvexMesh>(box({0, 0, 0}, {0.02, 0.02, 0.02})),
       std::make_shared<const ConvexMesh>(box({0.0201, 0, 0}, {0.05, 0.02, 0.02}))};

@@ -1,4 +1,4 @@
-// What is left behind the moved planes of a convex body, held against the definition.
+// The body behind the moved planes of a convex body, against the definition.
 
 #include "stimuli/inset.h"
 
@@ -35,8 +35,8 @@ double furthest_outside(const std::vector<HalfSpace>& planes, const Vec3& point)
   return most;
 }
 
-/// max u.x over the intersection of the half-spaces, over every corner that three of them can make;
-/// -infinity where it is empty.
+/// max u.x over the intersection of the half-spaces, from every corner that three of them can form;
+/// -infinity if it is empty.
 double brute_force_support(const std::vector<HalfSpace>& planes, const Vec3& u, double size) {
   double best = -std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < planes.size(); ++i) {
@@ -112,7 +112,7 @@ TEST(Inset, IsTheIntersectionOfTheMovedHalfSpaces) {
   EXPECT_GT(vanished, 10);
 }
 
-TEST(Inset, IsGoneFromTheInradiusOn) {
+TEST(Inset, IsEmptyFromTheInradiusOn) {
   Random random(32);
   for (int body = 0; body < 20; ++body) {
     const ConvexMesh mesh = random_body(random, 8);
@@ -134,7 +134,7 @@ TEST(Inset, TheLargestBallIsInsideAndNoneIsLarger) {
     const Ball ball = largest_inscribed_ball(mesh);
     EXPECT_NEAR(furthest_outside(moved_planes(mesh, 0), ball.centre), -ball.radius,
                 1e-14 * mesh.size());
-    // The largest r of all (c, r) on four planes that is behind the others.
+    // The largest r of all (c, r) on four planes and behind the others.
     const auto planes = moved_planes(mesh, 0);
     double best = 0;
     for (std::size_t a = 0; a < planes.size(); ++a) {
@@ -228,7 +228,7 @@ TEST(Inset, OfAPlateStaysAPlate) {
   EXPECT_FALSE(inset(mesh, 0.001));
 }
 
-TEST(Inset, ACornerOfManyPlanesThatRoundingTakesApartIsOneCorner) {
+TEST(Inset, ACornerSplitByRoundingIsOneCorner) {
   // A pyramid of 48 sides whose planes miss its apex by about 1e-12 of its size.
   constexpr double kSize = 0.06;
   constexpr int kSides = 48;

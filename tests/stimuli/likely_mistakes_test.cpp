@@ -22,7 +22,7 @@ std::string what_is_said_of(const std::string& name, const std::string& bytes) {
   return "";
 }
 
-TEST(LikelyMistakes, Utf16IsToldFromOtherBytes) {
+TEST(LikelyMistakes, Utf16IsDistinguishedFromOtherBytes) {
   for (const bool big : {false, true}) {
     for (const bool marked : {false, true}) {
       EXPECT_TRUE(is_utf16(utf16("v 0 0 0\n", big, marked)));
@@ -38,7 +38,7 @@ TEST(LikelyMistakes, Utf16IsToldFromOtherBytes) {
     EXPECT_FALSE(is_utf16(bytes)) << bytes;
 }
 
-TEST(LikelyMistakes, ADecimalCommaIsToldFromOtherWords) {
+TEST(LikelyMistakes, ADecimalCommaIsDistinguishedFromOtherWords) {
   EXPECT_EQ(point_meant("0,5"), "; decimals follow a point: 0.5");
   EXPECT_EQ(point_meant("-12,25e-3"), "; decimals follow a point: -12.25e-3");
   for (const char* const word : {"0.5", "1,2,3", ",5", "5,", "a,b", "", "1,x"})

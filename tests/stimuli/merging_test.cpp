@@ -40,7 +40,7 @@ TEST(MergeConvexNeighbours, HalvesOfABoxBecomeTheBoxWhateverTheOrderOfTheirFaces
   }
 }
 
-TEST(MergeConvexNeighbours, WhatWouldBeConcaveStaysApart) {
+TEST(MergeConvexNeighbours, AConcaveUnionStaysApart) {
   PlaneTable planes(1e-9);
   const Faces low = box_cell({0, 0, 0}, {2, 1, 1}, planes).faces;
   const Faces tower = box_cell({0, 0, 1}, {1, 1, 2}, planes).faces;

@@ -116,7 +116,7 @@ std::size_t facets_of(const PolygonSoup& soup) { return ConvexMesh(soup).facets(
 
 TEST_F(MeshFile, AFileThatIsTooLargeIsRefusedBeforeItIsRead) {
   const std::string path = write("huge.stl", "");
-  std::filesystem::resize_file(path, (std::uintmax_t{1} << 31) + 1);  // takes no room on the disk
+  std::filesystem::resize_file(path, (std::uintmax_t{1} << 31) + 1);  // uses no disk space
   try {
     read_mesh_file(path);
     FAIL();
@@ -179,7 +179,7 @@ TEST_F(MeshFile, NeedlesKeepTheirSidesWhenTheFileHasTheDigits) {
   EXPECT_EQ(facets_of(read("needle.obj", as_obj(soup))), 66U);
 }
 
-TEST_F(MeshFile, StatesHowExactTheNumbersAre) {
+TEST_F(MeshFile, GivesThePrecisionOfNumbers) {
   const auto error = [&](const std::string& numbers) {
     return read("e.obj", "v " + numbers + "\nf 1 1 1\n").coordinate_error;
   };
@@ -208,7 +208,7 @@ TEST_F(MeshFile, ReadsTheFormsOfObj) {
   }
 }
 
-TEST_F(MeshFile, LinesOfAnObjEndInAnyWay) {
+TEST_F(MeshFile, AnyLineEndingOfAnObjIsRead) {
   const std::string obj =
       "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 \\\n4";
   for (const std::string end : {"\n", "\r\n", "\r"}) {
@@ -298,7 +298,7 @@ TEST_F(MeshFile, ABinaryStlMustHaveTheTrianglesThatItClaims) {
 
 class MeshFileSurface : public MeshFile {
  protected:
-  /// What is wrong with the surface that a file describes.
+  /// The faults of the surface that a file describes.
   std::string surface_fault(const std::string& name, const std::string& bytes) const {
     try {
       const ConvexMesh mesh(read(name, bytes));
@@ -322,7 +322,7 @@ TEST_F(MeshFileSurface, FaultsOfAnObjHaveItsNumbersAndLines) {
       << turned;
   EXPECT_EQ(surface_fault("a.obj", "\nv 1e31 0 0\n" + corners + "f 1 2 3"),
             "not finite: vertex 1 at line 2: expected three finite coordinates (up to 1e30 m)");
-  // Corners of one place keep the numbers that the face itself gives them.
+  // Corners at one place keep the numbers that the face gives them.
   const std::string own = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 0\nv 0 0 1\nv 1 0 0\n";
   const std::string fault = surface_fault("a.obj", own + "f 1 3 2\nf 4 6 5\n");
   EXPECT_NE(fault.find("open: edge 6-5 of face 2 at line 8 (vertices 4 6 5)"), std::string::npos)
@@ -350,7 +350,7 @@ TEST_F(MeshFileSurface, FaultsOfAnStlHaveItsPlacesAndCoordinates) {
       << binary;
 }
 
-TEST_F(MeshFile, OtherThingsThanMeshFilesAreRefused) {
+TEST_F(MeshFile, OtherFilesAreRefused) {
   expect_fault("a.3ds", "ply", ".obj, .stl, .gltf, .glb, .ply or .off");
   EXPECT_THROW(read_mesh_file(folder_ / "none.obj"), MeshError);
   std::filesystem::create_directory(folder_ / "folder.stl");
@@ -359,7 +359,7 @@ TEST_F(MeshFile, OtherThingsThanMeshFilesAreRefused) {
   EXPECT_THROW(read_mesh_file(""), MeshError);
 }
 
-// Damaged files give a soup or a MeshError, nothing else.
+// Damaged files give only a soup or a MeshError.
 TEST_F(MeshFile, DamagedFilesNeverCrash) {
   Random random(3);
   const PolygonSoup soup = triangulated(cube(0.06));

@@ -114,7 +114,7 @@ TEST(MeshGltfFaults, NodesAreStrictTrees) {
             "a.gltf: /nodes/0/children/1" + one_parent + "1");
   EXPECT_EQ(refusal_with("\"nodes\": [0]", "\"nodes\": [0, 0]"),
             "a.gltf: /scenes/0/nodes/1" + one_parent + "0");
-  // Twice as many ways at each of 60 levels: who walks them all never ends.
+  // The number of paths doubles at each of 60 levels: visiting them all would never end.
   std::string nodes = "[", chain = "[";
   for (int i = 1; i <= 60; ++i) {
     const std::string next = std::to_string(i);
@@ -251,7 +251,7 @@ TEST(MeshGltfFaults, SurfacesAreNamedByPrimitiveAndNode) {
     convex_parts(read_mesh("a.gltf", text));
     ADD_FAILURE() << "it is open";
   } catch (const MeshError& error) {
-    // The last of the twelve triangles is missing: 4, 7, 6, of which 6-7 and 4-6 are rims.
+    // The last of the twelve triangles is missing: 4, 7, 6, of which 6-7 and 4-6 are open edges.
     EXPECT_NE(
         std::string(error.what())
             .find("open: edge 6-7 of face 6 of /meshes/0/primitives/0 in 'left' (vertices 2 6 7)"),
@@ -260,7 +260,7 @@ TEST(MeshGltfFaults, SurfacesAreNamedByPrimitiveAndNode) {
   }
 }
 
-// Damaged files give a soup or a MeshError, nothing else.
+// Damaged files give only a soup or a MeshError.
 TEST(MeshGltfFaults, DamagedFilesNeverCrash) {
   Random random(4);
   const std::string files[] = {
@@ -271,7 +271,7 @@ TEST(MeshGltfFaults, DamagedFilesNeverCrash) {
     for (std::uint64_t damage = 1 + random.below(3); damage > 0; --damage) {
       const std::size_t at = random.below(bytes.size());
       if (random.below(2) == 0) {
-        // Another digit or sign keeps it a document.
+        // Changing a digit or sign keeps the document valid.
         const std::size_t digit = bytes.find_first_of("0123456789", at);
         if (digit != std::string::npos) bytes[digit] = "0123456789-.e"[random.below(13)];
       } else {

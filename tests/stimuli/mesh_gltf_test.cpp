@@ -92,7 +92,7 @@ TEST(MeshGltf, TheDefaultSceneIsRead) {
   expect_box(read_mesh("a.gltf", text), kSize, Vec3(0));
   expect_box(read_mesh("a.gltf", changed(text, "\"scene\": 0", "\"scene\": 1")), kSize,
              Vec3(1, 0, 0));
-  // Without any scene: the nodes that no other has.
+  // Without a scene: the nodes that are no other's children.
   const std::string roots = R"([{"mesh": 0}, {"children": [0], "translation": [1, 0, 0]}])";
   expect_box(read_mesh("a.gltf", changed(document(roots), "\"scenes\"", "\"extras\"")), kSize,
              Vec3(1, 0, 0));
@@ -135,7 +135,7 @@ TEST(MeshGltf, StripsAndFansAreTriangles) {
   const std::string seen = R"({"attributes": {"POSITION": 0}, "mode": )";
   const std::string read =
       R"({"bufferView": 1, "componentType": 5123, "type": "SCALAR", "count": )";
-  // Once over all sides.
+  // A strip over all sides.
   expect_box(read_mesh("a.gltf", with({0, 1, 4, 5, 7, 1, 3, 0, 2, 4, 6, 7, 2, 3},
                                       seen + R"(5, "indices": 1})", read + "14}")),
              kSize, Vec3(0));

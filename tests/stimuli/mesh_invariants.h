@@ -1,5 +1,5 @@
 #pragma once
-// Everything that ConvexMesh promises, checked by visiting everything.
+// All invariants of ConvexMesh, checked exhaustively.
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-// What messages call the vertices and faces of a mesh: whole texts.
+// Names of a mesh's vertices and faces in messages: whole texts.
 
 #include "stimuli/mesh_names.h"
 
@@ -32,7 +32,7 @@ TEST(MeshNaming, OfAFileWithLines) {
   EXPECT_EQ(lines.vertex(0, kPlace), "vertex 7 at line 12");
   EXPECT_EQ(lines.vertex(1, kPlace), "vertex 8 at line 13");
   EXPECT_EQ(lines.face(0, {"7", "8"}), "face 3 at line 20 (vertices 7 8)");
-  // Beyond what the file numbers: by place, and by corners alone.
+  // Beyond the file's numbers: by place, and by corners alone.
   EXPECT_EQ(lines.label(2, kPlace), "(0.01, -2, 0.333333)");
   EXPECT_EQ(lines.vertex(2, kPlace), "vertex (0.01, -2, 0.333333)");
   EXPECT_EQ(lines.face(1, {"7"}), "face (vertices 7)");
@@ -66,7 +66,7 @@ TEST(MeshNames, OfASubsetAreTheChosenOnesInTheirOrder) {
   EXPECT_EQ(some.faces[0].number, 8U);
   EXPECT_EQ(some.place_kind, "byte");
   EXPECT_EQ(some.places, std::vector<std::string>{"a"});
-  // What has no names gets none.
+  // A mesh without names gets none.
   const MeshNames none = MeshNames{{}, {}, "byte", {}}.subset({0, 1}, {0});
   EXPECT_TRUE(none.vertices.empty());
   EXPECT_TRUE(none.faces.empty());

@@ -17,7 +17,7 @@ std::string number(double value) {
   return text.data();
 }
 
-// A cube of quadrilaterals; more than coordinates and corners in every line.
+// A cube of quadrilaterals, with extra values beside coordinates and corners in every line.
 std::string ascii_ply(const PolygonSoup& soup, const std::string& end = "\n") {
   std::string text = "ply" + end + "format ascii 1.0" + end + "comment made by a test" + end +
                      "obj_info of nothing" + end + "element vertex " +
@@ -113,7 +113,7 @@ TEST_F(PlyFile, EveryEncodingGivesTheSameMesh) {
   }
 }
 
-TEST_F(PlyFile, WhatFollowsTheLastElementIsSkipped) {
+TEST_F(PlyFile, DataAfterTheLastElementIsSkipped) {
   expect_same(read_mesh("a.ply", text_ + std::string("\0 more", 6)), soup_, 1e-9);
   expect_same(read_mesh("a.ply", binary_ply(soup_, true, false) + "abc"), soup_, 0);
 }
@@ -141,7 +141,7 @@ TEST_F(PlyFile, FaultsNameTheLine) {
             "found \"40\"");
 }
 
-TEST_F(PlyFile, HeadersThatSayNothingOfASurfaceAreRefused) {
+TEST_F(PlyFile, HeadersWithoutASurfaceAreRefused) {
   EXPECT_NE(fault_in("a.ply", "").find("line 1: expected \"ply\""), std::string::npos);
   EXPECT_NE(fault_in("a.ply", exchanged(text_, "ascii", "utf")).find("line 2: expected ascii"),
             std::string::npos);

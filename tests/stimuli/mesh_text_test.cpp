@@ -70,7 +70,7 @@ TEST(MeshText, TwentyFaultsAreListedAndTheOthersCounted) {
   }
 }
 
-TEST(MeshText, NumbersOfAFileTellHowExactTheyAre) {
+TEST(MeshText, NumbersOfAFileGiveTheirPrecision) {
   const auto error_of = [](const std::vector<std::string>& words) {
     NumberPrecision precision;
     for (const std::string& word : words) {
@@ -82,11 +82,11 @@ TEST(MeshText, NumbersOfAFileTellHowExactTheyAre) {
   };
   // printf's %.12f: half of the last decimal, whatever the size.
   EXPECT_NEAR(error_of({"0.030000000001", "1.250000000003", "-0.100000000007"}), 0.5e-12, 1e-15);
-  // As many digits as the longest has (12): of the largest.
+  // As many digits as in the longest number (12), relative to the largest.
   const double by_digits = error_of({"0.0312345678912", "-1.5", "0.25"});
   EXPECT_GT(by_digits, 0.49e-12);
   EXPECT_LT(by_digits, 1.5e-11);
-  // Written short: no better than single precision.
+  // Short numbers: not better than single precision.
   EXPECT_GT(error_of({"0.03", "-0.05", "1"}), 0.25 * std::numeric_limits<float>::epsilon());
 }
 

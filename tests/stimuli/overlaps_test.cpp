@@ -1,4 +1,4 @@
-// What convex parts have in common, against sampled points and boxes that are known.
+// Common volumes of convex parts, against sampled points and known boxes.
 
 #include "stimuli/parts/overlaps.h"
 

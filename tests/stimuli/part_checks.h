@@ -1,5 +1,5 @@
 #pragma once
-// What the tests of convex parts measure on them.
+// Measurements of the tests of convex parts.
 
 #include <algorithm>
 #include <cstdint>
@@ -13,7 +13,7 @@
 
 namespace palpate::stimuli::checks {
 
-/// By tetrahedra from a point of the mesh: apart from how the library adds up volumes.
+/// Volume by tetrahedra from a point of the mesh, independent of the library's method.
 inline double volume(const ConvexMesh& mesh) {
   double six = 0;
   const Vec3 apex = mesh.vertices()[0];
@@ -31,7 +31,7 @@ inline double volume(const std::vector<ConvexMesh>& parts) {
   return sum;
 }
 
-/// m; how far a point is out of a part; negative inside.
+/// m, distance of a point from a part; negative inside.
 inline double out_of(const ConvexMesh& mesh, const Vec3& point) {
   double most = -std::numeric_limits<double>::infinity();
   for (const Facet& facet : mesh.facets())
@@ -39,7 +39,7 @@ inline double out_of(const ConvexMesh& mesh, const Vec3& point) {
   return most;
 }
 
-/// What a solid is refused with.
+/// The message that refuses a solid.
 inline std::string refusal(const PolygonSoup& soup) {
   try {
     return "taken, in " + std::to_string(convex_parts(soup).size()) + " parts";

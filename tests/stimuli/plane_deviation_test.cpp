@@ -31,7 +31,7 @@ TEST(PlaneDeviation, AllowsForCornersFarPastTheEndsOfTheSide) {
   EXPECT_NEAR(deviation_of(1e-6, Vec3(-9, 1, 0), 1, 1e-9), 50, 1e-3);
 }
 
-TEST(PlaneDeviation, SharpEdgesAreNoPlaneHoweverLittleIsKnown) {
+TEST(PlaneDeviation, SharpEdgesAreNeverCoplanar) {
   const Vec3 tip(0.5, 1, 0);
   EXPECT_NEAR(deviation_of(3.14159, tip, 1, 1e-9), 5e8, 1);
   EXPECT_NEAR(deviation_of(-3.14159, tip, 1, 1e-9), -5e8, 1);

@@ -16,7 +16,7 @@ namespace palpate::stimuli {
 namespace {
 namespace polygons {
 
-TEST(PlaneOf, RegularPolygonsAnyhow) {
+TEST(PlaneOf, RegularPolygonsOfAnySizeAndOrientation) {
   Random random(3);
   for (int sides = 3; sides < 20; ++sides) {
     const double radius = std::pow(10, 4 * random.unit() - 4);
@@ -37,7 +37,7 @@ TEST(PlaneOf, RegularPolygonsAnyhow) {
         2 * radius * (sides % 2 == 0 ? 1 : std::cos(std::numbers::pi / (2 * sides)));
     EXPECT_LE(plane.diameter, longest * (1 + 1e-14));
     EXPECT_GE(plane.diameter, longest / 2);
-    // The other way round it looks the other way, all else the same.
+    // Reversed, it has the opposite normal; all else is the same.
     std::reverse(corners.begin(), corners.end());
     EXPECT_LT(glm::length(plane_of(corners).normal + plane.normal), 1e-13);
     EXPECT_NEAR(plane_of(corners).area, area, 1e-13 * radius * radius);
@@ -53,8 +53,7 @@ TEST(PlaneOf, RectangleIsExact) {
   EXPECT_NEAR(plane.diameter, 5, 1e-15);
 }
 
-/// Off its plane by rounding alone: far ends of a needle a million times longer than wide stay on
-/// it.
+/// The far ends of a needle a million times longer than wide stay on its plane, within rounding.
 TEST(PlaneOf, ANeedleIsNotTilted) {
   Random random(4);
   for (int round = 0; round < 100; ++round) {

@@ -77,7 +77,7 @@ TEST(Primitives, CubeHasSixSquares) {
   for (const Vec3& vertex : soup.vertices) EXPECT_EQ(glm::abs(vertex), Vec3(0.03));
 }
 
-TEST(Primitives, PolygonsOfPassesTheSizesOn) {
+TEST(Primitives, PolygonsOfUsesTheSizes) {
   ObjectSpec spec = spec_of(ShapeKind::sphere);
   spec.radius = 0.5;
   spec.subdivisions = 2;

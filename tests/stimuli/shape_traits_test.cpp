@@ -1,4 +1,4 @@
-// What the table of shapes says of each is what its geometry does.
+// The table of shapes agrees with the geometry of each shape.
 
 #include <gtest/gtest.h>
 
@@ -17,7 +17,7 @@ bool is_primitive(ShapeKind shape) {
   return shape != ShapeKind::mesh && shape != ShapeKind::compound;
 }
 
-/// Whether its polygons are others when something of the description changes.
+/// Whether a change of the description changes the polygons.
 template <class Change>
 bool depends_on(ShapeKind shape, const Change& change) {
   ObjectSpec spec;
@@ -62,7 +62,7 @@ TEST(ShapeTraits, AnAnalyticShapeHasASignedDistanceWhichIsZeroOnItsCorners) {
   EXPECT_FALSE(traits_of(ShapeKind::compound).analytic);
 }
 
-/// Those of runner/participants/shape_lines.h; what else there is has distances on a grid.
+/// Those of runner/participants/shape_lines.h; other shapes have distances on a grid.
 TEST(ShapeTraits, AFormulaIsOfSpheresConesCylindersAndCubes) {
   std::set<std::string> with_formula;
   for (const ShapeKind shape : kShapes) {

@@ -35,7 +35,7 @@ Vec3 random_point(Random& random, double reach) {
   return reach * (2.0 * Vec3(random.unit(), random.unit(), random.unit()) - 1.0);
 }
 
-// Distance along a ray from the middle of the solid to its surface, by halving.
+// Distance along a ray from the middle of the solid to its surface, by bisection.
 template <class Shape>
 Vec3 surface_point(const Shape& shape, const Vec3& middle, const Vec3& direction, double reach) {
   double inside = 0, outside = reach;
@@ -46,8 +46,8 @@ Vec3 surface_point(const Shape& shape, const Vec3& middle, const Vec3& direction
   return middle + inside * direction;
 }
 
-// The definition: no point of the surface is nearer than the distance, and the one that the
-// distance and normal lead to is on the surface. Outside and inside alike.
+// The definition: no point of the surface is nearer than the distance, and distance and normal lead
+// to a point on the surface. Both outside and inside.
 template <class Shape>
 void expect_nearest(const Shape& shape, double reach, Random& random) {
   std::vector<Vec3> surface;
@@ -63,11 +63,11 @@ void expect_nearest(const Shape& shape, double reach, Random& random) {
     double nearest = std::numeric_limits<double>::max();
     for (const Vec3& other : surface) nearest = std::min(nearest, glm::distance(point, other));
     EXPECT_GE(nearest, std::abs(found.distance) - 1e-12 * reach);
-    EXPECT_LE(nearest, std::abs(found.distance) + 0.15 * reach);  // the samples are that dense
+    EXPECT_LE(nearest, std::abs(found.distance) + 0.15 * reach);  // density of the samples
   }
 }
 
-// The gradient, by central differences, wherever it is smooth.
+// The gradient, by central differences, where the distance is smooth.
 template <class Shape>
 void expect_gradient(const Shape& shape, double reach, Random& random) {
   const double step = 1e-6 * reach;
@@ -82,7 +82,7 @@ void expect_gradient(const Shape& shape, double reach, Random& random) {
                         signed_distance(shape, point - by).distance) /
                        (2 * step);
     }
-    if (std::abs(glm::length(gradient) - 1) > 1e-4) continue;  // a ridge inside runs between
+    if (std::abs(glm::length(gradient) - 1) > 1e-4) continue;  // an inner ridge lies between
     ++smooth;
     EXPECT_NEAR(glm::distance(gradient, signed_distance(shape, point).normal), 0, 2e-4);
   }
@@ -178,7 +178,7 @@ TEST(SignedDistance, OfACubeMeshIsThatOfTheCube) {
   }
 }
 
-// Every corner of the mesh, seen from outside along the corner's axis, is itself the nearest place.
+// From outside along a corner's axis, the nearest place is the corner itself.
 TEST(SignedDistance, OverACornerItIsTheDistanceOfTheCorner) {
   const ConvexMesh mesh(cube(2));
   for (const Vec3& corner : mesh.vertices()) {
@@ -202,7 +202,7 @@ TEST(SignedDistance, OnTheSurfaceTheNormalIsAFacets) {
   }
 }
 
-// A mesh of chords lies within the analytic shape, and the gap falls with the square of the step.
+// An inscribed mesh lies within the analytic shape, and the gap falls with the square of the step.
 TEST(SignedDistance, OfFinerMeshesTendsToThatOfTheShape) {
   Random random(6);
   const auto worst = [&](const ObjectSpec& spec) {

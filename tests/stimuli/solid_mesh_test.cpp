@@ -15,7 +15,7 @@
 namespace palpate::stimuli {
 namespace {
 
-/// By the divergence theorem, of the surface's triangles.
+/// Volume by the divergence theorem over the surface's triangles.
 double volume_inside(const SolidMesh& mesh, const std::vector<SurfaceTriangle>& surface) {
   double volume = 0;
   for (const SurfaceTriangle& t : surface) {
@@ -24,7 +24,7 @@ double volume_inside(const SolidMesh& mesh, const std::vector<SurfaceTriangle>& 
   return volume;
 }
 
-/// Every side is passed once in each direction, so there is no hole and no face is turned.
+/// Every side occurs once in each direction, so there is no hole and no reversed face.
 void expect_closed(const std::vector<SurfaceTriangle>& surface) {
   std::set<std::pair<std::uint32_t, std::uint32_t>> sides;
   for (const SurfaceTriangle& t : surface) {
@@ -71,7 +71,7 @@ TEST(SolidMesh, FillsItsShapeAndIsClosedAtEveryResolution) {
     ShapeKind shape;
     Vec3 half;
     double volume;
-    bool flat;  ///< the shape is its elements
+    bool flat;  ///< the elements represent the shape exactly
   };
   const Case cases[] = {
       {ShapeKind::cube, Vec3(0.015), 0.03 * 0.03 * 0.03, true},
@@ -105,7 +105,7 @@ TEST(SolidMesh, FillsItsShapeAndIsClosedAtEveryResolution) {
   }
 }
 
-TEST(SolidMesh, HasAsManyElementsAlongASideAsItsLengthAsksForAndAtLeastTwo) {
+TEST(SolidMesh, HasElementsInProportionToASidesLengthAndAtLeastTwo) {
   EXPECT_EQ(mesh_of_primitive(solid_spec(ShapeKind::box), 8).hexahedra.size(), 8U * 4U * 2U);
   EXPECT_EQ(mesh_of_primitive(solid_spec(ShapeKind::box), 4).hexahedra.size(), 4U * 2U * 2U);
   EXPECT_EQ(mesh_of_primitive(solid_spec(ShapeKind::cube), 3).hexahedra.size(), 27U);

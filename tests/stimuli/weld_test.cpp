@@ -1,4 +1,4 @@
-// Which points are one: against every pair looked at.
+// Welded points, against a check of every pair.
 
 #include <gtest/gtest.h>
 
@@ -19,7 +19,7 @@ namespace welding {
 
 using Numbers = std::vector<std::uint32_t>;
 
-/// Clusters of points that are linked by pairs within the tolerance, each named by its first.
+/// Clusters of points linked by pairs within the tolerance, each named by its first point.
 Numbers by_all_pairs(const std::vector<Vec3>& points, double tolerance) {
   Numbers of(points.size());
   for (std::uint32_t i = 0; i < of.size(); ++i) of[i] = i;
@@ -50,7 +50,7 @@ TEST(Weld, TakesTheFirstOfEachCluster) {
   EXPECT_GT(welded, 1000);
 }
 
-TEST(Weld, OfTheToleranceItselfIsOne) {
+TEST(Weld, APairAtTheToleranceIsOne) {
   for (const Vec3& along : {Vec3(1, 0, 0), Vec3(0, 1, 0), Vec3(0, 0, 1)}) {
     const std::vector<Vec3> points{Vec3(0), 0.25 * along};
     EXPECT_EQ(weld(points, 0.25), (Numbers{0, 0}));
@@ -58,7 +58,7 @@ TEST(Weld, OfTheToleranceItselfIsOne) {
   }
 }
 
-/// A chain of neighbours is one, from whichever end it is listed.
+/// A chain of neighbours is one cluster, listed from either end.
 TEST(Weld, ChainsAreOne) {
   std::vector<Vec3> chain;
   for (int i = 0; i < 10; ++i) chain.emplace_back(0.1 * i, 0, 0);

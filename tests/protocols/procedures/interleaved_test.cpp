@@ -45,7 +45,7 @@ std::vector<ShownTrial> run_tracks(InterleavedTracks tracks, Random& random) {
   return shown;
 }
 
-TEST(InterleavedProcedures, EveryRoundHasATrialOfEveryTrackThatGoesOn) {
+TEST(InterleavedProcedures, EveryRoundHasATrialOfEveryUnfinishedTrack) {
   Random random(5);
   const std::vector<ShownTrial> shown = run_tracks({one_of_each(), 3}, random);
   std::map<std::size_t, std::size_t> counts;
@@ -59,7 +59,7 @@ TEST(InterleavedProcedures, EveryRoundHasATrialOfEveryTrackThatGoesOn) {
   EXPECT_EQ(counts[2], 25u);
 }
 
-TEST(InterleavedProcedures, ASessionThatGoesOnIsAsIfNothingHadHappened) {
+TEST(InterleavedProcedures, AResumedSessionContinuesTheSame) {
   for (const std::uint64_t seed : {1U, 2U, 99U}) {
     Random random(seed);
     const std::vector<ShownTrial> shown = run_tracks({one_of_each(), seed}, random);
@@ -77,7 +77,7 @@ TEST(InterleavedProcedures, ASessionThatGoesOnIsAsIfNothingHadHappened) {
   }
 }
 
-TEST(InterleavedProcedures, OrderIsByChance) {
+TEST(InterleavedProcedures, OrderIsRandom) {
   Random one(1), two(1);
   const auto first = run_tracks({one_of_each(), 1}, one);
   const auto second = run_tracks({one_of_each(), 2}, two);
@@ -87,7 +87,7 @@ TEST(InterleavedProcedures, OrderIsByChance) {
   EXPECT_GT(other, 10);
 }
 
-TEST(InterleavedProcedures, NoneIsLongerThanItsSpecSays) {
+TEST(InterleavedProcedures, NoneExceedsTheTrialsOfItsSpec) {
   for (const ProcedureSpec& spec : one_of_each()) {
     for (const double share : {0.0, 0.5, 1.0}) {
       Procedure procedure(spec, 4);

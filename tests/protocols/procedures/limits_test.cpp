@@ -7,7 +7,7 @@
 namespace palpate::protocols {
 namespace {
 
-/// Answers as somebody does whose threshold is exactly there.
+/// Answers of a participant with exactly this threshold.
 template <class Run>
 std::vector<double> shown_to(Run& run, double threshold, Easier easier = Easier::higher) {
   std::vector<double> levels;
@@ -43,7 +43,7 @@ TEST(LimitsProcedure, DescendingFirstAndLowerIsEasier) {
   EXPECT_EQ(run.estimate().threshold, 8.5);
 }
 
-TEST(LimitsProcedure, ThresholdsOutsideTheRangeAreNotMadeUp) {
+TEST(LimitsProcedure, NoThresholdIsEstimatedOutsideTheRange) {
   LimitsRun run(limits_to_ten(), 1);
   EXPECT_EQ(shown_to(run, 99).size(), 11u);  // ten without a change; the other changes at once
   EXPECT_EQ(run.estimate().at_limit, 1);
@@ -72,7 +72,7 @@ TEST(LimitsProcedure, StartsVaryWithTheSeed) {
     if (first && ascending) ++starts.at(static_cast<std::size_t>(*level) - 1);
     const bool success = *level > 5;
     run.record({*level, success});
-    first = success == ascending;  // the series is at its end
+    first = success == ascending;  // the series has ended
     if (first) ascending = !ascending;
   }
   for (const int count : starts) EXPECT_GT(count, 0);

@@ -72,7 +72,7 @@ TEST(Psychometric, LevelOfAShareIsTheInverse) {
   }
 }
 
-TEST(Psychometric, NothingAtLevelZeroOfALogarithmicScaleIsGuessedAt) {
+TEST(Psychometric, LevelZeroOfALogarithmicScaleGivesTheGuessRate) {
   for (const PsychometricShape shape : kShapes) {
     const PsychometricFunction function{shape, LevelScale::log10};
     EXPECT_EQ(psychometric_probability(function, {1, 3, 0.25, 0.1}, 0), 0.25);

@@ -8,8 +8,8 @@
 namespace palpate::protocols {
 namespace {
 
-/// Watson 2017, section "QUEST+", step by step, without a table and with the standard library:
-/// for every stimulus the posterior for either answer, its entropy, and the mean of these.
+/// Watson 2017, section "QUEST+", step by step, without tables and with the standard library: for
+/// every stimulus the posterior for either answer, its entropy, and the mean entropy.
 class PlainQuestPlus {
  public:
   explicit PlainQuestPlus(QuestPlus spec) : spec_(std::move(spec)) {
@@ -143,8 +143,8 @@ TEST(QuestPlusProcedure, EqualsTheDefinitionOfThePaper) {
   }
 }
 
-TEST(QuestPlusProcedure, EquallyGoodLevelsAreDecidedByOrder) {
-  // Symmetric about 0 in every respect: both sides of a threshold at 0 are equally good.
+TEST(QuestPlusProcedure, EquallyGoodLevelsAreChosenInOrder) {
+  // Fully symmetric about 0: both sides of a threshold at 0 are equally good.
   QuestPlus spec;
   spec.levels = {2, -2};
   spec.threshold = {{-1, 0, 1}, {}};
@@ -156,7 +156,7 @@ TEST(QuestPlusProcedure, EquallyGoodLevelsAreDecidedByOrder) {
   EXPECT_EQ(QuestPlusRun(spec).next_level(), -2);
 }
 
-TEST(QuestPlusProcedure, CountsALevelBesideTheGridAsWhatItIs) {
+TEST(QuestPlusProcedure, RecordsALevelOffTheGridAtItsTrueValue) {
   QuestPlus spec = small_quest(PsychometricShape::logistic, LevelScale::linear, Easier::higher);
   QuestPlusRun run(spec);
   PlainQuestPlus plain(spec);
@@ -183,12 +183,12 @@ TEST(QuestPlusProcedure, EndsAtAnEntropyOrAfterItsTrials) {
   EXPECT_GT(trials, 2);
 }
 
-TEST(QuestPlusProcedure, ImpossibleAnswersTeachNothing) {
+TEST(QuestPlusProcedure, ImpossibleAnswersAreIgnored) {
   QuestPlus spec = small_quest(PsychometricShape::weibull, LevelScale::log10, Easier::higher);
   spec.guess = {{0}, {}};
   QuestPlusRun run(spec);
   const std::vector<double> before = run.posterior();
-  run.record({0, true});  // nothing was there, nobody guesses, and yet "yes"
+  run.record({0, true});  // no stimulus and no guessing, yet "yes"
   EXPECT_EQ(run.posterior(), before);
   EXPECT_EQ(run.estimate().trials, 1);
 }
@@ -201,7 +201,7 @@ TEST(QuestPlusProcedure, MarginalsSumThePosterior) {
     for (const double p : run.marginal(parameter)) sum += p;
     EXPECT_NEAR(sum, 1, 1e-12);
   }
-  // The guess of 0 was three times as likely; an answer "yes" speaks for guessing.
+  // The guess rate 0 was three times as likely; an answer "yes" favours guessing.
   EXPECT_LT(run.marginal(2)[0], 0.75);
   EXPECT_NEAR(*run.estimate().guess, 0.5 * run.marginal(2)[1], 1e-12);
 }

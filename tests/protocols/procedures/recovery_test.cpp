@@ -62,9 +62,8 @@ TEST(ProcedureRecovery, StaircasesFindTheirConvergencePoint) {
   }
 }
 
-// Garcia-Perez 1998: in forced choice these ratios make a staircase converge at the same share of
-// successes with steps of any size, and transformed and weighted ones in general miss their
-// targets.
+// Garcia-Perez 1998: in forced choice, these ratios make a staircase converge at the same share of
+// successes for any step size; transformed and weighted staircases in general miss their targets.
 TEST(ProcedureRecovery, RatiosOfGarciaPerezAreNearlyIndifferentToTheStep) {
   for (const std::uint64_t seed : {1U, 2U}) {
     const double ratios[] = {0.2845, 0.5488, 0.7393, 0.8415};
@@ -90,8 +89,9 @@ TEST(ProcedureRecovery, RatiosOfGarciaPerezAreNearlyIndifferentToTheStep) {
   }
 }
 
-// Where successes are 75 % frequent on average, the mean level is not the level of 75 %: the
-// function bends, and a weighted staircase spreads over its steps. So the bias is one of the step.
+// The mean level of a staircase with 75 % successes on average is not the level of 75 %: the
+// function is curved, and a weighted staircase spreads over its steps. So the bias depends on the
+// step.
 TEST(ProcedureRecovery, WeightedStaircasesAreBiasedByTheirSteps) {
   for (const std::uint64_t seed : {1U, 2U}) {
     double coarse = 0;
@@ -145,7 +145,7 @@ TEST(ProcedureRecovery, QuestPlusOfTheThresholdAloneIsEfficient) {
     const double efficiency = 1 / (128 * best_information(kForcedChoice) * r.spread * r.spread);
     std::printf("        efficiency %.2f\n", efficiency);
     EXPECT_NEAR(r.bias, 0, 0.1 * r.spread + 3 * r.bias_se);
-    // The first trials are spent on the search; the standard error of a variance of 200
+    // The first trials are spent on the search; the standard error of a variance over 200
     // participants is a tenth of it.
     EXPECT_GT(efficiency, 0.6);
     EXPECT_LT(efficiency, 1.2);
@@ -158,7 +158,7 @@ TEST(ProcedureRecovery, QuestPlusGrowsMoreCertainWithItsTrials) {
     for (const int trials : {32, 64, 128}) {
       const Recovery r =
           print("QUEST+, Weibull 2AFC", forced_choice_quest(trials), kForcedChoice, seed);
-      // The means of skewed posteriors: a bias that is small beside the spread.
+      // Means of skewed posteriors have a bias that is small compared with the spread.
       EXPECT_NEAR(r.bias, 0, 0.2 * r.spread + 3 * r.bias_se) << trials;
       EXPECT_LT(r.spread, 0.85 * before);  // ideally 1 / sqrt(2)
       before = r.spread;
@@ -166,7 +166,7 @@ TEST(ProcedureRecovery, QuestPlusGrowsMoreCertainWithItsTrials) {
   }
 }
 
-TEST(ProcedureRecovery, NobodyAnswersAnythingFoundIsSaidToBeWithoutEstimate) {
+TEST(ProcedureRecovery, ParticipantsWithoutEstimateAreCounted) {
   Staircase spec = yes_no_staircase(0.5);
   const PsychometricParticipant never{{}, {1000, 2}};
   const Recovery r = simulate_recovery(spec, never, 20, 1);

@@ -99,12 +99,12 @@ TEST(Staircase, EstimateBalancesPeaksAndValleys) {
   ASSERT_EQ(run.reversal_levels(), (std::vector<double>{9, 11, 8}));
   EXPECT_EQ(run.estimate().threshold, 9.5);
   levels_after(run, "+");
-  // A fourth one, 10: of three the first is left out.
+  // A fourth reversal, 10: of the remaining three the first is left out.
   ASSERT_EQ(run.reversal_levels().back(), 10);
   EXPECT_EQ(run.estimate().threshold, 9);
 }
 
-TEST(Staircase, GoesOnFromALevelOfSomebodyElse) {
+TEST(Staircase, ContinuesFromALevelOfAnotherProgram) {
   StaircaseRun run(simple_staircase());
   run.record({15, true});
   EXPECT_EQ(run.next_level(), 14);
@@ -131,7 +131,7 @@ TEST(Staircase, ConvergencePointsOfTheLiterature) {
   EXPECT_NEAR(point(1, 3, step_ratio_for(0.8, 3)), 0.8, 1e-12);
 }
 
-/// Share of successes over a long run of a staircase: where it hovers.
+/// Share of successes over a long run of a staircase.
 double share_of_successes(Staircase spec, std::uint64_t seed) {
   const PsychometricParticipant participant{{}, {10, 0.4}};
   spec.stop_trials = 200000;

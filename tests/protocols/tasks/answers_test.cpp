@@ -1,5 +1,4 @@
-// Answers of tasks: what they are without keys of one's own, keys and labels, scales, and what is
-// refused.
+// Answers of tasks: defaults, chosen keys and labels, scales, and refusals.
 
 #include <gtest/gtest.h>
 
@@ -17,7 +16,7 @@ namespace answering {
 
 using nlohmann::json;
 
-/// The block of a protocol whose other parts are good; `more` is put into it.
+/// A block of an otherwise valid protocol, with `more` merged into it.
 json document(const std::string& task, const json& more) {
   json block{{"name", "b"}, {"task", task}, {"stimuli", {"ball"}}};
   if (task == "compare") block["standard"] = "ball";
@@ -57,7 +56,7 @@ std::vector<std::string> answers_of_block(const std::string& task, const json& m
 
 using Places = std::vector<std::string>;
 
-TEST(Answers, OfALevelThatIsSetAreTurnsTheOtherObjectAndTheEnd) {
+TEST(Answers, OfAnAdjustmentAreTurnsSwitchAndDone) {
   const std::vector<std::string> all =
       answers_of_block("adjust", {{"standard", "ball"},
                                   {"level", {{"path", "/stiffness_n_per_m"}}},
@@ -73,12 +72,12 @@ TEST(Answers, OfALevelThatIsSetAreTurnsTheOtherObjectAndTheEnd) {
   EXPECT_TRUE(all[3].ends_with(" done done")) << all[3];
 }
 
-TEST(Answers, AreNumberedInOrderWhereNoKeysAreNamed) {
+TEST(Answers, AreNumberedInOrderByDefault) {
   EXPECT_EQ(answers_of_block("compare", json::object()), (Places{"1 1 1", "2 2 2"}));
   EXPECT_EQ(answers_of_block("compare", {{"intervals", 3}}), (Places{"1 1 1", "2 2 2", "3 3 3"}));
 }
 
-TEST(Answers, KeysAndLabelsAreOnesOwn) {
+TEST(Answers, KeysAndLabelsCanBeChosen) {
   EXPECT_EQ(answers_of_block("compare", {{"keys", {{"z", "1"}, {"a", "2"}}}}),
             (Places{"a 2 2", "z 1 1"}))
       << "in the order of the keys";

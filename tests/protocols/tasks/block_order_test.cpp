@@ -1,5 +1,4 @@
-// Blocks whose trials are fixed beforehand: what they are of, how often, and the limits on their
-// order.
+// Blocks whose trials are fixed in advance: their kinds and numbers, and the limits on their order.
 
 #include <gtest/gtest.h>
 
@@ -52,7 +51,7 @@ using Kind = std::tuple<int, RendererKind, std::optional<double>>;  ///< stimulu
 
 Kind kind_of(const Trial& trial) { return {trial.stimulus, trial.renderer, trial.level}; }
 
-/// \param of_each  trials
+/// \param of_each  trials of each kind
 void expect_order(const json& block, std::size_t kinds, int of_each, std::size_t longest,
                   std::size_t nearest) {
   const Protocol protocol = parsed(study_of(block));
@@ -71,7 +70,7 @@ void expect_order(const json& block, std::size_t kinds, int of_each, std::size_t
         EXPECT_EQ(interval.renderer, trial.renderer);
         EXPECT_EQ(interval.stimulus, interval.standard ? 2 : trial.stimulus);
       }
-      // The last so many are neither all of this kind, nor is any of the nearest.
+      // At most `longest` of one kind in a row, and equal kinds at least `nearest` trials apart.
       std::size_t run = 1;
       while (run < order.size() && order[order.size() - 1 - run] == kind) ++run;
       EXPECT_LE(run, longest) << block.dump() << " " << order.size();
@@ -106,7 +105,7 @@ TEST(BlockOrder, KeepsItsLimitsWithOneRendererAndWithTwo) {
       }
       for (const std::size_t nearest : {2, 3}) {
         block["order"] = {{"min_distance", nearest}};
-        // Three kinds three apart have one order each, told apart by its beginning only.
+        // Three kinds three apart have one order for each beginning.
         if (kinds > nearest) expect_order(block, kinds, of_each, kAny, nearest);
       }
     }

@@ -1,4 +1,4 @@
-// Procedures read from a text that is stored are those of the session that was shown.
+// Procedures read from a stored text are those of the recorded session.
 
 #include <gtest/gtest.h>
 
@@ -21,7 +21,7 @@ nlohmann::json adaptive_study() {
   return document;
 }
 
-TEST(BlockProcedures, EstimateWhatTheTracksOfTheSessionEstimated) {
+TEST(BlockProcedures, GiveTheEstimatesOfTheSessionsTracks) {
   const Protocol protocol = parsed(adaptive_study());
   const auto blocks = procedures_of_blocks(protocol.source_text, "study.json");
   ASSERT_EQ(blocks.size(), 4U);
@@ -49,7 +49,7 @@ TEST(BlockProcedures, EstimateWhatTheTracksOfTheSessionEstimated) {
       const auto& procedures = blocks.at(protocol.blocks[static_cast<std::size_t>(block)].name);
       Procedure again = procedures.begin(participant, track);
       for (const Response& answer : answers[place]) {
-        // Limits with a jitter begin elsewhere with another seed.
+        // Limits with a jitter begin at another level with another seed.
         if (again.history().size() < static_cast<std::size_t>(estimate.trials))
           again.record(answer);
       }
@@ -63,7 +63,7 @@ TEST(BlockProcedures, EstimateWhatTheTracksOfTheSessionEstimated) {
   EXPECT_EQ(compared, 3U * (2 + 8));
 }
 
-TEST(BlockProcedures, SayWhatIsAskedAndVaried) {
+TEST(BlockProcedures, HaveTheQuestionAndTheUnitOfTheLevel) {
   nlohmann::json document = task_study();
   document["blocks"][0]["asks"] = "smaller";
   document["blocks"].push_back(nlohmann::json::parse(

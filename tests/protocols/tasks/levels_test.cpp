@@ -1,4 +1,4 @@
-// Which levels a block can show, what a stimulus has itself, and units and texts of levels.
+// The levels that a block can show, a stimulus's own level, and units and texts of levels.
 
 #include "protocols/tasks/levels.h"
 
@@ -62,7 +62,7 @@ TEST(Levels, OfConstantStimuliAreEachOnceInOrder) {
   EXPECT_EQ(levels_of(protocol.blocks[0]), (Levels{200, 300, 400}));
 }
 
-/// A sphere has some size, and not that of a country.
+/// A sphere has a positive and limited size.
 TEST(Levels, AnAdjustmentReachesOnlyWhatTheStimulusCanHave) {
   const auto is_refused = [](double least, double most) {
     try {

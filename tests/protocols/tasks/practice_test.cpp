@@ -13,7 +13,7 @@ namespace {
 
 using nlohmann::json;
 
-/// A block of practice, then one that counts.
+/// A block of practice, then a main block.
 Protocol practised(const char* criterion, int limit) {
   json document = task_study();
   json practice = json::parse(R"({"name": "try", "task": "identify", "stimuli": ["soft", "lump"],
@@ -26,7 +26,8 @@ Protocol practised(const char* criterion, int limit) {
   return parsed(document);
 }
 
-/// Right or wrong as told, then right. \return  trials of practice
+/// Answers right or wrong as given, then right.
+/// \return trials of practice
 std::vector<Trial> practice_of(const Protocol& protocol, const std::string& answers) {
   TaskPlan plan(protocol, 1, 1);
   std::vector<Trial> shown;
@@ -42,22 +43,22 @@ std::vector<Trial> practice_of(const Protocol& protocol, const std::string& answ
   return shown;
 }
 
-TEST(Practice, IsOverOnceSoManyOfTheLastAnswersWereRight) {
+TEST(Practice, EndsOnceEnoughOfTheLastAnswersWereRight) {
   const Protocol protocol = practised(R"({"correct": 3, "of": 4})", 30);
   EXPECT_EQ(practice_of(protocol, "1111").size(), 4U);
   EXPECT_EQ(practice_of(protocol, "0111").size(), 4U);
   EXPECT_EQ(practice_of(protocol, "1010").size(), 6U);  // 1010 11: the last four have three
-  EXPECT_EQ(practice_of(protocol, "11-0").size(), 7U);  // a time-out is no right answer
+  EXPECT_EQ(practice_of(protocol, "11-0").size(), 7U);  // a time-out is not a right answer
   EXPECT_EQ(practice_of(protocol, "0000000000").size(), 13U);
 }
 
-TEST(Practice, EndsAtItsLimitWhateverIsAnswered) {
+TEST(Practice, EndsAtItsLimitWhateverTheAnswers) {
   const Protocol protocol = practised(R"({"correct": 4, "of": 4})", 7);
   EXPECT_EQ(practice_of(protocol, "0000000000").size(), 7U);
   EXPECT_EQ(most_trials_of(protocol.blocks[0]), 7);
 }
 
-TEST(Practice, ComesAgainInRoundsOfAnOrderOfTheirOwn) {
+TEST(Practice, RepeatsInRoundsWithTheirOwnOrder) {
   const Protocol protocol = practised(R"({"correct": 8, "of": 8})", 40);
   const std::vector<Trial> shown = practice_of(protocol, std::string(40, '0'));
   ASSERT_EQ(shown.size(), 40U);
@@ -71,7 +72,7 @@ TEST(Practice, ComesAgainInRoundsOfAnOrderOfTheirOwn) {
   EXPECT_GE(orders.size(), 3U);
 }
 
-TEST(Practice, WithoutCriterionIsShownOnceAsBefore) {
+TEST(Practice, WithoutCriterionIsShownOnce) {
   json document = task_study();
   document["blocks"][0]["practice"] = true;
   const Protocol protocol = parsed(document);

@@ -1,5 +1,5 @@
-// The next trial follows from protocol, participant and answers alone, and every trial is as its
-// block says.
+// The next trial follows from protocol, participant and answers alone, and every trial agrees with
+// its block.
 
 #include "protocols/tasks/task_plan.h"
 
@@ -25,7 +25,7 @@ bool same(const Trial& a, const Trial& b) {
          a.orientation == b.orientation && a.catch_trial == b.catch_trial;
 }
 
-TEST(TaskPlan, GoesOnFromAnyTrialAsIfNothingHadHappened) {
+TEST(TaskPlan, ContinuesTheSameFromAnyTrial) {
   const Protocol protocol = parsed(task_study());
   const std::vector<Trial> whole = worked_off(TaskPlan(protocol, 3, 1));
   ASSERT_GT(whole.size(), 60U);
@@ -102,7 +102,7 @@ TEST(TaskPlan, FollowsEachStaircaseByItsOwnAnswers) {
   for (const auto& [number, track] : tracks) EXPECT_FALSE(track.next_level().has_value());
 }
 
-TEST(TaskPlan, HasTheShareOfCatchTrialsInWhichNothingIsShown) {
+TEST(TaskPlan, HasTheShareOfCatchTrials) {
   int catches = 0, all = 0;
   std::map<decltype(Trial::renderer), int> of_renderer, catches_of_renderer;
   std::map<int, std::set<decltype(Trial::renderer)>> of_track;
@@ -120,7 +120,7 @@ TEST(TaskPlan, HasTheShareOfCatchTrialsInWhichNothingIsShown) {
   }
   EXPECT_EQ(all, 24);  // 3 levels x 3 x 2 renderers, and a quarter of all
   EXPECT_EQ(catches, 6);
-  // As many with each renderer, and each in the track of its renderer.
+  // Equally many with each renderer, and each in the track of its renderer.
   ASSERT_EQ(of_renderer.size(), 2U);
   for (const auto& [renderer, count] : of_renderer) {
     EXPECT_EQ(count, 12);

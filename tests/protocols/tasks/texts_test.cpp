@@ -67,7 +67,7 @@ TEST(Texts, EachIsUnderItsKeyInTheFile) {
     EXPECT_EQ(found["texts." + name], text) << name;
 }
 
-TEST(Texts, AreReplacedEveryOneButWhatIsStoredStays) {
+TEST(Texts, AreAllReplacedButStoredAnswersStay) {
   Protocol protocol = everything();
   json other;
   for (const auto& [key, text] : texts_of(protocol)) other[key] = "T " + key;
@@ -87,7 +87,7 @@ TEST(Texts, NameEveryKeyThatIsMissingUnknownOrWrong) {
   texts.erase("pages.consent.text");
   texts["blocks.constant.question"] = 3;
   texts["blocks.constant.keys.2"] = "two\nlines";
-  texts["blocks.which.keys.ball"] = "die";  // as the other one is called
+  texts["blocks.which.keys.ball"] = "die";  // the label of the other one
   texts["blocks.nowhere.question"] = "?";
   std::vector<std::string> places = faults_of(texts.dump());
   std::sort(places.begin(), places.end());
