@@ -29,7 +29,7 @@ std::uint32_t SupportMap::near_support(const Vec3& direction) const {
 
 namespace {
 
-/// The surface of a mesh as a body: where its middle is, and how far it reaches in each direction.
+/// The middle and the extent in each direction of a mesh's surface, as of a body.
 struct Moments {
   Vec3 middle;
   std::array<std::array<double, 3>, 3> second{};  // m^2, about the middle
@@ -65,18 +65,18 @@ struct Moments {
   }
 };
 
-/// A ray out of the middle of a mesh.
+/// A ray from the middle of a mesh.
 struct Ray {
   Vec3 from, along;
 
-  /// How far along it the plane of a facet is; infinite where it is not ahead.
+  /// The distance along the ray to the plane of a facet; infinite if the plane is not ahead.
   double until(const stimuli::Facet& facet) const {
     const double rate = glm::dot(facet.normal, along);
     return rate > 0 ? (facet.offset - glm::dot(facet.normal, from)) / rate : HUGE_VAL;
   }
 };
 
-/// The facet by which the ray leaves the mesh: walks there, from the facet `start`.
+/// The facet by which the ray leaves the mesh, found by a walk from the facet `start`.
 std::uint32_t exit_facet(const stimuli::ConvexMesh& mesh, const Ray& ray, std::uint32_t start) {
   std::uint32_t at = start;
   double time = ray.until(mesh.facets()[at]);
@@ -107,7 +107,8 @@ FacetMap::FacetMap(const stimuli::ConvexMesh& mesh, std::size_t small_mesh,
   if (mesh.vertices().size() <= small_mesh) return;
   const Moments moments(mesh);
   middle_ = moments.middle;
-  // Cholesky's factor of the moments takes a ball to a body as wide as the mesh, its inverse back.
+  // The Cholesky factor of the moments maps a ball to a body as wide as the mesh; its inverse maps
+  // back.
   const auto& s = moments.second;
   const double least = 1e-12 * mesh.size() * mesh.size();
   const double a = std::sqrt(std::max(s[0][0], least));

@@ -1,6 +1,6 @@
 #pragma once
-// Directions cut into cells, as a cube map, and what a mesh looks up by direction: where searches
-// for its support and for its facets begin.
+// Directions divided into cells, as a cube map, and a mesh's maps by direction: the starts of
+// searches for its support and its facets.
 
 #include <algorithm>
 #include <cmath>
@@ -16,7 +16,7 @@ namespace palpate::rendering {
 /// The faces of a cube about the origin, each cut into resolution x resolution squares.
 class DirectionCells {
  public:
-  /// \param cells  wanted in all, about
+  /// \param approximate number of cells in total
   static DirectionCells about(double cells) {
     return DirectionCells(std::max(1, static_cast<int>(std::sqrt(cells / 6))));
   }
@@ -27,7 +27,7 @@ class DirectionCells {
     return 6 * static_cast<std::size_t>(resolution_) * static_cast<std::size_t>(resolution_);
   }
 
-  /// \param direction  any length; of 0 or without an end the cell is any
+  /// \param direction  any length; for 0 or an infinite one, any cell
   std::size_t cell_of(const Vec3& direction) const {
     int axis = 0;
     for (int k = 1; k < 3; ++k) {
@@ -60,7 +60,7 @@ class DirectionCells {
   }
 
  private:
-  /// The square along a side that coordinate c in [-1, 1] lies in; some square if c is no number.
+  /// The square along a side that contains coordinate c in [-1, 1]; some square if c is NaN.
   int square_of(double c) const {
     return static_cast<int>(
         std::min(std::max(0.0, (c + 1) * 0.5 * resolution_), resolution_ - 1.0));
@@ -75,10 +75,10 @@ class DirectionCells {
   int resolution_ = 0;
 };
 
-// Where hill climbing for the support function (separation.h) begins on a large mesh.
+// The start of hill climbing for the support function (separation.h) on a large mesh.
 
 /// A cube map of directions with the support vertex of each cell's middle, so that a climb takes a
-/// few steps whatever the number of vertices. Small meshes, climbed in few steps anyway, have none.
+/// few steps for any number of vertices. Small meshes need few steps anyway and have no map.
 class SupportMap {
  public:
   static constexpr std::size_t kSmallMesh = 2048;  ///< vertices; a mesh of up to so many has no map
@@ -98,13 +98,13 @@ class SupportMap {
   std::vector<std::uint32_t> cells_;
 };
 
-// Where walks over a large mesh begin: the facet by which a ray out of its middle leaves it.
+// The start of walks over a large mesh: the facet by which a ray from its middle leaves it.
 
-/// A cube map of directions with the facet that the middle ray of each cell leaves the mesh by, so
-/// that a walk begins a few facets from where it ends, whatever the number of facets. Directions
-/// are those of a frame in which the mesh is as wide in all of them (a linear map, from the second
-/// moments of its surface): plates and needles are seen as round ones. Small meshes, walked over in
-/// few steps anyway, have none. Built in linear time; 4 bytes a cell.
+/// A cube map of directions with the facet by which each cell's middle ray leaves the mesh, so that
+/// a walk begins a few facets from its end for any number of facets. Directions are those of a
+/// frame in which the mesh is equally wide in all directions (a linear map, from the second moments
+/// of its surface): there, plates and needles are round. Small meshes need few steps anyway and
+/// have no map. Built in linear time; 4 bytes a cell.
 class FacetMap {
  public:
   /// \param small_mesh       up to so many vertices get no map
@@ -120,7 +120,7 @@ class FacetMap {
   std::uint32_t facet_under(const Vec3& p) const;
 
  private:
-  /// To the frame in which the mesh is round, from the middle.
+  /// Maps to the frame in which the mesh is round, from the middle.
   Vec3 rounded(const Vec3& v) const;
 
   Vec3 middle_;

@@ -9,7 +9,7 @@
 namespace palpate::rendering {
 
 /// The virtual probe as the device reports it: a segment from tip to tail, m. World frame, or the
-/// mesh frame where a function says so. tip == tail: a point.
+/// mesh frame if a function says so. tip == tail: a point.
 struct LineProbe {
   Vec3 tip, tail;
 };
@@ -18,38 +18,38 @@ inline LineProbe translated(const LineProbe& probe, const Vec3& by) {
   return {probe.tip + by, probe.tail + by};
 }
 
-// What of a scene moves by itself. The renderers know no more of it than this; a scene in which
-// nothing moves has none, and its tick does not ask. World frame, SI units.
+// The moving objects of a scene, as far as the renderers know them. A scene without moving objects
+// has none of this, and its tick does not test for it. World frame, SI units.
 
 class Renderer;
 struct RenderState;
 struct Rendering;
 
-/// Where a moving object is.
+/// The pose and velocity of a moving object.
 struct BodyPose {
   int object = 0;    ///< index of the object in the scene
   Vec3 centre;       ///< m, of mass
   Quat orientation;  ///< from the object's axes to the world's
   Vec3 velocity;     ///< m/s, of the centre of mass
   Vec3 spin;         ///< rad/s
-  Pose moved;        ///< from where the scene placed the object to where it is
+  Pose moved;        ///< from its place in the scene's description to its present one
 };
 
-/// Somebody draws an object by a spring beside the probe, as with the mouse.
+/// A spring that pulls an object beside the probe, as with the mouse.
 struct BodyPull {
-  int object = -1;  ///< index in the scene; -1: none is drawn
-  Vec3 on_object;   ///< m, world; the place on it, where the scene placed the object at first
-  Vec3 to;          ///< m, world; where that place is drawn to
+  int object = -1;  ///< index in the scene; -1: none is pulled
+  Vec3 on_object;   ///< m, world; the place on the object as the scene first placed it
+  Vec3 to;          ///< m, world; target of that place
 };
 
-/// All that moves, from tick to tick.
+/// The state of everything that moves between ticks.
 class MotionState {
  public:
   virtual ~MotionState() = default;
   virtual std::unique_ptr<MotionState> clone() const = 0;
   /// By object. Valid until the next tick, which changes them in place.
   virtual std::span<const BodyPose> bodies() const = 0;
-  /// From the next tick on until the next call. Objects that cannot be drawn stay as they are.
+  /// Acts from the next tick on until the next call. Objects that cannot be pulled are unaffected.
   virtual void pull(const BodyPull& /*pull*/) noexcept {}
 
  protected:
@@ -58,12 +58,13 @@ class MotionState {
   MotionState& operator=(const MotionState&) = default;
 };
 
-/// How it moves. Immutable, part of the scene.
+/// The motion of a scene. Immutable, part of the scene.
 class SceneMotion {
  public:
   virtual ~SceneMotion() = default;
   virtual std::unique_ptr<MotionState> initial_state() const = 0;
-  /// The whole tick: what moves goes on for dt, the probe touches all of the scene.
+  /// The whole tick: moves the objects by dt and renders the contact of the probe with the whole
+  /// scene.
   virtual Rendering tick(const Renderer& renderer, RenderState& state, const LineProbe& probe,
                          double dt) const noexcept = 0;
 
@@ -73,7 +74,7 @@ class SceneMotion {
   SceneMotion& operator=(const SceneMotion&) = default;
 };
 
-/// A MotionState that is copied with what holds it. Copying allocates; ticks do not copy.
+/// A MotionState that is copied with its owner. Copying allocates; ticks do not copy.
 class OwnedMotion {
  public:
   OwnedMotion() = default;
@@ -88,7 +89,7 @@ class OwnedMotion {
   ~OwnedMotion() = default;
 
   MotionState* get() const { return state_.get(); }
-  /// Empty where nothing moves.
+  /// Empty if nothing moves.
   std::span<const BodyPose> bodies() const {
     return state_ ? state_->bodies() : std::span<const BodyPose>();
   }

@@ -1,7 +1,7 @@
 #pragma once
 // The extended probe (Ho, Basdogan & Srinivasan 2000, fig. 3b): a virtual stylus that is the real
-// one stretched about a pivot, and the forces that the hand gets of it by virtual work. Pure. World
-// frame, SI units.
+// one stretched about a pivot, and the forces on the hand by virtual work. Pure. World frame, SI
+// units.
 
 #include <algorithm>
 #include <glm/geometric.hpp>
@@ -15,8 +15,8 @@ namespace palpate::rendering {
 struct Reach {
   double factor = 1;      ///< virtual length by real length, above 0
   bool in_world = false;  ///< the pivot stands still in the world; else it is carried by the stylus
-  double fraction = 0;  ///< of the stylus, where it carries the pivot: 0 at the tip, 1 at the tail
-  Vec3 point{0, 0, 0};  ///< m, of a pivot in the world
+  double fraction = 0;    ///< place of a pivot on the stylus: 0 at the tip, 1 at the tail
+  Vec3 point{0, 0, 0};    ///< m, of a pivot in the world
 
   Vec3 pivot(const LineProbe& real) const {
     return in_world ? point : (1 - fraction) * real.tip + fraction * real.tail;
@@ -40,11 +40,11 @@ inline LineProbe unstretched(const Reach& reach, const LineProbe& virtual_probe)
           pivot + (virtual_probe.tail - pivot) / reach.factor};
 }
 
-/// What forces on the ends of the virtual stylus are on the ends of the real one: for every motion
-/// of the real ends they do the same work. The virtual ends are linear in the real ones,
-///   v = factor r + (1 - factor) pivot,  pivot = (1 - fraction) r_tip + fraction r_tail,
-/// so these are the forces through the transposed map. A pivot on the stylus leaves their sum as it
-/// is; one in the world multiplies it by the factor.
+/// The forces on the ends of the real stylus for forces on the ends of the virtual one: they do the
+/// same work for every motion of the real ends. The virtual ends are linear in the real ones,
+///   v = factor r + (1 - factor) pivot,  pivot = (1 - fraction) r_tip + fraction r_tail, so these
+///   are the forces through the transposed map. A pivot on the stylus keeps their sum; one in the
+///   world multiplies it by the factor.
 inline EndForces felt(const Reach& reach, const EndForces& on_virtual) {
   const Vec3 tip = reach.factor * on_virtual.tip, tail = reach.factor * on_virtual.tail;
   if (reach.in_world) return {tip, tail};
@@ -52,7 +52,7 @@ inline EndForces felt(const Reach& reach, const EndForces& on_virtual) {
   return {tip + (1 - reach.fraction) * on_pivot, tail + reach.fraction * on_pivot};
 }
 
-/// The inverse of felt: which forces on the virtual ends are felt as these.
+/// The inverse of felt: the forces on the virtual ends that are felt as these.
 inline EndForces on_virtual(const Reach& reach, const EndForces& felt_at_ends) {
   const Vec3 pivot =
       reach.in_world ? Vec3(0) : (1 - reach.factor) * (felt_at_ends.tip + felt_at_ends.tail);
@@ -60,8 +60,8 @@ inline EndForces on_virtual(const Reach& reach, const EndForces& felt_at_ends) {
           (felt_at_ends.tail - reach.fraction * pivot) / reach.factor};
 }
 
-/// A rendering of the virtual stylus as the hand gets it: force and device forces at the real ends.
-/// Torque stays about the virtual tip, and all places are where they are on the virtual stylus.
+/// A rendering of the virtual stylus with force and device forces at the real ends. Torque stays
+/// about the virtual tip, and all places stay on the virtual stylus.
 inline Rendering felt(const Reach& reach, Rendering rendering) {
   const EndForces forces = felt(reach, EndForces{rendering.device1, rendering.device2});
   rendering.device1 = forces.tip;
@@ -70,10 +70,9 @@ inline Rendering felt(const Reach& reach, Rendering rendering) {
   return rendering;
 }
 
-/// How many times a contact's stiffness is felt through a lever: the square of how far a contact at
-/// `along` (0 at the virtual tip, 1 at the virtual tail) moves when the real ends move by 1 in all
-/// (the root of their squares' sum), in the direction in which it moves most. 1 for a plain stylus
-/// touched at an end.
+/// The factor by which a lever multiplies a contact's felt stiffness. It is the square of the
+/// greatest motion of a contact at `along` (0 at the virtual tip, 1 at the virtual tail) for a unit
+/// motion of the real ends (root of the sum of squares). 1 for a plain stylus touched at an end.
 inline double stiffness_gain(const Reach& reach, double along) {
   const double pivot = reach.in_world ? 0 : 1 - reach.factor;
   const double tip = (1 - along) * reach.factor + pivot * (1 - reach.fraction);

@@ -1,19 +1,19 @@
 #pragma once
-// The fault bits of a renderer, and the one table that says what they mean: names in files, words
-// on screens and codebooks are made from it.
+// The fault bits of a renderer and the one table of their meanings: names in files, words on
+// screens and codebooks come from it.
 
 #include <array>
 #include <cstdint>
 
 namespace palpate::rendering {
 
-/// What a fault bit is called and what it means.
+/// The names of a fault bit and its meaning.
 struct FaultBit {
   std::uint32_t bit;
   const char* name;      ///< in files
   const char* words;     ///< on a screen
   const char* meaning;   ///< in a codebook
-  const char* why = "";  ///< why forces went off, in a sentence; "" where they do not
+  const char* why = "";  ///< why forces went off, in a sentence; "" if they do not
 };
 
 /// Bits of Rendering::faults.
@@ -34,25 +34,25 @@ inline constexpr std::array<FaultBit, 8> kRenderFaults = {{
      "the pose or the force was not a finite number: zero force until cleared",
      "a force or pose was not finite"},
     {render_fault::kStartedInside, "started-inside", "started inside",
-     "the stylus was inside an object at first: no force from it until it has been left once"},
+     "the stylus was inside an object at the start: no force from that object until the stylus has "
+     "left it once"},
     {render_fault::kWalkCapped, "walk-capped", "search cut short",
-     "the search for the deepest contact met its limit of steps: the force may not be the last"},
+     "the search for the deepest contact reached its limit of steps: the force may be inexact"},
     {render_fault::kContactsDropped, "contacts-dropped", "too many contacts",
-     "more objects were touched at once than are rendered: the force is too small"},
+     "more contacts at once than can be computed: some were left out, and the force may be too "
+     "small"},
     {render_fault::kContactCapped, "contact-capped", "contact cut short",
-     "the search for where several contacts let the ideal tool be met its limit of rounds: it "
-     "stayed "
-     "where it was"},
+     "with several contacts, the search for the ideal tool's position reached its limit of rounds: "
+     "the tool stayed where it was"},
     {render_fault::kReleased, "released", "hooked tool released",
-     "the tool hooked behind an object and turned too far from it: its force faded, and there is "
-     "none "
-     "from that object until it has been left"},
+     "the tool was hooked behind an object and turned too far: the force faded, and the object "
+     "gives no force until the tool has left it"},
     {render_fault::kSoftLate, "soft-late", "soft body late",
-     "the next step of a soft object was not there in time: its surface gave way by its local "
-     "compliance alone"},
+     "the next step of a soft object came too late: its surface yielded by its local compliance "
+     "alone"},
     {render_fault::kSoftStalled, "soft-stalled", "soft body stalled",
-     "the steps of a soft object had not come for a tenth of a second: zero force until cleared",
-     "a soft object was not stepped any more"},
+     "no step of a soft object for a tenth of a second: zero force until cleared",
+     "the steps of a soft object stopped"},
 }};
 
 /// Every bit of the table.

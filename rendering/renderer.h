@@ -19,7 +19,7 @@ struct Rendering {
   Vec3 device1;     ///< N, for the device at the tip
   Vec3 device2;     ///< N, for the device at the tail
   Contact deepest;  ///< the contact of largest depth; type none in free space
-  /// Ideal probe of the deepest contact; in free space the virtual one, or the one behind in
+  /// Ideal probe of the deepest contact; in free space the virtual one, or one that lags in
   /// turning.
   LineProbe ideal;
   int contacts = 0;          ///< contact points with force

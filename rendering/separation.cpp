@@ -118,7 +118,7 @@ void find_separating_plane(const stimuli::ConvexMesh& mesh, const Vec3& tip, con
   if (!(glm::dot(direction, direction) > 0)) direction = Vec3(1, 0, 0);
   plane.valid = false;
   double best_gap = -tolerance;
-  // Upper bound: to the nearest point of the current simplex; 0 before there is one.
+  // Upper bound: the distance to the nearest point of the current simplex; 0 before there is one.
   double distance = 0;
   Simplex simplex;
   for (int i = 0; i < kIterations; ++i) {

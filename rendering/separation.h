@@ -1,6 +1,6 @@
 #pragma once
-// Separating planes between probe and object: while one is valid, nothing else need be computed for
-// that object. Mesh frame, SI units.
+// Separating planes between probe and object: while one is valid, no other computation is needed
+// for that object. Mesh frame, SI units.
 
 #include <cstdint>
 #include <glm/geometric.hpp>
@@ -28,12 +28,13 @@ struct SeparatingPlane {
 std::uint32_t support_vertex(const stimuli::ConvexMesh& mesh, const Vec3& direction,
                              std::uint32_t start);
 
-/// Looks for a separating plane between the mesh and the segment, starting from `plane.normal` (any
-/// direction where there is none) and the vertex `support`; both are updated. plane.valid says
-/// whether one was found. Gilbert, Johnson & Keerthi 1988 (GJK), stopped at the first direction
-/// that shows at least half of the distance. \param tolerance  m; a probe that is no deeper than
-/// this is at the surface: the plane it touches counts, although it does not separate strictly
-/// \param map  of the mesh, or null: where hill climbing begins
+/// Searches for a separating plane between the mesh and the segment, starting from `plane.normal`
+/// (any direction if there is none) and the vertex `support`; updates both and sets plane.valid.
+/// Gilbert, Johnson & Keerthi 1988 (GJK), stopped at the first direction that gives at least half
+/// of the distance.
+/// \param tolerance  m; a probe no deeper than this is at the surface: the plane that it touches
+/// counts, although it does not separate strictly
+/// \param map  of the mesh, the start of hill climbing; or null
 void find_separating_plane(const stimuli::ConvexMesh& mesh, const Vec3& tip, const Vec3& tail,
                            double tolerance, SeparatingPlane& plane, std::uint32_t& support,
                            const SupportMap* map = nullptr);

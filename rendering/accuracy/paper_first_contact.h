@@ -28,19 +28,19 @@ bool paper_first_contact(const stimuli::ConvexMesh& mesh, const LineProbe& befor
 
 /// First contacts found and missed at one speed of the hand.
 struct FirstContactLoss {
-  double speed = 0;      ///< m/s, of the point of the stylus that leads
+  double speed = 0;      ///< m/s, of the leading point of the stylus
   double turning = 0;    ///< rad/s
   int entries = 0;       ///< trials in which the probe enters
   int paper_missed = 0;  ///< no crossing found in the tick of entry
-  int paper_never = 0;   ///< of those: nor in any of the next 20 ticks that are in contact
+  int paper_never = 0;   ///< those of them not found in any of the next 20 ticks in contact
   int paper_early = 0;   ///< a crossing reported in an earlier tick, without a touch
   int exact_missed = 0;  ///< by first_contact_segment, in the tick of entry
 };
 
 /// Straight motions at 1 kHz that bring a stylus of 0.12 m into the object from a random side, with
 /// random directions of stylus and motion, turning at a random rate up to `turning`. The tick of
-/// entry is known by brute force at a hundredth of the tick (deeper than 1e-9 of the size at the
-/// end of the tick or at one of the steps). Motions that miss the object are drawn again.
+/// entry is found by brute force in steps of a hundredth of a tick (deeper than 1e-9 of the size at
+/// the end of the tick or at one of the steps). Motions that miss the object are drawn again.
 FirstContactLoss first_contact_loss(const stimuli::ConvexMesh& mesh, double speed, double turning,
                                     int entries, std::uint64_t seed);
 

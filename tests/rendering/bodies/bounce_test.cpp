@@ -39,10 +39,10 @@ struct PlanarMotion {
   double normal = 0, tangent = 0, spin = 0;  ///< m/s, rad/s
 };
 
-/// Newton's law: the speed of approach comes back times the restitution; friction holds the place
-/// where its cone allows, else slides.
+/// Newton's law: the speed of approach returns, multiplied by the restitution; friction holds the
+/// point if its cone allows, else it slides.
 PlanarMotion after_impact(const PlanarImpact& of, const PlanarMotion& before) {
-  // Of the place: u_n = v_n - w r_t, u_t = v_t + w r_n.
+  // At the point: u_n = v_n - w r_t, u_t = v_t + w r_n.
   const double rn = of.normal, rt = of.tangent;
   const double nn = 1 / of.mass + rt * rt / of.moment, tt = 1 / of.mass + rn * rn / of.moment;
   const double nt = -rt * rn / of.moment;
@@ -60,7 +60,7 @@ PlanarMotion after_impact(const PlanarImpact& of, const PlanarMotion& before) {
           before.spin + (rn * jt - rt * jn) / of.moment};
 }
 
-/// A plank falls askew on an edge, with the edge's whole length on the floor.
+/// A tilted plank falls on an edge, with the edge's whole length on the floor.
 TEST(Bounce, APlankOnItsEdgeFollowsNewtonAndCoulomb) {
   const double length = 0.2, height = 0.04, depth = 0.06, mass = 0.3;
   const double moment = mass / 12 * (length * length + height * height);
