@@ -23,7 +23,7 @@ namespace palpate::protocols {
 struct Interval {
   int stimulus = 0;  ///< index into Protocol::stimuli; -1: nothing
   RendererKind renderer = RendererKind::point;
-  std::optional<double> level = std::nullopt;  ///< none: the stimulus as it is
+  std::optional<double> level = std::nullopt;  ///< none: the stimulus unchanged
   bool standard = false;                       ///< the other interval is compared with it
 };
 

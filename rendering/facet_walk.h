@@ -81,7 +81,7 @@ WalkResult farthest_plane_point(const stimuli::ConvexMesh& mesh, ContactFeature 
 /// other facets are few.
 void prefetch_neighbours(const stimuli::ConvexMesh& mesh, ContactFeature at);
 
-/// The penetration depth: the least over all facets of M, where there is no history to walk from.
+/// The penetration depth, the least over all facets of M, for cases without a history to walk from.
 /// Costs O(facets + edges). Negative depth, kind none: the probe is outside.
 WalkResult nearest_feature_segment(const stimuli::ConvexMesh& mesh, const Vec3& tip, const Vec3& d);
 WalkResult nearest_feature_point(const stimuli::ConvexMesh& mesh, const Vec3& tip);

@@ -83,7 +83,7 @@ void release_hooked(UnionTick& tick) {
   }
 }
 
-/// Null: the contact's part never gives way.
+/// Null: the contact's part never breaks.
 BreakState* breaking_of(UnionTick& tick, const PlacedContact& contact) {
   if (contact.loaded.part >= tick.scene.parts().size()) return nullptr;  // a surface
   const std::uint32_t index = tick.scene.parts()[contact.loaded.part].breaking;

@@ -165,7 +165,7 @@ class Scene {
   /// Parts of one group are contiguous.
   const std::vector<PartGroup>& groups() const { return groups_; }
   const std::vector<BreakingParts>& breaking() const { return breaking_; }
-  /// What the stylus carries; null: the plain stylus.
+  /// The tool on the stylus; null: the plain stylus.
   const Tool* tool() const { return tool_.segments.empty() ? nullptr : &tool_; }
   /// m, from the tip to the farthest point of the tool.
   double tool_reach() const { return tool_reach_; }

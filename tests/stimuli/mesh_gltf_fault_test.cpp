@@ -251,7 +251,7 @@ TEST(MeshGltfFaults, SurfacesAreNamedByPrimitiveAndNode) {
     convex_parts(read_mesh("a.gltf", text));
     ADD_FAILURE() << "it is open";
   } catch (const MeshError& error) {
-    // The last of the twelve triangles is missing: 4, 7, 6, of which 6-7 and 4-6 are open edges.
+    // The last of the twelve triangles is missing: 4, 7, 6, with open edges 6-7 and 4-6.
     EXPECT_NE(
         std::string(error.what())
             .find("open: edge 6-7 of face 6 of /meshes/0/primitives/0 in 'left' (vertices 2 6 7)"),

@@ -20,7 +20,7 @@ TEST(UniformRotation, GivesTheSameBitsOnEveryCompiler) {
   EXPECT_EQ(second.x, -0x1.5c7d25291ff10p-2);
   EXPECT_EQ(second.y, 0x1.b5e9dfa8b4601p-2);
   EXPECT_EQ(second.z, -0x1.6a50434ef6cfap-1);
-  Random other(3);  // its first draw is negative: the quaternion is turned round
+  Random other(3);  // its first draw is negative: the quaternion is negated
   const Quat third = uniform_rotation(other);
   EXPECT_EQ(third.w, 0x1.cb5051b91b9a6p-1);
   EXPECT_EQ(third.x, -0x1.2eef64fb71834p-2);
