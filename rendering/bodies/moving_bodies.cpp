@@ -340,7 +340,7 @@ void MovingBodies::settle_shape(BodiesState& state, std::size_t body, const Stro
   shape.last = into(frame, stroke.to);
   if (!(shape.unions.last.d != Vec3(0) || !shape.unions.pairs.empty())) return;
   shape.unions.last = into(frame, stroke.to, stroke.frame_to);
-  // Without a tool all poses have one frame: between two of them the stylus goes by its direction.
+  // Without a tool all poses share one frame: interpolate the stylus by its direction.
   if (fixed_.tool() == nullptr) shape.unions.last.frame = Mat3(1);
 }
 

@@ -261,8 +261,8 @@ TEST(MovingScene, AConcaveBodyIsFeltByItsSurfaceAsByItsParts) {
   }
 }
 
-/// A tip that goes straight into a wall of a body that has turned is first felt as deep as it is in
-/// it: between two ticks the stylus keeps its direction, whatever way the body has turned.
+/// A tip that moves straight into a wall of a rotated body is first felt at its true depth: between
+/// two ticks the stylus keeps its direction, however the body has turned.
 TEST(MovingScene, TheFirstTouchOfATurnedBodyIsAsDeepAsTheTipIs) {
   const Angle angle = angle_of(Quat(1, 0, 0, 0), false);
   for (const bool surface : {false, true}) {
