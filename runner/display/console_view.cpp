@@ -24,7 +24,7 @@ void coloured_text(const ImVec4& colour, const std::string& words) {
 }
 
 void table_row(const char* name, const std::string& value, const ImVec4& colour) {
-  ImGui::TableNextColumn();  // a new row where the last one is full
+  ImGui::TableNextColumn();  // starts a new row if the last one is full
   coloured_text(kQuiet, name);
   ImGui::TableNextColumn();
   coloured_text(colour, value);
@@ -48,7 +48,7 @@ bool wide_button(const char* words, float width, Look look) {
 }
 
 bool slider(const char* name, float& value, const SliderRange& range) {
-  // Behind ### stands what identifies it, as the words change.
+  // Dear ImGui identifies the slider by the text after ###; the words before it change.
   const std::string words =
       std::string(name) + " " + fixed_point(value, range.digits) + range.unit + "###" + name;
   const bool moved = ImGui::SliderFloat(words.c_str(), &value, range.least, range.most, "",
@@ -456,7 +456,7 @@ void draw_health(const ConsoleState& state, bool brief) {
 namespace {
 
 constexpr double kForceSpan = 10;  // s, shown in the plot
-constexpr double kSilence = 1;     // s without an update until the console says so
+constexpr double kSilence = 1;     // s; a longer silence is reported
 
 }  // namespace
 
@@ -566,7 +566,7 @@ void ConsoleView::draw_view(const Modifiers& modifiers, float width, float heigh
                                               {1, 0}, IM_COL32_WHITE, 6);
   ImGui::InvisibleButton("view", {width, height},
                          ImGuiButtonFlags_MouseButtonLeft | ImGuiButtonFlags_MouseButtonRight);
-  ImGui::SetItemAllowOverlap();  // for the button that hides it
+  ImGui::SetItemAllowOverlap();  // so that the button drawn over it works
   const ImGuiIO& io = ImGui::GetIO();
   PointerMotion pointer;
   pointer.over = ImGui::IsItemHovered() || ImGui::IsItemActive();

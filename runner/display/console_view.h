@@ -1,5 +1,5 @@
 #pragma once
-// The experimenter's console: layout of its panels, and what it keeps from frame to frame.
+// The experimenter's console: layout of its panels, and state kept between frames.
 
 #include <imgui.h>
 
@@ -14,7 +14,7 @@
 
 namespace palpate::runner {
 
-// Colours and small elements that the console's panels are made of, in Dear ImGui.
+// Colours and small elements of the console's panels, in Dear ImGui.
 
 namespace console_colour {
 inline const ImVec4 kQuiet{0.60F, 0.64F, 0.69F, 1};
@@ -39,11 +39,11 @@ bool wide_button(const char* words, float width, Look look = Look::plain);
 
 struct SliderRange {
   float least, most;  ///< logarithmic where least > 0
-  int digits;         ///< behind the point, to which it rounds
+  int digits;         ///< after the decimal point; the value is rounded to them
   const char* unit;   ///< with a space before it
 };
-/// Name and value stand beside it: in it, the handle would hide the value. \return  whether it was
-/// moved
+/// Name and value are drawn beside the slider: inside, the handle would hide the value. \return
+/// whether it was moved
 bool slider(const char* name, float& value, const SliderRange& range);
 
 std::string fixed_point(double value, int digits);
@@ -51,7 +51,7 @@ std::string fixed_point(double value, int digits);
 /// A point of the force plot.
 struct ForcePoint {
   double time = 0;   ///< s, session clock
-  double force = 0;  ///< N, on the hand, of both devices together
+  double force = 0;  ///< N, on the hand, sum of both devices
 };
 
 /// Text of an input field, zero-terminated.
@@ -90,13 +90,13 @@ class ConsoleView {
   void draw_side(double now, bool narrow, std::vector<ConsoleCommand>& commands);
   void draw_notes(std::vector<ConsoleCommand>& commands);
   void draw_answer(std::vector<ConsoleCommand>& commands);
-  static float min_notes_height();  ///< px, for the newest messages and the note field
+  static float min_notes_height();  ///< px, space for the newest messages and the note field
 
   SceneView scene_;
   Camera camera_;
   std::optional<PointerControl> control_;
   ConsoleState state_;
-  bool shared_, hidden_;   ///< hidden: shape, scene and whether answers are correct
+  bool shared_, hidden_;   ///< hidden: do not show shape, scene and whether answers are correct
   double updated_at_ = 0;  ///< s
   bool has_state_ = false;
   std::deque<ForcePoint> forces_;
@@ -106,7 +106,7 @@ class ConsoleView {
   bool emergency_highlit_ = false;
   float controls_ = 1;  ///< px, height of the controls as drawn last
   std::size_t messages_seen_ = 0;
-  int frames_to_scroll_ = 0;  ///< to the newest message
+  int frames_to_scroll_ = 0;  ///< frames that still scroll to the newest message
 };
 
 // Panels of the experimenter's console. Each function draws into the current Dear ImGui window.
@@ -117,19 +117,19 @@ void draw_status(const ConsoleState& state, bool hidden, bool compact);
 /// The steps before the first trial: the current one large, with a button for each possible answer.
 void draw_checklist(const Checklist& list, EndRequest& ending,
                     std::vector<ConsoleCommand>& commands);
-/// Buttons pressed are added to `commands`, without a time. The dialog for ending the session takes
-/// the place of the buttons: the console has no pop-ups, so nothing can cover the emergency button.
+/// Adds a command, without a time, for each button pressed. The dialog for ending the session
+/// replaces the buttons: the console has no pop-ups, so nothing can cover the emergency button.
 /// \param compact  as for the status
 void draw_buttons(const ConsoleState& state, bool compact, EndRequest& ending,
                   std::vector<ConsoleCommand>& commands);
 /// The emergency button along the upper edge of the window, over everything else. Only drawn: its
 /// clicks are handled by ConsoleWindow. \return its lower edge, px
 float draw_emergency(bool lit);
-/// Whether forces are off, why, and the button to allow them again.
+/// If forces are off: the reason, and the button to allow them again.
 /// \param silence  s without an update from the session; 0: updates arrive
 void draw_forces_off(const ConsoleState& state, double silence,
                      std::vector<ConsoleCommand>& commands);
-/// \param brief  only the servo's faults
+/// \param brief  show the servo's faults only
 void draw_health(const ConsoleState& state, bool brief);
 /// \param height  px
 void draw_forces(const std::deque<ForcePoint>& forces, float width, float height);

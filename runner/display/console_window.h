@@ -29,16 +29,16 @@ class ConsoleWindow final : public ExperimenterConsole {
 
   std::string name_of(ConsoleCommand::Kind kind) const override;
   std::string places() const override;
-  /// Of places(). By the display's thread.
+  /// Sets the result of places(). Called by the display's thread.
   void put_places(std::string note);
-  /// px, of the emergency button, with its margin.
+  /// Height of the emergency button with its margin, px.
   float emergency_height() const { return view_->emergency_height(); }
 
   GLFWwindow* handle() const { return window_; }
   void draw();
   /// Queues a command from a key of either window or a button. \param text  ConsoleCommand::text
   void send_command(ConsoleCommand::Kind kind, std::string text = {});
-  /// As the participant's window.
+  /// As in ParticipantWindow.
   void destroy();
   void abandon() noexcept { window_ = nullptr; }
 

@@ -9,18 +9,18 @@ namespace palpate::runner {
 
 /// The label of the button for a command.
 const char* button_label(ConsoleCommand::Kind kind);
-/// Why forces are off, as far as the session or the servo tells.
+/// The reason why forces are off, if session or servo gave one.
 std::string forces_off_reason(const ConsoleState& state);
-/// The state of the session in a word or two, and what it waits for or what to press.
+/// State of the session in a word or two; and what it waits for, or the key to press.
 std::string state_title(const ConsoleState& state);
 std::string state_detail(const ConsoleState& state);
-/// Fraction of the session's trials that are done, 0 to 1.
+/// Share of the session's trials that are done, 0 to 1.
 double fraction_done(const ConsoleState& state);
-/// Forces are off only because they have not been needed yet: nothing is wrong.
+/// Whether forces are off only because they have not been needed yet.
 bool forces_not_yet_on(const ConsoleState& state);
-/// Whether forces are off, why, and what to press next.
+/// Whether forces are off, the reason, and the button or key to press next.
 std::string forces_text(const ConsoleState& state);
-/// A number of an axis as it is, of half the number at its end too: "2.5", "500".
+/// A number at an axis, in full: "2.5", "500". Half of the number at the axis' end is shown too.
 std::string axis_label(double value);
 /// "1 h 05 min", "3 min 20 s"
 std::string duration_text(double seconds);

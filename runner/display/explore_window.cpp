@@ -35,25 +35,27 @@
 
 namespace palpate::runner {
 
-// What the window of a scene shows: its panels, and what they keep from frame to frame.
+// Contents of the window of a scene: its panels, and their state between frames.
 
-// A clip of what a window has shown: drawn a few pictures a frame, so the window goes on.
+// A clip of the last seconds of a window. A few pictures are drawn in each frame, so the window
+// stays responsive.
 
 /// Needs the current OpenGL context of the window.
 class ExploreClip {
  public:
-  static constexpr double kSpan = 5, kEvery = 0.04;  ///< s, of the path
-  static constexpr int kWide = 640, kHigh = 360;     ///< px
+  static constexpr double kSpan = 5;              ///< s, of the path
+  static constexpr double kEvery = 0.04;          ///< s, between pictures
+  static constexpr int kWide = 640, kHigh = 360;  ///< px
 
-  /// The last kSpan before the moment that is shown; from the first where that is it. Keeps these
-  /// moments: a timeline drops its own while they are drawn. \param timeline  not empty
+  /// Copies the last kSpan before the moment shown (if that is the first one, from there on),
+  /// because the timeline drops old moments while the clip is drawn. \param timeline  not empty
   ExploreClip(const Timeline& timeline, const Camera& camera);
 
   using Draw = std::function<ScenePicture(const SceneMoment&)>;
-  /// One picture more. \return whether that was the last
+  /// Draws the next picture. \return whether it was the last
   bool go_on(const Draw& draw, const Theme& theme);
   double done() const;  ///< 0 to 1
-  /// The animated WebP of what has been drawn; nothing goes on after it. Empty: nothing has.
+  /// The animated WebP of the pictures drawn; call it last. Empty: none were drawn.
   std::string finish();
 
  private:
@@ -71,18 +73,19 @@ class ExploreView {
 
   /// Draws a frame of Dear ImGui. \param seconds  since the last one
   void draw(double seconds, const Modifiers& modifiers);
-  /// As ConsoleView: the emergency button spans the upper edge and lies over everything.
+  /// As in ConsoleView: the emergency button spans the upper edge and lies over everything.
   bool in_emergency_button(float y) const { return y >= 0 && y < emergency_bottom_; }
   void highlight_emergency(bool on) { emergency_highlit_ = on; }
 
-  // What keys do.
+  // Actions of keys.
   void pause_or_go_on();
   void step(int moments);
   void keep_picture();
   void keep_clip();
 
-  /// Draws what is left of a clip and keeps it; less of it where `go_on`, asked before each picture
-  /// with what is done (0 to 1), says no. \return what keep_picture said; empty where none is drawn
+  /// Draws the rest of a clip and saves it. Calls `go_on` before each picture with the share done
+  /// (0 to 1); false ends the clip there. \return result of keep_picture; empty: no clip was in
+  /// progress
   std::string finish_clip(const std::function<bool(double)>& go_on);
 
  private:
@@ -114,17 +117,17 @@ class ExploreView {
   std::optional<PointerControl> control_;
   Timeline timeline_;
   std::vector<SceneMoment> fresh_;
-  std::unique_ptr<ExploreClip> clip_;  ///< while one is drawn
+  std::unique_ptr<ExploreClip> clip_;  ///< null: no clip is being drawn
   std::string under_pointer_, note_;
-  std::string not_pulled_;          ///< why not, while it is tried
-  rendering::BodyPull pull_;        ///< by the pointer; object -1: none
-  glm::vec3 pulled_from_{0, 0, 0};  ///< m; where the pointer took hold: the pull stays as far away
+  std::string not_pulled_;    ///< reason why the object cannot be pulled, while the user tries
+  rendering::BodyPull pull_;  ///< by the pointer; object -1: none
+  glm::vec3 pulled_from_{0, 0, 0};  ///< m; place that the pointer grabbed; the pull keeps its depth
   bool labels_ = false, dark_ = true;
   int cut_axis_ = 0;        ///< 0: none; else 1 to 3: x, y, z of the world
-  float cut_at_ = 0;        ///< of the size of the scene
-  int touched_object_ = 0;  ///< whose material the sliders show; the last: all
-  bool goes_on_ = true;     ///< moments have come since it was paused last
-  bool steps_ = false;      ///< the newest moment is shown: ticks were asked for while it is paused
+  float cut_at_ = 0;        ///< in sizes of the scene
+  int touched_object_ = 0;  ///< object whose material the sliders show; the last index: all
+  bool goes_on_ = true;     ///< moments have arrived since the last pause
+  bool steps_ = false;      ///< shows the newest moment: ticks were requested while paused
   float emergency_bottom_ = 40;
   bool emergency_highlit_ = false, fitted_ = false;
 };
@@ -159,7 +162,7 @@ std::string ExploreClip::finish() {
   return drawn_ > 0 ? animation_.finish(static_cast<double>(drawn_) * kEvery) : std::string();
 }
 
-// What the pointer does over ExploreView's picture.
+// Pointer input over ExploreView's picture.
 
 namespace {
 
@@ -172,7 +175,7 @@ constexpr ImU32 kQuietInk = IM_COL32(150, 158, 168, 255);
 std::string ExploreView::hint() const {
   if (!not_pulled_.empty()) return not_pulled_;
   if (const double away = source_.away(); away > 0)
-    return "It goes on once the stylus is back where it was: " +
+    return "Resumes once the stylus is back where it was: " +
            std::to_string(std::lround(1000 * away)) + " mm away";
   if (!control_ || timeline_.state() != Timeline::State::following)
     return "drag: look    middle or Shift: move    wheel: nearer";
@@ -187,7 +190,7 @@ std::string ExploreView::hint() const {
 void ExploreView::draw_axes(float right, float low) const {
   const float font = ImGui::GetFontSize();
   const glm::vec2 foot(right - 3.2F * font, low - 3.2F * font);
-  // As the camera sees them at the place that it looks at.
+  // Projected at the point that the camera looks at.
   const glm::vec2 middle = camera_.project(camera_.centre());
   const float unit = 0.01F * camera_.distance();
   constexpr std::array<const char*, 3> kNames{"x", "y", "z"};
@@ -218,8 +221,9 @@ void ExploreView::draw_over_scene(float x, float y, float width, float height) c
                                       hint().c_str());
 }
 
-/// Shift and the left button draw an object that moves, at the place under the pointer, in the
-/// plane of the picture. \return whether one is drawn, or asked for that cannot be
+/// Shift and the left button pull an object that moves, at the place under the pointer, in the
+/// plane of the picture. \return whether one is pulled, or the user tries to pull one that cannot
+/// move
 bool ExploreView::pull(const Modifiers& modifiers, const glm::vec2& at, bool left) {
   const SceneMoment* const shown = timeline_.shown();
   const bool wanted = left && modifiers.shift && shown != nullptr && source_.live() &&
@@ -238,9 +242,9 @@ bool ExploreView::pull(const Modifiers& modifiers, const glm::vec2& at, bool lef
     const stimuli::ObjectSpec& object = settings_.objects[hit->object];
     if (!object.body || hit->object >= shown->poses.size()) {
       not_pulled_ = settings_.drawing.label(hit->object) +
-                    (object.soft ? " is soft: press it with the stylus; what moves as a whole "
-                                   "(\"body\") can be pulled"
-                                 : " stands still: what moves (\"body\") can be pulled");
+                    (object.soft ? " is soft: press it with the stylus; only objects with "
+                                   "\"body\" can be pulled"
+                                 : " is fixed: only objects with \"body\" can be pulled");
       return true;
     }
     const Pose& now = shown->poses[hit->object];
@@ -310,8 +314,8 @@ double force_of(const SceneMoment& moment) {
   return std::isfinite(force) ? force : 0;
 }
 
-/// The objects that a choice means: one, or behind the last all of them; compounds with their
-/// parts.
+/// Calls `change` for the materials of the chosen object and its parts, or, for an index past the
+/// last, of all objects.
 void for_each_chosen(std::vector<stimuli::ObjectSpec>& objects, int chosen,
                      const std::function<void(stimuli::Material&)>& change) {
   const std::function<void(stimuli::ObjectSpec&)> visit = [&](stimuli::ObjectSpec& object) {
@@ -368,7 +372,7 @@ void ExploreView::draw_plot(float width, float height) {
   }
   double most = 0.1;
   for (const SceneMoment& moment : timeline_.moments()) most = std::max(most, force_of(moment));
-  // The largest and smallest of each column of pixels.
+  // Draw the largest and smallest value of each column of pixels.
   const auto columns = static_cast<std::size_t>(std::max(to - from, 1.0F));
   std::vector<ImVec2> line;
   double least_here = 0, most_here = 0;
@@ -409,7 +413,7 @@ void ExploreView::draw_plot(float width, float height) {
   list.AddLine({cursor, at.y + 0.3F * font}, {cursor, at.y + height - 0.3F * font},
                IM_COL32(240, 240, 240, 200), 1.5F);
   const std::string words = "Force on the hand, up to " + fixed_point(most, 2) + " N; " +
-                            fixed_point(span, 1) + " s; click: that moment";
+                            fixed_point(span, 1) + " s; click: show that moment";
   list.AddText({at.x + 0.6F * font, at.y + 0.3F * font}, IM_COL32(153, 163, 176, 255),
                words.c_str());
 }
@@ -445,7 +449,7 @@ void ExploreView::draw_looks() {
   ImGui::Checkbox("Dark", &dark_);
   ImGui::SameLine();
   if (ImGui::Button("Fit")) fitted_ = false;
-  // Standard views: what they look at and how large stays as it is.
+  // Standard views change the direction only, not centre and scale.
   struct View {
     const char* name;
     float yaw, pitch;
@@ -501,7 +505,7 @@ void ExploreView::draw_material() {
   setting("friction", friction, {0, 1.5F, 2, ""}, [&](stimuli::Material& m) {
     m.friction_static = m.friction_dynamic = std::clamp(friction, 0.0F, 10.0F);
   });
-  // A scene is compiled anew for each: not while the slider moves.
+  // Each change compiles the scene anew: wait until the slider is released.
   if (!done) return;
   source_.show(settings_.objects);
   if (!source_.live()) {
@@ -549,7 +553,7 @@ void ExploreView::take_moments(double seconds) {
   source_.take(fresh_);
   for (SceneMoment& moment : fresh_) timeline_.add(std::move(moment));
   if (steps_ && !fresh_.empty()) timeline_.seek(timeline_.last());
-  // Until it goes on, the stylus waits where it was.
+  // While the scene is held, the stylus stays where it was.
   const bool held = timeline_.state() != Timeline::State::following;
   goes_on_ = !held && (goes_on_ || !fresh_.empty());
   if (control_ && !goes_on_ && !timeline_.empty())
@@ -557,7 +561,8 @@ void ExploreView::take_moments(double seconds) {
   timeline_.advance(seconds);
 }
 
-// What is not seen must not be felt: while another moment than the newest is shown, forces are off.
+// A participant must not feel a state that is not shown: forces are off unless the newest moment is
+// shown.
 void ExploreView::pause_or_go_on() {
   const bool paused = timeline_.state() != Timeline::State::paused;
   if (paused) {
@@ -571,7 +576,7 @@ void ExploreView::pause_or_go_on() {
   source_.hold(timeline_.state() != Timeline::State::following);
 }
 
-/// Behind the newest moment a live scene makes more of them.
+/// At the newest moment, a live scene computes further ones.
 void ExploreView::step(int moments) {
   source_.hold(true);
   const bool at_end = timeline_.now() >= timeline_.last();
@@ -594,7 +599,7 @@ ScenePicture ExploreView::picture(const SceneMoment* moment) const {
     out.rods.clear();
     out.balls.clear();
   }
-  out.caption.clear();  // the panels say it
+  out.caption.clear();  // the panels show it
   if (cut_axis_ > 0) {
     glm::vec4 plane(0);
     plane[cut_axis_ - 1] = -1;
@@ -619,7 +624,7 @@ void ExploreView::keep_clip() {
   clip_ = std::make_unique<ExploreClip>(timeline_, camera_);
 }
 
-/// One picture more of it. \return whether that was the last
+/// Draws the next picture. \return whether it was the last
 bool ExploreView::draw_clip() {
   const auto draw = [this](const SceneMoment& moment) { return picture(&moment); };
   return clip_->go_on(draw, dark_ ? dark_theme() : light_theme());
@@ -631,7 +636,7 @@ void ExploreView::end_clip() {
   note_ = clip.empty() ? "" : settings_.keep_picture(clip, ".webp");
 }
 
-/// As many pictures as a frame has time for, at least one.
+/// Draws as many pictures as fit into a frame's time, at least one.
 void ExploreView::continue_clip() {
   if (clip_ == nullptr) return;
   constexpr std::chrono::milliseconds kShare(30);
@@ -736,12 +741,12 @@ void ExploreView::draw_state() {
   const bool behind = timeline_.state() != Timeline::State::following && source_.live() &&
                       timeline_.now() < timeline_.last();
   if (behind)
-    wrapped_text(console_colour::kQuiet, "Seen is the past. Live goes on from the newest moment, " +
-                                             fixed_point(timeline_.last() - timeline_.first(), 3) +
-                                             " s.");
+    wrapped_text(console_colour::kQuiet,
+                 "This shows the past. Live resumes from the newest moment, " +
+                     fixed_point(timeline_.last() - timeline_.first(), 3) + " s.");
 }
 
-/// What the ticks had since forces went off.
+/// The faults of the ticks since forces went off.
 std::string ExploreView::why_off() const {
   std::uint32_t bits = 0;
   const auto& moments = timeline_.moments();
@@ -757,11 +762,11 @@ std::string ExploreView::why_off() const {
   return words.empty() ? fault_row(servo_fault::kTripped).why : words;
 }
 
-/// Every bit of the moments that are kept: one tick is too short to be seen.
+/// Lists all faults of the kept moments: a single tick would be too short to see.
 void ExploreView::draw_faults() {
   const std::vector<Timeline::Fault> faults = timeline_.faults();
   if (faults.empty()) return;
-  coloured_text(console_colour::kQuiet, "Faults in these ticks; click: the last of them");
+  coloured_text(console_colour::kQuiet, "Faults in these ticks; click: show the last");
   for (const Timeline::Fault& fault : faults) {
     const bool ordinary = fault.bit == servo_fault::kForceLimited;
     ImGui::PushStyleColor(ImGuiCol_Text, ordinary ? console_colour::kBright : console_colour::kBad);
@@ -851,8 +856,8 @@ class ExploreWindow {
     glfwShowWindow(window_);
   }
 
-  /// A clip that is still drawn is kept: all of it, or, where the end is asked for by a signal or
-  /// once more by the user, what has been drawn.
+  /// Saves a clip that is being drawn: all of it, or the pictures so far if a signal or the user
+  /// asks again to end.
   void finish_clip() {
     if (gone_ || was_destroyed(window_)) return;
     glfwMakeContextCurrent(window_);
@@ -881,7 +886,7 @@ class ExploreWindow {
 
   static void on_key(GLFWwindow* window, int key, int scancode, int action, int mods) {
     auto& self = *static_cast<ExploreWindow*>(glfwGetWindowUserPointer(window));
-    // At once, whatever has the keyboard.
+    // At once, whichever element has the keyboard focus.
     if (action == GLFW_PRESS && (key == GLFW_KEY_F12 || key == GLFW_KEY_ESCAPE))
       self.source_.emergency_zero();
     ImGui_ImplGlfw_KeyCallback(window, key, scancode, action, mods);

@@ -14,19 +14,20 @@ namespace palpate::runner {
 
 struct ExploreSettings {
   std::string title;    ///< UTF-8
-  double ui_scale = 0;  ///< of text and buttons; 0: taken from the monitor
+  double ui_scale = 0;  ///< scale of text and buttons; 0: taken from the monitor
   std::vector<stimuli::ObjectSpec> objects;
-  SceneDrawing drawing;          ///< of these
-  SceneDrawingSettings looks;    ///< at first
+  SceneDrawing drawing;          ///< drawing of `objects`
+  SceneDrawingSettings looks;    ///< initial looks
   MouseStylus* mouse = nullptr;  ///< moved by the pointer over the scene; nullptr: none
-  WorkspaceMap workspace = {};   ///< of the servo, for the mouse
-  /// Keeps a picture (".png") or a clip (".webp") and says where, or why not; empty: none are kept.
+  WorkspaceMap workspace = {};   ///< the servo's, for the mouse
+  /// Saves a picture (".png") or a clip (".webp"). Returns its path or why it failed, in words.
+  /// Empty: pictures cannot be saved.
   std::function<std::string(const std::string& bytes, const char* kind)> keep_picture = {};
-  /// Asked once a frame: true ends the window.
+  /// Called once a frame; true closes the window.
   std::function<bool()> end_requested = {};
 };
 
-/// Shows the window until it is closed. In the main thread. \throws DisplayError
+/// Shows the window until it is closed. Call it in the main thread. \throws DisplayError
 void explore_in_window(ExploreSettings settings, TouchSource& source);
 
 }  // namespace palpate::runner

@@ -18,7 +18,7 @@ namespace {
 
 constexpr float kFontSize = 16, kTitleFontSize = 28;  // px at scale 1
 
-/// \param choices  must outlive the atlas' building, which reads the ranges
+/// \param choices  must outlive the building of the atlas, which reads the ranges
 void add_font(ImFontAtlas& atlas, const std::vector<FontChoice>& choices, float size) {
   ImFontConfig config;
   for (const FontChoice& choice : choices) {
@@ -32,7 +32,7 @@ void add_font(ImFontAtlas& atlas, const std::vector<FontChoice>& choices, float 
   }
 }
 
-/// The first font is the usual one, the last that of titles.
+/// The first font is for text, the last for titles.
 void load_console_fonts(const std::vector<std::string>& texts, float scale) {
   const std::vector<FontChoice> choices = choose_fonts(texts);
   ImFontAtlas& atlas = *ImGui::GetIO().Fonts;
@@ -73,7 +73,7 @@ void style_console(float scale) {
 
 ImGuiContext* begin_imgui(GLFWwindow* window, const std::vector<std::string>& texts, float scale) {
   ImGuiContext* const context = ImGui::CreateContext();
-  ImGui::GetIO().IniFilename = nullptr;  // writes no file
+  ImGui::GetIO().IniFilename = nullptr;  // write no file
   load_console_fonts(texts, scale);
   style_console(scale);
   glfwSetWindowFocusCallback(window, &ImGui_ImplGlfw_WindowFocusCallback);
@@ -113,7 +113,7 @@ bool european(unsigned letter) {
   return false;
 }
 
-/// Characters beyond the European ones. The console draws 16-bit characters only, left to right.
+/// The characters that are not European. The console draws 16-bit characters only, left to right.
 std::set<unsigned> letters_of(const std::vector<std::string>& texts) {
   std::set<unsigned> letters;
   for (const std::string& text : texts) {
@@ -150,7 +150,7 @@ bool readable(FcPattern* font, FontChoice& choice) {
   choice.path = reinterpret_cast<const char*>(text);
   int index = 0;
   FcPatternGetInteger(font, FC_INDEX, 0, &index);
-  choice.face = index & 0xffff;  // above: the instance of a variable font
+  choice.face = index & 0xffff;  // the upper bits are the instance of a variable font
   return g_file_test(choice.path.c_str(), G_FILE_TEST_IS_REGULAR) != 0;
 }
 

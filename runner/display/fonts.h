@@ -11,14 +11,13 @@ struct ImGuiContext;
 
 namespace palpate::runner {
 
-/// \param window  whose OpenGL context is current; its keys, characters, pointer and buttons are
-/// its
-///                owner's to pass on
-/// \param texts   UTF-8, whose characters are needed
-/// \param scale   of sizes
+/// \param window  its OpenGL context must be current; its owner
+///                passes keys, characters, pointer and buttons on
+/// \param texts   UTF-8; fonts are loaded for their characters
+/// \param scale   of all sizes
 ImGuiContext* begin_imgui(GLFWwindow* window, const std::vector<std::string>& texts, float scale);
 
-/// While the window's OpenGL context is current.
+/// Call it while the window's OpenGL context is current.
 void end_imgui(ImGuiContext* context);
 
 /// A font file and the characters to load from it.
@@ -28,8 +27,8 @@ struct FontChoice {
   std::vector<unsigned short> ranges;  ///< pairs of first and last character, ended by a 0
 };
 
-/// Fonts for the console: one for European scripts, then those that the other characters of `texts`
-/// (UTF-8) need. Empty where fontconfig has no TrueType font.
+/// Fonts for the console: one for European scripts, then those for the other characters of `texts`
+/// (UTF-8). Empty if fontconfig finds no TrueType font.
 std::vector<FontChoice> choose_fonts(const std::vector<std::string>& texts);
 
 }  // namespace palpate::runner

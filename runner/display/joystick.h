@@ -1,5 +1,5 @@
 #pragma once
-// Gamepads and foot pedals: what is pressed on them stands for keys of the keyboard.
+// Gamepads and foot pedals: their buttons, axes and hats stand for keys of the keyboard.
 
 #include <cstdint>
 #include <map>
@@ -20,21 +20,22 @@ struct JoystickState {
 class Joystick {
  public:
   virtual ~Joystick() = default;
-  /// As of now; none: nothing is connected.
+  /// The current state; none: nothing is connected.
   virtual std::optional<JoystickState> read() = 0;
 };
 
-/// The first one that is connected, through GLFW: to be used in the main thread, after glfwInit.
+/// The first connected device, read through GLFW. Use it in the main thread, after glfwInit.
 std::unique_ptr<Joystick> make_joystick();
 
-/// Finds the moments at which something is pressed.
+/// Detects presses from successive states.
 class JoystickKeys {
  public:
   /// \param keys  "button 1", "axis 2 +", "hat 1 up" -> name of a key
   explicit JoystickKeys(std::map<std::string, std::string> keys) : keys_(std::move(keys)) {}
 
-  /// Keys whose inputs have been pressed since the last call. What is down when it is connected
-  /// counts once it has been released. An axis is pressed beyond 0.6 and released within 0.4.
+  /// Keys whose inputs held down were pressed since the last call. An input that is down on
+  /// connection counts only after its release. An axis is pressed beyond 0.6 and released within
+  /// 0.4.
   std::vector<std::string> pressed(const std::optional<JoystickState>& now);
 
  private:

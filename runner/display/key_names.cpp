@@ -35,7 +35,7 @@ const char* special(int key) {
   }
 }
 
-/// The character of the key on a US keyboard; 0: none that a protocol would name.
+/// The character of the key on a US keyboard; 0: none that a protocol can name.
 char on_us_keyboard(int key) {
   if (key >= GLFW_KEY_KP_0 && key <= GLFW_KEY_KP_9) {
     return static_cast<char>('0' + key - GLFW_KEY_KP_0);

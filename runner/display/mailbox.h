@@ -1,6 +1,6 @@
 #pragma once
-// Queues between the session's thread and the display's. A lock is held for a swap of pointers
-// only, so that a stalled display blocks nobody.
+// Queues between the session's thread and the display's. Locks are held only while pointers are
+// swapped, so a stalled display blocks no other thread.
 
 #include <cstddef>
 #include <mutex>
@@ -31,7 +31,7 @@ class Mailbox {
   std::optional<T> newest_;
 };
 
-/// Every value, in order, up to a bound: a key that is held down must not fill the memory.
+/// Keeps every value, in order, up to a bound: a key held down must not fill the memory.
 template <class T>
 class EventQueue {
  public:

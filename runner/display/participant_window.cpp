@@ -19,16 +19,16 @@
 
 namespace palpate::runner {
 
-// Elements of a participant's page: answer keys, progress bar, checklist, the sign for the space
+// Elements of a participant's page: answer keys, progress bar, checklist, the symbol of the space
 // bar. Sizes are in a unit (px) that grows with the page.
 
-inline constexpr double kTextSize = 1.4;  ///< units, of a text to read
+inline constexpr double kTextSize = 1.4;  ///< units; size of a text to read
 
-/// The answer keys with their labels: side by side, or, where a label would be cut off or there are
-/// too many, one below the other in up to three columns, smaller where they must be.
+/// The answer keys with their labels. They stand side by side; if a label would be cut off or there
+/// are too many, in up to three columns, made smaller if necessary.
 class KeyMap {
  public:
-  /// \param room  px, the height that it may have where that is possible at all
+  /// \param room  the height available, px; exceeded only if nothing fits
   KeyMap(cairo_t* canvas, const Page& page, double unit, double width, double room);
   double height() const { return height_; }
   void draw(cairo_t* canvas, double middle, double top) const;
@@ -37,7 +37,7 @@ class KeyMap {
   struct Item {
     TextBlock key, answer;
     double cap_width, width;
-    double x, y;  ///< of the key's left upper edge, from the middle and the top
+    double x, y;  ///< upper left corner of the key, from the middle and the top
     double answer_x, answer_y;
   };
   bool lay_side_by_side(cairo_t* canvas, const Page& page, double width);
@@ -47,17 +47,17 @@ class KeyMap {
   std::vector<Item> items_;
 };
 
-/// A picture of the space bar with an arrow: "press to go on" without words.
+/// Draws the space bar with an arrow: "press to continue" without words.
 void draw_go_on(cairo_t* canvas, double middle, double top, double unit);
-/// Progress of the session, along the upper edge.
+/// Draws the session's progress along the upper edge.
 void draw_progress(cairo_t* canvas, const Page& page, double unit, double width);
-/// The current step's instruction, then a line for each step.
+/// Draws the current step's instruction, then a line for each step.
 void draw_checklist(cairo_t* canvas, const Checklist& list, double unit, double width, double top,
                     double room);
-/// A PNG file, as large as it fits, not enlarged beyond twice its size; a note where it is none.
+/// Draws a PNG file as large as fits, at most at twice its size; a note if it is not a PNG file.
 void draw_picture(cairo_t* canvas, const std::string& bytes, double middle, double top,
                   double width, double room);
-/// What is being typed, in a field.
+/// Draws the typed text in a field.
 void draw_typed(cairo_t* canvas, const std::string& typed, double middle, double top, double unit,
                 double width);
 double text_width(double width, double unit);
@@ -83,7 +83,7 @@ void draw_keycap(cairo_t* canvas, double x, double y, double width, double heigh
   cairo_stroke(canvas);
 }
 
-/// What cairo reads a PNG file from.
+/// Source from which cairo reads a PNG file.
 struct PngBytes {
   const std::string& all;
   std::size_t at = 0;
@@ -117,15 +117,15 @@ KeyMap::KeyMap(cairo_t* canvas, const Page& page, double unit, double width, dou
     }
   }
   unit_ = unit;
-  lay_side_by_side(canvas, page, width);  // too much for any: cut off
+  lay_side_by_side(canvas, page, width);  // no layout fits: cut labels off
 }
 
-/// \return  whether it is as it should be: nothing cut off, and a question's answers in one row
+/// \return  whether it looks right: nothing is cut off, and a question's answers are in one row
 bool KeyMap::lay_side_by_side(cairo_t* canvas, const Page& page, double width) {
   constexpr double kRowHeight = 5.2, kWidest = 12;  // units
   items_.clear();
   bool whole = true;
-  std::vector<double> rows;  // px, how wide each is
+  std::vector<double> rows;  // px; width of each row
   std::vector<std::size_t> row_of;
   for (const auto& [key, answer] : page.keys) {
     Item item{TextBlock(canvas, keycap_label(key), 1.15 * unit_),
@@ -162,7 +162,7 @@ bool KeyMap::lay_side_by_side(cairo_t* canvas, const Page& page, double width) {
 /// \return  whether it fits
 bool KeyMap::lay_in_columns(cairo_t* canvas, const Page& page, double width, double room,
                             int columns) {
-  constexpr double kGap = 0.5;  // units, between one and the next
+  constexpr double kGap = 0.5;  // units, between two columns
   const std::size_t each = (page.keys.size() + static_cast<std::size_t>(columns) - 1) /
                            static_cast<std::size_t>(columns);
   double cap_width = kKeycapHeight * unit_;
@@ -241,7 +241,7 @@ void draw_picture(cairo_t* canvas, const std::string& bytes, double middle, doub
 void draw_typed(cairo_t* canvas, const std::string& typed, double middle, double top, double unit,
                 double width) {
   TextBlock words(canvas, typed + "_", 1.6 * unit);
-  // The end is what is being typed.
+  // Show the end of the text, where it is being typed.
   std::string shown = typed;
   while (words.size().width > width - unit && shown.size() > 1) {
     shown.erase(0, 1);
@@ -337,7 +337,7 @@ void draw_checklist(cairo_t* canvas, const Checklist& list, double unit, double 
 namespace {
 
 constexpr double kSmallestUnit = 14;  // px, at scale 1
-constexpr double kMostKeys = 0.55;    // of the height, for the answer keys
+constexpr double kMostKeys = 0.55;    // largest share of the height for the answer keys
 constexpr std::size_t kMostScreens = 200;
 constexpr double kSmallestSize = 0.45;  // of the normal size; below it text is truncated instead
 
@@ -451,7 +451,7 @@ class PageLayout {
     const std::vector<std::string> all = screens();
     const auto count = static_cast<int>(all.size());
     const int at = std::clamp(screen, 0, count - 1);
-    // Not centred, like the other screens, even if the last has only two lines.
+    // Align at the top like the other screens, even if the last has only two lines.
     draw_text(canvas_, all[static_cast<std::size_t>(at)], kTextSize * unit_, kSmallestSize * unit_,
               width_, text_width(width_, unit_), top_, room_, kText, false);
     if (count == 1 && page_.parts < 2) return;
@@ -569,7 +569,8 @@ bool ParticipantWindow::handle_key(int key, int scancode) {
   const std::string name = match_key(key_names(key, scancode), page_.keys);
   if (name.empty()) return false;
   if (turn_page(name)) return true;
-  // The answers are shown below the last screen: until then nobody has read what they are about.
+  // The answers are shown below the last screen. Before that the participant has not read the whole
+  // question.
   const bool unread = page_.kind == Page::Kind::text && screen_ + 1 < screens_;
   if (unread && is_answer_key(key, scancode)) return true;
   keys_.add({name, now});

@@ -21,7 +21,7 @@ struct Image {
 
 struct PageOptions {
   double ui_scale = 1;  ///< text is at least as large as a desktop's with this scale
-  int screen = 0;       ///< of a text that takes several, from 0
+  int screen = 0;       ///< screen of a long text, from 0
 };
 
 /// Deterministic. Invalid UTF-8 is shown as a replacement character. A long text to read continues
@@ -56,32 +56,32 @@ class ParticipantWindow final : public ParticipantScreen {
   bool open() const override { return open_.load(); }
 
   GLFWwindow* handle() const { return window_; }
-  /// A key was pressed, here or in the console. \return false for a key without a name
+  /// A key was pressed, here or in the console. \return false: the key has no name
   bool handle_key(int key, int scancode);
   bool is_answer_key(int key, int scancode) const;
   bool typing() const { return page_.typing != Page::Typing::none; }
-  /// A character was typed, here or in the console: of an answer that is typed.
+  /// A character of a typed answer was entered, here or in the console.
   void handle_character(unsigned character);
   /// The wheel was turned. \param up  notches, negative: down
   void handle_wheel(double up);
-  /// Pressed elsewhere (a gamepad, a pedal), by its name.
+  /// Adds a key by its name that was pressed on a gamepad or pedal.
   void press(const std::string& key) { keys_.add({key, settings_.clock->now_ns()}); }
   /// Redraws if anything has changed since the last call.
   void draw();
-  /// The window was uncovered: the next draw() repaints it.
+  /// Makes the next draw() repaint a window that was uncovered.
   void refresh() { needs_redraw_ = true; }
   void close() noexcept { open_.store(false); }
-  /// Destroys the window; nothing may be drawn after that. Unlike the destructor it may throw
-  /// DisplayLost.
+  /// Destroys the window; do not draw afterwards. Unlike the destructor it may throw DisplayLost.
   void destroy();
   /// The display is lost: the destructor must not use it.
   void abandon() noexcept;
 
  private:
   void paint(int width, int height);
-  /// Turns to another screen of a long text. False: the key does not, or there is none.
+  /// Turns to another screen of a long text. \return false: the key does not turn, or there is no
+  /// such screen.
   bool turn_page(const std::string& key);
-  /// While an answer is typed: keys that write no character, and those of the numeric pad.
+  /// Handles keys that write no character, and the numeric pad, while an answer is typed.
   bool handle_typing(int key, int scancode);
 
   const WindowSettings& settings_;
@@ -89,13 +89,13 @@ class ParticipantWindow final : public ParticipantScreen {
   unsigned texture_ = 0, frame_ = 0;
   const double ui_scale_;
   Page page_;
-  int screen_ = 0, screens_ = 1;  ///< of a text
+  int screen_ = 0, screens_ = 1;  ///< current screen of a text, and their count
   Image image_;
   bool needs_redraw_ = true;  ///< the window does not show image_
   Mailbox<Page> pages_;
   EventQueue<KeyPress> keys_;
-  bool ignore_character_ = false;  ///< the next one: its key has been taken already
-  double wheel_ = 0;               ///< notches that make no whole one yet
+  bool ignore_character_ = false;  ///< skip the next one: its key was handled already
+  double wheel_ = 0;               ///< fraction of a notch, carried over
   std::atomic<bool> open_{true};
 };
 

@@ -10,7 +10,7 @@ namespace {
 constexpr double kNotch = 0.001;         // m
 constexpr double kNotchPlane = 0.004;    // m
 constexpr double kFirstPress = 0.0015;   // m; about 1 N at the usual stiffness
-constexpr double kPlaneDistance = 0.08;  // m, of the plane; outside of the usual home zones
+constexpr double kPlaneDistance = 0.08;  // m, of the plane; outside the usual home zones
 constexpr double kMostPress = 0.03, kFarthest = 0.2;  // m
 constexpr double kDepthPerPixel = 0.0004;             // m
 constexpr double kTurnPerPixel = 0.006;               // rad
@@ -113,10 +113,10 @@ unsigned SceneView::draw(const Objects& objects, const rendering::Tool& tool, co
   SceneMoment moment{sample, {}};
   moment.poses = poses_;
   if (sample.rendering.contacts > 0)
-    // The force that was commanded, which may be less than the rendered one.
+    // Show the commanded force, which may be less than the rendered one.
     moment.contacts.push_back({sample.rendering.deepest.point, sample.device1 + sample.device2});
   ScenePicture picture = drawing_->picture(moment, dark_theme(), {.thickness = kThickness});
-  picture.caption.clear();  // the console says it beside the view
+  picture.caption.clear();  // the console shows it beside the view
   return renderer_.draw(picture, camera, dark_theme(), width, height);
 }
 

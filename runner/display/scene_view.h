@@ -1,5 +1,5 @@
 #pragma once
-// 3D view of object and stylus for the console, rendered off screen into a texture.
+// 3D view of objects and stylus for the console, rendered off screen into a texture.
 
 #include <functional>
 #include <memory>
@@ -32,13 +32,13 @@ using LineOfSight =
     std::function<std::optional<glm::vec3>(const glm::vec3& from, const glm::vec3& along)>;
 
 /// Moves the mouse device's stylus with the pointer: the tip is under the pointer, pressed a little
-/// into the surface seen there; beside the object it lies in a plane in front of it, outside of the
-/// home zone. The wheel changes the penetration depth, and beside the object the plane's distance.
+/// into the surface there. Beside the object it lies in a plane in front of it, outside the home
+/// zone. The wheel changes the penetration depth or, beside the object, the distance of the plane.
 class PointerControl {
  public:
   PointerControl(MouseStylus& device, const WorkspaceMap& workspace);
   void step(const PointerMotion& pointer, const Camera& camera, const LineOfSight& object);
-  /// The stylus stays there, or goes there, until the next step. \param stylus  m, virtual frame
+  /// Puts the stylus there until the next step. \param stylus  m, virtual frame
   void rest_at(const rendering::LineProbe& stylus);
 
  private:
@@ -61,19 +61,19 @@ class SceneView {
 
   using Objects = std::shared_ptr<const std::vector<stimuli::ObjectSpec>>;
   /// \return the OpenGL texture, `width` by `height` px, valid until the next draw
-  /// \param bodies  where objects that move are
+  /// \param bodies  poses of objects that move
   unsigned draw(const Objects& objects, const rendering::Tool& tool, const Sample& sample,
                 std::span<const rendering::BodyPose> bodies, const Camera& camera, int width,
                 int height);
-  /// The first point where a line meets, from outside, the objects drawn last, where they were.
+  /// The first point where a line meets the objects drawn last from outside.
   std::optional<glm::vec3> hit(const glm::vec3& from, const glm::vec3& along) const;
-  /// Why the objects could not be drawn; empty: they were.
+  /// The reason why the objects could not be drawn; empty: they were.
   const std::string& trouble() const { return trouble_; }
 
  private:
   SceneRenderer renderer_;
   Objects shown_;
-  std::optional<SceneDrawing> drawing_;  ///< of these
+  std::optional<SceneDrawing> drawing_;  ///< of the current objects
   std::vector<Pose> poses_;              ///< of the objects; empty: none can move
   std::string trouble_;
 };

@@ -156,7 +156,7 @@ void TextInput::letter(const std::string& text, std::int64_t time_ns, std::vecto
   }
 }
 
-/// \return how many bytes of `rest`, which begins with Escape, it took
+/// \return number of bytes consumed of `rest`, which begins with Escape
 std::size_t TextInput::escape(std::string_view rest, std::int64_t time_ns,
                               std::vector<Event>& out) {
   const auto emergency = [time_ns](const std::string& key) {
@@ -178,8 +178,8 @@ std::size_t TextInput::escape(std::string_view rest, std::int64_t time_ns,
       out.emplace_back(KeyPress{kArrows[static_cast<std::size_t>(rest[2] - 'A')], time_ns});
     return std::min(end + 1, rest.size());
   }
-  // Terminals send Alt and a key as Escape followed by the key. That cannot be told from Escape
-  // alone without waiting, so it is an emergency too.
+  // Terminals send Alt and a key as Escape followed by the key. Distinguishing that from Escape
+  // alone would need a wait, so it is an emergency too.
   const std::string_view key = rest.substr(1);
   if (!key.empty() && static_cast<unsigned char>(key[0]) > ' ' && key[0] != kDelete &&
       utf8_size(key[0]) == key.size()) {
@@ -200,7 +200,7 @@ std::vector<TextInput::Event> TextInput::feed(std::string_view bytes, std::int64
       continue;
     }
     const std::size_t length = utf8_size(rest[at]);
-    if (length == 0) {  // no UTF-8
+    if (length == 0) {  // not UTF-8
       ++at;
       continue;
     }
@@ -321,7 +321,7 @@ namespace {
 using std::chrono::steady_clock;
 
 constexpr std::size_t kMaxWrite = 256;  // bytes; poll() promises that a terminal takes these
-constexpr auto kFlushTime = std::chrono::milliseconds(300);  // for what is left to write at the end
+constexpr auto kFlushTime = std::chrono::milliseconds(300);  // for the remaining text at the end
 
 class TextDisplay final : public DisplayLoop {
  public:
@@ -356,7 +356,7 @@ class TextDisplay final : public DisplayLoop {
     for (Output& output : out_.take()) {
       if (output.text.front() != '\r') {
         output.text = wrapped(output.text, columns_of(output.file));
-        // A command that is being typed is written again below the new text.
+        // Write a command that is being typed again below the new text.
         if (terminal_.on() && !input_.line().empty())
           output.text = "\r\x1b[K" + output.text + printable(input_.line());
       }
@@ -364,7 +364,7 @@ class TextDisplay final : public DisplayLoop {
     }
   }
 
-  /// Waits for a key, for text to write, or until it can be written.
+  /// Waits for a key, for text to write, or until the output accepts it.
   void step(int timeout_ms) {
     collect();
     std::array<pollfd, 3> files = {{{wake_.file(), POLLIN, 0},
@@ -413,7 +413,7 @@ class TextDisplay final : public DisplayLoop {
     const std::string_view now = std::string_view(output.text).substr(0, kMaxWrite);
     const ssize_t written = write(output.file, now.data(), now.size());
     if (written < 0 && (errno == EINTR || errno == EAGAIN)) return;
-    // On an error (closed pipe) the text is dropped.
+    // Drop the text on an error (closed pipe).
     output.text.erase(0, written < 0 ? output.text.size() : static_cast<std::size_t>(written));
     if (output.text.empty()) pending_.pop_front();
   }

@@ -69,11 +69,11 @@ class WakeEvent {
   int file_;
 };
 
-/// Breaks lines between words where they are longer than the terminal is wide.
-/// \param columns  of the terminal; 0: unknown, nothing is broken
+/// Breaks lines that are longer than the terminal's width, between words.
+/// \param columns  width of the terminal; 0: unknown, no line is broken
 std::string wrapped(const std::string& text, std::size_t columns);
 
-/// Width of the terminal that a file descriptor is; 0: it is none, or its width is unknown.
+/// Width of the terminal at a file descriptor; 0: not a terminal, or its width is unknown.
 std::size_t columns_of(int file);
 
 // Parses terminal input: single keys are answers, a line that begins with ':' is a command, Escape
@@ -95,7 +95,7 @@ class TextInput {
   };
   using Event = std::variant<KeyPress, ConsoleCommand, Unknown>;
 
-  /// \param bytes  that arrived together at `time_ns`
+  /// \param bytes  bytes that arrived together at `time_ns`
   std::vector<Event> feed(std::string_view bytes, std::int64_t time_ns);
   /// The command line being typed, with its colon; empty: none.
   const std::string& line() const { return line_; }
@@ -106,12 +106,12 @@ class TextInput {
   void end_line(std::int64_t time_ns, std::vector<Event>& out);
 
   std::string line_;
-  std::string partial_;  ///< a UTF-8 sequence that has not come whole
+  std::string partial_;  ///< an incomplete UTF-8 sequence
 };
 
 // Participant's screen and console as text, written by the thread of TextDisplay.
 
-/// A text and the file descriptor that it goes to.
+/// A text and the file descriptor to write it to.
 struct Output {
   int file = STDOUT_FILENO;
   std::string text;
@@ -137,7 +137,7 @@ class TextScreen final : public ParticipantScreen {
   std::atomic<bool> open_{true};
 };
 
-/// The console: writes what has changed in the state.
+/// The console: writes the changes of the state.
 class TextConsole final : public ExperimenterConsole {
  public:
   TextConsole(EventQueue<Output>& out, WakeEvent& wake) : out_(out), wake_(wake) {}
@@ -152,7 +152,7 @@ class TextConsole final : public ExperimenterConsole {
   EventQueue<Output>& out_;
   WakeEvent& wake_;
   EventQueue<ConsoleCommand> commands_;
-  // What was shown last; used by the session's thread only:
+  // Shown last; used by the session's thread only:
   std::size_t messages_shown_ = 0;
   std::string state_, held_by_, instruction_;
   int trial_ = 0;

@@ -1,5 +1,5 @@
 #pragma once
-// The last minute of a scene that is touched: what is shown of it, and how time goes on.
+// The last minute of a touched scene: the moment shown, and the passing of time.
 
 #include <array>
 #include <cstddef>
@@ -16,15 +16,15 @@ class Timeline {
  public:
   static constexpr double kSpan = 60;                      ///< s; older moments are dropped
   static constexpr std::size_t kMost = 60'001;             ///< moments
-  static constexpr double kSlowest = 0.001, kFastest = 4;  ///< times as fast
+  static constexpr double kSlowest = 0.001, kFastest = 4;  ///< factors on the speed
 
   enum class State {
     following,  ///< the newest moment is shown
-    playing,    ///< time goes on from an earlier one
+    playing,    ///< time runs on from an earlier moment
     paused,
   };
 
-  /// Appends a later moment; one that is not later begins anew.
+  /// Appends a later moment; one that is not later restarts the timeline.
   void add(SceneMoment moment);
   void clear();
 
@@ -32,31 +32,31 @@ class Timeline {
   const SceneMoment* shown() const;
   bool empty() const { return moments_.empty(); }
   const std::deque<SceneMoment>& moments() const { return moments_; }
-  double first() const;  ///< 0 where there is none; so the others
+  double first() const;  ///< s, of the first moment; 0 if empty, as the others
   double last() const;
-  double now() const;  ///< of the moment that is shown
+  double now() const;  ///< of the moment shown
   State state() const { return state_; }
   double speed() const { return speed_; }
 
   void pause();
-  /// From the moment that is shown; at the end from the beginning.
+  /// Plays from the moment shown; at the end, from the beginning.
   void play();
   void follow();
-  /// Pauses so many moments later, or earlier.
+  /// Pauses this many moments later; negative: earlier.
   void step(int moments);
   /// Pauses at the last moment not after `time`, or the first.
   void seek(double time);
   void set_speed(double speed);
 
-  /// What went wrong in the moments that are kept: how often, and when last (s).
+  /// A fault in the kept moments: how often it occurred, and its last time (s).
   struct Fault {
     std::uint32_t bit = 0;
     std::size_t count = 0;
     double last = 0;
   };
-  /// Of each bit that occurred, lowest first.
+  /// One for each bit that occurred, lowest first.
   std::vector<Fault> faults() const;
-  /// \param seconds  that have passed outside
+  /// \param seconds  elapsed real time
   void advance(double seconds);
 
  private:
@@ -65,7 +65,7 @@ class Timeline {
 
   std::deque<SceneMoment> moments_;
   State state_ = State::following;
-  double time_ = 0;        ///< shown, where it does not follow
+  double time_ = 0;        ///< shown, unless it follows the newest
   std::size_t index_ = 0;  ///< likewise
   double speed_ = 1;
   std::array<Fault, 32> faults_{};  ///< of each bit

@@ -21,7 +21,7 @@ namespace palpate::runner {
 namespace {
 
 constexpr double kFrame = 1.0 / 60;      // s, between frames of the console
-constexpr double kJoystickPoll = 0.002;  // s: GLFW has no events of its buttons
+constexpr double kJoystickPoll = 0.002;  // s: GLFW has no events for its buttons
 
 double seconds() {
   const auto since = std::chrono::steady_clock::now().time_since_epoch();
@@ -83,10 +83,11 @@ class Windows final : public DisplayLoop {
 
   std::string warning() const override {
     if (!layout_.shared) return {};
-    std::string text = settings_.mouse != nullptr
-                           ? "one monitor: whoever uses the mouse sees the shape, as is needed"
-                           : "one monitor: the console hides shape and scene until told to show "
-                             "them; a second monitor keeps them out of the participant's sight";
+    std::string text =
+        settings_.mouse != nullptr
+            ? "one monitor: the user of the mouse sees the shape, as this device requires"
+            : "one monitor: the console hides shape and scene until you show "
+              "them; a second monitor keeps them out of the participant's sight";
     if (settings_.full_screen)
       text += "; --full-screen needs a second monitor: the windows stand side by side";
     return text;
@@ -101,7 +102,7 @@ class Windows final : public DisplayLoop {
         step();
       }
       if (window_gone_) participant_.close();
-      // Not in the destructors: these calls throw if the display is lost.
+      // Not in destructors: these calls throw if the display is lost.
       console_.destroy();
       participant_.destroy();
       library_.close();
@@ -153,7 +154,7 @@ class Windows final : public DisplayLoop {
 
   static void on_participant_key(GLFWwindow* window, int key, int scancode, int action, int) {
     auto& self = *static_cast<Windows*>(glfwGetWindowUserPointer(window));
-    // Held down, the key that takes back what was typed repeats.
+    // Let Backspace repeat while held down.
     if (action == GLFW_REPEAT && key == GLFW_KEY_BACKSPACE && self.participant_.typing())
       self.participant_.handle_key(key, scancode);
     if (action != GLFW_PRESS) return;
@@ -171,7 +172,7 @@ class Windows final : public DisplayLoop {
   ParticipantWindow participant_;
   ConsoleWindow console_;
   WindowPlacing placing_;
-  std::unique_ptr<Joystick> joystick_;  ///< none: the protocol maps none
+  std::unique_ptr<Joystick> joystick_;  ///< null: the protocol maps none
   JoystickKeys joystick_keys_;
   std::atomic<bool> ended_{false};
 };

@@ -16,19 +16,19 @@
 namespace palpate::runner {
 
 struct WindowSettings {
-  std::string title;               ///< UTF-8, of the window frames: study and participant
-  bool full_screen = false;        ///< the participant's window, on a monitor of its own
-  double ui_scale = 0;             ///< of text and buttons; 0: taken from each window's monitor
-  int participant_monitor = 0;     ///< from 1; 0: the second if there is one, else the first
-  int console_monitor = 0;         ///< from 1; 0: the first
+  std::string title;            ///< UTF-8, of the window frames: study and participant
+  bool full_screen = false;     ///< the participant's window fills its own monitor
+  double ui_scale = 0;          ///< scale of text and buttons; 0: taken from each window's monitor
+  int participant_monitor = 0;  ///< from 1; 0: the second if there is one, else the first
+  int console_monitor = 0;      ///< from 1; 0: the first
   std::vector<std::string> texts;  ///< UTF-8, of the protocol: the console loads fonts for them
   /// Called at once, in the display's thread, when the emergency key or button is pressed; the
   /// command follows through commands().
   std::function<void()> emergency;
   MouseStylus* mouse = nullptr;  ///< moved by the pointer over the console's view; nullptr: none
-  WorkspaceMap workspace;        ///< of the servo, for the mouse
-  std::map<std::string, std::string> joystick;  ///< its inputs -> keys; empty: it is not looked at
-  std::optional<WindowPlaces> places;           ///< where they were put in an earlier session
+  WorkspaceMap workspace;        ///< the servo's, for the mouse
+  std::map<std::string, std::string> joystick;  ///< its inputs -> keys; empty: not used
+  std::optional<WindowPlaces> places;           ///< places of the windows in an earlier session
   Clock* clock = nullptr;  ///< time-stamps keys and commands; required; must outlive the windows
 };
 
@@ -39,7 +39,7 @@ class DisplayLoop {
   virtual ~DisplayLoop() = default;
   virtual ParticipantScreen& participant() = 0;
   virtual ExperimenterConsole& console() = 0;
-  /// A warning about the monitors for the experimenter; empty: none.
+  /// A warning for the experimenter about the monitors; empty: none.
   virtual std::string warning() const { return {}; }
   /// A warning about characters of the protocol's texts that it cannot show; empty: none.
   virtual std::string unreadable() const { return {}; }

@@ -11,14 +11,14 @@
 namespace palpate::runner {
 namespace {
 
-constexpr double kParticipantFraction = 0.4;  // of a monitor's width that both windows are on
+constexpr double kParticipantFraction = 0.4;  // share of the width of a monitor with both windows
 constexpr int kGap = 10;                      // px, around each window
-constexpr int kLeast = 200;                   // px, of a side; a smaller window is of no use
+constexpr int kLeast = 200;                   // px, of a side; a smaller window is useless
 // px, at scale 1:
 constexpr int kConsoleWidth = 1480, kConsoleHeight = 920;
 constexpr int kParticipantWidth = 1280, kParticipantHeight = 800;
 constexpr int kLeastWidth = 700, kLeastHeight = 480;  // of the console and of `explore`
-constexpr int kBarHeight = 64;                        // of the emergency button, with its margin
+constexpr int kBarHeight = 64;  // height of the emergency button with its margin
 
 /// \param number  from 1; 0: `otherwise`, or the first if there are fewer
 GLFWmonitor* monitor(int number, int otherwise) {
@@ -47,7 +47,7 @@ double scale_for(GLFWmonitor* on, double wanted) {
   return std::clamp(std::min(height / kUsualHeight, width / (kUsualHeight * 16 / 9)), 1.0, kMost);
 }
 
-/// The same monitor, or two that show the same part of the desktop.
+/// Whether these are one monitor, or two that show the same part of the desktop.
 bool overlap(GLFWmonitor* a, GLFWmonitor* b) {
   if (a == b) return true;
   int left[2], top[2], width[2], height[2];
@@ -57,7 +57,7 @@ bool overlap(GLFWmonitor* a, GLFWmonitor* b) {
          top[0] < top[1] + height[1] && top[1] < top[0] + height[0];
 }
 
-/// Without panels. \param on  nullptr: of a usual size
+/// The monitor's area without panels. \param on nullptr: assume a usual size
 ScreenBox work_area(GLFWmonitor* on) {
   ScreenBox area{0, 0, 1280, 800};
   if (on != nullptr) glfwGetMonitorWorkarea(on, &area.left, &area.top, &area.width, &area.height);
@@ -80,7 +80,7 @@ std::vector<GLFWmonitor*> monitors() {
   return {all, all + count};
 }
 
-/// The one that most of the box is on.
+/// The monitor that shows most of the box.
 GLFWmonitor* monitor_of(const ScreenBox& box) {
   GLFWmonitor* best = nullptr;
   std::int64_t most = 0;
@@ -95,7 +95,7 @@ GLFWmonitor* monitor_of(const ScreenBox& box) {
   return best;
 }
 
-/// Of the window manager, if it tells before there is a window on the screen.
+/// The window manager's frame, if it reports one before a window is shown.
 FrameSize usual_frame() {
   glfwDefaultWindowHints();
   glfwWindowHint(GLFW_CLIENT_API, GLFW_NO_API);
@@ -109,7 +109,7 @@ FrameSize usual_frame() {
 
 int scaled(int size, double scale) { return static_cast<int>(size * scale); }
 
-/// As large as it is wanted and fits, in the middle of the room.
+/// A box of the wanted size, as far as it fits, in the middle of the room.
 ScreenBox centred_in(const ScreenBox& room, int width, int height, const FrameSize& frame) {
   const ScreenBox most = without_frame(room, frame, kGap);
   width = std::min(width, std::max(most.width, kLeast));
@@ -118,7 +118,7 @@ ScreenBox centred_in(const ScreenBox& room, int width, int height, const FrameSi
           std::max(most.top, most.top + (most.height - height) / 2), width, height};
 }
 
-/// At the right edge of the room, as wide as the participant's window leaves it.
+/// A box at the right edge of the room, beside the participant's window.
 ScreenBox console_beside_participant(const ScreenBox& room, double scale, const FrameSize& frame) {
   const int part = static_cast<int>((1 - kParticipantFraction) * room.width);
   const int around = 2 * kGap + frame.left + frame.right;
@@ -129,8 +129,7 @@ ScreenBox console_beside_participant(const ScreenBox& room, double scale, const 
   return {room.right() - kGap - frame.right - width, room.top + kGap + frame.top, width, height};
 }
 
-/// Where the windows were put last; none: they do not fit there any more, or something else was
-/// asked for.
+/// The last places of the windows; null: they no longer fit there, or the settings ask for others.
 const WindowPlaces* usable(const WindowSettings& settings, const FrameSize& frame, int bar) {
   if (!settings.places || settings.full_screen || settings.participant_monitor > 0 ||
       settings.console_monitor > 0)
@@ -177,7 +176,7 @@ ScreenBox room_beside(const ScreenBox& console, int bar, const FrameSize& frame)
   const ScreenBox beside = rest_of(area, with_frame(console, frame));
   if (beside.width >= 2 * kLeast && beside.height >= kLeast)
     return without_frame(beside, frame, kGap);
-  // A console over the whole monitor: on it, but below the button.
+  // The console fills the monitor: put the window on it, below the button.
   const int below = std::clamp(console.top + bar, area.top, area.bottom());
   return without_frame({area.left, below, area.width, area.bottom() - below}, frame, kGap);
 }
@@ -242,8 +241,8 @@ GLFWwindow* make_window(const std::string& title, const WindowGeometry& geometry
     if (geometry.least_width > 0)
       glfwSetWindowSizeLimits(window, geometry.least_width, geometry.least_height, GLFW_DONT_CARE,
                               GLFW_DONT_CARE);
-    // After the limits, which write the window's hints anew: without a position among them the
-    // window manager would choose one.
+    // Call it after setting the limits, which rewrite the window's hints: without a position in
+    // them the window manager would choose one.
     glfwSetWindowPos(window, box.left, box.top);
   }
   glfwMakeContextCurrent(window);

@@ -8,7 +8,7 @@
 namespace palpate::runner {
 namespace {
 
-/// JSON, like the other events among a run's notes; read by the same words.
+/// Format for writing and reading: JSON, like the other events among a run's notes.
 constexpr const char* kWritten =
     "{\"windows\":{\"desktop_px\":[%d,%d],\"participant_px\":[%d,%d,%d,%d],"
     "\"console_px\":[%d,%d,%d,%d]}}";

@@ -1,5 +1,5 @@
 #pragma once
-// Rectangles of the desktop, and where a session's windows are in them.
+// Rectangles on the desktop, and the places of a session's windows.
 
 #include <optional>
 #include <string>
@@ -14,7 +14,7 @@ struct ScreenBox {
   bool operator==(const ScreenBox&) const = default;
 };
 
-/// What a window manager puts around a window, px.
+/// Frame that a window manager puts around a window, px.
 struct FrameSize {
   int left = 0, top = 0, right = 0, bottom = 0;
 };
@@ -27,19 +27,19 @@ ScreenBox with_frame(const ScreenBox& window, const FrameSize& frame);
 ScreenBox without_frame(const ScreenBox& box, const FrameSize& frame, int gap = 0);
 /// The largest part of `room` that is wholly left of, right of, above or below `taken`.
 ScreenBox rest_of(const ScreenBox& room, const ScreenBox& taken);
-/// Moved into `room` by as little as possible, and made smaller only where it does not fit.
+/// The box moved into `room` by as little as possible, and made smaller only if it does not fit.
 ScreenBox moved_into(const ScreenBox& box, const ScreenBox& room);
 
-/// Of a session's windows, without their frames.
+/// Places of a session's windows, without their frames.
 struct WindowPlaces {
   int desktop_width = 0, desktop_height = 0;  ///< px, of all monitors together
   ScreenBox participant, console;
   bool operator==(const WindowPlaces&) const = default;
 };
 
-/// A note of a run, from which the next session's windows are placed.
+/// A note of a run; it places the next session's windows.
 std::string to_note(const WindowPlaces& places);
-/// None: the note says something else.
+/// None: the note is of another kind.
 std::optional<WindowPlaces> window_places(const std::string& note);
 
 }  // namespace palpate::runner

@@ -13,18 +13,18 @@ extern "C" Window glfwGetX11Window(GLFWwindow* window);
 namespace palpate::runner {
 namespace {
 
-constexpr double kEvery = 0.1;     // s, between two looks at where the windows are
-constexpr double kSettling = 1.5;  // s, that a window manager has to show them
+constexpr double kEvery = 0.1;     // s, between two checks of the windows' places
+constexpr double kSettling = 1.5;  // s, that the window manager has to show them
 constexpr double kStill = 0.4;     // s without a move: it is not being dragged any more
 constexpr double kRaiseEvery = 0.5;
 constexpr int kTries = 3;
 
-/// Above the other windows; the keyboard stays where it is, unlike with glfwFocusWindow.
+/// Puts a window above the others. Unlike glfwFocusWindow it does not move the keyboard focus.
 void raise(GLFWwindow* window) {
   if (Display* const display = glfwGetX11Display()) XRaiseWindow(display, glfwGetX11Window(window));
 }
 
-/// No longer maximised or full-screen, by whichever key of the window manager it became so.
+/// Ends a maximised or full-screen state set through the window manager.
 void restore(GLFWwindow* window) {
   Display* const display = glfwGetX11Display();
   if (display == nullptr) return;
@@ -57,7 +57,7 @@ WindowPlacing::WindowPlacing(GLFWwindow* participant, GLFWwindow* console,
       console_{console, layout.console.box},
       full_screen_(layout.participant.full_screen_on != nullptr) {}
 
-/// \return false where a window is gone
+/// \return false if a window is gone
 bool WindowPlacing::look() {
   for (Placed* const one : {&participant_, &console_}) {
     ScreenBox& box = one->now;
@@ -73,7 +73,7 @@ void WindowPlacing::ask_for(Placed& placed) {
   glfwSetWindowPos(placed.window, placed.asked.left, placed.asked.top);
 }
 
-/// Some window managers choose a place of their own for a new window, but grant a later wish.
+/// Some window managers choose their own place for a new window but accept a later request.
 void WindowPlacing::settle(double now) {
   bool there = true;
   for (Placed* const one : {&participant_, &console_}) {
@@ -111,7 +111,7 @@ void WindowPlacing::uncover(double now, int bar) {
     raised_at_ = 0;
   }
   if (!covers) return;
-  // At once, also while it is dragged.
+  // At once, even while it is dragged.
   if (now - raised_at_ >= kRaiseEvery) {
     raise(console_.window);
     raised_at_ = now;
@@ -140,8 +140,8 @@ std::optional<WindowPlaces> WindowPlacing::moved_to() const {
       (participant_.now == participant_.shown && console_.now == console_.shown))
     return std::nullopt;
   const ScreenBox all = desktop();
-  // A window manager may put a window beside the place that it was asked for. What is kept is what
-  // has to be asked for next time.
+  // A window manager may put a window beside the requested place. Store the place to request next
+  // time.
   const auto wish = [](const Placed& one) {
     return ScreenBox{one.asked.left + one.now.left - one.shown.left,
                      one.asked.top + one.now.top - one.shown.top, one.now.width, one.now.height};

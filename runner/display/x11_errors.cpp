@@ -23,10 +23,10 @@ XContext our_windows() {
 int ignore_io_error(Display*) { return 0; }
 
 // The exception passes frames of Xlib, GLFW and Mesa. They may hold locks of the display, which is
-// never used again, and have unwind tables, as all Debian libraries do.
+// never used again. They have unwind tables, as all Debian libraries do.
 void throw_display_lost(Display*, void*) { throw DisplayLost(); }
 
-/// Errors of single requests are ignored: they are no reason to end a session. Must not throw: the
+/// Ignores errors of single requests: they do not justify ending a session. Must not throw: the
 /// display would stay locked.
 int flag_destroyed_window(Display* display, XErrorEvent* error) {
   XPointer gone = nullptr;

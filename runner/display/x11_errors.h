@@ -1,5 +1,5 @@
 #pragma once
-// What happens when the X server goes away or a window is destroyed from outside.
+// Handling of a lost X server and of windows destroyed from outside.
 
 struct GLFWwindow;
 

@@ -11,10 +11,10 @@ namespace palpate::runner {
 namespace {
 
 constexpr float kFieldOfView = 0.45F;                // rad, vertical
-constexpr float kNear = 0.03F, kFar = 40;            // of the distance
+constexpr float kNear = 0.03F, kFar = 40;            // in distances of the camera
 constexpr float kSteepestPitch = 1.5F;               // rad
 constexpr float kNearest = 1e-4F, kFarthest = 1e5F;  // m, of the camera from the centre
-constexpr float kMargin = 1.12F;                     // of a picture about what must be in it
+constexpr float kMargin = 1.12F;  // share by which a picture exceeds the fitted points
 
 }  // namespace
 
@@ -40,8 +40,8 @@ void Camera::fit(std::span<const glm::vec3> points) {
   if (points.empty()) return;
   const glm::mat3 to_view(view());
   const float up = std::tan(kFieldOfView / 2) / kMargin, right = up * width_ / height_;
-  // A point (x, y, z) of the view is in the picture where |x - cx| <= right (d - z): so of all
-  // x + right z and x - right z the extremes decide.
+  // A point (x, y, z) of the view is in the picture if |x - cx| <= right (d - z). So only the
+  // extremes of x + right z and x - right z matter.
   constexpr float kMost = std::numeric_limits<float>::max();
   float left_of = kMost, right_of = -kMost, below = kMost, above = -kMost, deepest = kMost,
         nearest = -kMost;

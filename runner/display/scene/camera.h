@@ -7,22 +7,23 @@
 
 namespace palpate::runner {
 
-/// The camera of a picture of a scene: z is up, and at first y leads away from it (the frame of
-/// rendering/README.md). Points in the virtual frame, m; pixels from the picture's upper left
-/// corner.
+/// The camera of a picture of a scene: z is up, and initially y points away from the camera (the
+/// frame of rendering/README.md). Points are in the virtual frame, m; pixels from the picture's
+/// upper left corner.
 class Camera {
  public:
   void resize(float width, float height);
   /// \param right, up  rad
   void orbit(float right, float up);
-  /// Where the camera stands, about the centre. \param yaw  rad, about +z, 0: on -y, looking
-  /// along +y with +x to the right. \param pitch  rad, up
+  /// Places the camera about the centre. \param yaw  rad, about +z, 0: on -y, looking along +y with
+  /// +x to the right. \param pitch  rad, up
   void look_from(float yaw, float pitch);
   /// \param closer  above 1: larger in the picture
   void zoom(float closer);
-  /// Moves the centre in the picture's plane. px
+  /// Moves the centre in the picture's plane, by pixels.
   void pan(const glm::vec2& pixels);
-  /// Moves centre and distance so that all points are in the picture as it is now, with a margin.
+  /// Changes centre and distance, not direction, so that all points are in the picture, with a
+  /// margin.
   void fit(std::span<const glm::vec3> points);
 
   glm::vec3 eye() const;
@@ -33,7 +34,7 @@ class Camera {
   bool in_front(const glm::vec3& point) const;  ///< not behind the viewer
   /// The point seen at a pixel, at the same depth as `depth_of`.
   glm::vec3 unproject(const glm::vec2& pixel, const glm::vec3& depth_of) const;
-  /// m, from the lower to the upper edge of the picture at the depth of a point.
+  /// Height of the picture at the depth of a point, m.
   float height_at(const glm::vec3& depth_of) const;
   glm::vec3 towards_viewer() const;  ///< unit, from the centre to the camera
 

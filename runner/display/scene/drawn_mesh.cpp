@@ -20,7 +20,7 @@ namespace {
 
 constexpr std::size_t kMostFileBytes = std::size_t{1} << 31;
 constexpr int kSides = 24;
-constexpr float kFlattest = 0.866F;  // cosine between normals that are smoothed
+constexpr float kFlattest = 0.866F;  // least cosine between normals that are smoothed
 
 void add(const stimuli::PolygonSoup& soup, const Pose& pose, DrawnMesh& out) {
   std::vector<Vec3> corners;
@@ -101,7 +101,7 @@ void add_facets(const stimuli::ConvexMesh& mesh, const Pose& pose, DrawnMesh& ou
 }
 
 void smooth(DrawnMesh& mesh) {
-  // Corners of one place, within a thousandth of the size.
+  // Corners within a thousandth of the size count as one place.
   float size = 0;
   for (const DrawnVertex& corner : mesh)
     size = std::max(size, std::abs(corner.position.x) + std::abs(corner.position.y) +
@@ -115,7 +115,8 @@ void smooth(DrawnMesh& mesh) {
     places[i] = {{std::llround(p.x / cell), std::llround(p.y / cell), std::llround(p.z / cell)}, i};
   }
   std::ranges::sort(places);
-  // Each triangle weighs by its angle at the corner, so that how a face is cut does not matter.
+  // Weight each triangle by its angle at the corner: the triangulation of a face then does not
+  // matter.
   std::vector<float> angles(mesh.size());
   for (std::size_t i = 0; i < mesh.size(); ++i) {
     const std::size_t first = i - i % 3;

@@ -17,27 +17,27 @@ namespace palpate::runner {
 struct DrawnVertex {
   glm::vec3 position;  ///< m
   glm::vec3 normal;    ///< unit, outward
-  float tint = 0;      ///< 0: the object's colour; 1: that of what has given way
+  float tint = 0;      ///< 0: the object's colour; 1: the colour of full deformation
 };
 using DrawnMesh = std::vector<DrawnVertex>;  ///< three corners a triangle
 
 /// The triangles of an object in its own frame (its pose is left out, not those of its parts).
-/// Edges that are flatter than 30 degrees are smoothed. \throws MeshError, std::runtime_error where
-/// a file is no mesh
+/// Edges flatter than 30 degrees are smoothed. \throws MeshError; std::runtime_error if a file is
+/// not a mesh
 DrawnMesh triangles_of(const stimuli::ObjectSpec& object);
 
-/// A surface of triangles. \param tints  of the places; empty: none
+/// A surface of triangles. \param tints  one for each place; empty: none
 DrawnMesh surface_mesh(std::span<const Vec3> places,
                        std::span<const std::array<std::uint32_t, 3>> triangles,
                        std::span<const float> tints);
 
-/// Adds the facets of a convex mesh, in the frame in which its own has this pose.
+/// Adds the facets of a convex mesh, transformed by `pose`.
 void add_facets(const stimuli::ConvexMesh& mesh, const Pose& pose, DrawnMesh& out);
 
-/// Where facets meet at less than 30 degrees, their corners get a common normal.
+/// Gives corners a common normal where facets meet at less than 30 degrees.
 void smooth(DrawnMesh& mesh);
 
-/// How far along a line it first enters the mesh; none: it misses it.
+/// Distance along a line to where it first enters the mesh; none: it misses.
 std::optional<float> distance_to(const DrawnMesh& mesh, const glm::vec3& from,
                                  const glm::vec3& along);
 

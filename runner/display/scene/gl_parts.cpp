@@ -25,8 +25,8 @@ struct TextImage {
   std::vector<unsigned char> bgra;  ///< premultiplied, rows from the top
 };
 
-/// \param size  px, of the font. \param halo  colour about the letters, so that they are readable
-/// on any ground
+/// \param size  px, of the font. \param halo  colour around the letters, so that they are readable
+/// on any background
 TextImage text_image(const std::string& text, double size, const glm::vec3& colour,
                      const glm::vec3& halo);
 

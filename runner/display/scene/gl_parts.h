@@ -1,6 +1,6 @@
 #pragma once
-// Parts of OpenGL that belong to someone: freed with their owner. All need a current context of
-// OpenGL 3.3, also to be destroyed.
+// Owners of OpenGL objects, which free them. All need a current OpenGL 3.3 context, also in their
+// destructors.
 
 #include <glm/mat4x4.hpp>
 #include <glm/vec2.hpp>
@@ -14,20 +14,19 @@
 
 namespace palpate::runner {
 
-/// \throws DisplayError where the current context is too old to draw scenes
+/// \throws DisplayError if the current context is too old to draw scenes
 void require_opengl();
 
-/// Whether the processor draws, not a graphics card.
+/// Whether the CPU draws instead of a graphics card.
 bool draws_in_software();
 
-/// After the last thing that is drawn into a target, before anything is drawn into another: where
-/// the processor draws, waits until it has. Mesa's software driver (llvmpipe, seen in 22.3.6) takes
-/// a target's work for done, and frees the fence that says so, while the thread that signals it may
-/// still be in it, if drawing into another target begins without having waited. That thread then
-/// writes into memory of somebody else.
+/// Call after the last drawing into a target, before drawing into another. If the CPU draws, waits
+/// until it has finished. Without the wait Mesa's software driver (llvmpipe, seen in 22.3.6) may
+/// free a target's fence while the thread that signals it still uses it; that thread then writes
+/// into freed memory.
 void finish_target();
 
-/// \throws DisplayError naming `doing` where OpenGL reports an error
+/// \throws DisplayError naming `doing` if OpenGL reports an error
 void check_opengl(const char* doing);
 
 /// A mesh on the graphics card.
@@ -53,7 +52,7 @@ class GlProgram {
   GlProgram& operator=(const GlProgram&) = delete;
 
   void use() const;
-  // Of the program in use.
+  // Set uniforms of the program in use.
   void set(const char* name, float value) const;
   void set(const char* name, int value) const;
   void set(const char* name, const glm::vec2& value) const;
@@ -66,7 +65,7 @@ class GlProgram {
   unsigned program_ = 0;
 };
 
-/// A picture that is drawn into, with several samples a pixel, and its resolved texture.
+/// A render target with several samples a pixel, and its resolved texture.
 class GlCanvas {
  public:
   ~GlCanvas();
@@ -74,7 +73,7 @@ class GlCanvas {
   GlCanvas(const GlCanvas&) = delete;
   GlCanvas& operator=(const GlCanvas&) = delete;
 
-  /// Makes it this large (px) and binds it. \throws DisplayError: too large for the driver
+  /// Resizes it (px) and binds it. \throws DisplayError: too large for the driver
   void begin(int width, int height, int samples);
   /// Resolves the samples into the texture.
   void end() const;
@@ -88,7 +87,7 @@ class GlCanvas {
   unsigned samples_frame_ = 0, samples_colour_ = 0, samples_depth_ = 0, frame_ = 0, texture_ = 0;
 };
 
-/// Distances from a light, for shadows.
+/// A shadow map: distances from a light.
 class GlDepthMap {
  public:
   explicit GlDepthMap(int size);
@@ -96,7 +95,7 @@ class GlDepthMap {
   GlDepthMap(const GlDepthMap&) = delete;
   GlDepthMap& operator=(const GlDepthMap&) = delete;
   void begin() const;
-  /// Makes it the texture that a sampler of shadows reads.
+  /// Binds it as the texture of a shadow sampler.
   void read_as(int unit) const;
 
  private:
@@ -106,7 +105,8 @@ class GlDepthMap {
 
 // Text over a picture.
 
-/// Where a point of the text lies: its left end at mid-height, its middle, its lower left corner.
+/// The point of the text that is positioned: its left end at mid-height, its centre, its lower left
+/// corner.
 enum class TextAnchor { left, centre, lower_left };
 
 class GlText {
@@ -116,10 +116,10 @@ class GlText {
   GlText(const GlText&) = delete;
   GlText& operator=(const GlText&) = delete;
 
-  /// Before the texts of a picture, into what is bound. \param size  px, of the font
+  /// Begins the texts of a picture, drawn into the bound target. \param size  px, of the font
   void begin(const glm::vec2& picture, double size, const Theme& theme);
   void draw(const std::string& text, const glm::vec2& at, TextAnchor anchor);
-  /// px, of the text as it would be drawn.
+  /// Size of the text as drawn, px.
   glm::vec2 size_of(const std::string& text) { return known(text).size; }
   void end();
 
@@ -132,7 +132,7 @@ class GlText {
   const Known& known(const std::string& text);
 
   GlProgram program_;
-  unsigned nothing_ = 0;  ///< vertices: the shader makes them
+  unsigned nothing_ = 0;  ///< vertex array without data: the shader computes the vertices
   std::map<std::string, Known> known_;
   glm::vec2 picture_{1, 1};
   double size_ = 0;

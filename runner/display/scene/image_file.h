@@ -10,10 +10,10 @@ namespace palpate::runner {
 /// std::runtime_error
 std::string png_of(const std::string& pixels, int width, int height);
 
-/// An animated WebP: pictures one after the other, then repeated without end.
+/// An animated WebP that repeats forever.
 class WebpAnimation {
  public:
-  /// px \throws std::runtime_error; so do all
+  /// \param width, height px. All functions throw std::runtime_error
   WebpAnimation(int width, int height);
   ~WebpAnimation();
   WebpAnimation(const WebpAnimation&) = delete;

@@ -15,10 +15,10 @@ namespace palpate::runner {
 
 // OpenGL without a display.
 
-/// A context of its own, current in the thread that made it, until it is destroyed there.
+/// A context of its own, current in the creating thread until destroyed there.
 class OffscreenContext {
  public:
-  /// \throws DisplayError saying what is missing
+  /// \throws DisplayError naming the missing part
   OffscreenContext();
   ~OffscreenContext();
   OffscreenContext(const OffscreenContext&) = delete;
@@ -49,7 +49,7 @@ EGLDisplay surfaceless_display() {
 }  // namespace
 
 OffscreenContext::OffscreenContext() {
-  // libepoxy ends the program where it does not find the library.
+  // libepoxy ends the program if it does not find the library.
   void* const library = dlopen("libEGL.so.1", RTLD_LAZY | RTLD_LOCAL);
   if (library == nullptr) refuse("the library libEGL is not installed");
   display_ = surfaceless_display();

@@ -1,5 +1,6 @@
 #pragma once
-// What a picture of a scene shows, as plain values. Virtual frame, z up, m; colours sRGB, 0 to 1.
+// The contents of a picture of a scene, as plain values. Virtual frame, z up, m; colours sRGB, 0 to
+// 1.
 
 #include <glm/mat4x4.hpp>
 #include <glm/vec3.hpp>
@@ -14,20 +15,18 @@
 
 namespace palpate::runner {
 
-/// No window can be opened or no picture drawn: not built in, no display, or an unsuitable one;
-/// what() says which.
+/// No window can be opened or no picture drawn: not built in, no display, or an unsuitable one.
 class DisplayError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
 struct DrawnObject {
-  /// Kept by the renderer as long as it is drawn: pass the same one again where nothing has
-  /// changed.
+  /// The renderer caches it while it is drawn: pass the same pointer again if nothing has changed.
   std::shared_ptr<const DrawnMesh> mesh;
   glm::mat4 place{1};
   glm::vec3 colour{0.6F};
-  float opacity = 1;  ///< below 1: drawn after what is opaque; the innermost object first
-  /// What lies inside of what, of those with one index: 0 the outermost.
+  float opacity = 1;  ///< below 1: drawn after opaque objects, the innermost first
+  /// Nesting depth among the surfaces with the same object index; 0: the outermost.
   int object = 0, layer = 0;
 };
 
@@ -35,10 +34,9 @@ struct DrawnRod {
   glm::vec3 from{0}, to{0};
   float radius = 0.001F;
   glm::vec3 colour{0.2F};
-  /// How much is seen of it inside of or behind objects: 0 nothing, 1 as much as before them.
+  /// Visibility inside or behind objects: 0 hidden, 1 as in front of them.
   float through = 0;
-  /// Of the picture's height: so thick it looks at most at its nearer end, however near that is to
-  /// the viewer; 0: no limit.
+  /// Largest apparent thickness at its nearer end, as a share of the picture's height; 0: no limit.
   float thickest = 0;
 };
 
@@ -46,7 +44,7 @@ struct DrawnBall {
   glm::vec3 centre{0};
   float radius = 0.001F;
   glm::vec3 colour{0.2F};
-  float through = 0;  ///< as DrawnRod's
+  float through = 0;  ///< as in DrawnRod
 };
 
 struct DrawnArrow {
@@ -86,12 +84,12 @@ struct ScenePicture {
   std::vector<DrawnTurn> turns;
   std::vector<DrawnLabel> labels;
   std::vector<std::string> caption;  ///< lines in the lower left corner
-  /// What casts and gets shadows is within this distance of this place; the ground fades beyond.
+  /// Shadows are drawn within `size` of `middle`; the ground fades beyond.
   glm::vec3 middle{0};
   float size = 0.1F;
   float ground = 0;  ///< height of the ground, z
   float grid = 0;    ///< between the lines on the ground; 0: none
-  /// What is on the side of positive dot(plane, (x, y, z, 1)) alone is drawn of objects.
+  /// Cutting plane: of objects, only the side with dot(plane, (x, y, z, 1)) > 0 is drawn.
   std::optional<glm::vec4> cut;
 };
 

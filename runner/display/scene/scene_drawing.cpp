@@ -68,7 +68,7 @@ void place_labels(std::vector<LabelBox>& boxes, const glm::vec2& picture) {
                              wanted.y <= picture.y;
     box.shown = near_enough && low.x <= high.x && low.y <= high.y;
     bool free = false;
-    // Above its place, then below, ever farther.
+    // Try rows above and below its place, at growing distance.
     for (int k = 0; box.shown && !free && k <= 2 * kMostRows; ++k) {
       const int rows = (k + 1) / 2 * (k % 2 == 1 ? -1 : 1);
       const glm::vec2 moved =
@@ -133,7 +133,7 @@ std::vector<glm::vec3> points_of(const DrawnTurn& turn) {
 
 namespace {
 
-/// \param side  +x of the tool; zero: as at the beginning of a trial
+/// \param side  +x of the tool; zero: the side at the beginning of a trial
 DrawnTool placed(const rendering::Tool& tool, const rendering::LineProbe& stylus,
                  const Vec3& side) {
   DrawnTool out{stylus, {}};
@@ -172,19 +172,19 @@ constexpr std::array<glm::vec3, 8> kObjectColours{{{0.42F, 0.60F, 0.83F},
 constexpr std::array<glm::vec3, 4> kLayerColours{
     {{0.91F, 0.63F, 0.36F}, {0.80F, 0.38F, 0.36F}, {0.50F, 0.33F, 0.55F}, {0.30F, 0.36F, 0.55F}}};
 
-// Of the size of the scene.
+// In sizes of the scene.
 constexpr double kIdealRadius = 0.020, kVirtualRadius = 0.012, kHeldRadius = 0.05,
                  kContactRadius = 0.035, kArrowRadius = 0.024, kTurnThickness = 0.013,
                  kTurnRadius = 0.28, kLongestArrow = 1.6;
-// Of the picture's height: the end of a stretched stylus that is held is near to the viewer.
+// Shares of the picture's height: the held end of a stretched stylus is near the viewer.
 constexpr double kThickestStretched = 0.035, kThickestHeld = 0.06;
-constexpr double kLengthOfOneNewton = 1.0 / 6;  // of the size: what a device gives at most is 1
+constexpr double kLengthOfOneNewton = 1.0 / 6;  // in sizes: a device's largest force is about 1
 constexpr double kTurnOfOneNewtonMetre = 8;     // rad
 constexpr double kLeastTurn = 0.05, kLongestTurn = 5.5;  // rad
 constexpr double kLeastForce = 0.005;                    // N; less is not drawn
 constexpr double kLeastTorque = 1e-4;                    // N m; likewise
-constexpr double kRedOfSize = 0.2;   // of the radius: so far has given way what is red
-constexpr float kFarthestFloor = 1;  // below the lowest, of the size
+constexpr double kRedOfSize = 0.2;   // share of the radius: a deformation this large is red
+constexpr float kFarthestFloor = 1;  // below the lowest point, in sizes
 constexpr float kSkinOpacity = 0.22F, kLayerOpacity = 0.42F;
 
 glm::mat4 place_of(const Pose& pose) {
@@ -277,7 +277,7 @@ std::vector<Pose> object_poses(const std::vector<stimuli::ObjectSpec>& objects,
   out.reserve(objects.size());
   for (const stimuli::ObjectSpec& object : objects) out.push_back(object.pose);
   for (const rendering::BodyPose& body : bodies) {
-    if (static_cast<std::size_t>(body.object) >= out.size()) continue;  // of another scene
+    if (static_cast<std::size_t>(body.object) >= out.size()) continue;  // belongs to another scene
     Pose& pose = out[static_cast<std::size_t>(body.object)];
     pose = stimuli::compose(body.moved, pose);
   }
@@ -318,7 +318,7 @@ SceneDrawing::SceneDrawing(const std::vector<stimuli::ObjectSpec>& objects, rend
   float radius = 0;
   for (const glm::vec3& point : points) radius = std::max(radius, glm::distance(point, middle_));
   size_ = std::max<double>(radius, 1e-4);
-  // What hovers or flies is above the world's floor, where that is near.
+  // If all objects hover above z = 0 and it is near, draw the floor there.
   const bool above_floor = low.z > 0 && low.z < kFarthestFloor * radius;
   ground_ = above_floor ? 0 : low.z;
 }
@@ -349,7 +349,7 @@ void SceneDrawing::add_layers(const rendering::Scene& scene) {
     if (part.layer < 1) continue;
     auto& layers = found[static_cast<std::size_t>(part.object)];
     layers.resize(std::max(layers.size(), static_cast<std::size_t>(part.layer)));
-    // In the frame of the object, which may move.
+    // In the frame of the object: it may move.
     const Pose& of = objects_[static_cast<std::size_t>(part.object)].pose;
     const Quat back = glm::conjugate(of.orientation);
     add_facets(*part.mesh,
@@ -476,7 +476,7 @@ void SceneDrawing::add_tool(const SceneMoment& moment, const Theme& theme,
             kThickestStretched);
   if (tip_alone)
     out.balls.push_back({seen.stylus.tip, radius(1.8 * kIdealRadius), theme.ideal_tool, 0.30F});
-  // What is held but does not touch.
+  // The part that is held but does not touch.
   if (!tool_.segments.empty())
     add_rod(seen.stylus, 0.4 * kIdealRadius, theme.ideal_tool, 0.2F, kThickestStretched);
   if (moment.held && finite(moment.held->tip) && finite(moment.held->tail))
@@ -516,7 +516,7 @@ void SceneDrawing::add_forces(const SceneMoment& moment, const Theme& theme,
 
 std::array<std::string, 2> SceneDrawing::scale_words(const SceneDrawingSettings& settings) const {
   char arrow[48], turn[48];
-  // Of a round force and torque that are a good part of what is drawn.
+  // For a round force and torque whose signs are about as large as the scene.
   const double force = round_step(size_ / arrow_scale(settings, size_));
   const double torque = round_step(kLongestTurn / turn_scale(settings));
   std::snprintf(arrow, sizeof arrow, "%g N: %.0f mm", force,

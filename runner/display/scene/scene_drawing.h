@@ -1,5 +1,5 @@
 #pragma once
-// Pictures of a scene as it is touched: from what a tick was to what is drawn.
+// Pictures of a scene that is touched: converts a tick's record to elements to draw.
 
 #include <array>
 #include <cstddef>
@@ -26,18 +26,18 @@ namespace palpate::runner {
 /// A label in a picture. Pixels from the upper left corner.
 struct LabelBox {
   glm::vec2 centre{0, 0}, size{0, 0};
-  float distance = 0;  ///< of what it names, from the viewer, m
+  float distance = 0;  ///< of the named thing from the viewer, m
   const std::string* text = nullptr;
   bool shown = true;
 };
 
-/// Moves labels so that they lie in the picture and on none of the others, the nearest things'
-/// first. Not shown is what names things outside of the picture, and what finds no room.
+/// Moves labels so that they lie in the picture and do not overlap, those of the nearest things
+/// first. Hides labels of things outside the picture and labels without room.
 void place_labels(std::vector<LabelBox>& boxes, const glm::vec2& picture);
 
-// Where the unit cylinder, cone and sphere go to be rods, arrows and balls.
+// Matrices that make rods, arrows and balls of the unit cylinder, cone and sphere.
 
-/// Takes the unit z axis from `from` to `to`, x and y to `radius`.
+/// Maps the unit z axis to `from`...`to`, and scales x and y by `radius`.
 glm::mat4 rod_place(const glm::vec3& from, const glm::vec3& to, float radius);
 /// The radius with which the rod is drawn.
 float radius_seen(const DrawnRod& rod, const Camera& camera);
@@ -46,92 +46,92 @@ glm::mat4 ball_place(const glm::vec3& centre, float radius);
 struct ArrowPlaces {
   glm::mat4 shaft, head;
 };
-/// The head ends at `to`; of a short arrow it is half.
+/// The head ends at `to`; in a short arrow it takes half the length.
 ArrowPlaces arrow_places(const glm::vec3& from, const glm::vec3& to, float radius);
 
 /// Points along the arc; the last three steps are its head.
 std::vector<glm::vec3> points_of(const DrawnTurn& turn);
 
-// What the stylus carries, as the console's view draws it. Virtual frame, m.
+// The tool on the stylus, as the console's view draws it. Virtual frame, m.
 
-/// The segments of the tool, as one of them is drawn: in the hand or as the ideal tool.
+/// Stylus and segments of one drawn tool: that in the hand, or the ideal tool.
 struct DrawnTool {
   rendering::LineProbe stylus;
-  std::vector<rendering::LineProbe> segments;  ///< without a tool the stylus alone
+  std::vector<rendering::LineProbe> segments;  ///< without a tool: the stylus alone
 };
 
-/// The tool in the hand: where the stylus is, with the roll of the ideal tool (they differ by its
-/// lag alone).
+/// The tool in the hand: at the stylus, with the roll of the ideal tool (they differ only by its
+/// lag).
 DrawnTool tool_in_hand(const rendering::Tool& tool, const Sample& sample);
 
-/// The ideal tool of the deepest contact; in free space where the hand is.
+/// The ideal tool of the deepest contact; in free space that in the hand.
 DrawnTool ideal_tool(const rendering::Tool& tool, const Sample& sample);
 
-/// All places of a tick; of a scene in which something rigid moves the deepest alone, with all of
-/// the force. \param state  after it
+/// All contact places of a tick. In a scene with a rigid moving object: the deepest only, with the
+/// total force. \param state after the tick
 std::vector<ContactPlace> contact_places(const rendering::Scene& scene,
                                          const rendering::RenderState& state,
                                          const rendering::Rendering& rendering);
 
-/// Of the objects after a tick. Empty where nothing moves.
+/// Poses of the objects after a tick. Empty if none moves.
 std::vector<Pose> object_poses(const std::vector<stimuli::ObjectSpec>& objects,
                                const rendering::RenderState& state);
 
-/// Where the surface of a soft object is.
+/// The deformed surface of a soft object.
 struct SoftSurfaceNow {
   int object = 0;
   std::vector<glm::vec3> places;  ///< m, of the surface's nodes
 };
 
-/// Of the soft objects after a tick.
+/// Surfaces of the soft objects after a tick.
 std::vector<std::shared_ptr<const SoftSurfaceNow>> soft_surfaces(
     const rendering::Scene& scene, const rendering::RenderState& state);
 
-/// What a picture shows of one tick.
+/// The parts of one tick that a picture shows.
 struct SceneMoment {
   Sample sample;
   std::vector<ContactPlace> contacts;
-  /// The stylus in the hand, where the virtual one reaches farther.
+  /// The stylus in the hand, if the virtual one reaches farther.
   std::optional<rendering::LineProbe> held = std::nullopt;
-  std::vector<Pose> poses =
-      {};  ///< of the objects, where they have moved; empty: as the scene has it
-  /// Of soft objects; those that are not there are drawn at rest.
+  std::vector<Pose> poses = {};  ///< of the objects that may have moved; empty: as in the scene
+  /// Surfaces of soft objects; missing ones are drawn at rest.
   std::vector<std::shared_ptr<const SoftSurfaceNow>> soft = {};
 };
 
-/// Of objects of which some have moved; empty where none can.
+/// Poses of all objects, from those of the bodies that move; empty if none moves.
 std::vector<Pose> object_poses(const std::vector<stimuli::ObjectSpec>& objects,
                                std::span<const rendering::BodyPose> bodies);
 
 struct SceneDrawingSettings {
-  bool sides = true;             ///< the side of the stylus touches, not its tip alone
-  bool labels = false;           ///< of the objects
-  double thickness = 1;          ///< of the tool, times what files have
-  double metres_per_newton = 0;  ///< of the arrows; 0: by the size of the scene, 6 N as long as it
-  double radians_per_newton_metre = 0;  ///< of the turn that shows torque; 0: 1 N m is 8 rad
+  bool sides = true;                    ///< the side of the stylus touches, not its tip alone
+  bool labels = false;                  ///< name the objects
+  double thickness = 1;                 ///< factor on the tool's thickness in files
+  double metres_per_newton = 0;         ///< of the arrows; 0: 6 N is as long as the scene
+  double radians_per_newton_metre = 0;  ///< of the arc that shows torque; 0: 1 N m is 8 rad
 };
 
 /// The parts of a scene that do not change from picture to picture.
 class SceneDrawing {
  public:
-  /// \throws MeshError, std::runtime_error where a file is no mesh
+  /// \throws MeshError, std::runtime_error if a file is not a mesh
   SceneDrawing(const std::vector<stimuli::ObjectSpec>& objects, rendering::Tool tool);
 
-  /// What only the compiled scene knows: layers (the surfaces about them become translucent), and
-  /// the surfaces of soft objects, which are coloured by how far they have given way, red from a
-  /// tenth of the object's size on.
+  /// Adds parts that only the compiled scene knows: layers (surfaces around them become
+  /// translucent), and the surfaces of soft objects. These are coloured by their deformation, red
+  /// from a tenth of the object's size on.
   void add_compiled(const rendering::Scene& scene);
 
   ScenePicture picture(const SceneMoment& moment, const Theme& theme,
                        const SceneDrawingSettings& settings) const;
 
-  /// What a camera should have in its picture: of the objects as the scene has them.
+  /// Points that the camera should show: of the objects at their initial poses.
   std::vector<glm::vec3> outline() const;
-  /// Of the tool and the forces at a tick: of the plain stylus what is near the objects.
+  /// Adds points of the tool and the forces at a tick; of the stylus only the part near the
+  /// objects.
   void add_outline(const SceneMoment& moment, const SceneDrawingSettings& settings,
                    std::vector<glm::vec3>& points) const;
 
-  /// The object, and where, that a line meets first from outside.
+  /// The object that a line meets first from outside, and the place.
   struct Hit {
     std::size_t object;
     glm::vec3 place;
@@ -140,7 +140,7 @@ class SceneDrawing {
                          const std::vector<Pose>& poses = {}) const;
 
   double size() const { return size_; }  ///< m, radius about the objects
-  /// How long arrows and turns are, in words: "5 N: 80 mm" and "200 mN m: 92 degrees".
+  /// The scales of arrows and arcs, in words: "5 N: 80 mm" and "200 mN m: 92 degrees".
   std::array<std::string, 2> scale_words(const SceneDrawingSettings& settings) const;
   const std::string& label(std::size_t object) const { return objects_[object].label; }
   std::size_t objects() const { return objects_.size(); }
@@ -174,8 +174,8 @@ class SceneDrawing {
   float ground_ = 0;
 };
 
-/// N m, about the middle of the stylus that the hand holds; both devices' forces, so without
-/// torsion about the stylus.
+/// Torque of both devices' forces about the middle of the stylus in the hand, N m. It has no
+/// component about the stylus.
 Vec3 torque_on_hand(const SceneMoment& moment);
 
 }  // namespace palpate::runner

@@ -14,13 +14,13 @@
 namespace palpate::runner {
 namespace {
 
-// Of the size of what is shown.
+// In sizes of the scene.
 constexpr float kLampSoftness = 0.030F, kSkySoftness = 0.22F, kGrain = 0.012F;
 constexpr float kGroundEdge = 12, kGroundFrom = 1.6F, kGroundTo = 5.5F;
 constexpr float kOverTranslucent = 0.5F;
 constexpr float kShadowReach = 1.7F;
-constexpr float kTurnHead = 7;  // of the arc's thickness
-constexpr int kSkyMap = 96;     // coarse: its texels melt into each other
+constexpr float kTurnHead = 7;  // in thicknesses of the arc
+constexpr int kSkyMap = 96;     // coarse: its texels blend
 
 constexpr glm::vec4 kNoCut{0, 0, 0, 1};
 
@@ -29,7 +29,7 @@ DrawnMesh unit_square() {
   return {{a, up}, {b, up}, {c, up}, {a, up}, {c, up}, {d, up}};
 }
 
-/// Above the viewer's left shoulder, wherever the camera stands.
+/// Direction to a lamp above the viewer's left shoulder, wherever the camera is.
 glm::vec3 lamp_of(const Camera& camera) {
   const glm::vec3 to_viewer = camera.towards_viewer();
   const glm::vec3 level = glm::normalize(glm::vec3(to_viewer.x, to_viewer.y, 0));
@@ -37,7 +37,7 @@ glm::vec3 lamp_of(const Camera& camera) {
   return glm::normalize(0.45F * level - 0.62F * right + glm::vec3(0, 0, 1));
 }
 
-/// To the unit cube that a map of shadows has: x and y across, z along the light.
+/// Maps to the unit cube of a shadow map: x and y across, z along the light.
 glm::mat4 light_view(const ScenePicture& picture, const glm::vec3& towards_light) {
   const float reach = kShadowReach * picture.size;
   const glm::vec3 up = std::abs(towards_light.z) > 0.99F ? glm::vec3(0, 1, 0) : glm::vec3(0, 0, 1);
@@ -111,7 +111,7 @@ std::vector<SceneRenderer::Item> SceneRenderer::tool_items(const ScenePicture& p
     arrow(drawn.from, drawn.from + drawn.by, drawn.radius, drawn.colour);
   for (const DrawnTurn& turn : picture.turns) {
     const std::vector<glm::vec3> path = points_of(turn);
-    // The head is as long as of an arrow, or half of a short arc.
+    // The head has the length of an arrow's, or takes half of a short arc.
     const float head = std::min(kTurnHead * turn.thickness / turn.radius, 0.5F * turn.sweep);
     const auto last =
         static_cast<std::size_t>((1 - head / turn.sweep) * static_cast<float>(path.size() - 1));
@@ -141,7 +141,7 @@ void SceneRenderer::draw_shadows(const ScenePicture& picture, const std::vector<
     map.begin();
     shadow_.set("matrix", view);
     for (const DrawnObject& object : picture.objects) {
-      if (object.layer > 0) continue;  // inside of what casts one
+      if (object.layer > 0) continue;  // inside an object that casts one
       shadow_.set("place", object.place);
       uploaded(object.mesh).draw();
     }
@@ -161,7 +161,7 @@ void SceneRenderer::draw_shadows(const ScenePicture& picture, const std::vector<
 
 void SceneRenderer::prepare_light(const ScenePicture& picture, const Camera& camera,
                                   const Theme& theme) const {
-  constexpr float kAcross = 2 * kShadowReach;  // of a map, in sizes
+  constexpr float kAcross = 2 * kShadowReach;  // width of a map, in sizes
   solid_.use();
   solid_.set("matrix", camera.matrix());
   solid_.set("eye", camera.eye());
@@ -187,7 +187,7 @@ void SceneRenderer::prepare_light(const ScenePicture& picture, const Camera& cam
   solid_.set("taps", quality_.taps);
 }
 
-/// What is behind or in front of translucent objects, once more and faintly: it must not drown.
+/// Draws parts behind or in front of translucent objects again, faintly, so that they stay visible.
 void SceneRenderer::draw_over_translucent(const ScenePicture& picture,
                                           const std::vector<Item>& items) const {
   if (std::ranges::none_of(picture.objects, translucent)) return;
@@ -205,14 +205,14 @@ void SceneRenderer::draw_background(const Theme& theme) const {
   background_.use();
   background_.set("above", theme.above);
   background_.set("below", theme.below);
-  square_.draw();  // any vertices will do: the shader makes its own of their numbers
+  square_.draw();  // any vertices will do: the shader computes positions from their indices
 }
 
 void SceneRenderer::draw_ground(const ScenePicture& picture, const Camera& camera) const {
-  if (camera.eye().z <= picture.ground) return;  // would hide everything
+  if (camera.eye().z <= picture.ground) return;  // it would hide everything
   glEnable(GL_BLEND);
   glBlendFunc(GL_SRC_ALPHA, GL_ONE_MINUS_SRC_ALPHA);
-  glDepthMask(GL_FALSE);  // what has sunk into it is seen
+  glDepthMask(GL_FALSE);  // objects below the ground stay visible
   solid_.set("is_ground", 1);
   const glm::vec3 at(picture.middle.x, picture.middle.y, picture.ground);
   solid_.set("place",
@@ -242,7 +242,8 @@ void SceneRenderer::draw_opaque_objects(const ScenePicture& picture) const {
   solid_.set("cut", kNoCut);
 }
 
-// Far objects first; of nested ones the backs from outside to inside, then the fronts back out.
+// Draw far objects first. Of nested ones draw the backs from outside to inside, then the fronts
+// from inside to outside.
 void SceneRenderer::draw_translucent_objects(const ScenePicture& picture,
                                              const Camera& camera) const {
   std::map<int, std::vector<const DrawnObject*>> of;
@@ -265,7 +266,7 @@ void SceneRenderer::draw_translucent_objects(const ScenePicture& picture,
   glEnable(GL_CULL_FACE);
   glEnable(GL_CLIP_DISTANCE0);
   solid_.set("cut", picture.cut.value_or(kNoCut));
-  solid_.set("taps", 0);  // the light goes through
+  solid_.set("taps", 0);  // no shadows: light passes through
   const auto draw = [&](const DrawnObject& object, GLenum culled, float opacity) {
     glCullFace(culled);
     solid_.set("place", object.place);

@@ -14,7 +14,7 @@
 
 namespace palpate::runner::shaders {
 
-// The shaders of scene_renderer.cpp. Light is added up in linear colours and written as sRGB.
+// The shaders of scene_renderer.cpp. Light is summed in linear colours and written as sRGB.
 
 inline constexpr const char* kSolidVertex = R"(#version 330 core
 layout(location = 0) in vec3 position;
@@ -33,13 +33,13 @@ void main() {
   gl_Position = matrix * world;
 })";
 
-// A lamp with soft shadows, a hemisphere of sky and ground that is darker under things, and a rim.
+// A lamp with soft shadows, a hemisphere of sky and ground that is darker below objects, and a rim.
 inline constexpr const char* kSolidFragment = R"(#version 330 core
 in vec3 at, outward;
 in float tinted;
 uniform vec3 colour, eye, lamp, ground_colour;
 uniform float opacity, softness, sky_softness, grain;
-uniform float grid, ground_from, ground_to;  // of the ground alone; grid < 0: none of its lines
+uniform float grid, ground_from, ground_to;  // for the ground only; grid < 0: no lines
 uniform vec3 middle;
 uniform bool is_ground;
 uniform int taps;
@@ -84,7 +84,7 @@ void main() {
     result = vec4(seen, 1.0 - smoothstep(ground_from, ground_to, far));
     return;
   }
-  // From the object's colour over yellow to red: how far it has given way.
+  // Deformation: from the object's colour through yellow to red.
   vec3 base = mix(mix(linear(colour), linear(vec3(0.95, 0.80, 0.35)), min(2.0 * tinted, 1.0)),
                   linear(vec3(0.80, 0.22, 0.20)), clamp(2.0 * tinted - 1.0, 0.0, 1.0));
   vec3 above = vec3(0.50, 0.53, 0.58), below = vec3(0.24, 0.22, 0.21);
@@ -144,21 +144,21 @@ struct DrawingQuality {
 /// Needs a current context of OpenGL 3.3, also to be destroyed.
 class SceneRenderer {
  public:
-  /// \throws DisplayError saying what of OpenGL is missing
+  /// \throws DisplayError naming the missing part of OpenGL
   explicit SceneRenderer(const DrawingQuality& quality = {});
 
-  /// What a window can afford, many times a second: less where the processor draws.
+  /// Quality for a window at many frames a second; lower if the CPU draws.
   static DrawingQuality live_quality();
 
   /// \param width, height  px \return the OpenGL texture, valid until the next draw
   /// \throws DisplayError
   unsigned draw(const ScenePicture& picture, const Camera& camera, const Theme& theme, int width,
                 int height);
-  /// What was drawn last: rows from the top, three bytes a pixel (red, green, blue).
+  /// The picture drawn last: rows from the top, three bytes a pixel (red, green, blue).
   std::string pixels() const { return canvas_.pixels(); }
 
  private:
-  /// Something opaque: a mesh, where it is, and how it looks.
+  /// An opaque mesh, its place and its looks.
   struct Item {
     const GlMesh* mesh;
     glm::mat4 place;
