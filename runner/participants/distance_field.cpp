@@ -9,9 +9,9 @@
 namespace palpate::runner {
 namespace {
 
-constexpr double kNodesAcross = 72;     // the object's longest side and its margins
+constexpr double kNodesAcross = 72;     // across the object's longest side and its margins
 constexpr double kLeastMargin = 0.012;  // m
-constexpr int kBand = 6;                // nodes from the surface up to which distances are exact
+constexpr int kBand = 6;                // nodes; distances are exact this near the surface
 constexpr float kUnknown = std::numeric_limits<float>::max();
 
 // Ericson 2005, "Real-Time Collision Detection", 5.1.5.
@@ -35,7 +35,7 @@ Vec3 nearest_on_triangle(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3
   return a + (vb * ab + vc * ac) / (va + vb + vc);
 }
 
-/// The nodes while they are worked out.
+/// Computes the nodes of a field.
 class Filling {
  public:
   Filling(const Vec3& low, double spacing, const std::array<int, 3>& count)
@@ -72,7 +72,7 @@ class Filling {
             std::min(count_[axis] - 1, static_cast<int>(std::floor((high - from) / spacing_)))};
   }
 
-  // Along each line of nodes the surface winds round what lies between two crossings.
+  // A node is inside if the crossings of its line with the surface give a positive winding number.
   void mark_inside_surface(const PlacedPart& part) {
     struct Crossing {
       double x;
@@ -80,7 +80,7 @@ class Filling {
     };
     std::vector<std::vector<Crossing>> lines(static_cast<std::size_t>(count_[1]) *
                                              static_cast<std::size_t>(count_[2]));
-    // No corner of a file lies on a line.
+    // Shift the lines so that no corner of a file lies on one.
     const double y0 = low_.y + 1.2345e-7 * spacing_, z0 = low_.z + 2.3456e-7 * spacing_;
     for (const auto& corners : part.surface->triangles) {
       std::array<Vec3, 3> v;
@@ -130,7 +130,7 @@ class Filling {
     std::vector<std::pair<Vec3, double>> planes;
     for (const stimuli::Facet& facet : part.mesh->facets()) {
       const Vec3 normal = part.pose.orientation * facet.normal;
-      // A hair wider: nodes on a seam must not be outside both of its parts.
+      // Move planes out slightly: a node on a seam must not be outside both parts.
       planes.emplace_back(normal,
                           facet.offset + glm::dot(normal, part.pose.position) + 1e-3 * spacing_);
     }
@@ -199,9 +199,9 @@ class Filling {
     }
   }
 
-  // Inside, the parts know distances to seams only. A node outside at distance s has a ball of that
-  // radius free of the solid, so |p - q| - s bounds the depth of p; for a node beside the surface
-  // the best of them is all but exact.
+  // Inside, the distances of parts include those to seams. A node q outside at distance s has a
+  // ball of radius s free of the solid, so |p - q| - s bounds the depth of p; for a node next to
+  // the surface the least bound is nearly exact.
   void find_depths() {
     for (int z = 1; z + 1 < count_[2]; ++z) {
       for (int y = 1; y + 1 < count_[1]; ++y) {
@@ -243,8 +243,8 @@ class Filling {
     return std::max(least, 0.0F);
   }
 
-  // From known distances on, by the eikonal equation (Zhao 2005, "A fast sweeping method for
-  // eikonal equations"): one sweep in each of the eight directions.
+  // Extends known distances by the eikonal equation (Zhao 2005, "A fast sweeping method for eikonal
+  // equations"): one sweep in each of the eight directions.
   void march(std::vector<float>& values, char side) const {
     std::vector<char> known(values.size());
     for (std::size_t i = 0; i < values.size(); ++i) known[i] = values[i] < kUnknown ? 1 : 0;
@@ -293,7 +293,7 @@ class Filling {
   const double spacing_;
   const std::array<int, 3> count_;
   std::vector<char> inside_;
-  std::vector<float> distance_, depth_;  // m; where outside and inside
+  std::vector<float> distance_, depth_;  // m; valid outside and inside
 };
 
 }  // namespace

@@ -1,6 +1,6 @@
 #pragma once
-// Signed distance to any union of convex parts, on a grid: what a simulated participant imagines of
-// a stimulus that has no formula.
+// Signed distance to a union of convex parts and closed surfaces, on a grid: the simulated
+// participant's model of a stimulus without a formula.
 
 #include <algorithm>
 #include <array>
@@ -24,7 +24,7 @@ struct PlacedPart {
   Pose pose;
   std::shared_ptr<const stimuli::ClosedSurface> surface = nullptr;
 
-  /// Calls visit(place) for its corners.
+  /// Calls visit(place) for each of its corners.
   template <class Visit>
   void for_each_corner(const Visit& visit) const {
     const auto all = [&](const auto& vertices) {
@@ -37,9 +37,9 @@ struct PlacedPart {
   }
 };
 
-/// At the nodes up to six spacings outside it is exact (the least distance of the parts); inside it
-/// is that to the surface of the union, whatever seams run there, within a tenth of the spacing
-/// near the surface; farther off within a few percent. Between nodes it is linear in each
+/// Up to six spacings outside, nodes are exact (the least distance of the parts). Inside, nodes
+/// have the distance to the surface of the union, without seams, within a tenth of the spacing near
+/// the surface. Farther off the error is a few percent. Between nodes the field is linear in each
 /// coordinate, so sharp edges and corners are rounded by up to half a spacing, some 0.7 mm at the
 /// size of a hand. Beyond the grid, which ends `margin()` from the object, the distance to the grid
 /// is added: an upper bound.
@@ -55,7 +55,7 @@ class DistanceField {
 
   struct Value {
     float distance;                   ///< m, negative inside
-    float slope_x, slope_y, slope_z;  ///< its gradient; of length 1 but for rounding at edges
+    float slope_x, slope_y, slope_z;  ///< its gradient; of length 1 except at rounded edges
   };
 
   /// So many places at once, a multiple of kLanes.
@@ -145,7 +145,7 @@ class DistanceField {
   struct Coordinate {
     std::int32_t cell;
     float fraction;  // within the cell
-    float off;       // m, out of the grid
+    float off;       // m, beyond the grid
   };
   Coordinate coordinate(std::size_t axis, float p) const {
     const float steps = (p - origin_[axis]) * per_spacing_;

@@ -64,7 +64,7 @@ void Explorer::draw_approach() {
   const double tilt = settings_.stylus.tilt + settings_.stylus.tilt_sd * random_.normal();
   goal_axis_ =
       std::cos(tilt) * direction + std::sin(tilt) * random_perpendicular(random_, direction);
-  // The stylus points upwards: the hand stays above the table.
+  // Keep the axis upwards: the hand stays above the table.
   goal_axis_.z = std::max(goal_axis_.z, settings_.motor.approach_min_rise);
   goal_axis_ = glm::normalize(goal_axis_);
 }
@@ -138,7 +138,7 @@ Vec3 Explorer::search() {
 }
 
 bool Explorer::wants_heading() const {
-  // Half a tick: the sum of many ticks is the interval but for roundings.
+  // Subtract half a tick: the sum of many ticks equals the interval except for rounding.
   return settings_.heading.chosen && motion_ == Motion::follow &&
          since_choice_ > settings_.heading.interval - tick_ / 2;
 }
@@ -152,7 +152,8 @@ void Explorer::turn_to(const Vec3& heading) {
 
 Vec3 Explorer::slide(const TouchState& known) {
   const double speed = settings_.motor.slide_speed;
-  // A random walk of the heading in the surface whose correlation fades as exp(-t / heading_time).
+  // The heading walks randomly within the surface; its correlation decays as exp(-t /
+  // heading_time).
   double turn = wander_ * random_.normal();
   if (turn_left_ > 0) {
     turn += turn_rate_ * std::min(tick_, turn_left_);
@@ -161,7 +162,7 @@ Vec3 Explorer::slide(const TouchState& known) {
   heading_ -= glm::dot(heading_, known.normal) * known.normal;
   heading_ = unit_or(heading_, any_perpendicular(known.normal));
   heading_ = std::cos(turn) * heading_ + std::sin(turn) * glm::cross(known.normal, heading_);
-  // Towards the depth that gives the light force at the sensed contact point.
+  // Move towards the depth that gives the light force at the sensed contact point.
   const Vec3 aimed = tip_ + known.along * axis_;
   const double rise = glm::dot(known.surface - aimed, known.normal) - aim_depth_;
   return speed * heading_ + std::clamp(rise / tick_, -speed, speed) * known.normal;
@@ -178,7 +179,7 @@ Vec3 Explorer::move_to_start() {
     motion_ = Motion::approach;
     return way / tick_;
   }
-  // Around the object, not through it.
+  // Move around the object, not through it.
   const Vec3 round = way - glm::dot(way, out) * out;
   const Vec3 level = (shell - radius) / tick_ * out;
   Vec3 v = speed * unit_or(round, any_perpendicular(out)) + level;
@@ -199,7 +200,7 @@ void Explorer::turn_axis() {
 void Explorer::limit_force(const Vec3& held) {
   const Vec3 offset = tip_ + grip_ * axis_ - held;
   const double length2 = glm::dot(offset, offset);
-  if (length2 < (1 - 1e-12) * max_offset_ * max_offset_) return;  // whatever the roundings
+  if (length2 < (1 - 1e-12) * max_offset_ * max_offset_) return;  // margin for rounding
   const double length = std::sqrt(length2);
   if (length > max_offset_) tip_ -= (1 - max_offset_ / length) * offset;
 }

@@ -13,7 +13,7 @@
 namespace palpate::runner {
 namespace {
 
-/// m, below the surface; none: nothing of the object has a stiffness.
+/// Depth of the felt surface, m; none: the object has no stiffness anywhere.
 std::optional<double> felt_depth(const stimuli::Material& material) {
   if (material.stiffness > 0) return 0;
   for (const stimuli::Layer& layer : material.layers) {

@@ -1,5 +1,5 @@
 #pragma once
-// Where a stimulus is felt first.
+// The surface at which a stimulus is felt first.
 
 #include <vector>
 
@@ -8,9 +8,9 @@
 
 namespace palpate::runner {
 
-/// The convex parts of the outermost surface that has a stiffness, in the frame of the workspace
-/// about its centre: the surface itself, or, where its stiffness is 0, the uppermost layer that has
-/// one. Layers below it are not known to the simulated participant.
+/// The convex parts of the outermost surface that has a stiffness, relative to the centre of the
+/// workspace. That is the object's surface or, if its stiffness is 0, the uppermost layer with a
+/// stiffness. The simulated participant does not know the layers below it.
 /// \throws MeshError
 std::vector<PlacedPart> felt_parts(const stimuli::ObjectSpec& stimulus);
 

@@ -11,7 +11,7 @@
 #include "runner/participants/lane_math.h"
 #include "runner/participants/shape_lines.h"
 
-// As in shape_observer.cpp the loops over the drawn hypotheses are written to be vectorised.
+// The loops over the drawn hypotheses are written to be vectorised, as in shape_observer.cpp.
 
 namespace palpate::runner {
 namespace {
@@ -58,7 +58,7 @@ Vec3 HeadingChoice::choose(ShapeObserver& posterior, const SlidingStylus& stylus
   Vec3 best = stylus.heading;
   double least = 0;
   for (int turn = 0; turn < settings_.headings; ++turn) {
-    // 0, 1, -1, 2, -2, ...: of equal headings the first is kept.
+    // Try 0, 1, -1, 2, -2, ...: of equal headings the first is kept.
     const int steps = (turn + 1) / 2 * (turn % 2 == 1 ? 1 : -1);
     const double angle = 2 * std::numbers::pi * steps / settings_.headings;
     const Vec3 heading = std::cos(angle) * stylus.heading + std::sin(angle) * side;
@@ -70,7 +70,7 @@ Vec3 HeadingChoice::choose(ShapeObserver& posterior, const SlidingStylus& stylus
   return best;
 }
 
-/// Fills drawn_ and few_. \return whether there is more than one shape among them
+/// Fills drawn_ and few_. \return whether they have more than one shape
 bool HeadingChoice::draw(ShapeObserver& posterior, Random& random) {
   posterior.draw(random, drawn_);
   std::size_t next = 0;
@@ -138,7 +138,8 @@ void HeadingChoice::predict(const SlidingStylus& stylus, const Vec3& shift, Pred
   }
 }
 
-/// Of every drawn hypothesis for the contact that drawn hypothesis i predicts at one place.
+/// Adds, for every drawn hypothesis, the log likelihood of the contact that drawn hypothesis i
+/// predicts at one place.
 void HeadingChoice::add_log_likelihood(int i, const Prediction& seen, const FloatVec& normal_before,
                                        bool ray, float* log_likelihood) const {
   const FloatVec n{seen.x[i], seen.y[i], seen.z[i]};
@@ -159,7 +160,7 @@ void HeadingChoice::add_log_likelihood(int i, const Prediction& seen, const Floa
   }
 }
 
-/// Of the shapes, nat, where the drawn hypotheses were equally likely before.
+/// Entropy of the shapes, nat, if the drawn hypotheses were equally likely before.
 float HeadingChoice::entropy(const float* log_likelihood) const {
   float masses[kRoom];
   for (int j = 0; j < kRoom; ++j) masses[j] = lane::exp(log_likelihood[j]);

@@ -60,10 +60,10 @@ void KeyboardRespondent::reply_with(const std::string& text) {
 }
 
 std::vector<KeyPress> KeyboardRespondent::take_keys() {
-  std::vector<KeyPress> keys = std::exchange(spoken_, {});  // came before the others
+  std::vector<KeyPress> keys = std::exchange(spoken_, {});  // these arrived before the others
   std::vector<KeyPress> pressed = screen_.keys();
   if (by_ == AnswerBy::experimenter) {
-    // Nobody answers beside the one who types; pages are read by the participant.
+    // Only the experimenter answers; the participant's keys turn pages.
     std::erase_if(pressed, [](const KeyPress& press) {
       return press.key != "space" && press.key != "enter" && press.key != "left" &&
              press.key != "right";
@@ -122,10 +122,10 @@ void KeyboardRespondent::wait_for_space(std::int64_t since_ns) {
 
 void KeyboardRespondent::read(const std::string& text) {
   if (text.empty()) return;
-  // Taken before the page is shown, so that a very early key press counts.
+  // Read the clock before showing the page, so that a very early key press counts.
   const std::int64_t before_ns = clock_.now_ns();
   Page page = between_trials(Page::Kind::text, text);
-  // The end page is shown before set_progress() has been told of the last trial.
+  // The end page is shown before set_progress() counts the last trial.
   if (&text == &protocol_.texts.end) page.done = page.trials;
   show(std::move(page));
   wait_for_space(before_ns);
@@ -249,7 +249,7 @@ std::optional<Answer> KeyboardRespondent::step(const Sample& sample) {
   return std::nullopt;
 }
 
-// The part of KeyboardRespondent that version 2 has: intervals, typed numbers, confidence, pages.
+// The part of KeyboardRespondent for version 2: intervals, typed numbers, confidence, pages.
 
 namespace {
 
@@ -260,7 +260,7 @@ constexpr std::size_t kMostTyped = 200;  // bytes
 
 using NamedKeys = std::vector<std::pair<std::string, std::string>>;
 
-/// 1, 2, ..., 9, 0, then letters, with the texts: keys of a page.
+/// Keys of a page: 1, 2, ..., 9, 0, then letters, each with its text.
 NamedKeys numbered(const std::vector<std::string>& texts) {
   NamedKeys keys;
   keys.reserve(texts.size());
@@ -315,7 +315,7 @@ void KeyboardRespondent::begin_interval(const protocols::Trial&, const IntervalV
   onset_ns_ = 0;
   buttons_ = 0xFF;
   pending_.reset();
-  if (view.continues) return;  // the page stands, and nothing that was pressed is lost
+  if (view.continues) return;  // the page stays, and no key press is lost
   keys_.clear();
   if (view.answers) {
     for (const protocols::TaskAnswer& answer : task()->answers) {
@@ -334,7 +334,7 @@ void KeyboardRespondent::begin_interval(const protocols::Trial&, const IntervalV
   cue_since_ns_ = 0;
 }
 
-/// What is read while an interval is felt: which one it is, what is asked.
+/// The text shown during an interval: its number and the question.
 std::string KeyboardRespondent::interval_text() const {
   const auto& texts = protocol_.texts;
   std::string text;
@@ -363,11 +363,11 @@ bool KeyboardRespondent::listen_to_task(const KeyPress& press) {
     return true;
   }
   if (meant->stimulus != pending_->stimulus) return false;
-  ++pending_->times;  // turned again before the last turn was felt
+  ++pending_->times;  // turned again before the last turn was presented
   return true;
 }
 
-/// A character, where one is being typed; numbers have digits, a point or comma and a minus.
+/// Takes a character of a typed answer. Numbers have digits, a point or comma and a minus.
 bool KeyboardRespondent::type(const std::string& key) {
   const bool text = page_.typing == Page::Typing::text;
   std::string& typed = page_.typed;
@@ -377,7 +377,7 @@ bool KeyboardRespondent::type(const std::string& key) {
     return true;
   }
   const bool digit = key.size() == 1 && key.find_first_of("0123456789.,-") == 0;
-  constexpr std::array kNames = {"up", "down", "left", "tab"};  // no others are so short
+  constexpr std::array kNames = {"up", "down", "left", "tab"};  // no other names are so short
   const bool name = std::find(kNames.begin(), kNames.end(), key) != kNames.end();
   const bool letter = text && !name && (key == "space" || key.size() <= 4);
   if (!(digit || letter) || typed.size() + key.size() > kMostTyped) return false;
@@ -397,7 +397,7 @@ std::optional<double> KeyboardRespondent::number_in(const std::string& typed,
   return number + 0.0;  // -0 is 0
 }
 
-/// Kindly: what would be a number, and nothing typed is lost.
+/// Says which numbers are accepted, and keeps the typed text.
 void KeyboardRespondent::refuse_number(std::optional<double> least, std::optional<double> most) {
   const auto& texts = protocol_.texts;
   reply_with((page_.typed.empty() ? texts.answer_first : texts.other_number) +
@@ -443,7 +443,7 @@ std::optional<Answer> KeyboardRespondent::meaning_in_interval(const std::string&
   return std::nullopt;
 }
 
-/// Any button goes on; button n stands for the n-th answer.
+/// Any button continues; button n stands for the n-th answer.
 void KeyboardRespondent::listen_to_buttons(unsigned pressed, std::int64_t time_ns) {
   if (pressed == 0) return;
   Answer answer;
@@ -511,7 +511,7 @@ KeyPress KeyboardRespondent::wait_for_key(std::int64_t since_ns) {
     std::vector<KeyPress> keys = take_keys();
     for (std::size_t i = 0; i < keys.size(); ++i) {
       if (keys[i].time_ns < since_ns) continue;
-      // The others come next: somebody types faster than this looks.
+      // Keep the others for the next call: keys may arrive faster than they are polled.
       spoken_.assign(keys.begin() + static_cast<std::ptrdiff_t>(i) + 1, keys.end());
       return keys[i];
     }

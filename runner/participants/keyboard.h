@@ -13,25 +13,25 @@
 
 namespace palpate::runner {
 
-/// Work to be done while the participant is waited for: device, console, markers.
+/// Work to be done while waiting for the participant: device, console, markers.
 class Attendant {
  public:
   virtual ~Attendant() = default;
   /// Called at every tick of a trial and every 5 ms between trials. An exception ends the wait.
   virtual void attend() = 0;
-  /// To be heard by the participant, where sounds are wanted.
+  /// Plays a sound to the participant, if sounds are on.
   virtual void sound(SoundCue /*cue*/) {}
 };
 
 enum class AnswerBy {
   keys,          ///< the protocol's
   buttons,       ///< of the device: button n stands for the n-th key of the protocol
-  experimenter,  ///< types what the participant says; the participant's keys go on only
+  experimenter,  ///< types the participant's spoken answers; the participant's keys only continue
 };
 
 class KeyboardRespondent final : public Respondent {
  public:
-  /// All arguments must outlive it. \param clock  the one that time-stamps keys
+  /// All arguments must outlive it. \param clock  the clock that time-stamps keys
   KeyboardRespondent(const protocols::Protocol& protocol, ParticipantScreen& screen,
                      Attendant& attendant, Clock& clock, AnswerBy by);
 
@@ -45,16 +45,15 @@ class KeyboardRespondent final : public Respondent {
   std::optional<Answer> confidence(const protocols::ConfidenceSpec& asked) override;
   std::string ask(const protocols::PageSpec& page, const protocols::PageItem& item) override;
 
-  /// What the participant has said: a key, its label or a number; "": on to the next.
-  /// \return  false: nothing of the kind is asked now, a number is out of range, or forces are not
-  /// on
+  /// Takes the participant's spoken answer: a key, its label or a number; "": on to the next.
+  /// \return  false: not expected now, a number is out of range, or forces are not on
   bool spoken(const std::string& answer, std::int64_t time_ns);
-  /// To be called while no trial is felt, where the device's buttons answer: button n stands for
-  /// the n-th key of a page, any goes on where there are none. \param newest  sample of the servo
+  /// Call it between trials if the device's buttons answer: button n stands for the n-th key of a
+  /// page; without keys any button continues. \param newest sample of the servo
   void look_at_buttons(const Sample& newest);
   /// Shows a page without answer keys.
   void show_message(const std::string& text);
-  /// To be called repeatedly while such a page is shown: replies to keys.
+  /// Call it repeatedly while such a page is shown: replies to keys.
   void tend();
   /// Progress of this session, shown on the pages between trials.
   void set_progress(std::size_t done, std::size_t trials);
@@ -74,21 +73,22 @@ class KeyboardRespondent final : public Respondent {
   std::optional<int> meaning(const std::string& key) const;
   // Version 2
   using Keys = std::vector<std::pair<std::string, std::string>>;
-  const protocols::TaskBlock* task() const;  ///< of the trial under way; nullptr: version 1
+  const protocols::TaskBlock* task() const;  ///< of the current trial; nullptr: version 1
   std::string interval_text() const;
-  /// \return  what it means, if it ends the interval
+  /// \return the answer, if the key ends the interval
   std::optional<Answer> meaning_in_interval(const std::string& key);
   void listen_to_buttons(unsigned pressed, std::int64_t time_ns);
-  std::vector<KeyPress> take_keys();           ///< pressed, or spoken and typed by the experimenter
-  bool listen_to_task(const KeyPress& press);  ///< false: to be heard after a turn
+  std::vector<KeyPress> take_keys();           ///< pressed, or typed by the experimenter
+  bool listen_to_task(const KeyPress& press);  ///< false: to be handled after a turn
   std::optional<Answer> typed_answer(const std::string& key);
-  bool type(const std::string& key);  ///< false: the key is not for typing
+  bool type(const std::string& key);  ///< false: the key does not type
   static std::optional<double> number_in(const std::string& typed, std::optional<double> least,
                                          std::optional<double> most);
   void reply_with(const std::string& text);
   void refuse_number(std::optional<double> least, std::optional<double> most);
   KeyPress wait_for_key(std::int64_t since_ns);
-  /// \return  index into keys, which are shown with the last screen; -1: gone on, without keys
+  /// \return  index into keys, which are shown with the last screen; -1: continued without an
+  /// answer
   int page_through(const std::vector<ReadScreen>& screens, const Keys& keys, Page::Kind kind,
                    std::int64_t& time_ns);
   std::string ask_typed(const protocols::PageItem& item);
@@ -107,12 +107,12 @@ class KeyboardRespondent final : public Respondent {
   std::int64_t cue_since_ns_ = 0;
   std::int64_t onset_ns_ = 0;      ///< of the trial; 0: not yet
   std::uint8_t buttons_ = 0xFF;    ///< down at the last tick
-  std::optional<Answer> pending_;  ///< given, until the servo's samples have reached its time
+  std::optional<Answer> pending_;  ///< given; waits until the servo's samples reach its time
   int task_block_ = -1;            ///< of the trial; -1: version 1
   IntervalView view_;
-  bool early_ = false;  ///< a trial or interval is prepared, and cannot be answered yet
-  std::optional<double> least_, most_;  ///< of the number that is typed
-  std::vector<KeyPress> spoken_;        ///< as keys, or pressed and not looked at yet
+  bool early_ = false;  ///< a trial or interval is prepared but cannot be answered yet
+  std::optional<double> least_, most_;  ///< range of the number being typed
+  std::vector<KeyPress> spoken_;        ///< spoken answers as keys, and keys not handled yet
 };
 
 }  // namespace palpate::runner

@@ -49,7 +49,7 @@ inline float log(float x) {
   return static_cast<float>(n) * 0.693147181f + 2.0f * f * series;
 }
 
-/// ln Phi(x) is zero from here on, to the bit.
+/// From here on ln Phi(x) is exactly zero.
 inline constexpr float kLogNormalCdfIsZero = 6.0f;
 
 /// ln Phi(x), Phi the standard normal distribution function.

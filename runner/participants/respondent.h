@@ -16,26 +16,26 @@ namespace palpate::runner {
 struct Answer {
   int stimulus = 0;          ///< index into Protocol::stimuli; version 2: into TaskBlock::answers
   std::int64_t time_ns = 0;  ///< session clock, when the event arrived
-  bool goes_on = false;      ///< no answer: on to the next interval
-  double number = 0;         ///< rate: as it was typed
-  int times = 1;             ///< adjust: so many turns at once
-  /// external: as the program says; none: whether it is the stimulus.
+  bool goes_on = false;      ///< no answer; continue with the next interval
+  double number = 0;         ///< rate: the typed number
+  int times = 1;             ///< adjust: number of turns at once
+  /// external: as the program reports; none: correct if it names the stimulus.
   std::optional<bool> correct = std::nullopt;
 };
 
-/// What is asked in an interval of a trial of version 2.
+/// The question in an interval of a trial of version 2.
 struct IntervalView {
-  int interval = 1, intervals = 1;             ///< from 1; of how many
-  bool answers = true;                         ///< an answer ends it; else the participant goes on
-  bool felt = true;                            ///< false: after the last one, forces off
-  const protocols::Interval* shown = nullptr;  ///< none where nothing is felt
+  int interval = 1, intervals = 1;  ///< number of the interval, from 1, and their count
+  bool answers = true;              ///< an answer ends it; false: the participant continues
+  bool felt = true;                 ///< false: after the last interval, forces off
+  const protocols::Interval* shown = nullptr;  ///< null if nothing is felt
   bool continues = false;  ///< adjust, after a turn: forces go on, keys count at once
 };
 
 /// A screen to read.
 struct ReadScreen {
   std::string text;
-  std::shared_ptr<const std::string> picture{};  ///< bytes of a PNG file; none
+  std::shared_ptr<const std::string> picture{};  ///< bytes of a PNG file; may be null
 };
 
 /// Short tones for the participant.
@@ -46,21 +46,22 @@ class TrialCutOff : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// A participant as the session sees one: a person at a keyboard or a simulated participant.
+/// The session's interface to a participant: a person at a keyboard or a simulated one.
 class Respondent {
  public:
   virtual ~Respondent() = default;
-  /// Shows a text of the protocol; returns when the participant goes on. Empty: returns at once.
+  /// Shows a text of the protocol; returns when the participant continues. Empty: returns at once.
   virtual void read(const std::string& text) = 0;
-  /// Several screens, back and forth; returns when the participant goes on behind the last one.
+  /// Shows several screens, back and forth; returns when the participant continues after the last.
   virtual void read_screens(const std::vector<ReadScreen>& screens) {
     for (const ReadScreen& screen : screens) read(screen.text);
   }
-  /// A break: like read, but at least until `until_ns` (session clock).
+  /// A break: like read, but lasts at least until `until_ns` (session clock).
   virtual void rest(const std::string& text, std::int64_t /*until_ns*/) { read(text); }
   /// Shows whether the last answer was correct, if the protocol asks for feedback.
   virtual void feedback(bool correct) = 0;
-  /// The next trial is due. \return what is shown in it, where a program says so: external blocks
+  /// The next trial is due. \return the trial's contents if a program chooses them (external
+  /// blocks)
   virtual std::optional<protocols::TrialChoice> choose(const protocols::Trial& /*next*/) {
     return std::nullopt;
   }
@@ -68,18 +69,19 @@ class Respondent {
   virtual void begin_trial(const protocols::Trial& trial) = 0;
   /// Version 2: an interval of that trial is about to begin.
   virtual void begin_interval(const protocols::Trial& /*trial*/, const IntervalView& /*view*/) {}
-  /// Version 2: how sure is the participant? \return  step of the scale and when; none: no answer
+  /// Version 2: asks for the participant's confidence. \return step of the scale, and its time;
+  /// none: no answer
   virtual std::optional<Answer> confidence(const protocols::ConfidenceSpec& /*asked*/) {
     return std::nullopt;
   }
-  /// Version 2: a question of a page; "": left out. Consent is "agree" or "disagree", a choice one
-  /// of the item's `choices`.
+  /// Version 2: asks a question of a page. \return the answer; "": skipped. Consent is "agree" or
+  /// "disagree", a choice one of the item's `choices`.
   virtual std::string ask(const protocols::PageSpec& /*page*/,
                           const protocols::PageItem& /*item*/) {
     return "";
   }
-  /// Called with every sample of the servo. Returns the answer once there is one, never one from
-  /// before time zero. \throws TrialCutOff if the trial is to be repeated.
+  /// Called with every sample of the servo. Returns the answer once there is one; answers before
+  /// time zero do not count. \throws TrialCutOff if the trial is to be repeated.
   virtual std::optional<Answer> step(const Sample& sample) = 0;
 };
 

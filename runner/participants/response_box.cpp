@@ -73,14 +73,14 @@ ResponseBox::ResponseBox(const std::string& name, const std::map<std::string, st
     throw std::runtime_error("the response box at " + path + ": " + why);
   };
   if (port_ < 0) refuse(std::strerror(errno));
-  if (tcgetattr(port_, &before_) != 0) refuse("this is no serial port");
+  if (tcgetattr(port_, &before_) != 0) refuse("it is not a serial port");
   termios raw = before_;
   cfmakeraw(&raw);
   raw.c_cflag |= static_cast<tcflag_t>(CLOCAL | CREAD);
   cfsetispeed(&raw, port.second);
   cfsetospeed(&raw, port.second);
   if (tcsetattr(port_, TCSANOW, &raw) != 0) refuse(std::strerror(errno));
-  tcflush(port_, TCIFLUSH);  // pressed before anybody listened
+  tcflush(port_, TCIFLUSH);  // drop bytes sent before the start
   wake_ = eventfd(0, EFD_CLOEXEC);
   if (wake_ < 0) refuse(std::strerror(errno));
   thread_ = std::jthread([this] { listen(); });
@@ -130,15 +130,17 @@ std::optional<unsigned char> ResponseBox::unknown_byte() const {
 
 std::string ScreenWithBox::trouble() const {
   if (box_.failed())
-    return "the response box is gone: the keyboard answers; plug it in and start again to have it";
+    return "the response box is unplugged: answer by keyboard; to use the box, plug it in and "
+           "restart";
   std::string trouble = screen_.trouble();
-  if (!trouble.empty()) return trouble;  // more than a byte of no key
+  if (!trouble.empty()) return trouble;  // matters more than an unknown byte
   if (const auto byte = box_.unknown_byte()) {
     char text[160];
-    std::snprintf(text, sizeof text,
-                  "the response box sent a byte that stands for no key (0x%02x): is its speed that "
-                  "of --response-box, and is the byte among the protocol's responses?",
-                  static_cast<unsigned>(*byte));
+    std::snprintf(
+        text, sizeof text,
+        "the response box sent a byte that stands for no key (0x%02x): check its speed in "
+        "--response-box and the bytes in the protocol's responses",
+        static_cast<unsigned>(*byte));
     return text;
   }
   return {};

@@ -18,24 +18,25 @@ namespace palpate::runner {
 
 class ResponseBox {
  public:
-  /// \param name  "PATH" or "PATH:BAUD", 9600 where it is not said; 8N1. A colon of the path's own
-  /// (/dev/serial/by-path/...) is none before a speed
-  /// \param keys  byte ("1", "0x05") -> name of a key; empty: printable characters are themselves.
-  /// "escape" is the emergency
+  /// \param name  "PATH" or "PATH:BAUD" (default 9600), 8N1. The path may contain colons
+  /// (/dev/serial/by-path/...)
+  /// \param keys  byte ("1", "0x05") -> name of a key; empty: printable characters stand for
+  /// themselves. "escape" is the emergency key
   /// \param clock  time-stamps bytes on arrival; must outlive it
-  /// \param emergency  called at once in the box's own thread
-  /// \throws std::invalid_argument: no speed of a serial port; std::runtime_error: cannot be opened
+  /// \param emergency  called at once, in the box's own thread
+  /// \throws std::invalid_argument: not a speed of a serial port; std::runtime_error: cannot be
+  /// opened
   ResponseBox(const std::string& name, const std::map<std::string, std::string>& keys, Clock& clock,
               std::function<void()> emergency);
   ~ResponseBox();
   ResponseBox(const ResponseBox&) = delete;
   ResponseBox& operator=(const ResponseBox&) = delete;
 
-  /// Pressed since the last call, in order of arrival.
+  /// Keys pressed since the last call, in order of arrival.
   std::vector<KeyPress> take() { return presses_.take(); }
-  /// It was unplugged, or its port fails: nothing comes any more.
+  /// It was unplugged or its port failed; it sends no more keys.
   bool failed() const { return failed_.load(); }
-  /// The first byte that stood for no key; line ends are none. nullopt: there was none
+  /// The first byte that stands for no key, line ends ignored. nullopt: there was none
   std::optional<unsigned char> unknown_byte() const;
 
  private:

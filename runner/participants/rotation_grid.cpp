@@ -12,14 +12,14 @@ namespace palpate::runner {
 namespace {
 
 constexpr int kFine = 9120;    // 11 degrees apart
-constexpr int kCoarse = 4608;  // 14 degrees; where hardly a symmetry makes them fewer
+constexpr int kCoarse = 4608;  // 14 degrees; for objects with few symmetries
 constexpr int kFewSymmetries = 4;
-constexpr int kHighestOrder = 32;  // a turn of 11 degrees, as far as the rotations are apart
+constexpr int kHighestOrder = 32;  // a turn of 11 degrees, the spacing of the rotations
 constexpr std::size_t kMostAxes = 1000;
 constexpr std::size_t kMostSymmetries = 240;
 constexpr std::size_t kSamples = 200;
 
-// Both ends of an axis are one axis.
+// Opposite directions are one axis.
 void add_axis(const Vec3& through, double least, std::vector<Vec3>& axes) {
   const double length = glm::length(through);
   if (length < least || axes.size() >= kMostAxes) return;
@@ -72,7 +72,7 @@ std::vector<Vec3> samples(const DistanceField& field) {
 }  // namespace
 
 Quat super_fibonacci(int i, int n) {
-  constexpr double kPsi = 1.533751168755204288118041;  // his constant: psi^4 = psi + 4
+  constexpr double kPsi = 1.533751168755204288118041;  // Alexa's constant: psi^4 = psi + 4
   const double s = i + 0.5;
   const double inner = std::sqrt(s / n);
   const double outer = std::sqrt(1 - s / n);
@@ -85,7 +85,7 @@ Quat super_fibonacci(int i, int n) {
 std::vector<Quat> symmetries(const std::vector<PlacedPart>& parts, const DistanceField& field) {
   std::vector<Quat> found{Quat(1, 0, 0, 0)};
   const std::vector<Vec3> points = samples(field);
-  // A sharp edge is known to half a spacing, so single points may differ by a whole one.
+  // A sharp edge has an error of half a spacing, so single points may differ by a whole one.
   const double most = field.spacing(), usual = field.spacing() / 5;
   const auto leaves_it = [&](const Quat& turn) {
     double squares = 0;
@@ -97,7 +97,7 @@ std::vector<Quat> symmetries(const std::vector<PlacedPart>& parts, const Distanc
     return squares <= usual * usual * static_cast<double>(points.size());
   };
   for (const Vec3& axis : possible_axes(parts, field.spacing())) {
-    if (found.size() > kMostSymmetries) break;  // all but a sphere
+    if (found.size() > kMostSymmetries) break;  // nearly a sphere
     for (int order = kHighestOrder; order > 1; --order) {
       const double angle = 2 * std::numbers::pi / order;
       if (!leaves_it(glm::angleAxis(angle, axis))) continue;

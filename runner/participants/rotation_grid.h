@@ -1,5 +1,5 @@
 #pragma once
-// Orientations that a stimulus can be told apart in.
+// Distinguishable orientations of a stimulus.
 
 #include <vector>
 
@@ -12,14 +12,13 @@ namespace palpate::runner {
 /// "Super-Fibonacci Spirals: Fast, Low-Discrepancy Sampling of SO(3)", algorithm 1).
 Quat super_fibonacci(int i, int n);
 
-/// The rotations about the origin that leave a solid as it is, the identity first: its field then
-/// differs by at most a fifth of its spacing (root mean square, near the surface). An axis of
+/// The rotations about the origin that map a solid to itself, the identity first: its field then
+/// changes by at most a fifth of its spacing (root mean square, near the surface). An axis of
 /// symmetry runs through a corner, or the middle of an edge or a facet, of the convex hull; turns
 /// by 360 degrees over 2 to 32 are tried about each.
 std::vector<Quat> symmetries(const std::vector<PlacedPart>& parts, const DistanceField& field);
 
-/// Rotations some 11 to 14 degrees apart, one of each set that a symmetry makes alike: the
-/// smallest.
+/// Rotations some 11 to 14 degrees apart: of each set that is equivalent by symmetry, the smallest.
 std::vector<Mat3> distinct_rotations(const std::vector<Quat>& group);
 
 }  // namespace palpate::runner

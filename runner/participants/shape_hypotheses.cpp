@@ -78,7 +78,7 @@ std::vector<Mat3> formula_rotations(stimuli::ShapeKind kind) {
   throw std::invalid_argument("no formula for this shape");
 }
 
-/// One of the shapes with a formula, centred, felt at its surface.
+/// Whether it is a shape with a formula, centred and felt at its surface.
 bool has_formula(const stimuli::ObjectSpec& stimulus) {
   return stimuli::traits_of(stimulus.shape).formula && stimulus.pose.position == Vec3(0) &&
          stimulus.pose.orientation == Quat(1, 0, 0, 0) && stimulus.material.stiffness > 0;
@@ -121,8 +121,7 @@ void ShapeHypotheses::append(const stimuli::ObjectSpec& stimulus) {
         (stimuli::traits_of(stimulus.shape).height ? stimulus.height : stimulus.edge) / 2);
   } else {
     const std::vector<PlacedPart> parts = felt_parts(stimulus);
-    if (parts.empty())
-      throw std::invalid_argument("nothing is left of a stimulus where it is felt");
+    if (parts.empty()) throw std::invalid_argument("a stimulus has no surface that can be felt");
     shape.field = std::make_shared<const DistanceField>(parts);
     rotations = distinct_rotations(symmetries(parts, *shape.field));
   }

@@ -14,10 +14,10 @@
 namespace palpate::runner {
 
 /// Shape x rotation grid modulo the shape's symmetry. Immutable, so threads can share it. A
-/// stimulus is known by the surface that is felt first (felt_parts.h), as it is placed about the
-/// centre of the workspace. The four analytic shapes there have formulas; any other has a field of
-/// distances and some 4600 rotations 14 degrees apart, fewer and 11 degrees apart with symmetries.
-/// Sphere: 1 hypothesis. Cone: 380 directions of the axis. Cylinder: 150 undirected axes.
+/// stimulus is represented by the surface that is felt first (felt_parts.h), placed relative to the
+/// centre of the workspace. The four analytic shapes, if centred, have formulas. Any other stimulus
+/// has a distance field and some 4600 rotations 14 degrees apart; with symmetries fewer, 11 degrees
+/// apart. Sphere: 1 hypothesis. Cone: 380 directions of the axis. Cylinder: 150 undirected axes.
 /// Cube: 384 rotations modulo its 24. Neighbours are 10 to 12 degrees apart; no orientation is
 /// further than 8, 10 and 12 degrees from the grid of cone, cylinder and cube.
 ///
@@ -31,23 +31,22 @@ class ShapeHypotheses {
     stimuli::ShapeKind kind = stimuli::ShapeKind::sphere;
     float radius = 0;     ///< m; sphere, cone, cylinder
     float half_size = 0;  ///< m; half the height of a cone or cylinder, half the edge of a cube
-    std::shared_ptr<const DistanceField> field;  ///< of a stimulus that has no formula
+    std::shared_ptr<const DistanceField> field;  ///< of a stimulus without a formula
     int first = 0;  ///< index of its first hypothesis, a multiple of kBlock
-    int count = 0;  ///< of hypotheses, without the padding
+    int count = 0;  ///< number of hypotheses, padding excluded
   };
 
-  /// Why a stimulus cannot be simulated; empty: it can.
+  /// The reason why a stimulus cannot be simulated; empty: it can.
   static std::string fault_of(const stimuli::ObjectSpec& stimulus);
 
-  /// Shape i is stimulus i. \throws std::invalid_argument naming every stimulus that has a size
-  /// that is not positive or cannot be felt at all; also for an empty list. MeshError.
+  /// Shape i is stimulus i. \throws std::invalid_argument naming every stimulus with a size that is
+  /// not positive or that cannot be felt; also for an empty list. MeshError.
   explicit ShapeHypotheses(const std::vector<stimuli::ObjectSpec>& stimuli);
 
-  /// One block for every shape of `all`, to be filled by copy_rotation: for questions about a few
-  /// of its hypotheses. All are the first of their shape until then.
+  /// One block for each shape of `all`, to be filled by copy_rotation, to evaluate a few of its
+  /// hypotheses. Initially all are the first hypothesis of their shape.
   static ShapeHypotheses one_block_each(const ShapeHypotheses& all);
-  /// Hypothesis `to` of this becomes hypothesis `from` of `all`, of the same shape. Does not
-  /// allocate.
+  /// Sets hypothesis `to` to hypothesis `from` of `all`, of the same shape. Does not allocate.
   void copy_rotation(int to, const ShapeHypotheses& all, int from);
 
   const std::vector<Shape>& shapes() const { return shapes_; }

@@ -125,7 +125,7 @@ class RotatedLine {
   float direction_[3][ShapeHypotheses::kBlock];
 };
 
-/// Works in the cube's frame.
+/// In the cube's frame.
 class CubeLine : public RotatedLine {
  public:
   CubeLine(const ShapeHypotheses& hypotheses, const ShapeHypotheses::Shape& shape, int first,
@@ -243,11 +243,11 @@ class AxialLine {
   Line line_;
   float axis_[3][ShapeHypotheses::kBlock];
   float across_[3][ShapeHypotheses::kBlock];     // the line's direction, its part across the axis
-  float from_axis_[3][ShapeHypotheses::kBlock];  // m, from the axis to the line where it is nearest
+  float from_axis_[3][ShapeHypotheses::kBlock];  // m, from the axis to the line's nearest point
   float nearest_[ShapeHypotheses::kBlock];       // m along the line
   float height_[ShapeHypotheses::kBlock];        // m along the axis, there
-  float climb_[ShapeHypotheses::kBlock];         // m along the axis a metre of line
-  // Squared radius = constant + 2 linear t + square t^2, t metres from there.
+  float climb_[ShapeHypotheses::kBlock];         // m along the axis for a metre of the line
+  // Squared radius = constant + 2 linear t + square t^2, t in metres from there.
   float constant_[ShapeHypotheses::kBlock];
   float linear_[ShapeHypotheses::kBlock];
   float square_[ShapeHypotheses::kBlock];
@@ -324,9 +324,10 @@ void find_along_line(const ShapeLine& shape, float length, Deepest& out) {
   for (int i = 0; i < ShapeHypotheses::kBlock; ++i) store(shape, i, middle[i] + reach, b);
   const float width = 2.0f * reach;
   for (int i = 0; i < ShapeHypotheses::kBlock; ++i) {
-    // The tangents at a and b intersect at the minimum of a kink and just below that of a smooth
+    // The tangents at a and b intersect at the minimum if it is a kink, and just below a smooth
     // minimum. The combination of the two normals with slope zero is perpendicular to the line. If
-    // both slopes have one sign, the other is set to zero and an end of the line is the minimum.
+    // both slopes have the same sign, the other is set to zero and an end of the line is the
+    // minimum.
     const float falling = lane::min(a.slope[i], 0.0f);
     const float rising = lane::max(b.slope[i], 0.0f);
     const float bend = lane::max(rising - falling, 1e-6f);
@@ -542,7 +543,7 @@ inline void find_at_tip(const SolidLine& shape, Deepest& out) {
   }
 }
 
-// Which class of lines (shape_lines.h, shape_lines.h) measures to which stimulus.
+// The class of lines for each stimulus.
 
 /// Calls visit(std::type_identity<ShapeLine>()) with the class of the stimulus.
 template <class Visit>
@@ -567,7 +568,7 @@ void visit_line_class(const ShapeHypotheses::Shape& shape, Visit&& visit) {
     case stimuli::ShapeKind::box:
     case stimuli::ShapeKind::mesh:
     case stimuli::ShapeKind::compound:
-      break;  // have a field
+      break;  // these have a field
   }
 }
 

@@ -30,13 +30,13 @@ struct Query {
   float direction_precision = 0;  // 1/rad^2
   float inverse_sd = 0;           // 1 / sqrt v, 1/m
   float free_space_weight = 0;
-  /// Without contact: a shape whose bounding sphere is smaller than this is so far from the stylus
-  /// that to feel nothing is certain, in every orientation. m; negative: none is.
+  /// For percepts without contact, m: a shape with a smaller bounding sphere is so far from the
+  /// stylus that contact is impossible in every orientation. Negative: there is no such radius.
   float surely_free = -1;
 
-  float kept = 0;       // share of the earlier evidence
+  float kept = 0;       // share kept of the earlier evidence
   float forgotten = 0;  // the rest
-  float weight = 0;     // of this percept
+  float weight = 0;     // weight of this percept
 
   int positions = 0;              // 0: no torque cue
   float position[kMaxPositions];  // m from the tip
@@ -154,7 +154,7 @@ Query make_query(const Percept& percept, const ObserverSettings& settings) {
   query.torque_floor = static_cast<float>(settings.torque_floor);
 
   if (!percept.contact) {
-    constexpr double kErrors = 0.001;  // m; of the search along the line, and roundings
+    constexpr double kErrors = 0.001;  // m; errors of the search along the line, and of rounding
     const double along = length > 0 ? glm::dot(-percept.tip, span) / (length * length) : 0;
     const double away = glm::length(percept.tip + std::clamp(along, 0.0, 1.0) * span);
     query.surely_free =
@@ -215,7 +215,7 @@ float log_prior(const ShapeHypotheses& hypotheses, const ShapeHypotheses::Shape&
       -std::log(static_cast<double>(hypotheses.shapes().size()) * shape.count));
 }
 
-/// m, about the shape's centre; infinite where it is not known.
+/// Radius about the shape's centre, m; infinite if unknown.
 float bounding_radius(const ShapeHypotheses::Shape& shape) {
   if (shape.field) return shape.field->reach();
   switch (shape.kind) {
@@ -231,7 +231,7 @@ float bounding_radius(const ShapeHypotheses::Shape& shape) {
   }
 }
 
-/// L of all hypotheses of one shape after a percept.
+/// Updates L of all hypotheses of one shape by a percept.
 template <class ShapeLine>
 void update_shape(const ShapeHypotheses& hypotheses, const ShapeHypotheses::Shape& shape,
                   const Query& query, const ObserverSettings& settings, float* log_posterior) {
@@ -293,7 +293,7 @@ void ShapeObserver::update(const Percept& percept) {
 }
 
 void ShapeObserver::find_posterior() {
-  // A maximum and a sum for each lane of a block: the compiler may not reorder a single sum.
+  // Keep a maximum and a sum for each lane of a block: the compiler may not reorder a single sum.
   const float* const l = log_posterior_.data();
   float most[kBlock];
   std::copy_n(l, kBlock, most);
@@ -336,7 +336,7 @@ void ShapeObserver::draw(Random& random, std::span<int> hypotheses) {
   }
   const auto count = static_cast<double>(hypotheses.size());
   std::size_t drawn = 0;
-  double below = 0;  // mass of the hypotheses before this one and of itself
+  double below = 0;  // mass of the hypotheses up to and including this one
   int last = 0;
   double next = total * random.unit() / count;
   for (const ShapeHypotheses::Shape& shape : hypotheses_->shapes()) {
@@ -349,7 +349,7 @@ void ShapeObserver::draw(Random& random, std::span<int> hypotheses) {
       }
     }
   }
-  while (drawn < hypotheses.size()) hypotheses[drawn++] = last;  // roundings of the sum
+  while (drawn < hypotheses.size()) hypotheses[drawn++] = last;  // if the sum was rounded down
 }
 
 }  // namespace palpate::runner

@@ -33,7 +33,7 @@
 
 namespace palpate::runner {
 
-/// What the weight of a percept goes by.
+/// Basis of a percept's weight.
 enum class Evidence { percept, movement };
 
 struct ObserverSettings {
@@ -44,13 +44,13 @@ struct ObserverSettings {
   double along_sd = 0.015;         ///< m; of the contact's position along the stylus
   double soft_min_scale = 0.0015;  ///< m; scale of the soft minimum over depths along the stylus
   int places_along = 15;           ///< positions along the stylus, both ends included; 2 to 64
-  double torque_floor = 1e-4;      ///< likelihood of a position that does not fit at all
+  double torque_floor = 1e-4;      ///< least likelihood of a position
   double free_space_weight = 0.2;  ///< weight of the evidence of a percept without contact
   double floor = -6;               ///< least log likelihood of one percept
   Evidence evidence = Evidence::percept;
-  double beta = 0.25;            ///< weight of a percept; without effect where movement counts
-  double movement_scale = 0.03;  ///< m; of the movement that makes evidence new
-  double turn_length = 0.03;     ///< m/rad; movement that a turn of the normal is worth
+  double beta = 0.25;            ///< weight of a percept; unused with evidence by movement
+  double movement_scale = 0.03;  ///< m; scale of the movement that makes evidence new
+  double turn_length = 0.03;     ///< m/rad; movement equivalent to a turn of the normal
   bool forgetting = true;        ///< whether old evidence fades at all
   double memory = 15;            ///< s; time constant of forgetting
   double percept_rate = 6;       ///< Hz
@@ -65,12 +65,12 @@ struct Percept {
   Vec3 tail;                    ///< ray only
   Vec3 direction;               ///< unit, of the force: outward normal; contact only
   std::optional<double> along;  ///< m from the tip to the contact, torque over force; ray only
-  /// Since the last percept with contact, infinite before: m that the tip moved, rad that the force
-  /// turned. Contact only; counts with evidence by movement.
+  /// Since the last percept with contact: m that the tip moved (infinite for the first), rad that
+  /// the force turned. Contact only; used with evidence by movement.
   double moved = std::numeric_limits<double>::infinity(), turned = 0;
 };
 
-/// Weight of the evidence of a percept with contact that is new by so much movement.
+/// Weight of a percept with contact after this much movement.
 double contact_weight(const ObserverSettings& settings, double moved, double turned);
 
 /// One posterior. Observers may share the hypotheses, which must outlive them. The same percepts
@@ -88,8 +88,8 @@ class ShapeObserver {
 
   int best() const { return best_; }  ///< Most probable shape; the first of equals.
   double probability(int shape) const { return probabilities_[static_cast<std::size_t>(shape)]; }
-  /// Draws hypotheses from the posterior, in ascending order: one from each of so many equal parts
-  /// of its mass (stratified). Does not allocate.
+  /// Draws hypotheses from the posterior, in ascending order: one from each of equal parts of its
+  /// mass (stratified). Does not allocate.
   void draw(Random& random, std::span<int> hypotheses);
   bool decided() const { return probability(best_) > settings_.threshold; }
 

@@ -13,8 +13,8 @@ namespace {
 
 constexpr double kLongestWait = 60;  // s of simulated time, from the start of a trial to time zero
 
-/// Where the grip is while the device is at its centre, virtual frame: the hand of a stylus that
-/// reaches farther stays about there. m.
+/// Place of the grip while the device is at its centre, virtual frame, m. With a stylus that
+/// reaches farther, the hand stays near it.
 Vec3 hand_place(const WorkspaceMap& map) {
   const Vec3 centre = map.to_virtual(Vec3(0));
   return map.reach->in_world ? stretched(*map.reach, {centre, centre}).tip : centre;
@@ -30,8 +30,8 @@ Quat turn_up_to(const Vec3& direction) {
   return w > 1e-9 ? glm::normalize(Quat(w, axis)) : Quat(0, 1, 0, 0);
 }
 
-/// How a hand far from the object explores: it comes from its own side, and leans the stylus as far
-/// as its workspace lets it.
+/// Settings for a hand far from the object: it approaches from its own side, and leans the stylus
+/// as far as its workspace allows.
 SimulatedSettings as_far_hand(SimulatedSettings own, const protocols::Protocol& protocol) {
   const WorkspaceMap map = workspace_of(protocol);
   if (!is_far(map)) return own;
@@ -40,7 +40,7 @@ SimulatedSettings as_far_hand(SimulatedSettings own, const protocols::Protocol& 
       own.device.workspace_radius * map.scale * (map.reach->in_world ? map.reach->factor : 1);
   const double room =
       radius - own.motor.approach_distance - std::abs(glm::length(hand_place(map)) - length);
-  constexpr double kLeast = 0.1;  // rad: what is out of the workspace, the device holds back
+  constexpr double kLeast = 0.1;  // rad; the device itself stops at the end of its workspace
   const double lean = 2 * std::asin(std::clamp(room / (2 * length), 0.0, 1.0));
   own.motor.approach_min_rise =
       std::max(own.motor.approach_min_rise, std::cos(std::max(lean, kLeast)));
@@ -84,7 +84,7 @@ void SimulatedParticipant::begin_trial(const protocols::Trial& trial) {
   HandTarget start = explorer_.begin(stream(2));
   put_in_device(start);
   stylus_.reset(start);
-  heading_random_ = stream(3);  // its own, so that the hand's and the percepts' stay as they are
+  heading_random_ = stream(3);  // separate from hand and percepts
   observer_.reset();
   ray_ = renderer_for(trial.renderer).side_contact();
   for (int k = 0; k < 3; ++k) centre_error_[k] = settings_.percept.centre_jitter * random_.normal();
@@ -118,8 +118,8 @@ std::optional<Answer> SimulatedParticipant::step(const Sample& sample) {
   return std::nullopt;
 }
 
-// The hand rests where the trial's first approach begins: what is not in the home zone at once will
-// never be.
+// The hand rests at the start of the first approach: if that is not in the home zone, it will never
+// be.
 void SimulatedParticipant::wait_for_time_zero(const Sample& sample) {
   const double waited = static_cast<double>(++ticks_before_) * period_;
   if (waited < kLongestWait + protocol_.home.rest) return;
@@ -141,7 +141,7 @@ void SimulatedParticipant::wait_for_time_zero(const Sample& sample) {
   throw StuckParticipant(text);
 }
 
-/// A vector of the world in the explorer's frame.
+/// Rotates a vector of the world into the explorer's frame.
 Vec3 SimulatedParticipant::explored(const Vec3& world) const {
   return far_ ? glm::conjugate(hand_side_) * world : world;
 }
@@ -179,7 +179,7 @@ SimulatedParticipant::SensedStylus::SensedStylus(const rendering::LineProbe& pro
     : span(probe.tail - probe.tip), length(glm::length(span)), axis(span / length) {}
 
 TouchState SimulatedParticipant::sense_touch(const Sample& sample, const SensedStylus& stylus) {
-  // Who holds a stylus knows its lever, and tells from the hand what happens at its ends.
+  // A person who holds a stylus knows its lever, and infers the forces at its ends from the hand.
   const rendering::EndForces ends{sample.device1, sample.device2};
   const rendering::EndForces forces =
       workspace_.reach ? rendering::on_virtual(*workspace_.reach, ends) : ends;
@@ -200,7 +200,7 @@ TouchState SimulatedParticipant::sense_touch(const Sample& sample, const SensedS
   return touch;
 }
 
-/// From the stylus as the device shows it to the one whose contact is on the surface; m.
+/// Shift from the displayed stylus to the one with its contact on the surface, m.
 Vec3 SimulatedParticipant::perceived_shift() const {
   return settings_.percept.place == PerceivedPlace::surface ? force_ / wall_stiffness_ : Vec3(0);
 }
@@ -219,7 +219,7 @@ Percept SimulatedParticipant::perceive(const Sample& sample, const SensedStylus&
     return sd * Vec3(random_.normal(), random_.normal(), random_.normal());
   };
   const auto tilted = [&noise](const Vec3& direction, double sd) {
-    const Vec3 e = noise(sd);  // only its part across the direction matters
+    const Vec3 e = noise(sd);  // only the part at right angles to the direction matters
     return glm::normalize(direction + e - glm::dot(e, direction) * direction);
   };
   Percept percept;

@@ -1,6 +1,6 @@
 #pragma once
-// A simulated participant: explores, perceives with noise, decides and answers. A model that is not
-// fitted to any person; all data that it produces are labelled as simulated.
+// A simulated participant: explores, perceives with noise, decides and answers. The model is not
+// fitted to any person; all its data are labelled as simulated.
 
 #include <cstdint>
 #include <memory>
@@ -14,17 +14,17 @@
 
 namespace palpate::runner {
 
-/// A trial does not begin: the stylus rests where it is not in the home zone. what() names
-/// participant, trial and settings.
+/// A trial cannot begin: the stylus rests outside the home zone. what() names participant, trial
+/// and settings.
 class StuckParticipant : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
 class SimulatedParticipant final : public Respondent {
  public:
-  /// \param own  settings of this individual. \param number  its number. Every trial has a random
-  /// stream of its own, seeded with `seed`, number, session and trial, so that a trial is the same
-  /// whatever ran before. \param hypotheses, stylus, protocol  must outlive it
+  /// \param own  settings of this individual. \param number its number. Every trial has its own
+  /// random stream, seeded with `seed`, number, session and trial, so it does not depend on earlier
+  /// trials. \param hypotheses, stylus, protocol  must outlive it
   SimulatedParticipant(const SimulatedSettings& own, const ShapeHypotheses& hypotheses,
                        SimulatedStylus& stylus, const protocols::Protocol& protocol,
                        std::uint64_t seed, int number);
@@ -34,14 +34,14 @@ class SimulatedParticipant final : public Respondent {
   void begin_trial(const protocols::Trial& trial) override;
   /// \throws StuckParticipant
   std::optional<Answer> step(const Sample& sample) override;
-  /// What it has perceived in the last step; none: nothing new.
+  /// The percept of the last step; none: nothing new.
   const std::optional<Percept>& percept() const { return percept_; }
-  /// Posterior of the shape that it takes for the most probable now.
+  /// Posterior of the most probable shape.
   double certainty() const { return observer_.probability(observer_.best()); }
 
  private:
   void wait_for_time_zero(const Sample& sample);
-  /// The stylus of a sample, as both the hand and the percepts need it.
+  /// The stylus of a sample, in the form that hand and percepts need.
   struct SensedStylus {
     explicit SensedStylus(const rendering::LineProbe& probe);
     Vec3 span;      ///< m, tip to tail
@@ -49,7 +49,7 @@ class SimulatedParticipant final : public Respondent {
     Vec3 axis;      ///< unit
   };
   void move_hand(const TouchState& touch, const Vec3& tip, const Vec3& axis);
-  /// From the explorer's frame to the device's.
+  /// Converts from the explorer's frame to the device's.
   void put_in_device(HandTarget& target) const;
   Vec3 explored(const Vec3& world) const;
   Vec3 explored_in_world(const Vec3& explored) const;
@@ -62,12 +62,12 @@ class SimulatedParticipant final : public Respondent {
   SimulatedStylus& stylus_;
   const protocols::Protocol& protocol_;
   double wall_stiffness_, period_, low_pass_;
-  double surely_unfelt2_;  ///< N^2; below it a force is not felt, whatever the roundings
+  double surely_unfelt2_;  ///< N^2; below it a force is certainly not felt
   std::uint64_t seed_;
   int number_;
   WorkspaceMap workspace_;
   bool far_;        ///< the hand is far from the object, beyond a stylus that reaches farther
-  Quat hand_side_;  ///< turns the explorer's up to where the hand is, as seen from the object
+  Quat hand_side_;  ///< rotates the explorer's up to the direction from object to hand
   Explorer explorer_;
   ShapeObserver observer_;
   HeadingChoice heading_choice_;
@@ -80,8 +80,8 @@ class SimulatedParticipant final : public Respondent {
   bool along_known_ = false;  ///< force and stylus are not parallel, so that torque gives `along`
   double next_percept_ = 0;   ///< s from time zero
   std::optional<double> answer_at_;    ///< s from time zero
-  bool touched_ = false;               ///< a percept with contact has been
-  Vec3 touched_tip_, touched_normal_;  ///< at the last one: m, and unit
+  bool touched_ = false;               ///< there was a percept with contact
+  Vec3 touched_tip_, touched_normal_;  ///< at the last such percept: m, and unit
   std::optional<Percept> percept_;     ///< of the last step
 };
 

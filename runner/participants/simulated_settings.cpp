@@ -20,10 +20,10 @@
 
 namespace palpate::runner {
 
-// What the numbers of the simulated participant can be: what a hand, a stylus and a device can be
-// at all, and what the model is defined for. Wide: plausible values are the study's affair.
+// Ranges of the simulated participant's numbers: physically possible hands, styli and devices, and
+// the domain of the model. The ranges are wide; plausible values are up to the study.
 
-/// Why a setting cannot have that value, as "must be ..."; empty: it can, or has no range.
+/// The range that a value violates, as "must be ..."; empty: it is valid, or has no range.
 /// \param pointer  JSON pointer into the complete settings, "/hand/mass_kg"
 std::string range_fault(const std::string& pointer, double value);
 
@@ -148,7 +148,7 @@ namespace {
 
 using nlohmann::json;
 
-// Version 3 has every key; what earlier versions did, in its words.
+// Version 3 has every key. These are the values that describe earlier versions.
 const char* const kBeforeVersion3 = R"({
   "percept": {"place": "tip"},
   "observer": {"evidence": "percept", "movement_scale_m": 0.03, "turn_length_m_per_rad": 0.03, "forgetting": true},
@@ -160,7 +160,7 @@ const char* const kBeforeVersion2 = R"({
   "search": {"after_loss": "press-on", "pull_to_centre_per_s": 15}
 })";
 
-/// The words that a switch can be, by its place.
+/// The words that a switch accepts, by its pointer.
 const std::map<std::string, std::vector<std::string>>& words() {
   static const std::map<std::string, std::vector<std::string>> kWords = {
       {"/percept/place", {"tip", "surface"}},
@@ -177,13 +177,13 @@ json frozen_settings(int version) {
                               " of the simulated participant");
 }
 
-/// What a version did where its file has no key for it.
+/// The settings of a version for keys that its file lacks.
 json implied_settings(int version) {
   json implied = json::object();
   if (version < 3) implied = read_json(kBeforeVersion3);
   if (version < 2) {
     implied.merge_patch(read_json(kBeforeVersion2));
-    implied["search"].erase("pull_to_centre");  // its own
+    implied["search"].erase("pull_to_centre");  // version 2 has its own
   }
   return implied;
 }
@@ -212,7 +212,7 @@ namespace {
 
 struct Check {
   std::string file;
-  bool whole;  ///< every key must be there, and the version stands
+  bool whole;  ///< every key is required, and the version may not change
   std::vector<protocols::Fault> faults = {};
 
   /// \param known  an object with all keys
@@ -243,7 +243,7 @@ struct Check {
   }
 };
 
-/// Takes out of `settings` what is the same in `implied`, and groups that are empty then.
+/// Removes from `settings` values equal to those of `implied`, and groups that become empty.
 void remove_implied(json& settings, const json& implied) {
   for (const auto& [key, value] : implied.items()) {
     if (!settings.contains(key)) continue;

@@ -1,6 +1,6 @@
 #pragma once
 // Every constant of the simulated participant, from versioned files that do not change. Versions
-// differ by switches, which a patch can set in any of them.
+// differ by switches, which a patch can set in any version.
 
 #include <cstdint>
 #include <nlohmann/json.hpp>
@@ -22,36 +22,37 @@ struct FrozenSettings {
 /// Ascending; ends with version 0.
 extern const FrozenSettings kFrozenSettings[];
 
-// The settings of simulated participants as JSON: frozen versions, what an older version does not
-// say, patches and the checksum.
+// The settings of simulated participants as JSON: frozen versions, values implied by older
+// versions, patches and the checksum.
 
-/// The frozen settings of a version with every key: switches that it did not know say what it did.
-/// \throws std::invalid_argument where there is no such version
+/// The frozen settings of a version with every key: switches unknown to it have the values that
+/// describe its behaviour.
+/// \throws std::invalid_argument if there is no such version
 nlohmann::json complete_settings(int version);
 
-/// Changes settings by the JSON merge patch (RFC 7396) in a file.
+/// Applies the JSON merge patch (RFC 7396) in a file.
 /// \throws protocols::InputError naming unknown keys and wrong values
 void patch_settings(nlohmann::json& settings, const std::string& path);
 
-/// Why a setting cannot have that value, as "must be ..."; empty: it can.
+/// The reason why a setting cannot have that value, as "must be ..."; empty: it can.
 /// \param pointer  JSON pointer into the complete settings
-/// \param now  what stands there: a number stays a number
+/// \param now  the present value: a number must stay a number
 std::string setting_fault(const std::string& pointer, const nlohmann::json& value,
                           const nlohmann::json& now);
 
-/// \throws protocols::InputError where a key is missing, unknown or of a wrong value
+/// \throws protocols::InputError if a key is missing, unknown or has a wrong value
 void check_settings(const nlohmann::json& settings);
 
-/// SHA-256 of complete settings. Keys that their version did not know count only where they differ
-/// from what it did: the checksum of unpatched settings is that of the frozen file without spaces.
+/// SHA-256 of complete settings. Keys unknown to their version count only if they differ from its
+/// behaviour, so the checksum of unpatched settings is that of the frozen file without spaces.
 std::string settings_checksum(nlohmann::json settings);
 
-/// Where a percept with contact has the stylus: as the device shows it, with its tip in the object,
-/// or moved out by what the force says, with the contact on the surface.
+/// Place of the stylus in a percept with contact: as displayed, with its tip in the object; or
+/// moved out according to the force, with the contact on the surface.
 enum class PerceivedPlace { tip, surface };
 
-/// Where the hand goes after a loss of contact: on along the direction that it pressed in, or on
-/// with its heading, which turns to the centre.
+/// Motion of the hand after a loss of contact: on in the direction of pressing, or on with its
+/// heading, which turns to the centre.
 enum class AfterLoss { press_on, turn_to_centre };
 
 struct SimulatedSettings {
@@ -63,14 +64,14 @@ struct SimulatedSettings {
     double force_low_pass;   ///< s, time constant
     double force_threshold;  ///< N; below it no contact is sensed
   } percept;
-  ObserverSettings observer;  ///< also holds the percept's other noises and its rate
+  ObserverSettings observer;  ///< also has the percept's other noises and its rate
   double non_decision;        ///< s, from decision to response
   struct Motor {
     double reaction_delay;     ///< s; delays the contact information only
     double slide_speed;        ///< m/s
     double approach_speed;     ///< m/s
     double indentation;        ///< m; force is this times the object's stiffness
-    double max_indentation;    ///< m; limits the force, without delay
+    double max_indentation;    ///< m; limits the force without delay
     double heading_time;       ///< s; correlation time of the heading
     double mean_follow;        ///< s; exponential
     double approach_distance;  ///< m from the centre, start of an approach
@@ -79,8 +80,8 @@ struct SimulatedSettings {
   struct Search {
     double aim_sd;  ///< m, per axis
     AfterLoss after_loss;
-    double press_on_pull;   ///< weight of the direction to the centre beside that of pressing
-    double pull_to_centre;  ///< 1/s; rate of turning towards the centre after contact was lost
+    double press_on_pull;   ///< weight of the direction to the centre relative to that of pressing
+    double pull_to_centre;  ///< 1/s; rate of turning to the centre after a loss of contact
     double give_up;         ///< s
   } search;
   HeadingSettings heading;
@@ -97,9 +98,9 @@ struct SimulatedSettings {
   std::string sha256;  ///< of the settings used, patch included
 };
 
-/// The version that is used where none is asked for.
+/// The default version.
 inline constexpr int kDefaultParticipantVersion = 3;
-/// Of the frozen settings, ascending.
+/// Versions of the frozen settings, ascending.
 std::vector<int> participant_versions();
 
 /// The frozen settings of a version, changed by the JSON merge patch (RFC 7396) in `patch_path`
@@ -107,14 +108,14 @@ std::vector<int> participant_versions();
 /// \throws InputError naming unknown keys and wrong values; std::invalid_argument: no such version
 SimulatedSettings load_simulated_settings(const std::string& patch_path,
                                           int version = kDefaultParticipantVersion);
-/// The same as the text of a JSON document that has every key, switches that a version did not know
-/// included, for whoever changes some of them. \throws as load_simulated_settings
+/// The same as the text of a JSON document with every key, including switches unknown to the
+/// version. Callers may edit it. \throws as load_simulated_settings
 std::string simulated_settings_text(const std::string& patch_path,
                                     int version = kDefaultParticipantVersion);
-/// The version that has this checksum with the patch; none where no version has.
+/// The version that has this checksum with the patch; none: no version has it.
 /// \throws InputError as load_simulated_settings
 std::optional<int> participant_version_of(const std::string& sha256, const std::string& patch_path);
-/// From such a text. \throws InputError where a key is missing or has a value that it cannot have
+/// Reads such a text. \throws InputError if a key is missing or has an invalid value
 SimulatedSettings read_simulated_settings(const std::string& text);
 
 /// The settings of participant `number` of a study, with individual speed, noise, delay and

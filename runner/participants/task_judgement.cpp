@@ -17,8 +17,8 @@ namespace palpate::runner {
 namespace {
 
 constexpr double kLeastDepth = 2e-4;        // m; below it force over depth is noise
-constexpr double kLevelStep = 1e-3;         // of the level, for the derivative
-constexpr double kLeastSensitivity = 1e-3;  // m of surface for a m of the level
+constexpr double kLevelStep = 1e-3;         // change of the level, for the derivative
+constexpr double kLeastSensitivity = 1e-3;  // movement of the surface for that of the level, m/m
 
 double box_distance(const Vec3& size, const Vec3& point) {
   const Vec3 beyond = glm::abs(point) - 0.5 * size;
@@ -26,7 +26,7 @@ double box_distance(const Vec3& size, const Vec3& point) {
          std::min(std::max({beyond.x, beyond.y, beyond.z}), 0.0);
 }
 
-/// Of the surface, m; not a number for a mesh.
+/// Distance to the surface, m; NaN for a mesh.
 double distance_to(const stimuli::ObjectSpec& object, const Vec3& point) {
   const Vec3 local = glm::conjugate(object.pose.orientation) * (point - object.pose.position);
   switch (object.shape) {
@@ -106,7 +106,7 @@ void LevelPercept::know_object(const protocols::TaskBlock& block,
       step_ = step;
       if (step != 0) level_ = level;
       return;
-    } catch (const protocols::InputError&) {  // beyond what it can have: the other way
+    } catch (const protocols::InputError&) {  // out of range: step the other way
     }
   }
 }
@@ -191,7 +191,7 @@ void TaskJudgement::feel(const protocols::Interval& interval, const Felt& felt) 
     reference = level_of(standard);
   }
   feels_standard_ = interval.standard;
-  if (!felt.touched && block().task == TaskKind::adjust) {  // nobody has to answer yet
+  if (!felt.touched && block().task == TaskKind::adjust) {  // no answer is needed yet
     (interval.standard ? standard_ : own_).reset();
     return;
   }
@@ -205,7 +205,7 @@ void TaskJudgement::feel(const protocols::Interval& interval, const Felt& felt) 
   noise_ = noise_of_difference(reference);
 }
 
-/// Index of the interval that is chosen.
+/// Index of the chosen interval.
 std::optional<int> TaskJudgement::compared() {
   const TaskBlock& asked = block();
   if (estimates_.size() < 2) return std::nullopt;
@@ -239,7 +239,7 @@ int TaskJudgement::detected() {
   return index_of(random_.unit() < yes ? "yes" : "no");
 }
 
-/// Feels the other one first, then turns and feels again.
+/// Feels the other interval first, then turns and feels again.
 int TaskJudgement::adjusted() {
   if (!own_ || !standard_) return index_of("switch");
   const TaskBlock& asked = block();
@@ -277,7 +277,7 @@ int TaskJudgement::answer() {
     case TaskKind::compare:
       return compared().value_or(0);
     case TaskKind::rate: {
-      // The step that is nearest to where the level stands among all levels.
+      // The step nearest to the level's place among all levels.
       const std::vector<double> levels = protocols::levels_of(block());
       const double range = levels.empty() ? 0 : levels.back() - levels.front();
       const double place = range > 0 ? (estimates_.back() - levels.front()) / range : 0.5;

@@ -9,13 +9,13 @@
 namespace palpate::runner {
 namespace {
 
-constexpr double kLook = 1.5;            // s of feeling in each interval, from the first contact on
-constexpr double kLongestLook = 8;       // s, also without contact
-constexpr std::uint64_t kJudgement = 9;  // of its random stream; the hand has 1 to 3
+constexpr double kLook = 1.5;       // s of exploration in each interval after the first contact
+constexpr double kLongestLook = 8;  // s, also without contact
+constexpr std::uint64_t kJudgement = 9;  // random stream; the hand has 1 to 3
 constexpr std::uint64_t kPages = 10;     // likewise
 constexpr int kMostIntervals = 64;       // trials of the hand within one of the session
 
-/// Whether the observer of shapes can know what a block shows.
+/// Whether the observer of shapes can identify a block's stimuli.
 bool is_told_by_shape(const protocols::Protocol& protocol, const protocols::TaskBlock& block) {
   if (block.task != protocols::TaskKind::identify || block.level) return false;
   for (std::size_t i = 0; i < block.stimuli.size(); ++i) {
@@ -30,7 +30,7 @@ bool is_told_by_shape(const protocols::Protocol& protocol, const protocols::Task
   return true;
 }
 
-/// FNV-1a, to seed with.
+/// FNV-1a hash, for seeds.
 std::uint64_t number_of(const std::string& name) {
   std::uint64_t hash = 14695981039346656037U;
   for (const char c : name) hash = (hash ^ static_cast<unsigned char>(c)) * 1099511628211U;
@@ -96,10 +96,10 @@ void TaskParticipant::begin_interval(const protocols::Trial& trial, const Interv
   percept_.begin(trial, *view.shown);
   judged_ = false;
   limited_ = block().interval_limit.has_value();
-  // In time, whatever there is of it.
+  // Answer within the time limit.
   constexpr double kShareOfTime = 0.8;
   look_ = std::min(kLook, kShareOfTime * block().interval_limit.value_or(block().time_out));
-  protocols::Trial approach = trial;  // each interval is approached in a way of its own
+  protocols::Trial approach = trial;  // each interval has its own approach
   approach.trial = trial.trial * kMostIntervals + felt_++ % kMostIntervals;
   approach.renderer = view.shown->renderer;
   hand_.begin_trial(approach);
@@ -119,7 +119,7 @@ Answer TaskParticipant::answer(std::int64_t time_ns) {
   return given;
 }
 
-/// As in version 1; what was found goes by its name.
+/// As in version 1; the shape found is converted to an answer by its name.
 std::optional<Answer> TaskParticipant::identify(const Sample& sample) {
   std::optional<Answer> found = identifier_->step(sample);
   if (!found) return found;
@@ -148,7 +148,7 @@ std::optional<Answer> TaskParticipant::step(const Sample& sample) {
   const std::optional<double> length = percept_.length();
   judgement_.feel(*view_.shown, {length ? length : percept_.stiffness(), length.has_value(),
                                  percept_.contact_ticks() > 0});
-  if (limited_) return std::nullopt;  // it is answered afterwards, without forces
+  if (limited_) return std::nullopt;  // the answer is given afterwards, without forces
   return answer(sample.time_ns);
 }
 
@@ -164,7 +164,7 @@ std::optional<Answer> TaskParticipant::confidence(const protocols::ConfidenceSpe
 
 std::string TaskParticipant::ask(const protocols::PageSpec& page, const protocols::PageItem& item) {
   if (page.kind == protocols::PageSpec::Kind::consent) return "agree";
-  // Of the question itself: the same whatever was asked before.
+  // Seed with the question, so that the answer does not depend on earlier ones.
   Random random(seed_, {static_cast<std::uint64_t>(number_), kPages, number_of(page.name),
                         number_of(item.name)});
   switch (item.kind) {

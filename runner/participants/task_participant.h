@@ -1,8 +1,7 @@
 #pragma once
-// A simulated participant for the tasks of version 2. Shapes it identifies as SimulatedParticipant
-// does, percept by percept. In all other tasks it explores as that one does, feels for a while, and
-// judges levels from contact (task_judgement.h) where contact tells them; the model knows the other
-// levels.
+// A simulated participant for the tasks of version 2. It identifies shapes as SimulatedParticipant
+// does, percept by percept. In all other tasks it explores likewise for a while and judges levels
+// from contact (task_judgement.h) if contact reveals them; the model is given the other levels.
 
 #include <cstdint>
 #include <map>
@@ -17,15 +16,15 @@
 
 namespace palpate::runner {
 
-/// What is identified in each block of a protocol; none: nothing, or what no shape tells apart.
+/// Hypotheses for each block of a protocol; null: nothing to identify, or stimuli of one shape.
 using BlockHypotheses = std::vector<std::shared_ptr<const ShapeHypotheses>>;
 /// \throws MeshError
 BlockHypotheses block_hypotheses(const protocols::Protocol& protocol);
 
 class TaskParticipant final : public Respondent {
  public:
-  /// As SimulatedParticipant. \param hypotheses  to explore with. \param of_blocks  to identify;
-  /// must outlive it, too
+  /// As SimulatedParticipant. \param hypotheses  for exploration. \param of_blocks for
+  /// identification; must outlive it, too
   TaskParticipant(const SimulatedSettings& own, const ShapeHypotheses& hypotheses,
                   const BlockHypotheses& of_blocks, SimulatedStylus& stylus,
                   const protocols::Protocol& protocol, std::uint64_t seed, int number);
@@ -45,10 +44,10 @@ class TaskParticipant final : public Respondent {
 
   const protocols::Protocol& protocol_;
   SimulatedParticipant hand_;
-  /// By what is identified.
+  /// Participants by the hypotheses that they identify.
   std::map<const ShapeHypotheses*, SimulatedParticipant> identifiers_;
   const BlockHypotheses& of_blocks_;
-  SimulatedParticipant* identifier_ = nullptr;  ///< in this trial
+  SimulatedParticipant* identifier_ = nullptr;  ///< of this trial
   TaskJudgement judgement_;
   LevelPercept percept_;
   std::uint64_t seed_;
@@ -59,7 +58,7 @@ class TaskParticipant final : public Respondent {
   double period_;
   std::int64_t answered_ns_ = 0;
   bool judged_ = false;   ///< in this interval
-  double look_ = 0;       ///< s of feeling in it
+  double look_ = 0;       ///< s of exploration in it
   bool limited_ = false;  ///< it ends by itself
 };
 

@@ -214,7 +214,7 @@ class Periphery(Task):
         self.play(terminal, ("stands for no key (0x00)", ""), ("[trial, ", ""))
         os.close(box)
         os.close(plug)
-        self.play(terminal, ("the response box is gone: the keyboard answers", "2"), ("GOOD BYE", " "))
+        self.play(terminal, ("the response box is unplugged: answer by keyboard", "2"), ("GOOD BYE", " "))
         self.end(terminal)
         self.assertEqual([row["response"] for row in self.export()], ["ball", "box"])
         told = [note["input_trouble"] for note in self.notes() if "input_trouble" in note]
