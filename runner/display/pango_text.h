@@ -39,7 +39,7 @@ struct Size {
 /// A block of text, laid out.
 class TextBlock {
  public:
-  /// \param size  of the font, px; \param width of a line, px; 0: unlimited
+  /// \param size  of the font, px; \param width  of a line, px; 0: unlimited
   TextBlock(cairo_t* canvas, const std::string& text, double size, double width = 0);
 
   void set_size(double size);

@@ -57,7 +57,7 @@ bool overlap(GLFWmonitor* a, GLFWmonitor* b) {
          top[0] < top[1] + height[1] && top[1] < top[0] + height[0];
 }
 
-/// The monitor's area without panels. \param on nullptr: assume a usual size
+/// The monitor's area without panels. \param on  nullptr: assume a usual size
 ScreenBox work_area(GLFWmonitor* on) {
   ScreenBox area{0, 0, 1280, 800};
   if (on != nullptr) glfwGetMonitorWorkarea(on, &area.left, &area.top, &area.width, &area.height);

@@ -50,7 +50,7 @@ class HeadingChoice {
   HeadingChoice(const ShapeHypotheses& all, const ObserverSettings& observer,
                 const HeadingSettings& settings);
 
-  /// \return the heading: unit, at right angles to the normal. \param random for the draw
+  /// \return the heading: unit, at right angles to the normal. \param random  for the draw
   Vec3 choose(ShapeObserver& posterior, const SlidingStylus& stylus, Random& random);
 
  private:

@@ -49,7 +49,7 @@ class KeyboardRespondent final : public Respondent {
   /// \return  false: not expected now, a number is out of range, or forces are not on
   bool spoken(const std::string& answer, std::int64_t time_ns);
   /// Call it between trials if the device's buttons answer: button n stands for the n-th key of a
-  /// page; without keys any button continues. \param newest sample of the servo
+  /// page; without keys any button continues. \param newest  sample of the servo
   void look_at_buttons(const Sample& newest);
   /// Shows a page without answer keys.
   void show_message(const std::string& text);

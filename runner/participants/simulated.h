@@ -22,7 +22,7 @@ class StuckParticipant : public std::runtime_error {
 
 class SimulatedParticipant final : public Respondent {
  public:
-  /// \param own  settings of this individual. \param number its number. Every trial has its own
+  /// \param own  settings of this individual. \param number  its number. Every trial has its own
   /// random stream, seeded with `seed`, number, session and trial, so it does not depend on earlier
   /// trials. \param hypotheses, stylus, protocol  must outlive it
   SimulatedParticipant(const SimulatedSettings& own, const ShapeHypotheses& hypotheses,

@@ -23,7 +23,7 @@ BlockHypotheses block_hypotheses(const protocols::Protocol& protocol);
 
 class TaskParticipant final : public Respondent {
  public:
-  /// As SimulatedParticipant. \param hypotheses  for exploration. \param of_blocks for
+  /// As SimulatedParticipant. \param hypotheses  for exploration. \param of_blocks  for
   /// identification; must outlive it, too
   TaskParticipant(const SimulatedSettings& own, const ShapeHypotheses& hypotheses,
                   const BlockHypotheses& of_blocks, SimulatedStylus& stylus,

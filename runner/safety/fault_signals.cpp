@@ -12,7 +12,7 @@ constexpr int kAsked[] = {SIGINT, SIGTERM, SIGHUP};
 constexpr int kDying[] = {SIGABRT, SIGSEGV, SIGBUS, SIGFPE, SIGILL};
 constexpr int kZeroPatience_ms = 20;  // ms, for the servo to send zero
 
-// A handler gets nothing but the signal's number.
+// A handler receives only the signal's number.
 std::atomic<FaultSignals*> installed{nullptr};
 
 void handle(int signal, void (*handler)(int), int flags) {
@@ -58,7 +58,7 @@ void FaultSignals::dying(int signal) {
   if (FaultSignals* const self = installed.load()) {
     self->zero_force();
     ServoThread* const servo = self->servo_.load();
-    // Where the servo's own thread is dying, the guard has been told.
+    // If the servo's own thread is failing, do not wait: the guard has the request.
     const timespec millisecond{0, 1'000'000};
     for (int i = 0; i < kZeroPatience_ms && servo != nullptr && !servo->in_this_thread() &&
                     !servo->forces_are_off();
@@ -66,7 +66,7 @@ void FaultSignals::dying(int signal) {
       nanosleep(&millisecond, nullptr);
     }
   }
-  raise(signal);  // SA_RESETHAND: the usual end, with its core dump
+  raise(signal);  // SA_RESETHAND: ends the program as usual, with a core dump
 }
 
 }  // namespace palpate::runner

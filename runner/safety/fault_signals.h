@@ -14,8 +14,8 @@
 
 namespace palpate::runner {
 
-// What every fault bit of a sample means: the one table that the console, the messages of a session
-// and the codebook of the exports are made from.
+// The meaning of every fault bit of a sample: the one table for the console, a session's messages
+// and the codebook of exports.
 
 inline constexpr std::array<rendering::FaultBit, 8> kServoFaults = {{
     {servo_fault::kForceLimited, "force-limited", "force limited",
@@ -42,7 +42,7 @@ inline constexpr std::array<rendering::FaultBit, 8> kServoFaults = {{
      "the device's reading was late: the one before was used again"},
 }};
 
-/// All bits that a sample or a trial may have, lowest first.
+/// All bits of a sample or a trial, lowest first.
 inline constexpr auto kFaultTable = [] {
   std::array<rendering::FaultBit, rendering::kRenderFaults.size() + kServoFaults.size()> all{};
   const auto rest =
@@ -58,7 +58,7 @@ static_assert(std::is_sorted(kFaultTable.begin(), kFaultTable.end(),
                                return a.bit < b.bit;
                              }));
 
-/// \param bit  one that is in the table
+/// \param bit  a bit of the table
 constexpr const rendering::FaultBit& fault_row(std::uint32_t bit) {
   return *std::find_if(kFaultTable.begin(), kFaultTable.end(),
                        [bit](const rendering::FaultBit& fault) { return fault.bit == bit; });
@@ -78,10 +78,10 @@ inline std::string fault_words(std::uint32_t faults) {
   return out;
 }
 
-/// While one of these lives, SIGINT, SIGTERM and SIGHUP command zero force and ask the session to
-/// end (the second one ends the program as usual); SIGABRT (failed assert, exception that nobody
-/// caught), SIGSEGV, SIGBUS, SIGFPE and SIGILL command zero force, wait for it to be sent, and end
-/// the program as usual. One at a time, made and destroyed in one thread.
+/// While it lives, SIGINT, SIGTERM and SIGHUP command zero force and ask the session to end (a
+/// second one ends the program as usual). SIGABRT (failed assertion, uncaught exception), SIGSEGV,
+/// SIGBUS, SIGFPE and SIGILL command zero force, wait until it is sent, and end the program as
+/// usual. Only one may exist at a time; create and destroy it in one thread.
 class FaultSignals {
  public:
   FaultSignals();
@@ -89,10 +89,10 @@ class FaultSignals {
   FaultSignals(const FaultSignals&) = delete;
   FaultSignals& operator=(const FaultSignals&) = delete;
 
-  /// Which forces are meant; null: none (any more). What is watched must outlive its watch.
+  /// Sets the servo or guard to command; null: none. It must outlive its use here.
   void watch(ServoThread* servo) noexcept { servo_.store(servo); }
   void watch(GuardedDevice* guard) noexcept { guard_.store(guard); }
-  /// The signal that asked for the end; 0: none.
+  /// The signal that requested the end; 0: none.
   int end_requested() const noexcept { return end_requested_.load(); }
 
  private:

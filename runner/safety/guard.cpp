@@ -115,7 +115,7 @@ class Guard {
         obey();
       } else if (now - heard_ns_ >= silence_ns_) {
         cut_off();
-        device_.read();  // keeps its replies flowing
+        device_.read();  // keep its replies flowing
         device_.write(Vec3(0), Vec3(0));
         if (getppid() != runner_ && now - heard_ns_ >= linger_ns_) break;
       }
@@ -199,7 +199,7 @@ class Guard {
   bool armed_ = false, answered_last_ = false;
 };
 
-/// Detaches from the runner but for the shared memory: from its terminal's signals and its files.
+/// Detaches from the runner's terminal signals and files; only the shared memory remains.
 void stand_alone() {
   setpgid(0, 0);
   for (const int signal : {SIGINT, SIGTERM, SIGQUIT, SIGHUP, SIGPIPE, SIGALRM, SIGUSR1, SIGUSR2})
@@ -225,7 +225,7 @@ void fail(GuardChannel& channel, const char* message) {
 
 void run_guard(GuardChannel& channel, const DeviceFactory& factory, const GuardSettings& settings,
                int runner) noexcept {
-  // While no force is possible yet there is nothing to guard: end with the runner.
+  // No force is possible yet, so end together with the runner.
   prctl(PR_SET_PDEATHSIG, SIGKILL);
   if (getppid() != runner) return;
   stand_alone();

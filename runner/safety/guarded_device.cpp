@@ -19,7 +19,7 @@ namespace palpate::runner {
 namespace {
 
 constexpr std::int64_t kReadingSpin_ns = 20'000;  // before sleeping for the reading
-constexpr int kUnanswered = 25;                   // reads in a row: forces go off
+constexpr int kUnanswered = 25;  // unanswered reads in a row after which forces go off
 constexpr auto kAnswerNap = std::chrono::milliseconds(2);
 constexpr auto kFarewell = std::chrono::seconds(2);  // for the guard to close the device
 
@@ -67,7 +67,7 @@ GuardedDevice::GuardedDevice(const DeviceFactory& factory, const GuardSettings& 
     throw std::runtime_error(channel_->message.data());
   }
   capabilities_ = channel_->capabilities.numbers();
-  // From here on a reading that is late has one before it to stand for it.
+  // Wait for a first reading: it can replace later ones that are late.
   for (read(); unanswered_ > 0; read()) {
     if (!ended() && std::chrono::steady_clock::now() < give_up) continue;
     kill(guard_, SIGKILL);
@@ -130,7 +130,7 @@ DeviceTrouble GuardedDevice::without_answer() noexcept {
   if (ended()) return DeviceTrouble::guard_lost;
   const std::int64_t now = RealClock().now_ns();
   if (reopening()) {
-    answered_ns_ = now;  // it is at work
+    answered_ns_ = now;  // the guard is at work
     return DeviceTrouble::reopening;
   }
   if (unanswered_ < kUnanswered) return DeviceTrouble::late;

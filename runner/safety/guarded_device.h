@@ -1,6 +1,6 @@
 #pragma once
-// A device behind the watchdog, as the runner sees it: reads and writes go through the guard
-// process, which outlives whatever happens to the runner.
+// The runner's interface to a device behind the watchdog: reads and writes go through the guard
+// process, which survives a crash of the runner.
 
 #include <cstdint>
 #include <memory>
@@ -11,17 +11,17 @@
 
 namespace palpate::runner {
 
-/// The runner's side of the watchdog. A reading that does not come within half a period is the last
-/// one again (DeviceTrouble::late). So many in a row are a lost device (guard_late) until readings
-/// come again; a guard that has ended, or has hung for longer than any busy machine keeps it, is
-/// one for good.
+/// The runner's side of the watchdog. If a reading takes longer than half a period, the last one is
+/// repeated (DeviceTrouble::late). After many such readings in a row the device counts as lost
+/// (guard_late) until readings arrive again. A guard that has ended, or hangs longer than a busy
+/// machine explains, is lost for good (guard_lost).
 class GuardedDevice final : public Device {
  public:
-  /// Forks: call it before there are other threads. `factory` runs in the guard. Returns once the
-  /// device has been read for the first time, whatever that reading says.
-  /// \throws std::runtime_error with what the factory threw, or why there is no guard
+  /// Forks: call it before creating other threads. `factory` runs in the guard. Returns once the
+  /// device has been read for the first time, even if that reading reports trouble.
+  /// \throws std::runtime_error with the factory's message, or why there is no guard
   GuardedDevice(const DeviceFactory& factory, const GuardSettings& settings);
-  /// Zero force; the device is closed and the guard ends.
+  /// Commands zero force, closes the device and ends the guard.
   ~GuardedDevice() override;
   GuardedDevice(const GuardedDevice&) = delete;
   GuardedDevice& operator=(const GuardedDevice&) = delete;
@@ -30,14 +30,15 @@ class GuardedDevice final : public Device {
   DeviceReading read() noexcept override;
   void write(const Vec3& device1, const Vec3& device2) noexcept override;
 
-  /// Zero force by the guard itself, whatever the servo does. From any thread or signal handler.
+  /// Makes the guard itself command zero force, whatever the servo does. From any thread or signal
+  /// handler.
   void emergency_zero() noexcept;
 
-  /// Has the guard open the device again (Device::reopen). Returns at once; readings are lost until
-  /// it is done. From one thread, which may be another than that of read and write.
+  /// Makes the guard open the device again (Device::reopen). Returns at once; readings are lost
+  /// until it is done. Call it from one thread, which may differ from that of read and write.
   void ask_to_reopen() noexcept;
   bool reopening() const noexcept;
-  /// What was in the way the last time; empty: nothing. By the thread that asked, once it is done.
+  /// The obstacle to the last reopening; empty: none. For the thread that asked, after it is done.
   std::string reopen_trouble() const;
 
   int guard_process() const { return guard_; }
@@ -59,7 +60,7 @@ class GuardedDevice final : public Device {
   DeviceReading last_;
   std::uint32_t trips_seen_ = 0;
   int unanswered_ = 0;            ///< reads in a row
-  std::int64_t answered_ns_ = 0;  ///< when one was answered last
+  std::int64_t answered_ns_ = 0;  ///< time of the last answer
 };
 
 }  // namespace palpate::runner

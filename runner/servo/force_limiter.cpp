@@ -7,8 +7,8 @@
 namespace palpate::runner {
 namespace {
 
-/// Whether both are shorter than the limit whatever the roundings: most ticks then need no square
-/// root. False where one is not finite.
+/// Whether both are certainly shorter than the limit, rounding included: most ticks then need no
+/// square root. False if one is not finite.
 bool surely_within(double limit, const Vec3& a, const Vec3& b) {
   const double least = (1 - 1e-12) * limit * limit;
   return glm::dot(a, a) < least && glm::dot(b, b) < least;
@@ -17,9 +17,9 @@ bool surely_within(double limit, const Vec3& a, const Vec3& b) {
 }  // namespace
 
 DeviceForces ForceLimiter::apply(const Vec3& device1, const Vec3& device2) noexcept {
-  double strongest = 0;  // where it may be above the limit
+  double strongest = 0;  // computed only if it may be above the limit
   if (!surely_within(limits_.max_force, device1, device2)) {
-    // A sum is finite only when each of its terms is.
+    // A sum is finite only if each term is.
     const double size1 = glm::length(device1), size2 = glm::length(device2);
     if (!std::isfinite(size1 + size2)) trip();
     strongest = std::max(size1, size2);

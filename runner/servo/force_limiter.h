@@ -1,5 +1,5 @@
 #pragma once
-// The last step before the device: limits the size and the change of commanded forces; zero where a
+// The last step before the device: limits the size and the change of commanded forces; zero if a
 // force is not finite.
 
 #include "stimuli/vec.h"
@@ -9,12 +9,12 @@ namespace palpate::runner {
 struct ForceLimits {
   double max_force = 6;     ///< N, of each device
   double max_change = 0.5;  ///< N per tick, of each device
-  double ramp = 0.2;        ///< s, from nothing to full force when forces go on
+  double ramp = 0.2;        ///< s, from zero to full force when forces go on
 };
 
 struct DeviceForces {
   Vec3 device1, device2;  ///< N, on the hand
-  bool limited = false;   ///< size or change was cut
+  bool limited = false;   ///< size or change was reduced
 };
 
 class ForceLimiter {
@@ -22,14 +22,14 @@ class ForceLimiter {
   ForceLimiter(const ForceLimits& limits, double tick)
       : limits_(limits), ramp_step_(tick / limits.ramp) {}
 
-  /// Both devices are scaled together where one is too strong, so that direction and moment keep
-  /// their sense. Not finite: zero for good (faulted) until clear().
+  /// If one force is too strong, both are scaled together, so that the directions of force and
+  /// moment stay. If a force is not finite: zero force (tripped) until clear().
   DeviceForces apply(const Vec3& device1, const Vec3& device2) noexcept;
   /// Zero force at once; the next apply starts a new ramp.
   void release() noexcept;
   /// Zero force at once and until clear().
   void trip() noexcept;
-  /// The ramp the other way from the next apply() on, then as trip().
+  /// Ramps down from the next apply() on, then acts as trip().
   void fade() noexcept { fading_ = true; }
   bool tripped() const noexcept { return tripped_; }
   void clear() noexcept { tripped_ = fading_ = false; }

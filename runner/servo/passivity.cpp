@@ -7,8 +7,8 @@
 namespace palpate::runner {
 namespace {
 
-/// The part of `motion` along the force, which is all that the damping may touch: a stylus that
-/// slides over a face keeps its way along it.
+/// The part of `motion` along the force. Only this part is damped, so that a stylus slides freely
+/// along a face.
 Vec3 part_along(Vec3& towards, const Vec3& force, const Vec3& motion) {
   const double size = glm::length(force);
   if (size > 0) towards = force / size;
@@ -29,7 +29,7 @@ DeviceForces PassivityController::damping(const Ends& at, const DeviceForces& sc
     excess_ = std::max(0.0, excess_ + fed - due);
     const double moved = glm::dot(moved1, moved1) + glm::dot(moved2, moved2);  // m^2
     if (excess_ > 0 && moved > 0) {
-      // Over the next tick, at this speed, damping b takes out b v^2 T = b moved / T.
+      // At this speed, damping b dissipates b v^2 T = b moved / T in the next tick.
       const double b = std::min(excess_ * tick_ / moved, settings_.most_damping);
       out.device1 = -b / tick_ * moved1;
       out.device2 = -b / tick_ * moved2;
@@ -39,7 +39,7 @@ DeviceForces PassivityController::damping(const Ends& at, const DeviceForces& sc
   started_ = true;
   last_ = at;
   scene_ = scene;
-  // Poses that are not finite: no force of ours, and a new account.
+  // Poses are not finite: add no force and reset the account.
   if (!std::isfinite(excess_ + glm::dot(way1, way1) + glm::dot(way2, way2))) {
     reset();
     out = {};

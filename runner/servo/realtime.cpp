@@ -31,7 +31,7 @@ bool may_lock_any_memory() {
          (sets[CAP_TO_INDEX(CAP_IPC_LOCK)].effective & CAP_TO_MASK(CAP_IPC_LOCK)) != 0;
 }
 
-/// Locks what there is, and what comes later as it is touched where no limit can make that fail.
+/// Locks all present memory. If no limit can make that fail, also locks future memory when touched.
 bool lock_memory() {
   if (mlockall(MCL_CURRENT) != 0) return false;
   rlimit limit{};
@@ -70,7 +70,8 @@ AwakeProcessors::~AwakeProcessors() {
 
 RealtimeRights request_realtime(const RealtimeSettings& settings) {
   RealtimeRights rights;
-  // An ordinary thread's sleep may be prolonged by 50 us to save wake-ups. Needs no right.
+  // The kernel may prolong an ordinary thread's sleep by 50 us to save wake-ups. Turning that off
+  // needs no right.
   prctl(PR_SET_TIMERSLACK, 1UL);
   if (settings.priority > 0) {
     sched_param param{};

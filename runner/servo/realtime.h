@@ -1,5 +1,5 @@
 #pragma once
-// The computer's clock, and real-time scheduling and locked memory, which make ticks come in time.
+// The computer's clock; real-time scheduling and locked memory, which keep ticks on time.
 
 #include <string>
 
@@ -16,21 +16,21 @@ class RealClock final : public Clock {
 
 struct RealtimeSettings {
   int priority = 80;        ///< of SCHED_FIFO, 1 to 99; 0: leave the ordinary scheduler
-  bool lock_memory = true;  ///< no page of this program is swapped out or fetched late
-  int core = -1;            ///< run on this processor alone; -1: any
-  bool awake = true;        ///< idle processors wake at once (AwakeProcessors)
+  bool lock_memory = true;  ///< keep all pages of this program in memory
+  int core = -1;            ///< run only on this processor; -1: any
+  bool awake = true;        ///< keep idle processors quick to wake (AwakeProcessors)
 };
 
-/// What was granted.
+/// The rights granted.
 struct RealtimeRights {
   bool fifo = false, locked_memory = false;
   int core = -1;
   bool awake = false;
-  std::string missing;  ///< what was asked for and not granted, and what that costs; empty: nothing
+  std::string missing;  ///< rights denied and their consequences; empty: none
 };
 
-/// While it lives, idle processors do not fall so deep asleep that waking takes time (the kernel's
-/// PM QoS, /dev/cpu_dma_latency), where that is allowed. Costs power.
+/// While it lives, keeps idle processors out of deep sleep states, from which waking takes time
+/// (the kernel's PM QoS, /dev/cpu_dma_latency), if allowed. Costs power.
 class AwakeProcessors {
  public:
   explicit AwakeProcessors(bool wanted) noexcept;
@@ -43,7 +43,8 @@ class AwakeProcessors {
   int file_ = -1;
 };
 
-/// Asks for the calling thread (memory: for the whole program). Goes on with what is granted.
+/// Requests the settings for the calling thread (memory: for the whole program) and accepts partial
+/// grants.
 RealtimeRights request_realtime(const RealtimeSettings& settings);
 
 }  // namespace palpate::runner

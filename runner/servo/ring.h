@@ -8,14 +8,14 @@
 
 namespace palpate::runner {
 
-/// A queue of fixed size from one thread to one other. Neither ever waits.
+/// A queue of fixed size from one thread to another. Neither thread ever waits.
 template <class T>
 class Ring {
  public:
-  /// Room for `size` or more; all memory is taken (and touched) here.
+  /// Holds at least `size` values; allocates and touches all memory here.
   explicit Ring(std::size_t size) : slots_(std::bit_ceil(size)) {}
 
-  /// By the writer. False where there is no room.
+  /// For the writer. False: it is full.
   bool push(const T& value) noexcept {
     const std::size_t at = written_.load(std::memory_order_relaxed);
     if (at - read_.load(std::memory_order_acquire) >= slots_.size()) return false;
@@ -23,12 +23,12 @@ class Ring {
     written_.store(at + 1, std::memory_order_release);
     return true;
   }
-  /// By the writer: how many more have room.
+  /// For the writer: number of free places.
   std::size_t room() const noexcept {
     return slots_.size() -
            (written_.load(std::memory_order_relaxed) - read_.load(std::memory_order_acquire));
   }
-  /// By the reader. False where there is nothing.
+  /// For the reader. False: it is empty.
   bool pop(T& value) noexcept {
     const std::size_t at = read_.load(std::memory_order_relaxed);
     if (at == written_.load(std::memory_order_acquire)) return false;
@@ -39,7 +39,7 @@ class Ring {
   std::size_t capacity() const noexcept { return slots_.size(); }
 
  private:
-  static constexpr std::size_t kLine = 64;  // the two counts do not share a line of the cache
+  static constexpr std::size_t kLine = 64;  // keeps the two counts in different cache lines
 
   std::vector<T> slots_;
   alignas(kLine) std::atomic<std::size_t> written_{0};

@@ -1,5 +1,5 @@
 #pragma once
-// What happens in one servo tick, and what is asked of the servo between ticks. Plain values.
+// Records of a servo tick, and requests to the servo between ticks. Plain values.
 
 #include <algorithm>
 #include <cstdint>
@@ -10,10 +10,10 @@
 
 namespace palpate::runner::servo_fault {
 
-// The fault bits of a servo tick beside the renderer's (rendering/render_fault.h). A bit that is
-// added here needs a row in runner/safety/fault_signals.h, which says what it means; a test looks.
+// The fault bits of a servo tick in addition to the renderer's (rendering/render_fault.h). Each bit
+// needs a row in runner/safety/fault_signals.h, which explains it; a test checks that.
 
-// Bits of Sample::faults; the renderer's are 1 to 8 and 4096 on.
+// Bits of Sample::faults; the renderer uses 1 to 8 and from 4096 on.
 inline constexpr std::uint32_t kForceLimited = 16;
 inline constexpr std::uint32_t kDeviceLost = 32;
 inline constexpr std::uint32_t kMissedTicks = 64;
@@ -33,19 +33,19 @@ enum class Phase : std::uint8_t {
   feeling,  ///< forces on
 };
 
-/// Why forces are not on yet, in homing.
+/// The reason why forces are not on yet, while homing.
 enum class Waiting : std::uint8_t {
   nothing,
   for_distance,  ///< the stylus is not in the home zone
-  for_rest,      ///< it is, and has not rested there long enough
+  for_rest,      ///< the stylus is there but has not rested long enough
 };
 
-/// What happened in one tick.
+/// The record of one tick.
 struct Sample {
   std::int64_t time_ns = 0;      ///< session clock, at the start of the tick
-  std::int64_t period_ns = 0;    ///< since the tick before
+  std::int64_t period_ns = 0;    ///< since the previous tick
   std::int64_t lateness_ns = 0;  ///< time_ns less the time at which the tick was due
-  std::int64_t warm_up_ns = 0;   ///< from there to the device's reading, by the clock
+  std::int64_t warm_up_ns = 0;   ///< from time_ns to the device's reading, by the clock
   std::int64_t compute_ns = 0;   ///< from the device's reading to the command for it, by the clock
   std::uint32_t tick = 0;        ///< since time zero of the trial; 0 before
   Phase phase = Phase::idle;
@@ -59,16 +59,17 @@ struct Sample {
   DeviceTrouble trouble = DeviceTrouble::none;
 };
 
-/// As a sample keeps it: 255 stands for more as well.
+/// The count as stored in a sample: 255 stands for 255 or more.
 inline std::uint8_t recorded_contacts(int contacts) {
   return static_cast<std::uint8_t>(std::min(contacts, 255));
 }
 
-/// Where a trial may start: the whole stylus outside of `radius` about the origin, at rest.
+/// The home zone, where a trial may start: the whole stylus is at rest outside `radius` about the
+/// origin.
 struct HomeZone {
   double radius = 0.062;     ///< m, bounding sphere and margin
   double rest = 0.5;         ///< s
-  double stillness = 0.005;  ///< m; the tip stays this near to where it came to rest
+  double stillness = 0.005;  ///< m; largest distance of the resting tip from where it came to rest
 };
 
 /// Servo-quality figures of one trial, from time zero.

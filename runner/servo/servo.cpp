@@ -21,8 +21,8 @@ double distance_of_segment(const rendering::LineProbe& probe) {  // from the ori
   return glm::length(probe.tip + t * d);
 }
 
-/// From the origin to the nearest point of what touches, m; NaN where the stylus is not finite. A
-/// trial's tool begins with the roll that its first pose gives it.
+/// Distance from the origin to the nearest point of stylus or tool, m; NaN if the stylus is not
+/// finite. A trial's tool begins with the roll of its first pose.
 double distance_of(const TrialScene& shown, const rendering::LineProbe& probe) {
   const double stylus = distance_of_segment(probe);
   if (!std::isfinite(stylus)) return std::numeric_limits<double>::quiet_NaN();
@@ -35,7 +35,7 @@ double distance_of(const TrialScene& shown, const rendering::LineProbe& probe) {
   for (std::size_t k = 0; k < placed.count; ++k) {
     const Vec3 from = probe.tip + placed.segments[k].from;
     const double distance = distance_of_segment({from, from + placed.segments[k].along});
-    if (std::isnan(distance)) return distance;  // std::min would forget it
+    if (std::isnan(distance)) return distance;  // std::min would drop NaN
     least = std::min(least, distance);
   }
   return least;
@@ -64,7 +64,7 @@ void Servo::prepare(const rendering::Scene& scene, const rendering::Renderer& re
   own_ = std::make_unique<TrialScene>(scene, renderer, home);
   begin(*own_);
   due_ns_ = clock_.now_ns();
-  sample_.time_ns = 0;  // the first period is the nominal one
+  sample_.time_ns = 0;  // so that the first period is the nominal one
 }
 
 void Servo::start() noexcept {
@@ -87,7 +87,7 @@ void Servo::begin(TrialScene& shown) noexcept {
 }
 
 void Servo::clear_fault() noexcept {
-  emergency_.store(false);  // first: a request that comes from now on is kept
+  emergency_.store(false);  // cleared first, so that later requests are kept
   fade_.store(false);
   clear_trip();
 }
@@ -104,7 +104,7 @@ void Servo::pull(const rendering::BodyPull& by) noexcept {
 
 bool Servo::at_home(const rendering::LineProbe& probe) noexcept {
   const HomeZone& home = shown_->home;
-  // It is the hand that rests: a long virtual stylus trembles more.
+  // Test the hand's rest: a long virtual stylus trembles more.
   const Vec3 tip = workspace_.reach ? unstretched(*workspace_.reach, probe).tip : probe.tip;
   const bool still = rested_ > 0 && glm::length(tip - rest_tip_) <= home.stillness;
   if (!still) {
@@ -166,8 +166,8 @@ void Servo::command(Vec3 device1, Vec3 device2) noexcept {
     limiter_.trip();
   }
   if (fade_.load(std::memory_order_relaxed)) limiter_.fade();
-  // A device with one grip adds both forces up: the limits and the energy account see their sum.
-  // Its torque is left out.
+  // A device with one grip receives the sum of both forces: the limits and the energy account use
+  // it. Torque is dropped.
   if (drives_force_alone_) {
     device1 += device2;
     device2 = Vec3(0);
@@ -197,7 +197,7 @@ DeviceForces Servo::kept_passive(const Vec3& device1, const Vec3& device2) noexc
     passivity_->reset();
     return limiter_.apply(device1, device2);
   }
-  ForceLimiter preview = limiter_;  // what the limits leave of the scene's forces alone
+  ForceLimiter preview = limiter_;  // to compute the limits' effect on the scene's forces alone
   const rendering::LineProbe ends = workspace_.to_device(sample_.probe);
   const DeviceForces damping =
       passivity_->damping({ends.tip, ends.tail}, preview.apply(device1, device2));
@@ -221,10 +221,10 @@ const Sample& Servo::tick() noexcept {
   }
   if (sample_.phase != Phase::feeling) {
     command(Vec3(0), Vec3(0));
-    limiter_.release();  // the ramp begins with the forces
+    limiter_.release();  // the ramp begins when forces go on
     return sample_;
   }
-  // Made in its place: an assignment would copy it.
+  // Construct it in place: an assignment would copy it.
   std::destroy_at(&sample_.rendering);
   ::new (&sample_.rendering) rendering::Rendering(shown_->renderer->tick(
       shown_->scene, shown_->state, sample_.probe, static_cast<double>(sample_.period_ns) * 1e-9));

@@ -1,6 +1,6 @@
 #pragma once
 // The servo loop's tick: device.read -> renderer -> force limits -> device.write. The same code for
-// a simulated participant (as fast as the processor goes) and a live one (paced by the clock).
+// a simulated participant (as fast as the processor allows) and a live one (paced by the clock).
 
 #include <algorithm>
 #include <atomic>
@@ -24,14 +24,14 @@ namespace palpate::runner {
 
 /// The scene of one trial with its renderer and the renderer's state.
 struct TrialScene {
-  /// \param ticks  that may wait for the session, also where something moves
+  /// \param ticks  capacity of queued ticks, poses of moving objects included
   TrialScene(const rendering::Scene& what, const rendering::Renderer& how, const HomeZone& where,
              std::size_t ticks = 1)
       : scene(what), renderer(&how), state(scene.initial_state()), home(where) {
     rendering::pace_by_tick(state);
-    // A soft body's shadow would be a body of its own, with steps of its own.
+    // A soft body's shadow would be a second body with its own steps.
     if (rendering::soft_objects(scene).empty()) shadow.emplace(scene.initial_state());
-    constexpr std::size_t kMostBodyPoses = 1 << 18;  // 50 MB; of many bodies fewer ticks can wait
+    constexpr std::size_t kMostBodyPoses = 1 << 18;  // 50 MB; many bodies: fewer ticks
     constexpr std::size_t kLeastTicks = 2048;
     const std::size_t bodies = state.motion.bodies().size();
     if (bodies == 0) return;
@@ -41,10 +41,11 @@ struct TrialScene {
 
   const rendering::Scene scene;
   const rendering::Renderer* renderer;
-  rendering::RenderState state;                  ///< the servo's alone while the scene is shown
-  std::optional<rendering::RenderState> shadow;  ///< likewise; a tick behind: for keep_warm()
+  rendering::RenderState state;  ///< used only by the servo while the scene is shown
+  std::optional<rendering::RenderState> shadow;  ///< likewise; one tick behind, for keep_warm()
   HomeZone home;
-  /// Of what moves, tick by tick: from a servo's thread to the session's. None where nothing moves.
+  /// Poses of moving objects, tick by tick, from a servo's thread to the session's. Null if none
+  /// moves.
   std::unique_ptr<Ring<rendering::BodyPose>> poses;
 };
 
@@ -55,33 +56,35 @@ class Servo final : public TickSource {
 
   void prepare(const rendering::Scene& scene, const rendering::Renderer& renderer,
                const HomeZone& home) override;
-  /// Waits for the tick's time, then does one tick. Never throws, allocates, locks or does I/O but
-  /// the device's own transfer.
+  /// Waits for the tick's time, then does one tick. Never throws, allocates or locks, and does no
+  /// I/O except the device's own transfer.
   const Sample& tick() noexcept;
   const Sample& next() noexcept override { return tick(); }
   std::span<const rendering::BodyPose> bodies() const noexcept override;
-  /// Somebody draws an object of the scene, until it is told otherwise.
+  /// Pulls an object of the scene until the next call.
   void pull(const rendering::BodyPull& by) noexcept;
-  /// Of the scene that is shown; none: nothing in it moves.
+  /// Poses of the scene shown; null: nothing in it moves.
   Ring<rendering::BodyPose>* poses() noexcept {
     return shown_ != nullptr ? shown_->poses.get() : nullptr;
   }
   ServoQuality stop() noexcept override;
 
-  /// As prepare, but without allocating and without a new start of the ticks' times. `shown` must
-  /// live until the next begin(), prepare() or stop().
+  /// As prepare, but does not allocate and does not restart the ticks' times. `shown` must live
+  /// until the next begin(), prepare() or stop().
   void begin(TrialScene& shown) noexcept;
-  /// Steps of soft objects that are due in the next tick wait, as they did where it was recorded.
+  /// Holds the steps of soft objects that are due in the next tick, as in the recording being
+  /// replayed.
   void hold_steps(bool held) noexcept {
     if (shown_ != nullptr) rendering::hold_steps(shown_->state, held);
   }
-  /// Zero force from the current tick on, until clear_fault(). From any thread or signal handler.
+  /// Commands zero force from the current tick on, until clear_fault(). Call it from any thread or
+  /// signal handler.
   void emergency_zero() noexcept { emergency_.store(true); }
-  /// The same by the ramp, as nobody is in a hurry: from full force in ForceLimits::ramp.
+  /// The same, but ramps down: from full force in ForceLimits::ramp. For cases without urgency.
   void fade_out() noexcept { fade_.store(true); }
-  /// The experimenter allows forces again. From any thread.
+  /// Allows forces again. Call it from any thread.
   void clear_fault() noexcept;
-  /// The same, but zero force that was asked for stays asked for.
+  /// The same, but requests for zero force stay in effect.
   void clear_trip() noexcept { clear_.store(true); }
 
   /// Turns on the passivity controller, which dissipates the energy that sampling feeds to the

@@ -15,7 +15,7 @@
 namespace palpate::runner {
 namespace {
 
-// One thread writes: a load and a store do, without the locked instruction of an increment.
+// Only one thread writes, so a load and a store suffice, without a locked increment.
 template <class T>
 void increase(std::atomic<T>& value, T by) noexcept {
   value.store(value.load(std::memory_order_relaxed) + by, std::memory_order_relaxed);
@@ -25,7 +25,7 @@ void increase(std::atomic<T>& value, T by) noexcept {
 
 int TimeHistogram::bin(std::int64_t ns) noexcept {
   if (ns < kSteps) return static_cast<int>(std::max<std::int64_t>(ns, 0));
-  // The leading bit says the doubling, the next three the step in it.
+  // The leading bit gives the doubling, the next three the step in it.
   const int shift = static_cast<int>(std::bit_width(static_cast<std::uint64_t>(ns))) - 4;
   return std::min(kBins - 1, shift * kSteps + static_cast<int>(ns >> shift));
 }
@@ -121,12 +121,12 @@ std::string to_json_text(const ServoHealth& health, double rate) {
 
 namespace {
 
-constexpr int kBelowTheServo = 10;  // in priority
+constexpr int kBelowTheServo = 10;  // difference in priority
 
 RealtimeSettings of_body(RealtimeSettings servo) {
   if (servo.priority > 0) servo.priority = std::max(1, servo.priority - kBelowTheServo);
-  servo.lock_memory = false;  // the servo has asked for the whole program
-  servo.core = -1;            // one that is the servo's alone stays so
+  servo.lock_memory = false;  // the servo has requested it for the whole program
+  servo.core = -1;            // leave the servo's processor to the servo
   servo.awake = false;
   return servo;
 }
@@ -158,7 +158,7 @@ SoftThread::~SoftThread() {
 }
 
 void SoftThread::ask(std::span<const rendering::NodeForce> forces) noexcept {
-  forces_.assign(forces.begin(), forces.end());  // has room for as many as there can be
+  forces_.assign(forces.begin(), forces.end());  // capacity suffices for the largest number
   phase_.store(Phase::asked, std::memory_order_release);
   sem_post(&asked_);
 }
@@ -166,7 +166,7 @@ void SoftThread::ask(std::span<const rendering::NodeForce> forces) noexcept {
 bool SoftThread::take(rendering::SoftView& view) noexcept {
   std::swap(view, view_);
   const bool good = good_;
-  phase_.store(Phase::idle, std::memory_order_relaxed);  // the servo's turn until it asks again
+  phase_.store(Phase::idle, std::memory_order_relaxed);  // the servo's turn
   return good;
 }
 
@@ -201,12 +201,12 @@ namespace {
 
 using std::chrono::steady_clock;
 
-constexpr auto kNap = std::chrono::milliseconds(4);  // of the session, where nothing is new
+constexpr auto kNap = std::chrono::milliseconds(4);  // sleep of the session while no sample is new
 constexpr std::size_t kPlaces = 4096;                // ticks
 constexpr auto kPatience = std::chrono::seconds(1);
 constexpr auto kPatienceWithoutMotors = std::chrono::seconds(10);
 constexpr auto kLongestWait =
-    std::chrono::milliseconds(50);  // from asking to asking; else all stood
+    std::chrono::milliseconds(50);  // between calls; after more the program stood still
 
 }  // namespace
 
@@ -255,7 +255,7 @@ void ServoThread::run() noexcept {
   while (!quit_.load(std::memory_order_relaxed)) {
     take_requests();
     const Sample& sample = servo_.tick();
-    if (tells_places_) publish_places(sample);  // first: who has the sample finds them
+    if (tells_places_) publish_places(sample);  // first, so that a reader of the sample finds them
     publish(sample);
     if (sample.phase == Phase::feeling) felt_at_ = sample.probe;
     if (steps_left_ > 0) count_step();
@@ -291,8 +291,8 @@ void ServoThread::take_requests() noexcept {
   }
 }
 
-/// The stylus may have been moved while nothing happened: what is between then and now must not be
-/// passed through in one tick.
+/// The stylus may have been moved while the scene was stopped: it must not pass through objects in
+/// one tick.
 void ServoThread::go_on_when_back(const rendering::LineProbe& probe) noexcept {
   const double away = felt_at_ ? std::max(glm::distance(probe.tip, felt_at_->tip),
                                           glm::distance(probe.tail, felt_at_->tail))
@@ -306,15 +306,16 @@ void ServoThread::go_on_when_back(const rendering::LineProbe& probe) noexcept {
   servo_.begin(*current_);
 }
 
-/// The ramp of the forces begins anew with each: what is not shown as it happens is not felt.
+/// Each step restarts the ramp of the forces: a hand must not feel states that are not shown as
+/// they happen.
 void ServoThread::count_step() noexcept {
-  if (servo_.shown() == nullptr) return;  // it waits
+  if (servo_.shown() == nullptr) return;  // it waits for the stylus
   const bool last = --steps_left_ == 0;
   servo_.stop();
   if (!last) servo_.begin(*current_);
 }
 
-/// To the session; false where there is no room.
+/// Passes a sample to the session; false: the ring is full.
 bool ServoThread::hand_over(const Sample& sample) noexcept {
   if (sample.bodies > 0) {
     Ring<rendering::BodyPose>& poses = *servo_.poses();
@@ -394,7 +395,7 @@ ServoQuality ServoThread::stop() noexcept {
   Patience patience(has_motors_);
   while (stops_done_.load(std::memory_order_acquire) != asked) {
     if (patience.is_over()) {
-      emergency_zero();  // should it ever come back
+      emergency_zero();  // in case the thread recovers
       ServoQuality stalled;
       stalled.faults = servo_fault::kStalled | servo_fault::kTripped;
       return stalled;

@@ -1,7 +1,7 @@
 #pragma once
-// The servo loop of a live session: a real-time thread of its own that waits for nothing but the
-// clock and the device. Scenes go in by an exchange of pointers, every sample comes out through a
-// ring of fixed size, the newest through a triple buffer. No locks.
+// The servo loop of a live session: a real-time thread that waits only for the clock and the
+// device. Scenes are passed in by exchange of pointers. Every sample is passed out through a ring
+// of fixed size, the newest also through a triple buffer. No locks.
 
 #include <semaphore.h>
 
@@ -31,23 +31,22 @@ namespace palpate::runner {
 
 // Timing statistics of the servo loop over every tick: lateness, computing time, missed ticks.
 
-/// Counts of times in steps of 1/8 of their size (12.5 % wide at most; exact below 16 ns), from 0
-/// to hours. One thread adds, any may read meanwhile.
+/// A histogram of times in steps of 1/8 of their size (12.5 % wide at most; exact below 16 ns),
+/// from 0 to hours. One thread adds; any may read at the same time.
 class TimeHistogram {
  public:
   void add(std::int64_t ns) noexcept;
   std::uint64_t count() const noexcept { return count_.load(std::memory_order_relaxed); }
   std::int64_t longest() const noexcept { return longest_.load(std::memory_order_relaxed); }
-  /// The time that the fraction `p` of the counts does not exceed, as the upper edge of its step,
-  /// ns.
+  /// The `p` quantile, as the upper edge of its step, ns.
   std::int64_t quantile(double p) const noexcept;
-  /// Fraction of counts in steps that lie above `ns`.
+  /// Share of counts in steps above `ns`.
   double fraction_above(std::int64_t ns) const noexcept;
-  /// The steps that hold any, as upper edge (ns) and count, in order.
+  /// The steps that are not empty, as upper edge (ns) and count, in order.
   std::vector<std::pair<std::int64_t, std::uint64_t>> steps() const;
 
  private:
-  static constexpr int kSteps = 8;   ///< for each doubling
+  static constexpr int kSteps = 8;   ///< number of steps in each doubling
   static constexpr int kBins = 352;  ///< up to 2^45 ns
   static int bin(std::int64_t ns) noexcept;
   static std::int64_t upper_edge(int bin) noexcept;
@@ -57,22 +56,22 @@ class TimeHistogram {
   std::atomic<std::int64_t> longest_{0};
 };
 
-/// Ticks against the clock: elapsed_ns / period = ticks - 1 + missed_ticks, whole numbers all.
+/// Ticks against the clock: elapsed_ns / period = ticks - 1 + missed_ticks, all whole numbers.
 struct TimeKept {
   std::uint64_t ticks = 0;
   std::uint64_t missed_ticks = 0;  ///< whole periods that passed without a tick
-  /// By the clock, from the time when the first tick was due to the start of the last one.
+  /// By the clock, from the due time of the first tick to the start of the last one.
   std::int64_t elapsed_ns = 0;
 };
 
-/// Of all ticks of a servo thread.
+/// Timing statistics of all ticks of a servo thread.
 class ServoHealth {
  public:
-  /// By the servo's thread.
+  /// Call it in the servo's thread.
   void add(const Sample& sample, std::int64_t period_ns) noexcept;
   void add_lost_sample() noexcept;
 
-  /// All three of the same moment.
+  /// All three values at the same moment.
   TimeKept time_kept() const noexcept;
   std::uint64_t ticks() const noexcept { return lateness_.count(); }
   std::uint64_t missed_ticks() const noexcept { return time_kept().missed_ticks; }
@@ -94,40 +93,40 @@ class ServoHealth {
   std::atomic<std::int64_t> longest_period_{0};
 };
 
-/// For a session's record, as JSON: counts, quantiles, and the histograms of every tick's lateness
-/// and computing time.
+/// JSON for a session's record: counts, quantiles, and the histograms of all ticks' lateness and
+/// computing time.
 std::string to_json_text(const ServoHealth& health, double rate);
 
-// The steps of soft objects, each object's in a thread of its own beside the servo's.
+// Threads that step soft objects, one for each object, beside the servo's.
 
-/// Where the surface of a soft object was at its last step, to be drawn.
+/// The surface of a soft object at its last step, for drawing.
 struct SoftSnapshot {
   std::vector<Vec3> now;  ///< m, of the nodes of the surface; empty: it has not been stepped
   std::uint64_t steps = 0;
 };
 
-/// One object's thread. The servo asks for a step and takes it, one at a time, by an exchange of
-/// buffers: it never waits, and the thread touches nothing of the servo's in between. The thread's
-/// own priority is below the servo's.
+/// The thread of one object. The servo asks for a step and takes its result, one at a time, by
+/// exchange of buffers. It never waits, and the thread does not touch the servo's data in between.
+/// The thread's priority is below the servo's.
 class SoftThread final : public rendering::SoftStepper {
  public:
-  /// \param realtime  the servo's. \throws std::system_error where no thread can be had
+  /// \param realtime  the servo's. \throws std::system_error if no thread can be created
   SoftThread(std::shared_ptr<const rendering::SoftObject> object, const RealtimeSettings& realtime);
-  ~SoftThread() override;  ///< after the step in hand. The servo must have left it
+  ~SoftThread() override;  ///< waits for the current step. The servo must no longer use it
   SoftThread(const SoftThread&) = delete;
   SoftThread& operator=(const SoftThread&) = delete;
 
-  // By the servo:
+  // Called by the servo:
   void ask(std::span<const rendering::NodeForce> forces) noexcept override;
   bool ready() const noexcept override {
     return phase_.load(std::memory_order_acquire) == Phase::made;
   }
   bool take(rendering::SoftView& view) noexcept override;
 
-  /// By one other thread. False where there is nothing new.
+  /// For one other thread. False: nothing is new.
   bool latest(SoftSnapshot& snapshot) noexcept { return drawn_.read(snapshot); }
   int object() const { return object_->object; }  ///< index in the scene
-  /// From any thread: steps wait, as those of a thread that has no processor. For tests.
+  /// Holds all steps, as if the thread had no processor. From any thread; for tests.
   void stall(bool stalled) noexcept { stalled_.store(stalled); }
 
  private:
@@ -140,7 +139,7 @@ class SoftThread final : public rendering::SoftStepper {
   std::atomic<Phase> phase_{Phase::idle};
   static_assert(std::atomic<Phase>::is_always_lock_free);
   std::atomic<bool> quit_{false}, stalled_{false};
-  // Whose turn it is owns these: the servo's when idle or made, the thread's when asked.
+  // Owned by the servo in phases idle and made, by the thread in phase asked.
   std::vector<rendering::NodeForce> forces_;
   rendering::SoftView view_;
   bool good_ = true;
@@ -151,11 +150,11 @@ class SoftThread final : public rendering::SoftStepper {
   std::jthread thread_;  ///< last: ends first
 };
 
-/// Those of a scene; none where nothing is soft.
+/// The threads of a scene; empty if it has no soft objects.
 class SoftThreads {
  public:
   SoftThreads(const rendering::Scene& scene, const RealtimeSettings& realtime);
-  /// Has the state's steps made here from now on. Right after initial_state().
+  /// Makes the state's steps run here from now on. Call it right after initial_state().
   void attach(rendering::RenderState& state);
 
   bool empty() const { return threads_.empty(); }
@@ -173,85 +172,88 @@ struct ServoSettings {
   WorkspaceMap workspace;
   bool passivity_controller = false;
   RealtimeSettings realtime;
-  std::size_t ring = 16384;     ///< samples that wait for the session before some are lost
-  bool touched_places = false;  ///< where every tick touches is told, too
+  std::size_t ring = 16384;     ///< samples that can wait for the session; more are lost
+  bool touched_places = false;  ///< also publish contact places of every tick
 };
 
-/// Until a servo that gives nothing counts as stalled: one second where it drives motors. Without
-/// motors nobody waits for zero force, so it is ten, and a time in which the whole program stood
-/// still does not count.
+/// The time until a silent servo counts as stalled: one second with motors. Without motors zero
+/// force is not urgent, so it is ten seconds, and time in which the whole program stood still does
+/// not count.
 class Patience {
  public:
   explicit Patience(bool has_motors) noexcept : has_motors_(has_motors) { begin(); }
-  /// Something has come.
+  /// Restarts the time: a sample has arrived.
   void begin() noexcept;
-  /// Ask every few milliseconds.
+  /// Call it every few milliseconds.
   bool is_over() noexcept;
 
  private:
   using Time = std::chrono::steady_clock::time_point;
   bool has_motors_;
   Time heard_, asked_;
-  std::chrono::nanoseconds waited_{0};  ///< while the program ran
+  std::chrono::nanoseconds waited_{0};  ///< only while the program ran
 };
 
-/// prepare, next and stop belong to one thread, the session's; latest to one, which may be another.
+/// Call prepare, next and stop in one thread, the session's; latest in one thread, which may be
+/// another.
 class ServoThread final : public TickSource {
  public:
-  /// Ticks from now on, without forces until prepare. The device and the clock are the thread's
-  /// alone and must outlive it. \throws std::system_error where no thread can be had
+  /// Starts ticking, without forces until prepare. Only the thread may use the device and the
+  /// clock, which must outlive it. \throws std::system_error if no thread can be created
   ServoThread(Device& device, Clock& clock, const ServoSettings& settings);
-  /// Zero force, then the end of the thread.
+  /// Commands zero force, then ends the thread.
   ~ServoThread() override;
   ServoThread(const ServoThread&) = delete;
   ServoThread& operator=(const ServoThread&) = delete;
 
   void prepare(const rendering::Scene& scene, const rendering::Renderer& renderer,
                const HomeZone& home) override;
-  /// Every sample since prepare, in order. Where the ring overflowed, the first one after the gap
-  /// says so (kSamplesLost); where the thread gives nothing for too long (Patience), what comes
-  /// back is its last sample with kStalled and kTripped.
+  /// Every sample since prepare, in order. If the ring overflowed, the first sample after the gap
+  /// has kSamplesLost. If the thread is silent for too long (Patience), returns its last sample
+  /// with kStalled and kTripped.
   const Sample& next() noexcept override;
   ServoQuality stop() noexcept override;
-  /// After stop(): the scene goes on from where it was stopped, what moves in it as well, as soon
-  /// as the stylus is back where it was then, within kBackWithin; until then there is no force.
-  /// \param ticks  so many, each with next to no force, then it stops again; 0: without end
+  /// After stop(): resumes the scene, moving objects included, once the stylus is back within
+  /// kBackWithin of where it was; until then there is no force.
+  /// \param ticks  number of ticks, each with almost no force, after which it stops again; 0: no
+  /// end
   void resume(std::uint32_t ticks = 0) noexcept;
   static constexpr double kBackWithin = 0.005;  ///< m, of tip and tail
-  /// m, that tip or tail are away from where they were, while resume() waits for them; else 0. From
+  /// Distance of tip or tail from where they were while resume() waits for them, m; else 0. From
   /// any thread.
   double away() const noexcept { return away_.load(); }
-  /// The next sample; null where there is none yet. By the session's thread.
+  /// The next sample; null: there is none yet. For the session's thread.
   const Sample* next_now() noexcept;
   std::span<const rendering::BodyPose> bodies() const noexcept override {
     return {popped_bodies_.data(), popped_.bodies};
   }
-  /// Somebody draws an object of the scene, until it is told otherwise. By one thread, any.
+  /// Pulls an object of the scene until the next call. For one thread, any.
   void pull(const rendering::BodyPull& by) noexcept { pull_.write(by); }
 
-  /// Where the tool touched, with ServoSettings::touched_places: of the ticks with contact alone,
-  /// in order; some are lost where the session does not keep up. By the session's thread.
+  /// Contact places of the next tick with contact, in order, with ServoSettings::touched_places.
+  /// Some are lost if the session does not keep up. For the session's thread.
   bool touched(TouchedPlaces& places) noexcept { return places_.pop(places); }
 
-  /// The newest sample, also between trials; false where there is none that is newer than the last.
+  /// The newest sample, also between trials; false: none is newer than the last one read.
   bool latest(Sample& sample) noexcept { return latest_.read(sample); }
-  /// Zero force within the tick and until clear_fault(). From any thread or signal handler.
+  /// Commands zero force within the tick and until clear_fault(). From any thread or signal
+  /// handler.
   void emergency_zero() noexcept { servo_.emergency_zero(); }
-  /// Zero force by the ramp and until clear_fault(). From any thread.
+  /// Ramps down to zero force, which stays until clear_fault(). From any thread.
   void fade_out() noexcept { servo_.fade_out(); }
   void clear_fault() noexcept { servo_.clear_fault(); }
   void clear_trip() noexcept { servo_.clear_trip(); }
-  /// True once zero force was commanded to the device after emergency_zero(). Signal safe.
+  /// True once the device was commanded zero force after emergency_zero(). Signal safe.
   bool forces_are_off() const noexcept { return off_.load(); }
 
   /// Whether the caller is the servo's thread. Signal safe.
   bool in_this_thread() const noexcept { return thread_id_.load() == current_thread(); }
 
   const RealtimeRights& rights() const { return rights_; }
-  /// The threads that step what is soft in the scene of prepare(), valid until the next one. By the
-  /// session's thread.
+  /// The threads that step soft objects in the scene of prepare(), valid until the next prepare().
+  /// For the session's thread.
   SoftThreads* soft_threads() noexcept { return scenes_.empty() ? nullptr : &scenes_.back()->soft; }
-  /// Every tick since the thread began, trials or not. From any thread.
+  /// Statistics of all ticks since the thread began, between trials too. From any thread.
   const ServoHealth& health() const { return health_; }
 
  private:
@@ -271,7 +273,7 @@ class ServoThread final : public TickSource {
   RealtimeRights rights_;
   ServoHealth health_;
 
-  /// A scene with the threads that step what is soft in it, which the servo's state refers to.
+  /// A scene with the threads that step its soft objects. The servo's state refers to them.
   struct ShownScene {
     ShownScene(const rendering::Scene& what, const rendering::Renderer& how, const HomeZone& where,
                const RealtimeSettings& realtime, std::size_t ticks)
@@ -282,30 +284,30 @@ class ServoThread final : public TickSource {
     SoftThreads soft;
   };
   std::vector<std::unique_ptr<ShownScene>>
-      scenes_;  ///< the session thread's; freed once the servo has left them
+      scenes_;  ///< owned by the session's thread; freed once the servo no longer uses them
   std::atomic<TrialScene*> incoming_{nullptr};
   std::atomic<std::uint32_t> stops_asked_{0}, stops_done_{0};
-  std::atomic<std::uint64_t> resume_{0};  ///< ticks + 1; 0: not asked
+  std::atomic<std::uint64_t> resume_{0};  ///< ticks + 1; 0: no request
   std::atomic<double> away_{0};
-  ServoQuality quality_;    ///< written before stops_done_ moves
-  bool scene_set_ = false;  ///< the session thread's: a scene is shown, or may be
+  ServoQuality quality_;    ///< written before stops_done_ changes
+  bool scene_set_ = false;  ///< used by the session's thread: a scene is shown, or may be
 
   Ring<Sample> ring_;
   TripleBuffer<Sample> latest_;
   Ring<TouchedPlaces> places_;
   bool tells_places_;
   TripleBuffer<rendering::BodyPull> pull_;
-  // The servo's own:
+  // Used by the servo only:
   TrialScene* current_ = nullptr;                ///< shown, or stopped and kept for resume()
   std::optional<rendering::LineProbe> felt_at_;  ///< m, the stylus in its last tick
-  bool waits_ = false;                           ///< to go on
-  std::uint32_t steps_left_ = 0;                 ///< 0: without end
+  bool waits_ = false;                           ///< waits for the stylus to resume
+  std::uint32_t steps_left_ = 0;                 ///< 0: no limit
   bool gap_ = false;           ///< samples were lost since the last one in the ring
   bool lost_samples_ = false;  ///< in this trial
   std::atomic<bool> off_{true}, quit_{false};
   std::atomic<int> thread_id_{0};
   Sample popped_;
-  std::vector<rendering::BodyPose> popped_bodies_;  ///< the session thread's, with popped_
+  std::vector<rendering::BodyPose> popped_bodies_;  ///< used by the session's thread, with popped_
   std::jthread thread_;
 };
 

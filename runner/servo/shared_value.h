@@ -1,5 +1,5 @@
 #pragma once
-// A seqlock: hands values between threads, or between the runner and its watchdog process.
+// A seqlock: passes values between threads, or between the runner and its watchdog process.
 
 #include <array>
 #include <atomic>
@@ -9,10 +9,9 @@
 
 namespace palpate::runner {
 
-/// A value that one thread or process writes and others read whole, or not at all: a sequence count
-/// that is odd while it is being written (H.-J. Boehm, "Can seqlocks get along with programming
-/// language memory models?", 2012, section 4). Has no address of its own: it may lie in memory that
-/// processes share.
+/// A value written by one thread or process. Others read it whole or not at all: a sequence count
+/// is odd during writing (H.-J. Boehm, "Can seqlocks get along with programming language memory
+/// models?", 2012, section 4). It contains no address, so it may lie in memory shared by processes.
 template <class T>
 class SharedValue {
   static_assert(std::is_trivially_copyable_v<T>);
@@ -24,11 +23,11 @@ class SharedValue {
     std::memcpy(words.data(), &value, sizeof(T));
     const std::uint32_t before = sequence_.load(std::memory_order_relaxed);
     sequence_.store(before + 1, std::memory_order_relaxed);
-    // Released: who reads a new word also sees that the count is odd.
+    // Release: a thread that reads a new word also sees the odd count.
     for (std::size_t i = 0; i < kWords; ++i) words_[i].store(words[i], std::memory_order_release);
     sequence_.store(before + 2, std::memory_order_release);
   }
-  /// False while it is being written.
+  /// False: it is being written.
   bool read(T& value) const noexcept {
     const std::uint32_t before = sequence_.load(std::memory_order_acquire);
     std::array<std::uint64_t, kWords> words{};

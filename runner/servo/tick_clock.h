@@ -1,5 +1,5 @@
 #pragma once
-// A clock that is fast enough to time one tick of a renderer by.
+// A clock fast enough to time one tick of a renderer.
 
 #include <chrono>
 #include <cstdint>
@@ -13,7 +13,7 @@ namespace palpate::runner {
 /// Counts of a fast clock. On x86 the time stamp counter: reading it costs some 10 ns.
 inline std::uint64_t begin_count() {
 #if defined(__x86_64__)
-  _mm_lfence();  // what goes before, as working out the pose, is not to be finished in this time
+  _mm_lfence();  // earlier work, such as computing the pose, must not be counted
   const std::uint64_t count = __rdtsc();
   _mm_lfence();
   return count;
@@ -31,7 +31,7 @@ inline std::uint64_t end_count() {
 #endif
 }
 
-/// Takes a tenth of a second to find out.
+/// Measures it; takes a tenth of a second.
 inline double nanoseconds_per_count() {
   const auto start = std::chrono::steady_clock::now();
   const std::uint64_t count = begin_count();

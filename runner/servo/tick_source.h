@@ -1,5 +1,5 @@
 #pragma once
-// The servo loop as a session sees it.
+// The session's interface to the servo loop.
 
 #include <span>
 
@@ -7,19 +7,19 @@
 
 namespace palpate::runner {
 
-/// In the caller's thread for a simulated participant, in a thread of its own for a live one.
+/// Runs in the caller's thread for a simulated participant, in its own thread for a live one.
 class TickSource {
  public:
   virtual ~TickSource() = default;
-  /// Puts a scene before the stylus and waits for it in the home zone.
+  /// Shows a scene; forces begin once the stylus rests in the home zone.
   virtual void prepare(const rendering::Scene& scene, const rendering::Renderer& renderer,
                        const HomeZone& home) = 0;
-  /// The next tick's sample: every one, in order. Waits for it.
+  /// Waits for the next tick's sample. Returns every sample, in order.
   virtual const Sample& next() noexcept = 0;
-  /// Where what moves of the scene is after the tick of the last sample. Valid until the next call
-  /// of next(). Empty where nothing moves, and where forces are off.
+  /// Poses of the scene's moving objects after the tick of the last sample. Valid until the next
+  /// call of next(). Empty if nothing moves or forces are off.
   virtual std::span<const rendering::BodyPose> bodies() const noexcept { return {}; }
-  /// Forces off; what the trial was like.
+  /// Switches forces off. \return the trial's servo quality
   virtual ServoQuality stop() noexcept = 0;
 };
 

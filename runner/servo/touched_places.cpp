@@ -7,7 +7,7 @@
 namespace palpate::runner {
 namespace {
 
-constexpr double kOwnForce = 1e-9;  // N; less beside soft objects is rounding
+constexpr double kOwnForce = 1e-9;  // N; on rigid objects beside soft ones, less is rounding
 
 class Places {
  public:
@@ -26,7 +26,7 @@ class Places {
   std::size_t count_ = 0;
 };
 
-/// All on what gives; on rigid objects beside it the deepest, with the rest of the force.
+/// All places on soft objects; on rigid objects the deepest place, with the rest of the force.
 void add_soft(const rendering::RenderState& state, const rendering::Rendering& rendering,
               Places& places) noexcept {
   Vec3 rest = rendering.force;

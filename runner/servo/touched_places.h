@@ -1,5 +1,5 @@
 #pragma once
-// Where a tool touched in a tick, for who draws it.
+// Places where a tool touched in a tick, for drawing.
 
 #include <array>
 #include <cstddef>
@@ -16,16 +16,16 @@ struct ContactPlace {
   Vec3 force;  ///< N, on the tool
 };
 
-/// The first places of a tick, as many as there is room for; of a scene in which something rigid
-/// moves the deepest alone, with all of the force. No allocation.
+/// The first places of a tick, up to the capacity. In a scene with a rigid moving object: the
+/// deepest only, with the total force. Does not allocate.
 /// \param state  after the tick
-/// \return how many
+/// \return the number found
 std::size_t find_contact_places(const rendering::Scene& scene, const rendering::RenderState& state,
                                 const rendering::Rendering& rendering,
                                 std::span<ContactPlace> out) noexcept;
 
 struct TouchedPlaces {
-  std::int64_t time_ns = 0;  ///< of the sample that they belong to
+  std::int64_t time_ns = 0;  ///< of the sample of these places
   std::size_t count = 0;
   std::array<ContactPlace, 32> places{};
 };

@@ -13,7 +13,7 @@ std::string png_of(const std::string& pixels, int width, int height);
 /// An animated WebP that repeats forever.
 class WebpAnimation {
  public:
-  /// \param width, height px. All functions throw std::runtime_error
+  /// \param width, height  px. All functions throw std::runtime_error
   WebpAnimation(int width, int height);
   ~WebpAnimation();
   WebpAnimation(const WebpAnimation&) = delete;

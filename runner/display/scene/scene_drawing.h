@@ -68,7 +68,7 @@ DrawnTool tool_in_hand(const rendering::Tool& tool, const Sample& sample);
 DrawnTool ideal_tool(const rendering::Tool& tool, const Sample& sample);
 
 /// All contact places of a tick. In a scene with a rigid moving object: the deepest only, with the
-/// total force. \param state after the tick
+/// total force. \param state  after the tick
 std::vector<ContactPlace> contact_places(const rendering::Scene& scene,
                                          const rendering::RenderState& state,
                                          const rendering::Rendering& rendering);
