@@ -46,7 +46,7 @@ constexpr std::pair<const char*, StreamField> kFields[] = {
 constexpr std::size_t kLongestText = 1000;  // characters, as JSON schemas count them
 constexpr double kMostRate = 1000;          // Hz
 
-/// The members of one message; what is wrong with them is collected.
+/// Reads the members of one message and collects their faults.
 class MemberReader {
  public:
   explicit MemberReader(const json& object) : object_(object) {}
@@ -73,7 +73,7 @@ class MemberReader {
         !(value->is_number_unsigned() && value->get<std::uint64_t>() > std::uint64_t{INT64_MAX})) {
       const auto number = value->get<std::int64_t>();
       if (number >= least && number <= most) return number;
-    } else if (value->is_number_float()) {  // 3.0 is a whole number, too
+    } else if (value->is_number_float()) {  // 3.0 counts as a whole number
       constexpr double kExact = 9007199254740992;
       const auto number = value->get<double>();
       if (std::abs(number) <= kExact && number == std::floor(number) &&
@@ -137,7 +137,7 @@ void read_hello(MemberReader& reader, Message& out) {
 }
 
 void read_orientation(MemberReader& reader, Message& out) {
-  constexpr double kRoundings = 1e-3;  // of the length of a quaternion that is meant as unit
+  constexpr double kRoundings = 1e-3;  // tolerated deviation of a unit quaternion's length
   const json* const value = reader.member("orientation_wxyz", false);
   if (value == nullptr) return;
   bool good = value->is_array() && value->size() == 4;
@@ -261,7 +261,7 @@ Message parse_message(const std::string& text) {
   if (!root.is_object()) throw MessageRefused("bad-message", "expected an object");
   Message out;
   MemberReader reader(root);
-  constexpr std::int64_t kMostId = std::int64_t{1} << 53;  // a JavaScript program's numbers
+  constexpr std::int64_t kMostId = std::int64_t{1} << 53;  // exact in JavaScript
   const auto id = reader.integer("id", true, 0, kMostId);
   out.id = id.value_or(0);
   std::string name;
@@ -292,12 +292,12 @@ void ClientClock::take(double t_client, std::int64_t received_ns,
   at_ns_ = received_ns;
   const double most = static_cast<double>(received_ns) - t_client;
   most_ = std::min(most_ + drift, most);
-  // It cannot have seen what was not sent.
+  // A client cannot have seen an answer that was not sent.
   const bool credible = seen && *seen > 0 && *seen == sent_ns_;
   const double least = credible ? static_cast<double>(*seen) - t_client : -kNever;
   least_ = std::max(least_ - drift, least);
   if (least_ <= most_) return;
-  forget();  // the clock was set
+  forget();  // the client's clock was set
   most_ = most;
 }
 

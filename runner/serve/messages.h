@@ -1,6 +1,6 @@
 #pragma once
-// What a client of `palpate serve` says, checked: nothing behind this sees text from outside. The
-// words of every message: protocols/serve.schema.json.
+// Checks the messages of clients of `palpate serve`: later code never sees unchecked text. All
+// messages are defined in protocols/serve.schema.json.
 
 #include <cstddef>
 #include <cstdint>
@@ -15,24 +15,24 @@
 namespace palpate::runner {
 
 inline constexpr int kServeVersion = 1;
-inline constexpr std::size_t kLongestMessage = 64 << 10;  ///< bytes; of `load` kLongestScene
+inline constexpr std::size_t kLongestMessage = 64 << 10;  ///< bytes; kLongestScene for `load`
 inline constexpr std::size_t kLongestScene = 1 << 20;
 
-/// Why a message is refused.
+/// The reason why a message is refused.
 struct Refusal {
-  std::string code;     ///< for programs: "bad-message"
+  std::string code;     ///< for programs, such as "bad-message"
   std::string message;  ///< for people
   std::string place;    ///< JSON pointer, in the message or the scene
 };
 
-/// Every reason, the first one first.
+/// All reasons, in order.
 class MessageRefused : public std::runtime_error {
  public:
   explicit MessageRefused(std::vector<Refusal> why, std::optional<std::int64_t> id = {});
   MessageRefused(std::string code, std::string message, std::string place = "")
       : MessageRefused({Refusal{std::move(code), std::move(message), std::move(place)}}) {}
   const std::vector<Refusal>& why() const { return why_; }
-  const std::optional<std::int64_t>& id() const { return id_; }  ///< where it could be read
+  const std::optional<std::int64_t>& id() const { return id_; }  ///< if it could be read
 
  private:
   std::vector<Refusal> why_;
@@ -57,18 +57,18 @@ enum class MessageType {
   bye
 };
 
-/// What a row of a stream may hold after time and tick.
+/// Fields that may follow time and tick in a row of a stream.
 enum class StreamField { tip, tail, force, rendered, contact, depth, object, faults, lateness };
-/// As in messages. \return empty: none of that name
+/// The field with the name used in messages; empty: none.
 std::optional<StreamField> stream_field(const std::string& name);
 
 struct Message {
   MessageType type = MessageType::alive;
   std::int64_t id = 0;
-  bool control = true;                ///< hello: else it watches
+  bool control = true;                ///< hello; false: it watches
   std::string token;                  ///< hello
   nlohmann::json scene;               ///< load
-  std::string stimulus, renderer;     ///< start; empty: not said
+  std::string stimulus, renderer;     ///< start; empty: not given
   std::optional<double> level;        ///< start
   std::optional<Quat> orientation;    ///< start, unit
   std::optional<std::int64_t> trial;  ///< start
@@ -76,33 +76,33 @@ struct Message {
   nlohmann::json value;               ///< set
   std::string text;                   ///< answer's response, stop's reason, mark's and note's text
   std::optional<std::int64_t> t_ns;   ///< answer
-  bool clock_is_known = false;        ///< answer: the client's clock was measured, see ClientClock
+  bool clock_is_known = false;        ///< answer: ClientClock knows the offset
   std::optional<bool> correct;        ///< answer
   int code = 0;                       ///< mark
   double rate = 0;                    ///< subscribe: Hz, 0: no stream
   std::vector<StreamField> fields;    ///< subscribe
-  nlohmann::json t_client;            ///< clock: comes back as it is
-  std::optional<std::int64_t> seen;   ///< clock: ns, of the newest answer to `clock` that it knows
+  nlohmann::json t_client;            ///< clock: returned unchanged
+  std::optional<std::int64_t> seen;   ///< clock: ns, of the newest answer to `clock` received
 };
 
-/// When an answer was given: by its own time where the client's clock is known, else on arrival.
+/// Time of an answer: its own if the client's clock is known, else its arrival.
 inline std::int64_t answer_time(const Message& message, std::int64_t arrived_ns) {
   return message.clock_is_known ? message.t_ns.value_or(arrived_ns) : arrived_ns;
 }
-/// As replies name it.
+/// The name of that choice in replies.
 inline const char* stamped_by(const Message& message) {
   return message.clock_is_known && message.t_ns ? "client" : "arrival";
 }
 
-/// What is known of a client's clock, from its `clock` messages. A message was sent before it
-/// arrived, and after the answer that it has seen was sent: both bound the clock's offset.
+/// Bounds the offset of a client's clock by its `clock` messages: a message was sent before its
+/// arrival, and after the last answer that the client has seen.
 class ClientClock {
  public:
   static constexpr double kWithin = 1e6;   ///< ns, of an answer's time
   static constexpr double kDrift = 50e-6;  ///< of two quartz clocks
 
-  /// \param t_client  by its clock, ns, when it asked. \param seen  when the answer was sent that
-  /// it knew then, by the server's clock
+  /// \param t_client  time of sending by the client's clock, ns. \param seen  when the last answer
+  /// that it knew was sent, by the server's clock
   void take(double t_client, std::int64_t received_ns, std::optional<std::int64_t> seen);
   void answered(std::int64_t sent_ns) { sent_ns_ = sent_ns; }
   /// Whether its offset is known to kWithin.

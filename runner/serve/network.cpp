@@ -45,10 +45,10 @@ constexpr auto kStreamEvery = std::chrono::milliseconds(17);  // at most 60 mess
 constexpr auto kWatchEvery = std::chrono::milliseconds(5);
 constexpr std::size_t kMostWatchers = 8;
 constexpr std::size_t kMostUnknown = 16;   // connections before their hello
-constexpr int kMostMessages = 200;         // a second; of more than twice as many it is closed
-constexpr std::size_t kMostWaiting = 256;  // replies and events of a client that does not read
-constexpr std::size_t kMostCommands = 64;  // that the session has not taken
-constexpr std::size_t kMostRows = 1024;    // of a stream's message
+constexpr int kMostMessages = 200;         // a second; above twice as many the client is closed
+constexpr std::size_t kMostWaiting = 256;  // queued replies and events of a client
+constexpr std::size_t kMostCommands = 64;  // commands not yet taken by the session
+constexpr std::size_t kMostRows = 1024;    // rows in a stream's message
 constexpr const char* kSubprotocol = "palpate.1";
 
 std::int64_t now_ns() {
@@ -56,7 +56,7 @@ std::int64_t now_ns() {
   return clock.now_ns();
 }
 
-/// In a time that does not tell how much of it is right.
+/// Compares in constant time, so that timing does not reveal the token.
 bool equal_in_constant_time(const std::string& said, const std::string& token) {
   std::size_t difference = said.size() ^ token.size();
   for (std::size_t i = 0; i < token.size(); ++i) {
@@ -133,14 +133,14 @@ class Client : public std::enable_shared_from_this<Client> {
   virtual void begin() = 0;
   virtual void close() = 0;
 
-  /// A client that does not read loses its connection, not the memory.
+  /// A client that does not read is disconnected, so that its queue stays bounded.
   void send(std::string text) {
     if (closing_ || closed) return;
     if (waiting_.size() >= kMostWaiting) return close();
     waiting_.push_back(std::move(text));
     write_next();
   }
-  /// Nothing of it has been written yet that a new one would wait behind.
+  /// Whether no message waits to be written.
   bool idle() const { return waiting_.empty(); }
   void close_after_writing() {
     closing_ = true;
@@ -153,14 +153,14 @@ class Client : public std::enable_shared_from_this<Client> {
   asio::steady_timer hello_timer;
   ClientClock clock;
   std::int64_t heard_ns = 0;
-  std::int64_t second_ns = 0;  ///< of the rate
+  std::int64_t second_ns = 0;  ///< start of the second in which messages are counted
   int in_second = 0;           ///< messages
   // Stream:
   double rate = 0;  ///< Hz; 0: none
   std::int64_t next_ns = 0;
   std::uint64_t dropped = 0, lost_before = 0;
   std::vector<StreamField> fields;
-  std::string rows;  ///< that wait for the next message
+  std::string rows;  ///< rows that wait for the next message
   std::size_t row_count = 0;
 
  protected:
@@ -183,7 +183,7 @@ class Client : public std::enable_shared_from_this<Client> {
   bool writing_ = false, closing_ = false;
 };
 
-/// What connections ask of the network.
+/// The network's interface for connections.
 class Hub {
  public:
   virtual ~Hub() = default;
@@ -353,7 +353,7 @@ class Network::Impl final : public Hub {
       client.in_second = 0;
     }
     client.heard_ns = now;
-    // Whoever floods is closed: else it would have all of this thread's time.
+    // Close a flooding client: it would take all of this thread's time.
     if (++client.in_second > 2 * kMostMessages) return client.close();
     Message message;
     try {
@@ -371,7 +371,7 @@ class Network::Impl final : public Hub {
       refuse("no-hello", "the first message must be hello");
       return client.close_after_writing();
     }
-    if (message.type == MessageType::emergency) {  // before every queue and limit
+    if (message.type == MessageType::emergency) {  // bypasses queues and limits
       hooks_.emergency();
       client.send(accepted(message.id, {{"t_ns", now_ns()}}));
       return tell_all(event("emergency", now, {{"by", client.id}}));
@@ -384,7 +384,7 @@ class Network::Impl final : public Hub {
     if (client.role == Client::Role::control) {
       if (hooks_.forces_are_on()) {
         hooks_.emergency();
-        tell_all(event("controller_gone", now_ns()));  // from here on no force is commanded
+        tell_all(event("controller_gone", now_ns()));  // from now on no force is commanded
       }
       command({client.id, true, {}});
     }
@@ -411,8 +411,9 @@ class Network::Impl final : public Hub {
       Local::socket other(io_);
       Code error;
       other.connect(place, error);
-      if (!error) throw std::runtime_error("--socket " + settings_.socket + ": a server is there");
-      // What a server left behind that was killed; nothing else is removed.
+      if (!error)
+        throw std::runtime_error("--socket " + settings_.socket + ": another server uses it");
+      // Remove the socket that a killed server left behind, but no other file.
       struct stat state {};
       if (::lstat(settings_.socket.c_str(), &state) == 0 && S_ISSOCK(state.st_mode))
         ::unlink(settings_.socket.c_str());
@@ -484,7 +485,7 @@ class Network::Impl final : public Hub {
   void greet(const std::shared_ptr<Greeting>& greeting) {
     const auto& request = greeting->parser.get();
     const std::string host(request[http::field::host]), origin(request[http::field::origin]);
-    if (!is_loopback_name(host))  // a name of somebody else's that resolves to here
+    if (!is_loopback_name(host))  // a foreign name that resolves to this computer
       return respond(greeting, http::status::forbidden, "Host: expected 127.0.0.1 or localhost\n");
     const std::string own = "http://" + host;
     if (!origin.empty() && origin != own &&
@@ -504,7 +505,7 @@ class Network::Impl final : public Hub {
     admit(client);
     client->accept(request);
   }
-  /// It knows no token: whoever opens it needs the whole address.
+  /// The page does not contain the token: its user needs the whole address.
   void show_page(const std::shared_ptr<Greeting>& greeting) {
     const std::string nonce = make_token(), port = std::to_string(this->port());
     std::string page = settings_.page;
@@ -572,7 +573,7 @@ class Network::Impl final : public Hub {
     };
     switch (message.type) {
       case MessageType::hello:
-        return refuse("bad-message", "hello was said before");
+        return refuse("bad-message", "hello was sent before");
       case MessageType::alive:
         return client.send(accepted(message.id));
       case MessageType::clock: {
@@ -602,7 +603,7 @@ class Network::Impl final : public Hub {
       case MessageType::bye:
         client.send(accepted(message.id));
         if (client.role == Client::Role::control) {
-          client.role = Client::Role::watch;  // in order: no emergency when it closes
+          client.role = Client::Role::watch;  // a regular end: closing causes no emergency
           command({client.id, true, {}});
         }
         return client.close_after_writing();
@@ -610,7 +611,7 @@ class Network::Impl final : public Hub {
         break;
     }
     if (client.role != Client::Role::control)
-      return refuse("not-controller", "only the controller may say this");
+      return refuse("not-controller", "only the controller may send this");
     message.clock_is_known = client.clock.is_known(received_ns);
     const std::int64_t id = message.id;
     if (!command({client.id, false, std::move(message)}))
@@ -629,7 +630,7 @@ class Network::Impl final : public Hub {
       if (client->role != Client::Role::unknown) client->send(text);
   }
 
-  /// The controller is silent while forces are on.
+  /// Detects a silent controller while forces are on.
   void watch() {
     watch_timer_.expires_after(kWatchEvery);
     watch_timer_.async_wait([this](const Code& error) {
@@ -662,7 +663,7 @@ class Network::Impl final : public Hub {
   }
   void add(Client& client, const StreamSample& sample) {
     if (client.rate <= 0) return;
-    // Half a period early: ticks come a little sooner or later than their times.
+    // Accept ticks half a period early, because their times jitter.
     constexpr double kEveryTick = 1000;  // Hz
     constexpr double kLongest = 1e18;    // ns
     const auto period = static_cast<std::int64_t>(std::min(1e9 / client.rate, kLongest));
@@ -675,7 +676,7 @@ class Network::Impl final : public Hub {
     if (client.row_count++ > 0) client.rows += ',';
     add_row(client.rows, sample, client.fields);
   }
-  /// Rows wait while a client has not read the last message; what has no room is dropped.
+  /// Rows wait until the client has read the last message; rows beyond the limit are dropped.
   void send_rows(Client& client) {
     const std::uint64_t lost = hooks_.ticks->lost();
     if (client.rate > 0) client.dropped += lost - client.lost_before;
@@ -696,9 +697,9 @@ class Network::Impl final : public Hub {
   asio::steady_timer watch_timer_, stream_timer_;
   std::map<std::uint64_t, std::shared_ptr<Client>> clients_;
   std::uint64_t newest_ = 0;
-  std::ptrdiff_t unread_ = 0;  ///< connections whose request has not come
+  std::ptrdiff_t unread_ = 0;  ///< connections whose request has not arrived
   bool silent_ = false;
-  std::mutex mutex_;  ///< of the next one
+  std::mutex mutex_;  ///< guards the next member
   std::vector<ServeCommand> commands_;
   std::thread thread_;
 };

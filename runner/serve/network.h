@@ -1,7 +1,7 @@
 #pragma once
 // The network side of `palpate serve`: WebSocket on the loopback, lines of the same messages on a
-// Unix socket, and the watchers' page. A thread of ordinary priority, which touches no state of the
-// servo; it knows who may say what, how often and how much.
+// Unix socket, and the watchers' page. Runs in a thread of ordinary priority that does not touch
+// the servo's state. It enforces roles, rates and sizes of messages.
 
 #include <cstdint>
 #include <functional>
@@ -15,20 +15,20 @@
 namespace palpate::runner {
 
 struct NetworkSettings {
-  std::uint16_t port = 0;  ///< of 127.0.0.1; 0: one that is free
+  std::uint16_t port = 0;  ///< of 127.0.0.1; 0: any free port
   std::string socket;      ///< path; empty: none
   std::string token;
-  std::vector<std::string> origins;  ///< whose pages may connect
-  /// For watchers, as HTML; its elements of style and script have the nonce @NONCE@.
+  std::vector<std::string> origins;  ///< origins whose pages may connect
+  /// HTML page for watchers; its style and script elements have the nonce @NONCE@.
   std::string page;
 };
 
-/// What the network asks for. Called in its thread; must not wait.
+/// Functions that the network calls in its thread; they must not wait.
 struct NetworkHooks {
-  std::function<void()> emergency, silence;  ///< zero force at once; by the ramp: nobody steers
+  std::function<void()> emergency, silence;  ///< zero force: at once; by the ramp
   std::function<bool()> forces_are_on;
-  std::function<nlohmann::json()> state;  ///< an object: the answer to hello has its members
-  std::function<std::string()> picture;   ///< of what is felt: the members of an answer, as JSON
+  std::function<nlohmann::json()> state;  ///< an object: part of the answer to hello
+  std::function<std::string()> picture;   ///< of the scene: members of an answer, as JSON
   TickStream* ticks = nullptr;
 };
 
@@ -37,18 +37,18 @@ std::string make_token();
 
 class Network final : public ServeOutput {
  public:
-  /// Listens, but serves nobody before begin(). \throws std::runtime_error that names the
-  /// port or path
+  /// Listens, but accepts no client before begin(). \throws std::runtime_error naming the port or
+  /// path
   explicit Network(NetworkSettings settings);
   ~Network() override;  ///< closes all connections and removes the socket
   Network(const Network&) = delete;
   Network& operator=(const Network&) = delete;
 
   void begin(NetworkHooks hooks);
-  /// Closes all connections; from then on no hook is called.
+  /// Closes all connections; afterwards no hook is called.
   void end();
   std::uint16_t port() const;
-  /// Commands since the last call, in order. By the session's thread.
+  /// Commands since the last call, in order. For the session's thread.
   std::vector<ServeCommand> commands();
 
   void reply(std::uint64_t client, std::string text) override;

@@ -1,5 +1,5 @@
 #pragma once
-// What goes between the session's thread of `palpate serve` and the network's: ticks and messages
+// Data exchanged by the session's thread of `palpate serve` and the network's: ticks and messages
 // out, commands in.
 
 #include <atomic>
@@ -15,19 +15,19 @@
 
 namespace palpate::runner {
 
-/// What a stream tells of a tick.
+/// A tick in a stream.
 struct StreamSample {
   std::int64_t time_ns = 0, lateness_ns = 0;
   std::uint32_t tick = 0, faults = 0;
   int object = -1;
   Vec3 tip, tail;    ///< m, virtual stylus
   Vec3 force;        ///< N, commanded to the hand, after the limits
-  Vec3 rendered;     ///< N, before them
-  Vec3 contact;      ///< m, the deepest; zero in free space
+  Vec3 rendered;     ///< N, before the limits
+  Vec3 contact;      ///< m, deepest contact; zero in free space
   double depth = 0;  ///< m
 };
 
-/// From the session's thread to the network's, which may be late: then ticks are lost.
+/// Passes ticks from the session's thread to the network's. If that is late, ticks are lost.
 class TickStream {
  public:
   void push(const Sample& sample) noexcept {
@@ -45,9 +45,9 @@ class TickStream {
                            .depth = sample.rendering.deepest.depth};
     if (!ring_.push(out)) lost_.fetch_add(1);
   }
-  /// In order; false where there is none.
+  /// The next tick, in order; false: there is none.
   bool next(StreamSample& out) noexcept { return ring_.pop(out); }
-  /// Ticks that found no room. From any thread.
+  /// Number of ticks lost because the queue was full. From any thread.
   std::uint64_t lost() const noexcept { return lost_.load(); }
 
  private:
@@ -55,23 +55,23 @@ class TickStream {
   std::atomic<std::uint64_t> lost_{0};
 };
 
-/// Where answers and events go to.
+/// Receives answers and events.
 class ServeOutput {
  public:
   virtual ~ServeOutput() = default;
-  /// To the client that asked. From any thread; never waits.
+  /// Replies to the client that asked. From any thread; never waits.
   virtual void reply(std::uint64_t client, std::string text) = 0;
-  /// To all. From any thread; never waits.
+  /// Sends to all clients. From any thread; never waits.
   virtual void tell(std::string text) = 0;
 };
 
-/// What draws: surfaces of objects in the world, as the members of an answer to `picture`.
+/// Draws the surfaces of objects in the world frame, as members of an answer to `picture`.
 using PictureOf = std::function<std::string(const std::vector<stimuli::ObjectSpec>&)>;
 
-/// What the controller said, for the session's thread.
+/// A command of the controller, for the session's thread.
 struct ServeCommand {
   std::uint64_t client = 0;
-  bool left = false;  ///< the controller is gone; no message
+  bool left = false;  ///< the controller has left; there is no message
   Message message;
 };
 

@@ -14,17 +14,17 @@ namespace {
 using nlohmann::json;
 using nlohmann::ordered_json;
 
-// Forces begin wherever the stylus is: an object that it is inside of gives none until it was left.
+// Forces begin wherever the stylus is: an object around it gives none until the stylus has left it.
 constexpr HomeZone kFromHere{.radius = 0, .rest = 0};
 constexpr std::int64_t kStartPatience = 2'000'000'000;  // ns, for the first tick with forces
-constexpr int kLeft = 20;  // ticks without contact: an edge chatters for less
+constexpr int kLeft = 20;  // ticks without contact, longer than chatter at an edge
 
 const rendering::Renderer& named_renderer(const std::string& name) {
   return renderer_for(name == "ray" ? protocols::RendererKind::ray
                                     : protocols::RendererKind::point);
 }
 
-/// \throws MessageRefused with every reason why the device cannot show it
+/// \throws MessageRefused with every reason why the device cannot render it
 void hold_against(const DeviceCapabilities& device, const protocols::Protocol& protocol) {
   std::vector<Refusal> why;
   for (std::size_t i = 0; i < protocol.stimuli.size(); ++i) {
@@ -66,10 +66,10 @@ ServedScene::ServedScene(Device& device, GuardedDevice* guard, Clock& clock, Set
       servo_(device, clock, settings_.servo),
       forces_(servo_, guard, clock) {
   if (settings_.scene.empty()) return;
-  // A device of three degrees of freedom shows it to the point renderer alone.
+  // A device with three degrees of freedom needs the point renderer.
   const bool ray = device_.sensed_freedom >= 5;
   const protocols::SceneSpec spec = read(settings_.scene, named_renderer(ray ? "ray" : "point"));
-  protocols::FaultList none(settings_.scene_path);  // it was read just now
+  protocols::FaultList none(settings_.scene_path);  // it was read without faults just now
   keep(protocols::read_json(settings_.scene, none), spec);
 }
 
@@ -120,10 +120,10 @@ protocols::SceneSpec ServedScene::read(const std::string& text,
 }
 
 void ServedScene::load(json scene) {
-  if (trial_) throw MessageRefused("running", "a scene is felt now: stop it first");
-  // The servo stretches the stylus from its beginning to its end.
+  if (trial_) throw MessageRefused("running", "a scene is running: stop it first");
+  // The servo's reach is fixed when it starts.
   if (scene.contains("reach") || scene_.contains("reach"))
-    throw MessageRefused("cannot-be-shown", "a reach goes with --scene alone", "/reach");
+    throw MessageRefused("cannot-be-shown", "a reach is possible with --scene only", "/reach");
   const bool ray = device_.sensed_freedom >= 5;
   const std::string text = scene.dump();
   const protocols::SceneSpec spec = read(text, named_renderer(ray ? "ray" : "point"));
@@ -144,12 +144,12 @@ void ServedScene::show(const protocols::SceneSpec& spec, const rendering::Render
 }
 
 void ServedScene::start(std::uint64_t client, const Message& message) {
-  if (trial_) throw MessageRefused("running", "a scene is felt now: stop it first");
+  if (trial_) throw MessageRefused("running", "a scene is running: stop it first");
   if (scene_.is_null()) throw MessageRefused("no-scene", "load a scene first");
   if (!held_by_.empty())
     throw MessageRefused("forces-off", "forces are off (" + held_by_ + "): clear first");
   if (!message.stimulus.empty() || message.level || message.orientation)
-    throw MessageRefused("bad-message", "stimulus, level and orientation go with --protocol alone");
+    throw MessageRefused("bad-message", "stimulus, level and orientation are for --protocol only");
   const rendering::Renderer& renderer =
       named_renderer(message.renderer.empty() ? "ray" : message.renderer);
   show(read(scene_.dump(), renderer), renderer);
@@ -158,13 +158,13 @@ void ServedScene::start(std::uint64_t client, const Message& message) {
       .asked_ns = clock_.now_ns(), .client = client, .id = message.id, .number = message.trial};
 }
 
-/// The scene begins anew with the value: its forces rise within the ramp.
+/// Restarts the scene with the value; its forces rise by the ramp.
 void ServedScene::set(std::uint64_t client, const Message& message) {
   if (scene_.is_null()) throw MessageRefused("no-scene", "load a scene first");
   if (trial_ && !trial_->holds) throw MessageRefused("running", "the scene is about to begin");
   json changed = scene_;
   try {
-    // What a scene leaves out has its default, and may be set.
+    // A member that the scene omits has its default and may be set.
     const json::json_pointer path(message.path);
     const json::json_pointer in = path.parent_pointer();
     if (!changed.contains(in) || (changed[in].is_array() && !changed.contains(path)))
@@ -229,7 +229,7 @@ void ServedScene::obey(std::uint64_t client, const Message& message) {
         return set(client, message);
       case MessageType::answer: {
         if (!trial_ || !trial_->holds)
-          throw MessageRefused("nothing-felt", "nothing is felt now: start first");
+          throw MessageRefused("nothing-felt", "no scene is running: start first");
         const std::int64_t now = clock_.now_ns();
         const std::int64_t at = answer_time(message, now);
         if (at < trial_->zero_ns || at > now)
@@ -263,7 +263,7 @@ void ServedScene::obey(std::uint64_t client, const Message& message) {
       case MessageType::clear:
         return clear(client, message);
       default:
-        throw MessageRefused("bad-message", "not for a scene");
+        throw MessageRefused("bad-message", "not possible without --protocol");
     }
   } catch (const MessageRefused& error) {
     output_->reply(client, refused(message.id, error.why()));
@@ -279,7 +279,7 @@ void ServedScene::controller_left() {
   tell("stopped", clock_.now_ns(), {{"reason", "the controller has left"}});
 }
 
-/// By the first tick without forces.
+/// The reason, from the first tick without forces.
 std::string ServedScene::why_off(const Sample& sample) {
   if (silent_.exchange(false)) return "the client was silent";
   return fault_words(sample.faults & ~servo_fault::kForceLimited);

@@ -1,6 +1,6 @@
 #pragma once
-// A scene that another program puts before the hand. Scenes and parameters come in as messages;
-// forces are the servo's, limited and guarded as in every other command.
+// A scene presented by another program, which sends scenes and parameters as messages. Forces come
+// from the servo, limited and guarded as in every other command.
 
 #include <atomic>
 #include <cstdint>
@@ -19,42 +19,42 @@
 
 namespace palpate::runner {
 
-/// A scene as a protocol of one stimulus for each object: what is known of protocols and devices
-/// goes for it, too.
+/// A scene as a protocol with one stimulus for each object, so that checks of protocols against
+/// devices apply.
 protocols::Protocol protocol_of(const protocols::SceneSpec& spec,
                                 const rendering::Renderer& renderer);
 
-/// All functions belong to one thread, the session's, but those that say otherwise.
+/// Call all functions in one thread, the session's, unless stated otherwise.
 class ServedScene {
  public:
   struct Settings {
-    std::string scene_path;  ///< its folder has the meshes; faults name it
+    std::string scene_path;  ///< its folder has the meshes; faults name this path
     std::string scene;       ///< JSON; empty: none yet
     ServoSettings servo;
     PictureOf picture;
   };
 
-  /// \param guard  may be none. \throws InputError, MeshError, MessageRefused: the first scene
+  /// \param guard  may be null. \throws InputError, MeshError, MessageRefused: the first scene
   /// cannot be shown on this device
   ServedScene(Device& device, GuardedDevice* guard, Clock& clock, Settings settings);
   ~ServedScene();  ///< zero force
   ServedScene(const ServedScene&) = delete;
   ServedScene& operator=(const ServedScene&) = delete;
 
-  /// Where replies go; before the first obey().
+  /// Sets the receiver of replies; call it before the first obey().
   void answer_through(ServeOutput& output) { output_ = &output; }
   void obey(std::uint64_t client, const Message& message);
-  /// The controller has left: nothing is felt any more.
+  /// The controller has left: ends forces.
   void controller_left();
-  /// Takes what the servo gave since the last call. Call it every few milliseconds.
-  /// \throws EndOfSession: the guard process has ended, forces are zero and cannot come back
+  /// Processes the servo's samples since the last call. Call it every few milliseconds.
+  /// \throws EndOfSession: the guard process has ended; forces are zero for good
   void attend();
-  /// While true, clear() and what waits for the device gives up.
+  /// While `stop` returns true, clear() and other waits for the device give up.
   void give_up_when(std::function<bool()> stop) { stop_ = std::move(stop); }
 
-  /// Zero force at once, until `clear`. From any thread.
+  /// Commands zero force at once, until `clear`. From any thread.
   void emergency_zero() noexcept;
-  /// The same by the ramp, because the controller says nothing any more. From any thread.
+  /// The same by the ramp, because the controller is silent. From any thread.
   void controller_is_silent() noexcept {
     silent_.store(true);
     forces_.fade();
@@ -63,9 +63,9 @@ class ServedScene {
   bool forces_are_on() const noexcept { return !servo_.forces_are_off(); }
   /// Ticks, for the network's thread.
   TickStream& ticks() noexcept { return ticks_; }
-  /// What hello is answered with: the scene of now, null without one. From any thread.
+  /// Members of the answer to hello: the current scene, or null. From any thread.
   nlohmann::json state() const;
-  /// What `picture` is answered with. From any thread.
+  /// Members of the answer to `picture`. From any thread.
   std::string picture() const;
   ServoThread& servo() { return servo_; }  ///< for signal handlers
 
@@ -75,7 +75,7 @@ class ServedScene {
     std::uint64_t client = 0;
     std::int64_t id = 0;
     std::optional<std::int64_t> number;
-    bool holds = false;  ///< forces are on: `start` was answered
+    bool holds = false;  ///< forces are on, and `start` was answered
     std::int64_t zero_ns = 0, first_contact_ns = 0, tick_ns = 0;
     int without_contact = 0;  ///< ticks
     bool in_contact = false, told_off = false;
@@ -101,13 +101,13 @@ class ServedScene {
   const Settings settings_;
   ServeOutput* output_ = nullptr;
   std::function<bool()> stop_ = [] { return false; };
-  mutable std::mutex mutex_;  ///< of the next two: written by this thread, read by others
+  mutable std::mutex mutex_;  ///< guards the next two: this thread writes, others read
   nlohmann::json scene_;      ///< null: none
   std::string picture_ = R"("objects":[])";
   const rendering::Renderer* renderer_ = nullptr;  ///< of the trial
   std::optional<Trial> trial_;
-  std::int64_t last_ns_ = 0;  ///< of the newest sample that was taken
-  std::string held_by_;       ///< why forces were taken off, until `clear`
+  std::int64_t last_ns_ = 0;  ///< of the newest processed sample
+  std::string held_by_;       ///< reason why forces are off, until `clear`
   TickStream ticks_;
   std::atomic<bool> silent_{false};
   Patience patience_;

@@ -24,7 +24,7 @@ ordered_json number_or_null(const std::optional<double>& value) {
   return value ? ordered_json(*value) : ordered_json();
 }
 
-/// Of a trial on record, for a program that goes on with it.
+/// A recorded trial, for a program that continues from it.
 ordered_json short_json(const data::TrialRecord& record) {
   ordered_json out = {{"trial", record.trial},        {"block", record.block},
                       {"stimulus", record.shape},     {"renderer", record.renderer},
@@ -39,13 +39,13 @@ ordered_json short_json(const data::TrialRecord& record) {
 std::string unserved(const protocols::Protocol& protocol) {
   for (const protocols::PageSpec& page : protocol.pages) {
     if (!page.items.empty() || page.kind == protocols::PageSpec::Kind::consent)
-      return "page '" + page.name + "' asks something, which palpate run can show";
+      return "page '" + page.name + "' has questions, which need palpate run";
   }
   for (const TaskBlock& block : protocol.blocks) {
     const std::string name = "block '" + block.name + "' ";
-    if (block.confidence) return name + "asks how sure they are, which palpate run can show";
+    if (block.confidence) return name + "asks for confidence, which needs palpate run";
     if (block.task == TaskKind::compare || block.task == TaskKind::adjust || block.standard)
-      return name + "has trials of several intervals, which palpate run can show";
+      return name + "has trials of several intervals, which need palpate run";
   }
   return "";
 }
@@ -113,7 +113,7 @@ const TaskBlock* ServedSession::block_of(const protocols::Trial& trial) const {
   return &parts_.station.protocol.blocks[static_cast<std::size_t>(trial.task_block)];
 }
 
-/// Null behind the last one.
+/// The next trial; null after the last.
 ordered_json ServedSession::next_trial() const {
   if (session_.plan().finished()) return {};
   const protocols::Trial& trial = session_.plan().next();
@@ -204,7 +204,7 @@ ServedSession::Outcome ServedSession::run_trials() {
   return {};
 }
 
-/// Everything is on record: there is nothing to do but to say so.
+/// All trials are on record: keep reporting the state until the controller leaves.
 void ServedSession::wait_for_the_end() {
   keep_state();
   while (controller_ != 0) {
@@ -230,7 +230,7 @@ void ServedSession::attend() {
   if (const int signal = parts_.end_requested())
     throw EndOfSession(data::RunEnd::paused, std::string("signal: ") + strsignal(signal));
   for (ServeCommand& command : source_()) commands_.push_back(std::move(command));
-  while (!commands_.empty()) {  // one of them may throw: the rest is obeyed later
+  while (!commands_.empty()) {  // one of them may throw: the others are obeyed later
     ServeCommand command = std::move(commands_.front());
     commands_.pop_front();
     if (command.left) {
@@ -288,7 +288,8 @@ void ServedSession::obey(const Asked& asked) {
     case MessageType::clear:
       return clear(asked);
     default:
-      throw MessageRefused("recorded", "the protocol says what is shown: load and set go without");
+      throw MessageRefused("recorded",
+                           "the protocol defines the scenes: load and set are for --scene only");
   }
 }
 
@@ -297,11 +298,11 @@ void ServedSession::start(const Asked& asked) {
   if (in_trial_ || start_) throw MessageRefused("running", "a trial is under way");
   if (!held_by_.empty())
     throw MessageRefused("forces-off", "forces are off (" + held_by_ + "): clear first");
-  choice_of(asked.message, session_.plan().next());  // refused at once, also in a break
+  choice_of(asked.message, session_.plan().next());  // refuse a bad choice at once, even in a break
   start_ = asked;
 }
 
-/// \throws MessageRefused: it is not the trial that is due, or cannot be shown
+/// \throws MessageRefused: it is not the trial that is due, or cannot be presented
 std::optional<protocols::TrialChoice> ServedSession::choice_of(const Message& message,
                                                                const protocols::Trial& next) const {
   const auto refused_as = [](const char* place, const std::string& expected) {
@@ -320,7 +321,7 @@ std::optional<protocols::TrialChoice> ServedSession::choice_of(const Message& me
                                         ", as the protocol has it");
     if (message.level && message.level != next.level) throw refused_as("/level", "the protocol's");
     if (message.orientation)
-      throw refused_as("/orientation_wxyz", "none: the protocol has orientations of its own");
+      throw refused_as("/orientation_wxyz", "none: the protocol sets the orientations");
     return std::nullopt;
   }
   protocols::TrialChoice choice;
@@ -349,9 +350,9 @@ Answer ServedSession::answer_of(const Message& message) const {
   const TaskBlock* const block = block_of(trial_);
   Answer out;
   if (message.correct && (block == nullptr || block->task != TaskKind::external))
-    throw MessageRefused("bad-answer", "expected none: palpate knows what is right", "/correct");
+    throw MessageRefused("bad-answer", "expected none: palpate judges the answer", "/correct");
   out.correct = message.correct;
-  if (block != nullptr && block->answers.empty()) {  // a number is typed
+  if (block != nullptr && block->answers.empty()) {  // the answer is a number
     const char* const end = message.text.data() + message.text.size();
     const auto [rest, error] = std::from_chars(message.text.data(), end, out.number);
     const bool within = !(block->least && out.number < *block->least) &&
@@ -379,7 +380,7 @@ Answer ServedSession::answer_of(const Message& message) const {
 
 void ServedSession::answer(const Asked& asked) {
   if (!in_trial_ || onset_ns_ == 0)
-    throw MessageRefused("nothing-felt", "nothing is felt now: start first");
+    throw MessageRefused("nothing-felt", "no trial is running: start first");
   if (given_) throw MessageRefused("answered", "the trial is answered");
   Answer given = answer_of(asked.message);
   const std::int64_t now = clock_.now_ns();
@@ -421,13 +422,13 @@ void ServedSession::rest(const std::string& text, std::int64_t until_ns) {
   }
 }
 
-/// Waits for `start`, whichever the block.
+/// Waits for `start` in every block.
 std::optional<protocols::TrialChoice> ServedSession::choose(const protocols::Trial& next) {
   while (true) {
     attend();
     try {
       if (start_) return choice_of(start_->message, next);
-    } catch (const MessageRefused& error) {  // a practice that goes on is another trial
+    } catch (const MessageRefused& error) {  // practice may have continued with another trial
       output_->reply(start_->client, refused(start_->message.id, error.why()));
       start_.reset();
     }

@@ -1,7 +1,7 @@
 #pragma once
-// A session on record whose participant is reached through another program: it says when a trial
-// begins, in external blocks what is shown, and what was answered. Plan, forces, samples and record
-// are those of every session.
+// A recorded session that another program runs with the participant. The program starts trials,
+// chooses their contents in external blocks, and reports answers. Plan, forces, samples and record
+// are as in every session.
 
 #include <atomic>
 #include <cstdint>
@@ -19,53 +19,53 @@
 
 namespace palpate::runner {
 
-/// Why a program cannot answer this protocol's trials, in words; empty: it can. Questions of pages,
+/// The reason why a program cannot run this protocol, in words; empty: it can. Questions on pages,
 /// confidence and trials of several intervals need the displays of `palpate run`.
 std::string unserved(const protocols::Protocol& protocol);
 
-/// All functions belong to one thread, the session's, but those that say otherwise.
+/// Call all functions in one thread, the session's, unless stated otherwise.
 class ServedSession final : public Respondent, public SessionEvents {
  public:
-  /// What it works with. All must outlive it.
+  /// The parts that it uses. All must outlive it.
   struct Parts {
     const Station& station;
     RunRecord& record;
     ServoThread& servo;
-    GuardedDevice* guard;  ///< none without force feedback
+    GuardedDevice* guard;  ///< null without force feedback
     std::function<int()> end_requested;
     const std::vector<data::TrialRecord>& stored;  ///< completed trials of the session
     PictureOf picture;
   };
   explicit ServedSession(const Parts& parts);
 
-  /// How it ended.
+  /// The way it ended.
   struct Outcome {
     data::RunEnd end = data::RunEnd::done;
     std::string reason;  ///< empty when done
     bool failed = false;
   };
-  /// Until the last trial is on record and the controller has gone, or a signal. Answers go to
-  /// `output`, commands come from `commands`.
+  /// Runs until the last trial is on record and the controller has left, or until a signal. Sends
+  /// answers to `output` and takes commands from `commands`.
   Outcome run(ServeOutput& output, std::function<std::vector<ServeCommand>()> commands);
 
-  /// Zero force at once, until `clear`. From any thread.
+  /// Commands zero force at once, until `clear`. From any thread.
   void emergency_zero() noexcept { forces_.off(); }
-  /// The same by the ramp, because the controller says nothing any more. From any thread.
+  /// The same by the ramp, because the controller is silent. From any thread.
   void controller_is_silent() noexcept {
     silent_.store(true);
     forces_.fade();
   }
   /// Ticks, for the network's thread.
   TickStream& ticks() noexcept { return ticks_; }
-  /// What hello is answered with. From any thread.
+  /// Members of the answer to hello. From any thread.
   nlohmann::json state() const;
-  /// What `picture` is answered with. From any thread.
+  /// Members of the answer to `picture`. From any thread.
   std::string picture() const;
 
   // As Respondent:
   void read(const std::string& text) override;
   void rest(const std::string& text, std::int64_t until_ns) override;
-  void feedback(bool /*correct*/) override {}  // the answer to `answer` has it
+  void feedback(bool /*correct*/) override {}  // the reply to `answer` has it
   std::optional<protocols::TrialChoice> choose(const protocols::Trial& next) override;
   void begin_trial(const protocols::Trial& trial) override;
   std::optional<Answer> step(const Sample& sample) override;
@@ -78,7 +78,7 @@ class ServedSession final : public Respondent, public SessionEvents {
   void recorded(const data::TrialRecord& record) override;
 
  private:
-  /// A message that is not answered yet.
+  /// A message that awaits its reply.
   struct Asked {
     std::uint64_t client = 0;
     Message message;
@@ -111,22 +111,22 @@ class ServedSession final : public Respondent, public SessionEvents {
   ServeOutput* output_ = nullptr;
   std::function<std::vector<ServeCommand>()> source_;
   std::deque<ServeCommand> commands_;  ///< not obeyed yet
-  // Of the trial under way:
+  // Of the current trial:
   bool in_trial_ = false;
   protocols::Trial trial_;
   std::optional<Asked> start_;   ///< waits for forces
-  std::optional<Asked> answer_;  ///< waits until it is on record
+  std::optional<Asked> answer_;  ///< waits until the trial is on record
   std::optional<Asked> stop_;    ///< waits for forces off
   std::optional<Answer> given_;
   std::int64_t onset_ns_ = 0;  ///< 0: not yet
   Waiting waits_for_ = Waiting::nothing;
   std::int64_t waits_since_ns_ = 0;
 
-  std::optional<data::TrialRecord> stored_;  ///< just now, without samples
-  std::uint64_t controller_ = 0;             ///< who spoke last; 0: nobody, or it has gone
-  std::string held_by_;                      ///< why forces are off, until `clear`
+  std::optional<data::TrialRecord> stored_;  ///< the trial stored last, without samples
+  std::uint64_t controller_ = 0;  ///< the client that sent a command last; 0: none, or it has left
+  std::string held_by_;           ///< reason why forces are off, until `clear`
   std::atomic<bool> silent_{false};
-  mutable std::mutex mutex_;  ///< of the next two: written by this thread, read by others
+  mutable std::mutex mutex_;  ///< guards the next two: this thread writes, others read
   nlohmann::ordered_json state_;
   std::string picture_ = R"("objects":[])";
   nlohmann::ordered_json trials_ = nlohmann::ordered_json::array();  ///< on record

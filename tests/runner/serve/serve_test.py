@@ -413,7 +413,7 @@ class Serve(ServeCase):
         process = self.serve()
         port = self.said["url"].rsplit(":", 1)[1]
         run = [PALPATE, "serve", "--device", "simulated"]
-        for options, said in ((["--port", port], "another server may run"), (["--socket", self.path], "a server is there")):
+        for options, said in ((["--port", port], "another server may run"), (["--socket", self.path], "another server uses it")):
             done = subprocess.run([*run, *options], capture_output=True, text=True, timeout=PATIENCE)
             self.assertEqual((done.returncode, done.stdout), (1, ""))
             self.assertIn(said, done.stderr)
