@@ -53,7 +53,7 @@ MouseStylus::MouseStylus(double length, double rate)
   capabilities_.name = "mouse";
   capabilities_.sensed_freedom = 5;
   capabilities_.actuated_freedom = 0;
-  // No motors: no force or stiffness is beyond its limits.
+  // It has no motors, so no force or stiffness exceeds its limits.
   capabilities_.max_force = 1000;
   capabilities_.max_stiffness = 1e6;
   capabilities_.max_rate = 10000;
@@ -74,7 +74,7 @@ StylusTarget MouseStylus::initial_target() const {
 DeviceReading MouseStylus::read() noexcept {
   target_.read(wanted_);
   now_.tip = towards(now_.tip, wanted_.tip, follow_, longest_step_);
-  // The tail follows separately and is put back to the stylus' length.
+  // The tail follows separately and is then set back to the stylus' length.
   const Vec3 tail = towards(now_.tail, wanted_.tail, follow_, 2 * longest_step_);
   const Vec3 axis = tail - now_.tip;
   const double long_enough = glm::length(axis);

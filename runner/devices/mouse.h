@@ -19,7 +19,7 @@ struct StylusTarget {
   void move(const Vec3& by);
   /// \param right, up  rad, of the tail about the tip
   void turn(double right, double up);
-  /// As that stylus, as far as it can be. m
+  /// Sets the pose of that stylus, within the target's limits. m
   void point(const rendering::LineProbe& stylus);
   Vec3 axis() const;  ///< unit, tip to tail
   rendering::LineProbe stylus() const { return {tip, tip + length * axis()}; }

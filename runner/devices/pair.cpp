@@ -38,7 +38,7 @@ DeviceCapabilities pair_of(const DeviceCapabilities& end, const char* name) {
   DeviceCapabilities can = end;
   can.name = name;
   can.sensed_freedom = can.actuated_freedom = 5;
-  can.max_torque = 0;  // forces at both ends give it
+  can.max_torque = 0;  // forces at both ends produce it
   return can;
 }
 
@@ -59,7 +59,7 @@ PairDevice::PairDevice(std::unique_ptr<Device> tip, std::unique_ptr<Device> tail
 
 DeviceReading PairDevice::read() noexcept {
   const DeviceReading tip = tip_->read(), tail = tail_->read();
-  // What is lost says why, before what is only late.
+  // Report the trouble of a lost end before that of a late one.
   DeviceTrouble trouble = tip.trouble;
   if (!tip.lost && tail.trouble != DeviceTrouble::none) trouble = tail.trouble;
   lost_ = tip.lost || tail.lost;
@@ -72,7 +72,7 @@ DeviceReading PairDevice::read() noexcept {
 }
 
 void PairDevice::write(const Vec3& device1, const Vec3& device2) noexcept {
-  // A force from one device alone would turn the stylus: both or none.
+  // Push with both or none: a force from one device alone would turn the stylus.
   tip_->write(lost_ ? Vec3(0) : device1, Vec3(0));
   tail_->write(lost_ ? Vec3(0) : stylus_.to_tail_frame(device2), Vec3(0));
 }

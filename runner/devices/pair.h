@@ -1,5 +1,5 @@
 #pragma once
-// Two devices of one model, each a point with forces, that hold the ends of a stylus, like the two
+// Two devices of one model that hold the ends of a stylus, each a point with forces, like the two
 // Phantoms of Ho, Basdogan & Srinivasan (2000), section 2: five degrees of freedom, sensed and
 // driven. World frame: the tip's device.
 
@@ -13,13 +13,13 @@ namespace palpate::runner {
 
 class PairDevice final : public Device {
  public:
-  /// \param name         of the kind
-  /// \param calibration  as DeviceCapabilities has it
+  /// \param name         name of the kind
+  /// \param calibration  as in DeviceCapabilities
   PairDevice(std::unique_ptr<Device> tip, std::unique_ptr<Device> tail,
              const StylusFromEnds& stylus, const char* name, const std::string& calibration);
 
   const DeviceCapabilities& capabilities() const override { return capabilities_; }
-  /// Lost when either device is, or when the distance of the ends differs from the stylus's length.
+  /// Lost if either device is lost or the distance of the ends differs from the stylus's length.
   /// Buttons of the tip's grip are bits 0 to 3, of the tail's 4 to 7.
   DeviceReading read() noexcept override;
   void write(const Vec3& device1, const Vec3& device2) noexcept override;
@@ -36,11 +36,12 @@ class PairDevice final : public Device {
 /// One device of a pair, as a point.
 using OpenEnd = std::unique_ptr<Device> (*)(const DeviceConfig& config);
 
-/// The numbers of a pair. \param end  of each device
+/// Capabilities of a pair. \param end  those of each device
 DeviceCapabilities pair_of(const DeviceCapabilities& end, const char* name);
 /// See DeviceKind::check. \throws std::invalid_argument, InputError: no registration of the two
 void check_pair(const DeviceConfig& config, const char* name);
-/// The two that config.serials names, the one at the stylus's tip first. \throws std::runtime_error
+/// Opens the two devices of config.serials, the one at the stylus's tip first. \throws
+/// std::runtime_error
 std::unique_ptr<Device> open_pair(const DeviceConfig& config, const char* name, OpenEnd open_end);
 
 }  // namespace palpate::runner

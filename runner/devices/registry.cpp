@@ -44,7 +44,7 @@ DeviceCapabilities as_opened(const DeviceConfig& config) {
   return open(config)->capabilities();
 }
 
-// Names with linkage, for templates.
+// Names with linkage, for template arguments.
 [[maybe_unused]] constexpr char kForceDimension2[] = "forcedimension2";
 [[maybe_unused]] constexpr char kInverse3x2[] = "inverse3x2";
 [[maybe_unused]] constexpr char kTouch2[] = "touch2";
@@ -100,7 +100,7 @@ constexpr DeviceKind kKinds[] = {
      nothing_to_check, as_opened<open_simulated>, always_there, open_simulated},
 };
 
-/// What a listing process sends: {"found": [...]} or {"error": "..."}.
+/// The message of a listing process: {"found": [...]} or {"error": "..."}.
 std::string listing_of(const DeviceKind& kind, const DeviceConfig& config) noexcept {
   Json out;
   try {
@@ -124,7 +124,7 @@ void write_all(int to, const std::string& text) {
   }
 }
 
-/// All that comes until the other end closes; none after the patience.
+/// Reads until the other end closes; none: it took too long.
 std::optional<std::string> read_all(int from) {
   const auto give_up = std::chrono::steady_clock::now() + kListingPatience;
   std::string text;
@@ -156,7 +156,7 @@ std::vector<ConnectedDevice> list_connected(const DeviceKind& kind, const Device
     prctl(PR_SET_PDEATHSIG, SIGKILL);
     if (getppid() != runner) _exit(1);
     const int nothing = open("/dev/null", O_WRONLY | O_CLOEXEC);
-    if (nothing >= 0) dup2(nothing, STDOUT_FILENO);  // what a library says is no result of ours
+    if (nothing >= 0) dup2(nothing, STDOUT_FILENO);  // keep a library's output out of our results
     write_all(ends[1], listing_of(kind, config));
     _exit(0);
   }

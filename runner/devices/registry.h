@@ -15,27 +15,28 @@ struct DeviceKind {
   const char* name;
   const char* description;
   bool has_force_feedback;  ///< moves a real hand: a guard process must own it
-  /// Finds what is wrong with a config before any device is touched. Called in this process,
-  /// because the type of an exception is lost on its way from the guard process.
+  /// Checks a config before any device is opened. Called in this process, because exceptions lose
+  /// their type on the way from the guard process.
   /// \throws std::invalid_argument (usage), InputError (files)
   void (*check)(const DeviceConfig& config);
-  /// What every such device can do, without opening one. What differs from device to device
-  /// (force, serial, calibration) is left at its default.
+  /// Capabilities common to all such devices, without opening one. Those that differ between
+  /// devices (force, serial, calibration) keep their defaults.
   DeviceCapabilities (*nominal)(const DeviceConfig& config);
   /// May load a maker's library, which starts threads: call list_connected.
-  /// \throws std::runtime_error where this computer cannot list such devices
+  /// \throws std::runtime_error if this computer cannot list such devices
   std::vector<ConnectedDevice> (*connected)(const DeviceConfig& config);
-  /// Ready to be read and written. \throws std::runtime_error saying why not and what to do
+  /// Opens a device, ready to be read and written. \throws std::runtime_error with the reason and
+  /// the remedy
   std::unique_ptr<Device> (*open)(const DeviceConfig& config);
-  /// Of a kind that is a pair: opens one of the two, as a point; else nullptr.
+  /// For a pair: opens one of the two as a point; else nullptr.
   OpenEnd open_end = nullptr;
 };
 
 std::span<const DeviceKind> device_kinds();
-/// The connected devices of a kind. Those with motors are listed in a process of its own, for three
-/// seconds at most: a maker's library can hang, crash, or start threads before the guard forks.
-/// Call it before there are other threads. \throws std::runtime_error as DeviceKind::connected, or
-/// saying that the listing hung or crashed
+/// The connected devices of a kind. Those with motors are listed in a separate process, for at most
+/// three seconds: a maker's library can hang, crash, or start threads before the guard forks. Call
+/// it before creating other threads. \throws std::runtime_error as DeviceKind::connected, or
+/// because the listing hung or crashed
 std::vector<ConnectedDevice> list_connected(const DeviceKind& kind, const DeviceConfig& config);
 /// \throws std::invalid_argument listing the known names
 const DeviceKind& device_kind(const std::string& name);

@@ -14,7 +14,7 @@ ReplayDevice::ReplayDevice(std::span<const data::SampleRecord> samples, double r
     : samples_(samples), nominal_ns_(std::llround(1e9 / rate)), now_ns_(nominal_ns_) {
   capabilities_.name = "replay";
   capabilities_.sensed_freedom = capabilities_.actuated_freedom = 5;
-  // The rendered force is compared, before the limits of the recorded device.
+  // Replay compares the rendered force, without the limits of the recorded device.
   capabilities_.max_force = capabilities_.max_stiffness = std::numeric_limits<double>::max();
   capabilities_.max_rate = rate;
 }

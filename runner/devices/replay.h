@@ -8,7 +8,7 @@
 
 namespace palpate::runner {
 
-/// Device and clock in one: each tick comes one recorded period after the last. Its readings are in
+/// Device and clock in one: each tick is one recorded period after the last. Its readings are in
 /// the virtual frame, so the servo needs no workspace map. `samples` must outlive it. After the
 /// last sample the device is lost.
 class ReplayDevice final : public Device, public Clock {
@@ -18,7 +18,7 @@ class ReplayDevice final : public Device, public Clock {
 
   const DeviceCapabilities& capabilities() const override { return capabilities_; }
   DeviceReading read() noexcept override;
-  void write(const Vec3&, const Vec3&) noexcept override {}  // forces go nowhere
+  void write(const Vec3&, const Vec3&) noexcept override {}  // forces are discarded
 
   std::int64_t now_ns() noexcept override { return now_ns_; }
   void wait_until(std::int64_t when_ns) noexcept override;

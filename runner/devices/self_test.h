@@ -13,9 +13,9 @@ struct SelfTestResult {
   std::string found;
 };
 
-/// Reads a device for a second with zero force and checks that readings come, in time, finite,
-/// within reach and without jumps. \param rate  Hz, of the servo; limited
-/// to the device's own
+/// Reads a device for a second with zero force and checks that readings arrive in time and are
+/// finite, within reach and without jumps. \param rate  Hz, of the servo; limited to the device's
+/// own
 std::vector<SelfTestResult> self_test(Device& device, double rate);
 
 }  // namespace palpate::runner

@@ -12,7 +12,7 @@ Vec3 round_to(const Vec3& v, double step) {
 }
 
 // Squared angle (rad^2) up to which Taylor series are used, 0.1 rad. The stylus is seldom farther
-// from where the hand points it. The first terms left out are below 1e-17 of the sum there.
+// from the hand's direction. There the first omitted terms are below 1e-17 of the sum.
 constexpr double kSeriesEnd = 0.01;
 
 /// asin(x) / x of x^2 up to kSeriesEnd.
@@ -153,8 +153,8 @@ DeviceReading SimulatedStylus::read() noexcept {
   axis_ = glm::normalize(rotate(target_.axis, turned + turned_balance));
   spin_ -= glm::dot(spin_, axis_) * axis_;
   away_is_known_ = false;
-  // For the next tick, now: the processor does it while the tick waits for the renderer. Not for a
-  // target that turns, which makes it void.
+  // Compute it for the next tick already: the processor does it while the tick waits for the
+  // renderer. A turning target would make it invalid.
   if (!target_turns_) find_away();
 
   DeviceReading reading;

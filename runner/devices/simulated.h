@@ -18,7 +18,7 @@ struct SimulatedDeviceSettings {
   double workspace_radius = 0.25;  ///< m; the grip stops there
 };
 
-/// The hand as a mechanical impedance about a target pose; it knows nothing of the object.
+/// The hand as a mechanical impedance about a target pose; it does not know the object.
 struct HandImpedance {
   double stiffness = 400;       ///< N/m
   double damping = 10;          ///< N s/m

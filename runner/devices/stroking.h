@@ -1,6 +1,6 @@
 #pragma once
-// The simulated device of `run --device simulated`: its hand rests outside of the workspace,
-// strokes through it and back, and repeats this open-loop.
+// The simulated device of `run --device simulated`: its hand rests outside the workspace, strokes
+// through it and back, and repeats this without feedback.
 
 #include "runner/devices/simulated.h"
 

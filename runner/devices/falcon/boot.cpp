@@ -92,11 +92,11 @@ using Bytes = std::span<const std::uint8_t>;
 
 constexpr std::array<std::uint8_t, 3> kMonitorProbe = {0x0A, 0x43, 0x0D};
 constexpr std::array<std::uint8_t, 4> kMonitorReply = {0x0A, 0x44, 0x2C, 0x0D};
-constexpr std::array<std::uint8_t, 1> kLock = {0x41};  // the boot ROM measures its bit rate by it
-// A full IN packet for each echo, so that the chip's 16 ms timer does not hold it back.
+constexpr std::array<std::uint8_t, 1> kLock = {0x41};  // the boot ROM measures the bit rate from it
+// Each echo fills an IN packet, so that the chip's 16 ms timer does not delay it.
 constexpr std::size_t kChunk = 62;
 
-/// One upload failed; it is worth trying again.
+/// One upload failed; another may succeed.
 class AttemptFailed : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
@@ -117,7 +117,7 @@ void send(Transport& transport, Bytes bytes) {
   throw AttemptFailed("bytes could not be sent");
 }
 
-/// Up to `count` bytes; fewer on time-out.
+/// Receives `count` bytes, or fewer on time-out.
 std::vector<std::uint8_t> receive(Transport& transport, std::size_t count, std::int64_t wait_ns) {
   std::vector<std::uint8_t> bytes(count);
   std::size_t have = 0;
@@ -131,7 +131,7 @@ std::vector<std::uint8_t> receive(Transport& transport, std::size_t count, std::
   return bytes;
 }
 
-/// Other bytes may precede the monitor's answer: it is searched for in all that arrives.
+/// Searches for the monitor's answer in all received bytes: others may precede it.
 void wake_monitor(Transport& transport, const BootSettings& settings) {
   for (int probe = 0; probe < settings.monitor_probes; ++probe) {
     send(transport, kMonitorProbe);
@@ -182,7 +182,7 @@ void upload(Transport& transport, const FirmwareImage& image, const BootSettings
 
   transport.control(request::kModem, kDtrLow);
   transport.control(request::kBaud, kBaudBoot);
-  purge(transport);  // late answers to further probes
+  purge(transport);  // discard late answers to further probes
   send(transport, kLock);
   expect_echo(transport, kLock, 0, settings.echo_wait_ns);
 
@@ -206,7 +206,7 @@ bool firmware_runs(Transport& transport, const BootSettings& settings) {
   transport.control(request::kBaud, kBaudNormal);
   purge(transport);
   const Packet zero = encode(Command{});
-  PacketStream stream;  // of all probes: a slow machine reads one reply over several waits
+  PacketStream stream;  // shared by all probes: a slow machine may read one reply in several parts
   for (int probe = 0; probe < settings.packet_probes && !transport.gone(); ++probe) {
     if (!transport.send(zero)) continue;
     const std::int64_t end = transport.now_ns() + settings.packet_wait_ns;
@@ -250,7 +250,7 @@ void boot(Transport& transport, const FirmwareImage* image, const BootSettings& 
       }
     }
     if (!runs) {
-      throw TransportError("the Falcon " + transport.serial() + " took no firmware in " +
+      throw TransportError("the Falcon " + transport.serial() + " did not accept its firmware in " +
                            std::to_string(settings.uploads) + " attempts:" + troubles);
     }
   }

@@ -13,7 +13,7 @@ namespace palpate::runner::falcon {
 
 /// A firmware file named by the user; none is shipped. A stream for the boot ROM of TI's C28x
 /// processors: 16-bit little-endian words; key 0x08AA, 8 reserved words, entry point; blocks of a
-/// count, a destination and so many words; a count of 0 ends it.
+/// count n, a destination and n words; a count of 0 ends the stream.
 struct FirmwareImage {
   std::vector<std::uint8_t> bytes;
   std::uint32_t entry = 0;
@@ -26,11 +26,11 @@ FirmwareImage parse_image(std::vector<std::uint8_t> bytes, const std::string& fi
 FirmwareImage read_image(const std::string& file);
 
 struct BootSettings {
-  int monitor_probes = 100;                   ///< until the boot monitor answers
+  int monitor_probes = 100;                   ///< most probes until the boot monitor answers
   std::int64_t monitor_wait_ns = 40'000'000;  ///< for each
   std::int64_t echo_wait_ns = 1'000'000'000;  ///< for the echo of a chunk
   int uploads = 10;                           ///< attempts; several are common
-  int packet_probes = 30;                     ///< until running firmware answers
+  int packet_probes = 30;                     ///< most probes until running firmware answers
   std::int64_t packet_wait_ns = 100'000'000;  ///< for each
 };
 
@@ -47,8 +47,8 @@ using BootReport = std::function<void(const BootProgress&)>;
 /// Puts the line into normal mode and requests a packet; true if one came. \throws TransportError.
 bool firmware_runs(Transport& transport, const BootSettings& settings = {});
 
-/// Starts the firmware: if it is not running, uploads `image` (null: none given), again where an
-/// echo is lost or wrong. \throws TransportError listing the failure of every attempt.
+/// Uploads `image` (null: none given) if no firmware is running, and repeats the upload if an echo
+/// is lost or wrong. \throws TransportError listing the failure of every attempt.
 void boot(Transport& transport, const FirmwareImage* image, const BootSettings& settings = {},
           const BootReport& report = {});
 

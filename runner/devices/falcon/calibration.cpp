@@ -44,7 +44,7 @@ constexpr int kVersion = 1;
 constexpr std::size_t kMany = 10'000;
 constexpr double kNsPerDay = 86400e9;
 
-/// "2026-05-01T09:30:00Z", with any fraction of a second; ns since 1970.
+/// Parses "2026-05-01T09:30:00Z", with any fraction of a second, to ns since 1970.
 std::optional<std::int64_t> parse_utc(const std::string& text) {
   constexpr std::string_view kForm = "dddd-dd-ddTdd:dd:dd";
   if (text.size() <= kForm.size() || text.back() != 'Z') return std::nullopt;
@@ -136,7 +136,7 @@ CalibrationVerdict judge(const std::string& what, const std::string& made_utc, b
   const double days = made ? static_cast<double>(unix_ns - *made) / kNsPerDay : NAN;
   std::ostringstream age;
   age << static_cast<long long>(std::floor(std::max(0.0, days)));
-  if (days <= kCalibrationDays && days > -1) {  // one day of tolerance for clocks that were set
+  if (days <= kCalibrationDays && days > -1) {  // one day of tolerance for adjusted clocks
     return {CalibrationState::good, what + ": made " + made_utc + ", " + age.str() + " days ago"};
   }
   return {CalibrationState::stale,
@@ -155,7 +155,7 @@ CalibrationVerdict implausible(const std::string& what, const ForceCalibration& 
   return {CalibrationState::implausible, text.str()};
 }
 
-/// The force scale is safety-critical: nobody else may be able to write the file.
+/// The force scale is safety-critical: other users must not be able to write the file.
 void require_own(const std::string& path) {
   struct stat found {};
   if (::stat(path.c_str(), &found) != 0) return;  // reading it reports why

@@ -1,5 +1,5 @@
 #pragma once
-// Calibrations of Falcons, in a file that the user names. Without one, a device's scale of force
+// Calibrations of Falcons, in a file named by the user. Without calibration, a device's force scale
 // may be wrong by a factor of 2 to 4.
 
 #include <cstdint>
@@ -14,7 +14,7 @@
 namespace palpate::runner::falcon {
 
 /// Asks the experimenter to pull the grip out and push it in until the device is homed. Zero force.
-/// \throws GuideError when stopped or when the device is unplugged.
+/// \throws GuideError if stopped or if the device is unplugged.
 void wait_until_homed(Device& device, Clock& clock, Guide& guide);
 
 /// Force scale of one device, measured with known weights.
@@ -23,7 +23,7 @@ struct ForceCalibration {
   double counts_per_torque = 0;  ///< 1/(N m) at the thighs; negative
   double residual = 0;    ///< N, root mean square deviation of the weights from the fitted line
   double sideways = 0;    ///< horizontal N for each N of weight; ideally 0
-  double arm_weight = 0;  ///< N, apparent weight of the device's arms; < 0: they rise
+  double arm_weight = 0;  ///< N, apparent weight of the device's arms; negative: they rise
   std::vector<double> weights;  ///< kg
   std::string made_utc;         ///< ISO 8601
 };
@@ -44,13 +44,13 @@ struct Calibration {
 
   const ForceCalibration* force_of(const std::string& serial) const;
   const PairRegistration* pair_of(const std::string& tip, const std::string& tail) const;
-  /// Replaces an earlier one of the same device or pair.
+  /// Adds a calibration; replaces an earlier one of the same device or pair.
   void put(const ForceCalibration& force);
   void put(const PairRegistration& pair);
 };
 
 /// A missing file gives an empty calibration. \throws InputError with every fault; also if another
-/// user could have written the file, because its scale decides what force reaches a hand.
+/// user could have written the file, because it scales the forces on a hand.
 Calibration read_calibration(const std::string& path);
 Calibration parse_calibration(const std::string& text, const std::string& path);
 std::string to_json(const Calibration& calibration);
@@ -60,14 +60,14 @@ std::string to_json(const Calibration& calibration);
 enum class CalibrationState : std::uint8_t { good, stale, implausible, missing };
 struct CalibrationVerdict {
   CalibrationState state = CalibrationState::good;
-  std::string text;  ///< one sentence for each device, with what to do
+  std::string text;  ///< one sentence for each device, with the remedy
 };
 
 /// A calibration becomes stale after these days: cables and motors age.
 inline constexpr double kCalibrationDays = 90;
 
-/// Whether the scale is within kPlausibleFactor of the nominal one. With a wrong scale the force
-/// limits would let a multiple of their value through, or forces could not be felt.
+/// Whether the scale is within kPlausibleFactor of the nominal one. With a wrong scale, forces
+/// could exceed their limits by that factor, or be too weak to feel.
 bool plausible(const ForceCalibration& force);
 
 /// Whether every device has a plausible and recent calibration. \param unix_ns  now

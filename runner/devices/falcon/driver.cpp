@@ -12,7 +12,7 @@ namespace palpate::runner::falcon {
 namespace {
 
 constexpr int kMaxImplausible = 5;  // in a row; more: the encoders have lost their reference
-constexpr double kSlack = 0.002;    // m, beyond what the fastest hand moves
+constexpr double kSlack = 0.002;    // m, beyond the fastest hand's motion
 constexpr std::int64_t kHaltReply = 20'000'000;  // ns
 constexpr int kHaltTries = 3;
 
@@ -98,7 +98,7 @@ void FalconDriver::locate() noexcept {
                                                     kSlack + kMaxSpeed * passed);
   if (!plausible) {
     ++counts_.implausible;
-    // The last valid position stands in for a few ticks, if there is one.
+    // Repeat the last valid position, if any, for a few ticks.
     const bool lost = ++implausible_in_a_row_ >= kMaxImplausible || !located_;
     reading_.trouble = lost ? DeviceTrouble::implausible : DeviceTrouble::late;
     return;
@@ -120,7 +120,8 @@ std::array<int, 3> FalconDriver::motors_for(const Vec3& force) noexcept {
   Vec3 counts = settings_.counts_per_torque * *torque;
   const double peak = std::max({std::abs(counts.x), std::abs(counts.y), std::abs(counts.z)});
   if (!std::isfinite(counts.x + counts.y + counts.z)) return motors;
-  if (peak > kMaxCount) {  // all three by one factor: clipping singly would turn the force
+  // Scale all three by one factor: separate clipping would rotate the force.
+  if (peak > kMaxCount) {
     counts *= kMaxCount / peak;
     ++counts_.saturated;
   }
@@ -145,7 +146,7 @@ bool FalconDriver::send(const std::array<int, 3>& motors) noexcept {
 
 void FalconDriver::push(const Vec3& force) noexcept {
   if (transport_->gone()) return;
-  // Whether the firmware can handle several packets at a time is not known: one at a time.
+  // Send one packet at a time: it is unknown whether the firmware can handle several.
   if (waiting_) {
     if (transport_->now_ns() - sent_ns_ < settings_.resend_ns) {
       ++counts_.late;

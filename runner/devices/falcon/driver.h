@@ -18,21 +18,21 @@ namespace palpate::runner::falcon {
 
 struct DriverSettings {
   double counts_per_torque = kCountsPerTorque;  ///< 1/(N m); from the calibration
-  /// A packet or its reply may get lost: it is sent again after this time.
+  /// Without a reply, a packet is sent again after this time.
   std::int64_t resend_ns = 4'000'000;
   /// The device counts as lost after this time without a reply.
   std::int64_t silence_ns = 25'000'000;
   std::function<void(Transport&)>
-      boot;  ///< starts the firmware, for reopen(); empty: it is always running
+      boot;  ///< starts the firmware, for reopen(); empty: always running
 };
 
 struct DriverReading {
-  Vec3 position;  ///< m, world frame, origin at the device's centre; the last valid one when in
+  Vec3 position;  ///< m, world frame, origin at the device's centre; the last valid one while in
                   ///< trouble
   std::uint8_t buttons = 0;
   DeviceTrouble trouble = DeviceTrouble::silent;
 
-  /// The position may be used: at worst the reply is late and the last one stands in for it.
+  /// Whether the position is usable: it is new, or the last one repeated because a reply is late.
   bool usable() const { return trouble == DeviceTrouble::none || trouble == DeviceTrouble::late; }
 };
 
@@ -40,10 +40,10 @@ struct DriverReading {
 struct DriverCounts {
   std::uint64_t replies = 0;
   std::uint64_t late = 0;         ///< commands not sent because a reply was still pending
-  std::uint64_t resent = 0;       ///< commands sent although the reply before had not come
+  std::uint64_t resent = 0;       ///< commands sent before the previous reply had arrived
   std::uint64_t malformed = 0;    ///< packets discarded
   std::uint64_t implausible = 0;  ///< positions discarded
-  std::uint64_t saturated = 0;    ///< forces scaled down to the limit of the motors
+  std::uint64_t saturated = 0;    ///< forces reduced to the limit of the motors
 };
 
 class FalconDriver {
@@ -56,7 +56,7 @@ class FalconDriver {
   FalconDriver& operator=(const FalconDriver&) = delete;
 
   const DriverReading& update() noexcept;
-  /// \param force  N, world frame, on the hand. Zero force is sent while in trouble.
+  /// \param force  N, world frame, on the hand. While in trouble, zero force is sent.
   void push(const Vec3& force) noexcept;
   /// Commands zero torque and waits up to 60 ms for the reply. False: none came.
   bool halt() noexcept;
@@ -94,7 +94,7 @@ class FalconDriver {
   std::array<int, 3> motors_{};
 };
 
-/// The largest force (N) that the motors can show in every direction everywhere in the workspace.
+/// The largest force (N) that the motors can render in every direction everywhere in the workspace.
 double guaranteed_force(double counts_per_torque);
 
 }  // namespace palpate::runner::falcon

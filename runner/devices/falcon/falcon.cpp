@@ -61,7 +61,7 @@ DeviceReading Falcon2Device::read() noexcept {
 }
 
 void Falcon2Device::reopen() {
-  // A device keeps its last command while no packets reach it.
+  // Halt both: a device keeps its last command while it receives no packets.
   tip_->halt();
   tail_->halt();
   tip_->reopen();
@@ -69,7 +69,7 @@ void Falcon2Device::reopen() {
 }
 
 void Falcon2Device::write(const Vec3& device1, const Vec3& device2) noexcept {
-  // A force from one device alone would turn the stylus: both or none.
+  // Push with both or none: a force from one device alone would turn the stylus.
   tip_->push(lost_ ? Vec3(0) : device1);
   tail_->push(lost_ ? Vec3(0) : stylus_.to_tail_frame(device2));
 }

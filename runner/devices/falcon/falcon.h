@@ -40,13 +40,13 @@ class Falcon2Device final : public Device {
                 const StylusFromEnds& stylus, const std::string& calibration = "");
 
   const DeviceCapabilities& capabilities() const override { return capabilities_; }
-  /// Lost when either device is, or when the distance of the ends differs from the stylus' length.
+  /// Lost if either device is lost or the distance of the ends differs from the stylus' length.
   /// Buttons of the tip's grip are bits 0 to 3, of the tail's 4 to 7.
   DeviceReading read() noexcept override;
   /// \param device1, device2  N, world frame: eq. (1)'s forces at tip and tail.
   void write(const Vec3& device1, const Vec3& device2) noexcept override;
 
-  /// Both ends command zero force meanwhile.
+  /// Both ends command zero force during that time.
   void reopen() override;
 
   FalconDriver& tip() { return *tip_; }

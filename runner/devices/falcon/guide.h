@@ -20,7 +20,7 @@ class Guide {
   virtual Answer answer() = 0;
 };
 
-/// A guided procedure gave no result; what() says why and what to do.
+/// A guided procedure gave no result; what() gives the reason and the remedy.
 class GuideError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };

@@ -9,7 +9,7 @@
 namespace palpate::runner::falcon {
 namespace {
 
-constexpr double kMaxStep = 0.02;     // m; beyond it the linear model is too far off
+constexpr double kMaxStep = 0.02;     // m; beyond it the linear model is too inaccurate
 constexpr double kConverged = 1e-11;  // rad, 1e-8 of a count
 constexpr int kMaxIterations = 40;    // a warm start takes 4
 constexpr int kMaxHalvings = 25;      // the step is then below the resolution of a double
@@ -47,14 +47,14 @@ Vec3 encoder_counts(const Vec3& thighs) { return (thighs - kZeroAngle) / kCountA
 std::optional<Legs> inverse(const Vec3& p) noexcept {
   Legs legs;
   for (std::size_t i = 0; i < 3; ++i) {
-    // From the thigh's joint, in the leg's plane (u, w) and across it (v).
+    // Relative to the thigh's joint: u, w in the leg's plane, v at right angles to it.
     const double u = p.x * kLegCos[i] + p.y * kLegSin[i] - kBaseRadial + kGripRadial;
     const double v = -p.x * kLegSin[i] + p.y * kLegCos[i] - kBaseTangential + kGripTangential;
     const double w = p.z;
     const double lean = v / kShin;
     if (!(std::abs(lean) < 1)) return std::nullopt;
     const double tilt = std::acos(lean);
-    const double shin = kShinEnds + kShin * std::sin(tilt);  // its length in the plane
+    const double shin = kShinEnds + kShin * std::sin(tilt);  // length of the shin in the plane
     const double reach2 = u * u + w * w;
     const double knee = (kThigh * kThigh + reach2 - shin * shin) / (2 * kThigh * std::sqrt(reach2));
     if (!(std::abs(knee) <= 1)) return std::nullopt;
@@ -128,7 +128,7 @@ double force_in_every_direction(const Vec3& position, double max_torque) noexcep
   if (!legs) return 0;
   const Inverse j(jacobian(*legs));
   if (!j.regular) return 0;
-  // The direction that loads a motor most is its column of the inverse.
+  // A motor's torque is largest for forces along its column of the inverse.
   return max_torque / std::max({glm::length(j.columns[0]), glm::length(j.columns[1]),
                                 glm::length(j.columns[2])});
 }

@@ -3,8 +3,9 @@
 // in m, angles in rad, in the Falcon's own frame: x right, y up, z out of the device towards the
 // user, z = 0 at its base. Pure functions.
 //
-// A leg is a two-link arm in its plane (Clavel 1991; Stamper 1997). The Jacobian departs from
-// libnifalcon's, whose third column is wrong (up to 66 %); ours is held against differences.
+// A leg is a two-link arm in its plane (Clavel 1991; Stamper 1997). The Jacobian differs from
+// libnifalcon's, which has a wrong third column (up to 66 %); tests compare ours with finite
+// differences.
 
 #include <array>
 #include <optional>
@@ -28,7 +29,7 @@ using Jacobian = std::array<Vec3, 3>;
 Vec3 thigh_angles(const Vec3& counts);
 Vec3 encoder_counts(const Vec3& thighs);
 
-/// Inverse kinematics; nullopt where a leg cannot reach.
+/// Inverse kinematics; nullopt: a leg cannot reach the position.
 std::optional<Legs> inverse(const Vec3& position) noexcept;
 
 Jacobian jacobian(const Legs& legs) noexcept;
@@ -38,9 +39,9 @@ struct ForwardResult {
   int iterations = 0;
 };
 
-/// Forward kinematics: Newton's method with its step limited to 20 mm and halved while the residual
-/// does not fall. From the last tick's position it takes at most 4 steps. nullopt where it does not
-/// converge, or converges out of the device's reach.
+/// Forward kinematics: Newton's method. Steps are limited to 20 mm and halved until the residual
+/// falls. From the last tick's position it takes at most 4 steps. nullopt: no convergence, or a
+/// result out of the device's reach.
 std::optional<ForwardResult> forward(const Vec3& thighs, const Vec3& start) noexcept;
 
 /// Torques at the thighs, N m, that give `force` (N) on the hand; nullopt at a singularity.
@@ -48,8 +49,8 @@ std::optional<Vec3> torque_for(const Jacobian& j, const Vec3& force) noexcept;
 /// The force (N) on the hand that torques (N m) give.
 Vec3 force_of(const Jacobian& j, const Vec3& torque) noexcept;
 
-/// The largest force (N) that can be shown in every direction at a position while no torque exceeds
-/// `max_torque` (N m); 0 out of reach.
+/// The largest force (N) that can be rendered in every direction at a position with no torque above
+/// `max_torque` (N m); 0: out of reach.
 double force_in_every_direction(const Vec3& position, double max_torque) noexcept;
 
 }  // namespace palpate::runner::falcon

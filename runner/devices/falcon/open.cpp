@@ -52,7 +52,7 @@ CalibrationVerdict judge(const Calibration& calibration, const std::vector<std::
   return verdict;
 }
 
-/// As DeviceCapabilities has it: empty when missing.
+/// The text for DeviceCapabilities; empty: missing.
 std::string summary_of(const CalibrationVerdict& verdict) {
   switch (verdict.state) {
     case CalibrationState::good:
@@ -110,7 +110,7 @@ CalibrationVerdict judge_calibration(const std::string& path,
 
 std::unique_ptr<FalconDriver> open_driver(const std::string& serial, const std::string& firmware,
                                           const Calibration& calibration) {
-  const auto image = image_in(firmware);  // first: a bad file is reported before the device opens
+  const auto image = image_in(firmware);  // read first: report a bad file before opening the device
   auto line = open_usb(serial);
   const std::string name = line->serial();
   DriverSettings settings;

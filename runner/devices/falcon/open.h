@@ -1,6 +1,6 @@
 #pragma once
-// Opens Falcons from a DeviceConfig, ready but for homing: the functions behind the Falcon's rows
-// in the registry of devices.
+// Functions for the Falcon's rows in the registry of devices. They open Falcons from a
+// DeviceConfig; only homing remains to be done.
 
 #include <memory>
 #include <string>
@@ -13,7 +13,7 @@
 
 namespace palpate::runner::falcon {
 
-/// Falcons that are plugged in. \throws TransportError where USB cannot be used.
+/// Connected Falcons. \throws TransportError if USB cannot be used.
 std::vector<ConnectedDevice> connected_falcons(const DeviceConfig& config);
 
 /// See DeviceKind::nominal.
@@ -24,13 +24,12 @@ DeviceCapabilities nominal_falcon2(const DeviceConfig& config);
 void check_falcon(const DeviceConfig& config);
 void check_falcon2(const DeviceConfig& config);
 
-/// One Falcon. Its capabilities' `calibration` is empty when none is stored, and begins with
-/// "stale" when it is too old, with "implausible" when its scale is not used. \throws
-/// TransportError, InputError.
+/// One Falcon. Its capabilities' `calibration` is empty if none is stored. It begins with "stale"
+/// if too old, with "implausible" if its scale is not used. \throws TransportError, InputError.
 std::unique_ptr<Device> open_falcon(const DeviceConfig& config);
 
-/// The two that config.serials names, the one at the stylus' tip first. Their registration must be
-/// in config.calibration. \throws TransportError, InputError.
+/// The two Falcons of config.serials, the one at the stylus' tip first. config.calibration must
+/// have their registration. \throws TransportError, InputError.
 std::unique_ptr<Device> open_falcon2(const DeviceConfig& config);
 
 /// State of all calibrations that these devices need. Two serial numbers are a pair, tip and tail.

@@ -79,7 +79,7 @@ std::optional<Reply> decode_reply(const Packet& packet) noexcept {
 }
 
 std::optional<Packet> PacketStream::take(std::uint8_t byte) noexcept {
-  // '<' is used for framing only: inside a packet it means that the packet was truncated.
+  // '<' is used for framing only: inside a packet it shows that the packet was truncated.
   if (byte == kBegin) {
     if (size_ > 0) ++dropped_;
     size_ = 0;

@@ -11,10 +11,10 @@ namespace palpate::runner::falcon {
 
 using Packet = std::array<std::uint8_t, 16>;
 
-/// Host to device. LED colours as libnifalcon's code uses them.
+/// Host to device. LED colours as in libnifalcon's code.
 struct Command {
   std::array<int, 3> motors{};  ///< -4095 to 4095; clamped
-  bool homing = true;           ///< must be set in every packet to start and keep it
+  bool homing = true;           ///< must be set in every packet to start and keep homing
   bool green = false, blue = false, red = false;
 };
 
@@ -32,7 +32,7 @@ std::optional<Command> decode_command(const Packet& packet) noexcept;
 Packet encode(const Reply& reply) noexcept;
 std::optional<Reply> decode_reply(const Packet& packet) noexcept;
 
-/// Finds packets in a byte stream in which they may be split, joined, truncated or garbled.
+/// Finds packets in a byte stream that may split, join, truncate or garble them.
 class PacketStream {
  public:
   /// Takes one byte; returns the packet that this byte completes, if any.

@@ -32,8 +32,8 @@ inline constexpr double kZeroAngle = 35 * 3.14159265358979323846 / 180;  ///< ra
 // uncertain by a factor of 2 to 4 until the device is calibrated with weights.
 inline constexpr double kCountsPerTorque = -1e4;  ///< 1/(N m) at the thigh
 inline constexpr int kMaxCount = 4095;            ///< larger values would wrap or saturate
-/// Nominal newtons commanded for each newton of a known weight. Weighing refuses slopes outside; a
-/// scale that is not plausible is never used for forces on a hand.
+/// Nominal newtons commanded for each newton of a known weight. Weighing refuses slopes outside
+/// these. An implausible scale is never used for forces on a hand.
 inline constexpr double kLeastSlope = 0.05, kMostSlope = 20;
 inline constexpr double kPlausibleFactor = 4;  ///< of the nominal scale, up or down
 
@@ -43,7 +43,7 @@ inline constexpr double kWorkspaceRadius = 0.04;            ///< about the centr
 inline constexpr double kNearest = 0.06, kFarthest = 0.20;  ///< range of plausible z
 inline constexpr double kWidest = 0.09;                     ///< plausible distance from the axis
 
-inline constexpr double kMaxStiffness = 3000;  ///< N/m at 1 kHz, as CHAI3D lists
+inline constexpr double kMaxStiffness = 3000;  ///< N/m at 1 kHz, from CHAI3D's list
 inline constexpr double kResolution = 5e-5;    ///< m, about one count near the centre
 inline constexpr double kMaxRate = 1000;       ///< Hz: the latency timer's 1 ms
 inline constexpr double kMaxSpeed = 5;         ///< m/s; hands move the grip more slowly

@@ -1,5 +1,5 @@
 #pragma once
-// Serial numbers come from the device, so they are untrusted text: they are printed, stored and
+// Serial numbers come from the device, so they are untrusted text that is printed, stored and
 // compared with files.
 
 #include <algorithm>
@@ -13,7 +13,7 @@ namespace palpate::runner::falcon {
 inline constexpr std::size_t kMaxSerial = 32;  ///< characters
 
 /// Keeps letters, digits, '.', '_' and '-', replaces others by '_', truncates to kMaxSerial.
-/// \return "" if there is nothing but blanks and zeros
+/// \return "": only blanks and zeros
 inline std::string clean_serial(std::span<const std::uint8_t> text) {
   std::string clean;
   bool any = false;

@@ -17,14 +17,14 @@ namespace {
 constexpr std::int64_t kTickNs = 1'000'000;
 constexpr double kStillness = 0.001;     // m
 constexpr double kApart = 0.015;         // m, from every earlier point
-constexpr double kMostResidual = 0.003;  // m; more: a point was wrong
+constexpr double kMostResidual = 0.003;  // m; above it a point was wrong
 
 class Procedure {
  public:
   Procedure(Device& tip, Device& tail, Clock& clock, Guide& guide)
       : tip_(tip), tail_(tail), clock_(clock), guide_(guide), due_ns_(clock.now_ns()) {}
 
-  /// Asks until a valid point was taken.
+  /// Repeats the request until a valid point was taken.
   PairedPoint take(const std::string& question, const std::vector<PairedPoint>& earlier,
                    const RegistrationSettings& settings) {
     for (;;) {
@@ -45,7 +45,7 @@ class Procedure {
 
  private:
   PairedPoint tick() {
-    // Missed ticks are not made up for.
+    // Do not make up for missed ticks.
     due_ns_ = std::max(due_ns_ + kTickNs, clock_.now_ns());
     clock_.wait_until(due_ns_);
     return {free_position(tip_), free_position(tail_)};
@@ -61,7 +61,7 @@ class Procedure {
     return reading.stylus.tip;
   }
 
-  /// The mean position during a rest; nullopt where either grip moved.
+  /// The mean position during a rest; nullopt: a grip moved.
   std::optional<PairedPoint> rest(double seconds) {
     const PairedPoint first = tick();
     PairedPoint mean;
@@ -165,8 +165,8 @@ RigidFit fit_rigid(std::span<const PairedPoint> points) {
                             " mm across): spread them over the workspace");
   }
   Eigen::Vector3d sign(1, 1, 1);
-  // The best orthogonal matrix may be a reflection where points are coplanar or noisy: take the
-  // best rotation.
+  // The best orthogonal matrix may be a reflection if points are coplanar or noisy: take the best
+  // rotation.
   sign[2] = (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0 ? -1 : 1;
   const Eigen::Matrix3d rotation = svd.matrixU() * sign.asDiagonal() * svd.matrixV().transpose();
   const Eigen::Vector3d shift = tip_mean - rotation * tail_mean;

@@ -24,7 +24,7 @@ struct RigidFit {
   double worst = 0;     ///< m
 };
 
-/// The points do not determine a transformation; what() says why.
+/// The points do not determine a transformation; what() gives the reason.
 class RegistrationError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
@@ -35,7 +35,7 @@ class RegistrationError : public std::runtime_error {
 /// \throws RegistrationError.
 RigidFit fit_rigid(std::span<const PairedPoint> points);
 
-/// The segment between the ends; checks that its length stays that of the stylus.
+/// The segment between the ends; checks that its length equals that of the stylus.
 class StylusFromEnds {
  public:
   /// \param length     m, between the centres of the grips
@@ -43,11 +43,11 @@ class StylusFromEnds {
   StylusFromEnds(const Pose& tail_in_tip, double length, double tolerance = 0.004)
       : tail_in_tip_(tail_in_tip), length_(length), tolerance_(tolerance) {}
 
-  /// \param tip, tail  m, each in its own device's frame. False when the distance
-  ///                   of the ends has been wrong for kMaxWrong ticks in a row: a grip has come
-  ///                   off, a joint has slipped, or a device has lost its reference.
+  /// \param tip, tail  m, each in its own device's frame.
+  /// \return false: the distance of the ends has been wrong for kMaxWrong ticks in a row. A grip
+  /// has come off, a joint has slipped, or a device has lost its reference.
   bool update(const Vec3& tip, const Vec3& tail) noexcept;
-  /// The last one of the right length, in the tip device's frame.
+  /// The last stylus of the right length, in the tip device's frame.
   const rendering::LineProbe& stylus() const { return stylus_; }
   double length() const { return length_; }
   double stretch() const {
@@ -70,12 +70,13 @@ class StylusFromEnds {
 
 namespace palpate::runner::falcon {
 
-// Registration: the relative pose of two Falcons that hold a stylus, from points that both reach.
+// Registration: the relative pose of two Falcons that hold a stylus, from points that both have
+// visited.
 
 struct RegistrationSettings {
   double stylus_length = 0.12;  ///< m, between the centres of the grips on the stylus
-  /// From the tip's grip to the tail's, m, tip's frame, while points are taken: zero with the grips
-  /// pinned together, else the stylus in its jig (its direction must not change).
+  /// Vector from the tip's grip to the tail's while points are taken, m, tip's frame: zero with the
+  /// grips pinned together, else the stylus in its jig (its direction must not change).
   Vec3 offset;
   int points = 8;
   double still = 0.5;  ///< s of rest at each point

@@ -33,7 +33,7 @@ class ByteRing {
 
  private:
   std::array<std::uint8_t, 4096> bytes_{};
-  std::size_t begin_ = 0, end_ = 0;  // count all bytes ever; a size_t does not overflow
+  std::size_t begin_ = 0, end_ = 0;  // these count all bytes; a size_t does not overflow
 };
 
 class UsbTransport final : public Transport {
@@ -111,7 +111,8 @@ class UsbTransport final : public Transport {
       if (transfer == nullptr) throw std::bad_alloc();
     }
     ~Slot() {
-      if (!busy) libusb_free_transfer(transfer);  // else leaked: the kernel may still write into it
+      // A busy one is leaked: the kernel may still write into it.
+      if (!busy) libusb_free_transfer(transfer);
     }
     Slot(const Slot&) = delete;
     Slot& operator=(const Slot&) = delete;
@@ -137,7 +138,7 @@ class UsbTransport final : public Transport {
     }
     const auto named = [this](const Candidate& c) { return c.listing.serial == serial_; };
     if (!serial_.empty() && std::count_if(candidates.begin(), candidates.end(), named) > 1) {
-      throw TransportError("several devices call themselves " + serial_ +
+      throw TransportError("several devices have the serial number " + serial_ +
                            "; unplug all but one:" + others);
     }
     for (Candidate& candidate : candidates) {
@@ -166,10 +167,10 @@ class UsbTransport final : public Transport {
     for (Slot& slot : in_) submit(slot, kInEndpoint, kPacket, &UsbTransport::received);
     if (!gone_) return;
     close();
-    throw TransportError("the Falcon " + serial_ + " takes no reads");
+    throw TransportError("the Falcon " + serial_ + " cannot be read");
   }
 
-  /// Cancels all transfers first: they point into this object.
+  /// Cancels all transfers before closing: they point into this object.
   void close() noexcept {
     closing_ = true;
     const auto busy = [this] {

@@ -17,7 +17,7 @@ using UsbDevice = std::unique_ptr<libusb_device, decltype(&libusb_unref_device)>
 UsbContext make_usb_context();
 /// Every Falcon on the bus.
 std::vector<UsbDevice> falcons_on(libusb_context* context);
-/// Opens one; nullptr and the reason in `listing.trouble` where it cannot be.
+/// Opens a Falcon; nullptr: it cannot be opened, and `listing.trouble` has the reason.
 UsbHandle open_listed(libusb_device* device, UsbListing& listing);
 
 }  // namespace palpate::runner::falcon

@@ -13,16 +13,16 @@ namespace {
 
 constexpr double kTick = 1e-3;  // s
 constexpr std::int64_t kTickNs = 1'000'000;
-constexpr double kNearCentre = 0.01;  // m, to begin with
+constexpr double kNearCentre = 0.01;  // m, at the start
 constexpr int kLastTicks = 20;
 constexpr int kMaxAttempts = 5;
 constexpr long kMaxInterrupted = 20;  // ticks of a measurement
 constexpr double kMaxDrift = 0.035;   // m, from the target; beyond it the motors are too weak
 constexpr double kRamp = 0.5;         // s, from zero to full force
-// By the nominal scale; with motors 4 times as strong the loop must still be stable.
+// In the nominal scale. The loop must stay stable with motors 4 times as strong.
 constexpr double kStiffness = 250, kDamping = 5, kIntegral = 250;  // N/m, N s/m, N/(m s)
 constexpr double kVelocityTime = 2.5e-3;                           // s, of the filter
-constexpr double kMostResidual = 0.1;                              // of the heaviest weight
+constexpr double kMostResidual = 0.1;                              // share of the heaviest weight
 
 /// PID control of the grip's position.
 class PositionController {
@@ -58,7 +58,7 @@ class Procedure {
   Procedure(Device& device, Clock& clock, Guide& guide)
       : device_(device), clock_(clock), guide_(guide), due_ns_(clock.now_ns()) {}
   ~Procedure() {
-    // A single zero command could be skipped while a reply is pending.
+    // Send several: a single zero command could be skipped while a reply is pending.
     for (int i = 0; i < kLastTicks; ++i) {
       next_reading();
       device_.write(Vec3(0), Vec3(0));
@@ -121,13 +121,13 @@ class Procedure {
   static double centimetres(double metres) { return std::round(metres * 1000) / 10; }
 
   DeviceReading next_reading() {
-    // Missed ticks are not made up for.
+    // Do not make up for missed ticks.
     due_ns_ = std::max(due_ns_ + kTickNs, clock_.now_ns());
     clock_.wait_until(due_ns_);
     return device_.read();
   }
 
-  /// nullopt where a guard process has just cut the force off; a zero command re-enables it.
+  /// nullopt: a guard process has just cut off forces; a zero command re-enables them.
   std::optional<Vec3> position() {
     const DeviceReading reading = next_reading();
     if (reading.trouble == DeviceTrouble::guarded) {
@@ -198,7 +198,7 @@ ForceCalibration fit_scale(const std::vector<Weighing>& weighings) {
   if (!(slope.z > kLeastSlope && slope.z < kMostSlope)) {
     std::ostringstream text;
     text << "the commanded force rose by " << slope.z
-         << " N for each N of weight, which cannot be: "
+         << " N for each N of weight, which is impossible: "
          << "did every weight hang freely from the grip?";
     throw GuideError(text.str());
   }
@@ -208,7 +208,7 @@ ForceCalibration fit_scale(const std::vector<Weighing>& weighings) {
     square += deviation * deviation / n;
   }
   ForceCalibration force;
-  // Slope above 1: the motors are weaker than nominal, so a newton metre takes more counts.
+  // A slope above 1 means motors weaker than nominal, so a newton metre takes more counts.
   force.counts_per_torque = kCountsPerTorque * slope.z;
   force.residual = std::sqrt(square) / slope.z;
   force.sideways = std::hypot(slope.x, slope.y) / slope.z;

@@ -1,8 +1,7 @@
 #pragma once
 // Calibration of a Falcon's force with known weights. The device has no force sensor, but a
-// position controller can hold its grip: the force commanded while it carries a weight, minus that
-// commanded without, is the weight. The grip moves slowly up and down meanwhile, so that friction
-// cancels.
+// position controller can hold its grip: the weight equals the commanded force with it minus that
+// without it. The grip moves slowly up and down during each measurement, so that friction cancels.
 
 #include <vector>
 
@@ -27,13 +26,13 @@ struct Weighing {
   Vec3 force;         ///< N, world frame, mean force commanded, by the nominal scale
 };
 
-/// The scale from weighings (the first without a weight). \throws GuideError where they are
+/// The scale from weighings (the first without a weight). \throws GuideError if they are
 /// inconsistent: force does not rise with weight, or is far from linear.
 ForceCalibration fit_scale(const std::vector<Weighing>& weighings);
 
 /// The whole guided procedure, at 1 kHz. Zero force before and after.
-/// \param device  one Falcon, opened with its nominal scale; should be owned by a guard process
-/// \throws GuideError when stopped, the device is lost, or the grip drifts away.
+/// \param device  one Falcon, opened with its nominal scale; a guard process should own it
+/// \throws GuideError if stopped, if the device is lost, or if the grip drifts away.
 ForceCalibration weigh(Device& device, Clock& clock, Guide& guide,
                        const WeighingSettings& settings);
 

@@ -14,12 +14,12 @@ namespace palpate::runner::forcedimension {
 namespace {
 
 constexpr double kWatchdogStep = 125e-6;       // s; at most 255 of them
-constexpr double kStatusPeriod = 0.008;        // s; the status costs a transfer of its own
+constexpr double kStatusPeriod = 0.008;        // s; the status costs a separate transfer
 constexpr double kFarthest = 0.5;              // m; no model reaches so far
 constexpr double kMaxSpeed = 5, kJump = 1e-3;  // m/s and m; hands move the grip more slowly
 constexpr int kCommunication = 2, kNoDevice = 5, kTimeOut = 7, kDeviceInUse = 20;
 
-/// Limits as CHAI3D lists them; 0: not known.
+/// Limits from CHAI3D's list; 0: unknown.
 struct Model {
   const char* family;
   double max_force, max_torque, max_stiffness, reach;  // N, N m, N/m, m
@@ -42,7 +42,7 @@ DeviceCapabilities capabilities_of(const Model& model, bool wrist, bool active_w
   DeviceCapabilities can;
   can.name = "forcedimension";
   can.sensed_freedom = wrist ? 5 : 3;
-  // Torque whose limit is not known is not driven.
+  // Do not drive torque without a known limit.
   can.actuated_freedom = active_wrist && model.max_torque > 0 ? 5 : 3;
   can.max_torque = can.actuated_freedom == 5 ? model.max_torque : 0;
   can.max_force = model.max_force;
@@ -58,7 +58,7 @@ std::string error_text(const Library& library) {
   return text != nullptr ? printable(text) : "no reason is given";
 }
 
-/// What opening one found.
+/// Result of opening a device.
 struct Found {
   char id;
   std::string serial, name;
@@ -78,21 +78,21 @@ Found open_one(const Library& library, int index) {
           name != nullptr ? printable(name) : "a device without a name"};
 }
 
-/// Ids that devices of this process hold, one at most each: the library has one list of devices for
-/// a process, and may give an open device's id again. For the thread that opens and closes.
+/// Ids of the devices open in this process: the library keeps one list of devices for the process
+/// and may return the id of an open device again. For the thread that opens and closes.
 std::vector<char>& held() {
   static std::vector<char> ids;
   return ids;
 }
 bool is_held(char id) { return std::count(held().begin(), held().end(), id) > 0; }
 
-/// In steps, as long as the guard process waits for a command: 5 ms, or 5 ticks of a slow servo.
+/// The watchdog's time in steps. It equals the guard process's: 5 ms, or 5 ticks of a slow servo.
 unsigned char watchdog_of(double rate) {
   return static_cast<unsigned char>(
       std::min(255.0, std::ceil(std::max(0.005, 5 / rate) / kWatchdogStep)));
 }
 
-/// Negative where the library cannot count them.
+/// Number of devices; negative: the library cannot count them.
 int count_of(const Library& library) {
   constexpr int kMost = 16;
   return std::min(library.get_device_count(), kMost);
@@ -112,7 +112,7 @@ void ForceDimensionDevice::open() {
   if (count < 0)
     throw std::runtime_error("Force Dimension devices cannot be counted: " + error_text(library_));
   const std::string wanted = config_.serials.empty() ? "" : config_.serials[0];
-  // Indices move when devices come and go: it is known by its serial number.
+  // Identify the device by its serial number: indices change as devices come and go.
   std::string others, trouble;
   Found device{};
   for (int index = 0; index < count && !id_; ++index) {
@@ -135,7 +135,7 @@ void ForceDimensionDevice::open() {
     std::string text = wanted.empty() ? "no Force Dimension device is ready"
                                       : "no Force Dimension device has the serial number " + wanted;
     if (!others.empty()) text += "; connected: " + others;
-    if (!trouble.empty()) text += "; of one: " + trouble;
+    if (!trouble.empty()) text += "; one reports: " + trouble;
     if (count == 0) text += ": check its cable, its power supply and the rights to use USB";
     throw std::runtime_error(text);
   }
@@ -147,15 +147,15 @@ void ForceDimensionDevice::open() {
     throw std::runtime_error(std::string("the Force Dimension device does not take '") + what +
                              "': " + why);
   };
-  need(library_.enable_expert_mode(), "expert mode");  // for the two below
+  need(library_.enable_expert_mode(), "expert mode");  // needed by the two below
   need(library_.set_time_guard(0, id), "no time guard");
   const bool watched =
       library_.set_watchdog != nullptr && library_.set_watchdog(watchdog_of(config_.rate), id) >= 0;
   need(library_.set_brakes(1, id), "brakes on");
   need(library_.set_gravity_compensation(1, id), "gravity compensation");
   if (library_.has_gripper(id) && library_.emulate_button != nullptr)
-    library_.emulate_button(1, id);  // a gripper that closes is a button
-  // Of a device that waits for its calibration forces stay off.
+    library_.emulate_button(1, id);  // report a closed gripper as a button
+  // Forces stay off until the device has been calibrated.
   std::array<int, kStatusRoom> status{};
   const bool calibrated = library_.get_status(status.data(), id) >= 0 && status[kReset] == 0;
   if (calibrated) need(library_.enable_force(1, id), "forces on");
@@ -168,8 +168,8 @@ void ForceDimensionDevice::open() {
   if (!watched) {
     capabilities_.calibration += ", WITHOUT the firmware's watchdog";
     std::fprintf(stderr,
-                 "This device has no watchdog of its own firmware: zero force after a crash "
-                 "depends on palpate's guard process alone.\n");
+                 "This device's firmware has no watchdog: zero force after a crash "
+                 "depends on palpate's guard process only.\n");
   }
   pushed_ = false;
   asked_ns_ = 0;
@@ -213,8 +213,8 @@ DeviceTrouble ForceDimensionDevice::trouble_of_status() noexcept {
   if (status[kPower] == 0) return DeviceTrouble::silent;
   if (status[kReset] != 0) return DeviceTrouble::not_calibrated;
   const bool stopped = status[kForce] == 0 || status[kError] != 0;
-  // It was calibrated just now, or nobody commanded it after it was opened: forces may go on. Zero
-  // until the servo says otherwise.
+  // It was calibrated just now, or has received no command since it was opened: enable forces, with
+  // zero force until the servo commands another.
   if (status_ == DeviceTrouble::not_calibrated || (stopped && !pushed_)) {
     library_.set_force_and_torque(0, 0, 0, 0, 0, 0, *id_);
     return library_.enable_force(1, *id_) < 0 ? last_error() : DeviceTrouble::none;
@@ -224,7 +224,8 @@ DeviceTrouble ForceDimensionDevice::trouble_of_status() noexcept {
 
 bool ForceDimensionDevice::plausible(const Vec3& position, const Vec3& axis,
                                      std::int64_t asked_ns) noexcept {
-  // From before the last reading to after this one: a busy machine stops the thread anywhere.
+  // Measure from before the last reading to after this one: a busy machine may stop the thread
+  // anywhere.
   const std::int64_t now = RealClock().now_ns();
   const double elapsed = asked_ns_ > 0 ? static_cast<double>(now - asked_ns_) * 1e-9 : 1;
   const double moved = glm::length(position - tip_);
@@ -233,7 +234,7 @@ bool ForceDimensionDevice::plausible(const Vec3& position, const Vec3& axis,
   asked_ns_ = asked_ns;
   if (!finite(position) || !finite(axis) || glm::length(position) > kFarthest) {
     tip_ = tail_ = Vec3(0);
-    asked_ns_ = 0;  // the next one is not measured against it
+    asked_ns_ = 0;  // do not compare the next reading with it
     return false;
   }
   if (capabilities_.sensed_freedom == 5) {

@@ -1,6 +1,6 @@
 #pragma once
-// A Force Dimension omega, delta, sigma or lambda, through the maker's library. Not tried on
-// hardware: what is uncertain is listed in runner/README.md.
+// A Force Dimension omega, delta, sigma or lambda, through the maker's library. Not tested on
+// hardware: runner/README.md lists the uncertainties.
 
 #include <cstdint>
 #include <memory>
@@ -13,25 +13,24 @@
 
 namespace palpate::runner::forcedimension {
 
-/// What the library's arguments and results mean in world coordinates (x right, y away from the
-/// user, z up).
+/// Convert between the library's frame and the world frame (x right, y away from the user, z up).
 inline Vec3 to_world(const Vec3& v) { return {v.y, -v.x, v.z}; }
 inline Vec3 from_world(const Vec3& v) { return {-v.y, v.x, v.z}; }
 
-/// The firmware drops forces when no command comes for 5 ms, at servo rates below 1 kHz for 5 ticks
-/// or 32 ms, which also covers a dead guard.
+/// The firmware switches forces off after 5 ms without a command (at servo rates below 1 kHz after
+/// 5 ticks, at most 32 ms). This also covers a dead guard.
 class ForceDimensionDevice final : public Device {
  public:
   /// Opens the device with the config's serial number, or the only one.
-  /// \throws std::runtime_error saying what is in the way
+  /// \throws std::runtime_error with the obstacle
   explicit ForceDimensionDevice(const DeviceConfig& config);
   ~ForceDimensionDevice() override;
 
   const DeviceCapabilities& capabilities() const override { return capabilities_; }
-  /// A stylus of a device with a wrist has its tip at the grip's centre and its tail towards the
-  /// user along the grip's own x axis; without one tip and tail are one point.
+  /// With a wrist, the stylus has its tip at the grip's centre and its tail towards the user along
+  /// the grip's x axis. Without a wrist, tip and tail are one point.
   DeviceReading read() noexcept override;
-  /// Without torque unless the wrist is driven: device1 + device2 at the grip.
+  /// Applies device1 + device2 at the grip; torque only if the wrist is driven.
   void write(const Vec3& device1, const Vec3& device2) noexcept override;
   void reopen() override;
 
@@ -47,8 +46,8 @@ class ForceDimensionDevice final : public Device {
   std::optional<char> id_;
   DeviceCapabilities capabilities_;
   Vec3 tip_, tail_;            ///< m, world, of the last good reading
-  std::int64_t asked_ns_ = 0;  ///< for the last good reading; 0: none since it was opened
-  int until_status_ = 0;       ///< readings until the status is asked for again
+  std::int64_t asked_ns_ = 0;  ///< time of asking for the last good reading; 0: none since opening
+  int until_status_ = 0;       ///< readings until the next query of the status
   DeviceTrouble status_ = DeviceTrouble::none;
   DeviceTrouble write_trouble_ = DeviceTrouble::none;
   bool lost_ = true;

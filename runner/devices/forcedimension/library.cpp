@@ -13,12 +13,12 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Below an installed SDK: lib/release/lin-*-gcc/libdrd.so*.
+/// Adds libraries below an installed SDK: lib/release/lin-*-gcc/libdrd.so*.
 void add_installed(const char* variable, std::vector<std::string>& places) {
   const char* const root = std::getenv(variable);
   if (root == nullptr || *root == '\0') return;
   std::vector<std::string> found;
-  std::error_code error;  // a folder that cannot be read has none
+  std::error_code error;  // treat an unreadable folder as empty
   for (const auto& build : fs::directory_iterator(fs::path(root) / "lib" / "release", error)) {
     if (!build.path().filename().string().starts_with("lin-")) continue;
     for (const auto& file : fs::directory_iterator(build.path(), error))

@@ -1,17 +1,18 @@
 #pragma once
-// The functions of Force Dimension's library, loaded at run time: it is proprietary, and a lab
-// installs it. Prototypes are written anew from its public documentation (SDK 3.7 to 3.17).
+// The functions of Force Dimension's library, loaded at run time: it is proprietary and is
+// installed by the lab. The prototypes were written from its public documentation (SDK 3.7 to
+// 3.17).
 
 #include <memory>
 #include <string>
 
 namespace palpate::runner::forcedimension {
 
-/// `id` is the number that opening a device gave. Negative results are errors unless said
+/// `id` is the number returned on opening a device. Negative results are errors unless stated
 /// otherwise. SI units; frame: x to the user, y right, z up.
 struct Library {
-  /// \param path  of libdrd or libdhd; empty: below $FDSDK and $FORCEDIM_SDK, then where the loader
-  ///              looks. \throws std::runtime_error saying what was tried and what is missing
+  /// \param path  of libdrd or libdhd; empty: search $FDSDK and $FORCEDIM_SDK, then the loader's
+  ///              paths. \throws std::runtime_error naming the paths or the missing function
   explicit Library(const std::string& path);
   Library(const Library&) = delete;
   Library& operator=(const Library&) = delete;
@@ -43,7 +44,7 @@ struct Library {
   int (*error_get_last)() = nullptr;
   const char* (*error_get_last_str)() = nullptr;
 
-  // What older versions do not have is null.
+  // Null in older versions without the function.
   int (*set_watchdog)(unsigned char periods_of_125us, char id) = nullptr;
   int (*emulate_button)(unsigned char on, char id) = nullptr;
 

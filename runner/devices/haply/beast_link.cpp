@@ -22,11 +22,11 @@ constexpr std::size_t kLongest = 1 << 20;  // bytes of a message
 std::pair<std::string, std::string> host_and_port(const std::string& service) {
   const std::size_t colon = service.rfind(':');
   if (colon == std::string::npos || colon == 0 || colon + 1 == service.size())
-    throw LinkError("'" + service + "' is no HOST:PORT of a service");
+    throw LinkError("'" + service + "' is not HOST:PORT of a service");
   return {service.substr(0, colon), service.substr(colon + 1)};
 }
 
-/// Runs what was begun until it has ended. \throws LinkError where it fails or takes too long
+/// Runs a started operation to its end. \throws LinkError if it fails or takes too long
 void finish(asio::io_context& io, const bool& done, const Code& error, const std::string& what) {
   const auto give_up = Clock::now() + kPatience;
   io.restart();
@@ -41,7 +41,7 @@ void open(asio::io_context& io, asio::ip::tcp::socket& socket, const std::string
   Code error;
   asio::ip::tcp::resolver resolver(io);
   const auto places = resolver.resolve(host, port, error);
-  if (error) throw LinkError(service + " is not known: " + error.message());
+  if (error) throw LinkError("the address " + service + " is unknown: " + error.message());
   bool done = false;
   asio::async_connect(socket, places, [&](const Code& code, const auto&) {
     done = true;

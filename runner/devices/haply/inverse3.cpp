@@ -14,14 +14,14 @@ namespace {
 
 constexpr std::int64_t kExchange_ns = 250'000;
 constexpr std::int64_t kSilent_ns = 25'000'000;      // without a state: the device counts as silent
-constexpr std::int64_t kStale_ns = 500'000'000;      // the same state, whatever is sent
-constexpr std::int64_t kUnheeded_ns = 200'000'000;   // a force that is not reported
-constexpr double kHeeded = 0.1, kFelt = 0.3;         // part of the force; N, that is looked at
+constexpr std::int64_t kStale_ns = 500'000'000;      // the same state although forces change
+constexpr std::int64_t kUnheeded_ns = 200'000'000;   // a sent force that is not reported
+constexpr double kHeeded = 0.1, kFelt = 0.3;         // share of the force; least force checked, N
 constexpr double kFarthest = 0.5;                    // m; no model reaches so far
 constexpr double kMaxSpeed = 5, kJump = 1e-3;        // m/s and m
 constexpr auto kPatience = std::chrono::seconds(2);  // for the list of devices
 
-// A reseller's numbers; the arm's reach as the maker's tutorials clamp it.
+// A reseller's numbers; the reach is the limit in the maker's tutorials.
 constexpr double kMaxForce = 4, kMaxStiffness = 1000, kReach = 0.1, kResolution = 1e-5;
 
 std::string service_of(const DeviceConfig& config) {
@@ -36,7 +36,7 @@ std::string advice_for(const std::string& service, const std::string& why) {
 /// The first message of a new connection.
 Inventory inventory_of(Link& link) {
   std::string_view message;
-  if (!link.receive(message, kPatience)) throw LinkError("it sends no list of devices");
+  if (!link.receive(message, kPatience)) throw LinkError("it sent no list of devices");
   return parse_inventory(message);
 }
 
@@ -73,7 +73,7 @@ const Pump::Newest& Pump::newest() noexcept {
 }
 
 void Pump::run() noexcept {
-  request_realtime({84, false, -1, false});  // below the guard that reads it
+  request_realtime({84, false, -1, false});  // below the guard, which reads it
   RealClock clock;
   std::int64_t due = clock.now_ns();
   try {
@@ -85,7 +85,7 @@ void Pump::run() noexcept {
     }
     wanted_.write({});
     exchange(false);
-  } catch (const std::exception&) {  // the connection, or what came over it
+  } catch (const std::exception&) {  // of the connection or of a message
     last_.trouble = DeviceTrouble::service_gone;
     last_.time_ns = clock.now_ns();
     newest_.write(last_);
@@ -125,7 +125,7 @@ void Pump::watch(const Vec3& sent, std::string_view message) noexcept {
     sent_changed_ = false;
   }
   last_message_ = hash;
-  // Where the hand holds still and the force stays, nothing need change.
+  // If hand and force do not change, neither need the state.
   if (sent_changed_ && last_.time_ns - changed_ns_ > kStale_ns)
     last_.trouble = DeviceTrouble::silent;
   const double size = glm::length(sent);
@@ -154,7 +154,7 @@ void Inverse3Device::open() {
         parse_force_scale(get(service, "/settings/devices/force_scale"));
     if (scale && *scale != 1)
       throw std::runtime_error("it scales forces by " + std::to_string(*scale) +
-                               ": set its force_scale to 1, or newtons are none");
+                               ": set its force_scale to 1, so that forces are newtons");
     std::unique_ptr<Link> link = connect(service);
     const Inventory found = inventory_of(*link);
     const std::string wanted = config_.serials.empty() ? "" : config_.serials[0];
@@ -175,7 +175,7 @@ void Inverse3Device::open() {
     if (arm->basis != "XYZ" || arm->mounted)
       throw std::runtime_error(
           "the axes of the Inverse3 '" + arm->id +
-          "' are permuted or moved there: set its basis to XYZ, without mount");
+          "' are permuted or moved by the service: set its basis to XYZ, without mount");
     Pump::Settings settings;
     settings.arm = arm->id;
     has_grip_ = may_have_grip_ && !found.grips.empty();
@@ -193,7 +193,7 @@ void Inverse3Device::open() {
     throw std::runtime_error(advice_for(service, error.what()));
   }
   asked_ns_ = 0;
-  // From here on there is a state.
+  // Wait for a first state.
   RealClock clock;
   const std::int64_t give_up = clock.now_ns() + 2'000'000'000;
   while (pump_->newest().time_ns == 0 && clock.now_ns() < give_up)
@@ -209,11 +209,12 @@ void Inverse3Device::reopen() {
 
 bool Inverse3Device::plausible(const Pump::Newest& newest) noexcept {
   const Vec3& at = newest.state.position;
-  // From before the last one to after this one: a busy machine stops the thread anywhere.
+  // Measure from before the last state to after this one: a busy machine may stop the thread
+  // anywhere.
   const double elapsed = asked_ns_ > 0 ? static_cast<double>(newest.time_ns - asked_ns_) * 1e-9 : 1;
   const double moved = glm::length(at - tip_);
   if (!finite(at) || glm::length(at) > kFarthest || !finite(newest.state.axis)) {
-    asked_ns_ = 0;  // the next one is not measured against it
+    asked_ns_ = 0;  // do not compare the next reading with it
     return false;
   }
   tip_ = at;

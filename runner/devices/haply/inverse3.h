@@ -1,6 +1,6 @@
 #pragma once
 // A Haply Inverse3, Inverse3x or Minverse, with or without a Verse Grip, through the maker's
-// Inverse Service. Not tried on hardware: what is uncertain is listed in runner/README.md.
+// Inverse Service. Not tested on hardware: runner/README.md lists the uncertainties.
 
 #include <atomic>
 #include <cstdint>
@@ -20,14 +20,14 @@ namespace palpate::runner::haply {
 
 inline constexpr const char* kService = "127.0.0.1:10001";
 
-/// Exchanges one message with the service every 250 us, in a thread of its own: the newest force
-/// out, the newest state in. One exchange a tick would make every force a tick late.
+/// Exchanges one message with the service every 250 us, in its own thread: sends the newest force
+/// and receives the newest state. With one exchange a tick, every force would be a tick late.
 class Pump {
  public:
   struct Settings {
     std::string arm, grip;  ///< ids; no grip: empty
     Dialect dialect = Dialect::vector;
-    double silence = 0.005;  ///< s; a force that is older becomes zero
+    double silence = 0.005;  ///< s; an older force becomes zero
   };
   struct Newest {
     State state;
@@ -36,7 +36,7 @@ class Pump {
   };
 
   Pump(std::unique_ptr<Link> link, const Settings& settings);
-  /// Zero force, then the end.
+  /// Sends zero force and ends.
   ~Pump();
   Pump(const Pump&) = delete;
   Pump& operator=(const Pump&) = delete;
@@ -61,20 +61,20 @@ class Pump {
   TripleBuffer<Newest> newest_;
   Newest seen_;  ///< the reader's
   std::atomic<bool> quit_{false}, misunderstood_{false};
-  // The thread's own.
+  // Used by the thread only.
   Newest last_;
   Vec3 sent_;
   std::size_t last_message_ = 0;    ///< hash
-  std::int64_t changed_ns_ = 0;     ///< when a message differed from the one before
-  bool sent_changed_ = false;       ///< since then
-  std::int64_t unanswered_ns_ = 0;  ///< since a force is sent that the service does not report
+  std::int64_t changed_ns_ = 0;     ///< time of the last message that differed from the one before
+  bool sent_changed_ = false;       ///< since changed_ns_
+  std::int64_t unanswered_ns_ = 0;  ///< start of sending a force that the service does not report
   std::thread thread_;
 };
 
 class Inverse3Device final : public Device {
  public:
-  /// \throws std::runtime_error saying what is in the way
-  /// \param grip  whether the axis of a Verse Grip is sensed, where there is one
+  /// \throws std::runtime_error with the obstacle
+  /// \param grip  whether to sense the axis of a Verse Grip, if there is one
   explicit Inverse3Device(const DeviceConfig& config, bool grip = true);
 
   const DeviceCapabilities& capabilities() const override { return capabilities_; }
@@ -89,11 +89,11 @@ class Inverse3Device final : public Device {
 
   DeviceConfig config_;
   DeviceCapabilities capabilities_;
-  bool other_dialect_ = false;  ///< than the version suggests
+  bool other_dialect_ = false;  ///< use the dialect that the version does not suggest
   bool may_have_grip_, has_grip_ = false;
   double period_ns_;
   Vec3 tip_, tail_;            ///< m, of the last good reading
-  std::int64_t asked_ns_ = 0;  ///< for that; 0: none
+  std::int64_t asked_ns_ = 0;  ///< time of asking for it; 0: none
   bool lost_ = true;
   std::unique_ptr<Pump> pump_;
 };
@@ -103,7 +103,7 @@ void check(const DeviceConfig& config);
 DeviceCapabilities nominal(const DeviceConfig& config);
 std::vector<ConnectedDevice> connected(const DeviceConfig& config);
 std::unique_ptr<Device> open(const DeviceConfig& config);
-/// Without the axis of a grip.
+/// Opens it without the axis of a grip.
 std::unique_ptr<Device> open_point(const DeviceConfig& config);
 
 }  // namespace palpate::runner::haply

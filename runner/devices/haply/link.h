@@ -9,7 +9,7 @@
 
 namespace palpate::runner::haply {
 
-/// The connection is gone or cannot be made; what() says why.
+/// The connection has ended or cannot be made; what() gives the reason.
 struct LinkError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
@@ -17,8 +17,8 @@ struct LinkError : std::runtime_error {
 class Link {
  public:
   virtual ~Link() = default;
-  /// Waits for the next message. None where it does not come in time: the next call goes on
-  /// waiting. The message is valid until the next call. \throws LinkError
+  /// Waits for the next message. False: it did not arrive in time; the next call continues to wait.
+  /// The message is valid until the next call. \throws LinkError
   virtual bool receive(std::string_view& message, std::chrono::microseconds patience) = 0;
   /// \throws LinkError
   virtual void send(std::string_view message) = 0;
@@ -26,7 +26,7 @@ class Link {
 
 /// \param service  "HOST:PORT"; the documented one is 127.0.0.1:10001. \throws LinkError
 std::unique_ptr<Link> connect(const std::string& service);
-/// The body of the reply; empty where the status is not 200. \throws LinkError
+/// The body of the reply; empty: the status is not 200. \throws LinkError
 std::string get(const std::string& service, const std::string& target);
 
 }  // namespace palpate::runner::haply

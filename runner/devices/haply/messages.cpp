@@ -27,12 +27,12 @@ Json parsed(std::string_view text, const char* what) {
   return out;
 }
 
-/// What a reply over HTTP says, with or without its wrapping.
+/// The data of an HTTP reply, wrapped or not.
 Json data_of(std::string_view reply, const char* what) {
   Json all = parsed(reply, what);
   const auto ok = all.find("ok");
   if (ok == all.end()) return all;
-  if (*ok != true) throw std::runtime_error(std::string("the service does not tell ") + what);
+  if (*ok != true) throw std::runtime_error(std::string("the service does not report ") + what);
   const auto data = all.find("data");
   return data != all.end() ? *data : Json::object();
 }
@@ -66,7 +66,7 @@ std::optional<Vec3> vector(const Json& of, const char* name) {
   return Vec3(number(*found, "x"), number(*found, "y"), number(*found, "z"));
 }
 
-/// \param take  called with each object of the array that has a device_id
+/// \param take  called for each object of the array with a device_id
 template <class Take>
 void each(const Json& message, const char* array, Take take) {
   const Json* const all = member(message, array);
@@ -75,7 +75,7 @@ void each(const Json& message, const char* array, Take take) {
     if (!text(one, "device_id").empty()) take(one);
 }
 
-/// Where the mount or a transform moves positions: anything but nothing, zeros and ones.
+/// Whether a mount or transform moves positions: it has numbers other than 0 and 1.
 bool moves(const Json& transform) {
   if (transform.is_structured()) {
     for (const Json& part : transform)
@@ -121,7 +121,7 @@ std::optional<double> parse_force_scale(std::string_view reply) {
       const double scale = number(data, name);
       if (std::isfinite(scale)) return scale;
     }
-  } catch (const std::runtime_error&) {  // older services have no such page
+  } catch (const std::runtime_error&) {  // older services lack this page
   }
   return std::nullopt;
 }
@@ -182,7 +182,7 @@ State parse_state(std::string_view message, const std::string& arm, const std::s
       const Json* const q = member(*state, "orientation");
       if (q == nullptr) return;
       const glm::dquat turn(number(*q, "w"), number(*q, "x"), number(*q, "y"), number(*q, "z"));
-      if (!(std::abs(glm::length(turn) - 1) < 0.05)) return;  // also where it is not finite
+      if (!(std::abs(glm::length(turn) - 1) < 0.05)) return;  // also if it is not finite
       out.has_grip = true;
       out.axis = glm::normalize(turn * Vec3(0, -1, 0));  // it points along its own +y
       out.buttons = buttons_of(*state);
@@ -193,7 +193,7 @@ State parse_state(std::string_view message, const std::string& arm, const std::s
 
 std::string command(const std::string& arm, const Vec3& force, Dialect dialect, bool first) {
   std::array<char, 512> out{};
-  // The id is the service's own, from its list: JSON escapes it where it must.
+  // The id comes from the service's list; escape it for JSON.
   const std::string id = Json(arm).dump(-1, ' ', true, Json::error_handler_t::replace);
   const char* const key = dialect == Dialect::vector ? "vector" : "values";
   const int size = std::snprintf(
@@ -203,7 +203,7 @@ std::string command(const std::string& arm, const Vec3& force, Dialect dialect, 
       first ? R"("configure":{"preset":"arm_front_centered"},)" : "", key, force.x, force.y,
       force.z);
   if (size < 0 || static_cast<std::size_t>(size) >= out.size())
-    throw std::runtime_error("a device with so long a name cannot be commanded");
+    throw std::runtime_error("the device's name is too long for a command");
   return {out.data(), static_cast<std::size_t>(size)};
 }
 

@@ -14,7 +14,7 @@ void* load(const std::string& path) {
   if (path.empty()) places = {"libHD.so", "libHD.so.3", "libHD.so.3.4"};
   std::string tried;
   for (const std::string& place : places) {
-    // Global: the driver's own libraries look for its names.
+    // Load it globally: the driver's own libraries look for its symbols.
     if (void* const handle = dlopen(place.c_str(), RTLD_NOW | RTLD_GLOBAL)) return handle;
     const char* const why = dlerror();
     tried += "\n  " + (why != nullptr ? std::string(why) : place);

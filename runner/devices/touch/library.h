@@ -1,6 +1,6 @@
 #pragma once
-// The functions of OpenHaptics' libHD, loaded at run time: it is proprietary, and a lab installs
-// it. Prototypes and numbers are written anew from its public documentation.
+// The functions of OpenHaptics' libHD, loaded at run time: it is proprietary and is installed by
+// the lab. Prototypes and numbers were written from its public documentation.
 
 #include <string>
 
@@ -17,9 +17,9 @@ struct Error {
 
 /// Frame: x right, y up, z to the user. Millimetres, newtons.
 struct Library {
-  /// Loads it once for the whole process and never lets go: it fails when it is loaded again.
-  /// \param path  empty: where the loader looks. \throws std::runtime_error saying what was tried
-  /// and what is missing
+  /// Loads it once for the whole process and never unloads it: loading it again fails.
+  /// \param path  empty: the loader's paths. \throws std::runtime_error naming the paths tried or
+  /// the missing function
   static const Library& get(const std::string& path);
 
   Handle (*init_device)(const char* name) = nullptr;  ///< nullptr: the default device
@@ -39,7 +39,7 @@ struct Library {
   void (*set_rate)(unsigned long hz) = nullptr;
   void (*start)() = nullptr;
   void (*stop)() = nullptr;
-  /// The callback is called at the scheduler's rate in its thread as long as it returns 1.
+  /// The scheduler calls the callback at its rate, in its thread, as long as it returns 1.
   unsigned long (*schedule)(unsigned (*callback)(void*), void* data,
                             unsigned short priority) = nullptr;
   void (*unschedule)(unsigned long) = nullptr;
@@ -48,7 +48,7 @@ struct Library {
   explicit Library(const std::string& path);
 };
 
-// What is asked for and set, and what comes back.
+// Parameters to get and set, and returned values.
 inline constexpr unsigned kButtons = 0x2000, kPosition = 0x2050, kTransform = 0x2052,
                           kForce = 0x2700, kModel = 0x2501, kSerialNumber = 0x2504,
                           kCalibrationStyle = 0x2555, kStiffness = 0x2602, kMaxForce = 0x2603,

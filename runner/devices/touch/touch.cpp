@@ -17,17 +17,17 @@ namespace {
 constexpr unsigned long kSchedulerRate = 1000;      // Hz
 constexpr unsigned short kPriority = 0xFFFF;        // the highest
 constexpr std::int64_t kSilent_ns = 25'000'000;     // without a call: the device counts as silent
-constexpr std::int64_t kTroubleLasts = 50'000'000;  // ns after the last error, so that it is seen
-constexpr int kMostErrors = 16;                     // of a call; more: a library that never ends
-constexpr int kCalibrationCalls = 100;              // calls between two looks at the calibration
-constexpr double kFarthest = 0.5;                   // m; no model reaches so far
-constexpr double kMaxSpeed = 5, kJump = 1e-3;       // m/s and m
-// A Touch, where the device does not say: continuous force, so that nothing is too much.
+constexpr std::int64_t kTroubleLasts = 50'000'000;  // ns; shows an error this long
+constexpr int kMostErrors = 16;         // errors taken in a call: a faulty library may never end
+constexpr int kCalibrationCalls = 100;  // calls between two checks of the calibration
+constexpr double kFarthest = 0.5;       // m; no model reaches so far
+constexpr double kMaxSpeed = 5, kJump = 1e-3;  // m/s and m
+// A Touch's continuous force, the safe value, for devices that report none.
 constexpr double kLeastForce = 0.88, kMostForce = 40, kLeastStiffness = 500, kMostStiffness = 5000;
 constexpr double kReach = 0.035;  // m; half the smallest side of a Touch's workspace
 
-/// Devices of this process that the scheduler calls; it is stopped while another is opened. For the
-/// thread that opens and closes.
+/// Number of this process's devices that the scheduler calls. The scheduler is stopped while
+/// another is opened. For the thread that opens and closes.
 int& running() {
   static int devices = 0;
   return devices;
@@ -37,7 +37,7 @@ std::string text_of(const char* text, const char* otherwise) {
   return text != nullptr && *text != '\0' ? printable(text) : otherwise;
 }
 
-/// The newest error, or 0; all others are forgotten.
+/// The newest error, or 0; discards all others.
 unsigned last_error(const Library& library) {
   unsigned newest = 0;
   for (int i = 0; i < kMostErrors; ++i) {
@@ -119,7 +119,7 @@ void TouchDevice::open() {
   library_.set_rate(kSchedulerRate);
   library_.start();
   ++running();
-  // From here on there is a reading.
+  // Wait for a first reading.
   RealClock clock;
   const std::int64_t give_up = clock.now_ns() + 500'000'000;
   while (seen_.time_ns == 0 && clock.now_ns() < give_up) {
@@ -133,7 +133,7 @@ void TouchDevice::close() noexcept {
   wanted_.write({});
   library_.stop();
   library_.unschedule(scheduled_);
-  // The last force goes on until another is set.
+  // Set zero force: the last force stays until another is set.
   const std::array<double, 3> zero{};
   library_.begin_frame(handle_);
   library_.set_doubles(kForce, zero.data());
@@ -150,7 +150,7 @@ void TouchDevice::reopen() {
 
 unsigned TouchDevice::called(void* device) noexcept {
   static_cast<TouchDevice*>(device)->exchange();
-  return 1;  // go on
+  return 1;  // call again
 }
 
 DeviceTrouble TouchDevice::errors() noexcept {
@@ -223,10 +223,11 @@ bool TouchDevice::plausible(const Frame& frame) noexcept {
   const Vec3& at = frame.position;
   if (!finite(at) || glm::length(at) > kFarthest || !finite(frame.axis) ||
       std::abs(glm::length(frame.axis) - 1) > 0.01) {
-    asked_ns_ = 0;  // the next one is not measured against it
+    asked_ns_ = 0;  // do not compare the next reading with it
     return false;
   }
-  // From before the last one to after this one: a busy machine stops the thread anywhere.
+  // Measure from before the last frame to after this one: a busy machine may stop the thread
+  // anywhere.
   const double elapsed = asked_ns_ > 0 ? static_cast<double>(frame.time_ns - asked_ns_) * 1e-9 : 1;
   const double moved = glm::length(at - tip_);
   tip_ = at;
@@ -270,8 +271,8 @@ std::vector<ConnectedDevice> connected(const DeviceConfig& config) {
   Library::get(config.library);
   std::vector<ConnectedDevice> out;
   const char* const home = std::getenv("GTDD_HOME");
-  if (home == nullptr || *home == '\0') return {{"", ""}};  // the default one, it may be
-  std::error_code error;                                    // a folder that cannot be read has none
+  if (home == nullptr || *home == '\0') return {{"", ""}};  // perhaps the default device
+  std::error_code error;                                    // an unreadable folder counts as empty
   for (const auto& file :
        std::filesystem::directory_iterator(std::filesystem::path(home) / "config", error))
     if (file.path().extension() == ".config") out.push_back({file.path().stem().string(), ""});

@@ -1,6 +1,6 @@
 #pragma once
-// A 3D Systems Touch, Touch X or Phantom, through the maker's library and its scheduler. Not tried
-// on hardware: what is uncertain is listed in runner/README.md.
+// A 3D Systems Touch, Touch X or Phantom, through the maker's library and its scheduler. Not tested
+// on hardware: runner/README.md lists the uncertainties.
 
 #include <cstdint>
 #include <memory>
@@ -14,24 +14,24 @@
 
 namespace palpate::runner::touch {
 
-/// What the library's arguments and results mean in world coordinates (x right, y away from the
-/// user, z up).
+/// Convert between the library's frame and the world frame (x right, y away from the user, z up).
 inline Vec3 to_world(const Vec3& v) { return {v.x, -v.z, v.y}; }
 inline Vec3 from_world(const Vec3& v) { return {v.x, v.z, -v.y}; }
 
-/// Devices are known by the names that the maker's setup gave them. The library's scheduler calls
-/// every millisecond in its own thread; every call sets the force, or the last one goes on.
+/// Devices are identified by the names given in the maker's setup. The library's scheduler calls
+/// every millisecond in its own thread. Every call must set the force, because the last one would
+/// persist.
 class TouchDevice final : public Device {
  public:
   /// Opens the device with the config's serial number, which is its name, or the default one.
-  /// \throws std::runtime_error saying what is in the way
+  /// \throws std::runtime_error with the obstacle
   explicit TouchDevice(const DeviceConfig& config);
   ~TouchDevice() override;
 
   const DeviceCapabilities& capabilities() const override { return capabilities_; }
   /// Never waits. The tip is the device's position, the tail lies behind it along the gimbal's z.
   DeviceReading read() noexcept override;
-  /// Without torque: device1 + device2 at the tip.
+  /// Applies device1 + device2 at the tip, without torque.
   void write(const Vec3& device1, const Vec3& device2) noexcept override;
   void reopen() override;
 
@@ -39,7 +39,7 @@ class TouchDevice final : public Device {
   struct Frame {
     Vec3 position, axis;  ///< m, world; from tip to tail
     std::uint8_t buttons = 0;
-    std::int64_t asked_ns = 0, time_ns = 0;  ///< before and after it was asked for; 0: none yet
+    std::int64_t asked_ns = 0, time_ns = 0;  ///< before and after asking for it; 0: none yet
     DeviceTrouble trouble = DeviceTrouble::none;
   };
   struct Wanted {
@@ -58,14 +58,14 @@ class TouchDevice final : public Device {
   Handle handle_ = kNoHandle;
   unsigned long scheduled_ = 0;
   DeviceCapabilities capabilities_;
-  double silence_ns_;  ///< a force that is older becomes zero
+  double silence_ns_;  ///< an older force becomes zero
   SharedValue<Wanted> wanted_;
   TripleBuffer<Frame> frames_;
   Frame seen_;                 ///< the reader's newest
   Vec3 tip_, tail_;            ///< m, of the last reading
-  std::int64_t asked_ns_ = 0;  ///< for that
+  std::int64_t asked_ns_ = 0;  ///< time of asking for it
   bool lost_ = true;
-  // The scheduler's thread's own.
+  // Used by the scheduler's thread only.
   DeviceTrouble trouble_ = DeviceTrouble::none;
   std::int64_t trouble_ns_ = 0;
   int until_calibration_ = 0;
