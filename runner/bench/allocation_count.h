@@ -1,12 +1,12 @@
 #pragma once
-// Counts heap allocations, to show that a tick makes none.
+// Counts heap allocations, to show that a tick does not allocate.
 
 #include <cstdint>
 
 namespace palpate::runner {
 
 /// Heap allocations of this thread so far, counted by a replaced operator new. Always 0 under
-/// sanitizers, which have their own.
+/// sanitizers, which have their own operator new.
 std::uint64_t allocations();
 
 /// Whether allocations() counts.

@@ -16,14 +16,14 @@
 namespace palpate::runner {
 namespace {
 
-constexpr double kRadius = 0.03;      // m
-constexpr double kLength = 0.12;      // m, of the stylus
-constexpr double kSpeed = 0.1;        // m/s, of the tip
-constexpr double kAtRest = 0.2;       // s, outside of the sphere at first
-constexpr double kHomeRest = 0.02;    // s of rest that the servo requires
-constexpr double kMaxLateFit = 2e-4;  // of ticks late by a period: one in five seconds at 1 kHz
+constexpr double kRadius = 0.03;             // m
+constexpr double kLength = 0.12;             // m, of the stylus
+constexpr double kSpeed = 0.1;               // m/s, of the tip
+constexpr double kAtRest = 0.2;              // s, initially, outside the sphere
+constexpr double kHomeRest = 0.02;           // s of rest that the servo requires
+constexpr double kMaxLateFit = 2e-4;         // share of ticks late by a period: one in 5 s at 1 kHz
 constexpr double kMaxLateWithLosses = 2e-3;  // the same; more can be felt
-constexpr int kTrippingRun = 5;              // missed ticks in a row that cut the forces off
+constexpr int kTrippingRun = 5;              // missed ticks in a row that switch forces off
 
 std::int64_t thread_time_ns() noexcept {
   timespec time{};
@@ -31,7 +31,7 @@ std::int64_t thread_time_ns() noexcept {
   return time.tv_sec * 1'000'000'000LL + time.tv_nsec;
 }
 
-/// Rests outside of the sphere, then follows a path over it, 1.5 mm deep, turning on the way.
+/// Rests outside the sphere, then follows a path on it, 1.5 mm deep, while turning.
 class ScriptedStylus final : public Device {
  public:
   explicit ScriptedStylus(double rate) : rate_(rate) {
@@ -71,7 +71,7 @@ class ScriptedStylus final : public Device {
 /// Wraps a device and records the servo thread's CPU time before and after its transfers.
 class MeteredDevice final : public Device {
  public:
-  /// \param skip  ticks not recorded at first; \param ticks  recorded after that
+  /// \param skip  number of first ticks not recorded; \param ticks  number recorded after them
   MeteredDevice(Device& device, std::size_t skip, std::size_t ticks)
       : device_(device), skip_(skip) {
     compute_.reserve(ticks);
@@ -99,7 +99,7 @@ class MeteredDevice final : public Device {
     written_ = thread_time_ns();
     if (asking_.size() < asking_.capacity()) asking_.push_back(written_ - asked);
   }
-  /// CPU time of a query of the CPU clock.
+  /// CPU time of one query of the CPU clock.
   const std::vector<std::int64_t>& asking() const { return asking_; }
   const std::vector<std::int64_t>& compute() const { return compute_; }
   /// CPU time from one command to the next, without the device's transfers.

@@ -1,6 +1,6 @@
 #pragma once
-// Whether this machine is fit for the servo loop: runs a servo thread for some seconds and measures
-// every tick.
+// Measures whether this machine is fit for the servo loop: runs a servo thread for some seconds and
+// measures every tick.
 
 #include <cstdint>
 #include <functional>
@@ -15,7 +15,7 @@ struct TimingSettings {
   double rate = 1000;   ///< Hz
   double seconds = 10;  ///< of ticks with forces on
   RealtimeSettings realtime;
-  bool guarded = false;  ///< with the device in a guard process, as a real one is
+  bool guarded = false;  ///< with the device in a guard process, like a real one
 };
 
 /// Of ticks with forces on; times in ns. Quantiles are exact.
@@ -24,10 +24,10 @@ struct ServoTiming {
   double rate = 0;
   std::uint64_t ticks = 0, missed_ticks = 0, old_readings = 0;
   std::int64_t lateness_median = 0, lateness_p99 = 0, lateness_p999 = 0, lateness_max = 0;
-  double late_fraction = 0;  ///< fraction of ticks that are more than a period late
+  double late_fraction = 0;  ///< share of ticks more than a period late
   int worst_run = 0;         ///< longest run of missed ticks
-  std::uint64_t trips = 0;   ///< times that missed ticks cut the forces off
-  /// Wall-clock time of bringing the scene back into the caches (Servo::keep_warm).
+  std::uint64_t trips = 0;   ///< number of times that missed ticks switched forces off
+  /// Wall-clock time of reloading the scene into the caches (Servo::keep_warm).
   std::int64_t warm_up_median = 0, warm_up_p999 = 0, warm_up_max = 0;
   /// Wall-clock time from the device's reading to the command, preemption included.
   std::int64_t clock_median = 0, clock_p999 = 0, clock_max = 0;

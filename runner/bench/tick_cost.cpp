@@ -20,7 +20,7 @@
 
 namespace palpate::runner {
 
-// Times ticks one by one. Of runner/bench alone.
+// Times ticks one by one. For runner/bench only.
 
 class TickTimer {
  public:
@@ -35,7 +35,7 @@ class TickTimer {
     empty_ns_ = at(empty, 0.5);
   }
 
-  /// Runs one tick; its time is recorded if its state of contact is the wanted one.
+  /// Runs one tick; records its time if its state of contact is the wanted one.
   rendering::Rendering tick(const rendering::Renderer& renderer, const rendering::Scene& scene,
                             rendering::RenderState& state, const rendering::LineProbe& probe,
                             bool touching_wanted) {
@@ -50,7 +50,7 @@ class TickTimer {
 
   std::size_t ticks() const { return counts_.size(); }
 
-  /// The statistics of the row; starts a new one.
+  /// Returns the statistics of the row and starts a new one.
   TickCost take() {
     TickCost cost;
     cost.ticks = counts_.size();
@@ -78,9 +78,9 @@ class TickTimer {
   std::size_t allocations_ = 0;
 };
 
-/// One row from kTickRounds rounds of the same ticks, `measure()` each: other programs and the
-/// machine only add to a round, so the lowest median and 99th percentile are kept. The maximum is
-/// that of all rounds.
+/// One row from kTickRounds rounds of the same ticks, each by `measure()`. Other programs and the
+/// machine can only make a round slower, so the row has the lowest median and 99th percentile. The
+/// maximum is that of all rounds.
 template <class Measure>
 TickCost least_disturbed(const Measure& measure) {
   TickCost row = measure();
@@ -98,13 +98,13 @@ TickCost least_disturbed(const Measure& measure) {
 }
 
 // Run time of ticks over an object of many convex parts with a tool of several segments: rows of
-// `palpate bench`. Of runner/bench alone.
+// `palpate bench`. For runner/bench only.
 
 inline constexpr std::size_t kUnionCosts = 7;  ///< rows
 
-/// Ten balls of 30 mm in a ring that overlap, one object, and a cross under the stylus that lies on
-/// them and turns, 1 to 2 mm deep, at 0.1 m/s: of all fineness, with 990 more balls out of reach,
-/// with one segment, and with one ball.
+/// One object of ten overlapping balls of 30 mm in a ring. A cross on the stylus lies on them and
+/// turns, 1 to 2 mm deep, at 0.1 m/s. Rows: several finenesses, 990 more balls out of reach, a
+/// single segment, and a single ball.
 void measure_union_costs(TickTimer& timer, std::size_t ticks,
                          const std::function<void(TickCost)>& keep);
 
@@ -153,10 +153,10 @@ rendering::Scene ring(const UnionBench& bench, const Mesh& mesh) {
   return rendering::Scene(std::move(balls), true, std::move(tool));
 }
 
-/// The hand goes round over the ring, turns and tilts; its height follows the depth of contact.
+/// The hand circles over the ring, turns and tilts; its height follows the depth of contact.
 class RingHand {
  public:
-  /// \param round  m, radius of its way
+  /// \param round  radius of its path, m
   explicit RingHand(double round) : round_(round) {}
 
   rendering::LineProbe next(double depth, rendering::RenderState& state) {
@@ -213,7 +213,7 @@ void measure_union_costs(TickTimer& timer, std::size_t ticks,
                                                         : 7;
     const auto mesh =
         std::make_shared<const stimuli::ConvexMesh>(stimuli::icosphere(kPartRadius, subdivisions));
-    // The cross lies over the ring's hollow; the stylus alone is led over the tops of the balls.
+    // The cross lies over the ring's hollow; the plain stylus moves over the tops of the balls.
     const double round = bench.segments == 3 ? 0.015 : kRing;
     const rendering::Scene scene = ring(bench, mesh);
     TickCost cost =
@@ -280,7 +280,7 @@ struct Bench {
   std::string name;
   std::size_t triangles;
   rendering::Scene scene;  ///< with side contact
-  double target_ns;        ///< in contact
+  double target_ns;        ///< for contact
 };
 
 /// m; depth of tip or side below the bounding sphere, negative outside.
@@ -323,8 +323,8 @@ TickCost time_free_space(TickTimer& timer, const rendering::Renderer& renderer, 
   return timer.take();
 }
 
-/// From a random direction and 10 mm away, drifting along the surface; with the ray every second
-/// time the side first.
+/// Approaches from 10 mm away in a random direction, drifting along the surface; with the ray every
+/// second approach is with the side.
 TickCost time_first_contact(TickTimer& timer, const rendering::Renderer& renderer,
                             const Bench& bench, std::size_t approaches) {
   Random random(2);
@@ -367,7 +367,7 @@ rendering::Scene thousand(const std::shared_ptr<const stimuli::ConvexMesh>& mesh
     object.mesh = mesh;
     object.trees = trees;
     object.object = i;
-    const int k = (i + 555) % 1000;  // puts the first in the middle
+    const int k = (i + 555) % 1000;  // put the first in the middle
     object.pose.position = 0.3 * Vec3(k % 10 - 5, k / 10 % 10 - 5, k / 100 - 5);
     objects.push_back(std::move(object));
   }

@@ -35,7 +35,7 @@ struct SimulateSettings {
   int jobs = 1;
 };
 
-/// None where --help was asked for and printed. \throws UsageError
+/// None: --help was given and printed. \throws UsageError
 std::optional<SimulateSettings> parse_simulate_settings(const std::vector<std::string>& args) {
   SimulateSettings settings;
   settings.jobs = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
@@ -47,8 +47,8 @@ std::optional<SimulateSettings> parse_simulate_settings(const std::vector<std::s
       "Runs the whole study with simulated participants through the renderers, device layer,\n"
       "session and store that live participants use. Their data is labelled simulated. Run\n"
       "again, it resumes where it stopped; the same seed gives the same data, whatever the jobs\n"
-      "and interruptions. With --shard several machines simulate a part of the participants each;\n"
-      "palpate merge joins the parts, with the same data.";
+      "and interruptions. With --shard each of several machines simulates some participants;\n"
+      "palpate merge joins the parts to the same data.";
   line.example =
       R"(  palpate simulate protocols/quick.json --db quick.db --participants 2    a minute's try
   palpate simulate protocols/ho2000.json --db study.db                    the paper's study
@@ -69,7 +69,7 @@ std::optional<SimulateSettings> parse_simulate_settings(const std::vector<std::s
        "at a time")  //
       ("ask-time-out-s",
        po::value(&settings.advisor_time_out)->default_value(1, "1")->value_name("S"),
-       "without an answer in that time the block's own procedure chooses, which is on record");
+       "without an answer in that time the block's own procedure chooses, and this is recorded");
   const auto values = line.parse(args);
   if (!values) return std::nullopt;
   check_advisor(settings.advisor, settings.advisor_time_out);
@@ -93,15 +93,15 @@ StudyPlan plan_of(const SimulateSettings& settings) {
   return plan;
 }
 
-/// The version that participants of this protocol in the database have; of any protocol if there
-/// are none. \throws UsageError: it has several
+/// The version of this protocol's participants in the database; if there are none, of those of any
+/// protocol. \throws UsageError: it has several
 int version_begun_with(data::Store& store, const std::string& protocol_sha256,
                        const std::string& patch) {
   std::map<std::string, std::optional<int>> version_of;  // by checksum
   std::set<int> own, all;
   for (const data::StoredRun& run : store.runs()) {
     const std::string& sha256 = run.info.observer_sha256;
-    if (sha256.empty()) continue;  // a person
+    if (sha256.empty()) continue;  // a human participant
     auto known = version_of.find(sha256);
     if (known == version_of.end())
       known = version_of.emplace(sha256, participant_version_of(sha256, patch)).first;
@@ -112,7 +112,7 @@ int version_begun_with(data::Store& store, const std::string& protocol_sha256,
   return version_to_go_on_with(own.empty() ? all : own, store.path());
 }
 
-/// \param seconds  that it took
+/// \param seconds  run time
 void print_summary(const protocols::Protocol& protocol, const std::string& database,
                    const SimulatedSettings& simulated, std::uint64_t seed,
                    const StudyProgress& progress, double seconds) {
@@ -127,7 +127,7 @@ void print_summary(const protocols::Protocol& protocol, const std::string& datab
               progress.simulated_seconds / seconds);
 }
 
-/// Blocks of which a tenth or more had no answer, and what would help.
+/// Prints blocks with no answer in a tenth or more of the trials, and remedies.
 void print_unanswered(const protocols::Protocol& protocol, const StudyProgress& progress) {
   for (const protocols::TaskBlock& block : protocol.blocks) {
     const auto found = progress.by_block.find(block.name);
@@ -167,14 +167,14 @@ int simulate_command(const std::vector<std::string>& args) {
     return data::Store::open(given->database, data::Store::Mode::write_or_create);
   };
   int version = options.version;
-  std::error_code none;  // what cannot be seen is refused where it is opened
+  std::error_code none;  // an invisible file is refused when opened
   if (version == 0 && std::filesystem::exists(given->database, none)) {
     store.emplace(open());
     version = version_begun_with(*store, protocol.sha256, options.patch);
   }
   if (version == 0) version = kDefaultParticipantVersion;
   const SimulatedSettings simulated = load_simulated_settings(options.patch, version);
-  // Before a database is created: what is refused leaves none behind.
+  // Check before creating a database, so that a refusal leaves none behind.
   const LimitedForSimulation limited = fit_to_simulation(protocol, simulated);
   for (const std::string& text : limited.texts)
     std::fprintf(stderr, "%s\n", printable(text).c_str());

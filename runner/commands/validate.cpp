@@ -23,7 +23,7 @@
 namespace palpate::runner {
 namespace {
 
-constexpr double kTypicalTrial = 10;  // s; a little more than the paper's participants took
+constexpr double kTypicalTrial = 10;  // s; a little more than in the paper
 
 /// Builds every mesh of an object, as a session does, and adds its faults.
 void check_meshes(const stimuli::ObjectSpec& object, const std::string& pointer,
@@ -45,7 +45,8 @@ void check_meshes(const stimuli::ObjectSpec& object, const std::string& pointer,
   }
 }
 
-/// Groups of a mesh file that overlap: taken, but hardly meant where parts should abut.
+/// Prints overlapping groups of a mesh file: accepted, but probably unintended if parts should
+/// abut.
 void print_overlaps(const stimuli::ObjectSpec& object, const std::string& name, std::ostream& out) {
   for (const stimuli::ObjectSpec& part : object.parts) print_overlaps(part, name, out);
   for (const std::string& overlap : stimuli::group_overlaps(object))
@@ -79,7 +80,7 @@ std::string masking(const protocols::Protocol& protocol) {
   return out.str();
 }
 
-/// Of version 2.
+/// Prints the summary of a protocol of version 2.
 void print_task_summary(const protocols::Protocol& protocol, std::ostream& out) {
   std::vector<std::string> renderers, stimuli;
   for (const protocols::RendererKind kind : protocol.renderers)
@@ -146,7 +147,7 @@ void print_verdict(const std::string& what, const std::vector<std::string>& reas
   for (const LimitedMaterial& one : limited) out << "      " << printable(one.text) << "\n";
 }
 
-/// Whether each kind of device and simulated participants can show the protocol; if not, why.
+/// Prints whether each kind of device and simulated participants can run the protocol, or why not.
 void print_fitness(const protocols::Protocol& protocol, const StimulusLibrary& library,
                    std::ostream& out) {
   DeviceConfig config;
@@ -175,8 +176,8 @@ int validate_command(const std::vector<std::string>& args) {
   CommandLine line;
   line.usage = "palpate validate PROTOCOL.json [--language CODE | --texts]";
   line.summary =
-      "Checks a protocol with its meshes and its schedule, and lists all faults. Says which\n"
-      "devices can show it, whether it can be simulated, and what prevents the others.";
+      "Checks a protocol with its meshes and its schedule, and lists all faults. Lists the\n"
+      "devices that can run it, whether it can be simulated, and the reasons if not.";
   line.example = R"(  palpate validate protocols/ho2000.json
   palpate validate protocols/roughness-magnitude.json --texts > texts.de.json   to be translated
   palpate validate protocols/roughness-magnitude.json --language de)";
@@ -187,7 +188,7 @@ int validate_command(const std::vector<std::string>& args) {
        "check the translation of its texts, too: NAME.texts.CODE.json or texts.CODE.json beside "
        "it")  //
       ("texts", boost::program_options::bool_switch(&texts),
-       "print all texts that a participant reads, as JSON, and nothing else");
+       "print only the texts that a participant reads, as JSON");
   line.positional_names = {"PROTOCOL.json"};
   const auto values = line.parse(args);
   if (!values) return 0;

@@ -12,7 +12,7 @@ namespace palpate::runner {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
-constexpr double kLowest = 10;          // Hz, of the first pole: below it pink noise is flat
+constexpr double kLowest = 10;          // Hz, first pole: below it pink noise is flat
 constexpr double kLongEnough = 1;       // s; the slowest pole has decayed to e^-60
 constexpr double kEvenPower = 1.0 / 3;  // mean square of uniform numbers in -1..1
 
@@ -29,7 +29,7 @@ NoiseSignal::NoiseSignal(const protocols::MaskingNoise& noise, double rate, std:
       slopes_.push_back({in_z_plane(pole, rate), in_z_plane(pole * std::sqrt(2.0), rate)});
     }
   }
-  double power = 0;  // gain of the filter in power, from its impulse response
+  double power = 0;  // power gain of the filter, from its impulse response
   const auto length = static_cast<int>(kLongEnough * rate);
   for (int i = 0; i < length; ++i) {
     const double response = filtered(i == 0 ? 1 : 0);
@@ -60,11 +60,11 @@ namespace {
 
 constexpr double kBlock = 0.02;  // s, length of a block
 
-// Pacing for outputs without a clock (a file), which accept everything at once: a block per 0.9 of
-// its duration. A sound card is slower than that and sets the pace itself.
+// Pacing for outputs without a clock (a file), which accept everything at once: write a block every
+// 0.9 of its duration. A sound card is slower and sets the pace itself.
 constexpr double kPace = 0.9;
 
-/// Pitches of a tone's parts, Hz, one after the other; 0: it is over.
+/// Pitches of a tone's successive parts, Hz; 0: no second part.
 std::array<double, 2> pitches_of(Tone tone) {
   switch (tone) {
     case Tone::ready:
@@ -79,7 +79,7 @@ std::array<double, 2> pitches_of(Tone tone) {
   return {};
 }
 
-/// Adds tones to the samples. One that begins fades out the one before, which would click.
+/// Adds tones to the samples. A new tone fades out the previous one, so that it does not click.
 class ToneSignal {
  public:
   ToneSignal(double level_db, double rate)
@@ -99,7 +99,7 @@ class ToneSignal {
   static constexpr double kLength = 0.1, kEdge = 0.01;  // s, of a part
   struct Playing {
     std::array<double, 2> pitches{};
-    double at = 0, over = 0;  // s since it began; when it ends
+    double at = 0, over = 0;  // s since its beginning; time of its end
   };
 
   double next(Playing& tone) const {

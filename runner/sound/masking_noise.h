@@ -50,25 +50,25 @@ class NoiseSignal {
   double fade_ = 0;  ///< 0 to 1, phase of the raised cosine
 };
 
-/// Tones: short, sines.
+/// Short tones, made of sines.
 enum class Tone { ready, go, right, wrong };
 
-/// What was played since the noise was last turned on.
+/// A report since the noise was last turned on.
 struct NoiseReport {
   double seconds = 0;   ///< of noise, including the fades
   int underruns = 0;    ///< gaps in the output
-  std::string trouble;  ///< why it failed; empty: it did not
+  std::string trouble;  ///< reason why it failed; empty: it did not
 };
 
-/// Plays in a thread of its own, for which neither session nor servo wait. Plays silence while off,
-/// so that a sound card does not click. To be used by one thread.
+/// Plays in its own thread; session and servo never wait for it. Plays silence while off, so that a
+/// sound card does not click. Use it from one thread.
 class NoisePlayer {
  public:
   using Opener = std::function<std::unique_ptr<SoundOutput>(const std::string& device)>;
 
-  /// Opens the output and plays silence. \param open  called again after a failure (unplugged
-  /// headphones). \param tones_db  level of tones, root mean square, dB re full scale; none: the
-  /// noise's
+  /// Opens the output and plays silence. \param open  function that opens the output; called again
+  /// after a failure (unplugged headphones). \param tones_db  level of tones, root mean square, dB
+  /// re full scale; none: the noise's
   /// \throws SoundError
   NoisePlayer(const protocols::MaskingNoise& noise, std::uint64_t seed, const std::string& device,
               Opener open = open_sound, std::optional<double> tones_db = {});
@@ -83,7 +83,8 @@ class NoisePlayer {
   void turn_on();
   /// Fades out; returns at once.
   void turn_off();
-  /// A short tone, heard latency() later; returns at once. One that sounds still is faded out.
+  /// Plays a short tone, heard latency() later; returns at once. Fades out a tone that still
+  /// sounds.
   void tone(Tone which = Tone::go) {
     tone_ = which;
     tones_.fetch_add(1);
@@ -91,14 +92,14 @@ class NoisePlayer {
   bool on() const { return on_.load(); }
   /// The output has failed since turn_on().
   bool failed() const { return failed_.load(); }
-  NoiseReport report() const;  ///< also after turn_off, until the next turn_on
+  NoiseReport report() const;  ///< valid after turn_off too, until the next turn_on
   const protocols::MaskingNoise& noise() const { return noise_; }
-  bool has_noise() const { return has_noise_; }  ///< false: tones alone
+  bool has_noise() const { return has_noise_; }  ///< false: tones only
   double tones_db() const { return tones_db_; }  ///< dB re full scale, root mean square
   std::uint64_t seed() const { return seed_; }
   const std::string& device() const { return device_; }
   double rate() const { return output_->rate(); }     ///< Hz
-  double latency() const { return latency_.load(); }  ///< s, until a change is heard
+  double latency() const { return latency_.load(); }  ///< s until a change is heard
 
  private:
   void start();
@@ -114,8 +115,8 @@ class NoisePlayer {
   std::string trouble_;                  ///< written before failed_
   std::atomic<bool> on_{false}, failed_{false}, quit_{false};
   std::atomic<std::uint64_t> frames_{0};  ///< of noise
-  std::atomic<unsigned> tones_{0};        ///< requested
-  std::atomic<Tone> tone_{Tone::go};      ///< the newest
+  std::atomic<unsigned> tones_{0};        ///< number requested
+  std::atomic<Tone> tone_{Tone::go};      ///< the newest requested
   std::atomic<int> underruns_{0};         ///< while on
   std::atomic<double> latency_{0};
   unsigned tones_begun_ = 0;  ///< used by the thread
@@ -124,8 +125,8 @@ class NoisePlayer {
   std::jthread thread_;
 };
 
-/// Events for the session's record, as a line of JSON: the settings when turned on, the report
-/// after.
+/// Events for the session's record, each a line of JSON: the settings when turned on, the report
+/// afterwards.
 std::string to_json_text(const NoisePlayer& player);
 std::string to_json_text(const NoiseReport& report);
 

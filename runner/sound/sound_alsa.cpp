@@ -14,11 +14,11 @@ constexpr unsigned kBuffer_us = 200'000;  // longest delay of the player's threa
 
 SoundError no_sound(const std::string& device, const std::string& what) {
   return SoundError("no sound from '" + device + "': " + what +
-                    "\nplug in headphones and name them by --sound-device ('aplay -L' lists what "
-                    "there is); --without-noise runs the session without masking noise and sounds");
+                    "\nplug in headphones and name them by --sound-device ('aplay -L' lists the "
+                    "names); --without-noise runs the session without masking noise and sounds");
 }
 
-/// Silences ALSA's messages: the SoundError has the reason.
+/// Suppresses ALSA's messages: the SoundError has the reason.
 void ignore_message(const char*, int, const char*, int, const char*, ...) {}
 
 class AlsaOutput final : public SoundOutput {

@@ -9,20 +9,20 @@
 
 namespace palpate::runner {
 
-/// No sound output; what() names the device, why, and what to do.
+/// No sound output; what() names the device, the reason and the remedy.
 class SoundError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
 class SoundOutput {
  public:
-  /// Plays what is still in its buffer.
+  /// Plays the rest of its buffer.
   virtual ~SoundOutput() = default;
   virtual double rate() const = 0;  ///< Hz
   /// Waits until the buffer has space. \param samples  left and right interleaved, full scale 32767
   /// \return the number of underruns since the last call. \throws SoundError: the output has failed
   virtual int write(std::span<const std::int16_t> samples) = 0;
-  /// s, until samples written now are heard
+  /// Time until samples written now are heard, s.
   virtual double latency() = 0;
 };
 

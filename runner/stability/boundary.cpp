@@ -20,8 +20,8 @@ namespace {
 
 constexpr double kDepth = 1e-3;     // m, at rest
 constexpr double kLength = 0.12;    // m
-constexpr double kAtRest = 0.01;    // of the swing it is released with: less counts as rest
-constexpr double kDiverged = 0.02;  // m, from rest: diverged
+constexpr double kAtRest = 0.01;    // share of the initial swing; less counts as rest
+constexpr double kDiverged = 0.02;  // m, from rest; beyond it the loop has diverged
 constexpr int kMaxDelay = 16;       // ticks
 
 Quat turned_about_y(double angle) { return {std::cos(angle / 2), 0, std::sin(angle / 2), 0}; }
@@ -75,7 +75,7 @@ std::vector<rendering::SceneObject> objects_of(ContactCase contact_case, bool ra
   throw std::invalid_argument("no such situation");
 }
 
-/// Puts the layers that materials have beside the objects.
+/// Adds the layers of materials as further objects.
 std::vector<rendering::SceneObject> with_layers(std::vector<rendering::SceneObject> objects) {
   std::vector<rendering::SceneObject> out;
   for (rendering::SceneObject& surface : objects) {
@@ -117,7 +117,7 @@ rendering::LineProbe stylus_at_height_0(ContactCase contact_case, bool ray) {
     const Vec3 tip(0.001, 0.002, 0);
     return {tip, tip + kLength * glm::normalize(Vec3(1, 0, 1))};
   }
-  // Lying across, off-centre, so that the ends get different forces.
+  // It lies across the edge, off-centre, so that the ends carry different forces.
   const double fraction = contact_case == ContactCase::two_objects ? 0.5 : 0.35;
   const Vec3 d(kLength, 0, 0);
   const Vec3 tip = Vec3(0, 1e-3, 0) - fraction * d;
@@ -128,7 +128,7 @@ rendering::LineProbe lowered(const rendering::LineProbe& probe, double tip, doub
   return {probe.tip - Vec3(0, 0, tip), probe.tail - Vec3(0, 0, tail)};
 }
 
-/// One end of the stylus, moving along z under a force stylus_at_height_0 over each tick.
+/// One end of the stylus, moving along z under a force held over each tick.
 class End {
  public:
   End(const LoopSettings& s, double offset) : z_(offset) {
@@ -199,7 +199,7 @@ class Loop {
         tip_(s, kReleasedTip),
         tail_(s, kReleasedTail),
         controller_({0.5 * s.mass * s.rate}, 1 / s.rate) {
-    // From above, so that the renderer finds a first contact.
+    // Approach from above, so that the renderer finds a first contact.
     scene.renderer().tick(scene.scene(), state_, lowered(scene.rest(), -5e-3, -5e-3), 1 / s.rate);
     for (auto& forces : under_way_) forces = {balance_.tip.z, balance_.tail.z};
     const double felt_stiffness = stiffness_ * (s.reach ? stiffness_gain(*s.reach, 0) : 1);
@@ -209,7 +209,7 @@ class Loop {
     block_ = static_cast<std::uint64_t>(10 * period);
   }
 
-  /// Goes on until there are so many blocks of ten periods, a multiple of four.
+  /// Runs until it has this many blocks of ten periods, a multiple of four.
   LoopOutcome run(std::uint64_t blocks) {
     while (swings_.size() < blocks && !diverged_) {
       swings_.emplace_back();
@@ -240,7 +240,8 @@ class Loop {
     return all.size();
   }
 
-  /// Force over stiffness, m: a rotation about the contact is not an oscillation of the contact.
+  /// Force over stiffness, m, so that a rotation about the contact does not count as its
+  /// oscillation.
   double height_of(double tip_force, double tail_force) const {
     return (tip_force + 0.7 * tail_force) / stiffness_;
   }
@@ -267,7 +268,7 @@ class Loop {
     const auto& now = under_way_[(ticks_ + under_way_.size() - static_cast<std::size_t>(s_.delay)) %
                                  under_way_.size()];
     tip_.advance(now[0] - balance_.tip.z);
-    // Through a reach, a contact at the tip is felt at both ends.
+    // With a reach, a contact at the tip acts on both ends.
     if (scene_.renderer().side_contact() || s_.reach) tail_.advance(now[1] - balance_.tail.z);
     const double height = height_of(r.device1.z, r.device2.z);
     if (ticks_++ == 0) first_ = height;
@@ -316,15 +317,16 @@ LoopScene::LoopScene(ContactCase contact_case, protocols::RendererKind kind,
   rendering::RenderState state = scene_.initial_state();
   rendering::Rendering r;
   constexpr double kStep = 1e-6;
-  // s; damping hardly acts. A body is stepped by the millisecond.
+  // s; slow ticks, in which damping hardly acts. A body needs shorter ones.
   const double slow = contact_case == ContactCase::body ? 0.05 : 1;
-  // Lowered from above to the wanted depth, as first contact needs a path from outside.
+  // Lower it from above to the wanted depth: first contact needs a path from outside.
   for (double down = -2e-3; r.deepest.depth < kDepth; down += kStep) {
     rest_ = lowered(start, down, down);
     r = renderer_->tick(scene_, state, rest_, slow);
     if (down > 0.05) throw std::logic_error("nothing under the stylus");
   }
-  r = renderer_->tick(scene_, state, rest_, slow);  // a second tick at rest: without damping force
+  // A second tick at rest gives the force without damping.
+  r = renderer_->tick(scene_, state, rest_, slow);
   force_tip_ = r.device1.z;
   force_tail_ = r.device2.z;
   contacts_ = static_cast<int>(r.contacts);
@@ -333,14 +335,14 @@ LoopScene::LoopScene(ContactCase contact_case, protocols::RendererKind kind,
 namespace {
 
 bool has_grown(const LoopOutcome& o) {
-  constexpr double kGrown = 2;  // times the initial swing: no rounding and no second mode
+  constexpr double kGrown = 2;  // times the initial swing; more than rounding or a second mode
   return !(o.late_swing <= kGrown * std::max(o.initial_swing, o.floor));
 }
 
 }  // namespace
 
 Verdict verdict_on(const LoopOutcome& o, bool linear) {
-  constexpr double kShrunk = 0.9;  // from the second quarter to the last: more is chance
+  constexpr double kShrunk = 0.9;  // from the second quarter to the last; less may be chance
   if (has_grown(o)) return Verdict::unstable;
   if (o.late_swing <= o.floor) return Verdict::stable;
   if (linear) return o.late_swing <= o.early_swing ? Verdict::stable : Verdict::unstable;
@@ -355,7 +357,7 @@ LoopOutcome run_loop(const LoopSettings& s, const LoopScene& loop) {
     outcome = running.run(std::uint64_t{4} << doubling);
     const Verdict verdict = verdict_on(outcome, s.linear());
     outcome.stable = verdict != Verdict::unstable;
-    // What hardly shrinks in a short run may do so in a longer one.
+    // A swing that hardly shrinks in a short run may shrink in a longer one.
     if (verdict == Verdict::stable || s.linear() || has_grown(outcome)) break;
   }
   return outcome;
@@ -363,7 +365,7 @@ LoopOutcome run_loop(const LoopSettings& s, const LoopScene& loop) {
 
 namespace {
 
-constexpr double kClose = 1.002;     // ratio at which the bisection ends
+constexpr double kClose = 1.002;     // ratio of the bounds that ends the bisection
 constexpr double kNoDamping = 1e-6;  // N s/m, practically none
 
 stimuli::Material material_of(const LoopCase& loop, double stiffness) {
@@ -431,7 +433,7 @@ BoundaryPoint boundary_at(const LoopCase& loop, double stiffness) {
 
 double stiffest_stable(const LoopCase& loop, double damping) {
   const auto stable = [&](double stiffness) { return is_stable(loop, stiffness, damping); };
-  // In steps first: a stable stiffness beyond an unstable one would not count.
+  // Search in steps first: a stable stiffness beyond an unstable one must not count.
   constexpr double kStep = 1.15, kMost = 1e7;
   double low = 1;
   while (low < kMost && stable(kStep * low)) low *= kStep;

@@ -35,7 +35,8 @@ struct LoopSettings {
   bool passivity_controller = false;
   std::optional<rendering::Reach> reach = std::nullopt;  ///< of the virtual stylus
 
-  /// Forces are linear in the motion while the contact lasts: a swing grows or shrinks for ever.
+  /// Whether forces are linear in the motion during contact, so that a swing grows or shrinks
+  /// forever.
   bool linear() const { return friction == 0 && resolution == 0 && !passivity_controller; }
 };
 
@@ -77,45 +78,44 @@ class LoopScene {
 /// Swings are of the contact (its force over its stiffness), peak to peak, m.
 struct LoopOutcome {
   bool stable = false;
-  double initial_swing = 0;  ///< when it is released
+  double initial_swing = 0;  ///< at the release
   double early_swing = 0;    ///< in the second quarter of the run
-  double late_swing = 0;     ///< in the last quarter; infinite where it diverged
+  double late_swing = 0;     ///< in the last quarter; infinite: it diverged
   double floor = 0;          ///< a smaller swing counts as rest
   std::uint64_t ticks = 0;
 };
 
-/// Whether a swing has come to rest, by what remains of it. A limit cycle does not grow any more,
-/// and is no rest: unstable.
+/// Whether a swing has come to rest. A limit cycle, which neither grows nor rests, is unstable.
 enum class Verdict {
   stable,
   unstable,
-  open,  ///< it shrinks, and has to be watched for longer
+  open,  ///< it shrinks and needs a longer run
 };
 Verdict verdict_on(const LoopOutcome& so_far, bool linear);
 
-/// Released 0.1 mm (tip) and 0.06 mm (tail) from equilibrium, under the constant force that holds
-/// it there. Each end is integrated exactly (matrix exponential) under a force that is held over
-/// the tick. Stable: what swings in the end is within three steps of the resolution, or within a
-/// hundredth of the initial swing, or still shrinks. It runs 40 periods, and where that does not
-/// tell, up to 64 times as long.
+/// Releases the stylus 0.1 mm (tip) and 0.06 mm (tail) from equilibrium, under the constant force
+/// that holds it there. Each end is integrated exactly (matrix exponential) under a force held over
+/// the tick. Stable: the final swing is within three steps of the resolution, or within a hundredth
+/// of the initial swing, or still shrinks. It runs 40 periods or, if that is inconclusive, up to 64
+/// times as long.
 LoopOutcome run_loop(const LoopSettings& settings, const LoopScene& scene);
 
 /// A loop without the two quantities that span the boundary: stiffness and physical damping.
 struct LoopCase {
   ContactCase contact_case = ContactCase::wall;
   protocols::RendererKind renderer = protocols::RendererKind::point;
-  LoopSettings settings;       ///< its damping is ignored
+  LoopSettings settings;       ///< the damping is ignored
   double virtual_damping = 0;  ///< N s/m, of the material
-  /// Of a layer half as deep as the contact, as a share of the surface's stiffness; 0: none.
+  /// Stiffness of a layer half as deep as the contact, as a share of the surface's; 0: none.
   double layer_share = 0;
   /// The mass of each end is chosen so that it oscillates 60 times more slowly than the sampling
-  /// rate: the case of the theory, which is independent of the mass. Else settings.mass.
+  /// rate: the case of the theory, which is independent of the mass. False: settings.mass.
   bool heavy = false;
 };
 
 struct BoundaryPoint {
   double stiffness = 0;  ///< N/m
-  double measured = 0;   ///< N s/m, smallest stable damping of each end; 0: stable without
+  double measured = 0;   ///< N s/m, smallest stable damping of each end; 0: stable without damping
   double theory = 0;     ///< N s/m, passive with any hand
   /// The theory applies: friction dissipates the effect of quantisation (K <= 2 f_c / Delta).
   bool promised = true;
@@ -124,17 +124,16 @@ struct BoundaryPoint {
   bool unsafe() const { return promised && measured > 1.001 * theory; }
 };
 
-/// K (T/2 + t_d) + |B|, with K and B as they are felt: of surface and layer together, and through
-/// the lever of a reach, touched at the virtual tip. Colgate & Schenkel 1997.
+/// K (T/2 + t_d) + |B|, with the effective K and B: of surface and layer together, and through the
+/// lever of a reach, for contact at the virtual tip. Colgate & Schenkel 1997.
 double passive_damping(const LoopCase& loop, double stiffness);
 
-/// Whether the loop comes to rest, as run_loop() says, with this stiffness, N/m, and damping of
-/// each end, N s/m.
+/// Whether run_loop() finds rest with this stiffness, N/m, and damping of each end, N s/m.
 bool is_stable(const LoopCase& loop, double stiffness, double damping);
 
 BoundaryPoint boundary_at(const LoopCase& loop, double stiffness);
 
-/// Largest stiffness, N/m, up to 10^7, up to which all are stable with this damping of each end.
+/// Largest stiffness, N/m, at most 10^7, up to which all are stable with this damping of each end.
 double stiffest_stable(const LoopCase& loop, double damping);
 
 }  // namespace palpate::runner

@@ -105,7 +105,7 @@ IntegratorRow measure(const Oscillator& o, const char* method, int steps,
     }
     best = std::min(best, (now_ns() - start) / (laps * kTicks));
   }
-  row.ns_per_tick = sink == 0.123456789 ? 0 : best;  // keeps the compiler from dropping the loop
+  row.ns_per_tick = sink == 0.123456789 ? 0 : best;  // prevents the compiler from removing the loop
   return row;
 }
 

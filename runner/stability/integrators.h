@@ -1,5 +1,5 @@
 #pragma once
-// Compares integrators for the simulated hand: why the exact one is used.
+// Compares integrators for the simulated hand, to justify the exact one.
 
 #include <functional>
 #include <string>
@@ -20,7 +20,7 @@ struct IntegratorRow {
   int steps = 1;                   ///< a tick
   double ns_per_tick = 0;
   /// m, largest over 500 ticks with a random force at each, against the closed form in extended
-  /// precision; infinity where it diverged.
+  /// precision; infinite: it diverged.
   double error = 0;
 };
 

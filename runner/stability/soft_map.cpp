@@ -19,7 +19,7 @@ constexpr double kRates[] = {62.5, 125, 250, 500, 1000};  // Hz
 constexpr double kSprings[] = {200, 800, 3000};           // N/m
 constexpr double kHalf = 0.015, kSoftTick = 0.001;        // m, s
 constexpr int kHeldTicks = 1500, kWatchedTicks = 200;
-constexpr int kLongestHeldTicks = 12500, kLongWatchedTicks = 1000;  // of what rings
+constexpr int kLongestHeldTicks = 12500, kLongWatchedTicks = 1000;  // for undamped bodies
 
 rendering::SoftObject slab(const SoftCase& what) {
   stimuli::SolidMesh mesh = stimuli::mesh_of_box({0.06, 0.06, 2 * kHalf}, {4, 4, 2});
@@ -87,7 +87,7 @@ SoftSwing press_and_hold(const SoftCase& what) {
   int held = kHeldTicks;
   for (int i = 0; i < falling + held - kWatchedTicks; ++i) tick();
   watch(kWatchedTicks);
-  // Nothing but its steps damps it: it may ring, but not for ever.
+  // Only its integration damps it: it may oscillate, but not forever.
   while (out.accepted && what.damping == 0 && !out.settles() && held < kLongestHeldTicks) {
     watch(kLongWatchedTicks);
     held += kLongWatchedTicks;
@@ -127,9 +127,9 @@ std::vector<SoftCase> soft_cases_elsewhere(std::uint64_t seed) {
 std::string soft_map_text(const std::vector<SoftSwing>& map) {
   std::string out =
       "Soft bodies: worst swing of the force, in % of it, while the tool is held still,\n"
-      "over springs of 200 to 3000 N/m and tools of 2 and 10 mm, of all that scenes may have.\n"
+      "over springs of 200 to 3000 N/m and tools of 2 and 10 mm, of all that scenes allow.\n"
       "Held for 1.5 s; without damping up to 12.5 s, until it swings by at most 1 % in a second.\n"
-      "-: none may\n\n"
+      "-: none allowed\n\n"
       "       Pa ";
   char cell[48];
   for (const double rate : kRates) {
@@ -161,7 +161,7 @@ std::string soft_map_text(const std::vector<SoftSwing>& map) {
   std::snprintf(cell, sizeof cell, "\n%d of %d cases", settled, accepted);
   out += cell;
   std::snprintf(cell, sizeof cell, " (1 %% at most), the slowest in %.1f s.\n", slowest);
-  return out + " that scenes may have come to rest" + cell;
+  return out + " that scenes allow come to rest" + cell;
 }
 
 }  // namespace palpate::runner

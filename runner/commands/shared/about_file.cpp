@@ -21,12 +21,12 @@ using protocols::Presence;
 constexpr std::size_t kMostEntries = 1000;
 constexpr std::size_t kLongest = 2000;  // characters of a text
 
-// Of the licenses that suit data, under their names in the SPDX list.
+// Licenses suitable for data, by their names in the SPDX list.
 constexpr std::array kLicenses = {
     "CC0-1.0",      "CC-BY-4.0",       "CC-BY-SA-4.0", "CC-BY-NC-4.0", "CC-BY-NC-SA-4.0",
     "CC-BY-ND-4.0", "CC-BY-NC-ND-4.0", "PDDL-1.0",     "ODC-By-1.0",   "ODbL-1.0"};
 
-/// A line that says something.
+/// Reads a line that is not empty.
 std::optional<std::string> read_line(const json& value, const std::string& place,
                                      FaultList& faults) {
   if (value.is_string()) {
@@ -61,13 +61,13 @@ std::vector<std::string> read_lines(ObjectReader& reader, const char* key) {
   return out;
 }
 
-/// A text that matches; `out` gets its last group.
+/// Reads a text that matches the pattern; `out` gets its last group.
 void read_pattern(ObjectReader& reader, const char* key, const std::regex& pattern,
                   const char* expected, std::string& out) {
   const json* const value = reader.member(key);
   if (value == nullptr) return;
   std::smatch match;
-  // std::regex recurses by the letter: nothing long is given to it.
+  // std::regex recurses for each letter, so limit the length.
   constexpr std::size_t kLongestPattern = 200;
   if (value->is_string() && value->get_ref<const std::string&>().size() <= kLongestPattern &&
       std::regex_match(value->get_ref<const std::string&>(), match, pattern)) {
@@ -77,7 +77,7 @@ void read_pattern(ObjectReader& reader, const char* key, const std::regex& patte
   }
 }
 
-/// ISO 7064, mod 11-2: finds every wrong digit and every two that changed places.
+/// ISO 7064, mod 11-2: detects every wrong digit and every swap of two.
 bool has_right_check_digit(const std::string& orcid) {
   int sum = 0;
   for (const char c : orcid.substr(0, orcid.size() - 1)) {
@@ -91,9 +91,10 @@ void read_orcid(ObjectReader& reader, std::string& out) {
   static const std::regex pattern(R"((https://orcid\.org/)?(\d{4}-\d{4}-\d{4}-\d{3}[\dX]))");
   read_pattern(reader, "orcid", pattern, "expected an ORCID such as 0000-0002-1825-0097", out);
   if (!out.empty() && !has_right_check_digit(out)) {
-    reader.faults().add(reader.pointer("orcid"),
-                        "expected an ORCID; a digit of this one is wrong, as its last one shows" +
-                            found_text(*reader.member("orcid")));
+    reader.faults().add(
+        reader.pointer("orcid"),
+        "expected an ORCID; a digit of this one is wrong, according to its check digit" +
+            found_text(*reader.member("orcid")));
   }
 }
 
@@ -103,7 +104,7 @@ void check_commas(const std::string& name, const std::string& place, FaultList& 
     faults.add(place, "expected one author, with one comma at most" + found_text(name));
 }
 
-/// Entries that are a text, or an object that says more. \param main  key of the text in it
+/// Entries are texts, or objects with more members. \param main  key of the text in an object
 template <class Entry>
 std::vector<Entry> read_entries(ObjectReader& reader, const char* key, Presence presence,
                                 const char* main, std::string Entry::*text,

@@ -1,6 +1,6 @@
 #pragma once
-// The file of --about: authors, license, funding, ethics of a study. Its keys and what they mean:
-// protocols/study.schema.json.
+// The file of --about: authors, license, funding, ethics of a study. protocols/study.schema.json
+// defines its keys.
 
 #include <string>
 
@@ -10,7 +10,7 @@ namespace palpate::runner {
 
 /// \throws protocols::InputError with every fault.
 data::StudyAbout read_about_file(const std::string& path);
-/// \param file_name  that faults name
+/// \param file_name  named in faults
 data::StudyAbout read_about_text(const std::string& text, const std::string& file_name);
 
 }  // namespace palpate::runner

@@ -98,7 +98,7 @@ void check_number(const std::string& option, const std::string& text, const boos
 
 /// "; did you mean '--jobs'?", or "".
 std::string option_meant(const std::string& given, const po::options_description& options) {
-  constexpr std::size_t kLongestOption = 40;  // that may be misspelt
+  constexpr std::size_t kLongestOption = 40;  // longest option to correct
   const std::size_t begin = std::min(given.find_first_not_of('-'), given.size());
   const std::string word = given.substr(begin, given.find('=') - begin);
   if (word.size() > kLongestOption) return "";

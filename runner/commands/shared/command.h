@@ -35,7 +35,7 @@ std::string given_or_asked(const std::string& given, const std::string& what);
 /// "P01", "P01 and P02", "P01, P02 and P03"
 std::string join_names(const std::vector<std::string>& names);
 
-/// The trial that an option names, "P03/1/12". \throws UsageError
+/// The trial named by an option, "P03/1/12". \throws UsageError
 data::TrialName parse_trial_name(const std::string& text);
 
 class UsageError : public std::runtime_error {
@@ -45,11 +45,11 @@ class UsageError : public std::runtime_error {
 /// A command's options: parses them, checks numbers and prints --help.
 struct CommandLine {
   std::string usage;    ///< "palpate validate PROTOCOL.json"
-  std::string summary;  ///< what it does, in a sentence
+  std::string summary;  ///< its purpose, in a sentence
   std::string example;  ///< one or more command lines with explanations
   boost::program_options::options_description options{"Options"};
   boost::program_options::positional_options_description positional;
-  std::vector<std::string> positional_names;  ///< not in the list of options; all std::string
+  std::vector<std::string> positional_names;  ///< not in the options' list; all std::string
 
   /// nullopt if --help was given: then it has been printed. \throws UsageError.
   std::optional<boost::program_options::variables_map> parse(const std::vector<std::string>& args);

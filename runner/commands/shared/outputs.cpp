@@ -23,7 +23,7 @@ namespace {
 namespace fs = std::filesystem;
 namespace po = boost::program_options;
 
-/// The paths that an option names, where it was given.
+/// The paths of an option, if it was given.
 std::vector<std::string> paths_of(const po::variables_map& values, const char* option) {
   if (values.count(option) == 0) return {};
   const auto& value = values[option].value();
@@ -33,7 +33,7 @@ std::vector<std::string> paths_of(const po::variables_map& values, const char* o
 
 bool given(const po::variables_map& values, const char* option) {
   if (values.count(option) == 0) return false;
-  const auto* flag = boost::any_cast<bool>(&values[option].value());  // of a bool_switch
+  const auto* flag = boost::any_cast<bool>(&values[option].value());  // value of a bool_switch
   return flag == nullptr || *flag;
 }
 
@@ -95,7 +95,7 @@ Outputs::Outputs(const po::variables_map& values, std::initializer_list<const ch
     : values_(values), force_(given(values, "force")) {
   for (const char* input : inputs) {
     for (const std::string& path : paths_of(values, input)) {
-      inputs_.add(path, std::string("--") + input + " reads it, it would be overwritten");
+      inputs_.add(path, std::string("--") + input + " reads it, so it must not be overwritten");
     }
   }
   for (const char* option : options) {
@@ -113,9 +113,9 @@ Outputs::Outputs(const po::variables_map& values, std::initializer_list<const ch
 }
 
 void Outputs::protect_files(const stimuli::ObjectSpec& object) {
-  inputs_.add(object.file, "it is a mesh that is read, and would be overwritten");
+  inputs_.add(object.file, "it is a mesh that is read, so it must not be overwritten");
   for (const std::string& file : object.files_read)
-    inputs_.add(file, object.file_name + " takes its data from it, it would be overwritten");
+    inputs_.add(file, object.file_name + " takes its data from it, so it must not be overwritten");
   for (const stimuli::ObjectSpec& part : object.parts) protect_files(part);
 }
 
@@ -159,7 +159,7 @@ void Outputs::write() {
   const bool made = !folder_.empty() && fs::create_directories(folder_, error);
   if (error) throw std::runtime_error(folder_ + ": " + error.message());
   try {
-    check();  // files may have changed since
+    check();  // files may have changed in the meantime
     std::deque<data::AtomicFile> drafts;
     for (const Output& output : outputs_) {
       if (is_stream(output.path)) continue;

@@ -1,5 +1,5 @@
 #pragma once
-// The files that a command writes: checked before its work begins, then written together or not at
+// The files that a command writes: checked before it works, then written all together or not at
 // all.
 
 #include <array>
@@ -16,13 +16,13 @@
 
 namespace palpate::runner {
 
-// CSV whose numbers have 17 significant digits, so that they read back exactly everywhere.
+// CSV with 17 significant digits, so that numbers are read back exactly everywhere.
 
-/// Rows are appended to from left to right. No field gets quotes: texts are names of letters,
-/// digits, '-' and '+'.
+/// Fields are appended to a row from left to right and are never quoted: texts are names of
+/// letters, digits, '-' and '+'.
 class CsvText {
  public:
-  /// \param names  of the columns. \param line_end  "\n" or "\r\n"
+  /// \param names  names of the columns. \param line_end  "\n" or "\r\n"
   CsvText(const auto& names, std::string line_end) : line_end_(std::move(line_end)) {
     for (const auto& name : names) *this << std::string_view(name);
     end_row();
@@ -51,7 +51,7 @@ class CsvText {
 
  private:
   std::string line_end_, text_;
-  bool first_ = true;  ///< the next field of the row
+  bool first_ = true;  ///< the next field is the first of its row
 };
 
 /// Writes one file atomically, private (0600), replacing an existing one. For files that a command
@@ -60,15 +60,15 @@ void write_whole(const std::string& path, const std::string& text);
 
 class Outputs {
  public:
-  /// Checks the files of the options that were given. An existing file is replaced only with
-  /// --force; never what the options `inputs` name, a database, a device or a folder. \param folder
-  /// an option that names a folder of files, or nullptr \throws UsageError with every fault;
+  /// Checks the files of the given options. An existing file is replaced only with --force. The
+  /// files of the options `inputs`, databases, devices and folders are never replaced. \param
+  /// folder an option that names a folder of files, or nullptr \throws UsageError with every fault;
   /// std::runtime_error if a folder is not writable.
   Outputs(const boost::program_options::variables_map& values,
           std::initializer_list<const char*> options, std::initializer_list<const char*> inputs,
           const char* folder = nullptr);
 
-  /// Protects all files that the meshes of an object were read from, which no option names.
+  /// Protects all files from which the meshes of an object were read; no option names them.
   /// \throws UsageError.
   void protect(const stimuli::ObjectSpec& object);
 

@@ -11,7 +11,7 @@
 namespace palpate::runner {
 namespace {
 
-std::atomic<bool> stop_asked{false};  // a signal handler can reach nothing else
+std::atomic<bool> stop_asked{false};  // a signal handler needs a global
 
 void ask_to_stop(int) { stop_asked = true; }
 
@@ -44,7 +44,7 @@ void ProgressLine::begin(std::string what) {
 
 void ProgressLine::show(double done) {
   const double now = now_ns();
-  if (first_ < 0) {  // what was done before took its time before
+  if (first_ < 0) {  // a resumed task's earlier part took no time now
     first_ = done;
     start_ = now;
   }

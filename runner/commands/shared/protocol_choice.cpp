@@ -38,7 +38,7 @@ std::vector<data::BlockFacts> blocks_of(const nlohmann::ordered_json& protocol) 
   return blocks;
 }
 
-/// "PAGE, ITEM" and what it asks.
+/// Pairs of "PAGE, ITEM" and its question.
 std::vector<std::pair<std::string, std::string>> questions_of(const nlohmann::ordered_json& json) {
   std::vector<std::pair<std::string, std::string>> questions;
   const auto text = [](const nlohmann::ordered_json& of, const char* key) {

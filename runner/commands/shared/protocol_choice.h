@@ -1,5 +1,5 @@
 #pragma once
-// When a participant returns and the protocol file was edited in between: which version to use.
+// Chooses the version of the protocol when a participant returns after the file was edited.
 
 #include <cstddef>
 #include <optional>
@@ -12,9 +12,9 @@
 
 namespace palpate::runner {
 
-// What exports need that data/ does not know: protocols, meanings of fault bits, the version.
+// Facts for exports that data/ does not know: protocols, meanings of fault bits, the version.
 
-/// With all of that; the rest as by default.
+/// Settings with these facts; the rest are defaults.
 data::ExportSettings export_settings();
 
 /// The protocol that a participant began with, if it differs from the named one.
@@ -22,7 +22,7 @@ struct EarlierProtocol {
   data::ProtocolInfo info;
   std::string shown_sha256;  ///< of the version shown in the last run; "": the participant's own
   std::size_t trials = 0;    ///< on record
-  std::string last_run;      ///< "2026-11-21 15:02 UTC"; "" where there was none
+  std::string last_run;      ///< "2026-11-21 15:02 UTC"; "": there was none
 };
 
 /// The latest protocol of this name with a different text in which `code` is enrolled.
@@ -40,8 +40,8 @@ struct ChangedProtocol {
   std::string option;  ///< --changed-protocol; "": not given
 };
 
-/// From the option, else from the user on a terminal, else the stored protocol. Prints what
-/// differs. \throws UsageError if the option is impossible or the user quits.
+/// Chooses by the option, else by asking on a terminal, else the stored protocol. Prints the
+/// differences. \throws UsageError if the option is impossible or the user quits.
 ProtocolChoice choose_protocol(const ChangedProtocol& changed);
 
 /// The differences and the choice, for the record.

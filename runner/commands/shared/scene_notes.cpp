@@ -15,7 +15,7 @@
 namespace palpate::runner {
 namespace {
 
-// mm; no hand goes round what is larger, and none feels the shape of what is smaller.
+// mm; a hand cannot reach around larger objects, nor feel the shape of smaller ones.
 constexpr double kBeyondHands = 1000, kBelowTouch = 0.1;
 
 }  // namespace
@@ -28,13 +28,13 @@ std::vector<std::string> objects_passed_through(const protocols::SceneSpec& scen
     const stimuli::ObjectSpec& object = scene.objects[i];
     const std::string place = "/objects/" + std::to_string(i) + ": ";
     if (object.body && any_soft)
-      notes.push_back(place + "moves through soft objects: they touch nothing but the tool");
+      notes.push_back(place + "moves through soft objects: they touch only the tool");
     const bool falls = object.soft && object.soft->fixed == stimuli::Soft::Fixed::none &&
                        glm::length(scene.gravity) > 0;
     if (falls && scene.objects.size() > 1)
       notes.push_back(place +
                       "is soft, not fixed, and falls through the other objects: soft ones "
-                      "touch nothing but the tool");
+                      "touch only the tool");
   }
   return notes;
 }
@@ -45,7 +45,7 @@ std::optional<std::string> elements_felt(const rendering::SoftObject& object) {
   char text[240];
   std::snprintf(text, sizeof text,
                 "the nodes of its elements are %.1f mm apart and the tool has a radius of %.1f mm: "
-                "a tool that slides over it feels each of them; expected a tool/radius_m of the "
+                "a sliding tool feels each node; expected a tool/radius_m of the "
                 "spacing or more, or a higher soft/resolution",
                 1000 * spacing, 1000 * radius);
   return text;
@@ -81,7 +81,7 @@ std::vector<std::string> mesh_notes(const stimuli::ObjectSpec& object) {
   try {
     for (const std::string& done : stimuli::closed_surface(soup).notes) note += "; " + done;
   } catch (const stimuli::MeshError&) {
-    // Convex all the same, within its coordinates' error.
+    // It is convex anyway, within its coordinates' error.
   }
   notes.push_back(std::move(note));
   return notes;

@@ -33,8 +33,9 @@ class MappedFile {
     if (file < 0 || ::fstat(file, &found) != 0 || !S_ISREG(found.st_mode)) {
       const int error = errno;
       if (file >= 0) ::close(file);
-      throw UsageError(printable(path) + ": expected a file that can be read: " +
-                       (file < 0 ? std::generic_category().message(error) : "it is another thing"));
+      throw UsageError(
+          printable(path) + ": expected a file that can be read: " +
+          (file < 0 ? std::generic_category().message(error) : "it is not a regular file"));
     }
     size_ = static_cast<std::size_t>(found.st_size);
     if (size_ > 0) data_ = ::mmap(nullptr, size_, PROT_READ, MAP_PRIVATE, file, 0);
@@ -151,11 +152,11 @@ std::vector<std::string> checksum_faults(const std::string& folder,
 
 void require_replaceable_folder(const std::string& folder, bool force, const std::string& mark,
                                 const std::vector<std::string>& open) {
-  if (folder.empty()) throw UsageError("--out: expected a folder to be made");
+  if (folder.empty()) throw UsageError("--out: expected a new folder");
   const fs::file_status status = fs::symlink_status(fs::path(folder));
   if (!fs::exists(status)) return;
   if (!fs::is_directory(status))
-    throw UsageError(printable(folder) + ": exists and is no folder; name a folder to be made");
+    throw UsageError(printable(folder) + ": exists and is not a folder; name a new folder");
   if (fs::is_empty(folder)) return;
   if (!force) throw UsageError(printable(folder) + ": exists already; --force replaces it");
   const std::vector<std::string> there = files_below(folder);
@@ -166,7 +167,7 @@ void require_replaceable_folder(const std::string& folder, bool force, const std
   for (const std::string& name : there) {
     if (name != kChecksums && !contains(open, name) && !listed.contains(name))
       throw UsageError(printable(folder) + ": contains " + printable(name) +
-                       ", which this command did not make and which would be lost; move it away, "
+                       "; this command did not write it, and it would be lost; move it away, "
                        "or name another folder");
   }
 }

@@ -13,7 +13,7 @@ namespace palpate::runner {
 inline constexpr const char* kChecksums = "SHA256SUMS";
 
 /// Names of all files below a folder, sorted, folders separated by '/'. \throws UsageError: it is
-/// no folder, or holds a link or another thing that is neither file nor folder, or a name that a
+/// not a folder, or has an entry that is neither file nor folder (such as a link), or a name that a
 /// list of checksums cannot have
 std::vector<std::string> files_below(const std::string& folder);
 
@@ -26,18 +26,18 @@ std::uint64_t size_of_member(const std::string& folder, const std::string& name)
 void write_member(const data::AtomicFolder& draft, const std::string& name,
                   const std::string& text);
 
-/// Writes SHA256SUMS of all files that are there. \param open  files that are not listed
+/// Writes SHA256SUMS of all files in the folder. \param open  files that are not listed
 void write_checksums(const data::AtomicFolder& draft, const std::vector<std::string>& open = {});
 
-/// How a folder differs from its SHA256SUMS, a sentence for each file: "x.csv has changed". Empty:
-/// it does not. \param open  files that are not listed
-/// \throws UsageError: it has no such list, or one that is none
+/// Differences of a folder from its SHA256SUMS, a sentence for each file: "x.csv has changed".
+/// Empty: none. \param open  files that are not listed
+/// \throws UsageError: it has no such list, or an invalid one
 std::vector<std::string> checksum_faults(const std::string& folder,
                                          const std::vector<std::string>& open = {});
 
-/// Refuses to write to a folder that exists, unless `force` is given and it is one that palpate
-/// made: with `mark`, a file that every such folder has, and without files that are neither listed
-/// nor `open`. \throws UsageError
+/// Refuses to replace an existing folder, unless `force` is given and palpate made the folder: it
+/// has the file `mark`, as every such folder, and only files that are listed or `open`. \throws
+/// UsageError
 void require_replaceable_folder(const std::string& folder, bool force, const std::string& mark,
                                 const std::vector<std::string>& open = {});
 

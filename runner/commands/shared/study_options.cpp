@@ -19,7 +19,7 @@ analysis::TrialTable read_study_trials(const std::string& database, const std::s
   try {
     return analysis::read_trials_store(database);
   } catch (const data::StoreRefused& error) {
-    throw UsageError(error.what());  // the file that was named is bad input: status 2
+    throw UsageError(error.what());  // the named file is bad input: status 2
   }
 }
 
@@ -100,7 +100,7 @@ Shard parse_shard(const std::string& text,
       throw UsageError(
           "--shard auto: task " + std::to_string(shard.number) + " of " +
           std::to_string(shard.count) +
-          " is no shard; the array's task numbers must follow one another (--array=1-N)");
+          " is not a shard; the array's task numbers must be consecutive (--array=1-N)");
     }
     return shard;
   }
@@ -145,7 +145,7 @@ int version_to_go_on_with(const std::set<int>& begun, const std::string& file) {
                      " of the simulated participant; choose one with --participant-version");
   }
   if (*begun.begin() != kDefaultParticipantVersion) {
-    std::fprintf(stderr, "%s: goes on with version %d of the simulated participant\n",
+    std::fprintf(stderr, "%s: continues with version %d of the simulated participant\n",
                  printable(file).c_str(), *begun.begin());
   }
   return *begun.begin();

@@ -173,7 +173,7 @@ std::string words(const protocols::Limits& spec) {
          " to " + level_text(spec.high) + " and back, steps of " + level_text(spec.step);
 }
 
-/// With the threshold in the middle of the levels.
+/// Answers as a participant whose threshold is in the middle of the levels.
 bool succeeds(const protocols::Protocol& protocol, const protocols::TaskBlock& block,
               const protocols::Trial& trial, Random& random) {
   const double draw = random.unit();
@@ -265,7 +265,7 @@ struct RecoveredProcedure {
   protocols::Recovery recovery;
 };
 
-/// QUEST+ is tried with a participant that it can find: of its function, in the middle of its
+/// QUEST+ is tried with a participant that fits its model: of its function, in the middle of its
 /// grids.
 protocols::PsychometricParticipant participant_for(const protocols::Protocol& protocol,
                                                    const protocols::TaskBlock& block,

@@ -13,8 +13,7 @@
 
 namespace palpate::runner {
 
-// The columns of a schedule: those of an exported trials.csv as far as they are known before the
-// response.
+// The columns of a schedule: those of an exported trials.csv that are known before the response.
 
 inline std::vector<std::string> schedule_columns() {
   return {"participant_id", "session",         "block",          "trial",         "renderer",
@@ -48,24 +47,24 @@ std::string task_schedule_text(const protocols::Protocol& protocol, int particip
 
 /// "staircase, 2 down 1 up, from 500 within 300 to 600, ..."
 std::string in_words(const protocols::ProcedureSpec& procedure);
-/// What a block shows and how its levels come: a line or several, without indentation.
+/// Contents of a block and the choice of its levels, in one or more lines, without indentation.
 std::vector<std::string> in_words(const protocols::Protocol& protocol,
                                   const protocols::TaskBlock& block);
 
-/// All trials of a participant. Those of adaptive blocks depend on the answers: they are given by a
-/// participant whose threshold is in the middle of the levels.
+/// All trials of a participant. Those of adaptive blocks depend on answers, here of a participant
+/// whose threshold is in the middle of the levels.
 std::vector<protocols::Trial> example_trials(const protocols::Protocol& protocol, int participant);
 
-/// What of a protocol of version 2 the eight buttons of a device cannot answer, so that a session
-/// with --buttons needs a keyboard: "numbers of 'estimate'", ...
+/// Parts of a protocol of version 2 that the eight buttons of a device cannot answer, so that a
+/// session with --buttons needs a keyboard: "numbers of 'estimate'", ...
 std::vector<std::string> keyboard_parts(const protocols::Protocol& protocol);
 
-/// Position of what was compared with the standard, from 1; 0: none.
+/// Position of the interval compared with the standard, from 1; 0: none.
 int comparison_interval(const protocols::TaskBlock& block, const protocols::Trial& trial);
 
 // How well the procedures of a protocol find a known threshold, for `schedule --recover`.
 
-/// A line for each procedure: what it aims at, bias and spread over so many simulated participants.
+/// A line for each procedure: its target, bias and spread over the simulated participants.
 /// \param format  table, csv or json
 std::string recovery_text(const protocols::Protocol& protocol, int participants, std::uint64_t seed,
                           const std::string& format);

@@ -112,13 +112,12 @@ analysis::Figure soft_map_figure(const std::vector<SoftSwing>& map) {
     allowed += one.accepted;
     settled += one.accepted && one.settles();
   }
-  figure.title =
-      "A tool held still on a soft body: where scenes may have it, the force comes to rest";
+  figure.title = "A tool held still on a soft body: where scenes allow it, the force comes to rest";
   figure.subtitle =
       "Swing of the force in % of it, highest less lowest of the last 0.2 s. Amber: "
       "refused. Blue: " +
       std::to_string(settled) + " of " + std::to_string(allowed) +
-      " that scenes may have within 1 %.";
+      " that scenes allow, within 1 %.";
   figure.description =
       "Stability of soft bodies. A panel for each tool and material; rows are moduli and contact "
       "springs, columns the rate of the body's steps, numbers the swing of the force in percent.";
@@ -144,13 +143,13 @@ analysis::Figure soft_map_figure(const std::vector<SoftSwing>& map) {
                                     " kN/m");
     analysis::Panel& panel = figure.panels.back();
     const std::string swing = one.finite ? significant(100 * one.swing) : "no number";
-    // Rows are turned about once their number is known.
+    // Rows are reversed once their number is known.
     panel.marks.push_back(analysis::rect_mark(
         one.accepted ? analysis::Role::point : analysis::Role::amber, x + 0.03, -y - 0.05, x + 0.97,
         -y - 0.95, one.settles() ? (one.accepted ? 0.16 : 0.25) : 0.8,
         title + ", " + rows[static_cast<std::size_t>(y)] + ", " + rate + " Hz: " + swing + " %" +
             (one.accepted ? "" : ", refused")));
-    // Less than a hundredth of a percent is nothing that a number need say.
+    // Do not print a number below a hundredth of a percent.
     analysis::Mark text =
         analysis::text_mark(one.settles() ? analysis::Role::ink : analysis::Role::page, x + 0.5,
                             -y - 0.5, one.finite && one.swing < 1e-4 ? "0" : swing, 11);
@@ -174,8 +173,8 @@ analysis::Figure integrator_figure(const StabilityReport& report) {
   constexpr std::array kMethods = {"explicit", "semi-implicit", "implicit", "exact"};
   analysis::Figure figure;
   figure.id = "integrators";
-  figure.title = "Integrators: the exact one costs least and errs least";
-  figure.subtitle = "Dots: 1, 4, 16, ... 1024 steps a tick; what blows up is not drawn.";
+  figure.title = "Integrators: the exact one has the least cost and error";
+  figure.subtitle = "Dots: 1, 4, 16, ... 1024 steps a tick; diverging ones are not drawn.";
   figure.description =
       "Error over run time of integrators. A panel for each oscillator, logarithmic both ways.";
   figure.max_row_width = kRoom;
@@ -288,7 +287,8 @@ analysis::Table integrator_table(const StabilityReport& report) {
   return table;
 }
 
-/// Run time of the fastest other method within a micrometre over that of the exact one, worst case.
+/// Run time of the fastest other method that errs by at most a micrometre, as a multiple of the
+/// exact one's; worst case.
 double integrator_gain(const StabilityReport& report) {
   double worst = HUGE_VAL;
   for (const IntegratorRow& exact : report.integrators) {

@@ -22,13 +22,13 @@ struct BoundaryCurve {
 
 /// Largest stable stiffness of a device, without and with the passivity controller.
 struct ControllerGain {
-  LoopCase loop;                 ///< without
+  LoopCase loop;                 ///< without the controller
   double damping = 0;            ///< N s/m, of each end
   double without = 0, with = 0;  ///< N/m, largest stable stiffness
 };
 
 struct StabilityReport {
-  std::vector<BoundaryCurve> theory;  ///< heavy ends: the case of the theory
+  std::vector<BoundaryCurve> theory;  ///< heavy ends, as the theory assumes
   std::vector<BoundaryCurve> curves;
   std::vector<ControllerGain> gains;
   std::vector<IntegratorRow> integrators;
@@ -45,7 +45,7 @@ std::vector<std::string> stability_sentences(const StabilityReport& report);
 std::vector<analysis::Table> stability_tables(const StabilityReport& report);
 std::string stability_text(const StabilityReport& report);
 nlohmann::ordered_json stability_json(const StabilityReport& report);
-/// Damping over stiffness, measured beside theory, a panel for each question.
+/// Damping over stiffness, measured and by theory, a panel for each question.
 analysis::Figure stability_figure(const StabilityReport& report);
 /// Error over run time of the integrators.
 analysis::Figure integrator_figure(const StabilityReport& report);

@@ -209,8 +209,8 @@ int stability_command(const std::vector<std::string>& args) {
       "At what stiffness does a contact become unstable (buzz)? Simulates the closed loop of\n"
       "hand, two devices and renderer against a wall, an edge, a sphere, two objects and a body\n"
       "on a wall, and compares the stability boundary with the passivity condition of theory.\n"
-      "Status 1 where theory is violated. With --soft: does a tool come to rest on a soft body\n"
-      "that is stepped at its own rate? Status 1 where it does not and scenes may have it.";
+      "Status 1 if theory is violated. With --soft: does a tool come to rest on a soft body\n"
+      "that is stepped at its own rate? Status 1 if it does not although scenes allow it.";
   line.example =
       "  palpate stability\n"
       "  palpate stability --soft\n"
@@ -221,9 +221,9 @@ int stability_command(const std::vector<std::string>& args) {
   auto add = line.options.add_options();
   namespace po = boost::program_options;
   add("full", "four stiffnesses a decade instead of one");
-  add("soft", "the map of soft bodies alone: moduli, springs, rates of the body (a minute)");
+  add("soft", "only the map of soft bodies: moduli, springs, rates of the body (a minute)");
   add("seed", po::value(&seed)->value_name("S"),
-      "with --soft: other places, depths and speeds, as drawn with this seed");
+      "with --soft: other places, depths and speeds, drawn with this seed");
   add("report", po::value(&page)->value_name("FILE"),
       "write a report with figures as an HTML page");
   add("figure", po::value(&figure)->value_name("FILE"), "write the map as SVG");

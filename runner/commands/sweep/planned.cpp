@@ -27,7 +27,7 @@ namespace {
 namespace po = boost::program_options;
 using nlohmann::json;
 
-/// The protocol with --repetitions; no more blocks than those.
+/// The protocol with --repetitions, and at most as many blocks.
 json base_protocol(const protocols::Protocol& protocol, const SweepSettings& settings) {
   json out = read_json(protocol.source_text);
   if (settings.repetitions == 0) return out;
@@ -72,13 +72,13 @@ data::SweepPlan plan_of_sweep(const SweepSettings& settings, const SweptStudy& s
   plan.program_version = PALPATE_VERSION;
   for (const protocols::SweepParameter& one : study.space().parameters)
     plan.parameters.push_back(one.name);
-  if (protocol.version == 2) {  // columns are of its blocks
+  if (protocol.version == 2) {  // columns belong to its blocks
     check_names_of_columns(plan, settings.space);
     return plan;
   }
   for (const protocols::StimulusSpec& stimulus : protocol.stimuli)
     plan.shapes.push_back(stimulus.name);
-  // The analysis' order: gains are of the ray against the point, whichever is listed first.
+  // The order of the analysis: gains compare the ray with the point, whichever is listed first.
   for (const protocols::RendererKind kind :
        {protocols::RendererKind::point, protocols::RendererKind::ray}) {
     if (std::count(protocol.renderers.begin(), protocol.renderers.end(), kind) > 0)
@@ -114,7 +114,7 @@ void add_sweep_options(CommandLine& line, SweepSettings& settings) {
        po::value(&settings.participants)->default_value(settings.participants)->value_name("N"),
        "simulated participants at each point")  //
       ("repetitions", po::value(&settings.repetitions)->value_name("R"),
-       "of each shape with each renderer, in place of the protocol's");
+       "of each shape with each renderer, instead of the protocol's");
   add_participant_version(line, settings.version);
   line.options.add_options()  //
       ("settings", po::value(&settings.patch)->value_name("FILE"),
@@ -141,7 +141,7 @@ PlannedSweep::PlannedSweep(const SweepSettings& settings)
       plan(plan_of_sweep(settings, study, design, protocol)) {
   if (design.size() < settings.points) {
     std::cerr << settings.design << ": " << design.size() << " points of the " << settings.points
-              << " asked for\n";
+              << " requested\n";
   }
 }
 
@@ -149,17 +149,17 @@ namespace {
 
 using nlohmann::json;
 
-constexpr double kTooFast = 0.2;         // s, as `analyze` leaves out by default
-constexpr std::size_t kMaxReason = 300;  // bytes: a row a point
+constexpr double kTooFast = 0.2;         // s; default of `analyze` for excluding trials
+constexpr std::size_t kMaxReason = 300;  // bytes, in the row of a point
 
 std::size_t index_of(const std::vector<std::string>& names, const std::string& name) {
   const auto found = std::find(names.begin(), names.end(), name);
   if (found == names.end())
-    throw std::runtime_error("a trial of '" + name + "', which the protocol has not");
+    throw std::runtime_error("a trial of '" + name + "', which is not in the protocol");
   return static_cast<std::size_t>(found - names.begin());
 }
 
-/// Trials as the analysis takes them, and the time in contact of each cell.
+/// Trials in the analysis' form, and the time in contact of each cell.
 class TrialCollection {
  public:
   explicit TrialCollection(const data::SweepPlan& plan)
@@ -240,7 +240,7 @@ std::optional<double> mean_of(const std::vector<double>& values) {
   return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
 }
 
-/// A figure of each participant of a cell of a task.
+/// A figure for each participant in a cell of a task.
 std::vector<double> figures_of_participants(const analysis::TaskCell& cell,
                                             const std::string& measure) {
   std::vector<double> values;
@@ -289,7 +289,7 @@ std::vector<double> identified(const analysis::TaskTable& table, const data::Tas
   return values;
 }
 
-/// Of a protocol of version 2, in the order of figure_columns().
+/// The figures of a protocol of version 2, in the order of figure_columns().
 std::vector<std::optional<double>> task_figures_of(const data::SweepPlan& plan,
                                                    analysis::TaskTable table) {
   analysis::FunctionSettings without_p;
@@ -331,7 +331,7 @@ data::SweepValue stored(const json& value) {
   return value.get<double>();
 }
 
-/// Without names of files: the same on every machine.
+/// The reason without file names, the same on every machine.
 std::string reason_of(const std::exception& error) {
   std::string text;
   if (const auto* const input = dynamic_cast<const protocols::InputError*>(&error)) {

@@ -1,5 +1,5 @@
 #pragma once
-// A sweep as it was asked for: the options that its results depend on, checked, and its plan.
+// The request for a sweep: the options that determine its results, checked, and its plan.
 
 #include <atomic>
 #include <cstdint>
@@ -19,12 +19,12 @@ struct SweepSettings {
   std::string patch;  ///< file of a JSON merge patch on the participant's settings; "": none
   std::int64_t points = 0;
   std::uint64_t seed = 1;
-  int version = 0;                        ///< of the simulated participant; 0: none was asked for
+  int version = 0;                        ///< of the simulated participant; 0: not given
   int participants = 7, repetitions = 0;  ///< repetitions 0: the protocol's
 };
 
 void add_sweep_options(CommandLine& line, SweepSettings& settings);
-/// To be called with what CommandLine::parse gave. \throws UsageError
+/// Call it with the result of CommandLine::parse. \throws UsageError
 void check_sweep_options(const boost::program_options::variables_map& values,
                          SweepSettings& settings);
 
@@ -33,7 +33,7 @@ struct PlannedSweep {
   /// protocol or space
   explicit PlannedSweep(const SweepSettings& settings);
 
-  protocols::Protocol protocol;  ///< as its file has it
+  protocols::Protocol protocol;  ///< as in its file
   SweptStudy study;
   Design design;
   data::SweepPlan plan;
@@ -41,18 +41,17 @@ struct PlannedSweep {
 
 // One point of a sweep: a study in memory, and its figures as `analyze` defines them.
 
-/// What a point follows from.
+/// The inputs of a point.
 struct Sweep {
   const SweptStudy& study;
   const Design& design;
   const data::SweepPlan& plan;
 };
 
-/// The point's study, not run.
+/// The point's study, not yet run.
 PointStudy study_of_point(const Sweep& sweep, std::int64_t point);
 
-/// Runs it. Whatever it throws is the reason why the point failed. \return none: it was stopped
-/// before its end
+/// Runs a point. An exception is the reason why the point failed. \return none: it was stopped
 std::optional<data::SweepRow> run_point(const Sweep& sweep, std::int64_t point,
                                         const std::atomic<bool>& stop);
 

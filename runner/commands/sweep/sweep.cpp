@@ -45,7 +45,7 @@ std::string analyze_sweep_file(const std::string& file, const std::string& patte
   } catch (const analysis::PatternError& error) {
     throw UsageError(error.what());
   } catch (const data::StoreRefused& error) {
-    throw UsageError(error.what());  // the file that was named is bad input: status 2
+    throw UsageError(error.what());  // the named file is bad input: status 2
   }
 }
 
@@ -71,9 +71,9 @@ void add_options(CommandLine& line, RunSettings& settings) {
       "Simulates a study at each of many points of a space of settings: of the simulated\n"
       "participant and of the protocol. FILE gets a row a point: its settings, and per shape\n"
       "and renderer times, accuracy, time-outs, contact, gains with standard errors, or why it\n"
-      "failed, which does not end the sweep. Started again, it goes on where it stopped or was\n"
-      "killed. The same plan gives the same file, to the byte, whatever the jobs, shards and\n"
-      "interruptions. Where to go from there: palpate analyze --sweep FILE, palpate export\n"
+      "failed; a failed point does not end the sweep. Run again, it resumes where it stopped\n"
+      "or was killed. The same plan gives the same bytes, whatever the jobs, shards and\n"
+      "interruptions. Next steps: palpate analyze --sweep FILE, palpate export\n"
       "--format csv, and palpate merge for shards.";
   line.example =
       R"(  palpate sweep protocols/quick.json --space protocols/spaces/small.json --points 8 \
@@ -95,7 +95,7 @@ void add_options(CommandLine& line, RunSettings& settings) {
   line.positional_names = {"PROTOCOL.json"};
 }
 
-/// None where --help was asked for and printed. \throws UsageError
+/// None: --help was given and printed. \throws UsageError
 std::optional<RunSettings> parse_run_settings(const std::vector<std::string>& args) {
   RunSettings settings;
   settings.jobs = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
@@ -114,12 +114,12 @@ std::optional<RunSettings> parse_run_settings(const std::vector<std::string>& ar
   return settings;
 }
 
-/// The points that workers take, and the rows that they give to the thread that owns the file.
+/// The points that workers take, and their rows for the thread that owns the file.
 class PointQueue {
  public:
   explicit PointQueue(std::vector<std::int64_t> todo) : todo_(std::move(todo)) {}
 
-  /// 0: none is left.
+  /// Takes a point; 0: none is left.
   std::int64_t take() {
     const std::size_t at = next_++;
     return at < todo_.size() ? todo_[at] : 0;
@@ -135,7 +135,7 @@ class PointQueue {
     if (error && !error_) error_ = std::move(error);
     came_.notify_all();
   }
-  /// What has come within 0.2 s; at least one row or the workers' end, if that takes longer.
+  /// The rows of the next 0.2 s; if there are none, waits for a row or the workers' end.
   std::vector<data::SweepRow> wait(int workers, bool& all_done) {
     std::unique_lock lock(mutex_);
     came_.wait_for(lock, std::chrono::milliseconds(200), [&] { return done_ == workers; });
@@ -157,7 +157,7 @@ class PointQueue {
   std::exception_ptr error_;
 };
 
-/// \param before  points of the shard that were on record \return points that are now
+/// \param before  points of the shard already on record \return points on record now
 std::int64_t run_points(const Sweep& sweep, data::SweepFile& file, PointQueue& queue, int jobs,
                         std::int64_t before) {
   const std::atomic<bool>& signal = catch_stop_signals();
@@ -204,10 +204,10 @@ std::int64_t run_points(const Sweep& sweep, data::SweepFile& file, PointQueue& q
   return done;
 }
 
-/// \throws data::StoreRefused: the file is no sweep's
+/// \throws data::StoreRefused: the file is not a sweep's
 int version_begun_with(const std::string& database) {
   std::set<int> begun;
-  std::error_code none;  // what cannot be seen is refused where it is opened
+  std::error_code none;  // an invisible file is refused when opened
   if (std::filesystem::exists(database, none)) {
     const json settings = json_or_discarded(data::SweepFile::open(database).plan().settings);
     for (const int version : participant_versions()) {
@@ -225,8 +225,7 @@ void print_summary(data::SweepFile& file, const data::SweepPlan& plan, const std
   if (failed > 0) std::cout << ", " << failed << " of them failed";
   std::cout << "\n";
   if (failed == 0) return;
-  std::cerr
-      << "the reasons stand in the column 'reason' of: palpate export --db FILE --format csv\n";
+  std::cerr << "the column 'reason' has the reasons: palpate export --db FILE --format csv\n";
 }
 
 int run_shard(const Sweep& sweep, const RunSettings& settings, const Shard& shard,

@@ -6,8 +6,8 @@
 
 namespace palpate::runner {
 
-/// `palpate analyze --sweep`: the analysis as text; puts what was asked for into `outputs`, which
-/// are not written yet. \throws UsageError: the file is no sweep's, or the pattern is none
+/// `palpate analyze --sweep`: the analysis as text; puts the requested files into `outputs` without
+/// writing them. \throws UsageError: the file is not a sweep's, or the pattern is invalid
 std::string analyze_sweep_file(const std::string& file, const std::string& pattern,
                                Outputs& outputs);
 

@@ -30,13 +30,13 @@
 
 namespace palpate::runner {
 
-// Columns of numbers in the text of a page: whole numbers of a step, as differences of the order
-// that takes the fewest bytes, 7 bits a byte (zigzag, least significant first), one zlib stream
-// (RFC 1950) in base64. watch.js reads them.
+// Columns of numbers in the text of a page: integer multiples of a step, as differences of the
+// order that takes the fewest bytes, 7 bits a byte (zigzag, least significant first), in one zlib
+// stream (RFC 1950) in base64. watch.js reads them.
 
 class WholeNumbers {
  public:
-  /// Values are rounded to the step; where one is not finite, the one before stands again.
+  /// Values are rounded to the step; one that is not finite repeats the previous one.
   /// \param steps_per_unit  1e8: to 10 nm
   void add(const std::string& name, std::span<const double> values, double steps_per_unit);
 
@@ -53,8 +53,8 @@ class WholeNumbers {
 namespace {
 
 constexpr int kHighestOrder = 3;
-// A page counts in double precision, exact to 2^53; a difference of order 3 is up to 8 times a
-// value, and zigzag doubles it.
+// JavaScript has double precision, exact to 2^53; a difference of order 3 is up to 8 times a value,
+// and zigzag doubles it.
 constexpr double kLargest = 1e14;
 
 void put(std::string& out, std::int64_t value) {
@@ -70,7 +70,7 @@ std::string packed(const std::vector<std::int64_t>& values) {
   return out;
 }
 
-/// In place; what was before the first value counts as 0.
+/// Differences in place; the value before the first counts as 0.
 void difference(std::vector<std::int64_t>& values) {
   for (std::size_t i = values.size(); i-- > 1;) values[i] -= values[i - 1];
 }
@@ -117,7 +117,7 @@ namespace {
 
 using Cell = std::array<std::int64_t, 3>;
 
-/// Corners of one cell of a grid become one, in their middle; triangles that collapse go.
+/// Merges the corners in each cell of a grid into their mean, and removes collapsed triangles.
 PictureMesh clustered(const DrawnMesh& drawn, double cell) {
   PictureMesh out;
   std::map<Cell, std::uint32_t> known;
@@ -140,7 +140,7 @@ PictureMesh clustered(const DrawnMesh& drawn, double cell) {
     }
     if (triangle[0] == triangle[1] || triangle[1] == triangle[2] || triangle[2] == triangle[0])
       continue;
-    // The same way round from its lowest corner, so that equal ones are found.
+    // Start at the lowest corner and keep the orientation, so that equal triangles are found.
     std::rotate(triangle.begin(), std::min_element(triangle.begin(), triangle.end()),
                 triangle.end());
     if (seen.insert(triangle).second) out.triangles.push_back(triangle);
@@ -166,7 +166,7 @@ PictureMesh picture_mesh(const stimuli::ObjectSpec& object, std::size_t most) {
   const double size = size_of(drawn);
   PictureMesh mesh = clustered(drawn, kSame * size);
   const std::size_t all = mesh.triangles.size();
-  // A surface of n triangles has corners some size / sqrt(n) apart.
+  // The corners of n triangles are some size / sqrt(n) apart.
   for (double cell = 0.5 * size / std::sqrt(static_cast<double>(most));
        mesh.triangles.size() > most; cell *= kCoarser)
     mesh = clustered(drawn, cell);
@@ -181,15 +181,15 @@ using analysis::escaped;
 using analysis::fixed;
 using Json = nlohmann::ordered_json;
 
-// Steps of what the page shows: finer than a device senses or shows.
+// Resolution of the page: finer than devices sense or render.
 constexpr double kPerSecond = 1e6, kPerMetre = 1e8, kPerNewton = 1e5, kPerUnit = 1e7;
 constexpr std::size_t kMostTriangles = 6000;  // of all objects of a page
 
 /// The ticks of a trial by one renderer, as columns.
 struct ShownTicks {
   std::map<std::string, std::vector<double>> columns;
-  std::vector<std::size_t> intervals;  ///< ticks of each
-  std::size_t equal = 0;               ///< to the record, bit by bit
+  std::vector<std::size_t> intervals;  ///< ticks of each interval
+  std::size_t equal = 0;               ///< ticks equal to the record, bit by bit
   std::size_t count = 0;
 
   void put(const std::string& name, double value) { columns[name].push_back(value); }
@@ -211,7 +211,7 @@ void put_body(ShownTicks& out, const std::optional<rendering::BodyPose>& body) {
     out.put(std::string("moved_q") + name, value);
 }
 
-/// \param other  what the other renderer makes of the path
+/// \param other  render the path with the other renderer
 ShownTicks ticks_of(const RecordedTrial& trial, bool other) {
   ShownTicks out;
   const data::TrialRecord& record = trial.stored.record;
@@ -282,7 +282,7 @@ class PageBuilder {
   TrialPage build() {
     std::size_t objects = 0;
     for (const WatchedTrial& one : trials_) objects += one.trial.stored.record.task ? 2 : 1;
-    // An object's share of the page; each trial asked about has at least one of its own.
+    // An object's share of the page; each requested trial has at least one object.
     most_triangles_ =
         std::max<std::size_t>(kMostTriangles / std::max<std::size_t>(objects, 1), 300);
     for (const WatchedTrial& one : trials_) add(one);
@@ -301,7 +301,7 @@ class PageBuilder {
     return {pose.position.x, pose.position.y, pose.position.z, q.w, q.x, q.y, q.z};
   }
 
-  /// Its number; equal ones are in the page once.
+  /// Returns the mesh's number; equal meshes are stored once.
   std::size_t add_mesh(const stimuli::ObjectSpec& object, const std::string& name) {
     const PictureMesh mesh = picture_mesh(object, most_triangles_);
     if (mesh.all_triangles > mesh.triangles.size())
@@ -326,7 +326,7 @@ class PageBuilder {
     for (int axis = 0; axis < 3; ++axis) {
       std::vector<double> values;
       for (const Vec3& corner : mesh.corners) values.push_back(corner[axis]);
-      // To a 16,000th of 6 cm at least.
+      // At least to 1/16,000 of 6 cm.
       const double size = std::max(1e-6, std::abs(*std::ranges::max_element(
                                              values, {}, [](double v) { return std::abs(v); })));
       numbers.add(std::string(1, "xyz"[axis]), values,
@@ -381,7 +381,7 @@ class PageBuilder {
     std::vector<std::string> out;
     if (other) {
       out.push_back("SIMULATED COMPARISON: the recorded path of " + one.name +
-                    " with the renderer that was not felt. The hand would have moved otherwise.");
+                    " with the other renderer. With it, the hand would have moved differently.");
       return out;
     }
     const data::TrialRecord& record = trial.stored.record;
@@ -461,7 +461,7 @@ class PageBuilder {
 
   std::string html() const {
     std::string json = document().dump();
-    // A text of a protocol could end the element otherwise.
+    // Otherwise a text of a protocol could end the element.
     for (std::size_t at = 0; (at = json.find('<', at)) != std::string::npos;)
       json.replace(at, 1, "\\u003c");
     const std::string label = simulated() ? "SIMULATED: " : "";

@@ -13,16 +13,16 @@
 
 namespace palpate::runner {
 
-// The surface of an object as a page shows it: corners that triangles share.
+// The surface of an object for a page: triangles with shared corners.
 
 struct PictureMesh {
   std::vector<Vec3> corners;  ///< m, the object's own frame
   std::vector<std::array<std::uint32_t, 3>> triangles;
-  std::size_t all_triangles = 0;  ///< of the object; more than are here: it was made coarser
+  std::size_t all_triangles = 0;  ///< of the object; if there are more than here, it was simplified
 };
 
-/// \param most  triangles; where there are more, corners that are near to each other become one,
-/// for the picture alone. \throws MeshError, std::runtime_error where a file is no mesh
+/// \param most  largest number of triangles; beyond it, near corners are merged, for the picture
+/// only. \throws MeshError; std::runtime_error if a file is not a mesh
 PictureMesh picture_mesh(const stimuli::ObjectSpec& object, std::size_t most);
 
 struct WatchedTrial {
@@ -32,13 +32,13 @@ struct WatchedTrial {
 
 struct TrialPage {
   std::string html;
-  std::size_t ticks = 0;           ///< that it shows; a comparison has them twice
-  std::vector<std::string> notes;  ///< what differs from the record or the object, in sentences
+  std::size_t ticks = 0;           ///< ticks shown; a comparison has them twice
+  std::vector<std::string> notes;  ///< differences from the record or the object, in sentences
 };
 
-/// Self-contained: nothing is loaded, and no script runs but its own.
-/// \param compare  after each trial, what the other renderer makes of its path
-/// \throws std::invalid_argument where protocol and record do not agree
+/// A self-contained page: it loads nothing and runs no script except its own.
+/// \param compare  after each trial, also its path with the other renderer
+/// \throws std::invalid_argument if protocol and record disagree
 TrialPage trial_page(const std::vector<WatchedTrial>& trials, bool compare);
 
 std::string_view watch_css();  ///< watch.css, embedded by the build

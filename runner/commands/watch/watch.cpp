@@ -12,14 +12,14 @@
 namespace palpate::runner {
 namespace {
 
-constexpr std::size_t kMostShown = 4;  // pictures that fit beside each other and are still seen
+constexpr std::size_t kMostShown = 4;  // pictures that stay legible side by side
 
 std::vector<data::TrialName> names_of(const std::vector<std::string>& texts, bool compare) {
   std::vector<data::TrialName> names;
   for (const std::string& text : texts) {
     names.push_back(parse_trial_name(text));
     if (std::ranges::count(texts, text) > 1)
-      throw UsageError("--trial " + printable(text, 60) + ": it is there twice");
+      throw UsageError("--trial " + printable(text, 60) + ": given twice");
   }
   if (names.size() * (compare ? 2 : 1) > kMostShown)
     throw UsageError(std::string("--trial: expected at most ") +
@@ -36,31 +36,31 @@ int watch_command(const std::vector<std::string>& args) {
       "palpate watch --db FILE --trial CODE/SESSION/TRIAL [--trial ...] [--compare] --out "
       "PAGE.html";
   line.summary =
-      "Writes a page that shows stored trials as they were felt: object, tool, contact and force\n"
+      "Writes a page that shows stored trials as presented: object, tool, contact and force\n"
       "in time, at speeds from 1/20 to 4. Contacts are found by rendering the trial again. The\n"
-      "page needs no network and opens in any browser; it holds no more of the participant than\n"
+      "page needs no network and opens in any browser; of the participant it has only\n"
       "the code. Needs servo samples (\"samples\": true in the protocol).";
   line.example =
       "  palpate watch --db study.db --trial P03/1/12 --out trial.html\n"
       "  palpate watch --db study.db --trial P03/1/12 --trial P03/1/40 --out two.html   (side by\n"
       "      side, on one axis of time)\n"
-      "  palpate watch --db study.db --trial P03/1/12 --compare --out both.html   (and what the\n"
-      "      other renderer makes of the same path)";
+      "  palpate watch --db study.db --trial P03/1/12 --compare --out both.html   (and the\n"
+      "      other renderer on the same path)";
   std::string db, protocol, out, folder;
   std::vector<std::string> trials;
   auto add = line.options.add_options();
   namespace po = boost::program_options;
   add("db", po::value(&db)->value_name("FILE")->required(), "the study's database; only read");
   add("trial", po::value(&trials)->value_name("CODE/SESSION/TRIAL")->required(),
-      "which trial; up to four, each with --trial");
+      "the trial; up to four, each with --trial");
   add("out", po::value(&out)->value_name("PAGE.html")->required(), "the page");
-  add("compare", "also show what the other renderer makes of the path");
+  add("compare", "also show the same path with the other renderer");
   add("protocol", po::value(&protocol)->value_name("NAME"),
-      "of which protocol, where the code is in several");
+      "the protocol, if the code is in several");
   add("meshes", po::value(&folder)->value_name("DIR"),
-      "where the protocol's mesh files are, for a database of before they were kept in it;\n"
+      "folder of the protocol's mesh files, for an old database that does not have them;\n"
       "default: the working directory");
-  add("force", "replace a page that is there");
+  add("force", "replace an existing page");
   const auto values = line.parse(args);
   if (!values) return 0;
   Outputs outputs(*values, {"out"}, {"db"});

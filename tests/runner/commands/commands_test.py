@@ -243,7 +243,7 @@ class Simulate(CommandCase):
             child.wait()
             done = self.simulate(begun, "--participants", 3, *more)
             self.assertIn(f"settings version {version}, ", done.stdout)
-            self.assertEqual("goes on with version" in done.stderr, version != 3, done.stderr)
+            self.assertEqual("continues with version" in done.stderr, version != 3, done.stderr)
             self.assertEqual(self.csv_of(begun), self.csv_of(whole))
         # Other settings than it has are refused as ever.
         refused = self.simulate(self.dir / "10begun.db", "--participants", 3, *patch, status=2)

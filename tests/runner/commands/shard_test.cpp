@@ -77,9 +77,10 @@ TEST(Shards, OfASlurmArrayCountFromItsFirstTask) {
     EXPECT_EQ(parsed("auto", task(id, least, "4")).number, number);
     EXPECT_EQ(parsed("auto", task(id, least, "4")).count, 4);
   }
-  EXPECT_EQ(refusal("auto", task("9", "1", "4")),
-            "--shard auto: task 9 of 4 is no shard; the array's task numbers must follow one "
-            "another (--array=1-N)");
+  EXPECT_EQ(
+      refusal("auto", task("9", "1", "4")),
+      "--shard auto: task 9 of 4 is not a shard; the array's task numbers must be consecutive "
+      "(--array=1-N)");
   EXPECT_EQ(refusal("auto", task("0", "1", "4")).substr(0, 26), "--shard auto: task 0 of 4 ");
   EXPECT_EQ(refusal("auto", task("1", "1", "1000001")).substr(0, 32),
             "--shard auto: task 1 of 1000001 ");

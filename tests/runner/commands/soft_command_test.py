@@ -41,7 +41,7 @@ class Soft(CommandCase):
             scene = self.file("scene.json", {"objects": objects, "gravity_m_per_s2": [0, 0, -9.81]})
             done = self.palpate("render", "--scene", scene, "--renderer", "ray", "--trajectory", path,
                                 "--out", self.dir / "out.csv", "--force")
-            falls = [line for line in done.stderr.splitlines() if "touch nothing but the tool" in line]
+            falls = [line for line in done.stderr.splitlines() if "touch only the tool" in line]
             self.assertEqual(len(falls), 1 if said else 0)
             self.assertIn(said, done.stderr)
             explained = self.palpate("render", "--scene", scene, "--renderer", "ray", "--explain").stdout

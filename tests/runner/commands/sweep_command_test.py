@@ -96,7 +96,7 @@ class Sweeps(SweepCase):
             self.assertEqual(point["settings"]["version"], version)
             done = subprocess.run([PALPATE, *map(str, self.command(begun))], cwd=self.folder, capture_output=True, text=True, timeout=600)
             self.assertEqual(done.returncode, 0, done.stderr)
-            self.assertIn(f"{begun}: goes on with version {version}", done.stderr)
+            self.assertIn(f"{begun}: continues with version {version}", done.stderr)
             self.assertEqual(self.bytes(begun), self.bytes(whole))
             self.assertIn("holds another sweep", self.sweep(begun, "--participant-version", 3, status=2))
         self.sweep("new.sweep", points=1)
@@ -282,7 +282,7 @@ class Sweeps(SweepCase):
         self.assertEqual(self.bytes("a.sweep"), self.bytes("b.sweep"))
         self.assertIn("SLURM_ARRAY_TASK_COUNT is not set", self.sweep("c.sweep", "--shard", "auto", status=2))
         variables["SLURM_ARRAY_TASK_ID"] = "13"
-        self.assertIn("is no shard", self.sweep("c.sweep", "--shard", "auto", status=2, env=variables))
+        self.assertIn("is not a shard", self.sweep("c.sweep", "--shard", "auto", status=2, env=variables))
 
     def test_designs(self):
         for design, points, expected in (("sobol", 5, 5), ("grid", 7, 6), ("saltelli", 9, 5)):
