@@ -1,5 +1,5 @@
-// The watchers' page of palpate serve: draws scene, stylus and force as they are now. The token is the address's
-// fragment, which no server gets to see.
+// The watchers' page of palpate serve: draws the current scene, stylus and force. The token is the address's
+// fragment, which browsers do not send to servers.
 (() => {
   'use strict';
   const {sub, times, size, surface_of, painter, kLight, kDark} = palpate_drawing;
@@ -193,6 +193,6 @@
     event.preventDefault();
   });
   draw();
-  // For whoever wants the numbers, from the console.
+  // Gives access to the numbers from the browser console.
   window.live = {stage, newest: () => newest, objects: () => objects, forces};
 })();

@@ -1,4 +1,4 @@
-// What the pages of palpate draw with: vectors, surfaces, and a painter for WebGL.
+// Drawing for the pages of palpate: vectors, surfaces, and a painter for WebGL.
 const palpate_drawing = (() => {
   'use strict';
   const kCrease = Math.cos(Math.PI / 6);  // flatter edges are smooth
@@ -13,7 +13,7 @@ const palpate_drawing = (() => {
       [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
   const size = a => Math.hypot(a[0], a[1], a[2]);
   const unit = a => times(1 / (size(a) || 1), a);
-  // A pose is [x, y, z, qw, qx, qy, qz]; its columns and place as a matrix.
+  // A pose is [x, y, z, qw, qx, qy, qz]; converts it to a matrix.
   function frame([x, y, z, w, i, j, k]) {
     return {
       x: [1 - 2 * (j * j + k * k), 2 * (i * j + k * w), 2 * (i * k - j * w)],
@@ -26,7 +26,7 @@ const palpate_drawing = (() => {
   const placed = (f, p) => add(turned(f, p), f.o);
   const joined = (a, b) =>
       ({x: turned(a, b.x), y: turned(a, b.y), z: turned(a, b.z), o: placed(a, b.o)});
-  // The frame with z along d.
+  // A frame with z along d.
   function along(from, d, radius, length) {
     const z = unit(d);
     const x = unit(cross(Math.abs(z[0]) < 0.9 ? [1, 0, 0] : [0, 1, 0], z));
@@ -35,7 +35,7 @@ const palpate_drawing = (() => {
 
   // ---- surfaces ------------------------------------------------------------------------------
 
-  // Triangles as three numbers of corners, outward.
+  // Triangles as three indices of corners, oriented outward.
   function surface_of(corners, triangles) {
     const normals = [], edges = new Map();
     for (const [index, t] of triangles.entries()) {
@@ -103,7 +103,7 @@ const palpate_drawing = (() => {
     return {right, into, up: cross(right, into)};
   }
 
-  // Null where the browser has no WebGL. stage: camera, what is shown about which centre, how long a newton is.
+  // Null: the browser has no WebGL. stage: camera, size and centre of the view, length of a newton.
   function painter(canvas, stage) {
     const gl = canvas.getContext('webgl', {alpha: false, antialias: true, preserveDrawingBuffer: true});
     if (!gl) return null;
@@ -182,7 +182,7 @@ const palpate_drawing = (() => {
       };
       gl.depthFunc(gl.LEQUAL);
       for (const one of moment.objects ?? (moment.mesh ? [moment] : [])) draw(one.mesh.vertices, one.object, colours.object, 1);
-      // What is in or behind the object shines through.
+      // Parts inside or behind the object show through.
       gl.depthFunc(gl.GREATER);
       gl.depthMask(false);
       rest(0.3);

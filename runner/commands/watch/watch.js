@@ -1,4 +1,4 @@
-// A trial on a page: decodes its ticks, draws them at a time that the reader moves.
+// A trial on a page: decodes its ticks and draws them at the time that the reader chooses.
 (async () => {
   'use strict';
   const $ = id => document.getElementById(id);
@@ -9,7 +9,7 @@
 
   // ---- numbers -------------------------------------------------------------------------------
 
-  // A zlib stream in base64 of whole numbers, 7 bits a byte, zigzag, each column as its differences.
+  // Decodes a zlib stream in base64: integers, 7 bits a byte, zigzag, each column as differences.
   async function unpacked(text) {
     const bytes = Uint8Array.from(atob(text), c => c.charCodeAt(0));
     const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream('deflate'));
@@ -56,7 +56,7 @@
     delete show.data;
     if (one.path !== undefined) show.c = {...shows[one.path].c, ...show.c};
     const c = show.c, n = c.t.length;
-    // The intervals of a trial follow each other on one axis of time.
+    // The intervals of a trial are consecutive on one axis of time.
     show.time = new Float64Array(n);
     let first = 0, start = 0;
     for (const part of show.parts) {
@@ -95,7 +95,7 @@
     };
   }
 
-  // Of all objects, so that pictures side by side have one scale.
+  // The size of all objects, so that pictures side by side have one scale.
   const outline = [];
   let strongest = 0;
   for (const show of shows) {
@@ -239,7 +239,7 @@
       }
       node('path', {class: 'touch', d: bands}, svg);
       node('path', {class: 'axis', d: `M${kLeft} ${kTop}V${height - kBottom}H${width - 8}`, fill: 'none'}, svg);
-      // Of every pixel the least and the greatest force, so that no peak is left out.
+      // Draw the least and the greatest force of every pixel, so that no peak is lost.
       let curve = '';
       for (let i = 0; i < n;) {
         const column = Math.floor(x(show.time[i]));
@@ -328,7 +328,7 @@
   });
   if (!any_solid) solid = false;
 
-  // The tick at the time, or the last one before it.
+  // The tick at this time, or the last one before it.
   function index_at(show, t) {
     let a = 0, b = show.time.length - 1;
     while (a < b) {
@@ -413,7 +413,7 @@
     camera.zoom = Math.min(Math.max(camera.zoom * by, 0.2), 20);
     redraw();
   }
-  // One finger or the mouse turns, two fingers or the wheel with Ctrl come closer.
+  // One finger or the mouse turns; two fingers or the wheel with Ctrl zoom.
   function turn_by(canvas) {
     const held = new Map();
     const apart = () => {
@@ -489,13 +489,13 @@
   });
   set_speed(1);
   set_solid(solid);
-  // A trial begins with the way to the object: show its first contact.
+  // A trial begins with the approach: show its first contact.
   const touches = shows.map(s => s.time[s.c.contacts.findIndex(n => n > 0)]).filter(t => t !== undefined);
   now = touches.length ? Math.min(Math.min(...touches) + 0.2, last) : 0;
   draw();
   $('controls').hidden = false;
   $('loading').remove();
-  // For whoever wants the numbers, from the console.
+  // Gives access to the numbers from the browser console.
   window.trial = {shows, tick, seek: t => (now = Math.min(Math.max(t, 0), last), draw()), at: () => now};
 })().catch(error => {
   document.getElementById('loading').textContent =
