@@ -73,7 +73,7 @@ class Press {
 
 class LayerThatBreaks : public ::testing::TestWithParam<double> {};
 
-TEST_P(LayerThatBreaks, GivesWayWhateverElseTheObjectHas) {
+TEST_P(LayerThatBreaks, BreaksWhateverElseTheObjectHas) {
   const double surface = GetParam(), step = 500 * 2e-5;
   const stimuli::Material material = of(surface, {{0.02, 500, 0, 1.0}});
   for (const rendering::Tool& tool :
@@ -95,7 +95,7 @@ TEST_P(LayerThatBreaks, GivesWayWhateverElseTheObjectHas) {
 
 INSTANTIATE_TEST_SUITE_P(UnderSurfaces, LayerThatBreaks, ::testing::Values(0.0, 0.001, 50.0));
 
-TEST(SceneBuilder, WhoStartsAboveALayerIsInsideOfAnObjectThatIsFeltUnderneathOnly) {
+TEST(SceneBuilder, AStartAboveALayerIsInsideAnObjectWithoutSurfaceStiffness) {
   for (const double surface : {0.0, 0.001}) {
     Press press(cube(of(surface, {{0.012, 500, 0, {}}})));
     for (const double depth : {0.010, 0.015, 0.022, 0.003}) {
@@ -110,7 +110,7 @@ TEST(SceneBuilder, WhoStartsAboveALayerIsInsideOfAnObjectThatIsFeltUnderneathOnl
   }
 }
 
-TEST(SceneBuilder, ASurfaceThatIsNotFeltHasNoForceAndNoContact) {
+TEST(SceneBuilder, ASurfaceWithoutStiffnessHasNoForceAndNoContact) {
   Press press(cube(of(0, {{0.012, 500, 0, {}}})));
   press.at(-0.001);
   const rendering::Rendering over = press.at(0.011), in = press.at(0.013);
@@ -121,7 +121,7 @@ TEST(SceneBuilder, ASurfaceThatIsNotFeltHasNoForceAndNoContact) {
   EXPECT_NEAR(in.deepest.depth, 0.001, 1e-9);
 }
 
-TEST(SceneBuilder, WhoIsInsideOfAnotherPartHasNotLeftTheCompound) {
+TEST(SceneBuilder, AStylusInsideAnotherPartHasNotLeftTheCompound) {
   // A block that is not felt at all stands on the layered one.
   Press press(compound({cube(of(0, {{0.005, 500, 0, 1.0}})),
                         box({-kHalf, -kHalf, kHalf}, {kHalf, kHalf, 3 * kHalf}, of(0, {}))}));
@@ -134,7 +134,7 @@ TEST(SceneBuilder, WhoIsInsideOfAnotherPartHasNotLeftTheCompound) {
   EXPECT_GT(press.largest_force(-2 * kHalf - 0.001, 0.0065), 0.7);
 }
 
-TEST(SceneBuilder, EachPartOfACompoundHasItsOwnBoundOfALayer) {
+TEST(SceneBuilder, EachPartOfACompoundHasItsOwnBreakingForce) {
   // Left of 1 N, right of 3 N, in the middle one that holds; in any order.
   const auto part = [](double x, std::optional<double> breaks) {
     return box({x - 0.02, -kHalf, -kHalf}, {x + 0.02, kHalf, kHalf},
@@ -156,7 +156,7 @@ TEST(SceneBuilder, EachPartOfACompoundHasItsOwnBoundOfALayer) {
   }));
 }
 
-TEST(SceneBuilder, OnePartThatBrokeLeavesItsNeighboursWhole) {
+TEST(SceneBuilder, ABrokenPartLeavesItsNeighboursWhole) {
   const auto part = [](double low, double high, std::optional<double> breaks) {
     return box({low, -kHalf, -kHalf}, {high, kHalf, kHalf}, of(100, {{0.002, 1000, 0, breaks}}));
   };
@@ -168,7 +168,7 @@ TEST(SceneBuilder, OnePartThatBrokeLeavesItsNeighboursWhole) {
   EXPECT_NEAR(press.largest_force(0.001, 0.006, 0.012), 100 * 0.006 + 1000 * 0.004, 1e-9);
 }
 
-TEST(SceneBuilder, ALayerGoesOnFromPartToPart) {
+TEST(SceneBuilder, ALayerContinuesFromPartToPart) {
   const stimuli::Material material = of(0, {{0.003, 1000, 0, {}}});
   const stimuli::ObjectSpec left = box(Vec3(-kHalf), {0, kHalf, kHalf}, material),
                             right = box({0, -kHalf, -kHalf}, Vec3(kHalf), material);
@@ -187,7 +187,7 @@ TEST(SceneBuilder, ALayerGoesOnFromPartToPart) {
   }
 }
 
-TEST(SceneBuilder, ALayerOfSomePartsIsUnderTheSurfaceOfTheWholeObject) {
+TEST(SceneBuilder, ALayerOfSomePartsLiesBelowTheWholeObjectsSurface) {
   // The lower block has the layer, a slab on it has none, or one of another kind.
   const auto lower = box(Vec3(-kHalf), {kHalf, kHalf, 0.02}, of(0, {{0.002, 1000, 0, {}}}));
   const auto upper = [](std::vector<stimuli::Layer> layers) {
@@ -232,7 +232,7 @@ TEST(SceneBuilder, LayersThatDifferFromPartToPartMeetAtTheSeam) {
   }
 }
 
-TEST(SceneBuilder, SaysHowDeepTheLayersOfACompoundMayBe) {
+TEST(SceneBuilder, StatesTheGreatestDepthOfACompoundsLayers) {
   const stimuli::Material material = of(0, {{0.026, 1000, 0, {}}});
   try {
     SceneBuilder().build({compound({box(Vec3(-kHalf), {0, kHalf, kHalf}, material),

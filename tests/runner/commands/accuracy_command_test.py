@@ -25,7 +25,7 @@ class Accuracy(unittest.TestCase):
         self.assertEqual(done.returncode, status, done.stdout + done.stderr)
         return done
 
-    def test_measures_every_shape_and_says_which_tessellation(self):
+    def test_measures_every_shape_and_recommends_a_tessellation(self):
         numbers, figure, page = self.dir / "a.json", self.dir / "a.svg", self.dir / "a.html"
         done = self.accuracy(*SMALL, "--json", numbers, "--figure", figure, "--report", page)
         self.assertEqual(done.stderr, "")
@@ -98,7 +98,7 @@ class Accuracy(unittest.TestCase):
             else:
                 self.assertIsNone(row["inside"], row)
 
-    def test_the_search_counts_the_same_with_any_number_of_threads(self):
+    def test_the_search_gives_the_same_counts_with_any_number_of_threads(self):
         one, three = self.dir / "1.json", self.dir / "3.json"
         # Status 1 where it finds something; here the counts are what is tested.
         for jobs, path in ((1, one), (3, three)):

@@ -164,7 +164,7 @@ void fill_errors(rendering::ErrorSummary& errors, const std::string& path, Numbe
   n.spread(errors.torque, path + "/torque", "nm");
 }
 
-TEST(AccuracyJson, HasEveryNumberOnceUnderItsName) {
+TEST(AccuracyJson, HasEveryNumberExactlyOnceUnderItsName) {
   AccuracyReport report;
   Numbers n;
   rendering::AccuracyRow& row = report.rows.emplace_back();
@@ -189,7 +189,7 @@ bool is_number(const std::string& cell) {
   return !cell.empty() && cell.find_first_not_of("0123456789.,-+e") == std::string::npos;
 }
 
-TEST(AccuracyTables, HaveTheirFormAndNamesBeforeNumbers) {
+TEST(AccuracyTables, HaveTheirFormWithNamesBeforeNumbers) {
   AccuracyReport report;
   Numbers n;
   for (const char* const probe : {"ray", "point"}) {

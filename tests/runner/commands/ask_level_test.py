@@ -99,7 +99,7 @@ class AskLevel(CommandCase):
         base.close()
         return found
 
-    def test_levels_are_asked_for_shown_and_told(self):
+    def test_levels_are_requested_presented_and_reported(self):
         program, db = self.asked(lambda message: level(message, 310.5 + message["trial"]))
         asked = program.of("ask")
         self.assertEqual(len(asked), TRIALS)
@@ -114,7 +114,7 @@ class AskLevel(CommandCase):
         self.assertEqual([message["level"] for message in told], self.levels(db))
         self.assertTrue(all(message["answered"] and message["success"] == message["correct"] for message in told))
 
-    def test_the_program_that_is_shipped_converges(self):
+    def test_the_shipped_program_converges(self):
         path = self.dir / "socket"
         program = subprocess.Popen([sys.executable, EXAMPLE, str(path)])
         self.addCleanup(program.wait)
@@ -148,7 +148,7 @@ class AskLevel(CommandCase):
             self.assertLess(time.monotonic(), deadline)
         self.assertEqual(self.levels(self.dir / "again.db"), levels)
 
-    def test_the_program_that_is_shipped_has_thirty_lines(self):
+    def test_the_shipped_program_has_thirty_lines(self):
         with open(EXAMPLE) as text:
             self.assertLessEqual(len(text.readlines()), 30)
 
@@ -157,7 +157,7 @@ class AskLevel(CommandCase):
         self.simulate(db)
         return self.levels(db)
 
-    def test_who_dies_hangs_or_sends_rubbish_leaves_the_procedure_to_itself(self):
+    def test_without_a_valid_answer_the_procedure_chooses(self):
         expected = self.own_procedure()
         cases = {"dies": (lambda message: "die", "gone", 5),
                  "hangs": (lambda message: None, "in time", 0.02),
@@ -182,13 +182,13 @@ class AskLevel(CommandCase):
                 if "expected" in reason:
                     self.assertIn(reason, program.of("refused")[0]["message"])
 
-    def test_an_answer_that_comes_after_refusals_counts_again(self):
+    def test_a_valid_answer_counts_again_after_refusals(self):
         _, db = self.asked(lambda message: level(message, 450) if message["trial"] > 6 else level(message, -1))
         levels, events = self.levels(db), self.events(db)
         self.assertEqual([one["trial"] for one in events], [trial for trial in range(3, 7)])
         self.assertEqual(levels[len(events):], [450] * (TRIALS - len(events)))
 
-    def test_what_is_recorded_is_not_asked_for_again(self):
+    def test_recorded_trials_are_not_requested_again(self):
         program, whole = self.asked(lambda message: level(message, 400 + message["trial"]))
         expected = self.levels(whole)
         # A session that was cut off: the same, with its last five trials taken away.

@@ -129,7 +129,7 @@ class Bundle(unittest.TestCase):
             shutil.copytree(self.base / name, self.dir / name)
         self.bundle = self.dir / "bundle"
 
-    def test_what_it_holds(self):
+    def test_contents_of_the_folder(self):
         there = files(self.bundle)
         for name in ("data/trials.csv", "data/codebook.csv", "data/psych-ds/dataset_description.json",
                      "registration/registration.md", "check.json", "check.html", "report.html", "figures/figure15.svg",
@@ -147,7 +147,7 @@ class Bundle(unittest.TestCase):
         with open(self.bundle / "data/trials.csv", newline="") as file:
             self.assertEqual({row["onset_utc"][:4] for row in csv.DictReader(file)}, {"1900"})
 
-    def test_the_same_numbers_as_of_the_database(self):
+    def test_numbers_equal_those_of_the_database(self):
         run("analyze", "--db", "study.db", "--json", "db.json", folder=self.dir)
         ours = json.loads((self.bundle / "analysis.json").read_text())
         theirs = json.loads((self.dir / "db.json").read_text())
@@ -210,7 +210,7 @@ class Bundle(unittest.TestCase):
                                   preexec_fn=nobody, env={"PATH": "/usr/bin:/bin", "LC_ALL": "C"})
             self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
 
-    def test_what_was_changed_is_named(self):
+    def test_changes_are_named(self):
         trials = self.bundle / "data/trials.csv"
         text = trials.read_bytes()
         time = list(csv.reader(text.decode().splitlines()))[1][8]
@@ -242,7 +242,7 @@ class Bundle(unittest.TestCase):
         self.assertEqual(crate_faults(self.dir / "new"), [])
         run("bundle", "--verify", self.dir / "new")
 
-    def test_who_withdraws_is_in_none_of_it(self):
+    def test_withdrawn_participants_are_absent(self):
         self.make(self.dir, out="first")
         done = run("forget", "--db", "study.db", "--participant", "S002", "--yes", folder=self.dir)
         self.assertIn("first/data/trials.csv", done.stdout)

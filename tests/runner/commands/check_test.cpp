@@ -199,7 +199,7 @@ class Check : public ::testing::Test {
 
 testing::TemporaryFolder* Check::shared_ = nullptr;
 
-TEST_F(Check, AStudyAsRegisteredPasses) {
+TEST_F(Check, AStudyThatMatchesItsRegistrationPasses) {
   run();
   const StudyCheck found = check();
   EXPECT_EQ(deviating(found), std::vector<std::string>{}) << evidence(found);
@@ -227,109 +227,109 @@ TEST_F(Check, SimulatedParticipantsAreLabelledAndHaveNoDates) {
   EXPECT_EQ(found.label, "SIMULATED PARTICIPANTS");
 }
 
-TEST_F(Check, AByteOfTheProtocol) {
+TEST_F(Check, AChangedByteOfTheProtocolIsADeviation) {
   run({.protocol = std::string(kProtocol) + " "});
   expect_alone(check(), "protocol",
                {"P01", "P04", "layout", checksum_hex(std::string(kProtocol) + " ").substr(0, 12)});
 }
 
-TEST_F(Check, ATextOfTheProtocol) {
+TEST_F(Check, AChangedTextOfTheProtocolIsADeviation) {
   std::string changed = kProtocol;
   changed.replace(changed.find("\"repetitions\""), 0, "\"title\": \"Other\", ");
   run({.protocol = changed});
   expect_alone(check(), "protocol", {"only texts: /title"});
 }
 
-TEST_F(Check, TheOrderOfTwoTrials) {
+TEST_F(Check, SwappedTrialsAreADeviation) {
   run({.swap_of = 3});
   expect_alone(check(), "order", {"P03 (number 3): session 1, trial", "registered 1,"});
 }
 
-TEST_F(Check, AParticipantTooFew) {
+TEST_F(Check, AMissingParticipantIsADeviation) {
   run({.participants = 3});
   expect_alone(check(), "participants", {"nobody has number 4"});
 }
 
-TEST_F(Check, AParticipantTooMany) {
+TEST_F(Check, AnAdditionalParticipantIsADeviation) {
   run({.participants = 5});
   expect_alone(check(), "participants", {"P05 has number 5"});
 }
 
-TEST_F(Check, ATrialTooFew) {
+TEST_F(Check, AMissingTrialIsADeviation) {
   run({.stop_of = 2});
   expect_alone(check(), "trials", {"P02: 15 of 16 trials"});
 }
 
-TEST_F(Check, PeopleAndSimulatedParticipantsMixed) {
+TEST_F(Check, MixingPeopleAndSimulatedParticipantsIsADeviation) {
   run({.simulated_from = 4});
   expect_alone(check(), "people", {"simulated: P04", "people: P01, P02 and P03"});
 }
 
-TEST_F(Check, ASessionBeforeTheRegistration) {
+TEST_F(Check, ASessionBeforeTheRegistrationIsADeviation) {
   run({.early = 2});
   expect_alone(check(), "dates", {"P02, session 1: began on", "P02, session 2"});
 }
 
-TEST_F(Check, AnotherExclusion) {
+TEST_F(Check, AnotherExclusionIsADeviation) {
   run();
   expect_alone(check({.too_fast = 0.5}), "exclusion", {"used 0.5 s, registered 0.2 s"});
 }
 
-TEST_F(Check, AnotherAlpha) {
+TEST_F(Check, AnotherAlphaIsADeviation) {
   run();
   expect_alone(check({.alpha = 0.1}), "alpha", {"used 0.1, registered 0.05"});
 }
 
-TEST_F(Check, AnotherVersion) {
+TEST_F(Check, AnotherVersionIsADeviation) {
   run({.other_version = 2});
   expect_alone(check(), "versions", {"P02: recorded with palpate 0.0.1"});
 }
 
-TEST_F(Check, CalibrationLeftOut) {
+TEST_F(Check, OmittedCalibrationIsADeviation) {
   run({.note = "pre-flight: homed; WITHOUT calibration"});
   expect_alone(check(), "calibration", {"P02, session 1: pre-flight"});
 }
 
-TEST_F(Check, NoiseLeftOut) {
+TEST_F(Check, OmittedNoiseIsADeviation) {
   run({.note = R"({"masking_noise":"left out"})"});
   expect_alone(check(), "noise", {"P02, session 1"});
 }
 
-TEST_F(Check, SoundsLeftOut) {
+TEST_F(Check, OmittedSoundsAreADeviation) {
   run({.note = R"({"sounds":"left out"})"});
   expect_alone(check(), "sounds", {"P02, session 1"});
 }
 
-TEST_F(Check, TorqueLeftOut) {
+TEST_F(Check, OmittedTorqueIsADeviation) {
   run({.note = data::kTorqueLeftOutNote});
   expect_alone(check(), "torque", {"P02, session 1"});
 }
 
-TEST_F(Check, LevelsFromOutside) {
+TEST_F(Check, LevelsFromOutsideAreADeviation) {
   run({.note =
            R"({"level_from_own_procedure":{"session":1,"trial":2,"level":1.0,"reason":"late"}})"});
   expect_alone(check(), "levels", {"P02, session 1"});
 }
 
-TEST_F(Check, ANoteThatOnlySpeaksOfThemIsNone) {
+TEST_F(Check, ANoteThatOnlyMentionsThemIsNoDeviation) {
   run({.note = "the participant asked about masking_noise and WITHOUT calibration"});
   EXPECT_EQ(deviating(check()), std::vector<std::string>{});
 }
 
-TEST_F(Check, AChangedRegistration) {
+TEST_F(Check, AChangedRegistrationIsReported) {
   run();
   std::ofstream(registration() + "/codebook.csv", std::ios::app) << "more\n";
   expect_alone(check(), "registration", {"codebook.csv has changed"});
 }
 
-TEST_F(Check, AFileMoreOrLessInTheRegistration) {
+TEST_F(Check, AnAddedOrMissingFileOfTheRegistrationIsReported) {
   run();
   std::filesystem::remove(registration() + "/codebook.csv");
   write(registration() + "/more.txt", "more");
   expect_alone(check(), "registration", {"codebook.csv is missing", "more.txt is not listed"});
 }
 
-TEST_F(Check, FillingInWhatIsAskedForIsNoDeviation) {
+TEST_F(Check, FillingInTheRequestedFieldsIsNoDeviation) {
   run();
   std::ofstream(registration() + "/registration.md", std::ios::app) << "Answers.\n";
   const StudyCheck found = check();
@@ -337,7 +337,7 @@ TEST_F(Check, FillingInWhatIsAskedForIsNoDeviation) {
   EXPECT_NE(found.points[0].sentence.find("registration.md"), std::string::npos);
 }
 
-TEST_F(Check, ReportedNumbers) {
+TEST_F(Check, DifferentReportedNumbersAreReported) {
   run();
   const std::string good = analysis::report_json(
       analysis::analyze(analysis::read_trials_store(database()), {}, PALPATE_VERSION));
@@ -348,7 +348,7 @@ TEST_F(Check, ReportedNumbers) {
                {"paired_by_shape.cone.t_test.p_holm: reported 0.001"});
 }
 
-TEST_F(Check, WhoHasWithdrawnIsNotUsed) {
+TEST_F(Check, WithdrawnParticipantsAreNotUsed) {
   run({.withdraws = 3});
   try {
     check();
@@ -358,7 +358,7 @@ TEST_F(Check, WhoHasWithdrawnIsNotUsed) {
   }
 }
 
-TEST_F(Check, TextsOfStrangersAreShownAsTheyAre) {
+TEST_F(Check, ForeignTextsAreShownLiterally) {
   run({.note = "pre-flight: <script>alert(1)</script>; WITHOUT calibration"});
   const StudyCheck found = check();
   const std::string page = check_html(found, read_registration(registration()));

@@ -77,7 +77,7 @@ class Cluster(unittest.TestCase):
     def calls(self):
         return [line.split("\t") for line in (self.slurm / "calls").read_text().splitlines()]
 
-    def test_an_array_of_shards_and_a_job_that_finishes_make_the_file_of_one_machine(self):
+    def test_an_array_of_shards_gives_the_file_of_one_machine(self):
         said = self.palpate("cluster", "sweep", *self.PLAN, "--shards", 3, "--dir", "a b", "--time", "01:00:00", "--partition", "all")
         self.assertIn("job 100: shards 1-3", said)
         self.assertIn("ten minutes", said)
@@ -93,7 +93,7 @@ class Cluster(unittest.TestCase):
         self.assertIn("points: 5 of 5", status)
         self.assertIn("report.html", status)
 
-    def test_shards_that_were_killed_go_on_and_the_result_is_the_same(self):
+    def test_killed_shards_resume_with_the_same_result(self):
         (self.slurm / "kill").write_text("2 3")
         self.palpate("cluster", "sweep", *self.PLAN, "--shards", 4, "--dir", "d")
         self.assertFalse((self.folder / "d/all.sweep").exists())
@@ -116,7 +116,7 @@ class Cluster(unittest.TestCase):
         self.palpate("export", "--db", database, "--format", "csv", "--out", "trials.csv", "--force")
         return (self.folder / "trials.csv").read_bytes()
 
-    def test_a_study_in_shards_of_participants_is_that_of_one_machine(self):
+    def test_a_study_in_shards_of_participants_equals_that_of_one_machine(self):
         (self.slurm / "kill").write_text("1")
         said = self.palpate("cluster", "simulate", *self.STUDY, "--shards", 2, "--dir", "d")
         self.assertIn("shards 1-2", said)
@@ -134,7 +134,7 @@ class Cluster(unittest.TestCase):
         self.assertIn("--shards", self.palpate("cluster", "simulate", *self.STUDY, "--shards", 4, "--dir", "e", status=2))
         self.assertIn("--space", self.palpate("cluster", "simulate", *self.STUDY, "--space", "s.json", "--shards", 2, "--dir", "e", status=2))
 
-    def test_tasks_are_estimated_by_what_is_felt_and_swept_as_on_one_machine(self):
+    def test_tasks_are_estimated_by_their_trials_and_swept_as_on_one_machine(self):
         # 4 + 70 + 80 trials of two intervals, 10 s each, 3000 simulated s in a second.
         stiffness = PROTOCOLS / "stiffness-2afc.json"
         said = self.palpate("cluster", "sweep", stiffness, "--space", "s.json", "--points", 100, "--participants", 30,
@@ -156,7 +156,7 @@ class Cluster(unittest.TestCase):
         self.assertEqual((self.folder / "v/all.sweep").read_bytes(), (self.folder / "few.sweep").read_bytes())
         self.assertIn("points: 3 of 3", self.palpate("cluster", "status", "v"))
 
-    def test_a_folder_goes_on_with_the_version_that_it_was_begun_with(self):
+    def test_a_folder_keeps_the_version_that_it_began_with(self):
         old = ["--participant-version", 1]
         (self.slurm / "kill").write_text("1")
         self.palpate("cluster", "simulate", *self.STUDY, *old, "--shards", 2, "--dir", "d")
@@ -176,7 +176,7 @@ class Cluster(unittest.TestCase):
     PLAN_OPTIONS = ["--gain-sd", 0.15, "--residual-sd", 0.5, "--effect", "cone=22,cube=11", "--participants", "4-30",
                     "--studies", 400, "--trials", "5,9,20"]
 
-    def test_a_plan_in_curves_is_that_of_one_machine(self):
+    def test_a_plan_in_curves_equals_that_of_one_machine(self):
         (self.slurm / "kill").write_text("2")
         self.assertIn("shards 1-3", self.palpate("cluster", "plan", *self.PLAN_OPTIONS, "--dir", "d"))
         self.assertIn("curves: 2 of 3", self.palpate("cluster", "status", "d"))
@@ -218,7 +218,7 @@ class Cluster(unittest.TestCase):
             for command in ("status", "submit"):
                 self.assertIn("cluster.json", self.palpate("cluster", command, "d", status=2))
 
-    def test_without_slurm_the_scripts_do_it(self):
+    def test_the_scripts_work_without_slurm(self):
         said = self.palpate("cluster", "sweep", *self.PLAN, "--shards", 2, "--dir", "d", status=1, slurm=False)
         self.assertIn("there is no Slurm here", said)
         said = self.palpate("cluster", "sweep", *self.PLAN, "--shards", 2, "--dir", "e", "--no-submit", slurm=False)
@@ -229,7 +229,7 @@ class Cluster(unittest.TestCase):
         self.assertEqual((self.folder / "e/all.sweep").read_bytes(), self.single())
         self.assertIn("2 done", self.palpate("cluster", "status", "e", slurm=False))
 
-    def test_what_was_put_together_too_early_is_no_result(self):
+    def test_an_early_merge_does_not_count_as_the_result(self):
         self.palpate("cluster", "sweep", *self.PLAN, "--shards", 3, "--dir", "d", "--no-submit")
 
         def script(*words):
@@ -246,7 +246,7 @@ class Cluster(unittest.TestCase):
         self.assertIn("report.html", self.palpate("cluster", "status", "d"))
         self.assertEqual((self.folder / "d/all.sweep").read_bytes(), self.single())
 
-    def test_files_that_change_on_the_way_change_nothing(self):
+    def test_later_changes_of_files_have_no_effect(self):
         room = self.folder / "lab" / "protocols"
         (room / "shapes").mkdir(parents=True)
         octahedron = ("v 0.03 0 0\nv -0.03 0 0\nv 0 0.03 0\nv 0 -0.03 0\nv 0 0 0.03\nv 0 0 -0.03\nf 1 3 5\nf 3 2 5\nf 2 4 5\n"
@@ -268,7 +268,7 @@ class Cluster(unittest.TestCase):
             subprocess.run([self.folder / "d" / words[0], *words[1:]], check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         self.assertEqual((self.folder / "d/all.sweep").read_bytes(), (self.folder / "one.sweep").read_bytes())
 
-    def test_all_is_private_whatever_the_umask(self):
+    def test_all_files_are_private_whatever_the_umask(self):
         (self.folder / "there").mkdir(mode=0o777)
         (self.folder / "there").chmod(0o777)
         before = os.umask(0)

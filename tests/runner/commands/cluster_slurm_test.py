@@ -95,7 +95,7 @@ class OnSlurm(unittest.TestCase):
             except OSError as error:
                 self.assertEqual(error.errno, errno.ENOSPC)
 
-    def test_killed_requeued_restarted_and_full(self):
+    def test_results_survive_kills_requeues_restarts_and_a_full_disk(self):
         self.small_disk()
         self.hit = set()
         plan = [PROTOCOLS / "quick.json", "--space", "s.json", "--points", POINTS, "--participants", 1,

@@ -56,7 +56,7 @@ class OverSsh(unittest.TestCase):
         self.assertEqual(done.returncode, status, done.stdout + done.stderr)
         return done.stdout + done.stderr
 
-    def test_the_merged_file_is_that_of_one_machine_also_after_a_shard_failed(self):
+    def test_the_merged_file_equals_that_of_one_machine_even_after_a_failed_shard(self):
         subprocess.run([PALPATE, "sweep", *SWEEP, "--db", self.folder / "one.sweep"], check=True, capture_output=True)
         subprocess.run([PALPATE, "cluster", "sweep", *SWEEP, "--shards", "6", "--dir", self.folder / "people", "--no-submit"],
                        check=True, capture_output=True)

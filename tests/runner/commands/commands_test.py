@@ -29,12 +29,12 @@ class Words(CommandCase):
         self.assertEqual(done.returncode, status, done.stdout + done.stderr)
         return done.stdout + done.stderr
 
-    def test_a_command_that_is_not_one_names_the_nearest(self):
+    def test_an_unknown_command_names_the_nearest(self):
         self.assertEqual(self.said("analyse"), "palpate: no command 'analyse'; did you mean 'analyze'? 'palpate --help' lists them\n")
         self.assertIn("did you mean 'export'?", self.said("exprot", "--db", "x"))
         self.assertEqual(self.said("xyzzy"), "palpate: no command 'xyzzy'; 'palpate --help' lists them\n")
 
-    def test_an_option_that_is_not_one_names_the_nearest(self):
+    def test_an_unknown_option_names_the_nearest(self):
         self.assertIn("did you mean '--participants'?", self.said("simulate", "p.json", "--participents=3"))
         self.assertNotIn("did you mean", self.said("simulate", "p.json", "--xyzzy"))
 
@@ -46,7 +46,7 @@ class Words(CommandCase):
 
 
 class Devices(CommandCase):
-    def test_what_needs_no_hardware_is_always_there_and_passes_its_test(self):
+    def test_devices_without_hardware_are_listed_and_pass_their_test(self):
         out = self.dir / "devices.json"
         text = self.palpate("devices", "--device", "simulated", "--json", out).stdout
         self.assertIn("5 degrees of freedom", text)
@@ -57,7 +57,7 @@ class Devices(CommandCase):
             if "time" not in test["what"]:  # a busy machine
                 self.assertTrue(test["passed"], test)
 
-    def test_what_pushes_nothing_has_no_limits_of_pushing(self):
+    def test_devices_without_motors_have_no_force_limits(self):
         out = self.dir / "devices.json"
         text = self.palpate("devices", "--device", "mouse", "--json", out).stdout
         self.assertIn("drives none: nothing is felt", text)
@@ -66,14 +66,14 @@ class Devices(CommandCase):
         self.assertIsNone(device["limits"]["max_force_n"])
         self.assertIsNone(device["limits"]["max_stiffness_n_per_m"])
 
-    def test_a_rate_that_is_asked_for_is_not_the_devices_own(self):
+    def test_a_requested_rate_is_not_shown_as_the_devices_own(self):
         out = self.dir / "devices.json"
         text = self.palpate("devices", "--device", "simulated", "--rate", "3210", "--json", out).stdout
         self.assertIsNone(json.loads(out.read_text())["devices"][0]["limits"]["max_rate_hz"])
         self.assertNotIn("3210 Hz;", text)
         self.assertIn("at any rate that is asked for", text)
 
-    def test_the_machine_is_judged_in_a_sentence_that_fits_the_figures(self):
+    def test_the_verdict_on_the_machine_matches_the_figures(self):
         out = self.dir / "timing.json"
         command = [PALPATE, "devices", "--timing", "--seconds", "0.5", "--rate", "2000", "--json", str(out)]
         done = subprocess.run(command, capture_output=True, text=True, timeout=60)
@@ -88,7 +88,7 @@ class Devices(CommandCase):
         self.assertLessEqual(late["p99"], late["max"])
         self.assertGreater(timing["compute_cpu_ns"]["median"], 0)
 
-    def test_without_rights_it_runs_and_says_what_that_costs(self):
+    def test_without_rights_it_runs_and_names_the_consequences(self):
         wish = ["--timing", "--seconds", "0.1"]
         command = ["prlimit", "--rtprio=0:0", "--memlock=0:0", "setpriv", "--bounding-set=-all", "--inh-caps=-all"]
         if os.geteuid() != 0:
@@ -127,7 +127,7 @@ class Usage(CommandCase):
             self.assertTrue(done.stderr)
         self.assertEqual(list(self.dir.iterdir()), [])
 
-    def test_numbers_without_a_sign_take_none_and_all_are_finite(self):
+    def test_unsigned_numbers_refuse_a_sign_and_all_must_be_finite(self):
         quick = PROTOCOLS / "quick.json"
         for args in (["simulate", quick, "--db", self.dir / "s.db", "--seed", "-1"],
                      ["simulate", quick, "--db", self.dir / "s.db", "--seed=-1"],
@@ -136,7 +136,7 @@ class Usage(CommandCase):
             self.assertIn("expected a", self.palpate(*args, status=2).stderr)
         self.assertEqual(list(self.dir.iterdir()), [])
 
-    def test_a_folder_is_no_database_to_merge(self):
+    def test_merge_refuses_a_folder(self):
         self.assertIn("this is a folder", self.palpate("merge", "--out", self.dir / "all.db", ".", status=2).stderr)
 
     def test_results_that_cannot_be_written_are_a_failure(self):
@@ -230,7 +230,7 @@ class Simulate(CommandCase):
         self.simulate(self.dir / "3.db", "--participants", 1, "--participant-version", 3)
         self.assertEqual(self.csv_of(self.dir / "default.db"), self.csv_of(self.dir / "3.db"))
 
-    def test_a_database_goes_on_with_the_version_that_it_was_begun_with(self):
+    def test_a_database_keeps_the_version_that_it_began_with(self):
         patch = ["--settings", self.file("patch.json", '{"motor": {"reaction_delay_s": 0.02}}')]
         for version, more in ((1, []), (2, []), (2, patch), (3, patch)):
             whole, begun = (self.dir / f"{version}{len(more)}{name}.db" for name in ("whole", "begun"))
@@ -256,7 +256,7 @@ class Simulate(CommandCase):
         other = self.file("other.json", json.dumps({**mine, "name": "other", "$schema": str(PROTOCOLS / "protocol.schema.json")}))
         self.assertIn("settings version 2, ", self.palpate("simulate", other, "--db", db, "--participants", 1).stdout)
 
-    def test_of_several_versions_in_a_database_one_is_asked_for(self):
+    def test_a_database_with_several_versions_requires_a_choice(self):
         db = self.dir / "both.db"
         for shard, version in (("1/2", 1), ("2/2", 2)):
             self.simulate(db, "--participants", 2, "--shard", shard, "--participant-version", version)
@@ -281,7 +281,7 @@ class Simulate(CommandCase):
             child.kill()
             child.wait()
 
-    def test_all_that_comes_out_is_labelled_simulated(self):
+    def test_all_outputs_are_labelled_simulated(self):
         db = self.dir / "one.db"
         self.assertIn("SIMULATED", self.simulate(db).stdout)
         rows = list(csv.DictReader(self.csv_of(db).decode().splitlines()))
@@ -307,7 +307,7 @@ class Simulate(CommandCase):
 
 
 class Bench(CommandCase):
-    def test_rows_are_those_of_the_contract(self):
+    def test_rows_have_the_documented_scenes(self):
         path = self.dir / "bench.json"
         shown = self.palpate("bench", "--ticks", 1000, "--json", path).stdout
         self.assertIn("327680", shown)

@@ -14,7 +14,7 @@ CODES = [1, 2, 3, 4, 5, 6, 128]
 
 
 class DevicesMarkers(CommandCase):
-    def test_every_kind_is_sent_to_every_receiver(self):
+    def test_every_kind_of_marker_is_sent_to_every_receiver(self):
         master, slave = pty.openpty()
         self.addCleanup(os.close, master)
         self.addCleanup(os.close, slave)

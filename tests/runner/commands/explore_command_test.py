@@ -104,13 +104,13 @@ class Explore(unittest.TestCase):
         self.assertIn(words, done.stderr)
         self.assertEqual(done.stdout, "")
 
-    def test_a_picture_for_each_time_that_was_asked_for(self):
+    def test_one_picture_for_each_requested_time(self):
         frames = self.draw("frames", "--every", "25ms")
         self.assertEqual([frame.name for frame in frames], [f"frame-{k:05}.png" for k in range(5)])
         for frame in frames:
             self.assertEqual(decode_png(frame.read_bytes())[:2], (200, 120))
 
-    def test_force_is_seen_and_no_force_is_not(self):
+    def test_a_force_is_drawn_and_no_force_is_not(self):
         first, *_, last = self.draw("frames", "--every", "50ms")
         self.assertEqual(red(first), 0, "0.05 s earlier the tip is 25 mm above the cube")
         self.assertGreater(red(last), 20)
@@ -123,7 +123,7 @@ class Explore(unittest.TestCase):
         self.path = self.write("far.csv", "\n".join([HEADER, *(f"{0.005 * k},0.5,0.5,0.5,0.5,0.5,0.6" for k in range(101))]) + "\n")
         return [middle_row(frame) for frame in self.draw(f"fall{gravity[2]}", "--every", "50ms", scene=scene)]
 
-    def test_what_gravity_draws_down_goes_down_in_the_picture(self):
+    def test_falling_objects_fall_in_the_picture(self):
         rows = self.falling([0, 0, -9.81])
         # 0.04 m of free fall take 0.09 s; then it lies on the plate.
         self.assertGreater(rows[1], rows[0] + 1)
@@ -162,7 +162,7 @@ class Explore(unittest.TestCase):
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertEqual(len(list((self.folder / "frames").iterdir())), 2, "the old ones are gone")
 
-    def test_a_folder_of_something_else_is_never_replaced(self):
+    def test_a_folder_with_other_files_is_never_replaced(self):
         (self.folder / "mine").mkdir()
         self.write("mine/thesis.txt", "all of it")
         options = ("--trajectory", self.path, "--frames", self.folder / "mine", "--force")
@@ -192,11 +192,11 @@ class Explore(unittest.TestCase):
         self.refuses("100000", "--trajectory", many, *frames, "--every", "1ms")
         self.assertFalse((self.folder / "frames").exists())
 
-    def test_a_path_of_readings_that_are_no_numbers_is_drawn(self):
+    def test_a_path_with_nan_readings_is_drawn(self):
         self.path = self.write("path.csv", f"{HEADER}\n0,nan,0,0,0,1,0\n0.1,1e300,0,0,0,inf,0\n")
         self.assertEqual(len(self.draw("frames", "--every", "100ms")), 2)
 
-    def test_without_a_driver_it_says_what_is_missing(self):
+    def test_without_a_driver_the_message_names_it(self):
         nowhere = {"__EGL_VENDOR_LIBRARY_FILENAMES": "/nonexistent", "__EGL_VENDOR_LIBRARY_DIRS": "/nonexistent"}
         done = self.run_explore("--trajectory", self.path, "--frames", self.folder / "frames", environment=nowhere)
         self.assertEqual(done.returncode, 1, done.stderr)

@@ -86,7 +86,7 @@ class Schedules(unittest.TestCase):
                     self.assertEqual(line.split(), [text for text in wanted if text])
             self.assertIsNone(next(shown, None), "the table has every trial")
 
-    def test_what_is_run_is_what_was_listed(self):
+    def test_the_session_follows_the_listed_schedule(self):
         with tempfile.TemporaryDirectory() as folder:
             study = pathlib.Path(folder) / "study.db"
             palpate("simulate", PROTOCOLS / "quick.json", "--db", study, "--participants", 2, "--seed", 4)
@@ -111,7 +111,7 @@ class Explained(unittest.TestCase):
             text = palpate("render", "--scene", path, "--renderer", renderer, "--explain", "--json", path.with_name("e.json"))
             return text, json.loads(path.with_name("e.json").read_text())
 
-    def test_counts_are_those_of_the_solids(self):
+    def test_counts_are_the_solids_faces_edges_and_corners(self):
         cube = {"shape": "cube", "edge_m": 0.02}  # 6 faces, 12 edges
         scene = {"objects": [cube, {**cube, "position_m": [0.2, 0, 0]},
                              {"shape": "compound", "position_m": [0, 0.3, 0], "parts": [cube, {**cube, "position_m": [0.01, 0, 0]}]}]}

@@ -82,7 +82,7 @@ class LiveTouchTest : public ::testing::Test {
 };
 
 // Five seconds of ticks in which the display does not look once.
-TEST_F(LiveTouchTest, ADisplayThatStallsMakesNoTickLateAndLosesNone) {
+TEST_F(LiveTouchTest, AStalledDisplayNeitherDelaysNorLosesTicks) {
   LiveTouch touch(device_, clock_, settings_of());
   clock_.start();
   ASSERT_TRUE(comes_true([&] { return touch.recorded() >= 5000; }));
@@ -115,7 +115,7 @@ LiveTouch::Settings with_drifting_cube() {
 }
 
 /// What moves is where it is in every moment, and goes where somebody draws it.
-TEST_F(LiveTouchTest, WhatMovesIsShownAndCanBeDrawn) {
+TEST_F(LiveTouchTest, MovingObjectsAreShownAndCanBePulled) {
   LiveTouch touch(device_, clock_, with_drifting_cube());
   clock_.start();
   ASSERT_TRUE(comes_true([&] { return touch.recorded() >= 1000; }));
@@ -144,7 +144,7 @@ TEST_F(LiveTouchTest, WhatMovesIsShownAndCanBeDrawn) {
   EXPECT_EQ(last.sample.faults, 0U);
 }
 
-TEST_F(LiveTouchTest, OfALongStallTheLastPartIsKept) {
+TEST_F(LiveTouchTest, TheLastPartOfALongStallIsKept) {
   LiveTouch touch(device_, clock_, settings_of());
   clock_.start();
   ASSERT_TRUE(comes_true([&] { return touch.recorded() >= 70'000; }));
@@ -156,7 +156,7 @@ TEST_F(LiveTouchTest, OfALongStallTheLastPartIsKept) {
     ASSERT_EQ(moments[i].sample.time_ns - moments[i - 1].sample.time_ns, 1'000'000) << i;
 }
 
-TEST_F(LiveTouchTest, AfterAnEmergencyNothingIsFeltUntilItIsTakenBack) {
+TEST_F(LiveTouchTest, AfterAnEmergencyForcesStayOffUntilCleared) {
   LiveTouch touch(device_, clock_, settings_of());
   clock_.start();
   const auto newest = [&] {
@@ -174,7 +174,7 @@ TEST_F(LiveTouchTest, AfterAnEmergencyNothingIsFeltUntilItIsTakenBack) {
   EXPECT_TRUE(comes_true([&] { return newest().device1.y > 1; }));
 }
 
-TEST_F(LiveTouchTest, WhileItIsHeldNothingIsFeltAndNothingHappens) {
+TEST_F(LiveTouchTest, AHeldSceneGivesNoForceAndDoesNotChange) {
   LiveTouch touch(device_, clock_, settings_of());
   clock_.start();
   std::vector<SceneMoment> moments;
@@ -199,7 +199,7 @@ void expect_no_gap(const std::vector<SceneMoment>& moments) {
   }
 }
 
-TEST_F(LiveTouchTest, APauseKeepsWhatMovesAndStepsGoOnFromIt) {
+TEST_F(LiveTouchTest, APauseKeepsMovingObjectsAndStepsContinueFromIt) {
   FastClock clock(1);  // no minute may go by while the test has no processor
   LiveTouch touch(device_, clock, with_drifting_cube());
   clock.start();
@@ -232,7 +232,7 @@ TEST_F(LiveTouchTest, APauseKeepsWhatMovesAndStepsGoOnFromIt) {
 }
 
 /// The hand went elsewhere meanwhile: no force and no motion until it is back.
-TEST_F(LiveTouchTest, AfterAPauseItGoesOnOnceTheHandIsBack) {
+TEST_F(LiveTouchTest, AfterAPauseTheSceneResumesOnceTheHandIsBack) {
   std::atomic<double> aside{0};
   testing::FakeDevice device([&](int tick) {
     DeviceReading reading = pressing(tick);
@@ -263,7 +263,7 @@ TEST_F(LiveTouchTest, AfterAPauseItGoesOnOnceTheHandIsBack) {
   expect_no_gap(moments);
 }
 
-TEST_F(LiveTouchTest, AnotherMaterialIsFeltOnceTheHandHasLeft) {
+TEST_F(LiveTouchTest, AnotherMaterialActsOnceTheHandHasLeft) {
   // Down and up again, so that the object is left.
   testing::FakeDevice device([](int tick) {
     const double y = 0.03 - 0.008 * std::sin(0.002 * tick);

@@ -67,7 +67,7 @@ def merge(out, shards):
 
 
 class ManyShards(unittest.TestCase):
-    def test_memory_does_not_grow_and_the_order_of_files_is_no_matter(self):
+    def test_memory_is_constant_and_the_order_of_files_does_not_matter(self):
         with tempfile.TemporaryDirectory() as scratch:
             folder = pathlib.Path(scratch)
             shards = make_shards(folder, 50, 1000)

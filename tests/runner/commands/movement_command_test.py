@@ -177,7 +177,7 @@ class Movement(CommandCase):
         with out.open() as file:
             return done, list(csv.DictReader(file))
 
-    def test_measures_are_what_their_definitions_say(self):
+    def test_measures_equal_their_definitions(self):
         db = self.study()
         _, rows = self.measured(db)
         self.palpate("export", "--db", db, "--format", "psych-ds", "--out", self.dir / "psych")
@@ -212,7 +212,7 @@ class Movement(CommandCase):
                 self.assertAlmostEqual(float(row[name]), value, delta=delta, msg=f"{name} of trial {row['trial']}")
         self.assertGreaterEqual(touched, 1)
 
-    def test_a_number_is_the_same_with_one_thread_and_with_two(self):
+    def test_results_do_not_depend_on_the_number_of_threads(self):
         db = self.study()
         one, rows = self.measured(db, "--jobs", 1)
         two, again = self.measured(db, "--jobs", 2)
@@ -224,7 +224,7 @@ class Movement(CommandCase):
             self.assertLess(float(smooth["path_length"]), float(row["path_length"]))
             self.assertEqual(smooth["coverage"], row["coverage"])
 
-    def test_one_renderer_has_means_and_nothing_to_compare(self):
+    def test_a_single_renderer_has_means_but_no_comparison(self):
         db = self.study(renderers=["ray"])
         out = self.dir / "movement.json"
         done, rows = self.measured(db, "--json", out)
@@ -238,7 +238,7 @@ class Movement(CommandCase):
         self.assertAlmostEqual(mean, math.exp(np.log(path).mean()), delta=1e-12)
         self.assertIn("path_length", done.stdout)
 
-    def test_differences_are_the_paired_ones_of_the_table(self):
+    def test_differences_are_paired(self):
         db = self.study(participants=3)
         out = self.dir / "movement.json"
         done, rows = self.measured(db, "--json", out)
@@ -355,12 +355,12 @@ class Movement(CommandCase):
         self.assertTrue((of_points < 1e-8).all())
         return len(of_points)
 
-    def test_what_has_no_samples_says_what_to_do(self):
+    def test_without_samples_the_message_gives_the_remedy(self):
         db = self.study(samples=False)
         said = self.palpate("analyze", "--db", db, "--movement", status=2).stderr
         self.assertIn('has no servo samples; a protocol with "samples": true keeps them', said)
 
-    def test_options_that_do_not_fit_are_refused(self):
+    def test_incompatible_options_are_refused(self):
         db = self.study(participants=1)
         for args, why in [(["--movement", "--protocol", "x"], "--protocol"),
                           (["--movement", "--cutoff-hz", "0"], "--cutoff-hz"),

@@ -46,7 +46,7 @@ class MovingStimuli(CommandCase):
             psych_ds = list(csv.DictReader(file))
         return bids, psych_ds
 
-    def test_scenes_that_move_are_simulated_kept_and_replayed(self):
+    def test_moving_scenes_are_simulated_stored_and_replayed(self):
         path, db, out = (self.dir / f"flying.{end}" for end in ("json", "db", "csv"))
         path.write_text(json.dumps({
             "version": 1, "name": "flying", "renderers": ["point", "ray"], "samples": True, "repetitions": 1, "seed": 16,

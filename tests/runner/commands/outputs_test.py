@@ -95,12 +95,12 @@ class Outputs(unittest.TestCase):
                     linked.unlink()
                     hard.unlink()
 
-    def test_a_mesh_that_a_scene_names_is_an_input(self):
+    def test_a_scenes_mesh_is_protected_as_an_input(self):
         scene, solid = self.write("scene.json", MESH), self.write("solid.obj", SOLID)
         for more in (["--trajectory", self.path, "--out"], ["--explain", "--json"]):
             self.refused(["render", "--scene", scene, "--renderer", "point", *more[:-1]], more[-1][2:], solid, "--force")
 
-    def test_what_a_mesh_takes_its_data_from_is_an_input(self):
+    def test_a_meshs_data_files_are_protected_as_inputs(self):
         solid = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)]
         corners = (0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3)
         buffer = self.dir / "my mesh.bin"
@@ -150,7 +150,7 @@ class Outputs(unittest.TestCase):
                 self.palpate(*command, f"--{option}", "", status=2)
                 self.refused(command, option, self.dir / "no" / "folder.x", status=1)
 
-    def test_what_is_there_is_replaced_with_force_alone_and_is_private(self):
+    def test_existing_files_are_replaced_only_with_force_and_stay_private(self):
         before = os.umask(0)
         self.addCleanup(os.umask, before)
         for command, options, _ in self.writers():
@@ -168,7 +168,7 @@ class Outputs(unittest.TestCase):
                     self.assertEqual(stat.S_IMODE(out.stat().st_mode), 0o600)
         self.assertEqual([p.name for p in self.dir.iterdir() if "palpate" in p.name], [])
 
-    def test_all_or_none(self):
+    def test_all_files_are_written_or_none(self):
         kept, page = self.write("a.json", "kept"), self.dir / "r.html"
         analyze = ["analyze", "--csv", self.csv, "--force", "--json", kept]
         self.refused(analyze, "report", "/dev/full")
@@ -189,7 +189,7 @@ class Outputs(unittest.TestCase):
             self.assertEqual(stat.S_IMODE(figure.stat().st_mode), 0o600)
         self.refused(["analyze", "--csv", self.csv], "figures", self.dir / "figures")
 
-    def test_a_killed_writer_leaves_what_was_there_and_the_next_one_clears_up(self):
+    def test_a_killed_writer_leaves_the_old_file_and_the_next_one_cleans_up(self):
         kept = self.write("a.json", "kept")
         command = [PALPATE, "analyze", "--csv", self.csv, "--json", kept, "--force"]
         done = subprocess.run(["prlimit", "--fsize=1000", *command], capture_output=True)
@@ -202,7 +202,7 @@ class Outputs(unittest.TestCase):
         self.assertGreater(kept.stat().st_size, 1000)
         self.assertEqual([p.name for p in self.dir.iterdir() if ".palpate-" in p.name], [".b.json.palpate-abcdef"])
 
-    def test_pipes_take_a_text_as_it_comes(self):
+    def test_pipes_receive_the_text_directly(self):
         shown = self.palpate("analyze", "--csv", self.csv, "--json", "/dev/stdout").stdout
         self.assertIn('"mixed_model"', shown)
         with open(self.dir / "shown", "w") as file:
@@ -219,7 +219,7 @@ class Outputs(unittest.TestCase):
         self.palpate("analyze", "--csv", self.csv, "--json", "/dev/null")
         self.assertTrue(stat.S_ISCHR(os.stat("/dev/null").st_mode))
 
-    def test_closed_standard_places_are_not_taken_by_files(self):
+    def test_closed_standard_streams_are_not_reused_by_files(self):
         command = ["analyze", "--db", self.db, "--json"]
         self.palpate(*command, self.dir / "open.json")
         shell = f"exec {PALPATE} {' '.join(map(str, command))} {self.dir}/closed.json <&- >&- 2>&-"
@@ -229,14 +229,14 @@ class Outputs(unittest.TestCase):
         self.assertEqual(subprocess.run(["bash", "-c", shell]).returncode, 1)
         self.palpate("analyze", "--db", self.dir / "n.db")
 
-    def test_links_of_ones_own_are_followed(self):
+    def test_own_links_are_followed(self):
         target = self.write("real.json", "old")
         (self.dir / "link.json").symlink_to("real.json")
         self.palpate("analyze", "--csv", self.csv, "--json", self.dir / "link.json", "--force")
         self.assertTrue((self.dir / "link.json").is_symlink())
         self.assertGreater(target.stat().st_size, 1000)
 
-    def test_files_that_only_sound_like_ours_are_left_alone(self):
+    def test_files_with_similar_names_are_left_alone(self):
         protocol = PROTOCOLS / "quick.json"
         others = {name: self.write(name, "mine") for name in
                   ("poetry.lock", "Cargo.lock", "all.palpate-new", "all.palpate-new-wal", "all.lock", "r.json.part")}

@@ -75,7 +75,7 @@ class Study(unittest.TestCase):
 
 
 class Register(Study):
-    def test_the_folder(self):
+    def test_contents_of_the_registration(self):
         folder = self.dir / "registration"
         names = set(tree(folder))
         self.assertEqual(names, {
@@ -89,14 +89,14 @@ class Register(Study):
         self.assertEqual(checked.returncode, 0, checked.stdout)
         self.assertEqual(len(checked.stdout.splitlines()), len(names) - 3)  # those to fill in, and itself
 
-    def test_all_is_private(self):
+    def test_all_files_are_private(self):
         folder = self.base / "registration"
         self.assertEqual(stat.S_IMODE(folder.stat().st_mode), 0o700)
         for path in folder.rglob("*"):
             if path.is_file():
                 self.assertEqual(stat.S_IMODE(path.stat().st_mode), 0o600, path)
 
-    def test_answers_by_question(self):
+    def test_answers_stand_under_their_questions(self):
         osf = json.loads((self.dir / "registration/osf.json").read_text())
         self.assertEqual(list(osf), QUESTIONS)
         self.assertTrue(osf["q3"].startswith("Experiment - "))
@@ -113,7 +113,7 @@ class Register(Study):
         for number in range(2, 24):
             self.assertIn(f"\n### {number}. ", text)
 
-    def test_orders_as_anybody_can_check_them(self):
+    def test_orders_can_be_recomputed(self):
         made = json.loads((self.dir / "registration/registration.json").read_text())
         self.assertEqual(len(made["orders"]), self.participants)
         osf = json.loads((self.dir / "registration/osf.json").read_text())
@@ -126,7 +126,7 @@ class Register(Study):
             self.assertEqual(hashlib.sha256(lines.encode()).hexdigest(), order["sha256"])
             self.assertIn(order["sha256"], osf["q7"])
 
-    def test_simulated_data_and_their_analysis(self):
+    def test_simulated_data_and_analysis_are_included(self):
         folder = self.dir / "registration"
         both = json.loads((folder / "analysis-simulated.json").read_text())
         for key, name in (("planned_effect", "planned-effect"), ("no_effect", "no-effect")):
@@ -141,7 +141,7 @@ class Register(Study):
             explained = {row["column"] for row in csv.DictReader(file) if row["table"] == "trials"}
         self.assertEqual(set(columns), explained)
 
-    def test_the_same_again(self):
+    def test_registering_again_gives_the_same_files(self):
         self.register("--jobs", "1")
         ours, again = tree(self.dir / "registration"), tree(self.dir / "new")
         self.assertEqual({name for name in ours if ours[name] != again[name]} -
@@ -149,7 +149,7 @@ class Register(Study):
         self.register(out="other", seed="2")
         self.assertNotEqual(again["simulated/no-effect.csv"], tree(self.dir / "other")["simulated/no-effect.csv"])
 
-    def test_a_hypothesis_that_cannot_be_refuted(self):
+    def test_a_hypothesis_that_cannot_be_refuted_is_reported(self):
         self.write("h.json", [HYPOTHESES[0] | {"refuted": "paired.cone.reduction < -1000"},
                               {"id": "H2", "text": "t", "corroborated": "counts.n_trials > 0", "refuted": "alpha > 1"}])
         done = self.register(hypotheses="h.json")
@@ -160,7 +160,7 @@ class Register(Study):
         self.assertEqual(json.loads((self.dir / "new/registration.json").read_text())["warnings"],
                          [line.removeprefix("warning: ") for line in done.stderr.splitlines()])
 
-    def test_a_study_without_power(self):
+    def test_a_study_without_power_is_reported(self):
         done = self.register("--participants", "2")
         self.assertIn("H1 lacks power", done.stderr)
         if self.participants > 2:
@@ -212,7 +212,7 @@ class Register(Study):
         self.register("--force", out="link", status=2)
         self.assertEqual((self.dir / "else/file").read_text(), "x")
 
-    def test_a_database_with_sessions(self):
+    def test_a_database_with_sessions_is_refused(self):
         self.register("--db", "study.db")
         osf = json.loads((self.dir / "new/osf.json").read_text())
         self.assertIn(f"{self.participants} sessions", osf["q8"])
@@ -232,7 +232,7 @@ class Register(Study):
         self.assertEqual(json.loads((self.dir / "new/hypotheses.json").read_text())[0]["text"],
                          json.loads((self.dir / "h.json").read_text())[0]["text"])
 
-    def test_meshes_come_along_from_below_the_protocol_only(self):
+    def test_only_meshes_below_the_protocols_folder_are_copied(self):
         solid = "v 0 0 0\nv .05 0 0\nv 0 .05 0\nv 0 0 .05\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
         (self.dir / "inner/meshes").mkdir(parents=True)
         for name in ("inner/meshes/a.obj", "b.obj"):
@@ -328,7 +328,7 @@ class Check(Study):
         self.assertEqual((self.dir / "check.json").read_text(), "mine")
         self.assertEqual(tree(self.dir / "registration"), before)
 
-    def test_what_is_no_registration(self):
+    def test_folders_that_are_not_registrations_are_refused(self):
         for name, content in (("registration.json", "{}"), ("registration.json", "nonsense"),
                               ("SHA256SUMS", "nonsense\n"), ("plan.json", "{}"), ("hypotheses.json", "[]"),
                               ("protocol.json", "{}")):
@@ -342,7 +342,7 @@ class Check(Study):
         self.check()
         run("check", "nowhere", "--db", "study.db", status=2, folder=self.dir)
 
-    def test_links_and_paths_that_lead_outside(self):
+    def test_links_and_paths_to_the_outside_are_refused(self):
         (self.dir / "secret.json").write_bytes((self.dir / "registration/plan.json").read_bytes())
         (self.dir / "registration/plan.json").unlink()
         (self.dir / "registration/plan.json").symlink_to(self.dir / "secret.json")
@@ -354,7 +354,7 @@ class Check(Study):
         self.write("registration/registration.json", made)
         self.assertIn("below", self.check(status=2).stderr)
 
-    def test_a_mesh_that_the_registration_does_not_hold_is_not_read(self):
+    def test_meshes_outside_the_registration_are_not_read(self):
         (self.dir / "outside.obj").write_text("v 0 0 0\nv .05 0 0\nv 0 .05 0\nv 0 0 .05\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n")
         protocol = json.loads((self.dir / "registration/protocol.json").read_text())
         protocol["stimuli"][0] = {"name": protocol["stimuli"][0]["name"], "shape": "mesh", "file": str(self.dir / "outside.obj")}

@@ -29,7 +29,7 @@ class Render(CommandCase):
             words = ("contact_type", "faults")
             return [{k: v if k in words else float(v) for k, v in row.items()} for row in csv.DictReader(file)]
 
-    def test_explain_lists_what_runs_and_what_was_left_out(self):
+    def test_explain_lists_the_active_and_omitted_parts(self):
         scene, out = self.file("scene.json", self.CUBE), self.dir / "stages.json"
         explain = ["render", "--scene", scene, "--renderer", "point", "--explain"]
         text = self.palpate(*explain, "--json", out).stdout
@@ -50,7 +50,7 @@ class Render(CommandCase):
         self.palpate(*explain[:-1], "--json", out, status=2)
         self.palpate(*explain[:-1], status=2)
 
-    def test_a_tip_pressed_into_the_top_of_a_cube(self):
+    def test_a_tip_pressed_into_a_cube_gives_the_springs_force(self):
         rows = self.render(self.CUBE, "point", [[0, 0.01, 0, 0.03, 0.01, 0, 0.15], [0.001, 0.01, 0, 0.024, 0.01, 0, 0.144]])
         self.assertEqual(rows[0]["contact_type"], "none")
         self.assertEqual((rows[0]["contacts"], rows[0]["object"], rows[0]["depth"]), (0, -1, 0))
@@ -84,7 +84,7 @@ class Render(CommandCase):
         self.assertEqual([row["faults"] for row in rows], ["started-inside", "started-inside", "", ""])
         self.assertEqual(list(rows[0])[-1], "faults")
 
-    def test_poses_that_are_no_numbers_are_faults_and_counted(self):
+    def test_nan_poses_are_faults_and_counted(self):
         path = self.file("path.csv", self.HEADER + "0,0,0,0.03,0,0,0.15\n1,nan,0,0.024,0,0,0.15\n"
                           "2,0,0,0.024,inf,0,0.15\n3,0,0,-1e308,0,0,0.15\n4,0,0,0.024,0,0,0.15\n")
         for renderer in ("point", "ray"):
@@ -119,7 +119,7 @@ class Render(CommandCase):
         self.assertAlmostEqual(grip["ideal_tip_x"], at - 7 * (at - 0.3), 12)
         self.assertAlmostEqual(grip["ideal_tail_x"], at + 7 * (0.42 - at), 12)
 
-    def test_sides_come_with_three_columns_or_none(self):
+    def test_sides_need_three_columns_or_none(self):
         scene, out = self.file("scene.json", self.CUBE), self.dir / "out.csv"
         for header, row, words in (("t,tip_x,tip_y,tip_z,tail_x,tail_y,tail_z,side_x,side_y", "0,0,0,1,0,0,2,1,0", "side_z"),
                                    (self.HEADER.strip() + ",side_x,side_y,side_z", "0,0,0,1,0,0,2", "ten numbers"),
@@ -128,7 +128,7 @@ class Render(CommandCase):
             done = self.palpate("render", "--scene", scene, "--renderer", "ray", "--trajectory", path, "--out", out, status=2)
             self.assertIn(words, done.stderr)
 
-    def test_a_layer_that_nothing_is_left_for_is_refused_with_the_depth_that_is_possible(self):
+    def test_a_layer_that_is_too_deep_is_refused_with_the_possible_depth(self):
         layers = '[{"depth_m": 0.02, "stiffness_n_per_m": 100}, {"depth_m": 0.025, "stiffness_n_per_m": 100}]'
         scene = self.file("scene.json", '{"objects": [{"shape": "cube", "edge_m": 0.05, "layers": ' + layers + "}]}")
         done = self.palpate("render", "--scene", scene, "--renderer", "ray", "--explain", status=2)
@@ -136,14 +136,14 @@ class Render(CommandCase):
         self.assertIn("expected less than 0.025 m", done.stderr)
         self.assertNotIn("layers/0", done.stderr)
 
-    def test_forty_objects_are_felt_and_no_fault(self):
+    def test_forty_objects_are_rendered_without_a_fault(self):
         cube = '{"shape": "cube", "edge_m": 0.05, "stiffness_n_per_m": 100}'
         scene = '{"objects": [' + ", ".join([cube] * 40) + "]}"
         row = self.render(scene, "ray", [[0, 0.01, 0, 0.03, 0.01, 0, 0.15], [1, 0.01, 0, 0.024, 0.01, 0, 0.144]])[1]
         self.assertEqual((row["contacts"], row["faults"]), (40, ""))
         self.assertAlmostEqual(row["force_z"], 4.0, 9)
 
-    def test_paths_without_end_or_writer_are_refused_in_words(self):
+    def test_paths_without_end_or_writer_are_refused(self):
         scene, out, pipe = self.file("scene.json", self.CUBE), self.dir / "out.csv", self.dir / "pipe"
         os.mkfifo(pipe)
         long = self.file("long.csv", self.HEADER + "0," * 800_000 + "\n")
@@ -165,7 +165,7 @@ class Render(CommandCase):
             self.assertIn(words, message, args)
         self.assertFalse(out.exists())
 
-    def test_a_path_comes_through_a_pipe(self):
+    def test_a_path_can_be_read_from_a_pipe(self):
         pipe, out = self.dir / "pipe", self.dir / "out.csv"
         os.mkfifo(pipe)
         with subprocess.Popen(["sh", "-c", f"sleep 0.2; printf '{self.HEADER}0,0,0,1,0,0,2\n' > {pipe}"]):

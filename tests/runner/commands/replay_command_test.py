@@ -47,7 +47,7 @@ class Replay(CommandCase):
         base.close()
         return db, [(f"{code}/{session}/{trial}", renderer) for code, session, trial, renderer in trials]
 
-    def test_where_a_stimulus_that_moves_was_is_on_record_and_comes_again(self):
+    def test_poses_of_moving_stimuli_are_recorded_and_replayed(self):
         # Heavy and slow enough to be where the hand looks for it; lighter ones float away before some trials find them.
         mass, damping, gravity, tick = 2, 10, -0.02, 0.001
         design = protocol()
@@ -192,7 +192,7 @@ class Replay(CommandCase):
         for said in (str(db), trials[0][0], "'torus'"):
             self.assertIn(said, done.stderr)
 
-    def test_says_what_is_missing(self):
+    def test_missing_data_is_named(self):
         db, trials = self.study()
         bare, names = self.study("bare", samples=False)
         for args, message in [((db, "P9/1/1"), "not on record"), ((db, "nonsense"), "CODE/SESSION/TRIAL"),

@@ -15,7 +15,7 @@ namespace palpate::runner {
 namespace {
 namespace shards {
 
-TEST(Shards, FollowOneAnotherAndDifferByAtMostOneItem) {
+TEST(Shards, AreConsecutiveAndDifferByAtMostOneItem) {
   for (const std::int64_t items : {0, 1, 7, 8, 100, 1000003}) {
     for (const std::int64_t count : {1, 2, 3, 8, 1000}) {
       std::int64_t next = 0;
@@ -66,7 +66,7 @@ TEST(Shards, AreGivenAsPartOfACount) {
                   std::string(bad) + "'");
 }
 
-TEST(Shards, OfASlurmArrayCountFromItsFirstTask) {
+TEST(Shards, OfASlurmArrayAreCountedFromItsFirstTask) {
   const auto task = [](const char* id, const char* least, const char* count) {
     return std::map<std::string, std::string>{{"SLURM_ARRAY_TASK_ID", id},
                                               {"SLURM_ARRAY_TASK_MIN", least},

@@ -12,7 +12,7 @@ def block(young, **soft):
 
 
 class Soft(CommandCase):
-    def test_which_of_four_soft_blocks_is_stiffer(self):
+    def test_simulated_participants_discriminate_soft_blocks(self):
         levels = [5000, 9000, 45000, 80000]
         protocol = self.file("blocks.json", {
             "version": 2, "name": "blocks", "renderers": ["ray"], "orientation": "fixed", "samples": True, "seed": 5,
@@ -30,7 +30,7 @@ class Soft(CommandCase):
         # More than twice as soft or as stiff as the standard: nobody takes one for the other.
         self.assertEqual([point["successes"] for point in curve], [0, 0, 1, 1])
 
-    def test_what_falls_through_soft_objects_is_told(self):
+    def test_objects_that_fall_through_soft_ones_are_reported(self):
         path = self.file("path.csv", "t,tip_x,tip_y,tip_z,tail_x,tail_y,tail_z\n0,1,0,0,1,0,0.1\n0.01,1,0,0,1,0,0.1\n")
         soft = block(20000, resolution=3)
         ball = {"shape": "sphere", "radius_m": 0.01, "position_m": [0, 0, 0.05], "body": {"mass_kg": 0.1}}
@@ -47,7 +47,7 @@ class Soft(CommandCase):
             explained = self.palpate("render", "--scene", scene, "--renderer", "ray", "--explain").stdout
             self.assertIn(said, explained)
 
-    def test_elements_that_a_tool_feels_are_told(self):
+    def test_elements_larger_than_the_tool_are_reported(self):
         path = self.file("path.csv", "t,tip_x,tip_y,tip_z,tail_x,tail_y,tail_z\n0,1,0,0,1,0,0.1\n0.01,1,0,0,1,0,0.1\n")
         hand = {"segments": [{"from_m": [0, 0, 0], "to_m": [0, 0, 0.1]}]}
         # A cube of 60 mm with n x n squares a side has 6 n^2 + 2 nodes on 21,600 mm^2.
@@ -68,7 +68,7 @@ class Soft(CommandCase):
                 if spacing:
                     self.assertIn(felt, done.stdout + done.stderr)
 
-    def test_what_was_felt_on_a_soft_block_is_replayed_to_the_bit(self):
+    def test_a_soft_blocks_trial_is_replayed_bit_by_bit(self):
         protocol = self.file("felt.json", {
             "version": 1, "name": "felt", "renderers": ["ray"], "orientation": "fixed", "samples": True, "seed": 7,
             "stimuli": [{"name": "soft", **block(15000, resolution=3)}, {"name": "hard", "shape": "cube", "edge_m": 0.05}],
@@ -88,7 +88,7 @@ class Soft(CommandCase):
         with out.open(newline="") as table:
             return list(csv.DictReader(table))
 
-    def test_a_block_without_a_resolution_is_felt(self):
+    def test_a_block_without_a_resolution_is_rendered(self):
         forces = [float(row["force_z"]) for row in self.render({"objects": [block(20000)]})]
         self.assertGreater(forces[-1], 0.05)
         self.assertGreaterEqual(min(forces), 0)

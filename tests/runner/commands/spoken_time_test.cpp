@@ -46,7 +46,7 @@ class SpokenTime : public ::testing::Test {
   std::string before_;
 };
 
-TEST_F(SpokenTime, IsTodayYesterdayOrADate) {
+TEST_F(SpokenTime, SaysTodayYesterdayOrADate) {
   stand_in("UTC0");
   const std::int64_t now = 1'772'323'200'000'000'000 + kHour / 2;  // 2026-03-01 00:30
   EXPECT_EQ(spoken_time(now, now), "today 00:30");
@@ -58,7 +58,7 @@ TEST_F(SpokenTime, IsTodayYesterdayOrADate) {
 }
 
 /// Central Europe: a day of 23 hours in March, one of 25 in October; and half an hour's change.
-TEST_F(SpokenTime, GoesByTheCalendarWhereClocksAreChanged) {
+TEST_F(SpokenTime, FollowsTheCalendarAcrossChangesOfClocks) {
   for (const char* const rules :
        {"CET-1CEST,M3.5.0,M10.5.0/3", "UTC0", "LHST-10:30LHDT-11,M10.1.0,M4.1.0",
         "EST5EDT,M3.2.0,M11.1.0", "XXX3YYY,M3.5.0/0,M10.5.0/0"}) {
@@ -85,7 +85,7 @@ TEST_F(SpokenTime, GoesByTheCalendarWhereClocksAreChanged) {
 }
 
 }  // namespace spoken_times
-TEST(WithdrawalTime, IsItsOwnNotThatOfTheSessionsBegin) {
+TEST(WithdrawalTime, IsTheWithdrawalsNotTheSessions) {
   const palpate::testing::TemporaryFolder folder;
   data::Store store = data::Store::open(folder / "s.db", data::Store::Mode::write_or_create);
   constexpr std::int64_t kHour_ns = 3'600'000'000'000, kBegan_ns = 946'717'200'000'000'000;

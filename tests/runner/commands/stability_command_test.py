@@ -38,7 +38,7 @@ class Stability(unittest.TestCase):
             checked += 1
         self.assertGreater(checked, 50)
 
-    def test_answers_in_text_numbers_and_pictures(self):
+    def test_results_as_text_numbers_and_pictures(self):
         numbers, figure, page = self.dir / "s.json", self.dir / "s.svg", self.dir / "s.html"
         done = self.stability("--json", numbers, "--figure", figure, "--report", page)
         self.assertIn("is the theory's", done.stdout)
@@ -86,7 +86,7 @@ class Stability(unittest.TestCase):
         self.assertEqual(len(list(root.iter(svg + "circle"))) + len(list(root.iter(svg + "polygon"))), points + len(result["curves"]))
         xml.etree.ElementTree.fromstring(re.sub(r"<!DOCTYPE html>|<script>.*?</script>", "", page.read_text(), flags=re.S))
 
-    def test_a_tool_rests_on_soft_bodies_wherever_scenes_may_have_them(self):
+    def test_a_tool_comes_to_rest_on_all_soft_bodies_that_scenes_allow(self):
         figure = self.dir / "soft.svg"
         said = self.stability("--soft", "--figure", figure).stdout
         header, *lines = re.search(r"^ +Pa .*?(?=\n\n)", said, re.S | re.M).group().split("\n")
@@ -121,7 +121,7 @@ class Stability(unittest.TestCase):
                 if worst:
                     self.assertAlmostEqual(max(worst), float(cell), delta=0.01 + 0.01 * max(worst))
 
-    def test_refuses_what_it_should(self):
+    def test_wrong_usage_is_refused(self):
         kept = self.dir / "kept.json"
         kept.write_text("mine")
         for args in (["--json", kept], ["--jobs", "0"], ["extra"], ["--soft", "--full"], ["--soft", "--json", self.dir / "new.json"], ["--seed", "1"],

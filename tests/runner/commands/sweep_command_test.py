@@ -14,7 +14,7 @@ from sweep_case import COLUMNS, PALPATE, PROTOCOL, PROTOCOLS, SPACE, SweepCase
 
 
 class Sweeps(SweepCase):
-    def test_a_row_a_point_with_the_columns_in_their_order(self):
+    def test_each_point_has_a_row_with_ordered_columns(self):
         self.sweep("a.sweep")
         rows = self.rows("a.sweep")
         self.assertEqual(self.bytes("a.sweep.csv").split(b"\r\n")[0].decode(), COLUMNS)
@@ -30,7 +30,7 @@ class Sweeps(SweepCase):
         self.assertEqual(len({row["noise"] for row in rows}), 6)
         self.assertIn("exists", self.palpate("export", "--db", "a.sweep", "--format", "csv", "--out", "a.sweep.csv", status=2))
 
-    def test_a_point_is_the_study_that_simulate_and_analyze_make_of_it(self):
+    def test_a_point_equals_simulate_and_analyze(self):
         self.sweep("a.sweep", "--shard", "2/3")
         rows = {row["point"]: row for row in self.rows("a.sweep")}
         self.assertEqual(set(rows), {"3", "4"})
@@ -86,7 +86,7 @@ class Sweeps(SweepCase):
         self.assertEqual(self.bytes("one.sweep"), file.read_bytes())
         self.assertEqual([path.name for path in self.folder.iterdir() if "journal" in path.name], [])
 
-    def test_a_file_goes_on_with_the_version_that_it_was_begun_with(self):
+    def test_a_file_keeps_the_version_that_it_began_with(self):
         for version in (1, 2):
             old = ["--participant-version", version]
             whole, begun = f"whole{version}.sweep", f"begun{version}.sweep"
@@ -104,7 +104,7 @@ class Sweeps(SweepCase):
         self.assertEqual(self.bytes("new.sweep"), self.bytes("3.sweep"))
         self.assertEqual(json.loads(self.palpate(*self.command("none.sweep", "--print-point", 1)))["settings"]["version"], 3)
 
-    def test_a_signal_stops_it_and_the_same_command_goes_on(self):
+    def test_a_signal_stops_it_and_the_same_command_resumes(self):
         running = subprocess.Popen([PALPATE, *map(str, self.command("a.sweep", points=500))], cwd=self.folder, text=True,
                                    stdout=subprocess.PIPE, stderr=subprocess.PIPE)
         for _ in range(600):  # until a first point is on record
@@ -123,7 +123,7 @@ class Sweeps(SweepCase):
         self.assertEqual(a, print_point(1, "--jobs", 2))
         self.assertEqual(len({p["seed"] for p in (a, b, c)} | {p["protocol"]["seed"] for p in (a, b, c)}), 6)
 
-    def test_a_point_that_fails_says_why_and_the_others_go_on(self):
+    def test_a_failed_point_has_its_reason_and_the_others_continue(self):
         space = json.loads(json.dumps(SPACE))
         space["parameters"].append({"name": "grip", "of": "protocol", "path": "/stylus/grip_m", "distribution": "choice",
                                     "values": [0.05, 0.3]})
@@ -139,7 +139,7 @@ class Sweeps(SweepCase):
             self.assertEqual(row["gain_ball"] + row["time_ray_hat"], "")
         self.assertTrue(all(row["status"] == "ok" and row["gain_ball"] for row in rows if row["grip"] == "0.05"))
 
-    def test_pointers_that_lead_nowhere_are_all_named_with_near_ones(self):
+    def test_invalid_pointers_are_all_named_with_similar_ones(self):
         space = {"version": 1, "parameters": [
             {"name": "a", "of": "participant", "path": "/motor/reaction_delay", "distribution": "uniform", "low": 0, "high": 1},
             {"name": "b", "of": "protocol", "path": "/stimuli/4/radius_m", "distribution": "uniform", "low": 0.02, "high": 0.03},
@@ -166,7 +166,7 @@ class Sweeps(SweepCase):
         self.assertFalse((self.folder / "a.sweep").exists())
         return said.strip().splitlines()
 
-    def test_what_is_never_a_value_of_its_place_is_refused(self):
+    def test_values_that_a_setting_cannot_have_are_refused(self):
         lines = self.refused_space(
             {"of": "participant", "path": "/hand/mass_kg", "distribution": "uniform", "low": -0.2, "high": -0.1},
             {"of": "participant", "path": "/motor/reaction_delay_s", "distribution": "uniform", "low": -9, "high": -1},
@@ -178,13 +178,13 @@ class Sweeps(SweepCase):
                                       "tip or surface")):
             self.assertIn(word, line)
 
-    def test_whole_numbers_that_a_double_confuses_are_refused(self):
+    def test_integers_beyond_a_doubles_precision_are_refused(self):
         line, = self.refused_space({"of": "protocol", "path": "/seed", "distribution": "choice",
                                     "values": [2 ** 53 - 1, 2 ** 53 + 1]})
         self.assertIn("/parameters/0/values/1", line)
         self.assertIn("2^53", line)
 
-    def test_a_shard_of_which_every_point_failed_is_a_failure(self):
+    def test_a_shard_fails_if_all_its_points_fail(self):
         self.write("s.json", {"version": 1, "parameters": [
             {"name": "mass", "of": "participant", "path": "/hand/mass_kg", "distribution": "choice", "values": [-0.1, 0.1]}]})
         ends = []
@@ -194,7 +194,7 @@ class Sweeps(SweepCase):
             ends.append((done.returncode, "every point failed" in done.stderr))
         self.assertEqual(sorted(ends), [(0, False), (1, True)])
 
-    def test_a_link_to_a_file_that_is_not_there_yet_leads_to_it(self):
+    def test_a_link_to_a_new_file_creates_it(self):
         os.symlink("later.sweep", self.folder / "link.sweep")
         os.symlink("later.db", self.folder / "link.db")
         self.sweep("link.sweep", points=1)
@@ -203,12 +203,12 @@ class Sweeps(SweepCase):
             self.assertTrue((self.folder / name).is_file() and not (self.folder / name).is_symlink(), name)
             self.assertTrue((self.folder / name.replace("later", "link")).is_symlink())
 
-    def test_merging_names_a_file_that_is_not_there(self):
+    def test_merging_names_a_missing_file(self):
         self.sweep("a.sweep", points=1)
         said = self.palpate("merge", "--out", "m.sweep", "a.sweep", "missing.sweep", status=2)
         self.assertIn("missing.sweep: there is no such file", said)
 
-    def test_another_plan_is_refused_with_what_differs(self):
+    def test_another_plan_is_refused_with_the_differences(self):
         self.sweep("a.sweep", points=1)
         said = self.sweep("a.sweep", "--seed", 2, points=2, status=2)
         self.assertIn("points: 1 and 2", said)
@@ -223,7 +223,7 @@ class Sweeps(SweepCase):
         self.write("p.json", json.dumps(PROTOCOL, indent=3))  # only its layout
         self.sweep("a.sweep", points=1)
 
-    def test_sweeps_and_studies_are_not_taken_for_each_other(self):
+    def test_sweeps_and_studies_are_not_confused(self):
         self.sweep("a.sweep", points=1)
         self.palpate("simulate", "p.json", "--db", "study.db", "--participants", 1)
         before = self.bytes("a.sweep"), self.bytes("study.db")

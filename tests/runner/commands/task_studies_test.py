@@ -79,7 +79,7 @@ class TaskStudies(CommandCase):
                 self.assertEqual(self.exported(parts)[0], text)
                 self.assertNotEqual(self.exported(self.simulated(protocol, f"{name}-7", seed=7))[0], text)
 
-    def test_answers_to_pages_are_exported_where_they_are_asked_for(self):
+    def test_answers_to_pages_are_exported_on_request(self):
         db = self.simulated(PROTOCOLS / "roughness-magnitude.json", "pages", participants=3)
         expected = [(f"S00{n}", page, item) for n in (1, 2, 3)
                     for page, item in (("consent", "consent"), ("about-you", "hand"), ("about-you", "age"))]
@@ -116,7 +116,7 @@ class TaskStudies(CommandCase):
                                for column in path.read_text().splitlines()[0].split(",")}
                     self.assertEqual(measured, headers)
 
-    def test_what_an_adaptive_procedure_made_of_its_answers_stands_beside_the_fit(self):
+    def test_adaptive_estimates_are_reported_beside_the_fit(self):
         db = self.simulated(PROTOCOLS / "stiffness-2afc.json", "stairs", participants=3)
         said = self.palpate("analyze", "--db", db, "--report", self.dir / "stairs.html").stdout
         self.assertIn("mean of its reversals, converging to 70.7 % successes", said)
@@ -155,7 +155,7 @@ class TaskStudies(CommandCase):
                     compared += 1
         self.assertEqual(compared, 6)
 
-    def test_what_quest_plus_made_of_its_answers_is_its_posterior(self):
+    def test_quest_plus_estimates_are_those_of_its_posterior(self):
         db = self.simulated(PROTOCOLS / "size-questplus.json", "quest", participants=2)
         spec = json.loads((PROTOCOLS / "size-questplus.json").read_text())["blocks"][1]["procedure"]
         self.assertIn("QUEST+: threshold", self.palpate("analyze", "--db", db, "--function", "weibull").stdout)
@@ -175,7 +175,7 @@ class TaskStudies(CommandCase):
                 self.assertAlmostEqual(found["slope"], sum(w * s for (_, s), w in posterior.items()) / whole, places=6)
                 self.assertEqual(found["n_trials"], 32)
 
-    def test_what_the_simulated_participants_can_do_is_found_again(self):
+    def test_the_analysis_recovers_the_simulated_abilities(self):
         db = self.simulated(PROTOCOLS / "stiffness-2afc.json", "a", participants=4)
         found = self.numbers("--db", db)
         constant = next(cell for cell in found["cells"] if cell["block_name"] == "constant")

@@ -78,14 +78,14 @@ class Page(unittest.TestCase):
         force = list(zip(c["force_x"], c["force_y"], c["force_z"]))
         return max(range(len(force)), key=lambda i: -dot(force[i], into) if c["contacts"][i] else 0)
 
-    def test_its_script_reads_the_numbers_that_are_there(self):
+    def test_the_script_decodes_the_pages_numbers(self):
         self.open()
         for number, show in enumerate(self.document["shows"]):
             for name, values in show["columns"].items():
                 found = self.browser.run(f"Array.from(trial.shows[{number}].c.{name})")
                 self.assertEqual(found, values, name)
 
-    def test_what_is_written_is_the_tick(self):
+    def test_the_texts_describe_the_tick(self):
         self.open()
         i = self.a_tick_seen()
         self.browser.run(f"trial.seek(trial.shows[1].time[{i}])")
@@ -98,7 +98,7 @@ class Page(unittest.TestCase):
         self.assertEqual(shown[3], f"{1000 * c['depth'][i]:.3f} mm")
         self.assertTrue(shown[4].startswith(self.document["types"][int(c["type"][i])] + ", "), shown)
 
-    def test_pixels_are_where_the_geometry_has_them(self):
+    def test_pixels_agree_with_the_geometry(self):
         self.open()
         i = self.a_tick_seen()
         self.browser.run(f"trial.seek(trial.shows[1].time[{i}])")

@@ -60,7 +60,7 @@ class Watch(CommandCase):
             self.assert_column(c[f"tail_{axis}"], [row[f"tail_{axis}"] for row in rows], METRE)
             self.assert_column(c[f"force_{axis}"], [row[f"{whose}_force_{axis}"] for row in rows], NEWTON)
 
-    def test_its_numbers_are_those_of_a_replay(self):
+    def test_the_pages_numbers_equal_a_replays(self):
         db = self.study()
         for trial in ("S001/1/1", "S001/1/2", "S001/1/3", "S001/1/4"):
             _, document = self.page(db, trial, more=["--compare"])
@@ -73,7 +73,7 @@ class Watch(CommandCase):
             self.assertIn("SIMULATED", recorded["facts"][0])
             self.assertIn("SIMULATED COMPARISON", other["facts"][0])
 
-    def test_ideal_tool_and_contact_are_those_of_render(self):
+    def test_ideal_tool_and_contact_equal_those_of_render(self):
         db = self.study()
         (trials := list(csv.DictReader(self.exported(db)[0].splitlines())))
         for row in trials:
@@ -106,7 +106,7 @@ class Watch(CommandCase):
                 self.assert_column([tip[i] + c[f"contact_{axis}"][i] for i in touched],
                                    [float(rendered[i][f"contact_{axis}"]) for i in touched], 3 * METRE)
 
-    def test_the_picture_is_the_object(self):
+    def test_the_picture_has_the_objects_surface(self):
         _, document = self.page(self.study(), "S001/1/1", "S001/1/2", "S001/1/3", "S001/1/4")
         self.assertEqual(len(document["meshes"]), 2, "equal objects are there once")
         for show in document["shows"]:
@@ -134,7 +134,7 @@ class Watch(CommandCase):
             self.assertAlmostEqual(volume / true, 1, delta=0.02)
             self.assertAlmostEqual(sum(q * q for q in part["pose"][3:]), 1, delta=1e-12)
 
-    def test_a_stimulus_that_moves_goes_along(self):
+    def test_moving_stimuli_move_in_the_picture(self):
         design = protocol(gravity_m_per_s2=[0, 0, -0.02])
         for stimulus in design["stimuli"]:
             stimulus["body"] = {"mass_kg": 2, "damping_per_s": 10}
@@ -147,7 +147,7 @@ class Watch(CommandCase):
         for axis in "xyz":
             self.assert_column(c[f"moved_{axis}"], [row[f"recorded_body_{axis}"] for row in rows], METRE)
 
-    def test_what_is_not_drawn_is_said(self):
+    def test_omissions_of_the_drawing_are_stated(self):
         layers = [{"depth_m": 0.001, "stiffness_n_per_m": 50}, {"depth_m": 0.004, "stiffness_n_per_m": 50}]
         stimuli = [{"name": "sphere", "shape": "sphere", "radius_m": 0.03, "material": {"layers": layers}},
                    {"name": "cube", "shape": "cube", "edge_m": 0.05}]

@@ -16,7 +16,7 @@ namespace palpate::runner {
 namespace {
 namespace kinds {
 
-TEST(DeviceKinds, AreThoseOfTheHandbookEachWithADescription) {
+TEST(DeviceKinds, AreTheDocumentedOnesEachWithADescription) {
   std::vector<std::string> names;
   for (const DeviceKind& kind : device_kinds()) {
     names.emplace_back(kind.name);
@@ -43,14 +43,14 @@ TEST(DeviceKinds, AnUnknownNameIsRefusedWithTheKnownOnes) {
 }
 
 // A real hand that motors move must have a guard.
-TEST(DeviceKinds, WhatHasMotorsIsGuarded) {
+TEST(DeviceKinds, DevicesWithMotorsAreGuarded) {
   for (const DeviceKind& kind : device_kinds()) {
     const std::string name = kind.name;
     EXPECT_EQ(kind.has_force_feedback, name != "mouse" && name != "simulated") << name;
   }
 }
 
-TEST(DeviceKinds, AFalconSensesAndMovesAPointTwoOfThemALine) {
+TEST(DeviceKinds, AFalconSensesAndMovesAPointAndTwoALine) {
   for (const auto& [name, freedom] : {std::pair("falcon", 3), std::pair("falcon2", 5)}) {
     const DeviceCapabilities can = device_kind(name).nominal({});
     EXPECT_EQ(can.name, name);
@@ -66,7 +66,7 @@ TEST(DeviceKinds, AFalconSensesAndMovesAPointTwoOfThemALine) {
   }
 }
 
-TEST(DeviceKinds, WithoutMotorsThereIsAlwaysOneAndItHasTheStylusOfTheConfig) {
+TEST(DeviceKinds, DevicesWithoutMotorsAreAlwaysPresentWithTheConfigsStylus) {
   DeviceConfig config;
   config.stylus_length = 0.2;
   config.stylus_grip = 0.03;
@@ -99,7 +99,7 @@ TEST(DeviceKinds, WithoutMotorsThereIsAlwaysOneAndItHasTheStylusOfTheConfig) {
 }
 
 // A maker's library may do all of these; the program goes on.
-TEST(DeviceKinds, AreListedInAProcessOfTheirOwn) {
+TEST(DeviceKinds, AreListedInASeparateProcess) {
   DeviceKind kind = device_kind("falcon");
   const auto said = [&kind] {
     try {

@@ -41,7 +41,7 @@ TEST(ReplayDevice, GivesTipTailAndButtonsInOrderAndThenIsLost) {
   EXPECT_TRUE(device.read().lost);
 }
 
-TEST(ReplayDevice, ItsClockGoesByTheRecordedPeriods) {
+TEST(ReplayDevice, ItsClockFollowsTheRecordedPeriods) {
   const auto samples = three_samples();
   ReplayDevice device(samples, 1000);
   // The period before the first tick is not on record: the clock goes to where it is asked to.
@@ -62,7 +62,7 @@ TEST(ReplayDevice, ItsClockGoesByTheRecordedPeriods) {
   EXPECT_EQ(device.now_ns(), last + 250'000) << "after the last sample";
 }
 
-TEST(ReplayDevice, APeriodThatIsNotOnRecordIsTheNominalOne) {
+TEST(ReplayDevice, AMissingPeriodIsTheNominalOne) {
   auto samples = three_samples();
   samples[1].period_ns = 0;
   ReplayDevice device(samples, 1000);

@@ -81,7 +81,7 @@ TEST(SelfTest, ReadsForASecondAtTheDevicesOwnRateWithoutForce) {
   EXPECT_FALSE(device.forces);
 }
 
-TEST(SelfTest, EachFaultIsFoundAndSaid) {
+TEST(SelfTest, EachFaultIsFoundAndReported) {
   constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
   TestedDevice device([](int i) {
     if (i == 20) return lost(DeviceTrouble::unplugged);
@@ -108,7 +108,7 @@ TEST(SelfTest, EachFaultIsFoundAndSaid) {
 }
 
 // What was lost between two readings says nothing about a jump.
-TEST(SelfTest, NoJumpIsCountedOverALostReading) {
+TEST(SelfTest, ALostReadingIsNotCountedAsAJump) {
   TestedDevice device(
       [](int i) { return i == 100 ? lost(DeviceTrouble::none) : at(i < 100 ? -0.1 : 0.1); });
   const std::vector<Line> lines = lines_of(device);
@@ -119,7 +119,7 @@ TEST(SelfTest, NoJumpIsCountedOverALostReading) {
                             "largest step 0.000 mm; a hand moves at most 10.0 mm a reading"}));
 }
 
-TEST(SelfTest, WhereNothingCameNothingIsSaidOfPositions) {
+TEST(SelfTest, WithoutReadingsPositionsAreNotJudged) {
   TestedDevice device([](int i) {
     DeviceReading reading = at(HUGE_VAL);
     return i < 100 ? lost(DeviceTrouble::silent) : reading;

@@ -112,7 +112,7 @@ TEST(SimulatedStylus, TurnsByRodriguesFormulaToTheLastDigits) {
   }
 }
 
-TEST(SimulatedStylus, FollowsAMovingTargetWithoutLagOfTheHandsDamper) {
+TEST(SimulatedStylus, FollowsAMovingTargetWithoutLagByTheHandsDamper) {
   SimulatedDeviceSettings device = ideal_device();
   device.damping = 0;
   SimulatedStylus stylus(device, HandImpedance{}, 0.12, 0.06, kStep);

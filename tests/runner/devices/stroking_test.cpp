@@ -41,7 +41,7 @@ void expect_strokes(StrokingStylus& device, const StrokeSettings& settings) {
   EXPECT_NEAR(furthest, 0, 1e-3);
 }
 
-TEST(StrokingStylus, RestsAMomentAndStrokesToTheCentreAndBack) {
+TEST(StrokingStylus, RestsThenStrokesToTheCentreAndBack) {
   StrokingStylus usual(kLength, kGrip, kRate);
   expect_strokes(usual, {0.1, 1.0, 1.5});
   const StrokeSettings other{0.06, 0.3, 0.8};
@@ -49,7 +49,7 @@ TEST(StrokingStylus, RestsAMomentAndStrokesToTheCentreAndBack) {
   expect_strokes(own, other);
 }
 
-TEST(StrokingStylus, ComesBackToTheSamePlaceTickByTick) {
+TEST(StrokingStylus, RepeatsTheSameStrokeTickByTick) {
   const StrokeSettings settings{0.08, 0.2, 0.4};
   StrokingStylus device(kLength, kGrip, 500, settings);
   std::vector<double> ys;
@@ -57,7 +57,7 @@ TEST(StrokingStylus, ComesBackToTheSamePlaceTickByTick) {
   for (std::size_t i = 300; i + 300 < ys.size(); ++i) ASSERT_NEAR(ys[i], ys[i + 300], 1e-4) << i;
 }
 
-TEST(StrokingStylus, GivesWayToAForceAsAHandDoes) {
+TEST(StrokingStylus, YieldsToAForceLikeAHand) {
   StrokingStylus device(kLength, kGrip, kRate, {0.1, 10, 1});
   for (int tick = 0; tick < 2000; ++tick) {
     device.write(Vec3(0, -1, 0), Vec3(0, -1, 0));

@@ -13,7 +13,7 @@ ConsoleState in(const char* word) {
   return state;
 }
 
-TEST(ConsoleWords, ABreakIsCalledABreakAndSaysHowLong) {
+TEST(ConsoleWords, ABreakIsNamedWithItsDuration) {
   ConsoleState state = in("block begins");
   state.seconds_left = 90;
   EXPECT_EQ(state_title(state), "break");
@@ -33,7 +33,7 @@ TEST(ConsoleWords, APageToReadNamesTheKeyToPress) {
   EXPECT_EQ(state_detail(held), "") << "the space bar does not";
 }
 
-TEST(ConsoleWords, AQuestionOfAPageSaysWhich) {
+TEST(ConsoleWords, AQuestionOfAPageShowsItsNumber) {
   const ConsoleState state = in("question 2 of 5: about-you, age");
   EXPECT_EQ(state_title(state), "question 2 of 5");
   EXPECT_EQ(state_detail(state), "about-you, age");
@@ -49,7 +49,7 @@ TEST(ConsoleWords, NumbersOfAnAxisAreNotRounded) {
   EXPECT_EQ(axis_label(500), "500");
 }
 
-TEST(ConsoleWords, TheBarCountsATrialOnceItIsOver) {
+TEST(ConsoleWords, TheBarCountsATrialAfterItsEnd) {
   ConsoleState state = in("trial");
   EXPECT_EQ(fraction_done(state), 0);
   state.trial = 4;
@@ -64,7 +64,7 @@ TEST(ConsoleWords, TheBarCountsATrialOnceItIsOver) {
   EXPECT_EQ(fraction_done(state), 1);
 }
 
-TEST(ConsoleWords, ForcesThatAreOffSayWhatToPressNext) {
+TEST(ConsoleWords, WhileForcesAreOffTheNextButtonIsNamed) {
   ConsoleState state = in("rest");
   EXPECT_EQ(forces_text(state), "No fault");
   state.sample.faults = servo_fault::kTripped | servo_fault::kEmergency;
@@ -77,7 +77,7 @@ TEST(ConsoleWords, ForcesThatAreOffSayWhatToPressNext) {
   EXPECT_EQ(forces_text(state), state.held_by);
 }
 
-TEST(ConsoleWords, BeforeTheFirstTrialForcesThatAreOffAreNoAlarm) {
+TEST(ConsoleWords, BeforeTheFirstTrialForcesOffIsNoAlarm) {
   ConsoleState state = in("pre-flight");
   state.checklist.steps = {{"Home the device", Checklist::Step::State::now}};
   state.sample.faults = servo_fault::kTripped | servo_fault::kDeviceLost;

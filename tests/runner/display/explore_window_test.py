@@ -72,7 +72,7 @@ class ExploreWindow(unittest.TestCase):
         left = int(0.74 * self.width)
         return sum(r > 200 and g < 140 and b < 140 for r, g, b in self.pixels(left, 70, self.width - left - 5, 90)) > 20
 
-    def test_a_recorded_path_plays_pauses_and_is_kept(self):
+    def test_a_recorded_path_plays_pauses_and_is_saved(self):
         scene = PROTOCOLS / "scenes" / "fig13-two-objects.json"
         self.open(scene, "--trajectory", scene.with_suffix(".csv"), "--pictures", self.folder / "kept")
         view = (20, 80, int(0.6 * self.width), int(0.6 * self.height))
@@ -138,7 +138,7 @@ class ExploreWindow(unittest.TestCase):
             return False
         wait_for("forces that may be on", allowed)
 
-    def test_the_emergency_is_there_by_key_and_button_and_is_taken_back(self):
+    def test_the_emergency_works_by_key_and_button_and_can_be_cleared(self):
         self.open()
         self.allow_forces()
         for ask in (lambda: self.screen.key("Escape"), lambda: self.screen.key("F12"),
@@ -149,7 +149,7 @@ class ExploreWindow(unittest.TestCase):
             self.allow_forces()
         self.assertEqual(self.end(), 0)
 
-    def test_the_pointer_touches_what_is_under_it(self):
+    def test_the_pointer_touches_the_object_under_it(self):
         self.open("--labels")
         middle = int(0.35 * self.width), int(0.42 * self.height)
         self.screen.point(self.window, middle[0] - 40, middle[1])
@@ -166,7 +166,7 @@ class ExploreWindow(unittest.TestCase):
             self.screen.keep(self.window, "explore_mouse")
         self.assertEqual(self.end(), 0)
 
-    def test_a_clip_is_kept_of_what_was_seen(self):
+    def test_a_clip_has_the_pictures_that_were_shown(self):
         # A picture each 40 ms, which a machine without a graphics card draws in seconds when it is busy.
         self.press_c_after(0.4)
         clip = wait_for("the clip", lambda: list((self.folder / "kept").glob("scene-1.webp")))[0]
@@ -206,12 +206,12 @@ class ExploreWindow(unittest.TestCase):
         self.assertEqual(self.program.wait(timeout=120), 0)
         self.assertGreaterEqual(self.kept_clip(), 90)
 
-    def test_of_a_clip_is_kept_what_was_drawn_before_a_signal(self):
+    def test_a_signal_saves_the_clip_drawn_so_far(self):
         self.press_c_for_a_long_clip()
         self.assertEqual(self.end(), 0)
         self.assertGreaterEqual(self.kept_clip(), 1)
 
-    def test_what_cannot_be_pulled_says_so(self):
+    def test_objects_that_cannot_be_pulled_are_reported(self):
         self.open()
         words = lambda: self.pixels(20, int(0.72 * self.height), int(0.6 * self.width), 30)
         middle = int(0.35 * self.width), int(0.42 * self.height)
@@ -249,20 +249,20 @@ class ExploreWindow(unittest.TestCase):
             wait_for("the button", lambda: all(reddish(self.pixel(int(share * width), 13)) for share in (0.1, 0.5, 0.9)))
         self.screen.keep(self.window, "explore_small")
 
-    def test_without_a_display_it_says_so(self):
+    def test_a_missing_display_is_reported(self):
         for environment in ({}, {"DISPLAY": ":98765"}):
             done = subprocess.run([PALPATE, "explore", self.scene], text=True, capture_output=True,
                                   env=dict({k: v for k, v in self.screen.environment.items() if k != "DISPLAY"}, **environment))
             self.assertEqual(done.returncode, 1, done.stderr)
             self.assertIn("--frames", done.stderr)
 
-    def test_a_display_that_is_lost_ends_it_in_order(self):
+    def test_a_lost_display_ends_it_regularly(self):
         self.open()
         self.screen.kill()
         self.assertEqual(self.program.wait(timeout=60), 1)
         self.assertIn("forces are off", self.program.stderr.read())
 
-    def test_options_that_do_not_go_together(self):
+    def test_incompatible_options_are_refused(self):
         for words, options in (("expected one of them", ["--device", "mouse", "--trajectory", "x.csv"]), ("--frames", ["--size", "20x20"]),
                                ("no device", ["--device", "hand"]), ("window", ["--frames", "f", "--trajectory", "t", "--device", "mouse"])):
             done = subprocess.run([PALPATE, "explore", self.scene, *options], text=True, capture_output=True, env=self.screen.environment)

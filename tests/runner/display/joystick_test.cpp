@@ -41,14 +41,14 @@ Strings keys_of(const std::map<std::string, std::string>& mapping,
   return all;
 }
 
-TEST(Joystick, AButtonIsAKeyOnceForEachPress) {
+TEST(Joystick, EachPressOfAButtonIsOneKey) {
   EXPECT_EQ(keys_of({{"button 1", "1"}, {"button 2", "space"}},
                     {buttons(false, false), buttons(true, false), buttons(true, false),
                      buttons(true, true), buttons(false, true), buttons(true, true)}),
             (Strings{"1", "space", "1"}));
 }
 
-TEST(Joystick, WhatIsHeldWhenItIsConnectedIsNoPress) {
+TEST(Joystick, InputsHeldOnConnectionAreNoPresses) {
   EXPECT_EQ(keys_of({{"button 1", "1"}}, {buttons(true, false), buttons(true, false),
                                           buttons(false, false), buttons(true, false)}),
             Strings{"1"});
@@ -73,7 +73,7 @@ TEST(Joystick, AHatHasFourSides) {
       (Strings{"u", "r", "d", "l"}));
 }
 
-TEST(Joystick, InputsThatItDoesNotHaveAreNeverPressed) {
+TEST(Joystick, MissingInputsAreNeverPressed) {
   EXPECT_EQ(keys_of({{"button 9", "1"}, {"axis 4 +", "2"}, {"hat 2 up", "3"}},
                     {buttons(false, false), buttons(true, true)}),
             Strings{});

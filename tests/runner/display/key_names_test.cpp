@@ -38,7 +38,7 @@ TEST(KeyNames, CharactersAreUtf8) {
   for (const auto& [character, bytes] : known) EXPECT_EQ(utf8(character), bytes) << character;
 }
 
-TEST(KeyNames, KeysWithoutACharacterHaveWords) {
+TEST(KeyNames, KeysWithoutACharacterHaveNames) {
   const std::map<int, std::string> known{{GLFW_KEY_SPACE, "space"},
                                          {GLFW_KEY_ESCAPE, "escape"},
                                          {GLFW_KEY_ENTER, "enter"},
@@ -54,7 +54,7 @@ TEST(KeyNames, KeysWithoutACharacterHaveWords) {
   EXPECT_EQ(first_name(GLFW_KEY_LEFT_SHIFT), "");
 }
 
-TEST(KeyNames, LettersAndDigitsAreThemselvesAndTheKeypadIsDigits) {
+TEST(KeyNames, LettersAndDigitsNameThemselvesAndTheKeypadGivesDigits) {
   std::set<std::string> names;
   for (char c = 'a'; c <= 'z'; ++c) {
     EXPECT_EQ(first_name(GLFW_KEY_A + c - 'a'), std::string(1, c));
@@ -80,7 +80,7 @@ TEST(KeyNames, LettersAndDigitsAreThemselvesAndTheKeypadIsDigits) {
   EXPECT_FALSE(on_keypad(GLFW_KEY_LEFT_SHIFT));
 }
 
-TEST(KeyNames, APressIsTheAnswerKeyThatItMatchesWhateverTheCase) {
+TEST(KeyNames, APressMatchesAnAnswerKeyInAnyCase) {
   const std::vector<std::pair<std::string, std::string>> keys{
       {"A", "ball"}, {"2", "box"}, {"\xC3\xA9", "cone"}, {"[", "bar"}};
   EXPECT_EQ(match_key({"a"}, keys), "A");

@@ -18,14 +18,14 @@ bool share_a_pixel(const LabelBox& a, const LabelBox& b) {
   return low_a.x < high_b.x && low_b.x < high_a.x && low_a.y < high_b.y && low_b.y < high_a.y;
 }
 
-TEST(LabelPlaces, WhatHasRoomStaysWhereItIs) {
+TEST(LabelPlaces, LabelsWithRoomStayInPlace) {
   std::vector<LabelBox> boxes{{{100, 100}, {60, 14}, 1}, {{100, 130}, {60, 14}, 2}};
   place_labels(boxes, kPicture);
   EXPECT_EQ(boxes[0].centre, glm::vec2(100, 100));
   EXPECT_EQ(boxes[1].centre, glm::vec2(100, 130));
 }
 
-TEST(LabelPlaces, TheNearerThingsLabelStaysAndTheOtherMoves) {
+TEST(LabelPlaces, TheNearerLabelStaysAndTheOtherMoves) {
   std::vector<LabelBox> boxes{{{100, 100}, {60, 14}, 5}, {{110, 102}, {60, 14}, 2}};
   place_labels(boxes, kPicture);
   EXPECT_EQ(boxes[0].distance, 2);
@@ -35,7 +35,7 @@ TEST(LabelPlaces, TheNearerThingsLabelStaysAndTheOtherMoves) {
   EXPECT_LT(std::abs(boxes[1].centre.y - 100), 35) << "not far from what it names";
 }
 
-TEST(LabelPlaces, AtTheBorderItIsMovedInAndFarOutsideNotShown) {
+TEST(LabelPlaces, AtTheBorderLabelsMoveInAndFarOutsideTheyAreHidden) {
   std::vector<LabelBox> boxes{{{5, 3}, {60, 14}, 1},
                               {{636, 200}, {60, 14}, 2},
                               {{-80, 200}, {60, 14}, 3},
@@ -47,7 +47,7 @@ TEST(LabelPlaces, AtTheBorderItIsMovedInAndFarOutsideNotShown) {
   EXPECT_FALSE(boxes[3].shown);
 }
 
-TEST(LabelPlaces, NoneLiesOnAnotherNorOutsideWhateverTheScene) {
+TEST(LabelPlaces, LabelsNeverOverlapNorLeaveThePicture) {
   std::mt19937 random(16);  // NOLINT(cert-msc32-c,cert-msc51-cpp): any sequence will do
   std::uniform_real_distribution<float> any(-0.2F, 1.2F), width(10, 900);
   for (int scene = 0; scene < 300; ++scene) {

@@ -25,14 +25,14 @@ class Monitors(WindowCase):
                                  *options], env=self.screen.environment, text=True, stdin=subprocess.DEVNULL,
                                 stdout=subprocess.PIPE, stderr=subprocess.PIPE)
 
-    def test_that_are_not_there_are_refused_whichever_window_was_to_be_there(self):
+    def test_missing_monitors_are_refused_for_either_window(self):
         for option in ("--participant-monitor", "--console-monitor"):
             program = self.run_on(option, "3")
             _, messages = program.communicate(timeout=PATIENCE)
             self.assertEqual(program.returncode, 1, messages)
             self.assertIn("monitor 3 is not connected; there are 1", messages, option)
 
-    def test_one_that_is_there_takes_both_windows(self):
+    def test_a_single_monitor_takes_both_windows(self):
         program = self.run_on("--participant-monitor", "1", "--console-monitor", "1")
         try:
             boxes = [self.screen.box(self.screen.window(title)) for title in ("windows, P01", "windows, P01 - console")]

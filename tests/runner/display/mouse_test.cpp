@@ -51,7 +51,7 @@ TEST(MouseStylus, FollowsWithoutJumpAndKeepsItsLength) {
   }
 }
 
-TEST(MouseStylus, NoTargetGivesAPoseThatIsNotFinite) {
+TEST(MouseStylus, EveryTargetGivesAFinitePose) {
   MouseStylus device(kLength, 1000);
   std::mt19937 random(7);  // NOLINT(cert-msc32-c,cert-msc51-cpp): any sequence will do
   std::uniform_real_distribution<double> far(-10, 10);
@@ -96,7 +96,7 @@ TEST(StylusTarget, StaysInReachAndTurnsFiveDegreesOfFreedom) {
   EXPECT_EQ(hand.tip, Vec3(0.25, -0.25, 0.1));
 }
 
-TEST(StylusTarget, PointsAsAnotherStylus) {
+TEST(StylusTarget, TakesThePoseOfAnotherStylus) {
   StylusTarget hand{{}, kLength, 0, 0};
   for (const auto& [yaw, pitch] : {std::pair{0.3, 0.8}, {-2.9, -1.2}, {1.6, 0.0}, {3.0, 1.4}}) {
     const StylusTarget other{{0.05, -0.1, 0.02}, kLength, yaw, pitch};

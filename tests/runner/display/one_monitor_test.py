@@ -19,7 +19,7 @@ class OneMonitor(unittest.TestCase):
         self.addCleanup(windows.close)
         return windows
 
-    def test_the_shape_is_hidden_until_it_is_asked_for(self):
+    def test_the_shape_is_hidden_until_requested(self):
         windows = self.open("--no-mouse")
         self.assertIn("hides shape and scene", windows.before[0])
         windows.say("state cone 0")
@@ -45,7 +45,7 @@ class OneMonitor(unittest.TestCase):
         width, _ = self.screen.size(windows.console)
         return picture[:3 * width * 640]
 
-    def test_the_newest_message_is_in_sight_in_a_small_window(self):
+    def test_the_newest_message_is_visible_in_a_small_window(self):
         windows = self.open("--no-mouse", size="1024x768")
         width, height = self.screen.size(windows.console)
 

@@ -121,7 +121,7 @@ TEST(ParticipantPage, ABreakShowsACountDownAndTheProgress) {
   EXPECT_EQ(inked_rows(plain) < inked_rows(counted) && inked_rows(counted) < inked_rows(far), true);
 }
 
-TEST(ParticipantPage, AReplyInABreakKeepsItsDistanceFromTheEdge) {
+TEST(ParticipantPage, AReplyInABreakKeepsAMarginToTheEdge) {
   Page page;
   page.text = "Rest your hand.";
   page.seconds_left = 25;
@@ -163,7 +163,7 @@ TEST(ParticipantPage, AChecklistInANarrowWindowKeepsItsTextSize) {
   EXPECT_GT(inked_rows(draw_page(page, 389, 728)), inked_rows(image)) << "more text, more lines";
 }
 
-TEST(ParticipantPage, EachStateOfAStepHasAMarkOfItsOwnShape) {
+TEST(ParticipantPage, EachStateOfAStepHasAMarkOfDistinctShape) {
   // Whoever sees no colours tells them apart, too.
   using State = Checklist::Step::State;
   std::vector<std::vector<bool>> shapes;
@@ -301,7 +301,7 @@ TEST(ParticipantPage, TheAnswersOfAQuestionAreShownWholeBesideIt) {
   }
 }
 
-TEST(ParticipantPage, OtherKindsOfPages) {
+TEST(ParticipantPage, OtherKindsOfPagesAreDrawn) {
   Page page;
   page.kind = Page::Kind::feedback;
   page.text = "\u2713";

@@ -30,7 +30,7 @@ rendering::SceneObject object_of(const stimuli::PolygonSoup& soup, const Vec3& a
   return out;
 }
 
-TEST(DrawnMeshTest, RoundThingsAreSmoothAndBoxesAreNot) {
+TEST(DrawnMeshTest, RoundSurfacesAreSmoothAndBoxesAreNot) {
   stimuli::ObjectSpec ball;
   ball.radius = 0.02;
   ball.subdivisions = 3;
@@ -56,7 +56,7 @@ TEST(DrawnMeshTest, ALineMeetsASphereWhereItEntersIt) {
   EXPECT_FALSE(distance_to(mesh, {0, 0, 0}, {0, 0, -1})) << "from inside there is no entry";
 }
 
-TEST(CameraTest, WhatIsFittedIsInThePictureAndFillsIt) {
+TEST(CameraTest, FittedPointsAreInThePictureAndFillIt) {
   std::mt19937 generator(7);
   std::uniform_real_distribution<float> any(-1, 1);
   for (int k = 0; k < 200; ++k) {
@@ -93,7 +93,7 @@ TEST(CameraTest, UnprojectIsTheInverseOfProject) {
 }
 
 /// The forces at the places add up to what the hand gets, whatever the scene.
-TEST(ContactPlacesTest, TheirForcesAddUp) {
+TEST(ContactPlacesTest, TheirForcesSumToTheForceOnTheHand) {
   const auto check = [](const rendering::Scene& scene, const std::vector<LineProbe>& path,
                         int least) {
     rendering::RenderState state = scene.initial_state();
@@ -125,7 +125,7 @@ TEST(ContactPlacesTest, TheirForcesAddUp) {
         path, 1);
 }
 
-TEST(TorqueTest, OfTheDevicesIsThatOfTheContactsButForTorsion) {
+TEST(TorqueTest, OfTheDevicesEqualsThatOfTheContactsExceptTorsion) {
   const rendering::Scene scene({object_of(stimuli::cube(0.05), {0, 0, 0}, 0)});
   rendering::RenderState state = scene.initial_state();
   SceneMoment moment;
@@ -144,7 +144,7 @@ TEST(TorqueTest, OfTheDevicesIsThatOfTheContactsButForTorsion) {
   EXPECT_LT(glm::distance(torque_on_hand(moment), whole - glm::dot(whole, axis) * axis), 1e-12);
 }
 
-TEST(TorqueTest, TheTurnSweepsInProportionAndItsScaleIsSaid) {
+TEST(TorqueTest, TheArcIsProportionalAndItsScaleIsStated) {
   stimuli::ObjectSpec ball;
   ball.radius = 0.03;
   const SceneDrawing drawing({ball}, {});

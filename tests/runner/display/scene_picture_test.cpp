@@ -107,7 +107,7 @@ TEST_F(ScenePictureTest, AnObjectIsSeenWhereItIsProjected) {
   EXPECT_TRUE(bluish(seen({0.05, 0, 0}))) << "moved with the camera";
 }
 
-TEST_F(ScenePictureTest, AForceIsAnArrowAndNoForceNone) {
+TEST_F(ScenePictureTest, AForceIsDrawnAsAnArrowAndZeroForceIsNot) {
   const SceneDrawing drawing({ball({0, 0, 0}, 0.03)}, {});
   draw(drawing.picture(away(), light_theme(), {}));
   EXPECT_EQ(count(reddish), 0);
@@ -119,7 +119,7 @@ TEST_F(ScenePictureTest, AForceIsAnArrowAndNoForceNone) {
   EXPECT_FALSE(reddish(seen({0.08, 0, 0}))) << "2 N are 40 mm here";
 }
 
-TEST_F(ScenePictureTest, TheVirtualToolIsSeenInsideOfTheObject) {
+TEST_F(ScenePictureTest, TheVirtualToolIsVisibleInsideTheObject) {
   const SceneDrawing drawing({ball({0, 0, 0}, 0.03)}, {});
   draw(drawing.picture(away(), light_theme(), {}));
   EXPECT_EQ(count(orange), 0);
@@ -149,7 +149,7 @@ TEST_F(ScenePictureTest, EverySegmentOfTheToolIsDrawn) {
   EXPECT_FALSE(dark(seen({0.015, 0, 0.01})));
 }
 
-TEST_F(ScenePictureTest, WhatLiesInsideOfATranslucentObjectIsSeen) {
+TEST_F(ScenePictureTest, PartsInsideATranslucentObjectAreVisible) {
   SceneDrawing drawing({ball({0, 0, 0}, 0.03)}, {});
   ScenePicture picture = drawing.picture(away(), light_theme(), {});
   picture.objects[0].opacity = 0.25F;
@@ -166,7 +166,7 @@ TEST_F(ScenePictureTest, WhatLiesInsideOfATranslucentObjectIsSeen) {
   EXPECT_FALSE(reddish(empty));
 }
 
-TEST_F(ScenePictureTest, ACutTakesAwayWhatIsBehindThePlane) {
+TEST_F(ScenePictureTest, ACutRemovesPartsBehindThePlane) {
   const SceneDrawing drawing({ball({0, 0, 0}, 0.03)}, {});
   ScenePicture picture = drawing.picture(away(), light_theme(), {});
   picture.cut = glm::vec4(-1, 0, 0, 0);  // x < 0 stays
@@ -204,7 +204,7 @@ TEST_F(ScenePictureTest, LabelsAreWritten) {
   EXPECT_NE(without, draw(drawing.picture(away(), light_theme(), {.labels = true})));
 }
 
-TEST_F(ScenePictureTest, NumbersThatAreNoneDrawNothing) {
+TEST_F(ScenePictureTest, NotANumberIsNotDrawn) {
   const SceneDrawing drawing({ball({0, 0, 0}, 0.03)}, {});
   SceneMoment moment = touching({0, 0, 0.03}, {0, 0, -0.01});
   moment.sample.probe.tip.x = moment.contacts[0].place.z = std::nan("");
@@ -214,7 +214,7 @@ TEST_F(ScenePictureTest, NumbersThatAreNoneDrawNothing) {
   EXPECT_EQ(count(reddish), 0);
 }
 
-TEST_F(ScenePictureTest, FilesHaveTheirMarks) {
+TEST_F(ScenePictureTest, FilesHaveTheirMagicBytes) {
   const SceneDrawing drawing({ball({0, 0, 0}, 0.03)}, {});
   draw(drawing.picture(away(), light_theme(), {}));
   EXPECT_EQ(painter_->png().substr(1, 3), "PNG");

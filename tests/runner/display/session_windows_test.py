@@ -241,7 +241,7 @@ class SessionTest(WindowCase):
         self.assertEqual(self.rows("SELECT end_reason FROM runs ORDER BY id"),
                          [("interrupted",), ("done",)])
 
-    def test_a_signal_ends_it_in_order(self):
+    def test_a_signal_ends_it_regularly(self):
         self.start()
         self.answer(1)
         self.wait_for_trial()
@@ -252,7 +252,7 @@ class SessionTest(WindowCase):
         self.finish()
         self.check_whole(cut_off=1)
 
-    def test_a_stalled_display_is_not_noticed(self):
+    def test_a_stalled_display_has_no_effect(self):
         self.write_protocol(response={**PROTOCOL["response"], "time_out_s": 1})
         self.start()
         self.screen.stall()
@@ -269,7 +269,7 @@ class SessionTest(WindowCase):
             self.assertGreaterEqual(ticks + missed, 180)
             self.assertLess(longest, 1_000_000_000)
 
-    def test_a_computer_that_stands_still_ends_no_trial_of_the_mouse(self):
+    def test_a_stalled_computer_does_not_end_trials_with_the_mouse(self):
         self.start()
         self.wait_for_trial()
         self.assertEqual(self.done(), 0)

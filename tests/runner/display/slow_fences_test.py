@@ -21,7 +21,7 @@ HELD_UP = {"LIBGL_ALWAYS_SOFTWARE": "1", "LP_NUM_THREADS": "1", "LD_PRELOAD": LI
 
 
 class SlowFences(unittest.TestCase):
-    def test_a_sessions_windows_outlive_it(self):
+    def test_a_sessions_windows_survive_slow_fences(self):
         skip_without_screen()
         screen = VirtualScreen("1024x768")
         self.addCleanup(screen.close)
@@ -34,7 +34,7 @@ class SlowFences(unittest.TestCase):
         windows.say("end")
         self.assertEqual(windows.program.wait(60), 0)
 
-    def test_pictures_without_a_display_outlive_it(self):
+    def test_pictures_without_a_display_survive_slow_fences(self):
         with tempfile.TemporaryDirectory() as folder:
             scene = SCENES / "fig13-two-objects.json"
             done = subprocess.run(

@@ -228,7 +228,7 @@ class TaskWindows(WindowCase):
         self.assertEqual(self.tasks()[1]["number"], 45)
         self.end()
 
-    def test_the_experimenter_types_what_is_said(self):
+    def test_the_experimenter_types_spoken_answers(self):
         self.start(COMPARE, options=["--spoken"])
         wait_for("a trial", lambda: self.screen.key("space") or self.rows("SELECT 1 FROM attempts"))
         time.sleep(1)

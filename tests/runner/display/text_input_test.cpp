@@ -53,7 +53,7 @@ TEST(TextInput, EscapeAndF12AreEmergencyKeysAlsoInACommand) {
   EXPECT_EQ(heard(":no\x1b[A"), "");
 }
 
-TEST(TextInput, AltWithAKeyIsAnEmergencyAndNoAnswer) {
+TEST(TextInput, AltWithAKeyIsAnEmergencyNotAnAnswer) {
   EXPECT_EQ(heard("\x1b\x31"), command(Kind::emergency_zero, "the key Alt+1"));
   EXPECT_EQ(heard("\x1b\xC3\xA4"), command(Kind::emergency_zero, "the key Alt+\xC3\xA4"));
   EXPECT_EQ(heard("\x1b["), command(Kind::emergency_zero, "the key Alt+["));

@@ -55,7 +55,7 @@ class TextScreens : public ::testing::Test {
   TextConsole console_{out_, wake_};
 };
 
-TEST_F(TextScreens, ATextToReadSaysWhatGoesOnAndHowMuchOfItThereIs) {
+TEST_F(TextScreens, ATextToReadNamesTheKeyToContinueAndItsLength) {
   EXPECT_EQ(page(of_kind(Page::Kind::text, "Hello")), "Hello\n[space bar: go on]\n");
   Page second = of_kind(Page::Kind::text, "More");
   second.part = 2;
@@ -75,7 +75,7 @@ TEST_F(TextScreens, ATextToReadSaysWhatGoesOnAndHowMuchOfItThereIs) {
   EXPECT_EQ(page(right), "Correct\n") << "how far the session is comes with the next trial";
 }
 
-TEST_F(TextScreens, AnswersStandWithTheirKeysOnceForcesAreOn) {
+TEST_F(TextScreens, AnswersAreListedWithTheirKeysOnceForcesAreOn) {
   Page trial = of_kind(Page::Kind::neutral, "Which?");
   trial.keys = {{"1", "ball"}, {"2", "b\x1b[2Jx"}};
   EXPECT_EQ(page(trial), "Which?\n") << "nothing to answer yet";
@@ -90,7 +90,7 @@ TEST_F(TextScreens, AnswersStandWithTheirKeysOnceForcesAreOn) {
   EXPECT_EQ(page(again), "");
 }
 
-TEST_F(TextScreens, WhatIsTypedIsShownBehindAPrompt) {
+TEST_F(TextScreens, TypedTextIsShownAfterAPrompt) {
   Page age = of_kind(Page::Kind::message, "How old?");
   age.typing = Page::Typing::number;
   EXPECT_EQ(page(age), "How old?\n> \n");
@@ -134,7 +134,7 @@ TEST_F(TextScreens, TheStatusNamesTrialBlockTimeAndFaultsWhenItChanges) {
   EXPECT_EQ(console(held), "[paused, block 2 of 3, trial 6 of 12]\n");
 }
 
-TEST_F(TextScreens, EveryMessageIsWrittenOnceAlsoWhenOldOnesAreDropped) {
+TEST_F(TextScreens, EveryMessageIsWrittenOnceEvenWhenOldOnesAreDropped) {
   ConsoleState state;
   state.messages = {"one", "two"};
   EXPECT_EQ(console(state), "* one\n* two\n");
@@ -147,7 +147,7 @@ TEST_F(TextScreens, EveryMessageIsWrittenOnceAlsoWhenOldOnesAreDropped) {
   EXPECT_EQ(console(state), "");
 }
 
-TEST_F(TextScreens, TheChecklistNamesTheStepThatIsDueAndItsCommands) {
+TEST_F(TextScreens, TheChecklistNamesTheCurrentStepAndItsCommands) {
   ConsoleState state;
   state.checklist.steps = {{"a", Step::State::done},
                            {"b", Step::State::left_out},

@@ -43,7 +43,7 @@ TEST(TimelineTest, TheNewestIsFollowedUntilItIsPaused) {
   EXPECT_DOUBLE_EQ(line.now(), 0.012);
 }
 
-TEST(TimelineTest, AStepIsOneMomentAndStaysWithin) {
+TEST(TimelineTest, AStepIsOneMomentAndStaysInRange) {
   Timeline line = of(1, 10);
   line.step(-1);
   EXPECT_EQ(line.state(), Timeline::State::paused);
@@ -56,7 +56,7 @@ TEST(TimelineTest, AStepIsOneMomentAndStaysWithin) {
   EXPECT_DOUBLE_EQ(line.now(), 0.010);
 }
 
-TEST(TimelineTest, SeekFindsTheLastMomentThatIsNotLater) {
+TEST(TimelineTest, SeekFindsTheLastMomentNotAfterTheTime) {
   Timeline line;
   for (const int t : {10, 20, 40}) line.add(moment_at(t));
   line.seek(0.0399);
@@ -90,7 +90,7 @@ TEST(TimelineTest, FaultsAreCountedWhileTheirMomentsAreKept) {
   EXPECT_TRUE(line.faults().empty());
 }
 
-TEST(TimelineTest, SlowMotionShowsEveryMomentOfATenthOfTheTime) {
+TEST(TimelineTest, SlowMotionShowsEveryMoment) {
   Timeline line = of(0, 1000);
   line.seek(0.5);
   line.play();
@@ -105,7 +105,7 @@ TEST(TimelineTest, SlowMotionShowsEveryMomentOfATenthOfTheTime) {
   EXPECT_DOUBLE_EQ(line.now(), 0) << "and begins anew";
 }
 
-TEST(TimelineTest, AMinuteIsKeptAndWhatIsShownStays) {
+TEST(TimelineTest, AMinuteIsKeptAndTheMomentShownStays) {
   Timeline line = of(0, 30'000);
   line.seek(25);
   for (int t = 30'001; t <= 80'000; ++t) line.add(moment_at(t));
@@ -115,14 +115,14 @@ TEST(TimelineTest, AMinuteIsKeptAndWhatIsShownStays) {
   EXPECT_DOUBLE_EQ(line.now(), line.first()) << "what was shown is too old: the oldest instead";
 }
 
-TEST(TimelineTest, ATimeThatIsNotLaterBeginsAnew) {
+TEST(TimelineTest, ATimeThatIsNotLaterRestartsTheTimeline) {
   Timeline line = of(5, 10);
   line.add(moment_at(2));
   EXPECT_EQ(line.moments().size(), 1U);
   EXPECT_DOUBLE_EQ(line.now(), 0.002);
 }
 
-TEST(TimelineTest, ASpeedThatIsNoneIsNotTaken) {
+TEST(TimelineTest, AnInvalidSpeedIsIgnored) {
   Timeline line;
   line.set_speed(0.5);
   line.set_speed(std::nan(""));

@@ -24,7 +24,7 @@ TEST(ToolShape, WithoutAToolIsTheStylus) {
   EXPECT_EQ(drawn.segments[0].tail, sample.probe.tail);
 }
 
-TEST(ToolShape, BeforeATrialHasTheRollThatATrialBeginsWith) {
+TEST(ToolShape, BeforeATrialHasTheInitialRollOfATrial) {
   Sample sample;
   sample.probe = {{0.01, 0, 0.1}, {0.01, 0.12, 0.1}};
   const DrawnTool drawn = tool_in_hand(kHook, sample);

@@ -71,7 +71,7 @@ class UprightPictureTest : public ::testing::Test {
 std::unique_ptr<ScenePainter> UprightPictureTest::painter_;
 
 // World frame: x right, y away from the user, z up.
-TEST_F(UprightPictureTest, TheAxesOfTheWorldPointWhereTheyAreSaidTo) {
+TEST_F(UprightPictureTest, TheAxesOfTheWorldPointAsDocumented) {
   camera_.look_from(0, 0.5F);
   const auto seen_at = [&](const Vec3& at) {
     SceneMoment moment;
@@ -105,7 +105,7 @@ TEST_F(UprightPictureTest, UpIsUpFromEverySide) {
   }
 }
 
-TEST_F(UprightPictureTest, TheGroundAndItsShadowLieUnderTheThings) {
+TEST_F(UprightPictureTest, TheGroundAndItsShadowsLieBelowTheObjects) {
   // A ball, and another high above it: the ground touches the lower one's lowest point.
   stimuli::ObjectSpec low, high;
   low.radius = high.radius = 0.02;

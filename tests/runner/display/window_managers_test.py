@@ -60,7 +60,7 @@ class Placed(unittest.TestCase):
         seen = self.screen.pixels("root", left, top + 14, right - left, 1)
         return all(red > 130 and green < 90 for red, green, _ in seen[20:-20])
 
-    def test_each_is_where_it_was_asked_to_be(self):
+    def test_each_window_is_at_its_requested_place(self):
         def places(width, height):
             self.participant = [30, 60, width // 3, height // 2]
             self.console = [width // 2 - 30, 80, width // 2 - 10, height - 150]
@@ -76,7 +76,7 @@ class Placed(unittest.TestCase):
             windows.say("places")
             self.assertEqual(windows.expect("places")[1], "places", "nobody has moved them")
 
-    def test_on_one_screen_the_participant_gets_what_the_console_leaves(self):
+    def test_on_one_screen_the_participant_gets_the_space_beside_the_console(self):
         for windows in self.each():
             wait_for("the button", lambda: self.bar_is_seen(windows))
             participant, console = self.boxes(windows)
@@ -91,7 +91,7 @@ class Placed(unittest.TestCase):
             self.assertEqual(self.boxes(windows), (participant, console), "and there they stay")
             self.screen.keep("root", f"placed_{self.name}")
 
-    def test_nothing_of_ours_covers_the_emergency_button(self):
+    def test_none_of_our_windows_covers_the_emergency_button(self):
         for windows in self.each():
             wait_for("the button", lambda: self.bar_is_seen(windows))
             time.sleep(2)  # no longer at the beginning
@@ -143,7 +143,7 @@ class Remembered(WindowCase):
     def notes(self):
         return [text for (text,) in self.rows("SELECT text FROM notes") if text.startswith('{"windows"')]
 
-    def test_the_next_session_begins_where_the_last_has_put_them(self):
+    def test_the_next_session_restores_the_windows_places(self):
         manager = MANAGERS[-1] if len(MANAGERS) < 3 else "openbox"
         managed(self.screen, manager)
         self.start()

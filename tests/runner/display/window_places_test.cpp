@@ -8,7 +8,7 @@
 namespace palpate::runner {
 namespace {
 
-TEST(WindowPlaces, TheRestIsTheLargestPartBesideWhatIsTaken) {
+TEST(WindowPlaces, TheRestIsTheLargestFreePart) {
   const ScreenBox room{100, 50, 1000, 800};
   EXPECT_EQ(rest_of(room, {600, 50, 500, 800}), (ScreenBox{100, 50, 500, 800}));
   EXPECT_EQ(rest_of(room, {100, 50, 300, 800}), (ScreenBox{400, 50, 700, 800}));
@@ -55,7 +55,7 @@ TEST(WindowPlaces, MovingInKeepsTheSizeWhereItFits) {
   EXPECT_EQ(moved_into({900, 300, 3000, 200}, room), (ScreenBox{0, 300, 1000, 200}));
 }
 
-TEST(WindowPlaces, ANoteSaysThemAndOnlySuchANoteDoes) {
+TEST(WindowPlaces, PlacesAreReadOnlyFromTheirNote) {
   const WindowPlaces places{3840, 1080, {-5, 20, 500, 400}, {1920, 31, 1480, 920}};
   const std::string note = to_note(places);
   EXPECT_EQ(note,

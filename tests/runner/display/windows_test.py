@@ -233,7 +233,7 @@ class WindowsTest(unittest.TestCase):
         self.assertGreater(distance_at(540, 120), 0.075)
         self.assertAlmostEqual(distance_at(*middle), 0.03 - 0.0015, delta=0.0008)
 
-    def test_a_stalled_display_keeps_nobody_waiting(self):
+    def test_a_stalled_display_delays_no_other_thread(self):
         self.windows.say("page neutral")
         self.windows.say("state cube 0")
         self.screen.settled_picture(self.windows.console)

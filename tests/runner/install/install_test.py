@@ -51,7 +51,7 @@ class Completion(unittest.TestCase):
         self.assertEqual((done.returncode, done.stderr), (0, ""), words)
         return done.stdout.splitlines()
 
-    def test_every_command_and_what_begins_alike(self):
+    def test_commands_are_completed_from_a_prefix(self):
         self.assertGreaterEqual(len(commands()), 15)
         self.assertEqual(set(self.offered("")), set(commands()) | {"--help", "--version"})
         self.assertEqual(self.offered("an"), ["analyze"])
@@ -65,7 +65,7 @@ class Completion(unittest.TestCase):
         self.assertEqual(self.offered("run", "quick.json", "--full"), ["--full-screen"])
         self.assertIn("--csv", self.offered("analyze", ""))
 
-    def test_words_that_an_option_takes(self):
+    def test_values_of_an_option_are_completed(self):
         self.assertEqual(self.offered("run", "quick.json", "--hand", ""), ["left", "right"])
         self.assertEqual(self.offered("run", "quick.json", "--device", "fal"), ["falcon", "falcon2"])
         self.assertEqual(self.offered("render", "--renderer", ""), ["point", "ray"])
@@ -75,7 +75,7 @@ class Completion(unittest.TestCase):
         self.assertEqual(self.offered("plan", "--goal", "="), ["all", "any"])
         self.assertEqual(self.offered("simulate", "quick.json", "--participants", ""), [])
 
-    def test_words_are_those_that_the_program_takes(self):
+    def test_completed_values_are_accepted_by_the_program(self):
         for command, option, wrong in (("render", "--renderer", ["--scene", "x", "--trajectory", "x", "--out", "y"]),
                                        ("export", "--format", ["--db", "x", "--out", "y"]),
                                        ("export", "--times", ["--db", "x", "--format", "csv", "--out", "y"]),
@@ -86,7 +86,7 @@ class Completion(unittest.TestCase):
             for word in self.offered(command, option, ""):
                 self.assertIn(word, help_of(command) + refused.stderr, f"{command} {option}")
 
-    def test_files_where_files_are_asked_for(self):
+    def test_files_are_completed_where_expected(self):
         self.assertEqual(sorted(self.offered("validate", "")), ["meshes", "quick.json"])
         self.assertEqual(sorted(self.offered("analyze", "--db", "")), ["meshes", "my study.db", "notes.txt", "quick.json"])
         self.assertEqual(self.offered("analyze", "--db", "=", "my"), ["my study.db"])
@@ -119,7 +119,7 @@ class ManPages(unittest.TestCase):
             for line in filter(None, examples.splitlines()):
                 self.assertIn("\\&" + line.replace("\\", "\\e"), page)
 
-    def test_the_usage_is_whole(self):
+    def test_the_usage_is_complete(self):
         self.assertIn("--force", self.pages["palpate-render"].split(".SH DESCRIPTION")[0])
         self.assertIn("--explain", self.pages["palpate-render"].split(".SH DESCRIPTION")[0])
 
@@ -128,7 +128,7 @@ class ManPages(unittest.TestCase):
             self.assertIn(f".BR palpate-{command} (1)", self.pages["palpate"])
             self.assertIn(f"\n{command}\n", self.pages["palpate"])
 
-    def test_the_reader_has_nothing_to_complain_of(self):
+    def test_man_reads_the_pages_without_warnings(self):
         for name in self.pages:
             path = pathlib.Path(self.scratch.name) / f"{name}.1.gz"
             done = subprocess.run(["man", "--warnings", "-E", "UTF-8", "-l", "-Tutf8", "-Z", path], capture_output=True,
@@ -137,7 +137,7 @@ class ManPages(unittest.TestCase):
 
 
 class Rights(unittest.TestCase):
-    def test_the_rules_are_for_the_devices_and_not_for_everybody(self):
+    def test_the_rules_name_the_devices_and_give_no_general_access(self):
         rules = (INSTALL / "60-palpate.rules").read_text()
         parameters = (SOURCES / "runner/devices/falcon/parameters.h").read_text()
         vendor, product = re.search(r"kVendor = 0x(\w+), kProduct = 0x(\w+);", parameters).groups()

@@ -24,7 +24,7 @@ class Adjusting : public ::testing::Test {
                exact()};
 };
 
-TEST_F(Adjusting, FeelsBothThenTurnsAsOftenAsItTakes) {
+TEST_F(Adjusting, FeelsBothThenTurnsAsOftenAsNeeded) {
   EXPECT_EQ(next(at(150)), "switch");
   EXPECT_EQ(judge_.judgement().turns(), 1);
   EXPECT_EQ(next(kStandard), "switch");  // it turns where it feels what it turns
@@ -54,7 +54,7 @@ TEST_F(Adjusting, EndsWhereItTurnsNoFarther) {
   EXPECT_EQ(judge_.named(judge_.judgement().answer()), "done");
 }
 
-TEST_F(Adjusting, GoesBackToWhatItDidNotTouch) {
+TEST_F(Adjusting, ReturnsToAnUntouchedInterval) {
   EXPECT_EQ(next(at(150)), "switch");
   EXPECT_EQ(next(kStandard, false), "switch");
   EXPECT_EQ(next(at(150)), "switch");  // the standard is still unknown
@@ -82,7 +82,7 @@ TEST_F(Adjusting, BeginsEachTrialAnew) {
   EXPECT_EQ(next(at(150)), "switch");
 }
 
-TEST(AdjustingJudgement, AdjustsUntilTheyAreTheSameByOneStandardDeviation) {
+TEST(AdjustingJudgement, AdjustsUntilTheyDifferByLessThanAStandardDeviation) {
   JudgementSettings settings = exact();
   settings.weber = 0.15;
   Judge judge(R"("task": "adjust", "stimuli": ["ball"], "standard": "ball",

@@ -78,7 +78,7 @@ TEST_P(DeepestPoint, DistancesAreExactToAMicrometre) {
   }
 }
 
-TEST_P(DeepestPoint, TipIsDistanceAndNormalOfTheTip) {
+TEST_P(DeepestPoint, WithoutLengthItIsDistanceAndNormalOfTheTip) {
   const ShapeHypotheses hypotheses({object_});
   Random random(12);
   int far_normals = 0;

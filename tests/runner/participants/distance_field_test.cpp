@@ -26,7 +26,7 @@ Vec3 point_around(Random& random, const Vec3& middle, double reach) {
   return point;
 }
 
-TEST(DistanceField, OfAnEllIsExactToASpacing) {
+TEST(DistanceField, OfAnLShapeIsExactToASpacing) {
   const DistanceField field(test::placed(stimuli::solids::prism(kEll, 0.03).soup));
   Random random(1);
   double squares = 0, count = 0;
@@ -64,7 +64,7 @@ TEST(DistanceField, ASeamIsNotASurface) {
 }
 
 // Where the surface has no stiffness, the first layer that has some is what is felt.
-TEST(DistanceField, IsThatOfTheLayerThatIsFeltFirst) {
+TEST(DistanceField, IsThatOfTheFirstLayerWithStiffness) {
   stimuli::ObjectSpec cube;
   cube.shape = stimuli::ShapeKind::cube;
   cube.material.layers = {{0.004, 0, 0, {}}, {0.008, 500, 0, {}}, {0.016, 900, 0, {}}};
@@ -98,7 +98,7 @@ TEST(DistanceField, ItsGradientIsTheNormal) {
   }
 }
 
-TEST(DistanceField, FarAwayItGrowsByAMetreAMetre) {
+TEST(DistanceField, FarAwayItGrowsWithSlopeOne) {
   const DistanceField field(test::placed(stimuli::cube(0.06)));
   for (const double far : {0.2, 1.0, 50.0}) {
     EXPECT_NEAR(test::distance_at(field, Vec3(far, 0, 0)), far - 0.03, 0.03 * far);
@@ -153,7 +153,7 @@ struct Touch {
 };
 
 // The search takes a step of all hypotheses at a time; each alone would find the same bits.
-TEST(SolidLine, HypothesesSearchAsIfEachWereAlone) {
+TEST(SolidLine, HypothesesAreSearchedIndependently) {
   const ShapeHypotheses hypotheses({ell_of_boxes()});
   const ShapeHypotheses::Shape& shape = hypotheses.shapes()[0];
   Random random(5);

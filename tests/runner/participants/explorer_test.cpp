@@ -78,13 +78,13 @@ SimulatedSettings quick_hand(int version) {
   return settings;
 }
 
-TEST(Explorer, OfVersion1PressesOnAfterALossOfContact) {
+TEST(Explorer, InVersion1PressesOnAfterALossOfContact) {
   const AfterLossOfContact at(quick_hand(1));
   const Vec3 expected = glm::normalize(Vec3(0, 0, -1) + 0.15 * glm::normalize(-at.before));
   EXPECT_LT(glm::length(at.target.velocity / 0.06 - expected), 1e-9);
 }
 
-TEST(Explorer, OfVersion2TurnsToTheCentreAfterALossOfContact) {
+TEST(Explorer, InVersion2TurnsToTheCentreAfterALossOfContact) {
   const SimulatedSettings settings = quick_hand(2);
   const AfterLossOfContact at(settings);
   const Vec3 way = at.target.velocity / settings.motor.slide_speed;
@@ -122,7 +122,7 @@ TEST(Explorer, TurnsToTheChosenHeadingInItsTime) {
   }
 }
 
-TEST(Explorer, WantsNoHeadingWhereItWanders) {
+TEST(Explorer, WantsNoHeadingWhileItWanders) {
   Explorer hand(quick_hand(2), kFromTip, kStiffness, kPeriod);
   HandTarget target = hand.begin(Random(7));
   for (int tick = 0; tick < 1000; ++tick) {

@@ -117,7 +117,7 @@ Choice choose_on(std::size_t shape, bool ray, int touches, std::uint64_t seed,
   return made;
 }
 
-TEST(HeadingChoice, TakesTheHeadingThatTellsMost) {
+TEST(HeadingChoice, TakesTheMostInformativeHeading) {
   const ShapeHypotheses hypotheses(four_shapes());
   int turned = 0;
   double gained = 0;
@@ -155,7 +155,7 @@ TEST(HeadingChoice, TakesAnyNumbersOfHeadingsPlacesAndHypotheses) {
   }
 }
 
-TEST(HeadingChoice, GoesStraightOnWhereOneShapeIsBelieved) {
+TEST(HeadingChoice, GoesStraightOnIfOneShapeIsCertain) {
   const ShapeHypotheses hypotheses(four_shapes());
   const Choice made = choose_on(0, false, 300, 3, hypotheses, {});
   EXPECT_EQ(made.chosen, made.stylus.heading);

@@ -128,7 +128,7 @@ TEST_F(KeyboardTasks, NumbersAreTypedWithPointCommaMinusAndBackspace) {
   EXPECT_EQ(answer()->number, 43);
 }
 
-TEST_F(KeyboardTasks, WhatIsNoNumberInRangeIsRefusedAndKept) {
+TEST_F(KeyboardTasks, InvalidNumbersAreRefusedAndStayInTheField) {
   for (const char* typed : {"\n", "51\n", "-1\n", "1.2.3\n", "--1\n", "1-\n", ".\n"}) {
     screen_.replies.clear();
     person();
@@ -149,7 +149,7 @@ TEST_F(KeyboardTasks, WhatIsNoNumberInRangeIsRefusedAndKept) {
   EXPECT_EQ(screen_.pages.back().typed.size(), 200U);
 }
 
-TEST_F(KeyboardTasks, TurnsAreCountedAlsoWhileTheNextIntervalIsMade) {
+TEST_F(KeyboardTasks, TurnsAreCountedWhileTheNextIntervalIsPrepared) {
   person();
   begin(2, {1, 2, true, true, nullptr});
   screen_.script = {{}, {}, {"2", "2", "2"}};
@@ -184,7 +184,7 @@ TEST_F(KeyboardTasks, AKeyBeforeTheForcesIsNoAnswer) {
   EXPECT_TRUE(screen_.replies.contains("OTHER KEY"));
 }
 
-TEST_F(KeyboardTasks, SpokenAnswersAreTypedByTheExperimenterAlone) {
+TEST_F(KeyboardTasks, OnlyTheExperimenterTypesSpokenAnswers) {
   person(AnswerBy::experimenter);
   begin(0, {});
   screen_.script = {{}, {"1"}, {"2"}};  // the participant's own keys
@@ -218,7 +218,7 @@ TEST_F(KeyboardTasks, SpokenAnswersAreTypedByTheExperimenterAlone) {
   EXPECT_TRUE(answer()->goes_on);
 }
 
-TEST_F(KeyboardTasks, TextsAreTypedInAnyLettersAndRequiredWhereTheyAre) {
+TEST_F(KeyboardTasks, TextsMayHaveAnyLettersAndMayBeRequired) {
   person();
   protocols::PageItem item;
   item.question = "?";
@@ -276,7 +276,7 @@ TEST_F(KeyboardTasks, LongScalesHaveAKeyForEachStep) {
   EXPECT_EQ(keys.size(), 20U);
 }
 
-TEST_F(KeyboardTasks, CuesAreHeardWhenTheyAreSeen) {
+TEST_F(KeyboardTasks, CuesSoundWhenTheyAreShown) {
   person();
   begin(0, {});
   Sample ready = felt();

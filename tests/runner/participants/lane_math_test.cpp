@@ -43,7 +43,7 @@ TEST(LaneMath, LogNormalCdfIsWithinItsBound) {
   }
 }
 
-TEST(LaneMath, LogNormalCdfIsZeroWhereItSaysSo) {
+TEST(LaneMath, LogNormalCdfIsZeroFromTheStatedBound) {
   EXPECT_NE(lane::log_normal_cdf(5.0f), 0.0f);
   for (float x = lane::kLogNormalCdfIsZero; x < 1e6f; x *= 1.000001f)
     ASSERT_EQ(lane::log_normal_cdf(x), 0.0f) << x;

@@ -80,7 +80,7 @@ TEST(LevelPercept, StiffnessIsTheMeanOfForceOverDepth) {
   EXPECT_DOUBLE_EQ(percept.stiffness().value_or(0), 200);
 }
 
-TEST(LevelPercept, ARadiusIsThatOfTheBallThroughThePlacesFelt) {
+TEST(LevelPercept, ARadiusIsThatOfTheBallThroughTheFeltPlaces) {
   const auto protocol =
       study({R"("shape": "sphere", "radius_m": 0.03, "position_m": [0.01, 0, 0])"}, "/radius_m",
             "0.02, 0.04");
@@ -105,7 +105,7 @@ TEST(LevelPercept, ARadiusIsThatOfTheBallThroughThePlacesFelt) {
   EXPECT_FALSE(percept.length());
 }
 
-TEST(LevelPercept, ARayIsFeltWhereTorqueSaysNotAtItsTip) {
+TEST(LevelPercept, ARaysContactIsPlacedByTorque) {
   const auto protocol =
       study({R"("shape": "sphere", "radius_m": 0.03)"}, "/radius_m", "0.02, 0.04");
   LevelPercept percept(protocol);
@@ -118,7 +118,7 @@ TEST(LevelPercept, ARayIsFeltWhereTorqueSaysNotAtItsTip) {
   EXPECT_NEAR(percept.length().value_or(0), 0.032, 1e-9);
 }
 
-TEST(LevelPercept, TheStimulusOfItsOwnLevelIsKnownToo) {
+TEST(LevelPercept, TheStimulusAtTheLevelItselfIsKnownToo) {
   const auto protocol =
       study({R"("shape": "sphere", "radius_m": 0.03)"}, "/radius_m", "0.02, 0.04");
   LevelPercept percept(protocol);
@@ -130,7 +130,7 @@ TEST(LevelPercept, TheStimulusOfItsOwnLevelIsKnownToo) {
   EXPECT_FALSE(percept.length());
 }
 
-TEST(LevelPercept, AnEdgeOfABoxIsTwiceAsFarAsItsFaces) {
+TEST(LevelPercept, AnEdgeLengthMovesEachFaceByHalf) {
   const auto protocol =
       study({R"("shape": "box", "size_m": [0.04, 0.05, 0.06])"}, "/size_m/0", "0.03, 0.05");
   LevelPercept percept(protocol);
@@ -146,7 +146,7 @@ TEST(LevelPercept, AnEdgeOfABoxIsTwiceAsFarAsItsFaces) {
   EXPECT_NEAR(percept.length().value_or(0), 0.04 + 0.005 / (0.5 * 3 / 5), 5e-5);
 }
 
-TEST(LevelPercept, ATurnedObjectIsFeltWhereItStands) {
+TEST(LevelPercept, ARotatedObjectIsFeltInItsPose) {
   const auto protocol = study({R"("shape": "box", "size_m": [0.04, 0.05, 0.06],
       "orientation_wxyz": [0.8, 0, 0, 0.6])"},
                               "/size_m/0", "0.03, 0.05");
@@ -157,7 +157,7 @@ TEST(LevelPercept, ATurnedObjectIsFeltWhereItStands) {
   EXPECT_NEAR(percept.length().value_or(0), 0.042, 1e-9);
 }
 
-TEST(LevelPercept, OfACompoundThePartThatIsNearCounts) {
+TEST(LevelPercept, TheNearestPartOfACompoundCounts) {
   const auto protocol = study({R"("shape": "compound", "parts": [
       {"shape": "sphere", "radius_m": 0.02, "position_m": [-0.03, 0, 0]},
       {"shape": "sphere", "radius_m": 0.015, "position_m": [0.03, 0, 0]}])"},
@@ -171,7 +171,7 @@ TEST(LevelPercept, OfACompoundThePartThatIsNearCounts) {
   EXPECT_NEAR(percept.length().value_or(0), 0.016, 1e-9);
 }
 
-TEST(LevelPercept, AtTheEndOfWhatIsPossibleTheOtherSideTells) {
+TEST(LevelPercept, AtTheLimitOfALevelTheOtherSideIsUsed) {
   const auto protocol = study({R"("shape": "sphere", "radius_m": 900)"}, "/radius_m", "800, 1000");
   LevelPercept percept(protocol);
   percept.begin(trial_of(), at(1000));  // m, the largest that a protocol can name
@@ -179,7 +179,7 @@ TEST(LevelPercept, AtTheEndOfWhatIsPossibleTheOtherSideTells) {
   EXPECT_NEAR(percept.length().value_or(0), 990, 1e-6);
 }
 
-TEST(LevelPercept, WhatTheSurfaceDoesNotShowHasNoEstimate) {
+TEST(LevelPercept, LevelsThatDoNotChangeTheSurfaceHaveNoEstimate) {
   const auto protocol = study(
       {R"("shape": "sphere", "radius_m": 0.03, "friction_static": 0.5, "friction_dynamic": 0.4)"},
       "/friction_static", "0.4, 0.6");
@@ -198,7 +198,7 @@ stimuli::ObjectSpec some_object() {
   return object;
 }
 
-TEST(LevelPercept, OneFormIsTheSameShapeSizesAndPlace) {
+TEST(LevelPercept, EqualFormsHaveTheSameShapeSizesAndPlace) {
   const stimuli::ObjectSpec object = some_object();
   EXPECT_TRUE(have_one_form(object, some_object()));
   const auto differs = [&](auto&& change) {
@@ -225,7 +225,7 @@ TEST(LevelPercept, OneFormIsTheSameShapeSizesAndPlace) {
   EXPECT_FALSE(differs([](Spec& o) { o.parts[0].material.stiffness *= 2; }));
 }
 
-TEST(LevelPercept, StiffnessAloneIsToldApartWhereAllFormsAreOneAndNoStiffnessIsTwice) {
+TEST(LevelPercept, StimuliDifferInStiffnessOnlyIfFormsAreEqualAndStiffnessesDistinct) {
   const std::string ball = R"("shape": "sphere", "radius_m": 0.03, "stiffness_n_per_m": )";
   const auto alone = [&](const std::vector<std::string>& stimuli) {
     protocols::Protocol protocol = study(stimuli, "/stiffness_n_per_m", "200, 300");
@@ -241,7 +241,7 @@ TEST(LevelPercept, StiffnessAloneIsToldApartWhereAllFormsAreOneAndNoStiffnessIsT
   EXPECT_FALSE(alone({ball + "100", ball + "200", R"("shape": "cube", "edge_m": 0.06)"}));
 }
 
-TEST(LevelPercept, WhatIsIdentifiedByStiffnessIsMeasured) {
+TEST(LevelPercept, IdentificationByStiffnessMeasuresIt) {
   const auto begun = [](const std::string& second) {
     const protocols::Protocol protocol = protocols::parse_protocol_text(
         R"({"version": 2, "name": "l", "renderers": ["ray"], "stimuli": [

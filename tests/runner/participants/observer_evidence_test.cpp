@@ -62,7 +62,7 @@ TEST(ObserverEvidence, OfAContactGrowsWithMovementAndTurn) {
   }
 }
 
-TEST(ObserverEvidence, IsNotNewWithoutMovement) {
+TEST(ObserverEvidence, DoesNotGrowWithoutMovement) {
   const ShapeHypotheses hypotheses(four_shapes());
   ShapeObserver observer(hypotheses, by_movement()), once(hypotheses, by_movement());
   Random random(8);
@@ -74,7 +74,7 @@ TEST(ObserverEvidence, IsNotNewWithoutMovement) {
   expect_same(observer, once);
 }
 
-TEST(ObserverEvidence, OfFreeSpaceIsFullWhereMovementCounts) {
+TEST(ObserverEvidence, OfFreeSpaceHasFullWeightWithEvidenceByMovement) {
   const ShapeHypotheses hypotheses(four_shapes());
   ShapeObserver observer(hypotheses, by_movement());
   observer.update(free_space());

@@ -79,18 +79,18 @@ TEST_F(Box, CharactersStandForThemselvesWithoutAMapping) {
   EXPECT_EQ(keys_after("12 a\r\n", {}, 4), "1 2 space a ");
 }
 
-TEST_F(Box, BytesAreTheKeysOfTheMappingAndNoOthersCount) {
+TEST_F(Box, OnlyMappedBytesAreKeys) {
   EXPECT_EQ(
       keys_after(std::string("1A\x05\0", 4), {{"A", "1"}, {"0x05", "space"}, {"0x00", "2"}}, 3),
       "1 space 2 ");
 }
 
-TEST_F(Box, EscapeIsTheEmergencyAtOnce) {
+TEST_F(Box, EscapeIsAnImmediateEmergency) {
   EXPECT_EQ(keys_after("E", {{"E", "escape"}}, 1), "escape ");
   EXPECT_EQ(emergencies_, 1);
 }
 
-TEST_F(Box, OneThatIsGoneIsToldAndTheKeyboardStays) {
+TEST_F(Box, AnUnpluggedBoxIsReportedAndTheKeyboardStays) {
   ResponseBox box(terminal_.path, {}, clock_, [] {});
   class Keyboard final : public ParticipantScreen {
    public:
@@ -107,7 +107,7 @@ TEST_F(Box, OneThatIsGoneIsToldAndTheKeyboardStays) {
 }
 
 // As of a box at another speed, whose bytes come as others.
-TEST_F(Box, AByteThatStandsForNoKeyIsTold) {
+TEST_F(Box, AnUnknownByteIsReported) {
   ResponseBox box(terminal_.path, {{"A", "1"}}, clock_, [] {});
   class Keyboard final : public ParticipantScreen {
    public:

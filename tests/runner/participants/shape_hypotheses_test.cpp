@@ -106,7 +106,7 @@ TEST(ShapeHypotheses, NoOrientationIsFarFromTheGrid) {
   }
 }
 
-TEST(ShapeHypotheses, NoTwoAreEqual) {
+TEST(ShapeHypotheses, HypothesesAreDistinct) {
   for (const stimuli::ShapeKind kind :
        {stimuli::ShapeKind::cone, stimuli::ShapeKind::cylinder, stimuli::ShapeKind::cube}) {
     const ShapeHypotheses hypotheses({spec(kind)});
@@ -144,7 +144,7 @@ TEST(ShapeHypotheses, NamesEveryStimulusThatCannotBeSimulated) {
 
 // What has a formula is known by it; anything placed off the centre, or felt below its surface, is
 // not what the formula says.
-TEST(ShapeHypotheses, OnlyCentredPlainShapesAreKnownByFormula) {
+TEST(ShapeHypotheses, OnlyCentredPlainShapesHaveFormulas) {
   stimuli::ObjectSpec moved = spec(stimuli::ShapeKind::cube);
   moved.pose.position = Vec3(0.01, 0, 0);
   const ShapeHypotheses hypotheses(

@@ -149,7 +149,7 @@ TEST(ShapeObserver, ResetRestoresThePrior) {
 
 // Far from a shape its orientation cannot matter, and is not looked at: from how far on is no
 // guess.
-TEST(ShapeObserver, FeelingNothingAgreesWithTheFormulasFromNearToFar) {
+TEST(ShapeObserver, FreeSpaceAgreesWithTheFormulasFromNearToFar) {
   std::vector<stimuli::ObjectSpec> slender = four_shapes();
   slender[1].radius = slender[2].radius = 0.01;
   slender[1].height = 0.12;
@@ -224,12 +224,12 @@ double accuracy(bool ray, double place_noise, double direction_noise) {
   return right / 80.0;
 }
 
-TEST(ShapeObserver, NamesWhatItTouchesWithoutNoise) {
+TEST(ShapeObserver, IdentifiesShapesWithoutNoise) {
   EXPECT_GE(accuracy(false, 0, 0), 0.98);
   EXPECT_GE(accuracy(true, 0, 0), 0.98);
 }
 
-TEST(ShapeObserver, NamesWhatItTouchesWithNoise) {
+TEST(ShapeObserver, IdentifiesShapesWithNoise) {
   EXPECT_GE(accuracy(false, 0.002, 0.15), 0.95);
   EXPECT_GE(accuracy(true, 0.002, 0.15), 0.95);
 }
@@ -249,7 +249,7 @@ TEST(ShapeObserver, DecidesAboveTheThreshold) {
   EXPECT_TRUE(decided);
 }
 
-TEST(ShapeObserver, FreeSpaceIsEvidenceAgainstAShapeThatWouldBeHit) {
+TEST(ShapeObserver, FreeSpaceIsEvidenceAgainstShapesThere) {
   const ShapeHypotheses hypotheses(four_shapes());
   ShapeObserver observer(hypotheses);
   Random random(9);

@@ -33,7 +33,7 @@ void expect_share(double found, double expected, const std::string& where) {
   EXPECT_NEAR(found, expected, 4 * error) << where;
 }
 
-TEST(TaskJudgement, ComparesAsTheNormalDistributionSays) {
+TEST(TaskJudgement, ComparesAccordingToTheNormalDistribution) {
   Judge larger(compare()), smaller(compare(R"(, "asks": "smaller")"));
   for (const double level : {320.0, 380.0, 400.0, 440.0}) {
     const double chosen = 0.02 / 2 + 0.98 * normal_cdf((level - 400) / (0.15 * 400));
@@ -50,7 +50,7 @@ TEST(TaskJudgement, OfThreeIntervalsTheLargestEstimateIsChosen) {
   EXPECT_GT(share(judge, "2", {kStandard, at(700), kStandard}), 0.96);
 }
 
-TEST(TaskJudgement, DifferentIsWhatDiffersByMoreThanOneStandardDeviation) {
+TEST(TaskJudgement, DifferentMeansMoreThanAStandardDeviation) {
   Judge judge(compare(R"(, "answer": "same_different")"));
   const double sd = 0.15 * 400;
   for (const double level : {400.0, 450.0, 520.0}) {
@@ -71,7 +71,7 @@ TEST(TaskJudgement, DifferentIsWhatDiffersByMoreThanOneStandardDeviation) {
   }
 }
 
-TEST(TaskJudgement, WhatWasNotTouchedIsAnyLevelOfTheBlock) {
+TEST(TaskJudgement, AnUntouchedIntervalIsJudgedAsARandomLevel) {
   // Two levels at random in 300 to 500, each with noise: as often one as the other, whatever they
   // are.
   Judge judge(compare());
@@ -135,7 +135,7 @@ TEST(TaskJudgement, NumbersScatterLogNormally) {
   EXPECT_NEAR(sd, 0.2, 4 * 0.2 / std::sqrt(2.0 * kDraws));
 }
 
-TEST(TaskJudgement, AStepOfAScaleIsTheNearestAmongAllLevels) {
+TEST(TaskJudgement, AStepOfAScaleIsTheNearestToTheLevelsPlace) {
   Judge judge(R"("task": "rate", "scale": [{"label": "a"}, {"label": "b"}, {"label": "c"},
                  {"label": "d"}, {"label": "e"}], )" +
                   constant("100, 500"),
@@ -170,7 +170,7 @@ TEST(TaskJudgement, LapsesGiveAnyAnswer) {
   expect_share(share(judge, "mid", {Interval{2, {}, {}, false}}, {}, trial_of(2)), 0.8, "right");
 }
 
-TEST(TaskJudgement, IsTheSurerTheClearerWhatWasFelt) {
+TEST(TaskJudgement, ConfidenceGrowsWithTheDifference) {
   JudgementSettings settings;
   settings.lapse = 0;
   Judge judge(compare(), settings);
@@ -189,7 +189,7 @@ TEST(TaskJudgement, IsTheSurerTheClearerWhatWasFelt) {
   EXPECT_EQ(confidence(1000), 3);
 }
 
-TEST(TaskJudgement, IsAsSureAsItsAnswerIsLikely) {
+TEST(TaskJudgement, ConfidenceFollowsTheProbabilityOfTheAnswer) {
   Judge detecting(R"("task": "detect", "catch_trials": 0.2, )" + constant("200, 1200"));
   const auto sure = [&](double level) {
     Trial shown = trial_of();
@@ -219,7 +219,7 @@ TEST(TaskJudgement, IsAsSureAsItsAnswerIsLikely) {
   EXPECT_EQ(half.judgement().confidence(10), 0);
 }
 
-TEST(TaskJudgement, WhatHasItsNoiseAlreadyGetsNoMore) {
+TEST(TaskJudgement, NoisyMeasurementsGetNoFurtherNoise) {
   JudgementSettings settings;
   settings.lapse = 0;
   Judge judge(compare(), settings);
@@ -231,7 +231,7 @@ TEST(TaskJudgement, WhatHasItsNoiseAlreadyGetsNoMore) {
   }
 }
 
-TEST(TaskJudgement, AnyLevelIsAsLikelyAsAnother) {
+TEST(TaskJudgement, RandomLevelsAreUniform) {
   Judge judge(R"("task": "rate", "scale": [{"label": "a"}, {"label": "b"}, {"label": "c"}], )" +
                   constant("100, 500"),
               exact());
@@ -240,7 +240,7 @@ TEST(TaskJudgement, AnyLevelIsAsLikelyAsAnother) {
   expect_share(share(judge, "2", {at(500)}, untouched), 0.5, "middle");
 }
 
-TEST(TaskJudgement, TurnsAreFeltWithTheSameNoiseEverywhere) {
+TEST(TaskJudgement, OrientationsHaveTheSameNoiseEverywhere) {
   JudgementSettings settings;
   settings.lapse = 0;
   Judge judge(R"("task": "compare", "standard": "ball", "stimuli": ["ball"],
@@ -252,7 +252,7 @@ TEST(TaskJudgement, TurnsAreFeltWithTheSameNoiseEverywhere) {
                  std::to_string(level));
 }
 
-TEST(TaskJudgement, WhereTheStandardIsZeroTheLargestLevelSetsTheNoise) {
+TEST(TaskJudgement, WithAZeroStandardTheLargestLevelSetsTheNoise) {
   JudgementSettings settings;
   settings.lapse = 0;
   const protocols::Protocol protocol = protocols::parse_protocol_text(

@@ -20,7 +20,7 @@ def on_path():
 
 @pytest.mark.parametrize("name,words", [("recover_parameters", ("slide speed", "correlation")),
                                         ("choose_sizes", ("standard", "best"))])
-def test_an_example_runs_and_is_the_same_again(name, words, tmp_path):
+def test_an_example_runs_and_repeats_its_results(name, words, tmp_path):
     command = [sys.executable, str(EXAMPLES / f"{name}.py"), "--quick"]
     said = [subprocess.run(command, cwd=tmp_path, check=True, capture_output=True, text=True, timeout=1500).stdout
             for _ in range(2)]
@@ -53,7 +53,7 @@ def test_the_posterior_is_calibrated_and_follows_the_truth():
         assert module.uniformity(np.clip(wrong[:, 0], 0, 1))[1] < 0.001
 
 
-def test_the_prior_is_what_it_says_and_is_never_left():
+def test_the_prior_has_its_distribution_and_bounds():
     module = importlib.import_module("recover_parameters")
     np.testing.assert_allclose(module.values_of(np.zeros(5)), module.LOW)
     np.testing.assert_allclose(module.values_of(np.ones(5)), module.HIGH)

@@ -60,7 +60,7 @@ def study_csv(program, folder, *options):
 
 
 @pytest.mark.parametrize("version,seed", [(1, 1), (2, 5), (3, 18446744073709551615)])
-def test_a_study_is_the_programs_to_the_bit(program, tmp_path, version, seed):
+def test_a_study_equals_the_programs_bit_by_bit(program, tmp_path, version, seed):
     (tmp_path / "p.json").write_text(json.dumps(QUICK))
     text = study_csv(program, tmp_path, "p.json", "--participants", 2, "--seed", seed, "--participant-version", version)
     columns = palpate.simulate(tmp_path / "p.json", palpate.settings(version), participants=2, seed=seed)
@@ -72,7 +72,7 @@ def test_a_study_is_the_programs_to_the_bit(program, tmp_path, version, seed):
     assert from_dict["response_time"].tobytes() == columns["response_time"].tobytes()
 
 
-def test_changed_settings_are_the_programs_patch(program, tmp_path):
+def test_changed_settings_equal_the_programs_patch(program, tmp_path):
     (tmp_path / "p.json").write_text(json.dumps(with_(QUICK, sessions={"count": 1})))
     (tmp_path / "patch.json").write_text(json.dumps({"motor": {"slide_speed_m_per_s": 0.031}, "observer": {"threshold": 0.7}}))
     text = study_csv(program, tmp_path, "p.json", "--participants", 1, "--settings", "patch.json")
@@ -84,7 +84,7 @@ def test_changed_settings_are_the_programs_patch(program, tmp_path):
     assert columns["observer_sha256"][0] != palpate.simulate(tmp_path / "p.json", participants=1)["observer_sha256"][0]
 
 
-def test_no_answer_is_nan_and_no_text(program, tmp_path):
+def test_no_answer_is_nan_not_a_text(program, tmp_path):
     (tmp_path / "p.json").write_text(json.dumps(with_(QUICK, response={"keys": QUICK["response"]["keys"], "time_out_s": 0.5})))
     text = study_csv(program, tmp_path, "p.json", "--participants", 1)
     columns = palpate.simulate(tmp_path / "p.json", participants=1)
@@ -93,7 +93,7 @@ def test_no_answer_is_nan_and_no_text(program, tmp_path):
     assert np.isnan(columns["first_contact_time"]).any()
 
 
-def test_a_schedule_is_the_programs(program, protocols):
+def test_a_schedule_equals_the_programs(program, protocols):
     for number in (1, 2, 11):
         text = program(protocols, "schedule", "quick.json", "--participant", number, "--format", "csv")
         assert_same(palpate.schedule(protocols / "quick.json", number), text)
@@ -116,7 +116,7 @@ def write_csv(file, columns):
 @pytest.mark.parametrize("extra,side", [({}, False), ({"reach": {"factor": 1.2, "pivot": "grip"}}, False),
                                         ({"tool": {"segments": [{"from_m": [0, 0, 0], "to_m": [0, 0, 0.1]},
                                                                 {"from_m": [0, 0, 0], "to_m": [0.01, 0, 0.02]}]}}, True)])
-def test_forces_are_the_programs_to_the_bit(program, tmp_path, renderer, extra, side):
+def test_forces_equal_the_programs_bit_by_bit(program, tmp_path, renderer, extra, side):
     scene, columns = with_(CUBE, **extra), path_of_stylus(side)
     (tmp_path / "s.json").write_text(json.dumps(scene))
     write_csv(tmp_path / "t.csv", columns)
@@ -193,7 +193,7 @@ def test_wrong_paths_are_named():
         palpate.render(CUBE, {name: t[name][:0] for name in t}, "ray")
 
 
-def test_threads_simulate_beside_each_other_with_the_same_result():
+def test_parallel_threads_give_the_same_results():
     started, together = threading.Barrier(2, timeout=60), []
 
     def study(seed):
@@ -244,7 +244,7 @@ def test_no_file_is_written(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_stubs_and_docstrings_fit_the_module():
+def test_stubs_and_docstrings_match_the_module():
     stub = ast.parse((pathlib.Path(palpate.__file__).parent / "_palpate.pyi").read_text())
     stated = {node.name for node in stub.body if isinstance(node, (ast.FunctionDef, ast.ClassDef))}
     stated |= {node.target.id for node in stub.body if isinstance(node, ast.AnnAssign)}
@@ -282,7 +282,7 @@ def test_both_clients_are_annotated_and_alike():
     assert list(inspect.signature(palpate.AsyncClient.connect).parameters.values()) == list(made.values())
 
 
-def test_without_its_compiled_part_it_says_how_to_build_it(tmp_path):
+def test_without_its_compiled_part_the_message_explains_the_build(tmp_path):
     package = tmp_path / "palpate"
     package.mkdir()
     for name in ("__init__.py", "client.py", "_palpate.pyi", "py.typed"):

@@ -23,7 +23,7 @@ std::set<std::uint32_t> declared_in(const std::string& header) {
   return bits;
 }
 
-TEST(FaultTable, HasOneRowForEveryBitThatIsDeclared) {
+TEST(FaultTable, HasOneRowForEveryDeclaredBit) {
   std::set<std::uint32_t> declared = declared_in("rendering/render_fault.h");
   declared.merge(declared_in("runner/servo/sample.h"));
   EXPECT_GE(declared.size(), 12u);
@@ -40,7 +40,7 @@ TEST(FaultTable, HasOneRowForEveryBitThatIsDeclared) {
   EXPECT_EQ(told, declared);
 }
 
-TEST(FaultTable, TheConsoleNamesEveryBitThatIsDeclared) {
+TEST(FaultTable, TheConsoleNamesEveryDeclaredBit) {
   EXPECT_EQ(fault_words(0), "");
   std::set<std::uint32_t> declared = declared_in("rendering/render_fault.h");
   declared.merge(declared_in("runner/servo/sample.h"));
@@ -56,7 +56,7 @@ TEST(FaultTable, TheConsoleNamesEveryBitThatIsDeclared) {
   EXPECT_EQ(fault_words(servo_fault::kTripped | 1U << 31U), "forces off, unknown (2147483648)");
 }
 
-TEST(FaultTable, WhatCutsTheForcesOffSaysWhyInAMessage) {
+TEST(FaultTable, FaultsThatSwitchForcesOffHaveAMessage) {
   // Zero force until cleared is what the codebook says of the faults that cut the forces off.
   for (const rendering::FaultBit& fault : kFaultTable) {
     const bool cuts = std::string(fault.meaning).find("until cleared") != std::string::npos;

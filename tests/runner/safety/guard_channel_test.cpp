@@ -29,7 +29,7 @@ DeviceCapabilities some_capabilities() {
   return device;
 }
 
-TEST(GuardChannel, CapabilitiesComeThroughWhole) {
+TEST(GuardChannel, CapabilitiesPassThroughUnchanged) {
   const DeviceCapabilities sent = some_capabilities();
   FixedCapabilities fixed;
   fixed.set(sent);
@@ -50,7 +50,7 @@ TEST(GuardChannel, CapabilitiesComeThroughWhole) {
   EXPECT_EQ(got.any_rate, sent.any_rate);
 }
 
-TEST(GuardChannel, LongTextsAreCutAndShorterOnesLeaveNothingBehind) {
+TEST(GuardChannel, LongTextsAreTruncatedAndShorterOnesReplaceThem) {
   DeviceCapabilities device = some_capabilities();
   device.name = std::string(1000, 'n');
   device.calibration = std::string(1000, 'c');
@@ -62,7 +62,7 @@ TEST(GuardChannel, LongTextsAreCutAndShorterOnesLeaveNothingBehind) {
   EXPECT_EQ(fixed.numbers().name, "falcon2");
 }
 
-TEST(GuardChannel, ReadingsComeThroughWhole) {
+TEST(GuardChannel, ReadingsPassThroughUnchanged) {
   DeviceReading sent;
   sent.stylus = {{0.01, 0.02, 0.03}, {0.04, 0.05, 0.06}};
   sent.buttons = 5;

@@ -23,7 +23,7 @@ using testing::Stage;
 using testing::stylus_at;
 using testing::visiting;
 
-TEST(Guard, WhatTheDeviceSaysComesThrough) {
+TEST(Guard, TheDevicesReadingsPassThrough) {
   Stage stage;
   GuardedDevice device(
       [&] {
@@ -52,7 +52,7 @@ TEST(Guard, WhatTheDeviceSaysComesThrough) {
   EXPECT_TRUE(homing_lost);
 }
 
-TEST(Guard, OpeningWaitsForATrueReading) {
+TEST(Guard, OpeningWaitsForAFirstReading) {
   Stage stage;
   GuardedDevice device(
       [&] {
@@ -109,7 +109,7 @@ TEST(Guard, NoForceBeforeAZeroCommandAndNoneAfterAnEmergency) {
   EXPECT_EQ(command(1), 1);
 }
 
-TEST(Guard, WhyADeviceCannotBeOpenedIsSaid) {
+TEST(Guard, TheReasonWhyADeviceCannotBeOpenedIsReported) {
   const auto factory = []() -> std::unique_ptr<Device> {
     throw std::runtime_error("the Falcon is asleep");
   };
@@ -130,7 +130,7 @@ TEST(Guard, WhyADeviceCannotBeOpenedIsSaid) {
   EXPECT_THROW(GuardedDevice(hanging, hasty), std::runtime_error);
 }
 
-TEST(Guard, AGuardThatHasEndedIsALostDevice) {
+TEST(Guard, AGuardThatHasEndedCountsAsALostDevice) {
   Stage stage;
   GuardedDevice device(
       [&] { return std::make_unique<RecordingDevice>(stage.shared->record, visiting); },
@@ -162,7 +162,7 @@ bool is_well(const DeviceReading& reading) {
   return !reading.lost && reading.trouble == DeviceTrouble::none;
 }
 
-TEST(Guard, ALateGuardIsALostDeviceOnlyUntilItIsBack) {
+TEST(Guard, ALateGuardIsALostDeviceOnlyUntilItRecovers) {
   Stage stage;
   GuardedDevice device(
       [&] { return std::make_unique<RecordingDevice>(stage.shared->record, visiting); },
@@ -220,7 +220,7 @@ class Plug final : public Device {
   bool open_ = true;
 };
 
-TEST(Guard, WhatWasUnpluggedIsOpenedAgainWhenAsked) {
+TEST(Guard, AnUnpluggedDeviceIsReopenedOnRequest) {
   Stage stage;
   GuardedDevice device([&] { return std::make_unique<Plug>(stage); }, no_rights());
   const auto reopened = [&device](const DeviceReading&) { return !device.reopening(); };
@@ -247,7 +247,7 @@ TEST(Guard, WhatWasUnpluggedIsOpenedAgainWhenAsked) {
   }
 }
 
-TEST(Guard, OpeningAgainTakesTheForceOffFirst) {
+TEST(Guard, ReopeningSwitchesForcesOffFirst) {
   Stage stage;
   GuardSettings settings = no_rights();
   settings.silence = 60;  // only what is asked for

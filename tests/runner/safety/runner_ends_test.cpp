@@ -181,7 +181,7 @@ INSTANTIATE_TEST_SUITE_P(
     [](const auto& end) { return std::string(end.param.name); });
 
 // Without a guard, nobody but the servo's own thread can send the zero: whoever dies must wait.
-TEST(FaultSignals, ADyingThreadWaitsForTheServosZeroForce) {
+TEST(FaultSignals, AFailingThreadWaitsForTheServosZeroForce) {
   Stage stage;
   const int runner = fork();
   if (runner == 0) {
@@ -198,7 +198,7 @@ TEST(FaultSignals, ADyingThreadWaitsForTheServosZeroForce) {
   EXPECT_EQ(stage.shared->record.last_force(), 0);
 }
 
-TEST(Guard, AStoppedRunnerThatGoesOnFeelsNothingUntilCleared) {
+TEST(Guard, ARunnerThatWasStoppedGivesNoForceUntilCleared) {
   Stage stage;
   const DeviceRecord& record = stage.shared->record;
   const int runner = fork();

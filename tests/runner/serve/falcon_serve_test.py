@@ -151,7 +151,7 @@ class Falcon(ServeCase):
             hand.start(renderer="point")
         return caught.exception.code
 
-    def test_killed_in_contact_the_force_is_zero_within_two_ticks(self):
+    def test_after_a_kill_in_contact_the_force_is_zero_within_two_ticks(self):
         at, gone, record = self.in_contact(lambda program: program.kill(), "controller_gone")
         since = [(t, counts) for t, counts in record if t > gone["t_ns"]]
         with_force = [t for t, counts in since if counts > 0]
@@ -178,7 +178,7 @@ class Falcon(ServeCase):
         for one, next_one in zip(ramp, ramp[1:]):
             self.assertLessEqual(next_one, one + 5)  # the hand sinks in while the force fades
 
-    def test_stopped_in_contact_the_force_fades(self):
+    def test_after_a_stop_in_contact_the_force_fades(self):
         self.assert_faded(*self.in_contact(lambda program: os.kill(program.pid, signal.SIGSTOP), "client_silent"))
 
     def test_silence_holds_forces_off_until_clear(self):
@@ -202,7 +202,7 @@ class Falcon(ServeCase):
             self.assertEqual(self.control.record()[-1][1], 0)
             self.wait_until_free(hand)
 
-    def test_the_server_killed_in_contact_the_guard_ends_the_force(self):
+    def test_the_guard_ends_the_force_after_the_server_is_killed_in_contact(self):
         self.start_program()
         self.put_into_the_ball()
         os.kill(self.server, signal.SIGKILL)
@@ -215,7 +215,7 @@ class Falcon(ServeCase):
         print(f"the server killed: zero {(zero - at) / 1e6:.1f} ms later, {len(with_force)} packets with force", file=sys.stderr)
         self.assertLessEqual(len(with_force), 1)
 
-    def test_without_its_guard_the_server_ends(self):
+    def test_the_server_ends_if_its_guard_has_ended(self):
         self.start_program()
         self.put_into_the_ball()
         guard, = self.children(self.server)

@@ -178,7 +178,7 @@ window.ready = true;
         self.assertEqual([(one["stimulus"], one["response"]) for one in self.browser.run("window.data")], [("ball", "yes")])
         self.assertEqual(process.wait(PATIENCE), 0)
 
-    def test_pages_of_others_do_not_connect(self):
+    def test_foreign_pages_cannot_connect(self):
         mine, other = self.pages({"index.html": PAGE.encode()}), self.pages({"index.html": PAGE.encode()})
         self.serve("--allow-origin", mine)
         for origin, token, said in ((mine, self.said["token"], "connected"), (mine, "0" * 32, "bad-token"),

@@ -66,7 +66,7 @@ class Clients(ServeCase):
         for row, told in zip(rows, table):
             self.assertAlmostEqual(float(row["response_time"]), float(told.get("response_time_s") or told["response_time"]), places=6)
 
-    def test_asyncio_does_what_the_blocking_client_does(self):
+    def test_asyncio_equals_the_blocking_client(self):
         self.serve()
 
         async def session(**where):

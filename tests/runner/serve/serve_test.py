@@ -115,7 +115,7 @@ class Serve(ServeCase):
                 self.assertEqual([float(row["depth"]) for row in rows], list(got["depth"]))
                 self.assertGreater(abs(got["rendered"]).max(), 0.1)
 
-    def test_scenes_are_held_against_the_device_and_every_fault_has_its_place(self):
+    def test_scenes_are_checked_against_the_device_and_every_fault_has_its_place(self):
         self.serve(scene=False)
         with self.client() as hand:
             self.assertIsNone(hand.server["scene"])
@@ -138,7 +138,7 @@ class Serve(ServeCase):
         with self.client(role="watch") as eye:
             self.assertEqual(eye.server["scene"]["objects"][0]["stiffness_n_per_m"], 40)
 
-    def test_the_token_replaces_no_other_file(self):
+    def test_the_token_never_replaces_another_file(self):
         study = self.dir / "study.db"
         study.write_text("precious")
         done = subprocess.run([PALPATE, "serve", "--device", "simulated", "--scene", self.scene, "--token-file", study],
@@ -146,7 +146,7 @@ class Serve(ServeCase):
         self.assertEqual((done.returncode, study.read_text()), (2, "precious"))
         self.assertIn("study.db exists and holds no token; name another file", done.stderr)
 
-    def test_only_who_knows_the_token_comes_in(self):
+    def test_only_clients_with_the_token_are_accepted(self):
         token = self.dir / "token.json"
         token.write_text('{"type":"serving","url":"of a server that was killed"}\n')
         token.chmod(0o644)
@@ -175,7 +175,7 @@ class Serve(ServeCase):
         self.assertEqual(process.wait(PATIENCE), 0)
         self.assertFalse(token.exists() or self.path.exists())
 
-    def test_pages_of_others_do_not_come_in(self):
+    def test_foreign_pages_are_refused(self):
         self.serve("--allow-origin", "http://lab.example")
         host = "Host: " + self.said["url"][5:]
         socket_ = ["Upgrade: websocket", "Connection: Upgrade", "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==",
@@ -192,7 +192,7 @@ class Serve(ServeCase):
         self.assertEqual(self.http(host), 200)  # the page, which knows no token
         self.assertIsNone(self.http(host, "X: " + "x" * 20000))
 
-    def test_who_says_nothing_or_too_much_is_closed(self):
+    def test_silent_and_flooding_connections_are_closed(self):
         self.serve()
         port = int(self.said["url"].rsplit(":", 1)[1])
         silent = self.lines()
@@ -299,7 +299,7 @@ class Serve(ServeCase):
             if max(after - before for before, after in zip(said, said[1:])) < 0.4:  # else this machine stood still
                 self.assertEqual([e for e in eye.events() if e["event"] == "client_silent"], [])
 
-    def test_everybody_may_ask_for_zero_force(self):
+    def test_every_client_may_request_zero_force(self):
         self.serve()
         eye, hand = self.client(role="watch"), self.client()
         hand.subscribe(1000, ("force", "faults"))
@@ -337,7 +337,7 @@ class Serve(ServeCase):
             self.assertLess(abs(clock.offset_ns), clock.round_trip_ns / 2 + 1)  # both are CLOCK_MONOTONIC
             self.assertEqual(hand.ask("clock", t_client=0.25)["t_client"], 0.25)
 
-    def test_the_time_of_an_answer_is_taken_where_the_clock_is_known(self):
+    def test_an_answers_own_time_counts_if_the_clock_is_known(self):
         self.serve()
 
         def answered(hand):
@@ -372,7 +372,7 @@ class Serve(ServeCase):
             self.refused("bad-message", hand.ask, "answer", response="x", t_ns=zero - 3_000_000_000)
             self.refused("bad-message", hand.ask, "answer", response="x", t_ns=zero + 3_000_000_000)
 
-    def test_what_is_set_lies_within_the_scene(self):
+    def test_set_reaches_only_members_of_the_scene(self):
         server = self.serve(scene=False)
         memory = pathlib.Path(f"/proc/{server.pid}/statm")
         placed = {"objects": [{**BALL["objects"][0], "position_m": [0, 0, 0]}]}
@@ -388,7 +388,7 @@ class Serve(ServeCase):
         with self.client(role="watch") as eye:
             self.assertEqual(eye.server["scene"]["objects"][0]["position_m"], [0, 0.001, 0])
 
-    def test_a_watcher_that_does_not_read_loses_its_rows_alone(self):
+    def test_a_watcher_that_does_not_read_loses_only_its_own_rows(self):
         self.serve(rate=1000)
         hand = self.client()
         deaf = self.lines()

@@ -202,7 +202,7 @@ class Served(ServeCase):
         while eye.server["record"]["done"] != 0 or len(self.sql("SELECT 1 FROM attempts WHERE state = 'cut_off'")) < 2:
             time.sleep(0.05)
 
-    def test_twelve_kills_lose_no_trial_that_was_acknowledged(self):
+    def test_twelve_kills_lose_no_acknowledged_trial(self):
         protocol = self.protocol({**EXTERNAL, "trials": 30})
         chance = random.Random(34)
         acknowledged, kills = [], 0

@@ -40,7 +40,7 @@ double swing_after(double stiffness, bool controlled, int ticks) {
   return most;
 }
 
-TEST(Passivity, ASampledSpringGrowsWithoutAndDoesNotWith) {
+TEST(Passivity, ASampledSpringGrowsOnlyWithoutTheController) {
   for (const double stiffness : {300.0, 3000.0, 10000.0}) {
     EXPECT_GT(swing_after(stiffness, false, 1000), 2e-3) << stiffness;
     EXPECT_LT(swing_after(stiffness, true, 1000), 1.01e-3) << stiffness;
@@ -71,7 +71,7 @@ TEST(Passivity, NeverPushesAlongTheMotion) {
   EXPECT_GT(acted, 1000);
 }
 
-TEST(Passivity, LeavesAConstantForceAndASlideAlongAFaceAlone) {
+TEST(Passivity, DoesNotDampAConstantForceOrASlideAlongAFace) {
   PassivityController control({}, kTick);
   const DeviceForces weight{Vec3(0, 0, -1), Vec3(0, 0, 2), false};
   for (int i = 0; i < 1000; ++i) {

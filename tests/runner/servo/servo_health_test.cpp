@@ -20,7 +20,7 @@ Sample tick_at(std::int64_t due_ns, std::int64_t lateness_ns, std::int64_t compu
   return sample;
 }
 
-TEST(ServoHealth, TheRecordTellsCountsTimesAndFaults) {
+TEST(ServoHealth, TheRecordHasCountsTimesAndFaults) {
   ServoHealth health;
   // 98 ticks in time; then one that is late by less than a period and one by two periods and some.
   std::int64_t due_ns = 7'000'000;

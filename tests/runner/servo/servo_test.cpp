@@ -160,7 +160,7 @@ TEST(Servo, AnEmergencyIsZeroWithinTheTickAndUntilCleared) {
   EXPECT_EQ(servo.tick().faults & servo_fault::kTripped, 0u);
 }
 
-TEST(Servo, WhatIsWrongWithTheDeviceIsOnRecord) {
+TEST(Servo, TroubleOfTheDeviceIsRecorded) {
   for (const DeviceTrouble trouble :
        {DeviceTrouble::unplugged, DeviceTrouble::not_homed, DeviceTrouble::guard_lost}) {
     FakeDevice device([trouble](int tick) {
@@ -195,7 +195,7 @@ void PrintTo(const DeviceFault& fault, std::ostream* out) { *out << fault.name; 
 
 class ServoFault : public ::testing::TestWithParam<DeviceFault> {};
 
-TEST_P(ServoFault, EndsInZeroForceForGood) {
+TEST_P(ServoFault, GivesZeroForceFromThenOn) {
   constexpr int kFaultTick = 2000;  // in contact
   FakeDevice device(
       [](int tick) { return tick == kFaultTick ? GetParam().reading : come_down(tick, 0.029); });
@@ -266,7 +266,7 @@ TEST(Servo, MissedTicksAreCountedAndFiveInARowEndTheForce) {
   }
 }
 
-TEST(Servo, ADeviceThatDrivesThreeGetsTheWholeForceAtItsGripWithinItsLimit) {
+TEST(Servo, ADeviceWithThreeDrivenAxesGetsTheTotalForceWithinItsLimit) {
   // The stylus lies on the cube's upper face, its middle above the face's: each end gets a half.
   const auto lie_down = [](double floor) {
     return [floor](int tick) {
@@ -301,7 +301,7 @@ TEST(Servo, ADeviceThatDrivesThreeGetsTheWholeForceAtItsGripWithinItsLimit) {
   }
 }
 
-TEST(Servo, AGripThatDrivesTorqueGetsForceAndTorqueWithinItsLimitsInTheSameRatio) {
+TEST(Servo, AGripWithTorqueGetsForceAndTorqueScaledTogetherWithinItsLimits) {
   for (const double middle : {-0.05, 0.0, 0.05}) {  // of the stylus beside that of the face, m
     const auto lie_down = [middle](int tick) {
       const double z = tick < 600 ? 0.1 : std::max(0.01, 0.1 - 1e-4 * (tick - 600));
@@ -329,7 +329,7 @@ TEST(Servo, AGripThatDrivesTorqueGetsForceAndTorqueWithinItsLimitsInTheSameRatio
   }
 }
 
-TEST(Servo, MissedTicksAreToldAndEndNothingWhereThereAreNoMotors) {
+TEST(Servo, WithoutMotorsMissedTicksAreOnlyReported) {
   for (const int missed : {4, 5, 50, 2000}) {
     FakeDevice device([](int tick) { return come_down(tick, 0.029); });
     device.take_motors_away();
@@ -347,7 +347,7 @@ TEST(Servo, MissedTicksAreToldAndEndNothingWhereThereAreNoMotors) {
   }
 }
 
-TEST(Servo, APoseThatIsNoNumberEndsTheTrialWithoutMotorsToo) {
+TEST(Servo, ANanPoseEndsTheTrialWithoutMotorsToo) {
   FakeDevice device([](int tick) {
     const double nan = std::numeric_limits<double>::quiet_NaN();
     return tick == 2000 ? DeviceReading{{{0, nan, 0.029}, {0, 0, 0.15}}, 0, false}
@@ -377,7 +377,7 @@ TEST(Servo, TheWorkspaceMapMovesAndScales) {
   EXPECT_NEAR(device.force.z, 0.8, 1e-9);
 }
 
-TEST(Servo, AReachStretchesTheStylusAndGivesTheHandTheWorkOfTheContact) {
+TEST(Servo, AReachStretchesTheStylusAndConservesWork) {
   // The real stylus stays 0.4 m above: its tip is 0.48 m nearer to the cube, at twice its height.
   FakeDevice device([](int tick) {
     DeviceReading r = come_down(tick, 0.029);
@@ -398,7 +398,7 @@ TEST(Servo, AReachStretchesTheStylusAndGivesTheHandTheWorkOfTheContact) {
   EXPECT_NEAR(sample.rendering.force.z, 0.8, 1e-9);
 }
 
-TEST(Servo, AToolWaitsForTheHomeZoneWithAllOfItself) {
+TEST(Servo, TheWholeToolMustBeInTheHomeZone) {
   rendering::Tool hook{{{{0, 0, 0}, {0, 0, 0.12}}, {{0, 0, 0}, {0, 0, -0.05}}}};
   const auto first_force = [&](const rendering::Tool& tool, double height) {
     FakeDevice device([&](int) { return stylus_at(height); });
@@ -417,7 +417,7 @@ TEST(Servo, AToolWaitsForTheHomeZoneWithAllOfItself) {
   EXPECT_EQ(first_force(hook, 0.112), 499);
 }
 
-TEST(Servo, AStylusThatIsNoNumberIsNotAtHomeWithAToolEither) {
+TEST(Servo, ANanStylusWithAToolIsNotInTheHomeZone) {
   rendering::Tool one{{{{0, 0, 0}, {0, 0, 0.12}}}}, two = one;
   two.segments.push_back({{0, 0, 0}, {0.01, 0, 0.02}});
   const rendering::LineProbe far{{0, 0, 0.5}, {0, 0, 0.62}};
@@ -439,7 +439,7 @@ TEST(Servo, AStylusThatIsNoNumberIsNotAtHomeWithAToolEither) {
   }
 }
 
-TEST(ForceLimiter, RampsUpCutsSizeAndChange) {
+TEST(ForceLimiter, RampsUpAndLimitsSizeAndChange) {
   ForceLimiter limiter({6, 0.5, 0.2}, 1e-3);
   DeviceForces out;
   Vec3 last(0);
@@ -457,7 +457,7 @@ TEST(ForceLimiter, RampsUpCutsSizeAndChange) {
   EXPECT_NEAR(out.device2.x, 3, 1e-9) << "both scaled together";
 }
 
-TEST(ForceLimiter, TheLimitsAreExactWhereALengthIsWithinRoundingsOfThem) {
+TEST(ForceLimiter, TheLimitsAreExactWithinRounding) {
   for (int ulps = -6; ulps <= 6; ++ulps) {
     double size = 6;
     for (int i = 0; i < std::abs(ulps); ++i) size = std::nextafter(size, ulps < 0 ? 0 : 9);

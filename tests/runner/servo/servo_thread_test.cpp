@@ -57,7 +57,7 @@ FakeDevice falling_device() {
   return FakeDevice([](int tick) { return stylus_at(std::max(0.029, 0.1 - 1e-4 * tick / 4)); });
 }
 
-TEST(ServoThread, EverySampleComesInOrderWhateverTheSessionDoes) {
+TEST(ServoThread, EverySampleArrivesInOrderWhateverTheSessionDoes) {
   FakeDevice device([](int) { return stylus_at(0.1); });
   UnhurriedClock clock;
   ServoThread servo(device, clock, fast());
@@ -78,7 +78,7 @@ TEST(ServoThread, EverySampleComesInOrderWhateverTheSessionDoes) {
   EXPECT_EQ(quality.faults & servo_fault::kSamplesLost, 0u);
 }
 
-TEST(ServoThread, TicksComeAtTheRateOfTheMachinesClock) {
+TEST(ServoThread, TicksFollowTheMachinesClock) {
   FakeDevice device([](int) { return stylus_at(0.1); });
   RealClock clock;
   ServoThread servo(device, clock, fast());
@@ -96,7 +96,7 @@ TEST(ServoThread, TicksComeAtTheRateOfTheMachinesClock) {
   EXPECT_GT(periods, 0);
 }
 
-TEST(ServoThread, ItsTicksAndTheMissedOnesAreTheTimeThatHasPassed) {
+TEST(ServoThread, TicksAndMissedTicksAddUpToTheElapsedTime) {
   FakeDevice device([](int tick) {
     if (tick % 50 == 0) std::this_thread::sleep_for(std::chrono::microseconds(1700));
     return stylus_at(0.1);
@@ -136,7 +136,7 @@ TEST(ServoThread, ItsTicksStayAwayFromTheKernels) {
   }
 }
 
-TEST(ServoThread, AFullRingIsAFaultOnRecordAndTheServoGoesOn) {
+TEST(ServoThread, AFullRingIsARecordedFaultAndTheServoContinues) {
   FakeDevice device([](int) { return stylus_at(0.1); });
   UnhurriedClock clock;
   ServoThread servo(device, clock, fast(64));
@@ -152,7 +152,7 @@ TEST(ServoThread, AFullRingIsAFaultOnRecordAndTheServoGoesOn) {
   EXPECT_GT(servo.health().lost_samples(), 300u);
 }
 
-TEST(ServoThread, ADisplayThatStallsForSecondsIsNotNoticed) {
+TEST(ServoThread, AStalledDisplayHasNoEffect) {
   FakeDevice device([](int) { return stylus_at(0.1); });
   UnhurriedClock clock;
   ServoThread servo(device, clock, fast(1 << 16));
@@ -225,7 +225,7 @@ TEST(ServoThread, EmergencyZeroHoldsUntilCleared) {
 }
 
 // Who dies in the servo's thread cannot wait for it; who dies in another one must.
-TEST(ServoThread, KnowsWhetherItIsTheOneWhoAsks) {
+TEST(ServoThread, KnowsWhetherTheCallerIsItsThread) {
   std::atomic<const ServoThread*> servo_now{nullptr};
   std::atomic<int> asked_inside{0}, answered_yes{0};
   FakeDevice device([&](int) {
@@ -262,7 +262,7 @@ class HangingDevice final : public Device {
   DeviceCapabilities capabilities_{"hanging", 5, 5, 8, 3000, 2000, 0.2, 0, true};
 };
 
-TEST(ServoThread, ADeviceThatHangsStopsTheTrialNotTheSession) {
+TEST(ServoThread, AHangingDeviceEndsTheTrialNotTheSession) {
   HangingDevice device;
   UnhurriedClock clock;
   ServoThread servo(device, clock, fast());
@@ -278,7 +278,7 @@ TEST(ServoThread, ADeviceThatHangsStopsTheTrialNotTheSession) {
   device.hangs.notify_all();
 }
 
-TEST(ServoThread, WithoutMotorsASilenceOfASecondAndAHalfIsWaitedOut) {
+TEST(ServoThread, WithoutMotorsASilenceOf1500MsIsTolerated) {
   HangingDevice device(0);
   UnhurriedClock clock;
   ServoThread servo(device, clock, fast());

@@ -130,7 +130,7 @@ int run_watched(void (*hook)(int tick)) {
   return status;
 }
 
-TEST(ServoTick, CallsTheSystemForItsSleepAlone) {
+TEST(ServoTick, CallsTheSystemOnlyToSleep) {
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
   GTEST_SKIP() << "the sanitizers call the system";
 #endif

@@ -66,7 +66,7 @@ bool equal(const Rendering& a, const Rendering& b) {
          a.faults == b.faults && a.contacts == b.contacts && a.deepest.depth == b.deepest.depth;
 }
 
-TEST(SoftThreads, APathComesOutTheSameWithoutThreadsIfItKnowsWhichTicksWereLate) {
+TEST(SoftThreads, APathGivesTheSameForcesWithoutThreadsIfLateTicksAreKnown) {
   const rendering::Scene scene = soft_cubes(2);
   SoftThreads threads(scene, kPlainThread);
   ASSERT_EQ(threads.size(), 2U);
@@ -92,7 +92,7 @@ TEST(SoftThreads, APathComesOutTheSameWithoutThreadsIfItKnowsWhichTicksWereLate)
   EXPECT_GT(felt, 300);
 }
 
-TEST(SoftThreads, AThreadThatStallsIsHeldForAWhileAndThenForcesEnd) {
+TEST(SoftThreads, AStalledThreadIsToleratedForAWhileThenForcesEnd) {
   const rendering::Scene scene = soft_cubes(1);
   SoftThreads threads(scene, kPlainThread);
   rendering::RenderState state = scene.initial_state();
@@ -133,7 +133,7 @@ class Broken final : public rendering::SoftStepper {
   int taken_ = 0;
 };
 
-TEST(SoftThreads, ABodyThatFailsGivesNoForceAnyMore) {
+TEST(SoftThreads, AFailedBodyGivesNoForce) {
   const rendering::Scene scene = soft_cubes(1);
   rendering::RenderState state = scene.initial_state();
   Broken broken;
@@ -154,7 +154,7 @@ TEST(SoftThreads, ABodyThatFailsGivesNoForceAnyMore) {
   EXPECT_TRUE(failed);
 }
 
-TEST(SoftThreads, AStepThatIsNoNumberOrFarAwayIsAFailure) {
+TEST(SoftThreads, ANanOrDistantStepIsAFailure) {
   const rendering::Scene scene = soft_cubes(1);
   const rendering::SoftObject& object = *rendering::soft_objects(scene)[0];
   for (const double wrong : {std::numeric_limits<double>::quiet_NaN(), 1e6}) {
@@ -197,7 +197,7 @@ class SlowClock final : public Clock {
   std::int64_t now_ = 0;
 };
 
-TEST(SoftThreads, AServoTripsWhereTheyStallAndSnapshotsShowTheSurface) {
+TEST(SoftThreads, TheServoTripsIfTheyStallAndSnapshotsShowTheSurface) {
   testing::FakeDevice device([](int tick) {
     const double z = std::max(0.024, 0.1 - 1e-4 * tick);
     return DeviceReading{{{0, 0, z}, {0, 0, z + 0.12}}, 0, false};
@@ -236,7 +236,7 @@ TEST(SoftThreads, AServoTripsWhereTheyStallAndSnapshotsShowTheSurface) {
   EXPECT_NE(servo.stop().faults & render_fault::kSoftStalled, 0U);
 }
 
-TEST(SoftThreads, WithoutMotorsAStallIsToldAndNothingIsTripped) {
+TEST(SoftThreads, WithoutMotorsAStallIsOnlyReported) {
   testing::FakeDevice device([](int tick) {
     const double z = std::max(0.024, 0.1 - 1e-4 * tick);
     return DeviceReading{{{0, 0, z}, {0, 0, z + 0.12}}, 0, false};

@@ -93,7 +93,7 @@ Settings expected() {
   return out;
 }
 
-TEST(Adjustment, FindsTheStandardWithTheSpreadOfItsNoise) {
+TEST(Adjustment, FindsTheStandardWithTheModelsSpread) {
   const Settings model = expected();
   std::printf("model alone: bias %.1f, spread %.1f N/m\n", model.mean - kStandard, model.sd);
   constexpr double kCount = kParticipants * kEach;

@@ -52,7 +52,7 @@ class Ask(Task):
         self.answer_all(["stairs"], db)
         return self.levels(db)
 
-    def test_what_it_answers_is_shown_and_told(self):
+    def test_proposed_levels_are_presented_and_reported(self):
         _, place, messages = self.asker()
         self.answer_all(["stairs"], self.db, options=["--ask", place])
         self.assertEqual(self.levels(self.db), [60.5 + trial for trial in range(1, TRIALS + 1)])
@@ -62,7 +62,7 @@ class Ask(Task):
         self.assertEqual([(one["level"], int(one["success"])) for one in told],
                          [(float(row["level"]), int(row["success"])) for row in rows])
 
-    def test_who_hangs_or_is_killed_leaves_the_procedure_to_itself_and_that_is_on_record(self):
+    def test_without_an_answer_the_procedure_chooses_and_this_is_recorded(self):
         expected = self.own()
         _, place, messages = self.asker("hangs")
         hung = self.dir / "hung.db"
@@ -88,7 +88,7 @@ class Ask(Task):
         for one in noted:
             self.assertRegex(one["reason"], "gone|nobody listens")
 
-    def test_a_session_that_goes_on_tells_a_new_asker_what_is_on_record(self):
+    def test_a_resumed_session_tells_a_new_asker_the_recorded_trials(self):
         process, place, _ = self.asker()
         self.answer_all(["stairs"], self.db, options=["--ask", place], before_trial=lambda count: count == 2)
         self.assertEqual(self.levels(self.db), [61.5, 62.5])

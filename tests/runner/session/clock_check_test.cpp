@@ -14,7 +14,7 @@ bool says(const ClockEvidence& evidence, const std::string& part) {
   return clock_warning(evidence).find(part) != std::string::npos;
 }
 
-TEST(ClockCheck, AClockThatAgreesIsBelieved) {
+TEST(ClockCheck, AConsistentClockIsAccepted) {
   EXPECT_EQ(clock_warning({kNow, {}, {}}), "");
   EXPECT_EQ(clock_warning({kNow, kNow - 1, kNow - kDay}), "");
   EXPECT_EQ(clock_warning({kNow, kNow + kSecond, kNow + kDay / 2}), "") << "set right meanwhile";
@@ -37,7 +37,7 @@ TEST(ClockCheck, YearsOff) {
   EXPECT_TRUE(says({kNow, {}, kNow - 9 * kYear}, "9 years after the protocol or the program"));
 }
 
-TEST(ClockCheck, DatesOfADamagedFileAreNoTrouble) {
+TEST(ClockCheck, DatesOfADamagedFileAreIgnored) {
   using Limits = std::numeric_limits<std::int64_t>;
   EXPECT_TRUE(says({kNow, Limits::max(), {}}, "before the newest record"));
   EXPECT_TRUE(says({kNow, Limits::min(), {}}, "after the newest record"));

@@ -61,7 +61,7 @@ SharpEdges edges_of(const stimuli::ObjectSpec& object) {
   return SharpEdges(SceneBuilder().build({object}, false));
 }
 
-TEST(SharpEdges, AreThoseOfTheShapesFormulas) {
+TEST(SharpEdges, MatchTheShapesFormulas) {
   Random random(41);
   for (const auto shape : {stimuli::ShapeKind::sphere, stimuli::ShapeKind::cone,
                            stimuli::ShapeKind::cylinder, stimuli::ShapeKind::cube}) {
@@ -86,7 +86,7 @@ TEST(SharpEdges, AreThoseOfTheShapesFormulas) {
   }
 }
 
-TEST(SharpEdges, ShallowOnesAreNone) {
+TEST(SharpEdges, ExcludeShallowEdges) {
   stimuli::ObjectSpec object;
   object.shape = stimuli::ShapeKind::cylinder;
   for (const int segments : {11, 12, 13, 64}) {
@@ -97,7 +97,7 @@ TEST(SharpEdges, ShallowOnesAreNone) {
   }
 }
 
-TEST(SharpEdges, TooManyAreATexture) {
+TEST(SharpEdges, TooManyCountAsATexture) {
   stimuli::ObjectSpec row, tooth;
   row.shape = stimuli::ShapeKind::compound;
   tooth.shape = stimuli::ShapeKind::cube;
@@ -121,7 +121,7 @@ Sample touching(const Vec3& point) {
   return sample;
 }
 
-TEST(ContactLog, CountsEveryTickAsIfItLookedAtAllEdges) {
+TEST(ContactLog, CountsEveryTickAsIfAllEdgesWereChecked) {
   stimuli::ObjectSpec cube;
   cube.shape = stimuli::ShapeKind::cube;
   cube.edge = 0.04;
@@ -156,7 +156,7 @@ TEST(ContactLog, CountsEveryTickAsIfItLookedAtAllEdges) {
   EXPECT_EQ(*log.edge_dwell(0.001), 0);
 }
 
-TEST(ContactLog, WithoutEdgesThatCanBeToldApartThereIsNoDwell) {
+TEST(ContactLog, WithoutDistinguishableEdgesThereIsNoDwell) {
   stimuli::ObjectSpec row, tooth;
   row.shape = stimuli::ShapeKind::compound;
   tooth.shape = stimuli::ShapeKind::cube;
@@ -208,7 +208,7 @@ Recomputed recompute(const data::TrialRecord& record, const stimuli::ObjectSpec&
   return out;
 }
 
-TEST(ContactLog, OfASimulatedStudyIsWhatItsSamplesSay) {
+TEST(ContactLog, OfASimulatedStudyMatchesItsSamples) {
   const protocols::Protocol protocol = protocols::parse_protocol_text(
       R"({"version": 1, "name": "touched", "samples": true,
           "stimuli": [{"name": "sphere", "shape": "sphere", "radius_m": 0.03},

@@ -50,7 +50,7 @@ double share(const stimuli::Material& material, const DeviceCapabilities& device
   return showable(material, device, rate, scale, controlled).fraction;
 }
 
-TEST(DeviceCheck, ARendererWithTorqueNeedsADeviceThatDrivesItOrAProtocolThatLeavesItOut) {
+TEST(DeviceCheck, ARendererWithTorqueNeedsADeviceWithTorqueOrAProtocolThatOmitsIt) {
   for (const int driven : {0, 3, 5}) {
     for (const bool ray : {false, true}) {
       for (const bool left_out : {false, true}) {
@@ -71,7 +71,7 @@ TEST(DeviceCheck, ARendererWithTorqueNeedsADeviceThatDrivesItOrAProtocolThatLeav
   }
 }
 
-TEST(DeviceCheck, LevelsThatFailAlikeAreOneSentence) {
+TEST(DeviceCheck, LevelsWithTheSameFaultShareASentence) {
   const protocols::Protocol protocol = protocols::parse_protocol_text(
       R"({"version": 2, "name": "levels", "renderers": ["point"],
           "stimuli": [{"name": "ball", "shape": "sphere", "radius_m": 0.02, "subdivisions": 1,
@@ -91,7 +91,7 @@ TEST(DeviceCheck, LevelsThatFailAlikeAreOneSentence) {
   EXPECT_NE(refused[1].find("2 other levels of 'ball'"), std::string::npos) << refused[1];
 }
 
-TEST(DeviceCheck, AStimulusMayFillTheWorkspaceAndNoMore) {
+TEST(DeviceCheck, AStimulusMayFillButNotExceedTheWorkspace) {
   const protocols::Protocol protocol = some_protocol(of(100));
   const StimulusLibrary library(protocol);
   const auto faults_where_it_lacks = [&](double metres) {
@@ -104,7 +104,7 @@ TEST(DeviceCheck, AStimulusMayFillTheWorkspaceAndNoMore) {
   EXPECT_EQ(faults_where_it_lacks(1e-6), 1u);
 }
 
-TEST(DeviceCheck, TheBoundsOfAMaterial) {
+TEST(DeviceCheck, MaterialsAreBoundedByDampingAndFriction) {
   const DeviceCapabilities device = some_device();
   EXPECT_EQ(share(of(2000), device), 1);  // at the bound: b = K T / 2
   EXPECT_NEAR(share(of(2500), device), 0.8, 1e-12);
@@ -117,7 +117,7 @@ TEST(DeviceCheck, TheBoundsOfAMaterial) {
   EXPECT_EQ(share(of(0), device), 1);
 }
 
-TEST(DeviceCheck, WhatIsNotKnownOfADeviceDoesNotBound) {
+TEST(DeviceCheck, UnknownPropertiesOfADeviceDoNotLimit) {
   DeviceCapabilities device = some_device();
   device.damping = device.friction = 0;
   EXPECT_EQ(share(of(2000, 100), device), 1);  // by the maker's figure at half its rate
@@ -134,7 +134,7 @@ double limited_layer_damping() {
   return std::round(1e9 * protocol.stimuli[0].object.material.layers[0].damping) / 1e9;
 }
 
-TEST(DeviceCheck, WhatAReachMakesTheHandFeelIsWhatIsLimited) {
+TEST(DeviceCheck, TheStiffnessMagnifiedByAReachIsLimited) {
   protocols::Protocol protocol = some_protocol(of(100));
   EXPECT_EQ(felt_gain(protocol), 1);
   protocol.reach = {.factor = 5, .pivot = protocols::ReachSpec::Pivot::point};
@@ -167,7 +167,7 @@ TEST(DeviceCheck, AToolBeyondTheStylusIsALeverToo) {
   EXPECT_DOUBLE_EQ(felt_gain(protocol), 4 + 1);  // as far beyond the tip as the tail is behind it
 }
 
-TEST(DeviceCheck, AStimulusStandsWhereTheVirtualTipGets) {
+TEST(DeviceCheck, AStimulusMustLieWithinReachOfTheVirtualTip) {
   protocols::Protocol protocol = some_protocol(of(1));
   protocol.reach = {.factor = 5, .pivot = protocols::ReachSpec::Pivot::tail};
   DeviceCapabilities device = some_device();
@@ -213,7 +213,7 @@ TEST(DeviceCheck, LayersAndPartsCount) {
   EXPECT_NEAR(protocol.stimuli[0].object.parts[0].material.stiffness, 2000, 1e-6);
 }
 
-TEST(DeviceCheck, OfACompoundCountsWhatItsPartsLayersAreTogether) {
+TEST(DeviceCheck, LayersOfACompoundsPartsAddUp) {
   // Surface of one part, layer of another: under an edge where they meet both are felt.
   stimuli::ObjectSpec surface, layered, both;
   surface.material = of(1800);
@@ -249,7 +249,7 @@ TEST(DeviceCheck, OfACompoundCountsWhatItsPartsLayersAreTogether) {
             object.parts[2].material.layers[0].stiffness);
 }
 
-TEST(DeviceCheck, APartThatIsSoftEnoughStaysBesideOneThatIsNot) {
+TEST(DeviceCheck, OnlyPartsThatAreTooStiffAreLimited) {
   stimuli::ObjectSpec soft, stiff;
   soft.material = of(500);
   stiff.material = of(8000);
@@ -262,7 +262,7 @@ TEST(DeviceCheck, APartThatIsSoftEnoughStaysBesideOneThatIsNot) {
   EXPECT_NEAR(protocol.stimuli[0].object.parts[1].material.stiffness, 2000, 1e-6);
 }
 
-TEST(DeviceCheck, RefusesUnlessLimitsAreAskedFor) {
+TEST(DeviceCheck, RefusesUnlessLimitsAreRequested) {
   protocols::Protocol protocol = some_protocol(of(2500, 0.1));
   EXPECT_TRUE(limit_materials(protocol, some_device()).empty());
   EXPECT_EQ(protocol.stimuli[0].object.material.stiffness, 2500);
@@ -328,7 +328,7 @@ TEST(DeviceCheck, TheRecordLimitsAProtocolAgainToTheBit) {
                std::invalid_argument);
 }
 
-TEST(DeviceCheck, ADeviceThatDoesNotPushShowsNothingAndRefusesNothing) {
+TEST(DeviceCheck, ADeviceWithoutMotorsRefusesNoMaterial) {
   DeviceCapabilities mouse = some_device();
   mouse.actuated_freedom = 0;
   protocols::Protocol protocol = some_protocol(of(1e5));

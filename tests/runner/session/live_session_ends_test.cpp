@@ -14,7 +14,7 @@ using testing::at;
 using testing::FakeDevice;
 using testing::LiveSessions;
 
-TEST_F(LiveSessions, AClosedScreenASignalAndAQuitEndItResumably) {
+TEST_F(LiveSessions, AClosedScreenASignalOrAQuitEndsItResumably) {
   FakeDevice device([](int) { return at(0.1); });
   screen_.answers = screen_.is_open = false;
   LiveSession::Outcome outcome = run(device);
@@ -74,7 +74,7 @@ TEST_F(LiveSessions, AWithdrawalCountsInEveryStateAndSpelling) {
   }
 }
 
-TEST_F(LiveSessions, WhoLeavesDuringTheFeedbackHasAnswered) {
+TEST_F(LiveSessions, AnEndDuringTheFeedbackKeepsTheAnswer) {
   protocol_.response.feedback = true;
   FakeDevice device([](int) { return at(0.1); });
   screen_.on_feedback = [&] { console_.next = {{ConsoleCommand::Kind::quit, "", 0}}; };
@@ -101,7 +101,7 @@ TEST_F(LiveSessions, AWithdrawalOnTheLastPageOrRightAfterAnotherEndCounts) {
   EXPECT_TRUE(has_note("she said why"));
 }
 
-TEST_F(LiveSessions, AStopIsTakenBackAndTheEndSaysSo) {
+TEST_F(LiveSessions, AStopCanBeCancelledAndTheEndReportsIt) {
   protocol_.texts.end = "that was all";
   FakeDevice device([](int) { return at(0.1); });
   const ConsoleCommand stop{ConsoleCommand::Kind::stop_after_trial, "", 0};
@@ -117,7 +117,7 @@ TEST_F(LiveSessions, AStopIsTakenBackAndTheEndSaysSo) {
   EXPECT_EQ(screen_.texts.back(), "") << "it was not the last object";
 }
 
-TEST_F(LiveSessions, AStopIsObeyedWhileItIsHeld) {
+TEST_F(LiveSessions, AStopIsObeyedWhileTheSessionWaits) {
   FakeDevice device([](int tick) { return at(0.1, tick > 30); });  // lost for good
   screen_.answers = false;
   console_.clears = false;
@@ -128,7 +128,7 @@ TEST_F(LiveSessions, AStopIsObeyedWhileItIsHeld) {
   EXPECT_EQ(outcome.recorded, 0u);
 }
 
-TEST_F(LiveSessions, ASessionAsLongAsAllowedIsPaused) {
+TEST_F(LiveSessions, ASessionThatReachesItsLimitIsPaused) {
   protocol_.sessions.max_minutes = 1e-6;
   FakeDevice device([](int) { return at(0.1); });
   const LiveSession::Outcome outcome = run(device);

@@ -33,7 +33,7 @@ TEST_F(LiveSessions, ALostDeviceCutsTheTrialOffAndItIsShownAgainOnceCleared) {
   EXPECT_EQ(device.force, Vec3(0));
 }
 
-TEST_F(LiveSessions, AClearedFaultIsCleared) {
+TEST_F(LiveSessions, AClearedFaultStaysCleared) {
   std::atomic<bool> plugged{true};
   FakeDevice device([&](int tick) {
     if (tick == 30) plugged = false;
@@ -55,7 +55,7 @@ TEST_F(LiveSessions, AClearedFaultIsCleared) {
   EXPECT_TRUE(has_note("fault cleared"));
 }
 
-TEST_F(LiveSessions, ADeviceThatIsUnpluggedInABreakIsToldOfThere) {
+TEST_F(LiveSessions, ADeviceUnpluggedInABreakIsReportedInTheBreak) {
   protocol_.breaks.every_trials = 1;
   protocol_.texts.break_text = "Rest.";
   std::atomic<bool> plugged{true};
@@ -81,7 +81,7 @@ TEST_F(LiveSessions, ADeviceThatIsUnpluggedInABreakIsToldOfThere) {
   EXPECT_TRUE(cut_off_reasons().empty()) << "no trial was begun without a device";
 }
 
-TEST_F(LiveSessions, AFaultSaysWhatItIsAndWhatGoesOn) {
+TEST_F(LiveSessions, AFaultNamesItsReasonAndTheNextStep) {
   FakeDevice device([&](int tick) { return at(0.1, tick > 30); });
   screen_.answers = console_.clears = false;
   console_.in_fault = {ConsoleCommand::Kind::stop_after_trial, "", 0};
@@ -93,7 +93,7 @@ TEST_F(LiveSessions, AFaultSaysWhatItIsAndWhatGoesOn) {
             "then 'on'");
 }
 
-TEST_F(LiveSessions, ALateGuardIsAPauseAndOneThatHasEndedEndsIt) {
+TEST_F(LiveSessions, ALateGuardPausesTheSessionAndAnEndedOneEndsIt) {
   std::atomic<DeviceTrouble> trouble{DeviceTrouble::none};
   FakeDevice device([&](int tick) {
     if (tick == 30) trouble = DeviceTrouble::guard_late;

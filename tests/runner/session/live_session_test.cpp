@@ -78,7 +78,7 @@ TEST_F(LiveSessions, AKeyThatDoesNothingGetsAReplyAndAFaultAsksToWait) {
   }));
 }
 
-TEST_F(LiveSessions, ABreakCountsDownAndTheConsoleKnowsWhatWasAnswered) {
+TEST_F(LiveSessions, ABreakCountsDownAndTheConsoleShowsTheAnswer) {
   protocol_.breaks.every_trials = 1;
   protocol_.breaks.min_seconds = 2;
   protocol_.response.labels["ball"] = "Kugel";
@@ -103,7 +103,7 @@ TEST_F(LiveSessions, ABreakCountsDownAndTheConsoleKnowsWhatWasAnswered) {
   EXPECT_EQ(console_.last.scores[0].shown + console_.last.scores[1].shown, 2);
 }
 
-TEST_F(LiveSessions, ButtonsAnswerAtTheirTickAndOneHeldFromBeforeDoesNot) {
+TEST_F(LiveSessions, ButtonsAnswerAtTheirTickUnlessHeldFromBefore) {
   FakeDevice device([](int tick) {  // button 1 is stuck, button 2 is pressed every 40 ticks
     return at(0.1, false, static_cast<std::uint8_t>(1 + (tick % 40 > 35 ? 2 : 0)));
   });
@@ -113,7 +113,7 @@ TEST_F(LiveSessions, ButtonsAnswerAtTheirTickAndOneHeldFromBeforeDoesNot) {
   for (const data::TrialRecord& record : records()) EXPECT_EQ(record.response, "box");
 }
 
-TEST_F(LiveSessions, MarkersThatNobodyTakesAreCountedAndHoldNobodyUp) {
+TEST_F(LiveSessions, UndeliveredMarkersAreCountedWithoutDelay) {
   struct Never final : MarkerSink {
     bool send(const Marker&) noexcept override { return false; }
   };

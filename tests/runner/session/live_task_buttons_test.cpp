@@ -107,7 +107,7 @@ TEST_F(LiveTaskButtons, OfTheDeviceAnswerPagesTrialsAndConfidence) {
   expect_all_answered();
 }
 
-TEST_F(LiveTaskButtons, TheConsoleSaysWhichQuestionIsShown) {
+TEST_F(LiveTaskButtons, TheConsoleNamesTheCurrentQuestion) {
   for (const char* const state :
        {"question 1 of 1: consent, consent", "question 2 of 2: you, tired", "page: how",
         "question 1 of 1: after, again"}) {

@@ -96,7 +96,7 @@ class ParallelMarkers : public testing::Test {
   FakePort fake_;
 };
 
-TEST_F(ParallelMarkers, EachIsAPulseAndTheNextWaitsForIt) {
+TEST_F(ParallelMarkers, EachIsAPulseAndTheNextWaitsForItsEnd) {
   {
     const auto sink = open_marker_sink("parport:" + path_ + ":20", MarkerCodes::this_computer);
     for (const Kind kind : {Kind::trial_start, Kind::first_contact, Kind::response})
@@ -111,7 +111,7 @@ TEST_F(ParallelMarkers, EachIsAPulseAndTheNextWaitsForIt) {
   EXPECT_EQ(fake_.requests.back(), static_cast<unsigned long>(PPRELEASE));
 }
 
-TEST_F(ParallelMarkers, SendingDoesNotWaitAndTooManyAreRefused) {
+TEST_F(ParallelMarkers, SendingDoesNotWaitAndAFullQueueRefuses) {
   const auto begin = Clock::now();
   int taken = 0;
   Clock::time_point sent;
@@ -127,7 +127,7 @@ TEST_F(ParallelMarkers, SendingDoesNotWaitAndTooManyAreRefused) {
   EXPECT_LT((sent - begin) * 4, Clock::now() - begin);
 }
 
-TEST_F(ParallelMarkers, APortThatFailsIsTold) {
+TEST_F(ParallelMarkers, AFailingPortIsReported) {
   fake_.refuses_claim = true;
   EXPECT_THROW(open_marker_sink("parport:" + path_, MarkerCodes::this_computer),
                std::runtime_error);
@@ -151,7 +151,7 @@ TEST_F(ParallelMarkers, APortThatFailsIsTold) {
   EXPECT_TRUE(told);
 }
 
-TEST_F(ParallelMarkers, AProtocolsOwnCodesGoOut) {
+TEST_F(ParallelMarkers, AProtocolsOwnCodesAreSent) {
   {
     std::vector<std::unique_ptr<MarkerSink>> sinks;
     sinks.push_back(open_marker_sink("parport:" + path_ + ":1", MarkerCodes::this_computer));
@@ -173,7 +173,7 @@ TEST_F(ParallelMarkers, AProtocolsOwnCodesGoOut) {
   EXPECT_EQ(bytes(), (std::vector<int>{0, 10, 0, 255, 0, 3, 0, 3, 0, 5, 0, 0}));
 }
 
-TEST_F(ParallelMarkers, AreInStepWithTheSecondsBetweenOthers) {
+TEST_F(ParallelMarkers, SyncMarkersKeepInStepWithTheSeconds) {
   {
     std::vector<std::unique_ptr<MarkerSink>> sinks;
     sinks.push_back(open_marker_sink("parport:" + path_ + ":1", MarkerCodes::this_computer));

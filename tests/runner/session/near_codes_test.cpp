@@ -7,7 +7,7 @@ namespace {
 
 using Codes = std::vector<std::string>;
 
-TEST(NearCodes, OneCodeWrittenInOtherWays) {
+TEST(NearCodes, VariantsOfOneCodeAreNear) {
   const Codes known = {"P01", "Q7", "SUBJ10"};
   for (const char* slip : {"p01", "P1", "p1", "PO1", "Po1", "P0l", "P0I", "P001", "P0i"}) {
     EXPECT_EQ(near_codes(slip, known), Codes{"P01"}) << slip;
@@ -16,7 +16,7 @@ TEST(NearCodes, OneCodeWrittenInOtherWays) {
   EXPECT_EQ(near_codes("q07", known), Codes{"Q7"});
 }
 
-TEST(NearCodes, ALetterAway) {
+TEST(NearCodes, CodesThatDifferByALetterAreNear) {
   for (const char* slip : {"SUJB10", "SUB10", "SUBBJ10", "SUBK10", "SUBJ10a"}) {
     EXPECT_EQ(near_codes(slip, {"SUBJ10"}), Codes{"SUBJ10"}) << slip;
   }
@@ -25,7 +25,7 @@ TEST(NearCodes, ALetterAway) {
   EXPECT_EQ(near_codes("MKHX", {"MKHB"}), Codes{"MKHB"});
 }
 
-TEST(NearCodes, NeighboursInAStudyAreNoSlips) {
+TEST(NearCodes, ConsecutiveCodesAreNotNear) {
   Codes known;
   for (int i = 1; i <= 120; ++i) {
     const std::string number = std::to_string(i);
@@ -40,7 +40,7 @@ TEST(NearCodes, NeighboursInAStudyAreNoSlips) {
   }
 }
 
-TEST(NearCodes, ShortCodesDifferByALetterOnPurpose) {
+TEST(NearCodes, ShortCodesThatDifferByALetterAreNotNear) {
   EXPECT_EQ(near_codes("B1", {"A1", "C1"}), Codes{});
   EXPECT_EQ(near_codes("B", {"A", "C"}), Codes{});
   EXPECT_EQ(near_codes("KXR", {"KXQ", "KQX"}), Codes{});

@@ -23,7 +23,7 @@ void home(Preflight& preflight) {
   for (int i = 0; i < 20; ++i) preflight.add(sample({0, 0, 0}));
 }
 
-TEST(Preflight, NothingNeededIsDoneOnceHomed) {
+TEST(Preflight, WithoutChecksItIsDoneOnceHomed) {
   Preflight preflight({});
   for (int i = 0; i < 100; ++i) preflight.add(sample({0, 0, 0}, 0, true));
   EXPECT_EQ(preflight.step(), Step::homing);
@@ -52,7 +52,7 @@ TEST(Preflight, EverySideMustBeReached) {
   EXPECT_EQ(preflight.step(), Step::done);
 }
 
-TEST(Preflight, AnEmergencyDoesNotUndoWhatIsDone) {
+TEST(Preflight, AnEmergencyKeepsCompletedSteps) {
   Preflight preflight({0.03, 0});
   home(preflight);
   Sample off = sample({0, 0, 0}, 0, true);
@@ -75,7 +75,7 @@ TEST(Preflight, ButtonsMustBeUpAndThenDown) {
   EXPECT_EQ(preflight.step(), Step::done);
 }
 
-TEST(Preflight, WhatIsLeftOutIsOnRecord) {
+TEST(Preflight, SkippedStepsAreRecorded) {
   Preflight preflight({0.03, 2});
   home(preflight);
   preflight.skip();
@@ -90,7 +90,7 @@ TEST(Preflight, WhatIsLeftOutIsOnRecord) {
   EXPECT_NE(preflight.findings()[2].find("NOT checked"), std::string::npos);
 }
 
-TEST(Preflight, ThePushIsAskedForGivenAndFelt) {
+TEST(Preflight, ThePushIsAnnouncedGivenAndConfirmed) {
   const ForceDirectionCheck push({2.5, 0.5, 0.2}, 3);
   PreflightNeeds needs{0.03, 0};
   needs.push = &push;
@@ -163,7 +163,7 @@ class Grip final : public Device {
   DeviceCapabilities able_;
 };
 
-TEST(ForceDirectionCheck, PushesToTheRightWithinTheLimitsAndLetsGo) {
+TEST(ForceDirectionCheck, PushesToTheRightWithinTheLimitsAndReleases) {
   for (const int driven : {3, 5}) {
     for (const double limit : {6.0, 0.8}) {
       Grip grip(limit, driven);
@@ -215,7 +215,7 @@ class WrongServo final : public TickSource {
   Sample sample_;
 };
 
-TEST(ForceDirectionCheck, TellsWhatIsWrongWithTheCommands) {
+TEST(ForceDirectionCheck, ReportsWrongCommands) {
   const ForceDirectionCheck push({2, 0.5, 0.2}, 5);
   const std::pair<std::string, std::function<void(Sample&)>> cases[] = {
       {"", [](Sample&) {}},
@@ -237,7 +237,7 @@ TEST(ForceDirectionCheck, TellsWhatIsWrongWithTheCommands) {
   EXPECT_TRUE(servo.stopped);
 }
 
-TEST(Preflight, ADeviceThatIsLostMeanwhileIsHomedAgain) {
+TEST(Preflight, ALostDeviceIsHomedAgain) {
   Preflight preflight({0.03, 0});
   home(preflight);
   preflight.add(sample({0, 0, 0}, 0, true));

@@ -14,7 +14,7 @@ from live_case import FEELING, PALPATE, PROTOCOL, Live
 
 
 class Broken(Live):
-    def test_killed_in_mid_trial_it_goes_on_with_that_trial(self):
+    def test_after_a_kill_in_a_trial_it_resumes_with_that_trial(self):
         terminal = self.begin()
         terminal.type("1")
         terminal.wait_for("trial 2 of 4]\n")
@@ -30,7 +30,7 @@ class Broken(Live):
         attempts = (self.dir / "attempts.csv").read_text()
         self.assertEqual(attempts.count("\n"), 2, attempts)
 
-    def test_an_index_that_is_cut_short_meanwhile_costs_nothing(self):
+    def test_a_truncated_index_loses_no_data(self):
         terminal = self.begin()
         for trial in (1, 2, 3):
             os.truncate(f"{self.db}-shm", 0 if trial < 3 else 100)
@@ -42,7 +42,7 @@ class Broken(Live):
         self.finish(terminal)
         self.assertEqual(self.attempts(), [(trial, 1, "completed") for trial in (1, 2, 3, 4)])
 
-    def test_a_replay_writes_over_no_mesh_that_it_reads(self):
+    def test_a_replay_never_overwrites_a_mesh_that_it_reads(self):
         (self.dir / "solid.obj").write_text(
             "v 0 0 0\nv 0.04 0 0\nv 0 0.04 0\nv 0 0 0.04\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n")
         before = (self.dir / "solid.obj").read_bytes()
@@ -57,7 +57,7 @@ class Broken(Live):
         done = subprocess.run([*replay, self.dir / "ticks.csv"], capture_output=True, text=True)
         self.assertEqual(done.returncode, 0, done.stderr)
 
-    def test_a_mesh_is_kept_with_the_data_and_replayed_and_exported_from_there(self):
+    def test_meshes_are_stored_with_the_data_for_replay_and_export(self):
         solid = "v 0 0 0\nv .04 0 0\nv 0 .04 0\nv 0 0 .04\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
         (self.dir / "solid.obj").write_text(solid)
         stimuli = [{"name": "ball", "shape": "mesh", "file": "solid.obj"}, PROTOCOL["stimuli"][1]]
@@ -93,7 +93,7 @@ class Broken(Live):
         with self.run_session(code=f"P{int(signal.SIGINT)}") as again:
             self.finish(again)
 
-    def test_a_terminal_that_hangs_up_ends_it(self):
+    def test_a_hangup_of_the_terminal_ends_it(self):
         terminal = self.begin()
         terminal.hang_up()
         self.assertEqual(terminal.process.wait(30), 1)
@@ -107,7 +107,7 @@ class Broken(Live):
         self.assertEqual(done.returncode, 1, done.stderr)
         self.assertIn("screen was closed", done.stderr)
 
-    def test_pipes_serve_as_well(self):
+    def test_pipes_work_like_a_terminal(self):
         process = subprocess.Popen([PALPATE, "run", self.protocol(repetitions=1, blocks_per_renderer=1, texts={}), "--db",
                                     self.db, "--participant", "P01", "--device", "simulated", "--no-window"],
                                    stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
@@ -121,7 +121,7 @@ class Broken(Live):
         self.assertEqual(process.returncode, 0, err)
         self.assertIn(b"2 of 2 trials on record; done", out)
 
-    def test_a_full_disk_is_told_and_the_trial_in_hand_is_not_said_to_be_saved(self):
+    def test_a_full_disk_is_reported_and_the_current_trial_is_not_called_saved(self):
         disk = self.dir / "disk"
         disk.mkdir()
         if subprocess.run(["mount", "-t", "tmpfs", "-o", "size=400k", "none", disk], capture_output=True).returncode:

@@ -33,7 +33,7 @@ class Enrolment(Live):
         self.finish(terminal)
         self.assertIn("participant P02 (number 1)", terminal.text)
 
-    def test_notes_of_before_the_first_trial_are_kept_when_it_begins(self):
+    def test_notes_before_the_first_trial_are_stored_when_it_begins(self):
         terminal = self.run_session()
         self.addCleanup(terminal.__exit__)
         terminal.wait_for("[space bar: go on]")
@@ -44,7 +44,7 @@ class Enrolment(Live):
         self.finish(terminal)
         self.assertEqual(self.notes(), ["wears a ring"])
 
-    def test_who_withdraws_before_the_first_trial_is_on_record(self):
+    def test_a_withdrawal_before_the_first_trial_is_recorded(self):
         with self.run_session() as terminal:
             terminal.wait_for("[space bar: go on]")
             terminal.type(":quit withdrawn\n")
@@ -54,7 +54,7 @@ class Enrolment(Live):
             self.assertEqual(refused.finish(), 2)
             self.assertRegex(refused.text, r"P01 has withdrawn \(today \d\d:\d\d\) and is not started again")
 
-    def test_what_fails_before_the_first_trial_enrols_nobody(self):
+    def test_a_failure_before_the_first_trial_enrols_no_participant(self):
         without_display = {name: value for name, value in os.environ.items() if "DISPLAY" not in name}
         done = subprocess.run([PALPATE, "run", self.protocol(), "--db", self.db, "--participant", "P01", "--device",
                                "mouse"], stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=60,
@@ -63,7 +63,7 @@ class Enrolment(Live):
         self.assertEqual(self.run_piped(code="P02").returncode, 1)
         self.assertEqual(self.codes(self.db), [])
 
-    def test_a_code_never_seen_before_is_asked_about(self):
+    def test_an_unknown_code_must_be_confirmed(self):
         with self.run_session(sure=False) as terminal:
             terminal.wait_for("holds no participants yet", "Is P01 a new participant? [y/N]")
             terminal.type("y\n")
@@ -85,7 +85,7 @@ class Enrolment(Live):
             self.assertIn("has completed every session", known.text)
             self.assertNotIn("[y/N]", known.text)
 
-    def test_a_script_takes_new_codes_but_none_that_looks_like_another(self):
+    def test_a_script_accepts_new_codes_unless_similar_to_known_ones(self):
         one = {"repetitions": 1, "blocks_per_renderer": 1, "texts": {}, "stimuli": PROTOCOL["stimuli"][:1],
                "response": {"keys": {"1": "ball"}, "time_out_s": 0.3}}
         def piped(code, *options):
@@ -115,7 +115,7 @@ class Enrolment(Live):
         self.assertIn("P02 is in", err)
         self.assertEqual(self.codes(self.db), ["P01", "P02", "p01"])
 
-    def test_a_code_need_not_stand_in_the_command_line(self):
+    def test_a_code_can_be_read_from_standard_input(self):
         terminal = self.run_session(code="-", sure=False)
         self.addCleanup(terminal.__exit__)
         terminal.wait_for("participant code: ")
@@ -140,7 +140,7 @@ class Enrolment(Live):
         self.assertEqual(forgotten.returncode, 0, forgotten.stderr)
         self.assertEqual(self.codes(self.db), [])
 
-    def test_a_clock_that_is_years_behind_is_told_and_on_record(self):
+    def test_a_clock_years_behind_is_reported_and_recorded(self):
         protocol = self.protocol()
         later = time.time() + 5 * 365.25 * 86400
         with unittest.mock.patch.object(self, "protocol", lambda **_: protocol):
@@ -174,7 +174,7 @@ class Changed(Live):
         return [text and json.loads(text)["texts"]["break"] for (text,) in self.sql(
             "SELECT p.text FROM runs r LEFT JOIN protocols p ON p.id = r.protocol_id ORDER BY r.id")]
 
-    def test_the_stored_protocol_goes_on_unless_told_otherwise(self):
+    def test_the_stored_protocol_is_kept_unless_requested_otherwise(self):
         with self.run_session(code="K1", **self.TEXTS) as terminal:
             terminal.wait_for("K1 began with another text of protocol two (1 trial on record, last run on ")
             terminal.wait_for("has changed since (only texts: /texts/break)")
@@ -197,7 +197,7 @@ class Changed(Live):
             self.assertEqual(terminal.finish(), 2)
             self.assertIn("K1 has completed every session", terminal.text)
 
-    def test_new_texts_where_only_texts_differ(self):
+    def test_new_texts_can_be_chosen_if_only_texts_differ(self):
         with self.run_session(code="K1", **self.TEXTS) as terminal:
             terminal.wait_for("which? ")
             terminal.type("t\n")
@@ -220,7 +220,7 @@ class Changed(Live):
         self.assertEqual([row["shape"] for row in self.export()],
                          [row["shape"] for row in csv.DictReader(schedule.splitlines())])
 
-    def test_another_order_is_no_new_text(self):
+    def test_another_order_does_not_count_as_new_texts(self):
         with self.run_session(code="K1", **self.DESIGN) as terminal:
             terminal.wait_for("(stimuli and order: /seed; texts: /texts/break)")
             terminal.wait_for("which? ")
@@ -236,7 +236,7 @@ class Changed(Live):
         self.assertEqual(self.run_piped("--changed-protocol", "new", code="K1").returncode, 2)
         self.assertEqual(self.ends(), ["paused"])
 
-    def test_begun_anew_under_a_new_code(self):
+    def test_a_participant_can_begin_anew_under_a_new_code(self):
         with self.run_session(code="K1", **self.DESIGN) as terminal:
             terminal.wait_for("which? ")
             terminal.type("n\n")
@@ -251,7 +251,7 @@ class Changed(Live):
         (change,) = self.changes()
         self.assertEqual((change["shown"], change["earlier_code"]), ("begun anew", "K1"))
 
-    def test_a_script_goes_on_with_the_stored_protocol_and_is_told(self):
+    def test_a_script_keeps_the_stored_protocol_and_is_informed(self):
         def piped(*options):
             """Up to the trial that is due; then the input ends."""
             process = subprocess.Popen([PALPATE, "run", self.protocol(**self.TEXTS), "--db", self.db, "--participant",
@@ -275,7 +275,7 @@ class Changed(Live):
         self.assertEqual(self.shown_texts(), [None, None, "sit down", None])
         self.assertEqual(self.codes(self.db), ["K1"])
 
-    def test_layout_alone_asks_nobody(self):
+    def test_a_change_of_layout_asks_no_question(self):
         path = self.protocol()
         path.write_text(json.dumps(PROTOCOL, indent=3, sort_keys=True))
         with unittest.mock.patch.object(self, "protocol", lambda **_: path):
@@ -284,7 +284,7 @@ class Changed(Live):
                 self.finish(terminal)
         self.assertEqual(self.codes(self.db), ["K1"])
 
-    def test_others_who_come_new_to_other_texts_get_the_next_number(self):
+    def test_new_participants_with_new_texts_get_the_next_number(self):
         terminal = self.begin(code="K2", **self.TEXTS)
         self.assertIn("participant K2 has number 2; session 1 of 1", terminal.text)
         self.assertIn("with another text of this protocol (only texts: /texts/break); numbers count on", terminal.text)

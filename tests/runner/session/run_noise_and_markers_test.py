@@ -47,19 +47,19 @@ class Noise(Live):
         self.assertIn("--sound-device", self.refusal.stderr)
         self.assertFalse(self.db.exists())
 
-    def test_told_so_it_runs_without_and_that_is_on_record(self):
+    def test_without_noise_runs_and_is_recorded(self):
         terminal = self.begin("--without-noise", "--sound-device", "none such", **self.NOISE)
         terminal.type("1")
         self.finish(terminal)
         self.assertEqual(self.events(), [{"masking_noise": "left out"}])
 
-    def test_a_protocol_without_noise_asks_for_no_sound_device(self):
+    def test_a_protocol_without_noise_needs_no_sound_device(self):
         terminal = self.begin("--sound-device", "none such")
         terminal.type("1")
         self.finish(terminal)
         self.assertEqual(self.events(), [])
 
-    def test_noise_is_heard_in_trials_and_faded_out_for_pages(self):
+    def test_noise_plays_in_trials_and_fades_out_for_pages(self):
         sound = self.dir / "sound.raw"
         terminal = self.begin("--sound-device", f"file:{sound},raw", breaks={"min_seconds": 1}, **self.NOISE)
         rate = 48000
@@ -98,7 +98,7 @@ class Noise(Live):
 
 
 class Marks(Live):
-    def test_udp_serial_port_and_a_receiver_that_takes_nothing(self):
+    def test_markers_reach_udp_and_serial_ports_despite_a_blocked_receiver(self):
         receiver = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self.addCleanup(receiver.close)
         receiver.bind(("127.0.0.1", 0))
@@ -195,7 +195,7 @@ class Marks(Live):
             "cut_off": 5, "first_contact": 2, "interval": 6, "response": 3, "response:ball": 14, "sync": 99,
             "time_out": 4, "trial_start": 10}, "sync": True}])
 
-    def test_the_code_does_not_leave_this_computer_unless_asked_to(self):
+    def test_the_code_leaves_this_computer_only_on_request(self):
         other, listener = "10.98.7.6", self.dir / "listen.py"
         network = ("ip link add here type veth peer name there && ip addr add 10.98.7.1/24 dev here && "
                    "ip link set lo up && ip link set here up && ip link set there up && "
@@ -316,13 +316,13 @@ while os.getppid() == runner:
         self.assertEqual(len(starts), 2)
         self.assertTrue(any(any(row[6:9]) for row in streamed), "the first trial was felt up to a contact")
 
-    def test_samples_that_the_stream_refuses_are_counted_and_hold_nobody_up(self):
+    def test_refused_samples_of_the_stream_are_counted_without_delay(self):
         terminal, lines = self.stream(PALPATE_FAKE_LSL_REFUSES="1")
         self.assertNotIn("chunk", " ".join(lines))
         self.assertRegex(terminal.text, r"[1-9]\d* samples were not taken by the stream")
         self.assertEqual(len(self.stored()), 2)
 
-    def test_a_stream_that_cannot_be_is_said_before_anything_else(self):
+    def test_an_impossible_stream_is_reported_first(self):
         faults = [("udp:x:1", 2, "expected lsl or lsl:NAME"), ("lsl:", 2, "expected lsl or lsl:NAME")]
         if ctypes.util.find_library("lsl") is None:
             faults.append(("lsl:x", 1, "liblsl is not installed"))
@@ -335,7 +335,7 @@ while os.getppid() == runner:
             self.assertIn("--markers", terminal.text)
         self.assertFalse(self.db.exists())
 
-    def test_what_cannot_be_opened_is_said_before_anything_else(self):
+    def test_outputs_that_cannot_be_opened_are_reported_first(self):
         for where in ("serial:/dev/null", "serial:" + str(self.dir / "none"), "udp:no.such.host.invalid:9"):
             with self.run_session("--markers", where) as terminal:
                 self.assertEqual(terminal.finish(), 1)

@@ -48,7 +48,7 @@ class Whole(Live):
         terminal.type("1")
         self.finish(terminal)
 
-    def test_numbers_orders_and_sessions(self):
+    def test_participants_get_their_numbers_orders_and_sessions(self):
         sessions = {"sessions": {"count": 2}}
         with self.run_session("--number", "5", **sessions) as terminal:
             terminal.wait_for("participant P01 has number 5; session 1 of 2")
@@ -75,7 +75,7 @@ class Whole(Live):
                 for row in self.export() if row["participant_id"] == "P01"]
         self.assertEqual(done, planned)
 
-    def test_practice_goes_on_until_the_criterion_and_says_what_was_right(self):
+    def test_practice_continues_to_the_criterion_with_feedback(self):
         practice = {"repetitions": 1, "criterion": 1.0, "max_rounds": 2}
         terminal = self.begin(practice=practice, repetitions=1, blocks_per_renderer=1,
                               texts={"instructions": "go", "practice": "try it"})
@@ -98,7 +98,7 @@ class Whole(Live):
         self.assertEqual(note.replace("\n", " ").split(), ["*", "note:"] + ["abcdefgh"] * 12)
         self.assertNotIn("[]", terminal.text)
 
-    def test_a_page_says_in_the_protocols_words_when_to_go_and_what_a_key_stands_for(self):
+    def test_a_page_uses_the_protocols_texts_for_go_and_replies(self):
         texts = {"ready": "Bereit", "go": "Los", "other_key": "Diese Taste gilt nicht"}
         terminal = self.begin(texts=texts, response={"keys": {
             "1": {"stimulus": "ball", "label": "Kugel"}, "2": {"stimulus": "box", "label": "W\u00fcrfel"}}})
@@ -140,7 +140,7 @@ class Commands(Live):
                                            (3, 1, "completed"), (4, 1, "completed")])
         self.assertEqual([row["attempt"] for row in self.export()], ["2", "1", "1", "1"])
 
-    def test_pause_holds_the_next_trial_and_keys_do_nothing_meanwhile(self):
+    def test_pause_holds_the_next_trial_and_ignores_keys(self):
         terminal = self.begin()
         terminal.type(":pause\n")
         terminal.wait_for("pause after this trial")
@@ -153,7 +153,7 @@ class Commands(Live):
         self.assertEqual(len(self.export()), 4)
         self.assertEqual(self.notes(), ["she asked for water"])
 
-    def test_stop_after_the_trial_and_go_on_another_day(self):
+    def test_a_stop_after_the_trial_can_be_resumed_another_day(self):
         terminal = self.begin()
         terminal.type(":stop\n1")
         self.finish(terminal)
@@ -186,7 +186,7 @@ class Commands(Live):
             self.assertEqual(refused.finish(), 2)
             self.assertIn("--after-withdrawal", refused.text)
 
-    def test_who_withdrew_is_begun_again_only_where_that_is_said(self):
+    def test_a_withdrawn_participant_is_resumed_only_on_request(self):
         terminal = self.begin()
         terminal.type(":QUIT Withdrawn.\n")
         self.finish(terminal)
@@ -208,7 +208,7 @@ class Commands(Live):
             self.finish(on)
         self.assertEqual(self.ends()[-1], "done")
 
-    def test_a_session_that_goes_on_begins_by_saying_so(self):
+    def test_a_resumed_session_says_so_first(self):
         terminal = self.begin()
         self.assertNotIn("continues with trial", terminal.text)
         terminal.type(":stop\n1")
@@ -217,20 +217,20 @@ class Commands(Live):
             again.wait_for("1 of 4 trials done, last run today ", " (paused), continues with trial 2")
             self.finish(again)
 
-    def test_a_stop_can_be_taken_back(self):
+    def test_a_stop_can_be_cancelled(self):
         terminal = self.begin()
         terminal.type(":stop\n:stop\n1")
         self.finish(terminal)
         self.assertIn("the stop is cancelled", terminal.text)
         self.assertEqual(self.ends(), ["done"])
 
-    def test_after_an_abort_nobody_reads_that_it_is_over(self):
+    def test_after_an_abort_the_end_text_is_not_shown(self):
         terminal = self.begin()
         terminal.type(":quit\n")
         self.finish(terminal)
         self.assertNotIn("good bye", terminal.text)
 
-    def test_the_end_is_no_trial(self):
+    def test_the_end_does_not_count_as_a_trial(self):
         terminal = self.begin()
         self.finish(terminal)
         self.assertRegex(terminal.text, r"\[end, [^\n]*trial 4 of 4")
@@ -249,7 +249,7 @@ class Commands(Live):
         self.assertEqual(self.attempts()[:2], [(1, 1, "cut_off"), (1, 2, "completed")])
         self.assertEqual(self.notes(), ["emergency zero: the key Escape", "fault cleared"])
 
-    def test_alt_with_a_key_is_an_emergency_that_says_so_and_answers_nothing(self):
+    def test_alt_with_a_key_is_a_reported_emergency_not_an_answer(self):
         terminal = self.begin()
         terminal.type("\x1b1")
         terminal.wait_for("EMERGENCY by the key Alt+1: forces are off")

@@ -11,7 +11,7 @@ from live_case import PALPATE, Live
 
 
 class Soft(Live):
-    def test_a_live_session_on_soft_blocks_is_replayed_to_the_bit(self):
+    def test_a_live_session_on_soft_blocks_is_replayed_bit_by_bit(self):
         def block(name, young):
             return {"name": name, "shape": "cube", "edge_m": 0.05, "stiffness_n_per_m": 300,
                     "soft": {"young_pa": young, "resolution": 3}}

@@ -30,7 +30,7 @@ class Judging final : public TickSource {
   Servo& servo_;
 };
 
-TEST(Session, WhatTheServoSaysOfATrialIsOnItsRecord) {
+TEST(Session, TheServosVerdictIsInTheTrialsRecord) {
   for (const std::uint32_t faults :
        {rendering::render_fault::kStartedInside, rendering::render_fault::kWalkCapped, 0u}) {
     SessionBench bench;
@@ -96,7 +96,7 @@ class Numbered final : public TickSource {
   Sample sample_;
 };
 
-TEST(Session, ATrialKeepsEverySampleAndWhatItBeganWith) {
+TEST(Session, ATrialKeepsEverySampleAndItsInitialFacts) {
   SessionBench bench;
   bench.protocol.samples = true;
   Numbered servo;
@@ -143,7 +143,7 @@ TEST(Session, ATrialKeepsEverySampleAndWhatItBeganWith) {
 
 // What passes by itself is the machine's lateness alone; stylus, device and whoever asked for zero
 // force need somebody who looks.
-TEST(SessionFault, IsTransientWhereOnlyTheMachineWasLate) {
+TEST(SessionFault, IsTransientIfOnlyTheMachineWasLate) {
   using namespace servo_fault;
   const auto transient = [](std::uint32_t faults, DeviceTrouble trouble = DeviceTrouble::none) {
     return SessionFault("", "", faults | kTripped, trouble).is_transient();
@@ -165,7 +165,7 @@ TEST(SessionFault, IsTransientWhereOnlyTheMachineWasLate) {
   EXPECT_TRUE(transient(kDeviceLost, DeviceTrouble::guarded));
 }
 
-TEST(SessionFault, TheReasonIsTheWorstAndSaysWhatToDo) {
+TEST(SessionFault, TheReasonIsTheWorstFaultWithItsRemedy) {
   using namespace servo_fault;
   const auto reason = [](std::uint32_t faults, DeviceTrouble trouble = DeviceTrouble::none) {
     return trip_reason(faults | kTripped, trouble);

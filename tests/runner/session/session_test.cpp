@@ -15,7 +15,7 @@ namespace {
 
 using testing::FakeDevice;
 
-TEST(Session, GoesThroughPracticeBlocksBreaksAndEnd) {
+TEST(Session, RunsPracticeBlocksBreaksAndEnd) {
   SessionBench bench;
   ScriptedRespondent respondent({});
   Session session = bench.session(respondent, SessionPlan(bench.protocol, 1, 1));
@@ -37,7 +37,7 @@ TEST(Session, GoesThroughPracticeBlocksBreaksAndEnd) {
   EXPECT_GE(bench.log.finished[4].onset_ns - bench.log.finished[3].response_ns, 20'000'000'000);
 }
 
-TEST(Session, ABreakIsDueAfterSoManyTrialsOfTheBlock) {
+TEST(Session, ABreakIsDueAfterItsNumberOfTrialsOfTheBlock) {
   SessionBench bench;
   bench.protocol.blocks_per_renderer = 1;
   bench.protocol.repetitions = 4;  // 2 of practice, then 8 for each renderer

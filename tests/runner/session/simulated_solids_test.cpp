@@ -47,7 +47,7 @@ class SimulatedSolids : public ::testing::Test {
 };
 
 // One presentation of each object under each renderer, through servo, renderers, session and store.
-TEST_F(SimulatedSolids, ConcaveObjectsAreExploredAndNamed) {
+TEST_F(SimulatedSolids, ConcaveObjectsAreExploredAndIdentified) {
   protocols::Protocol protocol =
       protocols::parse_protocol(PALPATE_SOURCE_DIR "/protocols/concave.json");
   protocol.repetitions = 1;
@@ -60,7 +60,7 @@ TEST_F(SimulatedSolids, ConcaveObjectsAreExploredAndNamed) {
 }
 
 // Alike outside: told apart by where the first layer that is felt lies.
-TEST_F(SimulatedSolids, LayersAreFeltWhereTheyLie) {
+TEST_F(SimulatedSolids, LayersAreFeltAtTheirDepths) {
   protocols::Protocol protocol =
       protocols::parse_protocol(PALPATE_SOURCE_DIR "/protocols/layered.json");
   protocol.repetitions = 1;
@@ -72,7 +72,7 @@ TEST_F(SimulatedSolids, LayersAreFeltWhereTheyLie) {
 
 // Approaches begin where the home zone of the cube does not: it begins 62 mm from the centre, those
 // of the other shapes at most 53 mm.
-TEST_F(SimulatedSolids, ATrialThatCannotBeginEndsTheStudyAndKeepsWhatWasDone) {
+TEST_F(SimulatedSolids, ATrialThatCannotBeginEndsTheStudyAndKeepsItsData) {
   const protocols::Protocol protocol =
       protocols::parse_protocol(PALPATE_SOURCE_DIR "/protocols/quick.json");
   std::ofstream(folder_ / "near.json") << R"({"motor": {"approach_distance_m": 0.06}})";

@@ -157,7 +157,7 @@ void SimulatedStudy::expect_frozen(int version) const {
 }
 
 // The participants are frozen: whoever changes one gives it another version, and other trials here.
-TEST_F(SimulatedStudy, TheFrozenParticipantsTrialsStayWhatTheyWere) {
+TEST_F(SimulatedStudy, TheFrozenParticipantsTrialsDoNotChange) {
 #ifdef __clang__
   GTEST_SKIP() << "other roundings grow to other trials: the files are the release compiler's, g++";
 #endif
@@ -168,7 +168,7 @@ TEST_F(SimulatedStudy, TheFrozenParticipantsTrialsStayWhatTheyWere) {
 }
 
 // Version 3 is version 2 with its switches on, and version 2 is version 1 with another search.
-TEST_F(SimulatedStudy, VersionsDifferByTheirSwitchesAlone) {
+TEST_F(SimulatedStudy, VersionsDifferOnlyByTheirSwitches) {
   const protocols::Protocol p = protocol();
   const auto trials = [&](const std::string& name, const SimulatedSettings& settings) {
     simulate(p, folder_ / name, 2, 1, settings);
@@ -323,7 +323,7 @@ TEST_F(SimulatedStudy, ChecksumsAreThoseOfTheFrozenFiles) {
   }
 }
 
-TEST_F(SimulatedStudy, VersionsAreKnownByTheirChecksums) {
+TEST_F(SimulatedStudy, VersionsAreFoundByTheirChecksums) {
   std::ofstream(folder_ / "patch.json") << R"({"motor": {"reaction_delay_s": 0.02}})";
   for (const int version : participant_versions()) {
     const std::string plain = load_simulated_settings("", version).sha256;
@@ -352,7 +352,7 @@ TEST_F(SimulatedStudy, ChecksumsKnowEverySwitch) {
 }
 
 // Every key can be found and changed in the text, in every version.
-TEST_F(SimulatedStudy, SettingsAsTextHaveEveryKeyAndReadAsTheyWere) {
+TEST_F(SimulatedStudy, SettingsAsTextHaveEveryKeyAndReadBackUnchanged) {
   const auto keys = [](int version) {
     std::vector<std::string> found;
     const nlohmann::json settings =

@@ -74,7 +74,7 @@ class EveryTask(Task):
         self.assertEqual(sorted((row["catch_trial"], row["correct"]) for row in rows),
                          [("0", "1"), ("0", "1"), ("1", "0"), ("1", "0")])
 
-    def test_numbers_are_typed_and_refused_kindly(self):
+    def test_typed_numbers_are_checked_with_a_message(self):
         terminal = self.start("number", "scale")
         self.play(terminal, ("WELCOME", " "), ("Type a number", "\n"),
                   ("Please type an answer first. (-10 \u2013 100)", "12,55"), ("> 12.55", "\x7f"), ("> 12.5\n", "9"),
@@ -128,7 +128,7 @@ class Pages(Task):
         (digest,), = self.sql("SELECT text_sha256 FROM page_answers WHERE page = 'consent'")
         self.assertEqual(digest, hashlib.sha256(PAGES[0]["text"].encode()).hexdigest())
 
-    def test_without_consent_nothing_is_shown_and_nothing_kept(self):
+    def test_without_consent_nothing_is_presented_or_stored(self):
         terminal = self.begin("number")
         self.play(terminal, ("1 I agree   2 I do not agree", "2"))
         self.end(terminal)
@@ -143,7 +143,7 @@ class Pages(Task):
         again.kill()
         self.assertEqual(self.answers(), [("consent", "consent", "3b", "agree")])
 
-    def test_killed_in_the_last_questionnaire_it_is_asked_again_and_only_that(self):
+    def test_after_a_kill_in_the_last_questionnaire_only_that_is_repeated(self):
         last = {"name": "last", "kind": "questionnaire", "when": "after",
                 "items": [{"name": "words", "kind": "text", "question": "LAST WORDS"}]}
         terminal = self.start("number", pages=[last])
@@ -223,7 +223,7 @@ class Periphery(Task):
         self.assertIn("gone", told[1])
         self.assertEqual(self.sql("SELECT response_device FROM runs"), [("keyboard, serial response box",)])
 
-    def test_tones_are_what_they_should_be_and_on_record(self):
+    def test_tones_have_their_pitches_and_are_recorded(self):
         sound = self.dir / "sound.raw"
         terminal = self.start("ident", options=["--sound-device", f"file:{sound},raw"], home={"rest_s": 0.5},
                               sounds={"ready": True, "go": True, "feedback": True, "level_db": -18})
@@ -260,7 +260,7 @@ class Periphery(Task):
             self.assertAlmostEqual(level, -18, delta=0.5)
         self.assertEqual([note["level_db"] for note in self.notes() if note.get("sounds") == "on"], [-18])
 
-    def test_sounds_that_are_left_out_are_on_record(self):
+    def test_omitted_sounds_are_recorded(self):
         terminal = self.start("ident", options=["--without-noise", "--sound-device", "none such"],
                               sounds={"go": True})
         self.play(terminal, ("WITHOUT the protocol's sounds", ""), ("WELCOME", " "), ("ABOUT", " "), ("MORE", " "),
@@ -277,7 +277,7 @@ class Killed(Task):
     def go(self, db, kill_after=None):
         self.answer_all(["stairs", "detect"], db, before_trial=lambda count: count == kill_after)
 
-    def test_at_every_trial_the_rest_is_the_same(self):
+    def test_a_kill_at_any_trial_leaves_the_rest_the_same(self):
         whole = self.dir / "whole.db"
         self.go(whole)
         expected = self.trials(whole)

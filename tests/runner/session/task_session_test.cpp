@@ -165,7 +165,7 @@ TEST_F(TaskSession, GivesTheSameDatabaseWhereverItIsInterrupted) {
   }
 }
 
-TEST_F(TaskSession, JudgesStifferBallsByWhatTheHandMet) {
+TEST_F(TaskSession, JudgesStiffnessByTheMeasuredForces) {
   json document = with_blocks(kCompare);
   document["blocks"] = json::array({json(document["blocks"][0])});
   document["blocks"][0]["procedure"]["levels"] = {100, 900};
@@ -254,7 +254,7 @@ TEST_F(TaskSession, IdentifiesAsInVersion1) {
   }
 }
 
-TEST_F(TaskSession, TellsThingsThatDifferInStiffnessAlone) {
+TEST_F(TaskSession, IdentifiesStimuliThatDifferOnlyInStiffness) {
   json document = base();
   document["stimuli"].push_back(document["stimuli"][0]);
   document["stimuli"][1]["name"] = "hard-ball";
@@ -271,7 +271,7 @@ TEST_F(TaskSession, TellsThingsThatDifferInStiffnessAlone) {
   EXPECT_LE(right, 20);
 }
 
-TEST_F(TaskSession, JudgesSizesByWhereTheHandMetTheSurface) {
+TEST_F(TaskSession, JudgesSizesByTheContactPlaces) {
   const auto share_right = [&](double level, const std::string& name) {
     json document = base();
     document["blocks"] = {

@@ -73,7 +73,7 @@ class Players : public ::testing::Test {
   Ear ear_;
 };
 
-TEST_F(Players, PlaySilenceUntilTheyAreTurnedOn) {
+TEST_F(Players, PlaySilenceUntilTurnedOn) {
   const auto noise = player();
   wait_for([&] { return ear_.count() > 2000; });
   EXPECT_FALSE(ear_.sounds());
@@ -105,7 +105,7 @@ TEST_F(Players, PlayOneToneOnRequest) {
 
 // A sine of amplitude a and pitch f moves by 2 pi f a / rate a sample at most; its edges of 10 ms
 // add a / (0.01 rate). Cut off in the middle it would jump by up to a.
-TEST_F(Players, ToneThatCutsAnotherShortOrTheEndDoesNotClick) {
+TEST_F(Players, AToneThatInterruptsAnotherDoesNotClick) {
   constexpr double kRate = 8000, kTonesDb = -12;
   const auto slope = [&](double pitch) {
     const double amplitude = std::sqrt(2.0) * std::pow(10, kTonesDb / 20);
@@ -135,7 +135,7 @@ TEST_F(Players, ToneThatCutsAnotherShortOrTheEndDoesNotClick) {
   }
 }
 
-TEST_F(Players, PlayTheSameOnBothChannels) {
+TEST_F(Players, PlayTheSameSignalOnBothChannels) {
   const auto noise = player();
   noise->turn_on();
   wait_for([&] { return noise->report().seconds > 0.1; });
@@ -144,7 +144,7 @@ TEST_F(Players, PlayTheSameOnBothChannels) {
     ASSERT_EQ(ear_.heard[i], ear_.heard[i + 1]);
 }
 
-TEST_F(Players, FadeOutWhenTheyEnd) {
+TEST_F(Players, FadeOutOnDestruction) {
   {
     const auto noise = player();
     noise->turn_on();

@@ -114,7 +114,7 @@ TEST(Stability, ALimitCycleIsUnstableWhateverItsAmplitude) {
 }
 
 // The swing of 3.26 mm that once counted as stable, and what lies about it.
-TEST(Stability, TheControllersLoopSwingsOnAboveItsBoundaryAndNowhereBelow) {
+TEST(Stability, TheControllersLoopIsUnstableOnlyAboveItsBoundary) {
   LoopSettings settings;
   settings.passivity_controller = true;
   const auto run = [&](double stiffness) {
@@ -180,7 +180,7 @@ TEST(Stability, ThePassivityControllerExtendsTheStableRange) {
   }
 }
 
-TEST(Integrators, TheExactOneIsExactAndTheOthersConverge) {
+TEST(Integrators, TheExactIntegratorIsExactAndTheOthersConverge) {
   const auto rows = compare_integrators([] {
     return std::chrono::duration<double, std::nano>(
                std::chrono::steady_clock::now().time_since_epoch())
@@ -204,7 +204,7 @@ TEST(Integrators, TheExactOneIsExactAndTheOthersConverge) {
   EXPECT_GT(blown_up, 2);
 }
 
-TEST(SoftMap, ScenesHaveWhatComesToRestAndNotWhatSwings) {
+TEST(SoftMap, ScenesAllowOnlyCasesThatComeToRest) {
   const SoftSwing calm = press_and_hold({.young = 1e6, .stiffness = 3000, .rate = 62.5});
   EXPECT_TRUE(calm.accepted);
   EXPECT_TRUE(calm.settles()) << calm.swing;
@@ -224,7 +224,7 @@ TEST(SoftMap, ScenesHaveWhatComesToRestAndNotWhatSwings) {
   }
 }
 
-TEST(SoftMap, ScenesHaveWhatComesToRestElsewhereAsWell) {
+TEST(SoftMap, AllowedCasesComeToRestElsewhereToo) {
   const std::vector<SoftCase> cases = soft_cases_elsewhere(3), others = soft_cases_elsewhere(4);
   ASSERT_EQ(cases.size(), soft_cases().size());
   EXPECT_NE(cases[0].x, others[0].x);

@@ -13,7 +13,7 @@ namespace {
 
 // Owen (1997, Ann. Stat. 25, 1541-1562): of n points of a Latin hypercube a mean's variance is at
 // most n / (n - 1) of that of independent ones. A Sobol sequence's digital shift has no such bound.
-TEST(PatternShare, IntervalOfDesignsHoldsTheTruthAtLeastAsOftenAsItSays) {
+TEST(PatternShare, IntervalCoversTheTruthAtLeastAtItsNominalRate) {
   const struct {
     const char* pattern;
     double truth;

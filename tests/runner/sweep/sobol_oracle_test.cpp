@@ -37,7 +37,7 @@ void expect_indices(const analysis::SobolIndices& found, const std::vector<Truth
 }
 
 // Ishigami & Homma (1990): sin x1 + a sin^2 x2 + b x3^4 sin x1 with each x uniform in (-pi, pi).
-TEST(SobolIndices, AreThoseOfIshigamisFunction) {
+TEST(SobolIndices, MatchIshigamisFunction) {
   constexpr double a = 7, b = 0.1, pi = std::numbers::pi;
   const Design design(DesignKind::saltelli, 4096 * 5, 20,
                       std::vector<protocols::SweepParameter>(3));
@@ -56,7 +56,7 @@ TEST(SobolIndices, AreThoseOfIshigamisFunction) {
 
 // A linear model of independent parameters: each has its squared coefficient's part, alone and in
 // all.
-TEST(SobolIndices, AreTheSquaredCoefficientsOfALinearModel) {
+TEST(SobolIndices, MatchTheSquaredCoefficientsOfALinearModel) {
   const std::vector<double> coefficients{4, 2, 1, 0};
   const Design design(DesignKind::saltelli, 2048 * 6, 7, std::vector<protocols::SweepParameter>(4));
   const auto linear = [&](const std::vector<double>& u) {

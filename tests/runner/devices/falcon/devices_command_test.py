@@ -120,14 +120,14 @@ class Devices(unittest.TestCase):
         self.assertEqual(status, 1)
         self.assertIn("--firmware", out + messages)
 
-    def test_what_is_no_firmware_is_refused_and_not_sent(self):
+    def test_invalid_firmware_is_refused_and_not_sent(self):
         image = self.folder / "image.bin"
         image.write_bytes(b"not firmware at all, but long enough to be")
         status, out, messages = self.run_devices(["--bare"], "--device", "falcon", "--firmware", image)
         self.assertNotEqual(status, 0)
         self.assertIn("expected the key 0x8AA", out + messages)
 
-    def test_an_unknown_serial_number_is_answered_with_those_there_are(self):
+    def test_an_unknown_serial_number_lists_the_connected_ones(self):
         _, out, messages = self.run_devices(["--falcons", "2"], "--device", "falcon", "--serial", "X")
         self.assertIn("no Falcon X is plugged in", out + messages)
         self.assertIn("there is EMU1", out + messages)
@@ -140,7 +140,7 @@ class Devices(unittest.TestCase):
         bench.control.tell("hand 1 0 0 0.125 200 10")
 
     @once_more_if_it_stood_still
-    def test_weights_give_the_true_scale(self):
+    def test_weighing_finds_the_true_scale(self):
         bench = self.calibrate(["--unhomed"], "--weights", "0.25")
         bench.control.tell("scale 1 -5000")
         bench.expect("pull the grip fully out")
@@ -221,7 +221,7 @@ class Devices(unittest.TestCase):
         self.assertGreater(abs(z), 0.999)
         self.assertAlmostEqual(pair["tail_position_m"][0], 0.003, delta=1e-3)
 
-    def test_wrong_usage_is_said_before_a_device_is_touched(self):
+    def test_wrong_usage_is_reported_before_opening_a_device(self):
         for arguments, text in [
                 (("--device", "falcon"), "--calibration"),
                 (("--device", "mouse", "--calibration", "c.json"), "falcon, falcon2"),
@@ -236,7 +236,7 @@ class Devices(unittest.TestCase):
             self.assertEqual(done.returncode, 2, done.stderr)
             self.assertIn(text, done.stderr)
 
-    def test_a_calibration_file_that_is_none_is_refused(self):
+    def test_an_invalid_calibration_file_is_refused(self):
         self.calibration.write_text('{"version": 1, "forces": [{"serial": 3}]}')
         status, _, messages = self.calibrate([]).finish()
         self.assertEqual(status, 2)

@@ -69,7 +69,7 @@ class Parrot final : public Transport {
 };
 
 // Only the firmware speaks in replies; what is merely framed like one may be anything on that line.
-TEST(FalconBoot, OnlyAReplyThatCanBeReadShowsRunningFirmware) {
+TEST(FalconBoot, OnlyAValidReplyShowsRunningFirmware) {
   Packet reply = encode(Reply{{1, -2, 3}, 0, 7});
   Parrot firmware(reply);
   EXPECT_TRUE(firmware_runs(firmware, {}));

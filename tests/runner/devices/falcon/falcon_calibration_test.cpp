@@ -78,7 +78,7 @@ TEST(FalconCalibration, EveryFaultIsNamed) {
   EXPECT_NE(refusal(R"({"version": 1)"), "");
 }
 
-TEST(FalconCalibration, OnlyScalesThatWeighingCanGiveAreAccepted) {
+TEST(FalconCalibration, OnlyScalesPossibleByWeighingAreAccepted) {
   const auto scaled = [](double counts) {
     Calibration calibration;
     calibration.put({"A1", counts, 0.01, 0.02, 0.3, {0.1, 0.2}, "2026-10-31T11:00:00Z"});
@@ -190,7 +190,7 @@ TEST(FalconCalibration, TwoFalconsWithoutARegistrationAreNotOpened) {
   EXPECT_NE(fault_of().find(config.calibration), std::string::npos) << fault_of();
 }
 
-TEST(FalconCalibration, OneFromTheFutureIsStale) {
+TEST(FalconCalibration, ACalibrationFromTheFutureIsStale) {
   const std::int64_t before = kNow - 200LL * 86400 * 1'000'000'000;
   const CalibrationVerdict verdict = judge_forces(example(), {"A1"}, before);
   EXPECT_EQ(verdict.state, CalibrationState::stale);

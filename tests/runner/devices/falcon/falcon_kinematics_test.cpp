@@ -37,7 +37,7 @@ std::vector<Vec3> workspace() {
   return points;
 }
 
-TEST(FalconKinematics, TheTableOfAnglesIsThatOfTheAzimuths) {
+TEST(FalconKinematics, TheTableOfCosinesMatchesTheAzimuths) {
   for (std::size_t i = 0; i < 3; ++i) {
     const double angle = kLegAzimuth[i] * std::numbers::pi / 180;
     EXPECT_NEAR(kLegCos[i], std::cos(angle), 1e-15);
@@ -95,7 +95,7 @@ TEST(FalconKinematics, KnownCountsOnTheAxis) {
   }
 }
 
-TEST(FalconKinematics, JacobianIsThatOfDifferences) {
+TEST(FalconKinematics, JacobianAgreesWithFiniteDifferences) {
   constexpr double kStep = 1e-6;
   for (const Vec3& p : workspace()) {
     const Jacobian j = jacobian(*inverse(p));

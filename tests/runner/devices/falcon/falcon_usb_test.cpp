@@ -62,7 +62,7 @@ struct ReadyArm {
   }
 };
 
-TEST(FalconUsb, ListsWhatIsPluggedIn) {
+TEST(FalconUsb, ListsConnectedDevices) {
   EmulatedBus bus;
   EXPECT_TRUE(list_usb().empty());
   bus.add("FALCON01");
@@ -75,7 +75,7 @@ TEST(FalconUsb, ListsWhatIsPluggedIn) {
   EXPECT_EQ(list[0].bus, 1);
 }
 
-TEST(FalconUsb, OpensTheOneThatIsNamed) {
+TEST(FalconUsb, OpensTheNamedDevice) {
   EmulatedBus bus;
   EXPECT_NE(open_failure("").find("no Falcon is plugged in"), std::string::npos);
   bus.add("FALCON01");

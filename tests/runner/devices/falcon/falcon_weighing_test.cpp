@@ -100,7 +100,7 @@ TEST(FalconWeighing, MissingWeightsAreDetected) {
   EXPECT_NE(failure.find("which is impossible"), std::string::npos) << failure;
 }
 
-TEST(FalconWeighing, TooHeavyEndsWithoutForce) {
+TEST(FalconWeighing, TooHeavyWeightsEndWithoutForce) {
   Bench bench(-1e4);
   const std::string failure = bench.failure({3, 3, 3});
   EXPECT_NE(failure.find("lighter weights"), std::string::npos) << failure;
@@ -143,7 +143,7 @@ TEST(FalconWeighing, AGripFarFromTheCentreIsSentBack) {
   EXPECT_NE(guide.asked[1].find("-2 cm right"), std::string::npos) << guide.asked[1];
 }
 
-TEST(FalconWeighing, OneWeightAloneIsRefused) {
+TEST(FalconWeighing, ASingleWeightIsRefused) {
   EXPECT_THROW(fit_scale({{0, {0, 0, 0.1}}}), GuideError);
   EXPECT_THROW(fit_scale({}), GuideError);
 }

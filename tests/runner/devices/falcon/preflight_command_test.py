@@ -68,7 +68,7 @@ class Preflight(FalconSession):
         self.assertIn("EMU1", calibration)
         self.assertIn("1 days ago", calibration)
 
-    def test_a_push_that_is_not_felt_ends_it_before_anything_is_recorded(self):
+    def test_a_push_that_is_not_confirmed_ends_the_session_unrecorded(self):
         terminal = self.run_session("--calibration", self.calibration(0))
         terminal.wait_for("(':go': push)")
         self.pushed_and_felt(terminal)
@@ -81,7 +81,7 @@ class Preflight(FalconSession):
         with contextlib.closing(sqlite3.connect(self.database)) as db:
             return db.execute("SELECT end_reason FROM runs ORDER BY id").fetchall()
 
-    def test_a_withdrawal_in_the_pre_flight_is_on_record_with_its_notes(self):
+    def test_a_withdrawal_in_the_pre_flight_is_recorded_with_its_notes(self):
         terminal = self.run_session("--calibration", self.calibration(0))
         terminal.wait_for("(':go': push)")
         terminal.type(":note the grip is cold\n")
@@ -95,7 +95,7 @@ class Preflight(FalconSession):
         self.assertEqual(refused.finish(), 2, refused.text)
         self.assertIn("--after-withdrawal", refused.text)
 
-    def test_ended_in_the_pre_flight_with_trials_on_record_these_are_counted(self):
+    def test_ending_in_the_pre_flight_counts_the_recorded_trials(self):
         terminal = self.run_session("--calibration", self.calibration(0))
         terminal.wait_for("(':go': push)")
         self.pushed_and_felt(terminal)
@@ -157,7 +157,7 @@ class Preflight(FalconSession):
             self.assertEqual(db.execute("PRAGMA integrity_check").fetchone(), ("ok",))
             self.assertEqual(db.execute("SELECT count(*) FROM attempts WHERE state = 'completed'").fetchone(), (0,))
 
-    def test_a_missing_or_stale_calibration_is_refused_unless_told_so(self):
+    def test_a_missing_or_stale_calibration_is_refused_unless_allowed(self):
         for options, word in ([(), "is missing"],
                               [("--calibration", self.folder / "none.json"), "is missing"],
                               [("--calibration", self.calibration(1, serial="OTHER")), "is missing"]):

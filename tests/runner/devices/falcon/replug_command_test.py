@@ -44,7 +44,7 @@ class Replug(FalconSession):
         with contextlib.closing(sqlite3.connect(self.database)) as db:
             return db.execute("SELECT state, count(*) FROM attempts GROUP BY state").fetchall()
 
-    def test_unplugged_in_contact_ten_times_the_session_goes_on(self):
+    def test_the_session_survives_ten_disconnections_in_contact(self):
         terminal = self.begin()
         for time in range(10):
             self.touch(terminal)
@@ -73,7 +73,7 @@ class Replug(FalconSession):
         self.assertGreaterEqual(counts["cut_off"], 10)
         self.assertTrue(json.loads((self.folder / "last.json").read_text())[0]["torque_is_zero"])
 
-    def test_a_lost_homing_is_not_cleared_before_it_is_homed(self):
+    def test_a_lost_homing_can_be_cleared_only_after_homing(self):
         terminal = self.begin()
         self.touch(terminal)
         self.control.tell("lose_homing 1")

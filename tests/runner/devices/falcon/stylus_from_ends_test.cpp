@@ -74,7 +74,7 @@ TEST(StylusFromEnds, CoplanarPointsGiveNoReflection) {
   }
 }
 
-TEST(StylusFromEnds, PointsThatDetermineNothingAreRefused) {
+TEST(StylusFromEnds, DegeneratePointsAreRefused) {
   const Pose truth{};
   EXPECT_THROW(fit_rigid(paired(truth, 3, 0, 1)), RegistrationError);
   EXPECT_THROW(fit_rigid(paired(truth, 8, 0, 1, Vec3(0.03, 0, 0))), RegistrationError);  // a line

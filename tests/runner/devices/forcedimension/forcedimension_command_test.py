@@ -118,7 +118,7 @@ class ForceDimension(unittest.TestCase):
         self.assertIn("/torque", terminal.text)
         self.assertFalse(self.database.exists())
 
-    def test_a_session_with_faults_is_whole_in_the_end(self):
+    def test_a_session_with_faults_is_complete_in_the_end(self):
         self.stub.set(reset=1)
         terminal = self.run_session("--new-participant")
         terminal.wait_for("calibration pit")

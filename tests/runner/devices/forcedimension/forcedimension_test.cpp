@@ -112,7 +112,7 @@ TEST_F(ForceDimension, ADrivenWristGetsTheTorqueOfTheTailsForceAboutTheTip) {
   EXPECT_NEAR(one().torque[2], 0, 1e-15);
 }
 
-TEST_F(ForceDimension, AModelThatNobodyKnowsGetsCautiousLimits) {
+TEST_F(ForceDimension, AnUnknownModelGetsCautiousLimits) {
   one().model = 3;
   const DeviceCapabilities can = open(config_)->capabilities();
   EXPECT_EQ(can.max_force, 8);
@@ -162,7 +162,7 @@ TEST_F(ForceDimension, EveryFaultIsTroubleAndZeroForceUntilItIsOver) {
   }
 }
 
-TEST_F(ForceDimension, AJumpIsNoMotionOfAHand) {
+TEST_F(ForceDimension, AJumpIsImplausible) {
   const auto device = open(config_);
   ASSERT_EQ(settle(*device), DeviceTrouble::none);
   one().wrong = 4;
@@ -170,7 +170,7 @@ TEST_F(ForceDimension, AJumpIsNoMotionOfAHand) {
   EXPECT_EQ(read(*device), DeviceTrouble::none) << "the servo keeps the forces off by itself";
 }
 
-TEST_F(ForceDimension, AfterADeadGuardTheFirmwareTakesTheForceOff) {
+TEST_F(ForceDimension, AfterADeadGuardTheFirmwareSwitchesForcesOff) {
   const auto device = open(config_);
   device->read();
   device->write({0, 0, 1}, Vec3(0));
@@ -191,7 +191,7 @@ TEST_F(ForceDimension, TheFirmwareWaitsForAServoThatIsSlow) {
   }
 }
 
-TEST_F(ForceDimension, ADeviceIsKnownByItsSerialNumberWhateverItsPlace) {
+TEST_F(ForceDimension, ADeviceIsIdentifiedByItsSerialNumberNotItsIndex) {
   state_->count = 2;
   other().serial = 99;
   other().hand[2] = 0.05;
@@ -225,7 +225,7 @@ TEST_F(ForceDimension, WhatCannotBeOpenedSaysWhy) {
   EXPECT_THROW(check(config_), std::invalid_argument);
 }
 
-TEST_F(ForceDimension, AnOldLibraryWorksAndWhatItDoesNotHaveIsOnRecord) {
+TEST_F(ForceDimension, AnOldLibraryWorksAndItsMissingFunctionsAreRecorded) {
   config_.library = OLD_LIBRARY;
   const auto device = open(config_);
   EXPECT_EQ(settle(*device), DeviceTrouble::none);
@@ -234,7 +234,7 @@ TEST_F(ForceDimension, AnOldLibraryWorksAndWhatItDoesNotHaveIsOnRecord) {
   EXPECT_EQ(one().watchdog, 0);
 }
 
-TEST_F(ForceDimension, AreListedWithTheirSerialNumbersAndTroubles) {
+TEST_F(ForceDimension, DevicesAreListedWithSerialNumbersAndTroubles) {
   state_->count = 2;
   other().in_use = 1;
   const std::vector<ConnectedDevice> found = connected(config_);

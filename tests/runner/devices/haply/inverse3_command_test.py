@@ -121,7 +121,7 @@ class Inverse3(unittest.TestCase):
             if self.service.pushes():
                 return
 
-    def test_a_session_with_faults_is_resumed_and_whole_in_the_end(self):
+    def test_a_session_with_faults_is_resumed_and_complete_in_the_end(self):
         terminal = self.begin("--new-participant")
         for fault, words, mend in (
                 ("set present 0", "the device is unplugged: plug it in again", "set present 1"),

@@ -37,7 +37,7 @@ TEST(HaplyMessages, AStateIsReadByTheNamesOfArmAndGrip) {
   EXPECT_FALSE(parse_state(kState, "A", "").has_grip);
 }
 
-TEST(HaplyMessages, WhatIsMissingIsMissingAndWhatIsNoMessageIsRefused) {
+TEST(HaplyMessages, MissingValuesStayMissingAndInvalidMessagesAreRefused) {
   const State state = parse_state(
       R"({"inverse3":[{"device_id":"A","state":{"cursor_position":{"x":1}}}]})", "A", "W");
   EXPECT_TRUE(state.has_arm);
@@ -72,7 +72,7 @@ TEST(HaplyMessages, VersionsAreReadBareAndWrapped) {
   EXPECT_EQ(parse_force_scale(""), std::nullopt);
 }
 
-TEST(HaplyMessages, ACommandConfiguresOnceAndHasTheForceUnderTheDialectsKey) {
+TEST(HaplyMessages, TheFirstCommandConfiguresAndTheForceHasTheDialectsKey) {
   EXPECT_EQ(
       command("A\"", {1, -0.5, 0}, Dialect::values, false),
       R"({"inverse3":[{"device_id":"A\"","commands":{"set_cursor_force":{"values":{"x":1,"y":-0.5,"z":0}}}}]})");
@@ -156,7 +156,7 @@ TEST_F(Inverse3, AForceThatIsNotRenewedBecomesZero) {
   EXPECT_EQ(service_.arm().force[2], 0) << "nobody writes: the servo has ended or hangs";
 }
 
-TEST_F(Inverse3, EveryFaultIsTroubleThenZeroForceAndItCanBeOpenedAgain) {
+TEST_F(Inverse3, EveryFaultGivesTroubleAndZeroForceAndAllowsReopening) {
   const struct {
     const char* name;
     std::function<void(EmulatedArm&)> fault, mend;
@@ -220,7 +220,7 @@ TEST_F(Inverse3, AServiceThatEndsAndComesBackIsOpenedAgain) {
                     {1, 0, 0}));
 }
 
-TEST_F(Inverse3, AForceThatTheServiceDoesNotHeedIsTriedUnderTheOtherKeyAfterAStop) {
+TEST_F(Inverse3, AForceThatTheServiceIgnoresIsRetriedInTheOtherDialect) {
   service_.with([](EmulatedArm& arm) { arm.vector = false; });  // although it is 3.5
   const auto device = open(config_);
   ASSERT_TRUE(works(*device));
@@ -233,7 +233,7 @@ TEST_F(Inverse3, AForceThatTheServiceDoesNotHeedIsTriedUnderTheOtherKeyAfterASto
                     {1, 0, 0}));
 }
 
-TEST_F(Inverse3, TheSameStateWhateverIsSentIsNoState) {
+TEST_F(Inverse3, AStateThatNeverChangesIsStale) {
   const auto device = open(config_);
   ASSERT_TRUE(works(*device));
   service_.with([](EmulatedArm& arm) { arm.frozen = true; });

@@ -97,7 +97,7 @@ TEST_F(Touch, AStylusIsReadInTheWorldFrameAndItsForcesAddUpAtTheTip) {
   EXPECT_DOUBLE_EQ(one().force[2], -2.2);  // +y of the world is away from the user
 }
 
-TEST_F(Touch, ADeviceThatDoesNotTellItsLimitsGetsTheLeast) {
+TEST_F(Touch, ADeviceThatReportsNoLimitsGetsTheLowest) {
   one().model = 3;
   EXPECT_EQ(open(config_)->capabilities().max_force, 0.88);
 }
@@ -157,7 +157,7 @@ TEST_F(Touch, ACalibrationThatIsDueIsUpdated) {
   EXPECT_EQ(one().reset, 0);
 }
 
-TEST_F(Touch, TwoAreKnownByTheirNamesAndCalledByOneScheduler) {
+TEST_F(Touch, TwoDevicesAreIdentifiedByNameAndShareOneScheduler) {
   state_->count = 2;
   state_->device[1].serial = 99;
   state_->device[1].hand[0] = 0.05;
@@ -180,7 +180,7 @@ TEST_F(Touch, TwoAreKnownByTheirNamesAndCalledByOneScheduler) {
   EXPECT_THROW(check(config_), std::invalid_argument);
 }
 
-TEST_F(Touch, NamesAreThoseThatTheMakersSetupStored) {
+TEST_F(Touch, NamesAreThoseOfTheMakersSetup) {
   const palpate::testing::TemporaryFolder home;
   std::filesystem::create_directory(home / "config");
   for (const char* name : {"Left.config", "Default Device.config", "notes.txt"})
