@@ -36,7 +36,7 @@ class Accuracy(unittest.TestCase):
         # 80 triangles are too few for a sphere and enough for a cube.
         self.assertIsNone(result["recommended"][0]["triangles_for_device"])
         self.assertEqual(result["recommended"][3]["triangles_for_device"], 12)
-        # What is recommended keeps the demands in the same file's rows; the next coarser one does not.
+        # The recommended tessellation meets the demands in the same file's rows; the next coarser one does not.
         def keeps(row):
             errors = row["against_shape"]
             return (errors["lost"] == 0 and errors["phantom"] == 0 and errors["depth"]["p999_m"] < 1e-3 and
@@ -71,20 +71,20 @@ class Accuracy(unittest.TestCase):
         drawn = xml.etree.ElementTree.parse(figure).getroot()
         dots = list(drawn.iter("{http://www.w3.org/2000/svg}circle"))
         self.assertEqual(len(dots), len(seen) + len(methods))
-        # The page is well-formed, holds the figure and every table, and asks for nothing.
+        # The page is well-formed, has the figure and every table, and loads nothing.
         root = xml.etree.ElementTree.fromstring(re.sub(r"<!DOCTYPE html>|<script>.*?</script>", "", page.read_text(), flags=re.S))
         self.assertEqual(len(root.findall(".//{http://www.w3.org/2000/svg}svg")), 2)  # for wide and narrow screens
         self.assertEqual(len(root.findall(".//table")), len(re.findall(r"(?m)^\S.*\n  (?:triangles|method|shape|case|wrong) ", done.stdout)))
         self.assertNotRegex(page.read_text(), r"src=|href=\"(?!#|data:)")
         self.assertIn("default-src 'none'; script-src 'sha256-", page.read_text())
-        # Both probes hold every extreme case; nothing is wrong in the search.
+        # Both probes pass every extreme case; the search finds no fault.
         self.assertTrue(all(e["holds"] for e in result["extremes"]))
         self.assertEqual(len(result["extremes"]) % 2, 0)
         self.assertGreaterEqual(len(result["extremes"]), 30)
         self.assertEqual(result["search"]["wrong"], 0)
         self.assertEqual(result["search"]["ticks"], 100000)
         self.assertEqual((result["union_search"]["wrong"], result["union_search"]["ticks"]), (0, 100000))
-        # Unions: the renderers are right where the truth is a closed form, on every case one row for each method.
+        # Unions: the renderers match closed forms; every case has one row for each method.
         unions = result["unions"]
         names = [m["name"] for m in unions["methods"]]
         self.assertEqual(names, ["law", "one per part", "penalties"])
@@ -100,7 +100,7 @@ class Accuracy(unittest.TestCase):
 
     def test_the_search_gives_the_same_counts_with_any_number_of_threads(self):
         one, three = self.dir / "1.json", self.dir / "3.json"
-        # Status 1 where it finds something; here the counts are what is tested.
+        # Status 1 if it finds a fault; this test compares the counts only.
         for jobs, path in ((1, one), (3, three)):
             done = subprocess.run([PALPATE, "accuracy", "--search", "31000", "--jobs", str(jobs), "--json", path],
                                   capture_output=True, text=True, timeout=300)

@@ -1,5 +1,5 @@
-// Every number that `palpate accuracy` measures stands in its JSON, once and under a name, and its
-// tables have their form.
+// Every number measured by `palpate accuracy` is in its JSON once, under a name, and its tables
+// have their form.
 
 #include <gtest/gtest.h>
 
@@ -17,10 +17,10 @@ namespace accuracy_numbers {
 
 using Json = nlohmann::ordered_json;
 
-/// Gives out numbers that nothing else in a report is, and remembers under which names they belong.
+/// Produces numbers that are unique in a report, and remembers their expected names.
 class Numbers {
  public:
-  /// \param path  of the JSON, below what is asked for
+  /// \param path  of the JSON, below the requested root
   template <class T>
   void set(T& value, const std::string& path) {
     value = static_cast<T>(next_);
@@ -39,7 +39,7 @@ class Numbers {
   int next_ = 1'000'003;
 };
 
-/// All numbers of a document above a million, by their path. No key is without a name.
+/// All numbers of a document above a million, by their path. Every key has a name.
 void collect(const Json& value, const std::string& path, std::map<std::string, double>& found) {
   if (value.is_object()) {
     for (const auto& [name, member] : value.items()) {

@@ -19,7 +19,7 @@ rendering::AccuracyRow row_of(const std::string& shape, int triangles, const std
   return row;
 }
 
-// A shape that is added is measured; it must stand in all that is shown of it as well.
+// A new shape is measured automatically; it must appear in all outputs too.
 TEST(AccuracyReport, ShowsEveryShapeThatWasMeasured) {
   AccuracyReport report;
   for (const char* probe : {"ray", "point"}) {

@@ -127,7 +127,8 @@ class AskLevel(CommandCase):
         self.assertEqual((len(levels), self.events(db)), (TRIALS, []))
         self.assertGreater(len(set(levels)), 3)
         self.assertTrue(all(300 <= one <= 600 for one in levels))
-        # Kesten's rule, from the answers on record: the first two steps whole and half, then by turns of the answers.
+        # Kesten's rule, from the recorded answers: the first two steps are whole and half, later ones depend on
+        # reversals.
         answers = [row["success"] == "1" for row in self.exported(db)[1] if row["block_name"] == "stairs"]
         turns = 0
         for at in range(TRIALS - 1):
@@ -135,7 +136,7 @@ class AskLevel(CommandCase):
             divisor = at + 1 if at < 2 else 2 + turns
             expected = levels[at] - 300 / divisor * (answers[at] - 0.75)
             self.assertAlmostEqual(levels[at + 1], min(max(expected, 300), 600), places=6)
-        # Ended by force, it leaves its socket behind, and begins again in spite of that.
+        # A killed program leaves its socket behind, but can start again.
         program.kill()
         program.wait()
         again = subprocess.Popen([sys.executable, EXAMPLE, str(path)])
@@ -191,7 +192,7 @@ class AskLevel(CommandCase):
     def test_recorded_trials_are_not_requested_again(self):
         program, whole = self.asked(lambda message: level(message, 400 + message["trial"]))
         expected = self.levels(whole)
-        # A session that was cut off: the same, with its last five trials taken away.
+        # A session that was cut off: the same without its last five trials.
         (self.dir / "socket").unlink()
         program = self.program(lambda message: level(message, 400 + message["trial"]))
         part = self.dir / "part.db"

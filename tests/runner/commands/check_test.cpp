@@ -1,5 +1,5 @@
-// A study that was run as registered passes the check; each single deviation is named, with its
-// evidence, and nothing else is.
+// A study run as registered passes the check. Each single deviation is named with its evidence, and
+// only that one.
 
 #include <gtest/gtest.h>
 
@@ -57,18 +57,18 @@ void write(const std::string& path, const std::string& text) {
 
 constexpr std::int64_t kHour_ns = 3'600'000'000'000;
 
-/// How a study differs from the registered one; as it is: not at all.
+/// Deviations of a study from the registered one; by default none.
 struct Change {
   std::string protocol = kProtocol;
   int participants = 4;
   bool simulated = false;
-  int simulated_from = 99;  ///< number of the first who is, among people
-  int swap_of = 0;          ///< number of who gets two trials in the wrong order
-  int stop_of = 0;          ///< number of who does not do the last trial
-  int early = 0;            ///< number of who begins before the registration
-  int other_version = 0;    ///< number of who is recorded with another version
+  int simulated_from = 99;  ///< number of the first simulated participant among people
+  int swap_of = 0;          ///< number of the participant with two trials in the wrong order
+  int stop_of = 0;          ///< number of the participant without the last trial
+  int early = 0;            ///< number of the participant who begins before the registration
+  int other_version = 0;    ///< number of the participant recorded with another version
   std::string note = {};    ///< on participant 2
-  int withdraws = 0;        ///< number of who ends by withdrawing
+  int withdraws = 0;        ///< number of the participant who withdraws
 };
 
 class Check : public ::testing::Test {
@@ -120,7 +120,7 @@ class Check : public ::testing::Test {
           if (trial.session == session) trials.push_back(trial);
         }
         if (number == change.swap_of && session == 1) {
-          // Two neighbours of different shapes, so that the order differs, not the numbers.
+          // Swap neighbours of different shapes, so that the order differs but not the counts.
           for (std::size_t i = 0; i + 1 < trials.size(); ++i) {
             if (trials[i].practice || trials[i].stimulus == trials[i + 1].stimulus) continue;
             std::swap(trials[i].stimulus, trials[i + 1].stimulus);
@@ -169,7 +169,7 @@ class Check : public ::testing::Test {
     return check_study(read_registration(registration()), registration(), database(), reported);
   }
 
-  /// Ids of the points that deviate.
+  /// Ids of the deviating points.
   static std::vector<std::string> deviating(const StudyCheck& check) {
     std::vector<std::string> ids;
     for (const CheckPoint& point : check.points) {
@@ -185,7 +185,7 @@ class Check : public ::testing::Test {
     }
     return all;
   }
-  /// That it is this deviation, alone, with these words in its evidence.
+  /// Expects only this deviation, with these words in its evidence.
   static void expect_alone(const StudyCheck& check, const std::string& id,
                            const std::vector<std::string>& words) {
     EXPECT_EQ(deviating(check), std::vector<std::string>{id});
@@ -214,7 +214,7 @@ TEST_F(Check, HypothesesAreJudged) {
   ASSERT_EQ(found.hypotheses.size(), 3U);
   EXPECT_EQ(found.hypotheses[0].second.verdict, analysis::Verdict::corroborated);
   EXPECT_EQ(found.hypotheses[1].second.verdict, analysis::Verdict::undecided);
-  // Both conditions hold: the hypothesis says nothing.
+  // Both conditions hold: the hypothesis is not decided.
   EXPECT_EQ(found.hypotheses[2].second.verdict, analysis::Verdict::undecided);
   EXPECT_EQ(found.hypotheses[2].second.corroborated, true);
   EXPECT_EQ(found.hypotheses[2].second.refuted, true);

@@ -170,7 +170,7 @@ class Cluster(unittest.TestCase):
         self.assertEqual((self.folder / "e/all.sweep").read_bytes(), (self.folder / "old.sweep").read_bytes())
         self.palpate("cluster", "simulate", *self.STUDY, "--shards", 2, "--dir", "f", "--no-submit")
         self.palpate("cluster", "sweep", *self.PLAN, "--shards", 2, "--dir", "g", "--no-submit")
-        for folder in ("f", "g"):  # whatever the default of the program that goes on
+        for folder in ("f", "g"):  # whatever the default of the resuming program
             self.assertIn("--participant-version 3", (self.folder / folder / "shard.sh").read_text())
 
     PLAN_OPTIONS = ["--gain-sd", 0.15, "--residual-sd", 0.5, "--effect", "cone=22,cube=11", "--participants", "4-30",
@@ -196,7 +196,7 @@ class Cluster(unittest.TestCase):
         (self.folder / "false.json").write_text(json.dumps(known))
         self.palpate(*plan, "--reuse", "false.json", "--json", "two.json")
         found = json.loads((self.folder / "two.json").read_text())
-        self.assertEqual(found["curves"][0]["points"][-1]["power"], 0.0125)  # it was taken, not simulated
+        self.assertEqual(found["curves"][0]["points"][-1]["power"], 0.0125)  # it was reused, not simulated
         self.assertEqual(found["curves"][1:], known["curves"][1:])
         for change, words in ((["--residual-sd", 0.6], "another model: residual_sd"), (["--studies", 500], "another simulation: studies"),
                               (["--seed", 3], "another simulation: seed"), (["--effect", "cone=22"], "another model")):
@@ -303,7 +303,7 @@ class Cluster(unittest.TestCase):
             (d / name).chmod(mode)
         self.folder.chmod(0o777)
         refused("others can write to")
-        self.folder.chmod(0o1777)  # nobody else can rename what is in it
+        self.folder.chmod(0o1777)  # other users cannot rename its entries
         (d / "shard.sh").rename(d / "own.sh")
         (d / "shard.sh").symlink_to("own.sh")
         refused("is a link")

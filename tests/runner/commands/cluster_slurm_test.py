@@ -111,7 +111,7 @@ class OnSlurm(unittest.TestCase):
         requeued = self.half_way()
         subprocess.run(["scontrol", "requeue", f"{self.job}_{requeued}"], env=self.slurm.environment, check=True)
 
-        self.half_way()  # its node's daemon goes and comes, the task stays
+        self.half_way()  # its node's daemon restarts, the task stays
         self.slurm.end("n1")
         self.slurm.start_node("n1")
 

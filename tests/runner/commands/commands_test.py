@@ -92,7 +92,7 @@ class Devices(CommandCase):
         wish = ["--timing", "--seconds", "0.1"]
         command = ["prlimit", "--rtprio=0:0", "--memlock=0:0", "setpriv", "--bounding-set=-all", "--inh-caps=-all"]
         if os.geteuid() != 0:
-            command = []  # a user's rights are few
+            command = []  # an ordinary user's rights
         else:
             command += ["--reuid=65534", "--clear-groups"]
         done = subprocess.run(command + [PALPATE, "devices", *wish], capture_output=True, text=True, timeout=60)
@@ -215,7 +215,7 @@ class Simulate(CommandCase):
                 (seen[version],) = connection.execute("SELECT DISTINCT observer_sha256 FROM sessions").fetchone()
             connection.close()
         self.assertEqual(len(set(seen.values())), 3)
-        # Neither a session that is complete nor one more participant takes other settings.
+        # Neither a complete session nor a further participant accepts other settings.
         for people in (1, 2):
             refused = self.simulate(self.dir / "3.db", "--participants", people, "--participant-version", 2, status=2)
             self.assertIn("S001 was simulated with other settings", refused.stderr)
@@ -239,13 +239,13 @@ class Simulate(CommandCase):
             child = subprocess.Popen([PALPATE, "simulate", PROTOCOLS / "quick.json", "--db", begun, "--participants", "3",
                                       *map(str, more)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
             time.sleep(0.3)
-            child.kill()  # wherever it is
+            child.kill()  # at any moment
             child.wait()
             done = self.simulate(begun, "--participants", 3, *more)
             self.assertIn(f"settings version {version}, ", done.stdout)
             self.assertEqual("continues with version" in done.stderr, version != 3, done.stderr)
             self.assertEqual(self.csv_of(begun), self.csv_of(whole))
-        # Other settings than it has are refused as ever.
+        # Settings other than its own are still refused.
         refused = self.simulate(self.dir / "10begun.db", "--participants", 3, *patch, status=2)
         self.assertIn("was simulated with other settings", refused.stderr)
 

@@ -150,7 +150,7 @@ class Explore(unittest.TestCase):
         self.assertEqual((data[:4], data[8:12]), (b"RIFF", b"WEBP"))
         self.assertEqual(struct.unpack("<I", data[4:8])[0] + 8, len(data))
         self.assertIn(b"ANIM", data)
-        # Pictures that do not differ are one that lasts longer: the tip comes down in all of these.
+        # Equal pictures are merged into a longer one; here the tip moves down in all of them.
         self.assertEqual(data.count(b"ANMF"), 5)
 
     def test_nothing_is_overwritten_without_force(self):

@@ -1,4 +1,4 @@
-// A scene that a hand touches while the display looks or does not.
+// A scene touched by a hand, with and without a responsive display.
 
 #include "runner/commands/explore/live_touch.h"
 
@@ -21,11 +21,11 @@ namespace {
 
 using std::chrono::steady_clock;
 
-/// The times are those of 1 kHz; in truth ticks come some hundred times as fast. It stands until it
-/// is started, so that the hand sets out once there is something to touch, not with the thread.
+/// A clock of 1 kHz whose ticks really are some hundred times as fast. It stands still until
+/// started, so that the hand moves only once there is an object to touch.
 class FastClock final : public Clock {
  public:
-  /// \param ticks  between two naps of 0.1 ms
+  /// \param ticks  between two sleeps of 0.1 ms
   explicit FastClock(std::uint64_t ticks = 64) : between_naps_(ticks) {}
   void start() { started_.store(true); }
   std::int64_t now_ns() noexcept override { return now_; }
@@ -42,7 +42,7 @@ class FastClock final : public Clock {
   const std::uint64_t between_naps_;
 };
 
-/// A hand that comes down onto the cube's upper face and stays 3 mm deep.
+/// A hand that moves down onto the cube's upper face and stays 3 mm deep.
 DeviceReading pressing(int tick) {
   const double y = std::max(0.022, 0.05 - 1e-4 * tick);
   DeviceReading reading;
@@ -60,11 +60,11 @@ LiveTouch::Settings settings_of() {
   out.spec.objects = {cube};
   out.renderer = &rendering::ray_renderer();
   out.servo.realtime = {0, false, -1, false};
-  out.servo.ring = 1 << 17;  // at that pace a recorder without the processor falls far behind
+  out.servo.ring = 1 << 17;  // at this rate a recorder that is not scheduled falls far behind
   return out;
 }
 
-/// Only a hang reaches the end.
+/// Times out only if it hangs.
 template <class Condition>
 bool comes_true(Condition condition) {
   const auto end = steady_clock::now() + std::chrono::seconds(60);
@@ -81,7 +81,7 @@ class LiveTouchTest : public ::testing::Test {
   FastClock clock_;
 };
 
-// Five seconds of ticks in which the display does not look once.
+// Five seconds of ticks in which the display takes no samples.
 TEST_F(LiveTouchTest, AStalledDisplayNeitherDelaysNorLosesTicks) {
   LiveTouch touch(device_, clock_, settings_of());
   clock_.start();
@@ -114,7 +114,7 @@ LiveTouch::Settings with_drifting_cube() {
   return settings;
 }
 
-/// What moves is where it is in every moment, and goes where somebody draws it.
+/// Every moment has the poses of moving objects, and objects follow a pull.
 TEST_F(LiveTouchTest, MovingObjectsAreShownAndCanBePulled) {
   LiveTouch touch(device_, clock_, with_drifting_cube());
   clock_.start();
@@ -124,7 +124,7 @@ TEST_F(LiveTouchTest, MovingObjectsAreShownAndCanBePulled) {
   for (std::size_t i = 0; i < 1000; ++i) {
     ASSERT_EQ(moments[i].poses.size(), 2U) << i;
     EXPECT_EQ(moments[i].poses[0].position, Vec3(0)) << i;
-    // The first tick is as long as another.
+    // The first tick is as long as the others.
     EXPECT_NEAR(moments[i].poses[1].position.z, 1e-5 * static_cast<double>(i + 1), 1e-9) << i;
   }
   const Vec3 corner(0.21, 0.01, 0.01), to(0.25, 0.03, 0);
@@ -189,7 +189,7 @@ TEST_F(LiveTouchTest, AHeldSceneGivesNoForceAndDoesNotChange) {
   EXPECT_TRUE(comes_true([&] { return touch.recorded() > before + 100; })) << "it goes on";
 }
 
-/// Each moment is a tick after the one before, in time and in what moves.
+/// Each moment is a tick after the previous one, in time and in the objects' motion.
 void expect_no_gap(const std::vector<SceneMoment>& moments) {
   for (std::size_t i = 1; i < moments.size(); ++i) {
     ASSERT_EQ(moments[i].sample.time_ns - moments[i - 1].sample.time_ns, 1'000'000) << i;
@@ -200,7 +200,7 @@ void expect_no_gap(const std::vector<SceneMoment>& moments) {
 }
 
 TEST_F(LiveTouchTest, APauseKeepsMovingObjectsAndStepsContinueFromIt) {
-  FastClock clock(1);  // no minute may go by while the test has no processor
+  FastClock clock(1);  // no minute may pass while the test is not scheduled
   LiveTouch touch(device_, clock, with_drifting_cube());
   clock.start();
   std::vector<SceneMoment> moments;
@@ -221,7 +221,7 @@ TEST_F(LiveTouchTest, APauseKeepsMovingObjectsAndStepsContinueFromIt) {
     EXPECT_EQ(touch.recorded(), before) << "and no more than " << steps;
   }
   touch.take(moments);
-  // What the hand would have got; in truth the ramp of the forces had just begun.
+  // The full force on the hand; actually the ramp of the forces had just begun.
   EXPECT_NEAR(moments.back().sample.device1.y + moments.back().sample.device2.y, 500 * 0.003, 1e-9);
   touch.hold(false);
   ASSERT_TRUE(comes_true([&] { return touch.recorded() > before + 300; }));
@@ -231,7 +231,7 @@ TEST_F(LiveTouchTest, APauseKeepsMovingObjectsAndStepsContinueFromIt) {
   EXPECT_NEAR(moments.back().poses.at(1).position.z, 0.01 * seconds, 1e-8);
 }
 
-/// The hand went elsewhere meanwhile: no force and no motion until it is back.
+/// The hand has moved away: no force and no motion until it is back.
 TEST_F(LiveTouchTest, AfterAPauseTheSceneResumesOnceTheHandIsBack) {
   std::atomic<double> aside{0};
   testing::FakeDevice device([&](int tick) {
@@ -264,7 +264,7 @@ TEST_F(LiveTouchTest, AfterAPauseTheSceneResumesOnceTheHandIsBack) {
 }
 
 TEST_F(LiveTouchTest, AnotherMaterialActsOnceTheHandHasLeft) {
-  // Down and up again, so that the object is left.
+  // Down and up again, so that the hand leaves the object.
   testing::FakeDevice device([](int tick) {
     const double y = 0.03 - 0.008 * std::sin(0.002 * tick);
     DeviceReading reading;

@@ -16,7 +16,7 @@ import xml.etree.ElementTree
 try:
     import numpy as np
 except ImportError:
-    SYSTEM = "/usr/bin/python3"  # has the system's packages, where PATH begins with another one
+    SYSTEM = "/usr/bin/python3"  # has the system's packages, even if PATH begins with another one
     if pathlib.Path(sys.executable).resolve() == pathlib.Path(SYSTEM).resolve() or not os.access(SYSTEM, os.X_OK):
         sys.exit(77)
     os.execv(SYSTEM, [SYSTEM, *sys.argv])
@@ -132,7 +132,7 @@ def of_touch(trial, tip, velocity, force, depth, contact, episodes):
     normal = force / np.where(size > 0, size, 1)[:, None]
     along = norm(velocity - (velocity * normal).sum(axis=1)[:, None] * normal)
     points = to_object(tip + depth[:, None] * normal)
-    # On a face; the edge nearest to it is the nearer of the faces' other two coordinates.
+    # On a face; the distance to the nearest edge follows from the larger of the other two coordinates.
     away = np.sort(np.abs(np.abs(points) - EDGE / 2), axis=1)
     on_edge = contact & (norm(away[:, :2]) <= 0.003)
     inner = np.zeros(len(size), bool)

@@ -74,7 +74,7 @@ class MovingStimuli(CommandCase):
                         self.assertAlmostEqual(float(at[name]), float(row[f"recorded_{name}"]), delta=0.51e-9)
             place = [[float(row[f"recorded_body_{axis}"]) for axis in "xyz"] for row in rows]
             felt = [float(row["recorded_depth"]) > 0 for row in rows]
-            # Nothing but the hand moves it.
+            # Only the hand moves it.
             first = felt.index(True) if any(felt) else len(rows)
             for at in place[:first]:
                 self.assertEqual(at, place[0])

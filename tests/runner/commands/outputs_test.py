@@ -177,7 +177,7 @@ class Outputs(unittest.TestCase):
         self.refused([*analyze, "--figures", self.dir / "figures"], "report", self.dir / "figures" / "times.svg",
                      status=1)  # the folder is not there yet
         ends = os.pipe()
-        os.close(ends[0])  # nobody reads: the text fails after all was checked
+        os.close(ends[0])  # no reader: writing the text fails after all checks
         before = self.everything()
         done = self.palpate(*analyze, "--report", f"/dev/fd/{ends[1]}", pass_fds=[ends[1]], status=1)
         os.close(ends[1])

@@ -19,7 +19,7 @@ import unittest
 import jsonschema
 
 PALPATE, SOURCE = str(pathlib.Path(sys.argv[1]).resolve()), pathlib.Path(sys.argv[2])
-# As the specification has it, literally.
+# Literally from the specification.
 HYPOTHESES = [{"id": "H1", "text": "Cones are found faster with the ray.",
                "corroborated": "paired.cone.p_holm < 0.05 && paired.cone.reduction > 0",
                "refuted": "paired.cone.ci95_high < 5"}]
@@ -87,7 +87,7 @@ class Register(Study):
             self.assertEqual((folder / name).read_bytes(), source.read_bytes())
         checked = subprocess.run(["sha256sum", "-c", "SHA256SUMS"], cwd=folder, capture_output=True, text=True)
         self.assertEqual(checked.returncode, 0, checked.stdout)
-        self.assertEqual(len(checked.stdout.splitlines()), len(names) - 3)  # those to fill in, and itself
+        self.assertEqual(len(checked.stdout.splitlines()), len(names) - 3)  # excluding files to fill in, and itself
 
     def test_all_files_are_private(self):
         folder = self.base / "registration"

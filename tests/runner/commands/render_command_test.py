@@ -112,7 +112,7 @@ class Render(CommandCase):
                 self.assertAlmostEqual(far[f"{name}_{k}"], held[f"{name}_{k}"], 12)
             self.assertAlmostEqual(far[f"device1_{k}"], 5 * held[f"device1_{k}"], 12)
             self.assertAlmostEqual(far[f"device2_{k}"], held[f"device2_{k}"] - 4 * held[f"device1_{k}"], 12)
-        # About the grip, 0.06 m from the tip along the stylus where nothing else is said.
+        # About the grip, by default 0.06 m from the tip along the stylus.
         grip = self.render(cube + ', "reach": {"factor": 7}}', "ray", real)[0]
         length = (0.12 ** 2 + 0.004 ** 2) ** 0.5
         at = 0.3 + 0.06 * 0.12 / length

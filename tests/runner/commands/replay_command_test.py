@@ -48,7 +48,7 @@ class Replay(CommandCase):
         return db, [(f"{code}/{session}/{trial}", renderer) for code, session, trial, renderer in trials]
 
     def test_poses_of_moving_stimuli_are_recorded_and_replayed(self):
-        # Heavy and slow enough to be where the hand looks for it; lighter ones float away before some trials find them.
+        # Heavy and slow enough to stay within the hand's reach; lighter ones float away before some trials touch them.
         mass, damping, gravity, tick = 2, 10, -0.02, 0.001
         design = protocol()
         design["gravity_m_per_s2"] = [0, 0, gravity]
@@ -67,13 +67,12 @@ class Replay(CommandCase):
             touched = next(i for i, row in enumerate(rows) if row["recorded_depth"] > 0)
             touched_by.add(next(name for name in ("point", "ray") if f", {name}, " in done.stdout))
             self.assertGreater(touched, 100)
-            # Until it is touched it falls as in a fluid.
+            # Before contact it falls as in a fluid.
             for i in range(0, touched, 50):
-                t = (i + 1) * tick  # it is where it is after the tick
+                t = (i + 1) * tick  # its pose is the one after the tick
                 fallen = gravity / damping * (t - (1 - math.exp(-damping * t)) / damping)
                 self.assertAlmostEqual(rows[i]["recorded_body_z"], fallen, delta=1e-12)
-            # From then on it has the momentum that the hand and its weight gave, less what the fluid took, to the
-            # first order in the step.
+            # From then on its momentum is the impulse of hand and weight less the fluid's, to first order in the step.
             for axis, weight in (("x", 0), ("y", 0), ("z", gravity)):
                 given, bound = 0, 1e-12
                 for i, row in enumerate(rows):
@@ -85,7 +84,7 @@ class Replay(CommandCase):
             for row in rows[:: len(rows) // 20]:
                 self.assertAlmostEqual(sum(row[f"recorded_body_q{k}"] ** 2 for k in "wxyz"), 1, delta=1e-12)
         self.assertEqual(touched_by, {"point", "ray"})
-        # One bit of one place that is off is told.
+        # One wrong bit of one place is reported.
         with sqlite3.connect(db) as base:
             packing, count, data = base.execute("SELECT packing, count, data FROM samples LIMIT 1").fetchone()
         base.close()
@@ -160,7 +159,7 @@ class Replay(CommandCase):
             return sum(float(row[f"{name}_{axis}"]) ** 2 for axis in "xyz") ** 0.5
         for name, figure in [("recorded_force", result["recorded"]), ("other_force", result["other"])]:
             self.assertAlmostEqual(max(size(row, name) for row in rows), figure["max_force_n"], 12)
-        # The point has no side: it feels no torque, and less often something.
+        # The point has no side contact: no torque, and less contact.
         self.assertTrue(all(size(row, "other_torque") == 0 for row in rows))
         self.assertLess(result["other"]["share_in_contact"], result["recorded"]["share_in_contact"])
         for row in rows:

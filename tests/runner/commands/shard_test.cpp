@@ -1,4 +1,4 @@
-// Shards: every item in one of them, whatever the counts; what is no shard is refused.
+// Shards: every item is in exactly one of them, whatever the counts; invalid shards are refused.
 
 #include <gtest/gtest.h>
 

@@ -27,7 +27,7 @@ class Soft(CommandCase):
         self.assertEqual(found["n_trials"], 4)
         curve = found["cells"][0]["psychometric_functions"][0]["levels"]
         self.assertEqual([point["level"] for point in curve], levels)
-        # More than twice as soft or as stiff as the standard: nobody takes one for the other.
+        # More than twice as soft or as stiff as the standard: always discriminated.
         self.assertEqual([point["successes"] for point in curve], [0, 0, 1, 1])
 
     def test_objects_that_fall_through_soft_ones_are_reported(self):

@@ -1,4 +1,4 @@
-// "today 09:30", "yesterday 15:02": by the calendar of the place, held against that of <chrono>.
+// "today 09:30", "yesterday 15:02": by the local calendar, compared with <chrono>'s.
 
 #include <gtest/gtest.h>
 
@@ -20,7 +20,7 @@ using std::chrono::sys_days;
 
 constexpr std::int64_t kHour = 3'600'000'000'000;  // ns
 
-/// The day at a place, without its clock.
+/// The local day, without the time of day.
 sys_days day_of(std::int64_t utc_ns) {
   const std::time_t seconds = utc_ns / 1'000'000'000;
   std::tm at{};

@@ -50,8 +50,8 @@ class Stability(unittest.TestCase):
         self.assertEqual(rates, {500, 1000, 2000, 5000, 10000})
         self.assertEqual({(c["loop"]["scene"], c["loop"]["renderer"]) for c in result["curves"] if c["panel"].startswith("scenes")},
                          {(s, r) for s in ("wall", "edge", "sphere", "two objects", "body on a wall") for r in ("point", "ray")})
-        # What can move and is held against a wall has the wall's boundary, with and without passivity controller: one
-        # that gave way, or bounced, would not.
+        # A movable object held against a wall has the wall's boundary, with and without passivity controller; one that
+        # slipped or bounced would not.
         for renderer in ("point", "ray"):
             wall, body = ([point["measured_ns_per_m"] for point in curve["points"]]
                           for name in ("wall", "body on a wall") for curve in result["curves"]
@@ -62,8 +62,8 @@ class Stability(unittest.TestCase):
                                     if (gain["loop"]["renderer"], gain["loop"]["scene"]) == (renderer, name))
             for found, expected in zip(body + body_gain, wall + wall_gain, strict=True):
                 self.assertAlmostEqual(found / expected, 1, delta=0.01)
-        # Theory, worked out again, for the stiffness that is felt: of surface and layer together; through a reach of
-        # 5, one end moves the virtual tip by its lever and the other by one less the other way.
+        # Theory, computed again, for the effective stiffness: of surface and layer together. With a reach of 5, one end
+        # moves the virtual tip by its lever, the other by one less in the opposite direction.
         felt = {"a layer as stiff as the surface": 2, "reach 5 about the tail": 5**2 + 4**2,
                 "reach 5 about the middle": 3**2 + 2**2}
         self.assertLessEqual(set(felt), {curve["name"] for curve in result["theory"] + result["curves"]})
@@ -93,10 +93,10 @@ class Stability(unittest.TestCase):
         self.assertEqual(re.findall(r"([\d.]+) Hz", header), ["62.5", "125", "250", "500", "1000"])
         swings = {float(line.split()[0]): line.split()[1:] for line in lines}
         self.assertEqual(list(swings), [1e3, 1e4, 1e5, 1e6, 1e7])
-        # Without damping (a third of the cases) and with: the slowest rate that a modulus may have.
+        # Without damping (a third of the cases) and with: the slowest allowed rate of a modulus.
         rates = [62.5, 125, 250, 500, 1000]
         least = {1e3: (500, 500), 1e4: (250, 250), 1e5: (250, 125), 1e6: (62.5, 62.5), 1e7: (62.5, 62.5)}
-        # What is too soft for so slow a body is refused; all else comes to rest, within 1 % of the force.
+        # Soft bodies with too slow steps are refused; all others come to rest, within 1 % of the force.
         for modulus, row in swings.items():
             self.assertEqual([cell == "-" for cell in row], [rate < min(least[modulus]) for rate in rates], modulus)
             for cell in row:
@@ -107,7 +107,7 @@ class Stability(unittest.TestCase):
         self.assertEqual(accepted, sum(3 * (rate >= undamped) + 6 * (rate >= damped)
                                        for undamped, damped in least.values() for rate in rates))
         self.assertLessEqual(float(re.search(r"the slowest in ([\d.]+) s", said)[1]), 12.5)
-        # The picture says of every case, in its tooltip, what the table says of the worst.
+        # The figure's tooltips have every case; the table has the worst.
         tips = [" ".join(title.itertext()) for title in
                 xml.etree.ElementTree.parse(figure).getroot().iter("{http://www.w3.org/2000/svg}title")]
         cells = [re.search(r", ([\d.]+) ([kM])Pa, [\d.]+ kN/m, ([\d.]+) Hz: ([\d.e+-]+) %(, refused)?$", tip) for tip in tips]

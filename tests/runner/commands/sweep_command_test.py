@@ -248,7 +248,7 @@ class Sweeps(SweepCase):
                        stdout=subprocess.DEVNULL)
         room = (self.folder / "a.sweep").stat().st_size + 1024
 
-        def little_room():  # a limit of the file's size stands for the disk
+        def little_room():  # a limit on the file's size replaces a full disk
             signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
             resource.setrlimit(resource.RLIMIT_FSIZE, (room, room))
 

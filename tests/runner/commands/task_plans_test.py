@@ -43,7 +43,7 @@ class TaskPlans(CommandCase):
 
     def test_without_a_difference_the_error_rate_is_alpha(self):
         found = self.powers("--jnd-effect", 0, "--trials", "105", "--participants", "8-8")[105, 8]
-        self.assertLessEqual(found["power"], 0.12)  # 0.05 but for the error of 100 studies
+        self.assertLessEqual(found["power"], 0.12)  # 0.05, apart from the error of 100 studies
         self.assertGreaterEqual(found["coverage"], 0.88)
 
     def test_wrong_usage_is_refused(self):
@@ -71,7 +71,7 @@ class TaskPlans(CommandCase):
             for stimulus in ("ball", "die"):
                 self.assertTrue(0 <= float(row[f"accuracy_which_{stimulus}_point"]) <= 1)
             self.assertLessEqual(float(row["bits_which_point"]), 1)
-        # As simulate and analyze find them: the point's seeds are on record.
+        # As found by simulate and analyze: the point's seeds are recorded.
         said = self.palpate("analyze", "--sweep", db, "--pattern", "threshold_stiffer_ball_point > 200",
                             "--json", self.dir / "a.json", "--report", self.dir / "a.html").stdout
         self.assertIn("threshold_stiffer_ball_point", said)

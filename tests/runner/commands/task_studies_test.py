@@ -44,19 +44,20 @@ class TaskStudies(CommandCase):
                 found = json.loads(out.read_text())
                 text, rows = self.exported(db)
                 self.assertEqual(found["n_trials"] + found["n_practice"], len(rows))
-                # The export is analysed to the same cells as the database, which alone knows the procedures and their scale.
+                # The analysis of the export gives the same cells as that of the database; only the database has the
+                # procedures and their scale.
                 scales = set()
                 for cell in found["cells"]:
                     for one in cell.get("psychometric_functions", []):
                         scales.add(one["fit"]["scale"])
                         for track in one.get("tracks", []):
                             kind = track.pop("procedure", {"kind": "constant"})["kind"]
-                            if kind != "staircase":  # which the export, where each could be one, does not know
+                            if kind != "staircase":  # unknown to the export, where each could be one
                                 self.assertEqual(track.pop("reversal_trials"), [], kind)
                 self.assertLessEqual(len(scales), 1)
                 known = ["--scale", *scales] if scales else []
                 exported = self.numbers("--csv", self.dir / f"{name}.csv", *known)["cells"]
-                for cell in (*exported, *found["cells"]):  # which the protocol alone tells
+                for cell in (*exported, *found["cells"]):  # known from the protocol only
                     for name_of_protocol in ("level_unit", "expected_easier"):
                         cell.pop(name_of_protocol)
                 for cell, own in zip(exported, found["cells"]):
@@ -71,7 +72,7 @@ class TaskStudies(CommandCase):
                     self.palpate("export", "--db", db, "--format", kind, "--out", folder)
                     self.assertTrue(any(folder.rglob("*.tsv")) or any(folder.rglob("*.csv")))
                     self.palpate("export", "--db", db, "--format", kind, "--out", folder, "--force")
-                # A second time nothing changes; resumed in parts it is the same; another seed is not.
+                # Repeating changes nothing, resuming in parts gives the same, another seed does not.
                 self.palpate("simulate", protocol, "--db", db, "--participants", 2)
                 self.assertEqual(self.exported(db)[0], text)
                 parts = self.simulated(protocol, f"{name}-parts", participants=1)
@@ -143,7 +144,7 @@ class TaskStudies(CommandCase):
                     self.assertEqual(found["kind"], "staircase")
                     down = {"1": 2, "2": 3}[track["track"]]
                     self.assertAlmostEqual(found["converges_at"], 0.5 ** (1 / down), places=9)
-                    # By the definition: the track's levels where its way turns, two discarded, an even number of them.
+                    # By definition: the track's levels at reversals, the first two discarded, an even number.
                     turns = [track["levels"][trial - 1] for trial in track["reversal_trials"]]
                     kept = turns[2 + (len(turns) - 2) % 2:]
                     self.assertEqual(found["n_reversals"], len(turns))
@@ -189,7 +190,7 @@ class TaskStudies(CommandCase):
         for one in stairs["psychometric_functions"]:
             self.assertEqual(sorted(track["track"] for track in one["tracks"]), ["1", "2"])
             for track in one["tracks"]:
-                # The trials that the procedure counts as reversals, the one that ends the track as well.
+                # The trials counted as reversals by the procedure, including the last of the track.
                 self.assertEqual(len(track["reversal_trials"]), track["procedure"]["n_reversals"])
                 self.assertGreaterEqual(len(track["reversal_trials"]), 5)
                 levels = track["levels"]

@@ -20,7 +20,7 @@ PROTOCOL = {"version": 1, "name": "short", "title": "</script><script>alert(1)</
             "repetitions": 1, "response": {"keys": {"1": "sphere", "2": "cube"}, "time_out_s": 5}, "seed": 7}
 READY = "new Promise(r => { const f = () => window.trial?.shows ? r() : setTimeout(f, 10); f(); })"
 SETTLED = "new Promise(r => requestAnimationFrame(() => requestAnimationFrame(r)))"
-# A browser without a graphics card says so.
+# Messages of a browser without a graphics card.
 OF_THE_MACHINE = ("software WebGL", "GL Driver Message")
 
 
@@ -114,7 +114,7 @@ class Page(unittest.TestCase):
         yaw, pitch = -0.5, 0.42
         right = (math.cos(yaw), math.sin(yaw), 0)
         up = (math.sin(yaw) * -math.sin(pitch), math.cos(yaw) * math.sin(pitch), math.cos(pitch))
-        # Both objects stand about the origin; the cube's corners are the farthest.
+        # Both objects are centred at the origin; the cube's corners are the farthest points.
         radius = math.sqrt(3) * 0.025
         scale = 1 / (1.7 * radius)
         strongest = max(math.hypot(*f) for s in self.document["shows"]
@@ -124,7 +124,7 @@ class Page(unittest.TestCase):
         red, green, blue, _ = pixel(scale * dot(middle, right) * height / width, scale * dot(middle, up))
         self.assertGreater(red, 1.8 * blue, "the arrow")
         self.assertEqual(pixel(-0.98, -0.98)[:3], [255, 255, 255])
-        # The tool that is in free space does not hide the other object: its middle is blue.
+        # The tool in free space does not hide the other object: its middle is blue.
         red, green, blue, _ = self.browser.run(
             "(() => { const c = document.querySelectorAll('canvas')[0], g = c.getContext('webgl'), p = new Uint8Array(4); "
             "trial.seek(0); g.readPixels(c.width >> 1, c.height >> 1, 1, 1, g.RGBA, g.UNSIGNED_BYTE, p); return [...p]; })()")
@@ -175,7 +175,7 @@ class Page(unittest.TestCase):
         self.press("v", 86)
         self.assertEqual(self.browser.run("document.getElementById('views').getAttribute('aria-pressed')"), "true")
         self.press("v", 86)
-        # Plays to the end by itself, and then stops.
+        # It plays to the end and then stops.
         self.browser.run("trial.seek(trial.shows[0].time.at(-1) - 0.2)")
         self.press(" ", 32)
         self.browser.run("new Promise(r => { const f = () => document.getElementById('play').textContent === 'Play' ? r() : "
@@ -223,7 +223,7 @@ class Page(unittest.TestCase):
                 "g.readPixels(1, 1, 1, 1, g.RGBA, g.UNSIGNED_BYTE, p); return p[0]; })()"))
         self.assertEqual(backs[0], 255)
         self.assertLess(backs[1], 60)
-        # Paper is white, whatever the screen was.
+        # Paper is white, whatever the screen's theme.
         self.browser.run("window.dispatchEvent(new Event('beforeprint'))")
         self.assertEqual(self.browser.run(
             "(() => { const c = document.querySelector('canvas'), g = c.getContext('webgl'), p = new Uint8Array(4); "

@@ -119,7 +119,7 @@ class Watch(CommandCase):
             else:
                 for p in corners:
                     self.assertAlmostEqual(math.hypot(*p), 0.03, delta=2e-4)
-            # Closed: every edge is there once in each direction; outward: the volume is positive.
+            # Closed: every edge occurs once in each direction; outward: the volume is positive.
             at = list(map(int, mesh["corner"]))
             triangles = [at[i:i + 3] for i in range(0, len(at), 3)]
             edges = [(t[k], t[(k + 1) % 3]) for t in triangles for k in range(3)]
@@ -143,7 +143,7 @@ class Watch(CommandCase):
         rows = self.replayed(db, "S001/1/1")
         c = document["shows"][0]["columns"]
         self.assertGreater(abs(c["moved_z"][-1]), 1e-5)
-        # Sphere and cube are centred, so the place of their origin is that of their mass.
+        # Sphere and cube are centred, so their origin is their centre of mass.
         for axis in "xyz":
             self.assert_column(c[f"moved_{axis}"], [row[f"recorded_body_{axis}"] for row in rows], METRE)
 

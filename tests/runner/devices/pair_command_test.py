@@ -161,7 +161,7 @@ class Pair(unittest.TestCase):
         return [self.ends.pushes(end) for end in (0, 1)]
 
     def take_points(self):
-        """False where a starved machine kept a device silent."""
+        """False: a busy machine kept a device silent."""
         self.move((0, 0, 0), (0, 0, 0))
         terminal = self.terminal("devices", "--calibrate", *self.options, "--points", 4)
         for point in ((0, 0, 0), (0.03, 0, 0), (0, 0.03, 0), (0, 0, 0.03)):
@@ -210,7 +210,7 @@ class Pair(unittest.TestCase):
                 end = len(lost)
                 self.ends.plug(end, False)
                 terminal.wait_for("the device is unplugged")
-                self.wait(lambda: not self.ends.pushes(1 - end))  # nobody reaches the other one
+                self.wait(lambda: not self.ends.pushes(1 - end))  # the other one receives none
                 self.ends.plug(end, True)
                 lost.add(end)
                 terminal.type(":clear\n:go\n")

@@ -1,4 +1,4 @@
-// The kinds of device by name, and what is known of each without opening one.
+// The kinds of device by name, and their properties known without opening one.
 
 #include "runner/devices/registry.h"
 
@@ -42,7 +42,7 @@ TEST(DeviceKinds, AnUnknownNameIsRefusedWithTheKnownOnes) {
   }
 }
 
-// A real hand that motors move must have a guard.
+// A device with motors, which moves a real hand, must have a guard.
 TEST(DeviceKinds, DevicesWithMotorsAreGuarded) {
   for (const DeviceKind& kind : device_kinds()) {
     const std::string name = kind.name;
@@ -91,14 +91,14 @@ TEST(DeviceKinds, DevicesWithoutMotorsAreAlwaysPresentWithTheConfigsStylus) {
   const rendering::LineProbe stylus = simulated->read().stylus;
   EXPECT_NEAR(stylus.tip.z, 0, 1e-4);
   EXPECT_NEAR(stylus.tip.y, -0.1, 1e-4);
-  // It moves as time goes by at the rate of the config: a rest of 1 s has 500 ticks.
+  // It moves with time at the config's rate: a rest of 1 s has 500 ticks.
   for (int tick = 0; tick < 490; ++tick) simulated->read();
   EXPECT_NEAR(simulated->read().stylus.tip.y, -0.1, 1e-3);
   for (int tick = 0; tick < 375; ++tick) simulated->read();
   EXPECT_NEAR(simulated->read().stylus.tip.y, 0, 2e-3) << "0.75 s later in the middle";
 }
 
-// A maker's library may do all of these; the program goes on.
+// A maker's library may do all of these; the program must continue.
 TEST(DeviceKinds, AreListedInASeparateProcess) {
   DeviceKind kind = device_kind("falcon");
   const auto said = [&kind] {

@@ -44,7 +44,7 @@ TEST(ReplayDevice, GivesTipTailAndButtonsInOrderAndThenIsLost) {
 TEST(ReplayDevice, ItsClockFollowsTheRecordedPeriods) {
   const auto samples = three_samples();
   ReplayDevice device(samples, 1000);
-  // The period before the first tick is not on record: the clock goes to where it is asked to.
+  // The period before the first tick is not recorded: the clock jumps to the requested time.
   const std::int64_t begin = device.now_ns();
   device.wait_until(begin + 700'000);
   EXPECT_EQ(device.now_ns(), begin + 700'000);

@@ -1,5 +1,5 @@
-// A second of readings held against what a hand and a device can do: the limits of each check from
-// both sides, and what is said.
+// A second of readings compared with the limits of hand and device: both sides of each check's
+// limit, and the messages.
 
 #include "runner/devices/self_test.h"
 
@@ -18,7 +18,7 @@ namespace self_testing {
 constexpr int kRate = 200;  // Hz: as many readings
 constexpr double kRadius = 0.2, kResolution = 1e-3;
 
-/// A device of 200 Hz that is asked for more, and that keeps whatever was written.
+/// A device of 200 Hz, run at a higher requested rate, that keeps the written forces.
 class TestedDevice final : public Device {
  public:
   explicit TestedDevice(std::function<DeviceReading(int)> script) : script_(std::move(script)) {
@@ -60,8 +60,8 @@ std::vector<Line> lines_of(TestedDevice& device) {
 }
 
 TEST(SelfTest, ReadsForASecondAtTheDevicesOwnRateWithoutForce) {
-  // 2 of 200 late, and each step and reach as far as may be: a hand makes 2 m/s, that is 10 mm at
-  // 200 Hz, and a reading is off by the resolution, here 1 mm, four times of which are granted.
+  // 2 of 200 late, and each step and reach at its limit: a hand moves at 2 m/s, 10 mm at 200 Hz,
+  // plus four times the resolution, here 1 mm.
   TestedDevice device([](int i) {
     DeviceReading reading = at(i % 2 == 0 ? kRadius + 0.05 - 1e-9 : kRadius + 0.05 - 0.014 + 1e-9);
     if (i < 2) reading.trouble = DeviceTrouble::late;
@@ -107,7 +107,7 @@ TEST(SelfTest, EachFaultIsFoundAndReported) {
                           "largest step 14.002 mm; a hand moves at most 10.0 mm a reading"}}));
 }
 
-// What was lost between two readings says nothing about a jump.
+// Lost readings between two positions do not prove a jump.
 TEST(SelfTest, ALostReadingIsNotCountedAsAJump) {
   TestedDevice device(
       [](int i) { return i == 100 ? lost(DeviceTrouble::none) : at(i < 100 ? -0.1 : 0.1); });

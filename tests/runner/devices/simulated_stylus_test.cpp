@@ -71,8 +71,8 @@ TEST(SimulatedStylus, SettlesInTheEquilibriumOfHandAndForce) {
   EXPECT_NEAR(glm::length(reading.stylus.tail - reading.stylus.tip), 0.12, 1e-9);
 }
 
-/// The stylus after one tick, turned at rest from one direction while the hand points it to
-/// another, in long double.
+/// The stylus after one tick from rest in one direction, with the hand's target in another, in long
+/// double.
 struct Turned {
   using Vec = glm::vec<3, long double, glm::highp>;
   Vec axis;
@@ -86,8 +86,7 @@ struct Turned {
   }
 };
 
-// Whatever is used for small angles in place of sines, it is that to the last digits, and small and
-// large angles meet.
+// The series for small angles agree with the sines to the last digits, and both branches meet.
 TEST(SimulatedStylus, TurnsByRodriguesFormulaToTheLastDigits) {
   SimulatedDeviceSettings device = ideal_device();
   device.resolution = 1e-17;
@@ -95,7 +94,7 @@ TEST(SimulatedStylus, TurnsByRodriguesFormulaToTheLastDigits) {
   const double inertia = device.end_mass * 2 * 0.06 * 0.06;
   Vec3 away(1, 0, 0), spin(0);
   SpringDamper(inertia, hand.turn_damping, hand.turn_stiffness, kStep).advance(away, spin);
-  const auto share = static_cast<long double>(away.x);  // of the angle, that is left after a tick
+  const auto share = static_cast<long double>(away.x);  // of the angle that remains after a tick
   const Vec3 target = glm::normalize(Vec3(0.3, -0.2, 0.9));
   const Vec3 side = glm::normalize(glm::cross(target, Vec3(0.5, 0.8, -0.1)));
   for (double angle = 1e-9; angle < 3; angle *= 1.09) {

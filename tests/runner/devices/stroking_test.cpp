@@ -14,7 +14,7 @@ namespace stroking {
 
 constexpr double kLength = 0.13, kGrip = 0.05, kRate = 1000;
 
-/// m, of the hand at a time in s since it first rested.
+/// Place of the hand, m, at a time in s since its first rest began.
 double wanted_y(const StrokeSettings& s, double time) {
   const double within = std::fmod(time, s.rest + s.stroke);
   if (within < s.rest) return -s.distance;

@@ -20,7 +20,7 @@ from emulator_control import EmulatorControl
 EMULATED, PALPATE = sys.argv[1:3]
 GRAVITY = 9.80665
 PATIENCE = 60  # s
-# What the command says where its guard is not heard from for 20 ms.
+# The command's messages if its guard is silent for 20 ms.
 GUARD_LOST = "the guard process has ended", "the guard process was late"
 
 
@@ -164,7 +164,7 @@ class Devices(unittest.TestCase):
         self.assertIn("EMU1", out)
         force = json.loads(self.calibration.read_text())["forces"][0]
         self.assertEqual(force["serial"], "EMU1")
-        # The mocked bus drops ticks on a busy machine; the procedure itself is held to 2 % elsewhere.
+        # The mocked bus drops ticks on a busy machine; another test limits the procedure's own error to 2 %.
         self.assertAlmostEqual(force["counts_per_newton_metre"] / -5000, 1, delta=0.1)
         self.assertEqual(force["weights_kg"], [0.25])
 
@@ -207,7 +207,7 @@ class Devices(unittest.TestCase):
         places = [(0.02, 0, 0), (-0.02, 0, 0), (0, 0.02, 0), (0, -0.02, 0), (0, 0, 0.02), (0.014, 0.014, -0.015)]
         for number, (x, y, z) in enumerate(places, 1):
             bench.expect(f"Point {number} of 6")
-            # In their own frames; the second is turned half round about the vertical, 3 mm off.
+            # In their own frames; the second is rotated by half a turn about the vertical and shifted by 3 mm.
             bench.control.tell(f"hand 1 {x} {y} {0.125 + z} 2000 60")
             bench.control.tell(f"hand 2 {-x + 0.003} {y} {0.125 - z} 2000 60")
             time.sleep(0.5)

@@ -4,16 +4,16 @@
 //                    [--record PATH] COMMAND...
 //
 // Their serial numbers are EMU1, EMU2, ... Firmware is loaded unless --bare; they are homed unless
-// --bare or --unhomed. Exits as COMMAND does; what they are at then is written to PATH, as by
-// state, and the packets of the first one as by record. Lines written to FIFO do something to
-// Falcon K (from 1), vectors in its own frame:
+// --bare or --unhomed. Exits with COMMAND's status. Writes the final states to PATH, as by state,
+// and the packets of the first Falcon as by record. Lines written to FIFO act on Falcon K (from 1),
+// vectors in its own frame:
 //
 //   unplug K | plug K | lose_homing K | buttons K BITS | firmware_file PATH
-//   hand K X Y Z STIFFNESS DAMPING     the hand wants the grip there (m, N/m, N s/m)
+//   hand K X Y Z STIFFNESS DAMPING     the hand pulls the grip there (m, N/m, N s/m)
 //   shake K METRES                     ... and moves it in and out, as for homing
 //   load K X Y Z MASS                  a force (N) and mass (kg) at the grip
 //   scale K COUNTS                     true counts per newton metre
-//   state PATH                         writes what they are at, as JSON
+//   state PATH                         writes their states as JSON
 //   record K PATH                      writes its newest packets: time (ns, CLOCK_MONOTONIC),
 //                                      commands of the motors (counts), as CSV
 
@@ -64,7 +64,7 @@ nlohmann::json state_of(Emulator& emulator) {
           {"position_m", {p.x, p.y, p.z}}};
 }
 
-/// A new file under its name at once: a reader never sees half of it.
+/// Replaces the file atomically: a reader never sees half of it.
 void write_state(EmulatedBus& bus, int falcons, const std::string& path) {
   nlohmann::json all = nlohmann::json::array();
   for (int i = 0; i < falcons; ++i) {
@@ -152,7 +152,7 @@ bool obey(EmulatedBus& bus, int falcons, const std::string& line) {
 }
 
 void listen(EmulatedBus& bus, int falcons, const std::string& fifo) {
-  // Open for writing, too: it never ends, however many writers come and go.
+  // Open it for writing too: it then never ends, however many writers close it.
   const int file = open(fifo.c_str(), O_RDWR | O_CLOEXEC);
   std::string line;
   for (char letter = 0; read(file, &letter, 1) == 1;) {
@@ -183,7 +183,7 @@ int run(int argc, char** argv) {
                  "[--last PATH] [--record PATH] COMMAND...\n";
     return 2;
   }
-  // A real Falcon does not wait for a processor. Where rights allow, nor does this one.
+  // A real Falcon does not wait for a processor. Use real-time priority if allowed.
   const int usual = getpriority(PRIO_PROCESS, 0);
   setpriority(PRIO_PROCESS, 0, -15);
   EmulatedBus bus;
@@ -214,7 +214,7 @@ int run(int argc, char** argv) {
   if (!last.empty()) write_state(bus, falcons, last);
   if (!record.empty()) write_record(bus, 0, record);
   std::cout.flush();
-  // The listener has no end of its own.
+  // The listener does not end by itself.
   std::_Exit(WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status));
 }
 

@@ -71,7 +71,7 @@ std::string EmulatedNode::sys_path() const {
 
 gboolean EmulatedNode::handle(UMockdevIoctlBase* /*base*/, UMockdevIoctlClient* client,
                               gpointer self) {
-  // A real device does not wait for a processor. Where rights allow, nor does this one.
+  // A real device does not wait for a processor. Use real-time priority if allowed.
   thread_local const bool asked = [] {
     const sched_param priority{60};
     pthread_setschedparam(pthread_self(), SCHED_FIFO, &priority);

@@ -1,6 +1,6 @@
 #pragma once
-// The device node of one emulated Falcon: it comes to the mocked bus and goes, and hands what
-// processes ask of it to its usbfs. Internal to the emulated bus.
+// The device node of one emulated Falcon: it joins and leaves the mocked bus, and passes requests
+// of processes to its usbfs. Internal to the emulated bus.
 
 #include <umockdev.h>
 
@@ -27,7 +27,7 @@ class EmulatedNode {
 
   void plug(int address);
   void unplug();
-  /// Only when nobody has the node open any more: umockdev would lose its clients.
+  /// Call it only when no process has the node open: umockdev would lose its clients.
   void bury();
 
   /// While no process is answered.
@@ -43,13 +43,13 @@ class EmulatedNode {
   };
 
   std::string sys_path() const;
-  // What umockdev calls, in its own threads.
+  // Callbacks of umockdev, in its own threads.
   static gboolean handle(UMockdevIoctlBase* base, UMockdevIoctlClient* client, gpointer self);
   static void vanished(UMockdevIoctlBase* base, UMockdevIoctlClient* client, gpointer self);
 
   UMockdevTestbed* testbed_;
   const int port_;
-  std::mutex mutex_;  // of usbfs_
+  std::mutex mutex_;  // guards usbfs_
   EmulatedUsbfs usbfs_;
   std::string path_;
   UMockdevIoctlBase* handler_ = nullptr;

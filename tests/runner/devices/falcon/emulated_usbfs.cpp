@@ -13,7 +13,7 @@
 namespace palpate::runner::falcon::testing {
 namespace {
 
-constexpr int kPolls = 3;  // a servo looks once a tick; who looks more often is waiting
+constexpr int kPolls = 3;  // a servo polls once a tick; a client that polls more often is waiting
 constexpr auto kIdle = std::chrono::microseconds(30);
 constexpr std::uint8_t kOut = 0x02, kIn = 0x81;
 constexpr std::uint8_t kGetDescriptor = 6, kStringDescriptor = 3, kSerialString = 3;
@@ -103,7 +103,7 @@ bool EmulatedUsbfs::submit(UMockdevIoctlClient* client, UMockdevIoctlData* argum
   if (unplugged) return complete(client, -1, ENODEV);
   Urb urb;
   urb.client = client;
-  // A client that is killed meanwhile gives no memory.
+  // A client killed in the meantime provides no memory.
   urb.request = umockdev_ioctl_data_resolve(argument, 0, sizeof(usbdevfs_urb), nullptr);
   if (urb.request == nullptr) return complete(client, -1, EFAULT);
   const auto size = static_cast<std::size_t>(urb.urb().buffer_length);
@@ -183,7 +183,7 @@ bool EmulatedUsbfs::reap(UMockdevIoctlClient* client, UMockdevIoctlData* argumen
                         [client](const Urb& urb) { return urb.client == client; });
   };
   if (mine() == done_.end() && ++empty_reaps_ > kPolls) {
-    std::this_thread::sleep_for(kIdle);  // or a libusb that waits would spin even faster
+    std::this_thread::sleep_for(kIdle);  // slows the spinning of a waiting libusb
     pump();
   }
   const auto found = mine();

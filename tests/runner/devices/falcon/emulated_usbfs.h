@@ -1,5 +1,5 @@
 #pragma once
-// The kernel's usbfs as one Falcon's node gives it to libusb: its calls, answered by an emulator.
+// The kernel's usbfs of one Falcon's node for libusb: its calls are answered by an emulator.
 // Internal to the emulated bus.
 
 #include <linux/usbdevice_fs.h>
@@ -16,19 +16,19 @@
 
 namespace palpate::runner::falcon::testing {
 
-/// One call at a time: whoever uses it holds the node's lock.
+/// One call at a time: callers hold the node's lock.
 class EmulatedUsbfs {
  public:
   explicit EmulatedUsbfs(std::string serial) : serial_(std::move(serial)) {}
 
-  /// Answers what a process asks of the node. \returns whether it did: always, if with an error.
+  /// Answers a request of a process. \returns true, even for an error
   bool ioctl(UMockdevIoctlClient* client);
   /// A process has closed the node, or died.
   void forget(UMockdevIoctlClient* client);
 
   Emulator emulator;
-  bool held = false;       ///< by another program: nobody here can claim it
-  bool unplugged = false;  ///< what is under way and what comes fails
+  bool held = false;       ///< by another program: it cannot be claimed here
+  bool unplugged = false;  ///< pending and new transfers fail
 
  private:
   struct Urb {
@@ -49,7 +49,7 @@ class EmulatedUsbfs {
   /// A set-up packet and its data; the length of the data, -1 to stall.
   int control(std::uint8_t* packet, std::size_t size);
   std::vector<std::uint8_t> string_descriptor(int index) const;
-  /// Completes the reads that wait, as far as the emulator has packets for them.
+  /// Completes waiting reads for which the emulator has packets.
   void pump();
 
   const std::string serial_;

@@ -18,7 +18,7 @@ constexpr std::int64_t kBootByteNs = 70'000;    // one at 142 857
 constexpr std::int64_t kPacketNs = 107'000;     // 16 at 1.5 M
 constexpr std::int64_t kFirmwareNs = 40'000;    // assumed
 constexpr std::size_t kChipBytes = 62;          // of data in a full IN packet
-constexpr double kIndexCount = -60;             // of each axis: near the middle of its way
+constexpr double kIndexCount = -60;             // of each axis: near the middle of its range
 constexpr double kPowerUpOffset = -700;         // counts, before homing
 constexpr double kStep = 1e-4;                  // s, of the plant
 constexpr std::size_t kRecord = 60'000;         // packets
@@ -229,7 +229,7 @@ std::optional<std::vector<std::uint8_t>> Emulator::in_packet(std::int64_t now_ns
   const std::int64_t latency_ns = std::int64_t{latency_ms_} * 1'000'000;
   const bool full = ready >= kChipBytes || event;
   if (!full && now_ns < last_in_ns_ + latency_ns) return std::nullopt;
-  // The timer runs on its own beat unless it was not listened to for long.
+  // The timer keeps its own period unless it was not polled for long.
   last_in_ns_ = now_ns < last_in_ns_ + 2 * latency_ns && !full ? last_in_ns_ + latency_ns : now_ns;
   std::vector<std::uint8_t> packet = {0x01, 0x60};
   const std::size_t count = std::min({ready, kChipBytes, size - 2});
@@ -271,7 +271,7 @@ void Emulator::move_to(std::int64_t now_ns) {
     force_ = force_of(jacobian(*legs), torque);
     const Vec3 target = plant.hand ? plant.hand(time_) : kCentre;
     Vec3 push = force_ + plant.load + plant.hand_stiffness * (target - position_);
-    // The damper implicitly, so that a stiff hand does not blow up.
+    // Integrate the damper implicitly, so that a stiff hand stays stable.
     velocity_ = (velocity_ + h / plant.mass * push) / (1 + h * plant.hand_damping / plant.mass);
     const double speed = glm::length(velocity_), held = h * plant.friction / plant.mass;
     velocity_ = speed > held ? (1 - held / speed) * velocity_ : Vec3(0);

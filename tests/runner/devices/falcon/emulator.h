@@ -1,7 +1,7 @@
 #pragma once
-// A Falcon that is not there: the USB-serial chip, the boot ROM, the running firmware, and a grip
-// of some mass that motors and a hand pull at. Time is an argument, so that it runs on a real or a
-// virtual clock. Written from the protocol's description, not from the driver.
+// An emulated Falcon: the USB-serial chip, the boot ROM, the running firmware, and a grip with mass
+// that motors and a hand move. Time is an argument, so it runs on a real or a virtual clock.
+// Written from the protocol's description, not from the driver.
 
 #include <array>
 #include <cstdint>
@@ -15,27 +15,27 @@
 
 namespace palpate::runner::falcon::testing {
 
-/// What goes wrong. Counts run from the moment they are set; 0: never.
+/// Faults to inject. Counts start when they are set; 0: never.
 struct EmulatorFaults {
-  int lost_echoes = 0;      ///< of the next uploads, so many lose a byte's echo
-  int wrong_echoes = 0;     ///< of the next uploads, so many echo a wrong byte
+  int lost_echoes = 0;      ///< number of next uploads that lose a byte's echo
+  int wrong_echoes = 0;     ///< number of next uploads that echo a wrong byte
   bool stray_byte = false;  ///< a zero before the monitor's answer
-  int deaf_probes = 0;      ///< the monitor ignores so many probes
+  int deaf_probes = 0;      ///< number of probes that the monitor ignores
   int short_every = 0;      ///< every n-th reply has 14 bytes
-  int split_every = 0;      ///< every n-th reply comes in two parts, 1.5 ms apart
-  int late_every = 0;       ///< every n-th reply comes late by late_ns
+  int split_every = 0;      ///< every n-th reply arrives in two parts, 1.5 ms apart
+  int late_every = 0;       ///< every n-th reply is late by late_ns
   std::int64_t late_ns = 5'000'000;
   bool silent = false;  ///< no replies at all
 };
 
 /// Everything in the Falcon's own frame: m, N, s.
 struct EmulatorPlant {
-  double counts_per_torque = -1e4;  ///< 1/(N m): the true scale, which the driver does not know
-  double mass = 0.15;               ///< kg, of the grip
-  Vec3 load{0, 0, 0};               ///< N, e.g. a weight that hangs at the grip
-  double friction = 0;              ///< N, Coulomb
+  double counts_per_torque = -1e4;               ///< 1/(N m): the true scale, unknown to the driver
+  double mass = 0.15;                            ///< kg, of the grip
+  Vec3 load{0, 0, 0};                            ///< N, e.g. a weight that hangs at the grip
+  double friction = 0;                           ///< N, Coulomb
   double hand_stiffness = 80, hand_damping = 6;  ///< N/m, N s/m
-  /// Where the hand wants the grip at a time (s); it is at rest at the centre by default.
+  /// The hand's target for the grip at a time (s); by default at rest at the centre.
   std::function<Vec3(double)> hand;
 };
 
@@ -54,7 +54,7 @@ class Emulator {
   /// Puts the grip there, at rest.
   void place(const Vec3& position);
 
-  // What it was told, and where it is.
+  // Its commands, and its state.
   Mode mode() const { return mode_; }
   const std::vector<std::uint8_t>& image() const { return image_; }
   int uploads() const { return uploads_; }
@@ -62,9 +62,9 @@ class Emulator {
   std::uint64_t malformed() const { return malformed_; }
   const std::array<int, 3>& motors() const { return motors_; }
   bool torque_is_zero() const { return motors_ == std::array<int, 3>{}; }
-  /// When the motors were last told something else than zero, ns; -1: never.
+  /// Time of the last command other than zero, ns; -1: never.
   std::int64_t last_torque_ns() const { return last_torque_ns_; }
-  /// When a zero command last ended a torque, ns; -1: never.
+  /// Time at which a zero command last ended a torque, ns; -1: never.
   std::int64_t zeroed_ns() const { return zeroed_ns_; }
   int largest_count() const { return largest_count_; }
   /// The newest packets, oldest first; none are lost within a minute at 1 kHz.

@@ -1,4 +1,4 @@
-"""Says to emulated Falcons what happens to them, and asks how they are."""
+"""Controls emulated Falcons and queries their state."""
 
 import csv
 import json
@@ -19,7 +19,7 @@ class EmulatorControl:
         self.patience = patience  # s; only a hang reaches it
         self.fifo = folder / "control"
         os.mkfifo(self.fifo)
-        # Held open for reading, too: nothing is lost before the other side has opened it.
+        # Also open it for reading: no line is lost before the other side opens it.
         self.descriptor = os.open(self.fifo, os.O_RDWR)
 
     def close(self):

@@ -1,5 +1,5 @@
 #pragma once
-// The line to an emulated Falcon in this process, on a clock that goes where it is told.
+// The line to an emulated Falcon in this process, on a clock that tests advance.
 
 #include <algorithm>
 #include <cstdint>
@@ -56,7 +56,7 @@ class FakeTransport final : public Transport {
   bool gone() const noexcept override { return gone_ || unplugged; }
   std::int64_t now_ns() noexcept override { return now_; }
 
-  /// Time passes outside of the driver.
+  /// Lets time pass outside the driver.
   void wait(std::int64_t ns) { now_ += ns; }
 
  private:

@@ -21,7 +21,7 @@ using testing::ScriptedGuide;
 
 constexpr double kLength = 0.12;
 
-/// Two devices that stand somehow to each other; a stiff hand moves the stylus between them.
+/// Two devices in an arbitrary relative pose; a stiff hand moves the stylus between them.
 struct Bench {
   Emulator tip_emulator, tail_emulator;
   FakeTransport *tip_line = nullptr, *tail_line = nullptr;
@@ -145,7 +145,7 @@ TEST(Falcon2, ReadsTheButtonsOfBothGrips) {
   EXPECT_EQ(run(bench, device, 3).buttons, 0x14);
 }
 
-/// Time goes on for both lines.
+/// Advances the time of both lines.
 class BenchClock final : public Clock {
  public:
   explicit BenchClock(Bench& bench) : bench_(bench) {}

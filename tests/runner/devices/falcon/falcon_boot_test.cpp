@@ -68,7 +68,7 @@ class Parrot final : public Transport {
   std::int64_t now_ = 0;
 };
 
-// Only the firmware speaks in replies; what is merely framed like one may be anything on that line.
+// Only the firmware sends valid replies; bytes merely framed like one may be anything on that line.
 TEST(FalconBoot, OnlyAValidReplyShowsRunningFirmware) {
   Packet reply = encode(Reply{{1, -2, 3}, 0, 7});
   Parrot firmware(reply);

@@ -160,7 +160,7 @@ TEST(FalconDriver, LostHomingGivesZeroForce) {
   for (int i = 0; i < 20; ++i) bench.tick(push);
   EXPECT_FALSE(bench.emulator.torque_is_zero());
   bench.emulator.lose_homing();
-  // A tick takes the news, the next carries the zero.
+  // One tick notices it, the next sends zero.
   for (int i = 0; i < 3; ++i) bench.tick(push);
   EXPECT_EQ(bench.driver->reading().trouble, DeviceTrouble::not_homed);
   EXPECT_TRUE(bench.emulator.torque_is_zero());
@@ -227,7 +227,7 @@ TEST(FalconDriver, UnpluggedAndReopened) {
   bench.driver->reopen();
   EXPECT_EQ(bench.line->reopened, 1) << "one that is well is left alone";
   EXPECT_EQ(bench.driver->reading().trouble, DeviceTrouble::none);
-  EXPECT_TRUE(bench.emulator.torque_is_zero());  // restart leaves none
+  EXPECT_TRUE(bench.emulator.torque_is_zero());  // restart leaves no torque
 }
 
 TEST(FalconDriver, LeavesTheMotorsWithoutTorque) {

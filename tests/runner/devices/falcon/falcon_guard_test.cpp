@@ -1,4 +1,4 @@
-// Whatever becomes of the runner, the guard process has the emulated Falcon at zero torque within
+// Whatever happens to the runner, the guard process sets the emulated Falcon to zero torque within
 // 20 ms, over the real libusb. The runner is this program, started again with --runner.
 
 #include <gtest/gtest.h>
@@ -26,7 +26,7 @@ using testing::EmulatedBus;
 using testing::Emulator;
 
 constexpr std::int64_t kLimitNs = 20'000'000, kStarvedNs = 5'000'000;
-// The machine that runs the tests may itself keep the guard from running now and then.
+// The machine may sometimes keep the guard from running.
 constexpr int kAttempts = 4;
 
 /// Pushes with 1.5 N until it is ended.
@@ -37,7 +37,7 @@ int be_runner() {
   while (owned == nullptr) {
     try {
       owned = std::make_unique<GuardedDevice>([] { return open_falcon({}); }, settings);
-    } catch (const std::runtime_error&) {  // the guard of the attempt before is still there
+    } catch (const std::runtime_error&) {  // the guard of the previous attempt still runs
       std::this_thread::sleep_for(std::chrono::milliseconds(100));
     }
   }
@@ -49,7 +49,7 @@ int be_runner() {
     due = std::max(due + 1'000'000, clock.now_ns());
     clock.wait_until(due);
     const DeviceReading reading = device.read();
-    // A zero command arms the guard again where a busy machine has made it cut the force off.
+    // A zero command rearms the guard after a busy machine made it cut off forces.
     const bool cut = reading.trouble == DeviceTrouble::guarded;
     device.write(reading.lost || cut ? Vec3(0) : Vec3(0, 0, 1.5), Vec3(0));
   }
@@ -108,7 +108,7 @@ TEST_P(FalconGuard, ZeroTorqueAtTheDeviceWithin20ms) {
       looked = EmulatedBus::now_ns();
       return bus.read(0, &Emulator::torque_is_zero);
     }));
-    // A machine that does not let this process look every few ms keeps the guard waiting as well.
+    // A machine that does not schedule this process every few ms delays the guard too.
     if (starved > kStarvedNs) continue;
     took = bus.read(0, &Emulator::zeroed_ns) - then;
     std::printf("  zero torque after %.1f ms\n", 1e-6 * static_cast<double>(took));

@@ -29,7 +29,7 @@ std::vector<Vec3> workspace() {
   for (double z = 0.08; z <= 0.176; z += 0.008) {
     for (double x = -0.04; x <= 0.041; x += 0.008) {
       for (double y = -0.04; y <= 0.041; y += 0.008) {
-        // At its ends the device reaches less far from its axis.
+        // At its ends the workspace is narrower.
         if (std::hypot(x, y) < (z < 0.1 || z > 0.15 ? 0.03 : 0.057)) points.emplace_back(x, y, z);
       }
     }
@@ -139,7 +139,7 @@ TEST(FalconKinematics, TorqueAndForceAreInverses) {
 TEST(FalconKinematics, ForceInEveryDirectionIsTheSmallestOfAllDirections) {
   const double max_torque = kMaxCount / std::abs(kCountsPerTorque);
   const double sure = force_in_every_direction(kCentre, max_torque);
-  EXPECT_NEAR(sure, 6.1, 0.1);  // as the table of the scale says
+  EXPECT_NEAR(sure, 6.1, 0.1);  // from the table of the scale
   const Jacobian j = jacobian(*inverse(kCentre));
   double least = 1e9;
   for (double polar = 0; polar <= std::numbers::pi; polar += 0.01) {
@@ -168,7 +168,7 @@ TEST(FalconKinematics, UnreachablePosesHaveNoSolution) {
   EXPECT_EQ(force_in_every_direction({0, 0, 0.5}, 1), 0);
 }
 
-/// Every 16-bit triple must give a place inside of what can be believed, or none.
+/// Every 16-bit triple must give a plausible position or none.
 TEST(FalconKinematics, AbsurdCountsGiveNoPosition) {
   for (int a = -32768; a <= 32767; a += 5461) {
     for (int b = -32768; b <= 32767; b += 5461) {

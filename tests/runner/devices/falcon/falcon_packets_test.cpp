@@ -129,7 +129,7 @@ TEST(FalconPackets, RandomBytesNeverBreakTheStream) {
   Random random(7);
   PacketStream stream;
   const std::string whole = text(encode(Reply{{1, -2, 3}, 0, 7}));
-  // Bytes near the alphabet, so that much looks like a packet.
+  // Bytes near the alphabet, so that many sequences resemble packets.
   constexpr std::string_view kAlphabet = "<>ABCDEFGHIJKLMNOPQ\xC0\xC1";
   std::uint64_t good = 0;
   for (int round = 0; round < 20000; ++round) {
@@ -140,7 +140,7 @@ TEST(FalconPackets, RandomBytesNeverBreakTheStream) {
       EXPECT_EQ(packet.back(), '>');
       good += decode_reply(packet).has_value() ? 1 : 0;
     }
-    const auto found = packets_in(stream, whole);  // '<' restarts: what follows is never lost
+    const auto found = packets_in(stream, whole);  // '<' restarts: the next is never lost
     ASSERT_EQ(found.size(), 1U);
     ASSERT_EQ(text(found[0]), whole);
   }

@@ -56,7 +56,7 @@ class FalconSession(unittest.TestCase):
         return terminal
 
     def hand(self, x, y, z):
-        """The hand takes the grip there: m from the centre, in the Falcon's own frame."""
+        """Moves the hand with the grip: m from the centre, in the Falcon's own frame."""
         self.control.tell(f"hand 1 {x} {y} {0.125 + z} 400 10")
 
     def state(self):
@@ -69,7 +69,7 @@ class FalconSession(unittest.TestCase):
             time.sleep(0.3)
 
     def pushed_and_felt(self, terminal):
-        """Asks for the push until it came whole: a starved machine's guard takes it off."""
+        """Requests the push until it was complete: on a busy machine the guard ends it."""
         self.hand(0, 0, 0)
         self.control.wait_until(lambda: abs(self.state()["position_m"][0]) < 0.001)
         while True:

@@ -32,7 +32,7 @@ std::string open_failure(const std::string& serial) {
   return "";
 }
 
-/// Ticks of a millisecond and somewhat, as the machine allows; until `done` or so many.
+/// Ticks of at least a millisecond, until `done` or the given number.
 template <class Force, class Done>
 int run(FalconDriver& driver, int ticks, Force force, Done done) {
   auto due = std::chrono::steady_clock::now();
@@ -197,7 +197,7 @@ TEST(FalconUsb, UnpluggedInContactAndPluggedInAgain) {
   EXPECT_THROW(driver.reopen(), TransportError);
   bench.bus.plug(0);
   bool open = false;
-  for (int i = 0; i < 200 && !open; ++i) {  // the bus's news take a moment
+  for (int i = 0; i < 200 && !open; ++i) {  // events of the bus take a moment
     try {
       driver.reopen();
       open = true;

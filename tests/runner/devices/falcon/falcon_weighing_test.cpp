@@ -40,9 +40,9 @@ struct Bench {
     settings.cycles = 1;
   }
 
-  /// Holds the grip at first, then lets go and hangs weight after weight.
+  /// Holds the grip at first, then releases it and hangs one weight after another.
   ForceCalibration weigh_all(const std::vector<double>& hung) {
-    const double floating = 0.3;  // N: what the arms weigh
+    const double floating = 0.3;  // N, weight of the arms
     ScriptedGuide guide([&, this](int question) {
       emulator.plant.hand_stiffness = question == 0 ? 200 : 0;
       emulator.plant.hand_damping = question == 0 ? 6 : 0.5;

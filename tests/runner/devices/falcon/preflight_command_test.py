@@ -35,7 +35,7 @@ class Preflight(FalconSession):
         terminal.type("\x1b")
         terminal.wait_for("EMERGENCY by the key Escape: forces are off until the fault is cleared")
         terminal.wait_for("orces are off: zero force was asked for by the key Escape; next: ':clear'")
-        terminal.type(":go\n")  # it is not obeyed before the fault is cleared
+        terminal.type(":go\n")  # it has no effect before the fault is cleared
         for place in ((-0.03, 0, 0), (0.03, 0, 0), (0, -0.03, 0), (0, 0.03, 0), (0, 0, -0.03), (0, 0, 0.03)):
             self.hand(*place)
             self.control.wait_until(lambda: all(abs(is_at - wanted) < 0.002 for is_at, wanted in zip(
@@ -134,7 +134,7 @@ class Preflight(FalconSession):
         terminal.type(":go\n")
         terminal.wait_for("move the stylus")
         terminal.type(":go\n")  # left unchecked
-        while True:  # a starved machine's guard takes the force off and cuts the trial off
+        while True:  # on a busy machine the guard ends forces and cuts the trial off
             self.hand(*AWAY)
             came = terminal.wait_for("[trial, ", "[fault, ", "[paused, ")
             if came != "[trial, ":

@@ -11,7 +11,7 @@ namespace palpate::runner::falcon::testing {
 namespace {
 
 constexpr const char* kPreload = "libumockdev-preload.so.0";
-constexpr const char* kMark = "PALPATE_PRELOADED";  // of our own: umockdev's comes too late
+constexpr const char* kMark = "PALPATE_PRELOADED";  // our own variable: umockdev's is set too late
 
 /// A sanitizer's runtime must come before everything else that is preloaded.
 std::string sanitizer_runtime() {
@@ -29,7 +29,7 @@ std::string sanitizer_runtime() {
 
 bool rerun_preloaded(char** argv) {
   if (std::getenv(kMark) != nullptr) {
-    // Only this program needs it set; what it starts inherits LD_PRELOAD.
+    // Only this program needs it; child processes inherit LD_PRELOAD.
     return dlsym(RTLD_DEFAULT, "umockdev_in_mock_environment") != nullptr;
   }
   std::string preload = sanitizer_runtime();

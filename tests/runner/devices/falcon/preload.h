@@ -1,5 +1,5 @@
 #pragma once
-// umockdev's library must stand before libc: a program that mocks a bus starts itself again with it
+// umockdev's library must be loaded before libc: a program that mocks a bus restarts itself with it
 // preloaded.
 
 namespace palpate::runner::falcon::testing {

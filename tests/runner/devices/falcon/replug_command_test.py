@@ -14,7 +14,7 @@ from falcon_session import AWAY, FalconSession
 
 class Replug(FalconSession):
     def begin(self):
-        """A session behind its pre-flight."""
+        """A session after its pre-flight."""
         terminal = self.run_session("--calibration", self.calibration(0), emulator=["--last", self.folder / "last.json"])
         terminal.wait_for("(':go': push)")
         self.pushed_and_felt(terminal)
@@ -27,7 +27,7 @@ class Replug(FalconSession):
         terminal.type(":clear\n:go\n")
 
     def touch(self, terminal):
-        """Until the grip is pushed at; a starved machine's guard may take the force off before."""
+        """Waits for a force on the grip; on a busy machine the guard may end forces before."""
         while True:
             self.hand(*AWAY)
             if terminal.wait_for("[trial, ", "[fault, ", "[paused, ") != "[trial, ":

@@ -1,5 +1,5 @@
 #pragma once
-// An experimenter who answers at once, after doing what was asked.
+// A scripted experimenter who does each request and answers at once.
 
 #include <functional>
 #include <string>
@@ -12,7 +12,7 @@ namespace palpate::runner::falcon::testing {
 
 class ScriptedGuide final : public Guide {
  public:
-  /// \param act  what is done on the n-th question (from 0); false: stops there.
+  /// \param act  action on the n-th question (from 0); false: stop there.
   explicit ScriptedGuide(std::function<bool(int)> act) : act_(std::move(act)) {}
 
   void say(const std::string& text) override { said.push_back(text); }
@@ -22,7 +22,7 @@ class ScriptedGuide final : public Guide {
     patience_ = kThinking;
   }
   Answer answer() override {
-    if (--patience_ > 0) return Answer::none;  // ticks go on meanwhile
+    if (--patience_ > 0) return Answer::none;  // ticks continue
     return going_on_ ? Answer::go_on : Answer::stop;
   }
 

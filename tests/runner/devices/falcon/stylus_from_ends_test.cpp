@@ -102,7 +102,7 @@ TEST(StylusFromEnds, AStylusThatChangesItsLengthIsAFault) {
   EXPECT_FALSE(stylus.update({0, 0, 0}, {0, 0, 0.01})) << "nothing right has been seen yet";
   EXPECT_TRUE(stylus.update({0, 0, 0}, {0, 0, 0.003}));
   const rendering::LineProbe good = stylus.stylus();
-  for (int i = 1; i < StylusFromEnds::kMaxWrong; ++i) {  // a late reply or two is borne
+  for (int i = 1; i < StylusFromEnds::kMaxWrong; ++i) {  // a few late replies are tolerated
     EXPECT_TRUE(stylus.update({0, 0, 0}, {0, 0, 0.006}));
     EXPECT_EQ(stylus.stylus().tail, good.tail);
     EXPECT_NEAR(stylus.stretch(), 0.006, 1e-12);

@@ -98,7 +98,7 @@ class ForceDimension(unittest.TestCase):
     def test_it_is_listed_and_tested_with_zero_force(self):
         found = self.palpate("devices", "--device", "forcedimension", "--library", STUB, "--json",
                              self.folder / "found.json")
-        # Whether they come in time is the machine's matter.
+        # Their timing depends on the machine.
         self.assertIn("passed  readings arrive: 0 of 1000 readings were lost", found.stdout, found.stderr)
         self.assertIn("connected: 4711", found.stdout)
         self.assertIn("senses 5 degrees of freedom, drives 3; up to 12 N, 5000 N/m", found.stdout)
@@ -125,7 +125,7 @@ class ForceDimension(unittest.TestCase):
         self.assertEqual(self.stub.get("forces_on"), 0)
         self.stub.set(reset=0)
         terminal.wait_for("(':go': push)")
-        while True:  # a starved machine's guard takes the push off
+        while True:  # on a busy machine the guard ends the push
             terminal.type(":go\n")
             self.wait(lambda: self.stub.get("force_y") > 0.5)  # right
             self.assertAlmostEqual(self.stub.get("force_x"), 0)

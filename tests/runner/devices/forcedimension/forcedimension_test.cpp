@@ -1,4 +1,4 @@
-// Force Dimension's devices through a library that stands in for the maker's.
+// Force Dimension's devices through a stub of the maker's library.
 
 #include "runner/devices/forcedimension/forcedimension.h"
 
@@ -24,7 +24,7 @@ using testing::StubState;
 class ForceDimension : public ::testing::Test {
  protected:
   ForceDimension() {
-    // The stub keeps the first file that it maps: each test writes the same one anew.
+    // The stub keeps the first file that it maps: each test rewrites the same file.
     static const palpate::testing::TemporaryFolder folder;
     static const std::string path = folder / "stub";
     setenv("PALPATE_STUB_STATE", path.c_str(), 1);
@@ -38,7 +38,7 @@ class ForceDimension : public ::testing::Test {
   StubDevice& one() { return state_->device[0]; }
   StubDevice& other() { return state_->device[1]; }
   static DeviceTrouble read(Device& device) { return device.read().trouble; }
-  /// Until the status has been asked for again.
+  /// Reads until the status has been queried again.
   static DeviceTrouble settle(Device& device) {
     DeviceTrouble trouble = DeviceTrouble::none;
     for (int tick = 0; tick < 10; ++tick) {
@@ -199,7 +199,7 @@ TEST_F(ForceDimension, ADeviceIsIdentifiedByItsSerialNumberNotItsIndex) {
   const auto device = open(config_);
   EXPECT_NEAR(device->read().stylus.tip.z, 0.05, 1e-12);
   EXPECT_EQ(one().open, 0) << "the other one was let go";
-  one().connected = 0;  // its place is the first now
+  one().connected = 0;  // its index is the first now
   device->reopen();
   EXPECT_NEAR(device->read().stylus.tip.z, 0.05, 1e-12);
   config_.serials = {"5"};

@@ -1,6 +1,6 @@
-// Stands in for Force Dimension's library: its functions over a state that a test sets
-// (stub_state.h; the file is named by PALPATE_STUB_STATE). Written from the public documentation,
-// no code of the maker's. With STUB_OLD it has no watchdog, as older versions.
+// A stub of Force Dimension's library: its functions use a state set by a test (stub_state.h;
+// PALPATE_STUB_STATE names the file). Written from the public documentation, without the maker's
+// code. With STUB_OLD it has no watchdog, like older versions.
 
 #include <array>
 #include <cmath>
@@ -38,7 +38,7 @@ double now() {
   return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
 }
 
-/// The open device of this id that answers; nullptr: none, and why is set.
+/// The open device of this id that answers; nullptr: none, and the error is set.
 StubDevice* device_of(char id) {
   StubDevice& device = state().device[id == kFirstId + 1 ? 1 : 0];
   if (device.connected == 0) {
@@ -56,7 +56,7 @@ void go_limp(StubDevice& device) {
   for (int i = 0; i < 3; ++i) device.force[i] = device.torque[i] = 0;
 }
 
-/// The firmware's own watch.
+/// The firmware's watchdog.
 void watch(StubDevice& device) {
   const bool silent = device.watchdog > 0 && now() - device.last_command > device.watchdog * 125e-6;
   if (device.forces_on != 0 && (silent || device.too_fast != 0 || device.power == 0)) {
@@ -84,7 +84,7 @@ int dhdGetDeviceCount() {
   return state().count < 0 ? fail(2) : there;
 }
 
-/// Indices count what is connected: they move when a device comes or goes.
+/// Indices number the connected devices: they change when a device is added or removed.
 int dhdOpenID(char index) {
   int at = 0;
   for (int i = 0; i < static_cast<int>(state().count); ++i) {
@@ -218,7 +218,7 @@ const char* dhdErrorGetLastStr() {
     case kInUse:
       return "device already in use";
     default:
-      return "an error\x1b[2J";  // no library is trusted with a terminal
+      return "an error\x1b[2J";  // a library's text must not control the terminal
   }
 }
 

@@ -1,6 +1,6 @@
 #pragma once
-// What a test and the stub library share: a file of doubles, mapped by both. Python reads it, too
-// (stub_state.py), so all is a double and the order is fixed.
+// State shared by a test and the stub library: a file of doubles, mapped by both. Python reads it
+// too (stub_state.py), so all members are doubles in a fixed order.
 
 #include <fcntl.h>
 #include <sys/mman.h>
@@ -15,17 +15,17 @@ namespace palpate::runner::testing {
 struct StubDevice {
   // Set by the test.
   double serial = 0;
-  double model = 0;             ///< 0 omega.6, 1 omega.3, 2 sigma.7, 3 one that nobody knows
+  double model = 0;             ///< 0 omega.6, 1 omega.3, 2 sigma.7, 3 unknown
   double hand[3] = {0, 0, 0};   ///< m
-  double hand_stiffness = 400;  ///< N/m: the grip gives way to forces by so much
+  double hand_stiffness = 400;  ///< N/m, of the grip's displacement by forces
   double connected = 1, power = 1, reset = 0, in_use = 0;
   double wrong = 0;  ///< position: 1 NaN, 2 infinite, 3 1e9 m, 4 jumps by 50 mm
   double buttons = 0;
-  double too_fast = 0;  ///< 1: the device takes its forces off by itself
+  double too_fast = 0;  ///< 1: the device switches its forces off
   double error = 0;     ///< code that every call fails with; 0: none
   double delay = 0;     ///< s, of every reading
   // Set by the stub.
-  double force[3] = {0, 0, 0}, torque[3] = {0, 0, 0};  ///< N, N m, that it would push with
+  double force[3] = {0, 0, 0}, torque[3] = {0, 0, 0};  ///< N, N m, of a real device
   double forces_on = 0, brakes = 0, watchdog = 0, open = 0, commands = 0, last_command = 0;
 };
 
@@ -34,7 +34,7 @@ struct StubState {
   StubDevice device[2];
 };
 
-/// Maps the file at `path`, which is made where it does not exist.
+/// Maps the file at `path`, creating it if necessary.
 inline StubState* map_stub_state(const std::string& path) {
   const int file = open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600);
   if (file < 0 || ftruncate(file, sizeof(StubState)) != 0)

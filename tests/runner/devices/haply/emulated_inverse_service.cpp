@@ -1,11 +1,11 @@
 // An emulated Inverse Service, to try palpate without a device:
 //   emulated_inverse_service [PORT]      then: palpate run ... --device inverse3 --service
-//   127.0.0.1:PORT
-// Lines on standard input change it: "hand X Y Z" (m), "grip W X Y Z", "stiffness N_PER_M",
-// "version TEXT", "set NAME 0|1" (present, in_use, calibrated, powered, awake, button, mute,
-// frozen), "delay S", "second LINE" (of the second arm, there once "present" is set), "service 0|1"
-// (0 ends all connections), "stroke" (the hand moves to and fro by itself), "state" (prints force
-// and commands as JSON). It ends with its input, unless the hand strokes.
+//   127.0.0.1:PORT Lines on standard input change it: "hand X Y Z" (m), "grip W X Y Z", "stiffness
+//   N_PER_M", "version TEXT", "set NAME 0|1" (present, in_use, calibrated, powered, awake, button,
+//   mute, frozen), "delay S", "second LINE" (the same for the second arm, which exists once
+//   "present" is set), "service 0|1" (0 ends all connections), "stroke" (the hand moves to and fro
+//   by itself), "state" (prints force and commands as JSON). It ends with its input, unless the
+//   hand strokes.
 
 #include <chrono>
 #include <cmath>
@@ -23,7 +23,7 @@ using palpate::runner::testing::EmulatedService;
 
 namespace {
 
-/// Rests beside the object for a second, then passes through the middle and back.
+/// Rests beside the object for a second, then moves through the middle and back.
 [[noreturn]] void stroke(EmulatedService& service) {
   constexpr double kAway = 0.08;  // m
   for (double t = 0;; t += 0.002) {

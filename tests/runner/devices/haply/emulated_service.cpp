@@ -112,7 +112,7 @@ void EmulatedService::accept() {
           const std::string reply = answer(text, mute, commanded);
           if (!mute) stream.write(asio::buffer(reply));
         }
-      } catch (const std::exception&) {  // the client has gone: its arms are idle
+      } catch (const std::exception&) {  // the client has disconnected: its arms are idle
         const std::scoped_lock arms(mutex_);
         for (std::size_t i = 0; i < arms_.size(); ++i)
           if (commanded[i]) arms_[i].force = {0, 0, 0};
@@ -148,7 +148,7 @@ std::string EmulatedService::answer(const std::string& message, bool& mute,
   Json out = {{"inverse3", Json::array()}, {"verse_grip", Json::array()}};
   for (std::size_t i = 0; i < arms_.size(); ++i) {
     EmulatedArm& arm = arms_[i];
-    // Unknown keys are ignored; a command counts once, and of this client alone.
+    // Ignore unknown keys; a command counts once, and only this client's.
     std::array<double, 3> force{0, 0, 0};
     for (const Json& one : in.value("inverse3", Json::array())) {
       if (one.value("device_id", "") != arm.id || !one.contains("commands")) continue;

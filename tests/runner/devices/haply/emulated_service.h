@@ -1,6 +1,6 @@
 #pragma once
-// An Inverse Service that is not there: the messages of Haply's over WebSocket and HTTP, one arm
-// with a grip, held by a hand that gives way. Written from the public documentation.
+// An emulated Inverse Service: Haply's messages over WebSocket and HTTP, one arm with a grip, held
+// by an elastic hand. Written from the public documentation.
 
 #include <array>
 #include <atomic>
@@ -13,7 +13,7 @@
 
 namespace palpate::runner::testing {
 
-/// What a test sets and sees.
+/// State set and read by a test.
 struct EmulatedArm {
   std::string id = "049D", version = "3.5.0.0", basis = "XYZ";
   bool vector = true;  ///< the key under which it takes forces; else "values"
@@ -24,8 +24,8 @@ struct EmulatedArm {
   bool has_grip = true, awake = true, present = true, in_use = false, calibrated = true,
        powered = true, button = false, mute = false, frozen = false;
   double delay = 0;                      ///< s, of each reply
-  std::string instead;                   ///< sent in place of a state; "": nothing is
-  std::array<double, 3> force{0, 0, 0};  ///< N, that it would push with
+  std::string instead;                   ///< sent instead of a state; "": unused
+  std::array<double, 3> force{0, 0, 0};  ///< N, of a real device
   std::uint64_t commands = 0;
   std::string first;  ///< message of the last connection
 };
@@ -40,7 +40,7 @@ class EmulatedService {
   std::string address() const;  ///< HOST:PORT
   /// Ends all connections; new ones are refused until it is on again.
   void turn(bool on);
-  /// \param which  1: the second arm, which is there once `present` is set
+  /// \param which  1: the second arm, which exists once `present` is set
   template <class Change>
   void with(Change change, std::size_t which = 0) {
     const std::scoped_lock lock(mutex_);

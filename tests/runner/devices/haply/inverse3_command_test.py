@@ -57,7 +57,7 @@ class Service:
 
 
 class Foreign(socketserver.BaseRequestHandler):
-    """A program that has Haply's port."""
+    """Another program that occupies Haply's port."""
 
     def handle(self):
         self.request.recv(4096)
@@ -92,11 +92,11 @@ class Inverse3(unittest.TestCase):
             return db.execute(query).fetchall()
 
     def begin(self, *options):
-        """A session behind its pre-flight."""
+        """A session after its pre-flight."""
         self.service.tell(AWAY)
         terminal = self.run_session(*options)
         terminal.wait_for("(':go': push)")
-        while True:  # a starved machine's guard takes the push off
+        while True:  # on a busy machine the guard ends the push
             terminal.type(":go\n")
             self.wait(lambda: self.service.force()[0] > 0.5 or "check failed" in terminal.hear()[terminal.read_to:])
             self.assertLess(self.service.force()[0], 1 + 1e-6, "one push, not two")
@@ -109,7 +109,7 @@ class Inverse3(unittest.TestCase):
         return terminal
 
     def touch(self, terminal):
-        """Until the hand is pushed at. A starved machine's guard may take the force off before."""
+        """Waits for a force on the hand. On a busy machine the guard may end forces before."""
         while True:
             self.service.tell(AWAY)
             if terminal.wait_for("[trial, ", "[fault, ", "[paused, ") != "[trial, ":

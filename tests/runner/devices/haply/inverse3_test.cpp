@@ -45,7 +45,7 @@ TEST(HaplyMessages, MissingValuesStayMissingAndInvalidMessagesAreRefused) {
   EXPECT_TRUE(std::isnan(state.force.x)) << "not told";
   EXPECT_FALSE(parse_state(R"({"inverse3":[{"device_id":"A","state":{}}]})", "A", "").has_arm);
   EXPECT_FALSE(parse_state(R"({"inverse3":7})", "A", "").has_arm);
-  // A grip that is asleep, or whose quaternion is none.
+  // A grip that is asleep, or has an invalid quaternion.
   for (const char* grip :
        {R"("state":{"orientation":{"w":0,"x":0,"y":0,"z":0}})",
         R"("state":{"orientation":{"w":1}})", R"("state":{})",
@@ -88,7 +88,7 @@ class Inverse3 : public ::testing::Test {
  protected:
   Inverse3() { config_.service = service_.address(); }
 
-  /// Reads as a servo does, with a force to the right, until `holds` or far too long.
+  /// Reads like a servo, with a force to the right, until `holds` or a long time-out.
   bool until(Device& device, const std::function<bool(const DeviceReading&)>& holds,
              const Vec3& force = Vec3(0)) {
     for (int tick = 0; tick < 10'000; ++tick) {

@@ -1,8 +1,8 @@
-// Stands in for OpenHaptics' libHD: its functions and its scheduler over a state that a test sets
-// (forcedimension/stub_state.h; the file is named by PALPATE_STUB_STATE). Written from the public
-// documentation, no code of the maker's. What differs from Force Dimension's: hand in the library's
-// frame (x right, y up, z to the user); `reset` 1: to be calibrated by hand, 2: an update is due;
-// `error` is a code of libHD that every frame reports, 1 all of them for ever; `delay` > 0: the
+// A stub of OpenHaptics' libHD: its functions and scheduler use a state set by a test
+// (forcedimension/stub_state.h; PALPATE_STUB_STATE names the file). Written from the public
+// documentation, without the maker's code. Differences from Force Dimension's: the hand is in the
+// library's frame (x right, y up, z to the user); `reset` 1: calibrate by hand, 2: an update is
+// due; `error` is a code of libHD that every frame reports, 1: errors without end; `delay` > 0: the
 // scheduler stalls.
 
 #include <atomic>
@@ -41,7 +41,7 @@ struct Library {
   unsigned current = 0, pending = 0;  // device of the calling thread; newest error
 };
 
-/// Never destroyed: as the maker's, it is there until the process ends.
+/// Never destroyed: like the maker's, it lives until the process ends.
 Library& library() {
   static auto* const one = new Library;
   return *one;
@@ -49,7 +49,7 @@ Library& library() {
 
 StubDevice& device() { return library().state->device[library().current % 2]; }
 
-/// By its name: the serial number in decimal, or the default one.
+/// Finds a device by its name: the serial number in decimal, or the default one.
 int index_of(const char* name) {
   if (name == nullptr) return 0;
   for (int i = 0; i < static_cast<int>(library().state->count); ++i)

@@ -1,4 +1,4 @@
-// 3D Systems' devices through a library that stands in for the maker's.
+// 3D Systems' devices through a stub of the maker's library.
 
 #include "runner/devices/touch/touch.h"
 
@@ -27,7 +27,7 @@ using testing::StubState;
 class Touch : public ::testing::Test {
  protected:
   Touch() {
-    // The stub keeps the first file that it maps: each test writes the same one anew.
+    // The stub keeps the first file that it maps: each test rewrites the same file.
     static const palpate::testing::TemporaryFolder folder;
     static const std::string path = folder / "stub";
     setenv("PALPATE_STUB_STATE", path.c_str(), 1);
@@ -39,7 +39,7 @@ class Touch : public ::testing::Test {
   }
 
   StubDevice& one() { return state_->device[0]; }
-  /// Reads as a servo does, with a force upwards, until `holds` or far too long.
+  /// Reads like a servo, with a force upwards, until `holds` or a long time-out.
   static bool until(Device& device, const std::function<bool(const DeviceReading&)>& holds,
                     double up = 0) {
     for (int tick = 0; tick < 10'000; ++tick) {
@@ -139,7 +139,7 @@ TEST_F(Touch, EveryFaultIsTroubleAndZeroForceUntilItIsOver) {
     const DeviceReading reading = device->read();
     EXPECT_TRUE(reading.lost);
     EXPECT_TRUE(std::isfinite(reading.stylus.tip.x + reading.stylus.tip.y + reading.stylus.tip.z));
-    if (what != &StubDevice::delay) {  // a scheduler that stands still sets no force at all
+    if (what != &StubDevice::delay) {  // a stalled scheduler sets no force
       EXPECT_TRUE(until(
           *device, [this](const DeviceReading&) { return one().force[1] == 0; }, 1));
     }
@@ -194,7 +194,7 @@ TEST_F(Touch, NamesAreThoseOfTheMakersSetup) {
   EXPECT_EQ(connected(config_).size(), 1U) << "the default one, it may be";
 }
 
-// In a process of its own: a library that was loaded stays.
+// In a separate process: a loaded library stays loaded.
 TEST_F(Touch, ALibraryThatCannotBeUsedSaysWhy) {
   GTEST_FLAG_SET(death_test_style, "threadsafe");
   const auto tell = [this](const char* path) {
