@@ -58,7 +58,7 @@ class DistanceField {
     float slope_x, slope_y, slope_z;  ///< its gradient; of length 1 except at rounded edges
   };
 
-  /// So many places at once, a multiple of kLanes.
+  /// kMost: most places at once, a multiple of kLanes.
   static constexpr int kMost = 32, kLanes = 16;
   struct Places {
     float x[kMost], y[kMost], z[kMost];  // m
@@ -66,7 +66,7 @@ class DistanceField {
   struct Values {
     float distance[kMost], slope_x[kMost], slope_y[kMost], slope_z[kMost];
   };
-  /// \param count  of places; those up to the next multiple of kLanes are looked at, too
+  /// \param count  number of places; the arrays are read up to the next multiple of kLanes
   void distances(const Places& places, int count, float* out) const {
     Cells cells;
     find_cells(places, count, cells);
@@ -115,14 +115,14 @@ class DistanceField {
     return {out.distance[0], out.slope_x[0], out.slope_y[0], out.slope_z[0]};
   }
 
-  /// m; no place is nearer to the solid than its distance from the origin less this.
+  /// m; a place is at least its distance from the origin less this away from the solid.
   float reach() const { return reach_; }
 
  private:
   using Two = float __attribute__((vector_size(8)));
   using Four = float __attribute__((vector_size(16)));
-  /// The values at the corners of a cell: where x is lowest and highest, each at (y, z) lowest, y
-  /// one on, z one on, both.
+  /// The values at the corners of a cell: at its lowest and highest x, each at the lowest (y, z),
+  /// the next y, the next z, and both.
   struct Corners {
     Four low, high;
   };
@@ -141,7 +141,7 @@ class DistanceField {
             __builtin_shufflevector(front, back, 1, 3, 5, 7)};
   }
 
-  // Written so that loops over lanes are vectorised: whole numbers of 32 bits, no branches.
+  // Written for vectorised loops over lanes: 32-bit integers, no branches.
   struct Coordinate {
     std::int32_t cell;
     float fraction;  // within the cell
@@ -154,9 +154,9 @@ class DistanceField {
     return {cell, inside - static_cast<float>(cell), (steps - inside) * step_};
   }
   struct Cells {
-    std::int32_t node[kMost];            // the lowest of the cell
+    std::int32_t node[kMost];            // lowest node of the cell
     float x[kMost], y[kMost], z[kMost];  // fractions within the cell
-    float beyond[kMost];                 // m, out of the grid
+    float beyond[kMost];                 // m, beyond the grid
   };
   void find_cells(const Places& places, int count, Cells& out) const {
     for (int first = 0; first < count; first += kLanes) {

@@ -449,10 +449,10 @@ class ChosenLines {
   float start_[3][kBlock], along_[3][kBlock];
 };
 
-/// A solid that is not convex may have several local minima along the line. Steps of at most
-/// `kPlaces` to its length, longer where the distance, which changes by a metre a metre at most,
-/// leaves nothing to be found; then closer around the least. Within 0.5 mm of the minimum. Many
-/// hypotheses take a step at a time: one would wait for the grid's memory at each.
+/// A solid that is not convex may have several local minima along the line. Samples it in at most
+/// `kPlaces` steps, fewer where the distance (its slope is at most 1) rules out a new minimum; then
+/// refines around the least sample. Finds the minimum within 0.5 mm. Many hypotheses advance
+/// together, because a single one would wait for the grid's memory at each step.
 inline void find_along_line(const SolidLine& shape, float length, Deepest& out) {
   constexpr int kBlock = ShapeHypotheses::kBlock;
   constexpr int kPlaces = 16;
@@ -511,7 +511,7 @@ inline void find_along_line(const SolidLine& shape, float length, Deepest& out) 
   all.values(found_best, there);
   for (int i = 0; i < kBlock; ++i) {
     const FloatVec normal = SolidLine::unit({there.slope_x[i], there.slope_y[i], there.slope_z[i]});
-    // Between the ends a contact's normal is perpendicular to the line.
+    // Between the ends, a contact's normal is perpendicular to the line.
     const bool between = found_best[i] > 0 && found_best[i] < length;
     const FloatVec u = shape.along(i);
     const float slope = dot(normal, u);

@@ -66,8 +66,8 @@ void add_torque_cue(const ShapeLine& shape, const Query& query, const Deepest& d
   }
 }
 
-/// The same for the hypotheses alone that the torque can leave above the floor: each distance is a
-/// look into a grid.
+/// The same, but only for hypotheses that the torque can leave above the floor, because each
+/// distance is a costly look into a grid.
 void add_torque_cue(const SolidLine& shape, const Query& query, const Deepest& deepest,
                     float* log_likelihood) {
   ChosenLines lines(shape);
@@ -90,8 +90,8 @@ void add_torque_cue(const SolidLine& shape, const Query& query, const Deepest& d
     log_likelihood[lines.which(i)] += lane::log(fits[i] / weights[i] + query.torque_floor);
 }
 
-/// Whether some hypothesis of the block is above the floor if the torque fits as well as it can;
-/// else it is the floor for all of them, whatever the torque.
+/// Whether a hypothesis of the block is above the floor if the torque fits perfectly. If not, all
+/// of them are at the floor, whatever the torque.
 bool torque_matters(const Query& query, const float* log_likelihood) {
   float most[8];
   for (int i = 0; i < 8; ++i) most[i] = log_likelihood[i];
