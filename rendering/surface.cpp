@@ -131,8 +131,10 @@ void Surface::build_tree() {
   order_.resize(triangles_.size());
   std::iota(order_.begin(), order_.end(), 0U);
   nodes_.reserve(triangles_.size());
+  normals_.reserve(triangles_.size());
   build_node(middles, 0, static_cast<std::uint32_t>(order_.size()));
   nodes_.shrink_to_fit();
+  normals_.shrink_to_fit();
 }
 
 std::uint32_t Surface::build_node(std::span<const Vec3> middles, std::uint32_t begin,
@@ -157,6 +159,7 @@ std::uint32_t Surface::build_node(std::span<const Vec3> middles, std::uint32_t b
   node.first = begin;
   node.count = end - begin;
   nodes_.push_back(node);
+  normals_.push_back(normals_of(begin, end));
   if (end - begin <= kLeaf) return index;
   const Vec3 extent = last_middle - first_middle;
   int axis = 0;
@@ -173,6 +176,27 @@ std::uint32_t Surface::build_node(std::span<const Vec3> middles, std::uint32_t b
   nodes_[index].first = right;
   nodes_[index].count = 0;
   return index;
+}
+
+Surface::Normals Surface::normals_of(std::uint32_t begin, std::uint32_t end) const {
+  Vec3 low(HUGE_VAL), high(-HUGE_VAL);
+  const auto add = [&](const Vec3& normal) {
+    low = glm::min(low, normal);
+    high = glm::max(high, normal);
+  };
+  for (std::uint32_t i = begin; i < end; ++i) {
+    const SurfaceTriangle& t = triangles_[order_[i]];
+    add(t.normal);
+    for (std::uint32_t k = 0; k < 3; ++k) {
+      if (owns(t, order_[i], k) && t.touches(k))
+        add(triangles_[SurfaceTriangle::triangle_of(t.across[k])].normal);
+    }
+  }
+  Normals out;
+  for (int k = 0; k < 3; ++k)
+    out.middle[static_cast<std::size_t>(k)] = static_cast<float>(0.5 * (low[k] + high[k]));
+  out.radius = rounded_up(0.5 * glm::length(high - low) + 1e-6);
+  return out;
 }
 
 int Surface::winding(const Vec3& point) const {

@@ -30,6 +30,11 @@ struct alignas(64) SurfaceTriangle {
   bool touches(std::uint32_t k) const { return (touched >> k & 1) != 0; }
 };
 
+/// Whether a side that two triangles share is this one's own.
+inline bool owns(const SurfaceTriangle& triangle, std::uint32_t index, std::uint32_t k) {
+  return triangle.across[k] > (index << 2 | k);
+}
+
 /// A closed surface as it stands in an object.
 struct SurfaceShell {
   std::shared_ptr<const stimuli::ClosedSurface> surface;
@@ -55,6 +60,11 @@ class Surface {
     std::uint32_t first = 0;  ///< leaf: of order(); else the right child, the left one is the next
     std::uint32_t count = 0;  ///< leaf: triangles; else 0
   };
+  /// Of a node: the normals of its triangles, and of those beyond their sides, are in a ball.
+  struct Normals {
+    std::array<float, 3> middle;
+    float radius = 0;
+  };
   const stimuli::LargeArray<Node>& nodes() const { return nodes_; }
   const stimuli::LargeArray<std::uint32_t>& order() const { return order_; }
 
@@ -64,6 +74,17 @@ class Surface {
   template <class Visit>
   void near_segment(const Vec3& start, const Vec3& along, double room, const Visit& visit) const;
 
+  /// How far a segment may move: its ends by so much each, what is between them accordingly.
+  struct Motion {
+    double start = 0, end = 0;  ///< m
+    double turn = 0;            ///< m, by which the one may move against the other
+  };
+  /// Calls visit(triangle) for those that an end of such a segment may touch, and those whose sides
+  /// it may touch, which are silhouettes; and some more.
+  template <class Visit>
+  void touchable(const Vec3& start, const Vec3& along, const Motion& motion,
+                 const Visit& visit) const;
+
   /// How often the surface winds round a point that does not lie on it.
   int winding(const Vec3& point) const;
 
@@ -72,11 +93,13 @@ class Surface {
   void find_edges();
   void build_tree();
   std::uint32_t build_node(std::span<const Vec3> middles, std::uint32_t begin, std::uint32_t end);
+  Normals normals_of(std::uint32_t begin, std::uint32_t end) const;
 
   stimuli::LargeArray<Vec3> vertices_;
   stimuli::LargeArray<SurfaceTriangle> triangles_;
   std::vector<stimuli::Material> materials_;
   stimuli::LargeArray<Node> nodes_;
+  stimuli::LargeArray<Normals> normals_;  // by node
   stimuli::LargeArray<std::uint32_t> order_;
   Vec3 centre_;
   double radius_ = 0;

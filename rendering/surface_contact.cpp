@@ -15,8 +15,10 @@ namespace {
 
 constexpr std::size_t kFewNear = 12, kManyNear = 48;    // triangles that a list is to have
 constexpr double kSmallRoom = 1e-6, kLargeRoom = 0.25;  // of the size
-constexpr double kStep = 0.02;                          // rad; a larger turn is taken in steps
-constexpr int kMostSteps = 64, kContactSteps = 8;       // of a tick with a first contact
+constexpr double kSomeTicks = 3;                        // that a short list is made for
+constexpr double kMostOfRoom = 0.75;  // that a motion may take; the rest is for where it is pushed
+constexpr double kStep = 0.02;        // rad; a larger turn is taken in steps
+constexpr int kMostSteps = 64, kContactSteps = 8;  // of a tick with a first contact
 
 }  // namespace
 
@@ -37,86 +39,141 @@ SurfacePlane SurfaceTool::plane_at(const SurfacePatch& patch) const {
   return {patch, plane.normal, plane.depth};
 }
 
-/// m, of any end of a segment, from where it was when triangles were listed.
-double SurfaceTool::moved_from_list(const PosedTool& at, const Vec3& by) const {
-  double most2 = 0;
+/// m, by which the ends of segments are from where they were when triangles were listed.
+EndRooms SurfaceTool::moved_from_list(const PosedTool& at, const Vec3& by) const {
+  double start2 = 0, end2 = 0;
   for (std::size_t j = 0; j < at.count; ++j) {
     const Vec3 start = at.segments[j].start + by - own_.listed.segments[j].start;
     const Vec3 end = start + at.segments[j].along - own_.listed.segments[j].along;
-    most2 = std::max({most2, glm::dot(start, start), glm::dot(end, end)});
+    start2 = std::max(start2, glm::dot(start, start));
+    end2 = std::max(end2, glm::dot(end, end));
   }
-  return std::sqrt(most2);
+  return {std::sqrt(start2), std::sqrt(end2)};
 }
 
-/// Lists the triangles within `room` of the tool; none where they are too many.
-void SurfaceTool::list(const PosedTool& at, double room) {
+/// m, that the tool may still go in any direction with what is listed; not positive: none.
+double SurfaceTool::room_left(const PosedTool& at, const Vec3& by) const {
+  if (!own_.has_list) return 0;
+  const EndRooms moved = moved_from_list(at, by);
+  return std::min(own_.room.start - moved.start, own_.room.end - moved.end);
+}
+
+/// Lists what can be touched within `room` of the tool; nothing where it is too much.
+void SurfaceTool::list(const PosedTool& at, const EndRooms& room, std::size_t most) {
   own_.near.clear();
   own_.listed = at;
   own_.room = room;
   own_.has_list = true;
-  const double far = room + 4 * skin_;
+  const double start = room.start + 4 * skin_, end = room.end + 4 * skin_;
+  const Surface::Motion far{start, end, start + end};  // the ends may move opposite ways
   for (std::size_t j = 0; j < at.count && own_.has_list; ++j) {
     const PosedTool::Segment& segment = at.segments[j];
-    surface_.near_segment(segment.start, segment.along, far, [&](std::uint32_t triangle) {
+    surface_.touchable(segment.start, segment.along, far, [&](std::uint32_t triangle) {
       const std::uint8_t what = within(triangle, segment, far);
       if (what == 0) return true;
-      own_.has_list = own_.near.size() < own_.near.capacity();
+      own_.has_list = own_.near.size() < most;
       if (own_.has_list) own_.near.push_back({triangle, static_cast<std::uint8_t>(j), what});
       return own_.has_list;
     });
   }
 }
 
-/// What of a triangle and a segment can come together while no end of that moves farther than
+/// What of a triangle and a segment can come together while the segment moves no farther than
 /// `far`.
 std::uint8_t SurfaceTool::within(std::uint32_t index, const PosedTool::Segment& segment,
-                                 double far) const {
+                                 const Surface::Motion& far) const {
   const SurfaceTriangle& t = surface_.triangles()[index];
   const Vec3 &a = surface_.vertices()[t.corners[0]], &b = surface_.vertices()[t.corners[1]],
              &c = surface_.vertices()[t.corners[2]];
-  const Vec3 low = glm::min(a, glm::min(b, c)) - far, high = glm::max(a, glm::max(b, c)) + far;
-  const auto end_is_near = [&](const Vec3& p) {
-    return std::abs(glm::dot(t.normal, p - a)) <= far && p.x >= low.x && p.y >= low.y &&
-           p.z >= low.z && p.x <= high.x && p.y <= high.y && p.z <= high.z;
+  const Vec3 low = glm::min(a, glm::min(b, c)), high = glm::max(a, glm::max(b, c));
+  const auto end_is_near = [&](const Vec3& p, double room) {
+    return std::abs(glm::dot(t.normal, p - a)) <= room && p.x >= low.x - room &&
+           p.y >= low.y - room && p.z >= low.z - room && p.x <= high.x + room &&
+           p.y <= high.y + room && p.z <= high.z + room;
   };
-  std::uint8_t what = end_is_near(segment.start) ? surface_pair::kTip : std::uint8_t{0};
+  std::uint8_t what = end_is_near(segment.start, far.start) ? surface_pair::kTip : std::uint8_t{0};
   if (segment.along == Vec3(0)) return what;
-  if (end_is_near(segment.end(true))) what |= surface_pair::kTail;
-  // The ends may move opposite ways.
-  const double turn = 2 * far, own = glm::dot(t.normal, segment.along);
+  if (end_is_near(segment.end(true), far.end)) what |= surface_pair::kTail;
+  const double own = glm::dot(t.normal, segment.along);
   for (std::uint32_t k = 0; k < 3; ++k) {
     if (!owns(t, index, k) || !t.touches(k)) continue;
     const double other = glm::dot(
         surface_.triangles()[SurfaceTriangle::triangle_of(t.across[k])].normal, segment.along);
-    if (std::min(own, other) > turn || std::max(own, other) < -turn) continue;
+    if (std::min(own, other) > far.turn || std::max(own, other) < -far.turn) continue;
+    if (!side_is_near(k == 0 ? a : k == 1 ? b : c, k == 0 ? b : k == 1 ? c : a, segment, far))
+      continue;
     what |= static_cast<std::uint8_t>(1U << k);
   }
   return what;
 }
 
-/// Sees to it that a motion of the tool stays among the triangles that are listed.
+/// Whether a side, from v0 to v1, may be touched by the segment: it is in a ball about its middle.
+bool SurfaceTool::side_is_near(const Vec3& v0, const Vec3& v1, const PosedTool::Segment& segment,
+                               const Surface::Motion& far) const {
+  const Vec3 middle = 0.5 * (v0 + v1) - segment.start, half = 0.5 * (v1 - v0);
+  const double length2 = glm::dot(segment.along, segment.along);
+  const double at = std::clamp(glm::dot(middle, segment.along) / length2, 0.0, 1.0);
+  const double radius = glm::length(half) * (1 + 1e-9);
+  // Farther along, the segment may move farther or less far.
+  const double reach = (radius + std::max(far.start, far.end)) / std::sqrt(length2);
+  const double farthest = std::clamp(far.end > far.start ? at + reach : at - reach, 0.0, 1.0);
+  const double room = radius + far.start + farthest * (far.end - far.start);
+  const Vec3 apart = middle - at * segment.along;
+  return glm::dot(apart, apart) <= room * room;
+}
+
+/// Sees to it that a motion of the tool stays among what is listed.
 void SurfaceTool::keep_list(const PosedTool& from, const PosedTool& to) {
+  const auto is_listed = [&](const PosedTool& at) {
+    const EndRooms moved = moved_from_list(at, Vec3(0));
+    return moved.start <= own_.made_for.start && moved.end <= own_.made_for.end;
+  };
+  if (own_.has_list && is_listed(from) && is_listed(to)) return;
+  if (!own_.crowded) {
+    list_for_some_ticks(from, to);
+    if (own_.has_list) return;
+  }
+  list_for_this_tick(from, to);
+  own_.crowded = !own_.has_list || own_.near.size() > kFewNear / 3 * to.count;
+}
+
+/// As much room as is likely to be wanted, as long as the list stays short.
+void SurfaceTool::list_for_some_ticks(const PosedTool& from, const PosedTool& to) {
   const std::size_t few = kFewNear * to.count, many = kManyNear * to.count;
   const double size = surface_.size();
-  const bool crowded = own_.near.size() > many && own_.room > own_.wanted_room;
-  if (own_.has_list && !crowded && moved_from_list(from, Vec3(0)) < 0.75 * own_.room &&
-      moved_from_list(to, Vec3(0)) < 0.75 * own_.room)
-    return;
   if (!(own_.wanted_room > 0)) own_.wanted_room = 0.01 * size;
   own_.listed = to;
-  const double needed = 3 * moved_from_list(from, Vec3(0)) + 8 * skin_;
-  double room = std::max(needed, own_.wanted_room);
-  list(to, room);
-  while ((!own_.has_list || own_.near.size() > many) && room > needed) {
-    room = std::max(needed, 0.5 * room);
-    list(to, room);
+  const EndRooms moved = moved_from_list(from, Vec3(0));
+  const EndRooms needed{kSomeTicks * moved.start + 8 * skin_, kSomeTicks * moved.end + 8 * skin_};
+  EndRooms room{std::max(needed.start, own_.wanted_room), std::max(needed.end, own_.wanted_room)};
+  list(to, room, many);
+  while (!own_.has_list && (room.start > needed.start || room.end > needed.end)) {
+    room = {std::max(needed.start, 0.5 * room.start), std::max(needed.end, 0.5 * room.end)};
+    list(to, room, many);
   }
-  // A leap has a long list of its own.
+  own_.made_for = {kMostOfRoom * room.start, kMostOfRoom * room.end};
+  const double least = std::min(room.start, room.end);
   if (own_.has_list && own_.near.size() < few)
-    own_.wanted_room = 1.5 * room;
+    own_.wanted_room = 1.5 * least;
   else
-    own_.wanted_room = std::min(room, own_.wanted_room);
+    own_.wanted_room = std::min(least, own_.wanted_room);
   own_.wanted_room = std::clamp(own_.wanted_room, kSmallRoom * size, kLargeRoom * size);
+}
+
+/// No more than what the motion itself passes, and a little about it.
+void SurfaceTool::list_for_this_tick(const PosedTool& from, const PosedTool& to) {
+  PosedTool middle = to;
+  for (std::size_t j = 0; j < to.count; ++j) {
+    PosedTool::Segment& segment = middle.segments[j];
+    segment.start = 0.5 * (from.segments[j].start + to.segments[j].start);
+    segment.along = 0.5 * (from.segments[j].along + to.segments[j].along);
+  }
+  own_.listed = middle;
+  const EndRooms first = moved_from_list(from, Vec3(0)), last = moved_from_list(to, Vec3(0));
+  own_.made_for = {std::max(first.start, last.start), std::max(first.end, last.end)};
+  // Where it is pushed, both of its ends go the same way.
+  const double pushed = own_.made_for.start + 8 * skin_;
+  list(middle, {own_.made_for.start + pushed, own_.made_for.end + pushed}, own_.near.capacity());
 }
 
 /// Whether the virtual tool, which nothing holds, can touch nothing in this tick.
@@ -137,8 +194,8 @@ bool SurfaceTool::far_away() {
   const double near = surface_.radius() + std::sqrt(step2) + 2 * skin_;
   if (distance2 > near * near) return true;
   keep_list(before, now);
-  return own_.has_list && own_.near.empty() && moved_from_list(before, Vec3(0)) < own_.room &&
-         moved_from_list(now, Vec3(0)) < own_.room;
+  return own_.has_list && own_.near.empty() && room_left(before, Vec3(0)) > 0 &&
+         room_left(now, Vec3(0)) > 0;
 }
 
 /// Takes the ideal tool from a pose outside of the surface to as near to another as it may be.

@@ -2,6 +2,7 @@
 // Where a tool can touch a closed surface (surface_contact.h): for a fixed orientation of the tool,
 // patches in the space of its translations. Local frame of the surface, m.
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -45,6 +46,74 @@ void Surface::near_segment(const Vec3& start, const Vec3& along, double room,
     if (!is_near(node)) continue;
     if (node.count == 0) {
       __builtin_prefetch(&nodes_[node.first]);
+      stack[open++] = node.first;
+      stack[open++] = at + 1;
+      continue;
+    }
+    for (std::uint32_t i = node.first; i < node.first + node.count; ++i) {
+      if (!visit(order_[i])) return;
+    }
+  }
+}
+
+template <class Visit>
+void Surface::touchable(const Vec3& start, const Vec3& along, const Motion& motion,
+                        const Visit& visit) const {
+  const Vec3 half = 0.5 * along, middle = start + half, tail = start + along;
+  const Vec3 size(std::abs(half.x), std::abs(half.y), std::abs(half.z));
+  const double length2 = 4 * (half.x * half.x + half.y * half.y + half.z * half.z);
+  const double length = std::sqrt(length2), most = std::max(motion.start, motion.end);
+  const double per_length2 = length2 > 0 ? 1 / length2 : 0;
+  const double turn = motion.turn + 1e-9 * length;
+  const auto end_is_near = [](const Node& node, const Vec3& end, double room) {
+    return std::abs(end.x - static_cast<double>(node.middle[0])) <=
+               static_cast<double>(node.half[0]) + room &&
+           std::abs(end.y - static_cast<double>(node.middle[1])) <=
+               static_cast<double>(node.half[1]) + room &&
+           std::abs(end.z - static_cast<double>(node.middle[2])) <=
+               static_cast<double>(node.half[2]) + room;
+  };
+  const auto side_is_near = [&](const Node& node, const Normals& normals) {
+    const double a0 = node.half[0], b0 = node.half[1], c0 = node.half[2];
+    const double x = middle.x - static_cast<double>(node.middle[0]),
+                 y = middle.y - static_cast<double>(node.middle[1]),
+                 z = middle.z - static_cast<double>(node.middle[2]);
+    if (std::abs(x) > a0 + most + size.x || std::abs(y) > b0 + most + size.y ||
+        std::abs(z) > c0 + most + size.z)
+      return false;
+    // None of them is a silhouette.
+    const double facing = 2 * std::abs(half.x * static_cast<double>(normals.middle[0]) +
+                                       half.y * static_cast<double>(normals.middle[1]) +
+                                       half.z * static_cast<double>(normals.middle[2]));
+    if (facing > turn + length * static_cast<double>(normals.radius)) return false;
+    // Farther along, the segment may move farther or less far.
+    const double at = 0.5 - 2 * (x * half.x + y * half.y + z * half.z) * per_length2;
+    const double reach =
+        2 * (a0 * size.x + b0 * size.y + c0 * size.z) * per_length2 + most * length * per_length2;
+    const double farthest =
+        std::clamp(motion.end > motion.start ? at + reach : at - reach, 0.0, 1.0);
+    const double room = motion.start + farthest * (motion.end - motion.start);
+    const double a = a0 + room, b = b0 + room, c = c0 + room;
+    if (std::abs(x) > a + size.x || std::abs(y) > b + size.y || std::abs(z) > c + size.z)
+      return false;
+    const double slack = 1e-12 * (a + b + c) * (size.x + size.y + size.z);
+    return std::abs(y * half.z - z * half.y) <= b * size.z + c * size.y + slack &&
+           std::abs(z * half.x - x * half.z) <= a * size.z + c * size.x + slack &&
+           std::abs(x * half.y - y * half.x) <= a * size.y + b * size.x + slack;
+  };
+  if (nodes_.empty()) return;
+  std::array<std::uint32_t, 64> stack{};  // halves at each level
+  std::size_t open = 0;
+  stack[open++] = 0;
+  while (open > 0) {
+    const std::uint32_t at = stack[--open];
+    const Node& node = nodes_[at];
+    if (!(length > 0 && side_is_near(node, normals_[at])) &&
+        !end_is_near(node, start, motion.start) && !end_is_near(node, tail, motion.end))
+      continue;
+    if (node.count == 0) {
+      __builtin_prefetch(&nodes_[node.first]);
+      __builtin_prefetch(&normals_[node.first]);
       stack[open++] = node.first;
       stack[open++] = at + 1;
       continue;
@@ -140,11 +209,6 @@ inline constexpr std::uint8_t kAll = 31;
 void sweep_triangle(const Surface& surface, std::uint32_t triangle, std::uint8_t segment,
                     std::uint8_t what, const PosedTool::Segment& from, const PosedTool::Segment& to,
                     double tolerance, double slack, PatchHit& first);
-
-/// Whether a side that two triangles share is this one's own.
-inline bool owns(const SurfaceTriangle& triangle, std::uint32_t index, std::uint32_t k) {
-  return triangle.across[k] > (index << 2 | k);
-}
 
 /// Calls visit(patch) for those of a triangle and of the sides that are its own.
 template <class Visit>

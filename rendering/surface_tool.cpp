@@ -45,7 +45,7 @@ PatchHit SurfaceTool::cast(const Vec3& from, const Vec3& to) const {
   const double length = glm::length(way);
   if (!(length > 0)) return first;
   double done = 0;
-  const double room = own_.has_list ? own_.room - moved_from_list(turned_, from) : 0;
+  const double room = room_left(turned_, from);
   if (room > 0) {
     for (const NearPatch& near : own_.patches)
       cast_on_patch(surface_, near.patch, near.plane, turned_, from, to, tolerance_, first);
@@ -60,8 +60,8 @@ PatchHit SurfaceTool::cast(const Vec3& from, const Vec3& to) const {
     const double reach = 0.5 * (end - done) * length + 2 * skin_;
     for (std::size_t j = 0; j < turned_.count; ++j) {
       const PosedTool::Segment& segment = turned_.segments[j];
-      surface_.near_segment(
-          segment.start + middle, segment.along, reach, [&](std::uint32_t triangle) {
+      surface_.touchable(
+          segment.start + middle, segment.along, {reach, reach}, [&](std::uint32_t triangle) {
             for_each_patch(surface_, triangle, static_cast<std::uint8_t>(j), surface_pair::kAll,
                            segment.along, [&](const SurfacePatch& patch) {
                              cast_on_patch(surface_, patch,
@@ -174,14 +174,14 @@ bool SurfaceTool::in_the_way_at_rest(SurfacePlane& out) const {
     found = true;
     out = {patch, plane.normal, plane.depth};
   };
-  if (own_.has_list && moved_from_list(turned_, exact_) < own_.room) {
+  if (room_left(turned_, exact_) > 0) {
     for (const NearPatch& near : own_.patches) look(near.patch, near.plane);
     return found;
   }
   for (std::size_t j = 0; j < turned_.count; ++j) {
     const PosedTool::Segment& segment = turned_.segments[j];
-    surface_.near_segment(
-        segment.start + exact_, segment.along, 4 * skin_, [&](std::uint32_t triangle) {
+    surface_.touchable(
+        segment.start + exact_, segment.along, {4 * skin_, 4 * skin_}, [&](std::uint32_t triangle) {
           for_each_patch(
               surface_, triangle, static_cast<std::uint8_t>(j), surface_pair::kAll, segment.along,
               [&](const SurfacePatch& patch) { look(patch, plane_of(surface_, patch, turned_)); });
@@ -305,8 +305,7 @@ PatchHit SurfaceTool::sweep(const PosedTool& from, const PosedTool& to, const Ve
     sweep_triangle(surface_, triangle, static_cast<std::uint8_t>(j), what, from.segments[j], end,
                    tolerance_, slack, first);
   };
-  if (own_.has_list && moved_from_list(from, Vec3(0)) < own_.room &&
-      moved_from_list(to, shift) < own_.room) {
+  if (room_left(from, Vec3(0)) > 0 && room_left(to, shift) > 0) {
     for (const NearTriangle& near : own_.near) look(near.triangle, near.segment, near.what);
     return first;
   }
@@ -314,10 +313,11 @@ PatchHit SurfaceTool::sweep(const PosedTool& from, const PosedTool& to, const Ve
     const PosedTool::Segment& a = from.segments[j];
     const PosedTool::Segment b{to.segments[j].start + shift, to.segments[j].along};
     const Vec3 start = 0.5 * (a.start + b.start), along = 0.5 * (a.along + b.along);
-    const double reach =
-        0.5 * std::max(glm::length(b.start - a.start), glm::length(b.end(true) - a.end(true))) +
-        2 * skin_;
-    surface_.near_segment(start, along, reach, [&](std::uint32_t triangle) {
+    const Vec3 turned = 0.5 * (b.along - a.along);
+    const Surface::Motion reach{0.5 * glm::length(b.start - a.start) + 2 * skin_,
+                                0.5 * glm::length(b.end(true) - a.end(true)) + 2 * skin_,
+                                glm::length(turned)};
+    surface_.touchable(start, along, reach, [&](std::uint32_t triangle) {
       look(triangle, j, surface_pair::kAll);
       return true;
     });

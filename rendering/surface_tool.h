@@ -47,9 +47,15 @@ class SurfaceTool {
   bool far_away();
   void step(const ToolPose& target, const ToolPose& from);
   void keep_list(const PosedTool& from, const PosedTool& to);
-  void list(const PosedTool& at, double room);
-  std::uint8_t within(std::uint32_t index, const PosedTool::Segment& segment, double far) const;
-  double moved_from_list(const PosedTool& at, const Vec3& by) const;
+  void list_for_some_ticks(const PosedTool& from, const PosedTool& to);
+  void list_for_this_tick(const PosedTool& from, const PosedTool& to);
+  void list(const PosedTool& at, const EndRooms& room, std::size_t most);
+  std::uint8_t within(std::uint32_t index, const PosedTool::Segment& segment,
+                      const Surface::Motion& far) const;
+  bool side_is_near(const Vec3& v0, const Vec3& v1, const PosedTool::Segment& segment,
+                    const Surface::Motion& far) const;
+  EndRooms moved_from_list(const PosedTool& at, const Vec3& by) const;
+  double room_left(const PosedTool& at, const Vec3& by) const;
   SurfacePlane plane_at(const SurfacePatch& patch) const;
 
   // Turning.

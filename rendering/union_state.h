@@ -85,16 +85,24 @@ struct NearPatch {
   SurfacePatch patch;
 };
 
+/// m, of the first ends of a tool's segments, and of the second ends.
+struct EndRooms {
+  double start = 0, end = 0;
+};
+
 /// A surface's state between ticks. Local frame, m.
 struct SurfaceState {
   std::array<SurfacePatch, kMostPlanes> carrying;  ///< held the ideal tool at the last tick
   std::size_t carrying_count = 0;
-  /// All triangles within `room` of the tool where it was at `listed`.
+  /// All that the tool can touch while no end of it is farther than `room` from its place at
+  /// `listed`.
   std::vector<NearTriangle> near;
   PosedTool listed;
-  double room = 0;
+  EndRooms room;
+  EndRooms made_for;       ///< the part of the room that a motion may use
   double wanted_room = 0;  ///< for the next list
   bool has_list = false;
+  bool crowded = false;            ///< a list for some ticks would be long: each is for one tick
   std::vector<NearPatch> patches;  ///< of this tick
   /// The contacts of the last tick; their friction is in UnionMemory::pairs.
   struct Rubbed {

@@ -10,8 +10,11 @@
 #include <span>
 
 #include "data/base/random.h"
+#include "rendering/surface_patch.h"
+#include "rendering/verification/surface_stroke.h"
 #include "runner/bench/allocation_count.h"
 #include "stimuli/closed_surface.h"
+#include "stimuli/primitives.h"
 #include "tests/shared/union_scenes.h"
 
 namespace palpate::rendering {
@@ -32,6 +35,7 @@ stimuli::Material spring() {
 
 SceneSurface surface_of(const std::vector<stimuli::PolygonSoup>& soups) {
   std::vector<SurfaceShell> shells;
+  shells.reserve(soups.size());
   for (const stimuli::PolygonSoup& soup : soups)
     shells.push_back(
         {std::make_shared<const stimuli::ClosedSurface>(stimuli::closed_surface(soup).surface),
@@ -71,11 +75,13 @@ stimuli::PolygonSoup bent_block(double angle) {
 stimuli::PolygonSoup stairs(Random& random, int cells, double edge) {
   stimuli::PolygonSoup soup;
   std::vector<int> heights;
+  heights.reserve(static_cast<std::size_t>(cells) * static_cast<std::size_t>(cells));
   for (int i = 0; i < cells * cells; ++i)
     heights.push_back(1 + static_cast<int>(random.unit() * cells));
   const auto solid = [&](const std::array<int, 3>& c) {
     if (*std::min_element(c.begin(), c.end()) < 0 || c[0] >= cells || c[1] >= cells) return false;
-    return c[2] < heights[static_cast<std::size_t>(c[0] * cells + c[1])];
+    return c[2] < heights[static_cast<std::size_t>(c[0]) * static_cast<std::size_t>(cells) +
+                          static_cast<std::size_t>(c[1])];
   };
   for (int x = 0; x < cells; ++x) {
     for (int y = 0; y < cells; ++y) {
@@ -401,6 +407,92 @@ TEST_P(SurfaceContact, AThinPlateStopsAFastHand) {
   Rendering r;
   for (int i = 0; i < 12; ++i) r = tick(scene, state, standing({0.003, 0.002, 0.022 - 0.004 * i}));
   EXPECT_NEAR(glm::length(r.force - Vec3(0, 0, kStiffness * 0.022)), 0, 1e-6);
+}
+
+/// A ball with waves, as fine as scans are, in single precision.
+stimuli::PolygonSoup wavy_ball(int subdivisions) {
+  stimuli::PolygonSoup soup = stimuli::icosphere(0.03, subdivisions);
+  for (Vec3& v : soup.vertices) {
+    const Vec3 d = 100.0 * v;
+    const double wave = std::sin(d.x + 2) + std::sin(1.7 * d.y - d.z) + std::sin(0.9 * d.z + 1.3);
+    v = Vec3(glm::vec3((1 + 0.1 * wave) * v));
+  }
+  return soup;
+}
+
+/// A hand whose stylus turns by degrees from tick to tick, over triangles of half a millimetre.
+TEST_P(SurfaceContact, AFineMeshIsNotEnteredByAStylusThatTurnsFast) {
+  const SceneSurface placed = surface_of({wavy_ball(5)});
+  const Surface& surface = *placed.surface;
+  const Scene scene({}, true, {}, nullptr, {placed});
+  RenderState state = scene.initial_state();
+  SurfaceStrokeSettings settings;
+  settings.side = GetParam()->side_contact();
+  SurfaceStroke hand(settings);
+  double depth = 0;
+  int contacts = 0;
+  for (int i = 0; i < 4000; ++i) {
+    const std::uint64_t before = runner::allocations();
+    const Rendering r = tick(scene, state, hand.next(depth));
+    ASSERT_EQ(runner::allocations(), before);
+    depth = r.deepest.depth;
+    if (r.contacts == 0 || (r.faults & render_fault::kReleased) != 0) continue;
+    ++contacts;
+    if (i % 20 != 0) continue;
+    const double rounding = 1e-10 * surface.size();
+    if (settings.side) {
+      ASSERT_LE(through(surface, r.ideal.tip, r.ideal.tail - r.ideal.tip), rounding) << i;
+    } else if (surface.winding(r.ideal.tip) > 0) {
+      ASSERT_LE(distance(surface, r.ideal.tip), rounding) << i;
+    }
+  }
+  EXPECT_GT(contacts, 3000);
+}
+
+/// A segment is laid against a triangle or an edge, then its ends are moved away by as much as they
+/// may move: the triangle is still among those that it can touch.
+TEST(SurfaceTree, FindsAllThatAMovingSegmentCanTouch) {
+  Random random(23);
+  const SceneSurface placed = surface_of({wavy_ball(3)});
+  const Surface& surface = *placed.surface;
+  int sides = 0;
+  for (int i = 0; i < 20000; ++i) {
+    const auto index =
+        static_cast<std::uint32_t>(random.unit() * static_cast<double>(surface.triangles().size()));
+    const SurfaceTriangle& t = surface.triangles()[index];
+    const auto corner = [&](std::uint32_t k) { return surface.vertices()[t.corners[k % 3]]; };
+    const double length = 0.2 * random.unit();
+    Vec3 start, end;
+    if (i % 2 == 0) {  // an end on the triangle
+      const double a = random.unit(), b = (1 - a) * random.unit();
+      start = corner(0) + a * (corner(1) - corner(0)) + b * (corner(2) - corner(0));
+      end = start + length * direction(random);
+      if (i % 4 == 0) std::swap(start, end);
+    } else {  // across a side that is a silhouette
+      const auto k = static_cast<std::uint32_t>(i / 2 % 3);
+      if (!owns(t, index, k) || !t.touches(k)) continue;
+      const Vec3 e = corner(k + 1) - corner(k);
+      const Vec3& other = surface.triangles()[SurfaceTriangle::triangle_of(t.across[k])].normal;
+      const Vec3 along = length * glm::normalize(glm::cross(t.normal + other, glm::normalize(e)) +
+                                                 (random.unit() - 0.5) * glm::normalize(e));
+      if (glm::dot(t.normal, along) * glm::dot(other, along) >= 0) continue;
+      start = corner(k) + random.unit() * e - random.unit() * along;
+      end = start + along;
+      ++sides;
+    }
+    const Surface::Motion motion{1e-3 * random.unit(), 5e-3 * random.unit()};
+    const Vec3 from_start = random.unit() * motion.start * direction(random),
+               from_end = random.unit() * motion.end * direction(random);
+    bool found = false;
+    surface.touchable(start - from_start, (end - from_end) - (start - from_start),
+                      {motion.start, motion.end, motion.start + motion.end},
+                      [&](std::uint32_t triangle) {
+                        found = triangle == index;
+                        return !found;
+                      });
+    ASSERT_TRUE(found) << i;
+  }
+  EXPECT_GT(sides, 1000);
 }
 
 TEST(SurfaceTool, ASingleMeshGivesTheForcesOfItsParts) {
