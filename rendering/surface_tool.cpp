@@ -366,6 +366,11 @@ double SurfaceTool::turn(const ToolPose& from, double most) {
   return 0;
 }
 
+/// Planes that were raised for the way of a turn hold the tool where they are.
+void SurfaceTool::lower_planes() {
+  for (SurfacePlane& plane : planes_.all()) plane.depth = plane_at(plane.patch).depth;
+}
+
 /// Whether a tool that turns to turned_, moved by about at_, gets there without meeting a patch;
 /// then it is there.
 bool SurfaceTool::settle(const PosedTool& from, double most_push) {
@@ -376,6 +381,7 @@ bool SurfaceTool::settle(const PosedTool& from, double most_push) {
     const SurfacePatch patch = patch_after_turn(surface_, own_.carrying[i], turned_);
     if (!holds(patch) && !planes_.full()) planes_.add(plane_at(patch));
   }
+  bool raised = false;
   for (int round = 0; round < kPushRounds; ++round) {
     if (!planes_.empty()) {
       if (!planes_.nearest(wanted, skin_, skin_ / 8, at_)) return false;
@@ -383,14 +389,17 @@ bool SurfaceTool::settle(const PosedTool& from, double most_push) {
       if (!(glm::dot(moved, moved) <= most_push * most_push)) return false;
     }
     const PatchHit hit = sweep(from, turned_, at_);
-    if (!hit.hit()) return true;
+    if (!hit.hit()) {
+      if (raised) lower_planes();
+      return true;
+    }
     const SurfacePatch patch = patch_after_turn(surface_, hit.patch, turned_);
     bool held = false;
     for (SurfacePlane& plane : planes_.all()) {
       if (!(plane.patch == patch)) continue;
       // On its way it dips under an edge that it is above at either end.
       plane.depth += dip;
-      held = true;
+      held = raised = true;
     }
     dip *= 2;
     if (held) continue;

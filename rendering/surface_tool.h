@@ -61,6 +61,7 @@ class SurfaceTool {
   // Turning.
   double turn(const ToolPose& from, double most);
   bool settle(const PosedTool& from, double most_push);
+  void lower_planes();
   PatchHit sweep(const PosedTool& from, const PosedTool& to, const Vec3& shift) const;
 
   // Translating.
