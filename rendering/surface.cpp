@@ -14,8 +14,8 @@ namespace {
 
 constexpr std::uint32_t kLeaf = 4;
 
-/// Six times the volume under d's plane, as exact as doubles make it: its rounding is below the
-/// bound that is returned beside it (Shewchuk 1997, orient3d's filter).
+/// Six times the signed volume below d's plane, in doubles, and a bound of its rounding error
+/// (Shewchuk 1997, orient3d's filter).
 struct Volume {
   double value, bound;
 };
@@ -74,7 +74,7 @@ void Surface::add(const SurfaceShell& shell) {
     t.shell = static_cast<std::uint32_t>(materials_.size());
     const Vec3 &a = vertices_[t.corners[0]], &b = vertices_[t.corners[1]],
                &c = vertices_[t.corners[2]];
-    // Of the two longest sides: the rounding of needles is least.
+    // From the two longest sides: for needles that rounds least.
     const Vec3 ab = b - a, bc = c - b, ca = a - c;
     const double ab2 = glm::dot(ab, ab), bc2 = glm::dot(bc, bc), ca2 = glm::dot(ca, ca);
     Vec3 normal = ab2 >= bc2 && ab2 >= ca2 ? (bc2 > ca2 ? glm::cross(ab, bc) : glm::cross(ca, ab))
@@ -103,12 +103,12 @@ void Surface::find_edges() {
     for (std::uint32_t k = 0; k < 3; ++k) {
       const SurfaceTriangle& other = triangles_[SurfaceTriangle::triangle_of(t.across[k])];
       const std::uint32_t apex = other.corners[(SurfaceTriangle::side_of(t.across[k]) + 2) % 3];
-      // Positive where the other's corner is under this triangle's plane.
+      // Positive if the neighbour's far corner is below this triangle's plane.
       const Volume under = volume_of(a, b, c, vertices_[apex]);
       if (!(under.value < -under.bound)) t.touched |= 1U << k;
     }
   }
-  // Both sides say the same.
+  // Both triangles of an edge must agree.
   for (std::uint32_t i = 0; i < triangles_.size(); ++i) {
     for (std::uint32_t k = 0; k < 3; ++k) {
       const std::uint32_t across = triangles_[i].across[k];
@@ -200,7 +200,7 @@ Surface::Normals Surface::normals_of(std::uint32_t begin, std::uint32_t end) con
 }
 
 int Surface::winding(const Vec3& point) const {
-  // Crossings of a ray, in directions that no file has, until none is within rounding of a side.
+  // Count crossings of a ray. Try odd directions until no crossing is within rounding of a side.
   constexpr int kDirections = 8;
   int count = 0;
   for (int n = 0; n < kDirections; ++n) {

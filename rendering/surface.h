@@ -20,17 +20,17 @@ struct alignas(64) SurfaceTriangle {
   Vec3 normal;                             ///< unit, outward
   double offset = 0;                       ///< m; the plane is dot(normal, p) == offset
   std::array<std::uint32_t, 3> corners{};  ///< counter-clockwise seen from outside
-  /// Side k is from corner k to corner k + 1. Beyond it: the triangle, times four, and its side.
+  /// Side k is from corner k to corner k + 1. The neighbour's index times four, plus its side.
   std::array<std::uint32_t, 3> across{};
   std::uint32_t shell = 0;    ///< index in Surface::materials()
-  std::uint32_t touched = 0;  ///< bit k: a segment can touch side k, it is not concave
+  std::uint32_t touched = 0;  ///< bit k: side k is not concave, so a segment can touch it
 
   static constexpr std::uint32_t triangle_of(std::uint32_t side) { return side >> 2; }
   static constexpr std::uint32_t side_of(std::uint32_t side) { return side & 3; }
   bool touches(std::uint32_t k) const { return (touched >> k & 1) != 0; }
 };
 
-/// Whether a side that two triangles share is this one's own.
+/// Whether this triangle owns the side k that it shares with another.
 inline bool owns(const SurfaceTriangle& triangle, std::uint32_t index, std::uint32_t k) {
   return triangle.across[k] > (index << 2 | k);
 }
@@ -60,7 +60,7 @@ class Surface {
     std::uint32_t first = 0;  ///< leaf: of order(); else the right child, the left one is the next
     std::uint32_t count = 0;  ///< leaf: triangles; else 0
   };
-  /// Of a node: the normals of its triangles, and of those beyond their sides, are in a ball.
+  /// A ball around the normals of a node's triangles and their neighbours across touched edges.
   struct Normals {
     std::array<float, 3> middle;
     float radius = 0;
@@ -68,19 +68,19 @@ class Surface {
   const stimuli::LargeArray<Node>& nodes() const { return nodes_; }
   const stimuli::LargeArray<std::uint32_t>& order() const { return order_; }
 
-  /// Calls visit(triangle) for those whose box is within `room` of the segment, and some more
-  /// (surface_patch.h).
-  /// \param visit  returns whether to go on
+  /// Calls visit(triangle) for all triangles within `room` of the segment, and for some farther
+  /// ones. Defined in surface_patch.h. \param visit  returns whether to continue
   template <class Visit>
   void near_segment(const Vec3& start, const Vec3& along, double room, const Visit& visit) const;
 
-  /// How far a segment may move: its ends by so much each, what is between them accordingly.
+  /// How far a segment may move. Points between its ends move by the interpolated distance.
   struct Motion {
     double start = 0, end = 0;  ///< m
-    double turn = 0;            ///< m, by which the one may move against the other
+    double turn = 0;            ///< m; one end relative to the other
   };
-  /// Calls visit(triangle) for those that an end of such a segment may touch, and those whose sides
-  /// it may touch, which are silhouettes; and some more.
+  /// Calls visit(triangle) for all triangles that the segment can touch within the motion: with an
+  /// end, or on a silhouette edge that the triangle owns. Also visits some that it cannot touch.
+  /// \param visit  returns whether to continue
   template <class Visit>
   void touchable(const Vec3& start, const Vec3& along, const Motion& motion,
                  const Visit& visit) const;

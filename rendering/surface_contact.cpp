@@ -13,12 +13,12 @@
 namespace palpate::rendering {
 namespace {
 
-constexpr std::size_t kFewNear = 12, kManyNear = 48;    // triangles that a list is to have
+constexpr std::size_t kFewNear = 12, kManyNear = 48;    // wanted length of a list
 constexpr double kSmallRoom = 1e-6, kLargeRoom = 0.25;  // of the size
-constexpr double kSomeTicks = 3;                        // that a short list is made for
-constexpr double kMostOfRoom = 0.75;  // that a motion may take; the rest is for where it is pushed
-constexpr double kStep = 0.02;        // rad; a larger turn is taken in steps
-constexpr int kMostSteps = 64, kContactSteps = 8;  // of a tick with a first contact
+constexpr double kSomeTicks = 3;                        // a short list lasts for about so many
+constexpr double kMostOfRoom = 0.75;                    // for the motion; the rest is for pushes
+constexpr double kStep = 0.02;                          // rad; larger turns are divided
+constexpr int kMostSteps = 64, kContactSteps = 8;       // steps of a tick; at a first contact
 
 }  // namespace
 
@@ -39,7 +39,7 @@ SurfacePlane SurfaceTool::plane_at(const SurfacePatch& patch) const {
   return {patch, plane.normal, plane.depth};
 }
 
-/// m, by which the ends of segments are from where they were when triangles were listed.
+/// m, the greatest distances of segment ends from their places in the list.
 EndRooms SurfaceTool::moved_from_list(const PosedTool& at, const Vec3& by) const {
   double start2 = 0, end2 = 0;
   for (std::size_t j = 0; j < at.count; ++j) {
@@ -51,14 +51,15 @@ EndRooms SurfaceTool::moved_from_list(const PosedTool& at, const Vec3& by) const
   return {std::sqrt(start2), std::sqrt(end2)};
 }
 
-/// m, that the tool may still go in any direction with what is listed; not positive: none.
+/// m, how far the tool may still move in any direction before the list is incomplete.
 double SurfaceTool::room_left(const PosedTool& at, const Vec3& by) const {
   if (!own_.has_list) return 0;
   const EndRooms moved = moved_from_list(at, by);
   return std::min(own_.room.start - moved.start, own_.room.end - moved.end);
 }
 
-/// Lists what can be touched within `room` of the tool; nothing where it is too much.
+/// Lists everything within `room` of the tool that it can touch. Clears has_list if that is more
+/// than `most`.
 void SurfaceTool::list(const PosedTool& at, const EndRooms& room, std::size_t most) {
   own_.near.clear();
   own_.listed = at;
@@ -78,8 +79,8 @@ void SurfaceTool::list(const PosedTool& at, const EndRooms& room, std::size_t mo
   }
 }
 
-/// What of a triangle and a segment can come together while the segment moves no farther than
-/// `far`.
+/// The parts of a triangle that the segment can touch while it moves by at most `far`: bits of
+/// surface_pair.
 std::uint8_t SurfaceTool::within(std::uint32_t index, const PosedTool::Segment& segment,
                                  const Surface::Motion& far) const {
   const SurfaceTriangle& t = surface_.triangles()[index];
@@ -107,7 +108,7 @@ std::uint8_t SurfaceTool::within(std::uint32_t index, const PosedTool::Segment& 
   return what;
 }
 
-/// Whether a side, from v0 to v1, may be touched by the segment: it is in a ball about its middle.
+/// Whether the segment may reach the ball around the edge from v0 to v1.
 bool SurfaceTool::side_is_near(const Vec3& v0, const Vec3& v1, const PosedTool::Segment& segment,
                                const Surface::Motion& far) const {
   const Vec3 middle = 0.5 * (v0 + v1) - segment.start, half = 0.5 * (v1 - v0);
@@ -122,7 +123,7 @@ bool SurfaceTool::side_is_near(const Vec3& v0, const Vec3& v1, const PosedTool::
   return glm::dot(apart, apart) <= room * room;
 }
 
-/// Sees to it that a motion of the tool stays among what is listed.
+/// Renews the list if the motion of the tool may leave it.
 void SurfaceTool::keep_list(const PosedTool& from, const PosedTool& to) {
   const auto is_listed = [&](const PosedTool& at) {
     const EndRooms moved = moved_from_list(at, Vec3(0));
@@ -137,7 +138,7 @@ void SurfaceTool::keep_list(const PosedTool& from, const PosedTool& to) {
   own_.crowded = !own_.has_list || own_.near.size() > kFewNear / 3 * to.count;
 }
 
-/// As much room as is likely to be wanted, as long as the list stays short.
+/// Lists as much room as a short list allows.
 void SurfaceTool::list_for_some_ticks(const PosedTool& from, const PosedTool& to) {
   const std::size_t few = kFewNear * to.count, many = kManyNear * to.count;
   const double size = surface_.size();
@@ -160,7 +161,7 @@ void SurfaceTool::list_for_some_ticks(const PosedTool& from, const PosedTool& to
   own_.wanted_room = std::clamp(own_.wanted_room, kSmallRoom * size, kLargeRoom * size);
 }
 
-/// No more than what the motion itself passes, and a little about it.
+/// Lists the room of this motion and a small margin.
 void SurfaceTool::list_for_this_tick(const PosedTool& from, const PosedTool& to) {
   PosedTool middle = to;
   for (std::size_t j = 0; j < to.count; ++j) {
@@ -171,12 +172,12 @@ void SurfaceTool::list_for_this_tick(const PosedTool& from, const PosedTool& to)
   own_.listed = middle;
   const EndRooms first = moved_from_list(from, Vec3(0)), last = moved_from_list(to, Vec3(0));
   own_.made_for = {std::max(first.start, last.start), std::max(first.end, last.end)};
-  // Where it is pushed, both of its ends go the same way.
+  // A push moves both ends alike.
   const double pushed = own_.made_for.start + 8 * skin_;
   list(middle, {own_.made_for.start + pushed, own_.made_for.end + pushed}, own_.near.capacity());
 }
 
-/// Whether the virtual tool, which nothing holds, can touch nothing in this tick.
+/// Whether a free virtual tool cannot touch anything in this tick.
 bool SurfaceTool::far_away() {
   const PosedTool before = pose(tick_.state.has_last ? all_.last : tick_.tool),
                   now = pose(tick_.tool);
@@ -198,10 +199,10 @@ bool SurfaceTool::far_away() {
          room_left(now, Vec3(0)) > 0;
 }
 
-/// Takes the ideal tool from a pose outside of the surface to as near to another as it may be.
+/// Moves the ideal tool from a pose outside the surface as near to another pose as it can get.
 void SurfaceTool::step(const ToolPose& target, const ToolPose& from) {
   target_ = target;
-  // A turn that leads into a crack, or to no rest, is halved.
+  // If a turn ends in a crack or nowhere at rest, try half of it.
   double most = 1;
   do {
     most = 0.5 * turn(from, most);
@@ -236,7 +237,7 @@ void SurfaceTool::follow() {
     };
     go();
     if (!planes_.empty() && steps < kContactSteps) {
-      // In finer steps it meets what comes first.
+      // Finer steps find the patch that is met first.
       steps = kContactSteps;
       own_.carrying_count = 0;
       go();
@@ -284,7 +285,7 @@ namespace {
 using PatchKind = SurfacePatch::Kind;
 
 constexpr int kMostFaces = 64;      // to each side of a contact
-constexpr double kFlat = 1 - 5e-9;  // cosine of 1e-4 rad, by which rounding may bend a flat face
+constexpr double kFlat = 1 - 5e-9;  // cosine of 1e-4 rad: rounding may bend a flat face so far
 
 /// Angle of the segment to a triangle, of the blend angle, -1 to 1; 1: its tip dips.
 double turned_to(const SurfaceTriangle& triangle, const Vec3& d, double length) {
@@ -309,7 +310,7 @@ class Lying {
     return turned_to(surface_.triangles()[triangle], d_, length_);
   }
 
-  /// What of the segment is over a triangle, in its plane, and the side by which it leaves.
+  /// The portion of the segment over a triangle, in its plane, and the side where it leaves.
   Crossed crossed(std::uint32_t index, bool towards_end) const {
     const SurfaceTriangle& t = surface_.triangles()[index];
     Crossed out{{}, 0};
@@ -329,8 +330,8 @@ class Lying {
     return out;
   }
 
-  /// By how much a triangle and those that follow, towards the end or the beginning, move the point
-  /// from `from`. Counts those within the blend angle.
+  /// How far this triangle and the following ones, towards the end or the beginning, move the point
+  /// from `from`. Counts the triangles within the blend angle in `along`.
   double way(std::uint32_t triangle, double from, bool towards_end, int& along) const {
     double moved = 0;
     for (int i = 0; i < kMostFaces; ++i) {
@@ -346,7 +347,7 @@ class Lying {
       from = end;
       if (towards_end ? from >= 1 : from <= 0) break;
       const SurfaceTriangle& beyond = surface_.triangles()[SurfaceTriangle::triangle_of(at.next)];
-      // A segment that bridges a hollow touches one side of it alone.
+      // Across a hollow, the segment touches only one of its sides.
       if (!beyond.touches(SurfaceTriangle::side_of(at.next)) &&
           glm::dot(beyond.normal, surface_.triangles()[triangle].normal) < kFlat)
         break;
@@ -374,7 +375,7 @@ double place_on(const Surface& surface, const SurfacePatch& patch, const Vec3& t
   if (patch.kind == PatchKind::edge) {
     const std::uint32_t right = SurfaceTriangle::triangle_of(
         surface.triangles()[left].across[SurfaceTriangle::side_of(patch.side)]);
-    // The triangle that the tip is over faces down along the segment.
+    // The triangle ahead slopes down along the segment.
     const bool left_ahead = by_tip(surface.triangles()[left], d);
     const std::uint32_t ahead = left_ahead ? left : right, behind = left_ahead ? right : left;
     place += lying.way(ahead, at, true, along);
@@ -435,12 +436,12 @@ void SurfaceTool::add_contact(const SurfacePlane& plane, const Vec3& shift) {
   all_.contacts.push_back(out);
 }
 
-/// Contacts from the planes that hold the tool, without the skin.
+/// Makes contacts of the planes that hold the tool, without the skin.
 void SurfaceTool::add_contacts() {
   Vec3 shift = stuck_ ? at_ : exact_;
   if (planes_.empty() && !stuck_) shift = at_;
   memory_.shift = placed_.world_vector(shift);
-  if (stuck_) tick_.faults |= render_fault::kContactCapped;  // it stays where it is
+  if (stuck_) tick_.faults |= render_fault::kContactCapped;  // it keeps its place
   const double length = glm::length(shift);
   const SurfacePlane* most = planes_.most_loaded();
   if (stuck_ || (most != nullptr && most->multiplier > kMostLeverage * length)) {
@@ -456,9 +457,9 @@ void SurfaceTool::add_contacts() {
   }
 }
 
-/// What the next tick needs.
+/// Stores the state for the next tick.
 void SurfaceTool::remember(std::size_t first_contact) {
-  // Mostly it has taken the whole turn.
+  // Usually the tool has taken the whole turn.
   const bool behind = pose_.d != tick_.tool.d || pose_.frame != tick_.tool.frame;
   const double angle = behind ? angle_between(carried_, pose_, tick_.tool) : 0;
   memory_.touching = !planes_.empty() || stuck_ || angle > 0 || at_ != Vec3(0);
@@ -472,7 +473,7 @@ void SurfaceTool::remember(std::size_t first_contact) {
   all_.exceptions |= angle > kMostLag;
   const double size = carried_ != nullptr ? tick_.scene.tool_reach() : glm::length(pose_.d);
   all_.reach = std::max(all_.reach, glm::length(at_) + angle * size);
-  // The mean contact place, about which the tool turns at the next tick.
+  // The mean contact place: the tool turns about it at the next tick.
   Vec3 grasp(0);
   double weight = 0;
   const PartGroup& group = tick_.scene.groups()[group_];
@@ -484,7 +485,7 @@ void SurfaceTool::remember(std::size_t first_contact) {
     grasp += share * (carried_ != nullptr
                           ? glm::transpose(pose_.frame) * (c.place - c.shift - tick_.tool.tip)
                           : Vec3(0, 0, c.loaded.probe_fraction));
-    // Its friction goes on where the last contact of the segment had about the same normal.
+    // Continue the friction of the segment's last contact with the most similar normal.
     std::size_t best = 0;
     double most = -HUGE_VAL;
     for (std::size_t k = 0; k < own_.rubbed.size(); ++k) {

@@ -9,7 +9,7 @@ namespace {
 
 using PatchKind = SurfacePatch::Kind;
 
-/// A side as its triangle has it, from v0 to v1, the triangle to its left.
+/// A side from v0 to v1, with its own triangle on the left.
 struct EdgeOf {
   const SurfaceTriangle &left, &right;
   Vec3 v0, v1;
@@ -23,10 +23,11 @@ EdgeOf edge_of(const Surface& surface, std::uint32_t side) {
           surface.vertices()[left.corners[(k + 1) % 3]]};
 }
 
-/// Out of an edge that a segment touches: at right angles to both, between the triangles' normals.
+/// The contact normal of an edge and a segment: perpendicular to both, between the triangles'
+/// normals.
 Vec3 edge_normal(const EdgeOf& edge, const Vec3& along, double left, double right) {
   constexpr double kAlongEdge = 1e-6;
-  // Exact also where the segment lies along the edge, but for sharp ones.
+  // Also right if the segment lies along the edge, unless the edge is sharp.
   const Vec3 between = std::abs(right) * edge.left.normal + std::abs(left) * edge.right.normal;
   const Vec3 e = edge.v1 - edge.v0;
   Vec3 across = left >= 0 ? glm::cross(e, along) : glm::cross(along, e);
@@ -47,7 +48,7 @@ double to_side(const Vec3& p, const Vec3& a, const Vec3& b) {
   return glm::dot(apart, apart);
 }
 
-/// An end that moves from `from` to `to` against a triangle.
+/// Tests a segment end that moves from `from` to `to` against a triangle.
 void sweep_end(const Surface& surface, std::uint32_t index, std::uint8_t segment, bool tail,
                const Vec3& from, const Vec3& to, double tolerance, PatchHit& first) {
   const SurfaceTriangle& t = surface.triangles()[index];
@@ -66,7 +67,7 @@ void sweep_end(const Surface& surface, std::uint32_t index, std::uint8_t segment
   first = {{index << 2, segment, tail, PatchKind::face}, time};
 }
 
-/// A segment whose ends move linearly against an edge: where the two are in one plane is a
+/// Tests a segment whose ends move linearly against an edge. The two are coplanar at the roots of a
 /// quadratic equation in time.
 void sweep_edge(const Surface& surface, std::uint32_t side, std::uint8_t segment,
                 const PosedTool::Segment& from, const PosedTool::Segment& to, double tolerance,
@@ -89,7 +90,7 @@ void sweep_edge(const Surface& surface, std::uint32_t side, std::uint8_t segment
     const double rate = c1 + 2 * c2 * time;
     const bool up = left >= -level && right <= level, down = left <= level && right >= -level;
     if (!((up && rate < 0) || (down && rate > 0))) return;
-    // Crossing of the two lines.
+    // Where the two lines cross.
     const Vec3 apart = r + time * way;  // from v0 to the start
     const Vec3 normal = glm::cross(e, along);
     const double size2 = glm::dot(normal, normal);
@@ -154,7 +155,7 @@ SurfacePatch patch_after_turn(const Surface& surface, const SurfacePatch& patch,
   const Vec3& along = tool.segments[patch.segment].along;
   const EdgeOf edge = edge_of(surface, patch.side);
   if (by_tip(edge.left, along) != by_tip(edge.right, along)) return patch;
-  // It goes on over the triangle that has turned away.
+  // Continue on the triangle that turned away.
   const bool left =
       std::abs(glm::dot(edge.left.normal, along)) <= std::abs(glm::dot(edge.right.normal, along));
   const std::uint32_t triangle =

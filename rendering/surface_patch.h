@@ -13,7 +13,7 @@
 
 namespace palpate::rendering {
 
-// Triangles of a closed surface near a segment. Included by the few that ask, as it is inlined.
+// Searches for triangles near a segment. Included only by callers, because they are inlined.
 
 template <class Visit>
 void Surface::near_segment(const Vec3& start, const Vec3& along, double room,
@@ -81,7 +81,7 @@ void Surface::touchable(const Vec3& start, const Vec3& along, const Motion& moti
     if (std::abs(x) > a0 + most + size.x || std::abs(y) > b0 + most + size.y ||
         std::abs(z) > c0 + most + size.z)
       return false;
-    // None of them is a silhouette.
+    // No edge of the node is a silhouette.
     const double facing = 2 * std::abs(half.x * static_cast<double>(normals.middle[0]) +
                                        half.y * static_cast<double>(normals.middle[1]) +
                                        half.z * static_cast<double>(normals.middle[2]));
@@ -124,7 +124,7 @@ void Surface::touchable(const Vec3& start, const Vec3& along, const Motion& moti
   }
 }
 
-/// A triangle with an end of a segment, or an edge that is no concave one with a segment.
+/// A triangle with a segment end, or a non-concave edge with a segment.
 struct SurfacePatch {
   enum class Kind : std::uint8_t { none, face, edge };
   std::uint32_t side = 0;  ///< the triangle times four; of an edge its side as well
@@ -169,7 +169,8 @@ inline bool by_tip(const SurfaceTriangle& triangle, const Vec3& along) {
 PatchPlane plane_of(const Surface& surface, const SurfacePatch& patch, const PosedTool& tool);
 PatchPolygon polygon_of(const Surface& surface, const SurfacePatch& patch, const PosedTool& tool);
 
-/// The patch that took over from one that the tool, turned, has no more; or the same.
+/// The patch that replaces this one after a turn in which its edge stopped being a silhouette; else
+/// the same patch.
 SurfacePatch patch_after_turn(const Surface& surface, const SurfacePatch& patch,
                               const PosedTool& tool);
 
@@ -178,39 +179,37 @@ SurfacePatch patch_after_turn(const Surface& surface, const SurfacePatch& patch,
 /// that goes through the side itself goes through both.
 bool meets(const PatchPolygon& polygon, const Vec3& from, const Vec3& way);
 
-/// m, along the plane, by which a translation is off the polygon; 0 over it.
+/// m, distance of a translation from the polygon along its plane; 0 above the polygon.
 double distance_off(const PatchPolygon& polygon, const Vec3& normal, const Vec3& at);
 
 /// Where a motion of the tool first meets a patch.
 struct PatchHit {
   SurfacePatch patch;
-  double time = 2;  ///< of the motion; above 1: it does not
+  double time = 2;  ///< fraction of the motion; above 1: no hit
   bool hit() const { return time <= 1; }
 };
 
-/// Whether a translation from `from` to `to` enters the patch, and does so before `first`, which it
-/// is then.
-/// \param tolerance  m; who is no farther than this behind a plane is still before it
+/// Replaces `first` if a translation from `from` to `to` enters the patch earlier.
+/// \param tolerance  m; a tool less than this behind a plane counts as before it
 void cast_on_patch(const Surface& surface, const SurfacePatch& patch, const PatchPlane& plane,
                    const PosedTool& tool, const Vec3& from, const Vec3& to, double tolerance,
                    PatchHit& first);
 
-/// What of a triangle and a segment can come together: bits.
+/// Bits for the parts of a triangle and a segment that can touch.
 namespace surface_pair {
 inline constexpr std::uint8_t kSides = 7;  ///< bit k: side k, which is the triangle's own
 inline constexpr std::uint8_t kTip = 8, kTail = 16;
 inline constexpr std::uint8_t kAll = 31;
 }  // namespace surface_pair
 
-/// The same of a segment whose ends move linearly, for all patches of a triangle and of the sides
-/// that are its own.
-/// \param what   of them; bits of surface_pair
-/// \param slack  m, by which edges and segment are longer
+/// The same for a segment whose ends move linearly, over all patches of a triangle and its own
+/// sides. \param what   patches to test; bits of surface_pair \param slack  m; edges and segment
+/// are extended by it
 void sweep_triangle(const Surface& surface, std::uint32_t triangle, std::uint8_t segment,
                     std::uint8_t what, const PosedTool::Segment& from, const PosedTool::Segment& to,
                     double tolerance, double slack, PatchHit& first);
 
-/// Calls visit(patch) for those of a triangle and of the sides that are its own.
+/// Calls visit(patch) for the patches of a triangle and its own sides.
 template <class Visit>
 void for_each_patch(const Surface& surface, std::uint32_t index, std::uint8_t segment,
                     std::uint8_t what, const Vec3& along, const Visit& visit) {

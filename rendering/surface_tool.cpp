@@ -8,24 +8,24 @@
 namespace palpate::rendering {
 namespace {
 
-constexpr int kRounds = 96;          // of casts in one tick; then the ideal tool stays where it is
-constexpr double kSlidOff = 4;       // skins; a contact farther off its patch has left it
-constexpr double kAtRest = 2e-12;    // of the size: the same without the skin
+constexpr int kRounds = 96;          // casts a tick at most; then the ideal tool keeps its place
+constexpr double kSlidOff = 4;       // skins; farther off its patch, a contact has ended
+constexpr double kAtRest = 2e-12;    // of the size; the same without the skin
 constexpr double kOnPatch = 1e-11;   // of the size
-constexpr double kExact = 1e-5;      // of the skin; what is nearer than this is rounding
-constexpr double kRounding = 0.125;  // of the skin; so much less of it is a skin
-constexpr double kLessSkin = 0.25;   // of the skin, in a gap where two do not fit, and so on
-constexpr double kInTheWay = 0.25;   // of rounding; what a tool at rest is deeper in holds it
-constexpr double kSamePlace = 8;     // skins; within it a contact that comes back never left
-// The bottom of a valley of 1e-7 rad is hidden by the skin: its sides would take turns for ever.
-constexpr int kTimes = 2;             // that a patch let go of the tool in this tick
+constexpr double kExact = 1e-5;      // of the skin; shorter distances are rounding
+constexpr double kRounding = 0.125;  // of the skin; tolerance of its width
+constexpr double kLessSkin = 0.25;   // of the skin, repeatedly, in a gap narrower than two
+constexpr double kInTheWay = 0.25;   // of the tolerance; a patch that is deeper holds the tool
+constexpr double kSamePlace = 8;     // skins; within them a returning contact never left
+// The skin hides the bottom of a valley of 1e-7 rad: its sides would alternate endlessly.
+constexpr int kTimes = 2;             // releases by one patch in a tick
 constexpr double kSameValley = 1e-6;  // of the size
 constexpr int kMostInTheWay = 4;
-constexpr int kPieces = 64;  // of a long way, each looked at by itself
+constexpr int kPieces = 64;  // of a long cast, examined one by one
 
 }  // namespace
 
-/// The patches of the tool as it is turned, of what is listed.
+/// Collects the listed patches for the turned tool.
 void SurfaceTool::collect_patches() {
   own_.patches.clear();
   if (!own_.has_list) return;
@@ -38,7 +38,7 @@ void SurfaceTool::collect_patches() {
   }
 }
 
-/// The first patch on the straight way.
+/// Finds the first patch on a straight line.
 PatchHit SurfaceTool::cast(const Vec3& from, const Vec3& to) const {
   PatchHit first;
   const Vec3 way = to - from;
@@ -84,9 +84,9 @@ bool SurfaceTool::holds(const SurfacePatch& patch) const {
                      [&](const SurfacePlane& plane) { return plane.patch == patch; });
 }
 
-/// Takes up the planes that held the tool at the last tick, where it is still beyond them.
+/// Adds the planes that held the tool at the last tick, if it is still outside of them.
 void SurfaceTool::resume_planes() {
-  // What the turn put in use may be no patch of the tool as it is turned now.
+  // Drop planes of the turn that the tool does not rest on.
   planes_.remove_if([&](const SurfacePlane& plane) {
     return plane.multiplier <= 0 || !(glm::dot(plane.normal, at_) - plane.depth > 0);
   });
@@ -97,7 +97,7 @@ void SurfaceTool::resume_planes() {
   }
 }
 
-/// m, by which the tool is past the patch of a plane.
+/// m, distance of the tool from the patch of a plane, along the plane.
 double SurfaceTool::off_patch(const SurfacePlane& plane, const Vec3& at) const {
   return distance_off(polygon_of(surface_, plane.patch, turned_), plane.normal, at);
 }
@@ -114,12 +114,12 @@ bool SurfaceTool::parted_here(const SurfacePatch& patch) const {
   return false;
 }
 
-/// Lets go of planes that hold nothing.
+/// Drops planes that hold nothing.
 void SurfaceTool::let_go_of_idle_planes() {
   planes_.remove_if([](const SurfacePlane& plane) { return !(plane.multiplier > 0); });
 }
 
-/// Lets go of planes whose patch the tool has slid off. True when there are some.
+/// Drops planes whose patch the tool has slid off; returns whether there were any.
 bool SurfaceTool::let_go_of_slid_planes(const Vec3& at, double slack) {
   bool slid = false;
   planes_.remove_if([&](SurfacePlane& plane) {
@@ -127,7 +127,7 @@ bool SurfaceTool::let_go_of_slid_planes(const Vec3& at, double slack) {
     if (!(off_patch(plane, at) > slack)) return false;
     std::size_t known = 0;
     while (known < parted_count_ && !(parted_[known].patch == plane.patch)) ++known;
-    if (known == parted_.size()) {  // the oldest is forgotten
+    if (known == parted_.size()) {  // forget the oldest
       std::move(parted_.begin() + 1, parted_.end(), parted_.begin());
       parted_[--known].times = 0;
     }
@@ -139,14 +139,14 @@ bool SurfaceTool::let_go_of_slid_planes(const Vec3& at, double slack) {
   return slid;
 }
 
-/// Where the tool rests without the skin; sets the multipliers. False where rounding hides it.
+/// Finds the place of rest without the skin, and the multipliers. False if rounding hides it.
 bool SurfaceTool::find_exact_place() {
   return planes_.nearest(Vec3(0), 0, kExact * skin_, exact_) ||
          planes_.nearest(Vec3(0), 0, kRounding * skin_, exact_);
 }
 
-/// Whether planes hold the tool, a skin away, on patches that it is past without the skin: those of
-/// a groove may end between the two, and leave a gap that is too narrow for the skin.
+/// Whether the tool rests on a patch with the skin but beyond its border without it: a groove's
+/// patches may end in between and leave a gap that is narrower than the skin.
 bool SurfaceTool::past_a_patch_at_rest() const {
   const double size = surface_.size(), slack = kSlidOff * skin_ + kOnPatch * size;
   bool past = false, off = false;
@@ -158,8 +158,7 @@ bool SurfaceTool::past_a_patch_at_rest() const {
   return past && !off;
 }
 
-/// Whether the tool, without the skin that keeps it off what holds it, is behind another patch that
-/// it was less than the skin away from; then the plane that keeps it out.
+/// Looks for a patch that the tool enters when the skin is removed; sets its plane.
 bool SurfaceTool::in_the_way_at_rest(SurfacePlane& out) const {
   double deepest = kInTheWay * tolerance_;
   bool found = false;
@@ -191,7 +190,7 @@ bool SurfaceTool::in_the_way_at_rest(SurfacePlane& out) const {
   return found;
 }
 
-/// Puts a plane in use.
+/// Adds a plane to those that hold the tool.
 void SurfaceTool::take_plane(const SurfacePlane& plane) {
   if (planes_.full()) let_go_of_idle_planes();
   stuck_ = planes_.full();
@@ -200,7 +199,7 @@ void SurfaceTool::take_plane(const SurfacePlane& plane) {
 
 void SurfaceTool::move_to_hit(const Vec3& goal, const PatchHit& hit) {
   SurfacePlane plane = plane_at(hit.patch);
-  // It stops a skin before the plane.
+  // Stop one skin before the plane.
   const Vec3 way = goal - at_;
   const double rate = glm::dot(plane.normal, way);
   const double height = glm::dot(plane.normal, at_) - plane.depth;
@@ -215,8 +214,9 @@ void SurfaceTool::move_to_hit(const Vec3& goal, const PatchHit& hit) {
   take_plane(plane);
 }
 
-/// The point nearest to the virtual tool a skin off the planes. In a gap narrower than two skins
-/// the tool keeps a share of the skin, or else what it has. False where rounding hides it.
+/// Finds the point nearest to the virtual tool that is one skin off the planes. In a gap narrower
+/// than two skins it keeps part of the skin, or else its present distances. False if rounding hides
+/// it.
 bool SurfaceTool::find_goal(Vec3& goal) {
   in_crack_ = false;
   if (planes_.nearest(Vec3(0), skin_, kRounding * skin_, goal)) return true;
@@ -227,8 +227,8 @@ bool SurfaceTool::find_goal(Vec3& goal) {
   return planes_.nearest_from(at_, skin_, kRounding * skin_, kExact * skin_, goal);
 }
 
-/// Whether the tool is at rest where its planes hold it without the skin. Planes that it is behind
-/// there are taken up: a skin away they may hold nothing, so it is not asked again whether they do.
+/// Whether the tool is at rest when the skin is removed. Adds the planes that it would enter; they
+/// stay even if they hold nothing one skin away.
 bool SurfaceTool::rests() {
   SurfacePlane in_the_way;
   for (int i = 0; i < kMostInTheWay; ++i) {
@@ -243,7 +243,7 @@ bool SurfaceTool::rests() {
   return false;
 }
 
-/// Moves the ideal tool as near to the virtual one as the surface lets it.
+/// Moves the ideal tool as near to the virtual one as the surface allows.
 void SurfaceTool::translate() {
   parted_count_ = 0;
   const double slack = kAtRest * surface_.size();
@@ -259,7 +259,7 @@ void SurfaceTool::translate() {
     let_go_of_idle_planes();
     if (!find_exact_place()) break;
     if (let_go_of_slid_planes(exact_, slack)) continue;
-    if (past_a_patch_at_rest() && !find_goal(exact_)) break;  // the gap is closed to it
+    if (past_a_patch_at_rest() && !find_goal(exact_)) break;  // the gap is too narrow
     if (rests()) return;
   }
   stuck_ = true;
@@ -267,12 +267,12 @@ void SurfaceTool::translate() {
 
 namespace {
 
-constexpr int kPushRounds = 12;          // to get out of what a turn brought the tool into
-constexpr double kLeastTurn = 1.0 / 16;  // of a turn that fails; then it waits for the next tick
-constexpr double kFarPush = 8;           // times the turn's own motion; farther is no way out
-constexpr double kLonger = 1e-11;        // of the size, by which edges are longer for a sweep
+constexpr int kPushRounds = 12;          // pushes out of patches that a turn meets
+constexpr double kLeastTurn = 1.0 / 16;  // of the turn; a shorter one waits for the next tick
+constexpr double kFarPush = 8;           // times the turn's motion; a longer push fails
+constexpr double kLonger = 1e-11;        // of the size; a sweep extends edges by it
 
-/// m, of any end of a segment.
+/// m, the farthest motion of a segment end.
 double most_moved(const PosedTool& from, const PosedTool& to, const Vec3& shift) {
   double most2 = 0;
   for (std::size_t j = 0; j < to.count; ++j) {
@@ -283,7 +283,7 @@ double most_moved(const PosedTool& from, const PosedTool& to, const Vec3& shift)
   return std::sqrt(most2);
 }
 
-/// rad, of any segment.
+/// rad, the largest turn of a segment.
 double most_turned(const PosedTool& from, const PosedTool& to) {
   double most2 = 0;
   for (std::size_t j = 0; j < to.count; ++j) {
@@ -296,7 +296,7 @@ double most_turned(const PosedTool& from, const PosedTool& to) {
 
 }  // namespace
 
-/// The first patch that a tool meets whose segments' ends move linearly.
+/// Finds the first patch that the tool meets while its segment ends move linearly.
 PatchHit SurfaceTool::sweep(const PosedTool& from, const PosedTool& to, const Vec3& shift) const {
   PatchHit first;
   const double slack = kLonger * surface_.size();
@@ -325,9 +325,9 @@ PatchHit SurfaceTool::sweep(const PosedTool& from, const PosedTool& to, const Ve
   return first;
 }
 
-/// Turns the ideal tool as the virtual one has turned, about where it touches, as far as the
-/// surface lets it.
-/// \param most  of the turn \return what it took of it, 0 to 1
+/// Turns the ideal tool about its contacts to the virtual orientation, as far as the surface
+/// allows.
+/// \param most  largest fraction to try \return fraction taken, 0 to 1
 double SurfaceTool::turn(const ToolPose& from, double most) {
   const PosedTool before = pose(from);
   const PosedTool whole = pose(target_);
@@ -335,7 +335,7 @@ double SurfaceTool::turn(const ToolPose& from, double most) {
       placed_.local_vector(turned(memory_.grasp, from) - turned(memory_.grasp, target_));
   const Vec3 apart = placed_.local_vector(from.tip - target_.tip);
   planes_.clear();
-  // About the grasp, from where the tool was to the virtual orientation there.
+  // Turn about the grasp, from the last place.
   const double motion = most_moved(before, whole, apart + shift);
   PosedTool near_whole = whole;
   for (std::size_t j = 0; j < whole.count; ++j) near_whole.segments[j].start += apart + shift;
@@ -366,13 +366,12 @@ double SurfaceTool::turn(const ToolPose& from, double most) {
   return 0;
 }
 
-/// Planes that were raised for the way of a turn hold the tool where they are.
+/// Puts planes back that were raised to let a turn pass.
 void SurfaceTool::lower_planes() {
   for (SurfacePlane& plane : planes_.all()) plane.depth = plane_at(plane.patch).depth;
 }
 
-/// Whether a tool that turns to turned_, moved by about at_, gets there without meeting a patch;
-/// then it is there.
+/// Moves the tool to turned_ at about at_ if no patch is in the way; returns whether it did.
 bool SurfaceTool::settle(const PosedTool& from, double most_push) {
   const Vec3 wanted = at_;
   double dip = skin_ + 0.125 * most_moved(from, turned_, wanted) * most_turned(from, turned_);
@@ -397,7 +396,7 @@ bool SurfaceTool::settle(const PosedTool& from, double most_push) {
     bool held = false;
     for (SurfacePlane& plane : planes_.all()) {
       if (!(plane.patch == patch)) continue;
-      // On its way it dips under an edge that it is above at either end.
+      // The tool dips below an edge on the way, although both end poses are above it.
       plane.depth += dip;
       held = raised = true;
     }

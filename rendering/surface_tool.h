@@ -17,7 +17,7 @@ struct SurfacePlane {
   Vec3 normal;            ///< out of the solid
   double depth = 0;       ///< m, of the virtual tool below it: dot(normal, y) >= depth outside
   double multiplier = 0;  ///< m, of the normal in the way from the virtual to the ideal tool
-  bool stays = false;     ///< came back where it had let go: rounding, it is not let go there again
+  bool stays = false;     ///< released and hit again at one place: rounding, keep it there
 };
 
 class SurfaceTool {
@@ -97,21 +97,21 @@ class SurfaceTool {
   const Tool* carried_;
   double skin_, tolerance_;
 
-  ToolPose target_;   ///< the virtual tool, or in a first contact a pose before it
+  ToolPose target_;   ///< the virtual tool; at a first contact an earlier pose
   ToolPose pose_;     ///< the ideal tool's orientation; its tip is the virtual one plus at_
   PosedTool turned_;  ///< of that orientation, with the virtual tip
-  Vec3 at_;           ///< from the virtual to the ideal tool, a skin off what it rests on
-  Vec3 exact_;        ///< the same without the skin, once it rests
+  Vec3 at_;           ///< from the virtual to the ideal tool, one skin off its contacts
+  Vec3 exact_;        ///< the same without the skin, at rest
   PlanesOf<SurfacePlane> planes_;
   struct Parted {
     SurfacePatch patch;
     Vec3 at;
     int times = 0;
   };
-  std::array<Parted, 8> parted_;  ///< the last that let go of the tool in this tick
+  std::array<Parted, 8> parted_;  ///< the last patches that released the tool in this tick
   std::size_t parted_count_ = 0;
   bool stuck_ = false;
-  bool in_crack_ = false;  ///< opposite planes leave it less than a skin
+  bool in_crack_ = false;  ///< opposite planes are less than a skin apart
 };
 
 }  // namespace palpate::rendering
