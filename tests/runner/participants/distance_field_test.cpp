@@ -204,7 +204,7 @@ TEST(SolidLine, FindsTheDeepestPlaceOfAConcaveShape) {
     Deepest deepest;
     find_along_line(to_shape, touch.line.length, deepest);
     for (int i = 0; i < ShapeHypotheses::kBlock; ++i) {
-      const Mat3 r = hypotheses.rotation(touch.first + i);
+      const Mat3 r = hypotheses.rotation(hypotheses.nearby_order()[touch.first + i]);
       double least = std::numeric_limits<double>::infinity();
       for (int k = 0; k <= 1000; ++k) {
         least = std::min(
