@@ -43,7 +43,7 @@ MAY_INCLUDE = {
     "runner/servo": RENDERING | {"runner", "rendering/bodies/soft"},
     "runner/safety": SERVO,
     "runner/sound": {"stimuli", "protocols"},
-    "runner/devices": SERVO | {"protocols", "data", "runner/devices/falcon"},
+    "runner/devices": SERVO | {"protocols", "data", "data/files", "runner/devices/falcon"},
     "runner/devices/falcon": SERVO | {"protocols"},
     "runner/display": SERVO | {"protocols", "runner/devices", "runner/safety", "runner/display/scene"},
     "runner/display/scene": SERVO,
@@ -53,7 +53,7 @@ MAY_INCLUDE = {
     "runner/serve": SERVO | {"protocols", "runner/safety", "runner/session"},
     "runner/sweep": SERVO | {"protocols", "runner/participants"},
     "runner/stability": SERVO | {"protocols", "rendering/bodies", "runner/devices"},
-    "runner/bench": SERVO | {"runner/safety"},
+    "runner/bench": SERVO | {"data/files", "runner/safety", "runner/devices"},
 }
 # The commands, the Python module and main() may include everything.
 EVERYTHING = ("runner/commands", "runner/main.cpp", "runner/python")
@@ -113,11 +113,11 @@ PUBLIC = {
     "analysis/report": "html_page hypotheses movement_report plan_report report sweep_report tables "
                        "task_report",
     "runner": "",
-    "runner/servo": "device force_limiter passivity realtime ring sample servo servo_thread "
+    "runner/servo": "device device_times force_limiter passivity realtime ring sample servo servo_thread "
                     "shared_value tick_clock tick_source touched_places triple_buffer",
-    "runner/safety": "fault_signals guarded_device",
+    "runner/safety": "fault_signals guarded_device shared_memory",
     "runner/sound": "masking_noise",
-    "runner/devices": "mouse registry replay self_test simulated",
+    "runner/devices": "device_delay mouse registry replay self_test simulated",
     "runner/devices/falcon": "calibration open stylus_from_ends weighing",
     "runner/display": "display explore_window mailbox text_display timeline window",
     "runner/display/scene": "camera picture drawn_mesh image_file painter scene_drawing "
@@ -130,7 +130,7 @@ PUBLIC = {
     "runner/serve": "network served_scene served_session",
     "runner/sweep": "design swept_study",
     "runner/stability": "boundary integrators soft_map",
-    "runner/bench": "servo_timing tick_cost",
+    "runner/bench": "chain_timing servo_timing tick_cost",
     "runner/commands": "render/forces shared/command shared/task_words shared/study_options",
 }
 

@@ -1,6 +1,7 @@
 #include "runner/bench/servo_timing.h"
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
@@ -10,6 +11,7 @@
 #include <utility>
 
 #include "runner/safety/guarded_device.h"
+#include "runner/safety/shared_memory.h"
 #include "runner/servo/servo_thread.h"
 #include "stimuli/primitives.h"
 
@@ -19,7 +21,6 @@ namespace {
 constexpr double kRadius = 0.03;             // m
 constexpr double kLength = 0.12;             // m, of the stylus
 constexpr double kSpeed = 0.1;               // m/s, of the tip
-constexpr double kAtRest = 0.2;              // s, initially, outside the sphere
 constexpr double kHomeRest = 0.02;           // s of rest that the servo requires
 constexpr double kMaxLateFit = 2e-4;         // share of ticks late by a period: one in 5 s at 1 kHz
 constexpr double kMaxLateWithLosses = 2e-3;  // the same; more can be felt
@@ -31,10 +32,13 @@ std::int64_t thread_time_ns() noexcept {
   return time.tv_sec * 1'000'000'000LL + time.tv_nsec;
 }
 
-/// Rests outside the sphere, then follows a path on it, 1.5 mm deep, while turning.
+using Go = SharedMemory<std::atomic<bool>>;
+
+/// Rests outside the sphere until forces are on, then follows a path on it, 1.5 mm deep, while
+/// turning.
 class ScriptedStylus final : public Device {
  public:
-  explicit ScriptedStylus(double rate) : rate_(rate) {
+  ScriptedStylus(double rate, const std::atomic<bool>& go) : rate_(rate), go_(go) {
     capabilities_.name = "led";
     capabilities_.sensed_freedom = capabilities_.actuated_freedom = 5;
     capabilities_.max_force = 8.5;
@@ -42,8 +46,8 @@ class ScriptedStylus final : public Device {
   }
   const DeviceCapabilities& capabilities() const override { return capabilities_; }
   DeviceReading read() noexcept override {
-    const double t = ++tick_ / rate_ - kAtRest;
-    if (t < 0) return at({0, 0, 0.1}, 0);
+    if (!go_.load(std::memory_order_relaxed)) return at({0, 0, 0.1}, 0);
+    const double t = ++tick_ / rate_;
     const double angle = t * kSpeed / kRadius;
     const double depth = 0.0015 * std::min(1.0, t / 0.1);
     const Vec3 out(std::sin(angle) * std::cos(0.3 * angle), std::sin(0.3 * angle) * std::sin(angle),
@@ -64,6 +68,7 @@ class ScriptedStylus final : public Device {
   }
 
   double rate_;
+  const std::atomic<bool>& go_;
   int tick_ = 0;
   DeviceCapabilities capabilities_;
 };
@@ -71,9 +76,9 @@ class ScriptedStylus final : public Device {
 /// Wraps a device and records the servo thread's CPU time before and after its transfers.
 class MeteredDevice final : public Device {
  public:
-  /// \param skip  number of first ticks not recorded; \param ticks  number recorded after them
-  MeteredDevice(Device& device, std::size_t skip, std::size_t ticks)
-      : device_(device), skip_(skip) {
+  /// \param go  whether ticks are recorded; \param ticks  largest number of recorded ticks
+  MeteredDevice(Device& device, const std::atomic<bool>& go, std::size_t ticks)
+      : device_(device), go_(go) {
     compute_.reserve(ticks);
     tick_.reserve(ticks);
     asking_.reserve(ticks);
@@ -81,7 +86,7 @@ class MeteredDevice final : public Device {
   const DeviceCapabilities& capabilities() const override { return device_.capabilities(); }
   DeviceReading read() noexcept override {
     const std::int64_t began = thread_time_ns();
-    if (skip_ == 0 && tick_.size() < tick_.capacity())
+    if (recording_ && tick_.size() < tick_.capacity())
       tick_.push_back(began - written_ + last_compute_);
     DeviceReading reading = device_.read();
     read_ = thread_time_ns();
@@ -89,9 +94,8 @@ class MeteredDevice final : public Device {
   }
   void write(const Vec3& device1, const Vec3& device2) noexcept override {
     last_compute_ = thread_time_ns() - read_;
-    if (skip_ > 0) {
-      --skip_;
-    } else if (compute_.size() < compute_.capacity()) {
+    recording_ = go_.load(std::memory_order_relaxed);
+    if (recording_ && compute_.size() < compute_.capacity()) {
       compute_.push_back(last_compute_);
     }
     device_.write(device1, device2);
@@ -107,7 +111,8 @@ class MeteredDevice final : public Device {
 
  private:
   Device& device_;
-  std::size_t skip_;
+  const std::atomic<bool>& go_;
+  bool recording_ = false;
   std::int64_t read_ = 0, written_ = 0, last_compute_ = 0;
   std::vector<std::int64_t> compute_, tick_, asking_;
 };
@@ -126,7 +131,7 @@ std::vector<std::int64_t> sorted(std::vector<std::int64_t> values) {
 
 /// One long trial; records every tick with forces on.
 void run_trial(ServoThread& servo, double rate, std::size_t wanted,
-               const std::function<bool()>& wait, ServoTiming& out,
+               const std::function<bool()>& wait, std::atomic<bool>& go, ServoTiming& out,
                std::vector<std::int64_t>& compute, std::vector<std::int64_t>& warm_up) {
   const rendering::Scene scene(
       {{std::make_shared<const stimuli::ConvexMesh>(stimuli::icosphere(kRadius, 3)), Pose{},
@@ -146,6 +151,7 @@ void run_trial(ServoThread& servo, double rate, std::size_t wanted,
     }
     tripped = trips;
     if (sample.phase != Phase::feeling) continue;
+    go.store(true, std::memory_order_relaxed);
     out.lateness.push_back(sample.lateness_ns);
     compute.push_back(sample.compute_ns);
     warm_up.push_back(sample.warm_up_ns);
@@ -166,17 +172,18 @@ void run_trial(ServoThread& servo, double rate, std::size_t wanted,
 ServoTiming measure_servo(const TimingSettings& settings, const std::function<bool()>& wait) {
   const double rate = settings.rate;
   const auto wanted = static_cast<std::size_t>(std::llround(settings.seconds * rate));
-  ScriptedStylus own(rate);
+  const Go go;
+  go->store(false);
+  ScriptedStylus own(rate, *go);
   std::unique_ptr<GuardedDevice> guarded;
   if (settings.guarded) {
     GuardSettings guard;
     guard.rate = rate;
     guard.priority = settings.realtime.priority > 0 ? settings.realtime.priority + 5 : 0;
     guarded = std::make_unique<GuardedDevice>(
-        [rate] { return std::make_unique<ScriptedStylus>(rate); }, guard);
+        [rate, &go] { return std::make_unique<ScriptedStylus>(rate, *go); }, guard);
   }
-  MeteredDevice device(guarded ? static_cast<Device&>(*guarded) : own,
-                       static_cast<std::size_t>(kAtRest * rate), wanted);
+  MeteredDevice device(guarded ? static_cast<Device&>(*guarded) : own, *go, wanted);
   RealClock clock;
   ServoSettings servo_settings;
   servo_settings.rate = rate;
@@ -190,7 +197,7 @@ ServoTiming measure_servo(const TimingSettings& settings, const std::function<bo
   {
     ServoThread servo(device, clock, servo_settings);
     out.rights = servo.rights();
-    run_trial(servo, rate, wanted, wait, out, by_clock, warm_up);
+    run_trial(servo, rate, wanted, wait, *go, out, by_clock, warm_up);
   }
   std::sort(out.lateness.begin(), out.lateness.end());
   out.ticks = out.lateness.size();

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <iomanip>
@@ -11,6 +12,7 @@
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/scene_notes.h"
 #include "runner/commands/shared/task_words.h"
+#include "runner/devices/device_delay.h"
 #include "runner/devices/registry.h"
 #include "runner/devices/simulated.h"
 #include "runner/session/device_check.h"
@@ -148,18 +150,24 @@ void print_verdict(const std::string& what, const std::vector<std::string>& reas
 }
 
 /// Prints whether each kind of device and simulated participants can run the protocol, or why not.
+/// \param measured  delays of devices, which lower the stiffness that they can show
 void print_fitness(const protocols::Protocol& protocol, const StimulusLibrary& library,
-                   std::ostream& out) {
+                   const std::vector<ChainTiming>& measured, std::ostream& out) {
   DeviceConfig config;
   config.rate = protocol.servo_rate;
   config.stylus_length = protocol.stylus.length;
   config.stylus_grip = protocol.stylus.grip;
   out << "  can be shown by (run --device NAME)\n";
   for (const DeviceKind& kind : device_kinds()) {
-    const DeviceCapabilities can = kind.nominal(config);
+    DeviceCapabilities can = kind.nominal(config);
+    const auto chain = std::ranges::find(measured, kind.name, &ChainTiming::device);
+    if (chain != measured.end()) can = with_delay(can, chain->counted(), protocol.servo_rate);
     protocols::Protocol shown = protocol;
     const std::vector<LimitedMaterial> limited = limit_materials(shown, can);
     print_verdict(kind.name, incompatibilities(shown, library, can), limited, out);
+    if (chain != measured.end())
+      out << "      with its delay of " << chain->counted() * 1e3
+          << " ms from pose to force, measured " << printable(chain->made_utc) << "\n";
   }
   const SimulatedSettings settings = load_simulated_settings("");
   const SimulatedStylus stylus(settings.device, settings.hand, protocol.stylus.length,
@@ -174,26 +182,33 @@ void print_fitness(const protocols::Protocol& protocol, const StimulusLibrary& l
 
 int validate_command(const std::vector<std::string>& args) {
   CommandLine line;
-  line.usage = "palpate validate PROTOCOL.json [--language CODE | --texts]";
+  line.usage = "palpate validate PROTOCOL.json [--language CODE | --texts] [--calibration FILE]";
   line.summary =
       "Checks a protocol with its meshes and its schedule, and lists all faults. Lists the\n"
       "devices that can run it, whether it can be simulated, and the reasons if not.";
   line.example = R"(  palpate validate protocols/ho2000.json
   palpate validate protocols/roughness-magnitude.json --texts > texts.de.json   to be translated
   palpate validate protocols/roughness-magnitude.json --language de)";
-  std::string language;
+  std::string language, calibration;
   bool texts = false;
   line.options.add_options()  //
       ("language", boost::program_options::value(&language)->value_name("CODE"),
        "check the translation of its texts, too: NAME.texts.CODE.json or texts.CODE.json beside "
        "it")  //
       ("texts", boost::program_options::bool_switch(&texts),
-       "print only the texts that a participant reads, as JSON");
+       "print only the texts that a participant reads, as JSON")  //
+      ("calibration", boost::program_options::value(&calibration)->value_name("FILE"),
+       "use the delays that `palpate devices --timing --device NAME` stored beside it");
   line.positional_names = {"PROTOCOL.json"};
   const auto values = line.parse(args);
   if (!values) return 0;
   const auto file = (*values)["PROTOCOL.json"].as<std::string>();
 
+  const std::vector<ChainTiming> measured =
+      calibration.empty() ? std::vector<ChainTiming>() : stored_chains(chain_file(calibration));
+  if (!calibration.empty() && measured.empty())
+    throw UsageError("--calibration: there is no " + printable(chain_file(calibration)) +
+                     "; make it with palpate devices --timing --device NAME --calibration FILE");
   protocols::Protocol protocol = protocols::parse_protocol(file);
   if (!language.empty()) protocols::translate(protocol, file, language);
   if (texts) {
@@ -223,7 +238,7 @@ int validate_command(const std::vector<std::string>& args) {
     if (felt)
       std::cout << "  note        stimulus " << protocol.stimuli[i].name << ": " << *felt << "\n";
   }
-  print_fitness(protocol, library, std::cout);
+  print_fitness(protocol, library, measured, std::cout);
   return 0;
 }
 

@@ -8,10 +8,11 @@
 
 #include "runner/devices/falcon/stylus_from_ends.h"
 #include "runner/servo/device.h"
+#include "runner/servo/device_times.h"
 
 namespace palpate::runner {
 
-class PairDevice final : public Device {
+class PairDevice final : public Device, public KeepsTimes {
  public:
   /// \param name         name of the kind
   /// \param calibration  as in DeviceCapabilities
@@ -25,9 +26,11 @@ class PairDevice final : public Device {
   void write(const Vec3& device1, const Vec3& device2) noexcept override;
   /// Both ends command zero force first.
   void reopen() override;
+  DeviceTimes times() const noexcept override;
 
  private:
   std::unique_ptr<Device> tip_, tail_;
+  const KeepsTimes *tip_times_, *tail_times_;  ///< the same devices, where they tell
   StylusFromEnds stylus_;
   DeviceCapabilities capabilities_;
   bool lost_ = true;

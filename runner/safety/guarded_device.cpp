@@ -1,6 +1,5 @@
 #include "runner/safety/guarded_device.h"
 
-#include <sys/mman.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -9,7 +8,6 @@
 #include <cmath>
 #include <csignal>
 #include <cstring>
-#include <new>
 #include <stdexcept>
 #include <thread>
 
@@ -23,23 +21,10 @@ constexpr int kUnanswered = 25;  // unanswered reads in a row after which forces
 constexpr auto kAnswerNap = std::chrono::milliseconds(2);
 constexpr auto kFarewell = std::chrono::seconds(2);  // for the guard to close the device
 
-GuardChannel* make_channel() {
-  void* memory = mmap(nullptr, sizeof(GuardChannel), PROT_READ | PROT_WRITE,
-                      MAP_SHARED | MAP_ANONYMOUS, -1, 0);
-  if (memory == MAP_FAILED)
-    throw std::runtime_error(std::string("no memory to share with a guard process: ") +
-                             std::strerror(errno));
-  return new (memory) GuardChannel;
-}
-
 }  // namespace
 
-void GuardedDevice::Unmap::operator()(GuardChannel* channel) const {
-  munmap(channel, sizeof(GuardChannel));
-}
-
 GuardedDevice::GuardedDevice(const DeviceFactory& factory, const GuardSettings& settings)
-    : channel_(make_channel()), settings_(settings) {
+    : settings_(settings) {
   const int runner = getpid();
   guard_ = fork();
   if (guard_ < 0)

@@ -3,10 +3,10 @@
 // process, which survives a crash of the runner.
 
 #include <cstdint>
-#include <memory>
 #include <string>
 
 #include "runner/safety/guard.h"
+#include "runner/safety/shared_memory.h"
 #include "runner/servo/device.h"
 
 namespace palpate::runner {
@@ -44,15 +44,11 @@ class GuardedDevice final : public Device {
   int guard_process() const { return guard_; }
 
  private:
-  struct Unmap {
-    void operator()(GuardChannel* channel) const;
-  };
-
   bool ended() noexcept;
   DeviceTrouble without_answer() noexcept;
   void end() noexcept;
 
-  std::unique_ptr<GuardChannel, Unmap> channel_;
+  SharedMemory<GuardChannel> channel_;
   const GuardSettings settings_;
   int guard_ = -1;
   bool ended_ = false;

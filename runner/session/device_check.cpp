@@ -257,12 +257,12 @@ std::string passivity_advice(const protocols::Protocol& protocol, const stimuli:
 /// workspace's origin (m, device frame); empty: it can.
 std::string workspace_fault(const protocols::Protocol& protocol, double radius,
                             const DeviceCapabilities& device) {
-  constexpr double kRounding = 1e-9;  // m: sums of decimal fractions are rounded
+  constexpr double kDecimalRounding = 1e-9;  // m: sums of decimal fractions are rounded
   const WorkspaceMap map = workspace_of(protocol);
   const double far = glm::length(protocol.workspace.centre), held = device.workspace_radius;
   if (!map.reach) {
     const double needed = far + radius;
-    if (needed <= held + kRounding) return "";
+    if (needed <= held + kDecimalRounding) return "";
     return sentence(" with its home zone needs ", needed, " m about the centre of '", device.name,
                     "', which reaches ", held,
                     " m: move /workspace/centre_m or raise /workspace/scale");

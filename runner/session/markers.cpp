@@ -328,11 +328,11 @@ class PulseSink final : public MarkerSink {
   }
 
   bool send(const Marker& marker) noexcept override {
-    constexpr std::size_t kMostWaiting = 16;
+    constexpr std::size_t kMostPulses = 16;
     try {
       const std::lock_guard lock(mutex_);
       // A byte that the port did not take is reported with the next marker.
-      if (waiting_.size() >= kMostWaiting || std::exchange(failed_, false)) return false;
+      if (waiting_.size() >= kMostPulses || std::exchange(failed_, false)) return false;
       waiting_.push_back(static_cast<unsigned char>(marker.code));
     } catch (...) {  // out of memory
       return false;

@@ -10,6 +10,7 @@ For an idle machine; nothing is judged.
 """
 
 import argparse
+import atexit
 import json
 import pathlib
 import random
@@ -36,6 +37,7 @@ class Server:
         self.path = folder / "socket"
         self.process = subprocess.Popen([program, "serve", "--device", "simulated", "--scene", scene, "--socket", self.path],
                                         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        atexit.register(self.process.kill)  # also where this program fails
         self.said = json.loads(self.process.stdout.readline())
 
     def client(self, **more):
@@ -136,7 +138,7 @@ def flood(program, minutes):
                     hand.start(renderer="ray")
                     print("forces were off:", off[0]["reason"], file=sys.stderr)
                 due = max(due + 1 / 190, time.monotonic())  # never catches up: above 400 a second it would be closed
-                time.sleep(due - time.monotonic() if due > time.monotonic() else 0)
+                time.sleep(max(0, due - time.monotonic()))
             hand.stop()
         readers.end()
         deaf.close()

@@ -6,13 +6,17 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <filesystem>
 #include <iostream>
 #include <nlohmann/json.hpp>
 #include <thread>
 
 #include "data/base/text.h"
+#include "data/files/atomic_file.h"
+#include "runner/bench/chain_timing.h"
 #include "runner/bench/servo_timing.h"
 #include "runner/commands/devices/calibrate.h"
+#include "runner/commands/devices/lab_report.h"
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/outputs.h"
 #include "runner/devices/registry.h"
@@ -90,8 +94,7 @@ bool open_and_test(const DeviceKind& kind, const DeviceConfig& config, Json& row
 bool list_kind(const DeviceKind& kind, const DeviceConfig& config, bool named, Json& rows) {
   Json row = {{"name", kind.name}, {"description", kind.description}};
   std::printf("%s: %s\n", kind.name, kind.description);
-  if (kind.has_force_feedback)
-    std::printf("    not tried on hardware, only with what stands in for it\n");
+  if (kind.has_force_feedback) std::printf("    not tried on hardware, only with an emulator\n");
   bool good = true, usable = false;
   row["connected"] = Json::array();
   try {
@@ -171,12 +174,16 @@ void print(const ServoTiming& t) {
               t.sentence().c_str());
 }
 
+double seconds_of(const po::variables_map& values) {
+  const auto seconds = values["seconds"].as<double>();
+  if (!(seconds >= 0.1 && seconds <= 86'400)) throw UsageError("--seconds: must be 0.1 to 86400");
+  return seconds;
+}
+
 int timing(const po::variables_map& values, const DeviceConfig& config, Json& report) {
   TimingSettings settings;
   settings.rate = config.rate;
-  settings.seconds = values["seconds"].as<double>();
-  if (!(settings.seconds >= 0.1 && settings.seconds <= 86'400))
-    throw UsageError("--seconds: must be 0.1 to 86400");
+  settings.seconds = seconds_of(values);
   settings.guarded = values.count("guarded") > 0;
   settings.realtime.core = values["core"].as<int>();
   const auto cores = static_cast<int>(std::thread::hardware_concurrency());
@@ -191,6 +198,91 @@ int timing(const po::variables_map& values, const DeviceConfig& config, Json& re
   print(result);
   report["timing"] = to_json(result);
   return result.verdict() == ServoTiming::Verdict::unfit ? 1 : 0;
+}
+
+std::string microseconds(std::int64_t ns) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%10.1f", static_cast<double>(ns) / 1000);
+  return text;
+}
+
+void print(const char* what, const Percentiles& of) {
+  std::printf("%-44s%s%s%s%s\n", what, microseconds(of.median).c_str(),
+              microseconds(of.p99).c_str(), microseconds(of.p999).c_str(),
+              microseconds(of.max).c_str());
+}
+
+/// For --report: the delay of a device that can be opened, and this machine's servo.
+void add_timing(const DeviceKind* only, const DeviceConfig& config, Json& report) {
+  constexpr double kSeconds = 3;
+  if (only != nullptr && only->has_force_feedback) {
+    try {
+      report["chain"] = to_json(measure_chain(*only, config, kSeconds));
+    } catch (const std::runtime_error& error) {
+      report["chain"] = {{"trouble", error.what()}};
+    }
+  }
+  TimingSettings settings;
+  settings.rate = config.rate;
+  settings.seconds = kSeconds;
+  settings.guarded = true;
+  report["timing"] = to_json(measure_servo(settings));
+  report["machine"] = machine_facts();
+}
+
+/// \throws std::runtime_error if the file exists
+void write_report(const std::string& path, const Json& report, const DeviceConfig& config) {
+  data::AtomicFile file(path);
+  file.write(without_personal_data(report, config.serials).dump(2) + "\n");
+  file.sync();
+  file.commit(false);
+  std::printf(
+      "%s describes these devices and this machine's timing, without serial numbers and names: "
+      "read it, then send it\n",
+      printable(path).c_str());
+}
+
+/// Measures the delay of one device at zero force and stores it beside the calibration.
+/// \return the exit status
+int time_chain(const DeviceKind& kind, const DeviceConfig& config, const po::variables_map& values,
+               Json& report) {
+  const double seconds = seconds_of(values);
+  try {
+    kind.check(config);
+  } catch (const std::invalid_argument& error) {
+    throw UsageError(std::string("--device: ") + error.what());
+  }
+  if (!kind.has_force_feedback)
+    throw UsageError(std::string("--timing --device ") + kind.name +
+                     ": it has no motors, so there is no delay from pose to force");
+  if (isatty(STDERR_FILENO) != 0)
+    std::fprintf(stderr, "Measuring %s for %g s, at zero force ...\n", kind.name, seconds);
+  const ChainTiming timing = measure_chain(kind, config, seconds);
+  std::printf("%-44s%10s%10s%10s%10s\n", "us", "median", "p99", "p99.9", "max");
+  print("reading through the guard process", timing.reading);
+  print("age of the pose at its use", timing.age);
+  print("from a command until its force is sent", timing.wait);
+  print("age + sending: the delay", timing.delay);
+  const auto count = [](std::uint64_t n) { return static_cast<unsigned long long>(n); };
+  std::printf(
+      "%llu ticks at %g Hz; readings lost %llu, repeated %llu; forces not sent within a tick "
+      "%llu\n",
+      count(timing.ticks), timing.rate, count(timing.lost), count(timing.late),
+      count(timing.unsent));
+  const DeviceCapabilities can = kind.nominal(config);
+  std::printf(
+      "stable stiffness at %g Hz: %.4g N/m, without the delay %.4g N/m; the delay of 99 %% of "
+      "ticks is %.3g ms\n",
+      timing.rate,
+      with_delay(can, timing.counted(), timing.rate).max_stiffness * timing.rate / can.max_rate,
+      can.max_stiffness * timing.rate / can.max_rate, timing.counted() * 1e3);
+  report["chain"] = to_json(timing);
+  if (config.calibration.empty()) return 0;
+  const std::string path = chain_file(config.calibration);
+  store_chain(path, timing);
+  std::printf("stored in %s: palpate validate --calibration %s uses it\n", printable(path).c_str(),
+              printable(config.calibration).c_str());
+  return 0;
 }
 
 DeviceConfig config_of(const po::variables_map& values) {
@@ -208,7 +300,8 @@ DeviceConfig config_of(const po::variables_map& values) {
 
 void add_options(CommandLine& line) {
   line.usage =
-      "palpate devices [--device NAME] [--timing] [--calibrate] [--markers WHERE] [--json FILE]";
+      "palpate devices [--device NAME] [--timing] [--calibrate] [--markers WHERE] [--json FILE] "
+      "[--report FILE]";
   line.summary =
       "Lists the connected devices with their limits and self-tests; measures whether this\n"
       "machine keeps the servo's timing; calibrates forces; sends markers to try their wiring.\n"
@@ -216,6 +309,8 @@ void add_options(CommandLine& line) {
   line.example = R"(  palpate devices                                       what is there
   palpate devices --device falcon --firmware nvent.bin  opens one and tests it
   palpate devices --timing --seconds 60                 is this machine fit at 1 kHz?
+  palpate devices --timing --device inverse3 --calibration lab.json    delay from pose to force
+  palpate devices --device forcedimension --report found.json          for palpate's developers
   palpate devices --calibrate --device falcon --calibration lab.json --weights 0.1,0.2,0.4
   palpate devices --markers parport:/dev/parport0       does the EEG amplifier see each code?
 )";
@@ -231,7 +326,10 @@ void add_options(CommandLine& line) {
        "the maker's program, where a device is reached through one; default: its own port here")  //
       ("calibration", po::value<std::string>()->value_name("FILE"), "file of calibrations")       //
       ("rate", po::value<double>()->default_value(1000)->value_name("HZ"), "of the servo")        //
-      ("timing", "measure this machine; exit status 1 when it is not fit")                        //
+      ("timing",
+       "measure this machine; exit status 1 when it is not fit. With --device: measure the delay "
+       "from its pose to its force, at zero force, and store it beside the calibration as "
+       "NAME.timing.json")                                                                        //
       ("seconds", po::value<double>()->default_value(10)->value_name("S"), "--timing: duration")  //
       ("guarded", "--timing: with the device in a guard process, as a Falcon is")                 //
       ("no-fifo", "--timing: without real-time priority")                                         //
@@ -243,6 +341,9 @@ void add_options(CommandLine& line) {
        "send one marker of each kind, half a second apart, to what `palpate run --markers` takes; "
        "exit status 1 when one is not taken")                                               //
       ("json", po::value<std::string>()->value_name("FILE"), "write the findings as JSON")  //
+      ("report", po::value<std::string>()->value_name("FILE"),
+       "write limits, self-tests and timing of these devices to a new file for palpate's "
+       "developers, without personal data")  //
       ("force", "replace an existing file");
   add_calibrate_options(line.options);
 }
@@ -322,6 +423,15 @@ int devices_command(const std::vector<std::string>& args) {
   }
   const DeviceConfig config = config_of(*values);
   Outputs outputs(*values, {"json"}, {"calibration", "firmware"});
+  if (values->count("report") > 0) {
+    for (const char* other : {"timing", "calibrate", "json"}) {
+      if (values->count(other) > 0)
+        throw UsageError(std::string("--report includes it; do not combine it with --") + other);
+    }
+    const auto path = (*values)["report"].as<std::string>();
+    if (std::filesystem::exists(path))
+      throw UsageError("--report: " + printable(path) + " exists; name another file");
+  }
   const bool named = values->count("device") > 0;
   const std::string name = named ? (*values)["device"].as<std::string>() : "";
   const DeviceKind* const only = named ? &kind_of(name) : nullptr;
@@ -330,8 +440,16 @@ int devices_command(const std::vector<std::string>& args) {
     return calibrate_devices(name, config, *values);
   }
   Json report = {{"program_version", PALPATE_VERSION}};
-  const int status = values->count("timing") > 0 ? timing(*values, config, report)
-                                                 : list_devices(only, config, report);
+  int status = 0;
+  if (values->count("timing") == 0) {
+    status = list_devices(only, config, report);
+  } else {
+    status = named ? time_chain(*only, config, *values, report) : timing(*values, config, report);
+  }
+  if (values->count("report") > 0) {
+    add_timing(only, config, report);
+    write_report((*values)["report"].as<std::string>(), report, config);
+  }
   outputs.put("json", report.dump(2) + "\n");
   outputs.write();
   return status;

@@ -12,6 +12,7 @@
 #include "runner/devices/falcon/parameters.h"
 #include "runner/devices/falcon/transport.h"
 #include "runner/servo/device.h"
+#include "runner/servo/device_times.h"
 #include "stimuli/vec.h"
 
 namespace palpate::runner::falcon {
@@ -64,6 +65,7 @@ class FalconDriver {
   const DriverReading& reading() const { return reading_; }
   const DriverCounts& counts() const { return counts_; }
   const std::string& serial() const { return transport_->serial(); }
+  DeviceTimes times() const noexcept { return {located_ns_, sent_ns_}; }
   /// Counts sent last, -4095 to 4095.
   const std::array<int, 3>& motors() const { return motors_; }
   double counts_per_torque() const { return settings_.counts_per_torque; }

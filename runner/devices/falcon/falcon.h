@@ -11,7 +11,7 @@
 
 namespace palpate::runner::falcon {
 
-class FalconDevice final : public Device {
+class FalconDevice final : public Device, public KeepsTimes {
  public:
   /// \param calibration  state of its force calibration, for DeviceCapabilities
   explicit FalconDevice(std::unique_ptr<FalconDriver> driver, const std::string& calibration = "");
@@ -23,6 +23,7 @@ class FalconDevice final : public Device {
   void write(const Vec3& device1, const Vec3& device2) noexcept override;
 
   void reopen() override { driver_->reopen(); }
+  DeviceTimes times() const noexcept override { return driver_->times(); }
 
   FalconDriver& driver() { return *driver_; }
 
@@ -34,7 +35,7 @@ class FalconDevice final : public Device {
 // Two Falcons that hold the ends of a stylus, like the two Phantoms of Ho, Basdogan & Srinivasan
 // (2000), section 2: five degrees of freedom, sensed and actuated. World frame: the tip's device.
 
-class Falcon2Device final : public Device {
+class Falcon2Device final : public Device, public KeepsTimes {
  public:
   Falcon2Device(std::unique_ptr<FalconDriver> tip, std::unique_ptr<FalconDriver> tail,
                 const StylusFromEnds& stylus, const std::string& calibration = "");
@@ -48,6 +49,7 @@ class Falcon2Device final : public Device {
 
   /// Both ends command zero force during that time.
   void reopen() override;
+  DeviceTimes times() const noexcept override { return later_of(tip_->times(), tail_->times()); }
 
   FalconDriver& tip() { return *tip_; }
   FalconDriver& tail() { return *tail_; }

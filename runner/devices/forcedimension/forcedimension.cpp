@@ -253,6 +253,7 @@ DeviceReading ForceDimensionDevice::read() noexcept {
     if (library_.get_position_and_frame(&x, &y, &z, frame, *id_) < 0) {
       trouble = last_error();
     } else {
+      pose_ns_ = asked_ns;
       trouble = write_trouble_;
       if (--until_status_ < 0 || status_ != DeviceTrouble::none) {
         until_status_ = static_cast<int>(kStatusPeriod * config_.rate);
@@ -277,6 +278,7 @@ void ForceDimensionDevice::write(const Vec3& device1, const Vec3& device2) noexc
   pushed_ = pushed_ || force != Vec3(0) || torque != Vec3(0);
   const Vec3 f = from_world(force), t = from_world(torque);
   const bool taken = library_.set_force_and_torque(f.x, f.y, f.z, t.x, t.y, t.z, *id_) >= 0;
+  force_ns_ = RealClock().now_ns();
   write_trouble_ = taken ? DeviceTrouble::none : last_error();
 }
 

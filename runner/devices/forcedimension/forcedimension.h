@@ -10,6 +10,7 @@
 
 #include "runner/devices/forcedimension/library.h"
 #include "runner/servo/device.h"
+#include "runner/servo/device_times.h"
 
 namespace palpate::runner::forcedimension {
 
@@ -19,7 +20,7 @@ inline Vec3 from_world(const Vec3& v) { return {-v.y, v.x, v.z}; }
 
 /// The firmware switches forces off after 5 ms without a command (at servo rates below 1 kHz after
 /// 5 ticks, at most 32 ms). This also covers a dead guard.
-class ForceDimensionDevice final : public Device {
+class ForceDimensionDevice final : public Device, public KeepsTimes {
  public:
   /// Opens the device with the config's serial number, or the only one.
   /// \throws std::runtime_error with the obstacle
@@ -33,6 +34,7 @@ class ForceDimensionDevice final : public Device {
   /// Applies device1 + device2 at the grip; torque only if the wrist is driven.
   void write(const Vec3& device1, const Vec3& device2) noexcept override;
   void reopen() override;
+  DeviceTimes times() const noexcept override { return {pose_ns_, force_ns_}; }
 
  private:
   void open();
@@ -47,7 +49,8 @@ class ForceDimensionDevice final : public Device {
   DeviceCapabilities capabilities_;
   Vec3 tip_, tail_;            ///< m, world, of the last good reading
   std::int64_t asked_ns_ = 0;  ///< time of asking for the last good reading; 0: none since opening
-  int until_status_ = 0;       ///< readings until the next query of the status
+  std::int64_t pose_ns_ = 0, force_ns_ = 0;  ///< DeviceTimes
+  int until_status_ = 0;                     ///< readings until the next query of the status
   DeviceTrouble status_ = DeviceTrouble::none;
   DeviceTrouble write_trouble_ = DeviceTrouble::none;
   bool lost_ = true;

@@ -101,6 +101,10 @@ void Pump::exchange(bool first) {
   Vec3 force(wanted.x, wanted.y, wanted.z);
   if (static_cast<double>(age) * 1e-9 > settings_.silence || !finite(force)) force = Vec3(0);
   link_->send(command(settings_.arm, force, settings_.dialect, first));
+  if (wanted.time_ns != sent_wanted_ns_) {
+    sent_wanted_ns_ = wanted.time_ns;
+    force_ns_.store(clock.now_ns());
+  }
   std::string_view message;
   while (!link_->receive(message, std::chrono::milliseconds(5)))
     if (quit_.load()) return;
@@ -229,6 +233,7 @@ DeviceReading Inverse3Device::read() noexcept {
     return {{tip_, tail_}, 0, true, DeviceTrouble::service_gone};
   }
   const Pump::Newest newest = pump_->newest();
+  pose_ns_ = newest.asked_ns;
   const std::int64_t age = RealClock().now_ns() - newest.time_ns;
   DeviceTrouble trouble = newest.trouble;
   if (trouble == DeviceTrouble::none && (newest.time_ns == 0 || age > kSilent_ns))

@@ -13,6 +13,7 @@
 #include "runner/devices/haply/link.h"
 #include "runner/devices/haply/messages.h"
 #include "runner/servo/device.h"
+#include "runner/servo/device_times.h"
 #include "runner/servo/shared_value.h"
 #include "runner/servo/triple_buffer.h"
 
@@ -43,6 +44,8 @@ class Pump {
 
   void push(const Vec3& force) noexcept;  ///< N, on the hand
   const Newest& newest() noexcept;        ///< for one thread
+  /// When the newest push was sent, ns; 0: none yet. From any thread.
+  std::int64_t force_ns() const noexcept { return force_ns_.load(); }
   /// Whether the service seemed not to understand forces in this dialect.
   bool misunderstood() const noexcept { return misunderstood_.load(); }
 
@@ -61,17 +64,19 @@ class Pump {
   TripleBuffer<Newest> newest_;
   Newest seen_;  ///< the reader's
   std::atomic<bool> quit_{false}, misunderstood_{false};
+  std::atomic<std::int64_t> force_ns_{0};  ///< DeviceTimes
   // Used by the thread only.
   Newest last_;
   Vec3 sent_;
-  std::size_t last_message_ = 0;    ///< hash
-  std::int64_t changed_ns_ = 0;     ///< time of the last message that differed from the one before
-  bool sent_changed_ = false;       ///< since changed_ns_
-  std::int64_t unanswered_ns_ = 0;  ///< start of sending a force that the service does not report
+  std::int64_t sent_wanted_ns_ = 0;  ///< Wanted::time_ns of sent_
+  std::size_t last_message_ = 0;     ///< hash
+  std::int64_t changed_ns_ = 0;      ///< time of the last message that differed from the one before
+  bool sent_changed_ = false;        ///< since changed_ns_
+  std::int64_t unanswered_ns_ = 0;   ///< start of sending a force that the service does not report
   std::thread thread_;
 };
 
-class Inverse3Device final : public Device {
+class Inverse3Device final : public Device, public KeepsTimes {
  public:
   /// \throws std::runtime_error with the obstacle
   /// \param grip  whether to sense the axis of a Verse Grip, if there is one
@@ -82,6 +87,7 @@ class Inverse3Device final : public Device {
   DeviceReading read() noexcept override;
   void write(const Vec3& device1, const Vec3& device2) noexcept override;
   void reopen() override;
+  DeviceTimes times() const noexcept override { return {pose_ns_, pump_ ? pump_->force_ns() : 0}; }
 
  private:
   void open();
@@ -94,6 +100,7 @@ class Inverse3Device final : public Device {
   double period_ns_;
   Vec3 tip_, tail_;            ///< m, of the last good reading
   std::int64_t asked_ns_ = 0;  ///< time of asking for it; 0: none
+  std::int64_t pose_ns_ = 0;   ///< DeviceTimes
   bool lost_ = true;
   std::unique_ptr<Pump> pump_;
 };

@@ -190,6 +190,10 @@ void TouchDevice::exchange() noexcept {
   newtons = {wanted_force.x, wanted_force.y, wanted_force.z};
   library_.set_doubles(kForce, newtons.data());
   library_.end_frame(handle_);
+  if (whole && wanted.time_ns != set_ns_) {
+    set_ns_ = wanted.time_ns;
+    force_ns_.store(clock.now_ns());
+  }
   if (--until_calibration_ < 0) {
     until_calibration_ = kCalibrationCalls;
     unsigned found = library_.check_calibration();

@@ -2,6 +2,7 @@
 // A 3D Systems Touch, Touch X or Phantom, through the maker's library and its scheduler. Not tested
 // on hardware: runner/README.md lists the uncertainties.
 
+#include <atomic>
 #include <cstdint>
 #include <memory>
 #include <string>
@@ -9,6 +10,7 @@
 
 #include "runner/devices/touch/library.h"
 #include "runner/servo/device.h"
+#include "runner/servo/device_times.h"
 #include "runner/servo/shared_value.h"
 #include "runner/servo/triple_buffer.h"
 
@@ -21,7 +23,7 @@ inline Vec3 from_world(const Vec3& v) { return {v.x, v.z, -v.y}; }
 /// Devices are identified by the names given in the maker's setup. The library's scheduler calls
 /// every millisecond in its own thread. Every call must set the force, because the last one would
 /// persist.
-class TouchDevice final : public Device {
+class TouchDevice final : public Device, public KeepsTimes {
  public:
   /// Opens the device with the config's serial number, which is its name, or the default one.
   /// \throws std::runtime_error with the obstacle
@@ -34,6 +36,7 @@ class TouchDevice final : public Device {
   /// Applies device1 + device2 at the tip, without torque.
   void write(const Vec3& device1, const Vec3& device2) noexcept override;
   void reopen() override;
+  DeviceTimes times() const noexcept override { return {seen_.asked_ns, force_ns_.load()}; }
 
  private:
   struct Frame {
@@ -65,7 +68,9 @@ class TouchDevice final : public Device {
   Vec3 tip_, tail_;            ///< m, of the last reading
   std::int64_t asked_ns_ = 0;  ///< time of asking for it
   bool lost_ = true;
+  std::atomic<std::int64_t> force_ns_{0};  ///< DeviceTimes
   // Used by the scheduler's thread only.
+  std::int64_t set_ns_ = 0;  ///< Wanted::time_ns of the force set last
   DeviceTrouble trouble_ = DeviceTrouble::none;
   std::int64_t trouble_ns_ = 0;
   int until_calibration_ = 0;

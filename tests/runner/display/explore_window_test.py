@@ -45,7 +45,12 @@ class ExploreWindow(unittest.TestCase):
         self.program = subprocess.Popen([PALPATE, "explore", scene, *options], env=self.screen.environment, text=True,
                                         stdout=subprocess.PIPE, stderr=subprocess.PIPE)
         self.addCleanup(self.close_program)
-        self.window = self.screen.window(f"{pathlib.Path(scene).name} - palpate explore")
+        try:
+            self.window = self.screen.window(f"{pathlib.Path(scene).name} - palpate explore")
+        except AssertionError as error:
+            self.program.kill()
+            said = "\n".join(self.program.communicate())
+            raise AssertionError(f"{error}; the program said {said!r}; windows: {self.screen.do('search', '--name', '.*')!r}") from None
         self.screen.focus(self.window)
         self.width, self.height = self.screen.size(self.window)
         wait_for("the emergency button", lambda: reddish(self.pixel(40, 20)))

@@ -1,0 +1,165 @@
+"""palpate devices --timing --device and --report on emulated devices: the delay follows the device's, validate uses it, and
+the report holds no personal data.
+
+Usage: device_timing_test.py PALPATE EMULATED_INVERSE_SERVICE STUB_LIBDRD STUB_LIBHD [EMULATED_FALCONS]
+"""
+
+import datetime
+import json
+import mmap
+import os
+import pathlib
+import re
+import struct
+import subprocess
+import sys
+import tempfile
+import unittest
+
+PALPATE, SERVICE, DRD, HD, *FALCONS = sys.argv[1:6]
+PATIENCE = 120  # s; only a hang reaches it
+RATE = 100  # Hz, that a busy machine keeps
+# As in stub_state.h: the number of devices, then the numbers of each.
+FIELDS = ("serial model hand_x hand_y hand_z hand_stiffness connected power reset in_use wrong buttons too_fast error delay").split()
+NUMBERS = 27  # of each device
+
+
+class Timing(unittest.TestCase):
+    def setUp(self):
+        scratch = tempfile.TemporaryDirectory()
+        self.addCleanup(scratch.cleanup)
+        self.folder = pathlib.Path(scratch.name)
+        self.calibration = self.folder / "lab.json"
+        state = self.folder / "stub"
+        state.write_bytes(bytes(8 * (1 + 2 * NUMBERS)))
+        self.file = open(state, "r+b")
+        self.addCleanup(self.file.close)
+        self.stub = mmap.mmap(self.file.fileno(), 0)
+        self.addCleanup(self.stub.close)
+        struct.pack_into("d", self.stub, 0, 1)
+        self.set(serial=4711, model=1, hand_stiffness=400, connected=1, power=1)
+        self.environment = {**os.environ, "PALPATE_STUB_STATE": str(state)}
+
+    def set(self, **numbers):
+        for name, number in numbers.items():  # at once: pack_into would write a zero first
+            at = 8 * (1 + FIELDS.index(name))
+            self.stub[at:at + 8] = struct.pack("d", number)
+
+    def service(self):
+        process = subprocess.Popen([SERVICE], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+
+        def end():
+            process.stdin.close()
+            process.wait(PATIENCE)
+            process.stdout.close()
+        self.addCleanup(end)
+        return "--service", process.stdout.readline().split()[1]
+
+    def palpate(self, *arguments, status=0, under=()):
+        done = subprocess.run([*map(str, under), PALPATE, *map(str, arguments)], capture_output=True, text=True,
+                              timeout=PATIENCE, env=self.environment)
+        self.assertEqual(done.returncode, status, done.stderr + done.stdout)
+        return done.stderr if status else done.stdout
+
+    def time(self, kind, *options, under=()):
+        said = self.palpate("devices", "--timing", "--device", kind, "--rate", RATE, "--seconds", 1, "--calibration",
+                            self.calibration, *options, under=under)
+        print(said, file=sys.stderr)
+        chains = json.loads((self.folder / "lab.timing.json").read_text())["chains"]
+        chain, = [one for one in chains if one["device"] == kind]
+        self.assertEqual((chain["rate_hz"], chain["ticks"]), (RATE, RATE))
+        self.assertLess(chain["lost_readings"], RATE / 2)  # a busy machine holds the guard process up
+        for name in ("reading_ns", "pose_age_ns", "force_wait_ns", "delay_ns"):
+            values = list(chain[name].values())
+            self.assertEqual(values, sorted(values))
+            self.assertGreaterEqual(values[0], 0)
+        # Each delay is an age and a wait.
+        self.assertLessEqual(chain["delay_ns"]["max"], chain["pose_age_ns"]["max"] + chain["force_wait_ns"]["max"])
+        self.assertGreaterEqual(chain["delay_ns"]["max"], max(chain["pose_age_ns"]["median"], chain["force_wait_ns"]["median"]))
+        return chain
+
+    def test_what_a_library_takes_is_measured(self):
+        quick = self.time("forcedimension", "--library", DRD)
+        self.set(delay=0.003)  # s, of each pose
+        slow = self.time("forcedimension", "--library", DRD)
+        # A pose is as old as the library takes to give it.
+        self.assertGreaterEqual(slow["pose_age_ns"]["median"], 3_000_000)
+        self.assertGreaterEqual(slow["reading_ns"]["median"], 3_000_000)
+        self.assertGreater(slow["delay_ns"]["median"], quick["delay_ns"]["median"])
+
+    def test_validate_counts_what_was_measured(self):
+        protocol = {"version": 1, "name": "stiff", "renderers": ["point"], "repetitions": 1, "servo": {"rate_hz": RATE},
+                    "stimuli": [{"name": "ball", "shape": "sphere", "radius_m": 0.01, "subdivisions": 1}],
+                    "material": {"stiffness_n_per_m": 5000}, "response": {"keys": {"1": "ball"}}}
+        file = self.folder / "stiff.json"
+        file.write_text(json.dumps(protocol))
+        self.assertIn("--timing", self.palpate("validate", file, "--calibration", self.calibration, status=2))
+        service = self.service()
+        chain = self.time("inverse3", *service)
+        self.time("touch", "--library", HD)
+        shows = r"'inverse3' shows up to ([0-9.e+]+) N/m"
+        before = float(re.search(shows, self.palpate("validate", file)).group(1))
+        said = self.palpate("validate", file, "--calibration", self.calibration)
+        counted = float(re.search(shows, said).group(1))
+        half, delay = 0.5 / RATE, chain["delay_ns"]["p99"] * 1e-9
+        self.assertAlmostEqual(counted / before, half / (half + delay), places=3)
+        self.assertEqual(said.count("with its delay of"), 2)
+        # A second measurement replaces that of its kind alone.
+        self.time("inverse3", *service)
+        kept = json.loads((self.folder / "lab.timing.json").read_text())["chains"]
+        self.assertEqual(sorted(one["device"] for one in kept), ["inverse3", "touch"])
+        (self.folder / "lab.timing.json").write_text('{"version": 1, "chains": [{"device": 3}]}')
+        self.assertIn("/chains/0", self.palpate("validate", file, "--calibration", self.calibration, status=2))
+
+    @unittest.skipUnless(FALCONS, "needs libumockdev")
+    def test_a_falcon(self):
+        made = datetime.datetime.now(datetime.timezone.utc).strftime("%Y-%m-%dT%H:%M:%SZ")
+        self.calibration.write_text(json.dumps({"version": 1, "forces": [
+            {"serial": "EMU1", "counts_per_newton_metre": -10000, "weights_kg": [0.1], "made_utc": made}]}))
+        self.time("falcon", under=FALCONS)
+
+    def test_wrong_use(self):
+        for kind in ("mouse", "simulated"):
+            self.palpate("devices", "--timing", "--device", kind, status=2)
+        self.palpate("devices", "--timing", "--device", "forcedimension", "--seconds", 0, status=2)
+        self.set(connected=0)
+        self.palpate("devices", "--timing", "--device", "forcedimension", "--library", DRD, status=1)
+        self.palpate("devices", "--report", self.folder / "r.json", "--json", self.folder / "j.json", status=2)
+        self.assertEqual([one.name for one in self.folder.iterdir()], ["stub"])
+
+    def test_the_report_tells_all_of_the_device_and_nothing_of_the_person(self):
+        library = self.folder / "anna" / "libdrd.so"
+        library.parent.mkdir()
+        library.symlink_to(DRD)
+        self.set(serial=47112)  # the library has 16 bits
+        out = self.folder / "found.json"
+        options = ("devices", "--device", "forcedimension", "--library", library, "--rate", RATE, "--report", out)
+        self.palpate(*options)
+        text = out.read_text()
+        found = json.loads(text)
+        row, = found["devices"]
+        self.assertEqual(row["connected"], [{"serial": "...12", "trouble": ""}])
+        self.assertEqual(row["limits"]["serial"], "...12")
+        self.assertGreater(row["limits"]["max_force_n"], 0)
+        self.assertIn("maker's", row["limits"]["calibration"])
+        self.assertTrue(row["self_test"] and all(one["passed"] for one in row["self_test"]))
+        self.assertLess(found["chain"]["lost_readings"], found["chain"]["ticks"] / 2)
+        self.assertIn("lateness_ns", found["timing"])
+        self.assertEqual(found["machine"]["processors"], os.cpu_count())
+        self.assertTrue(found["program_version"] and found["machine"]["kernel"])
+        for private in ("47112", "anna", str(self.folder), os.uname().nodename, str(pathlib.Path.home()) + "/"):
+            self.assertNotIn(private, text)
+        self.assertIn("exists", self.palpate(*options, "--force", status=2))
+        self.assertEqual(out.read_text(), text)
+        # A library that cannot be loaded is named without its folder.
+        broken = self.folder / "anna" / "broken.so"
+        broken.write_text("no library")
+        other = self.folder / "other.json"
+        self.palpate("devices", "--device", "forcedimension", "--library", broken, "--report", other, status=1)
+        self.assertIn("broken.so", other.read_text())
+        self.assertNotIn("anna", other.read_text())
+
+
+if __name__ == "__main__":
+    del sys.argv[1:6]
+    unittest.main()
