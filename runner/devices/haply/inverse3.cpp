@@ -20,6 +20,9 @@ constexpr double kHeeded = 0.1, kFelt = 0.3;         // share of the force; leas
 constexpr double kFarthest = 0.5;                    // m; no model reaches so far
 constexpr double kMaxSpeed = 5, kJump = 1e-3;        // m/s and m
 constexpr auto kPatience = std::chrono::seconds(2);  // for the list of devices
+constexpr auto kWait = std::chrono::milliseconds(5);  // for a reply, before a look at quit_
+constexpr int kWaitsUntilZero = 3;                    // without a reply the force becomes zero
+constexpr int kMostUnanswered = 20;                   // zeros sent to such a service
 
 // A reseller's numbers; the reach is the limit in the maker's tutorials.
 constexpr double kMaxForce = 4, kMaxStiffness = 1000, kReach = 0.1, kResolution = 1e-5;
@@ -85,11 +88,45 @@ void Pump::run() noexcept {
     }
     wanted_.write({});
     exchange(false);
-  } catch (const std::exception&) {  // of the connection or of a message
-    last_.trouble = DeviceTrouble::service_gone;
-    last_.time_ns = clock.now_ns();
-    newest_.write(last_);
+  } catch (const LinkError&) {
+    give_up();
+  } catch (const std::exception&) {  // of a message: the connection may still carry a command
+    give_up();
+    try {
+      send(Vec3(0));
+    } catch (const LinkError&) {  // closed below
+    }
   }
+  link_.reset();  // a service that has lost its client idles the arm
+}
+
+void Pump::give_up() noexcept {
+  last_.trouble = DeviceTrouble::service_gone;
+  last_.time_ns = RealClock().now_ns();
+  newest_.write(last_);
+}
+
+void Pump::send(const Vec3& force, bool first) {
+  link_->send(command(settings_.arm, force, settings_.dialect, first));
+}
+
+std::optional<Pump::Reply> Pump::receive() {
+  std::string_view message;
+  int commands = 1;  // without a reply
+  for (int waits = 1; !link_->receive(message, kWait); ++waits) {
+    if (quit_.load()) return std::nullopt;
+    if (waits < kWaitsUntilZero || commands > kMostUnanswered) continue;
+    // A service that does not answer may still obey, and must not hold the last force.
+    send(Vec3(0));
+    ++commands;
+  }
+  Reply newest;
+  do {
+    newest = {parse_state(message, settings_.arm, settings_.grip),
+              std::hash<std::string_view>()(message)};
+    // Then the replies to the zeros, unless they are lost.
+  } while (--commands > 0 && link_->receive(message, kWait));
+  return newest;
 }
 
 void Pump::exchange(bool first) {
@@ -100,28 +137,25 @@ void Pump::exchange(bool first) {
   const std::int64_t asked_ns = clock.now_ns(), age = asked_ns - wanted.time_ns;
   Vec3 force(wanted.x, wanted.y, wanted.z);
   if (static_cast<double>(age) * 1e-9 > settings_.silence || !finite(force)) force = Vec3(0);
-  link_->send(command(settings_.arm, force, settings_.dialect, first));
+  send(force, first);
   if (wanted.time_ns != sent_wanted_ns_) {
     sent_wanted_ns_ = wanted.time_ns;
     force_ns_.store(clock.now_ns());
   }
-  std::string_view message;
-  while (!link_->receive(message, std::chrono::milliseconds(5)))
-    if (quit_.load()) return;
-  const State state = parse_state(message, settings_.arm, settings_.grip);
+  const std::optional<Reply> reply = receive();
+  if (!reply) return;
   const DeviceTrouble before = last_.trouble;
-  last_ = {state, asked_ns, clock.now_ns(), before};
-  if (!state.has_arm) {
+  last_ = {reply->state, asked_ns, clock.now_ns(), before};
+  if (!reply->state.has_arm) {
     last_.trouble = DeviceTrouble::unplugged;
   } else if (before == DeviceTrouble::unplugged) {
     last_.trouble = DeviceTrouble::none;
   }
-  watch(force, message);
+  watch(force, reply->hash);
   newest_.write(last_);
 }
 
-void Pump::watch(const Vec3& sent, std::string_view message) noexcept {
-  const std::size_t hash = std::hash<std::string_view>()(message);
+void Pump::watch(const Vec3& sent, std::size_t hash) noexcept {
   sent_changed_ = sent_changed_ || sent != sent_;
   sent_ = sent;
   if (hash != last_message_ || changed_ns_ == 0) {

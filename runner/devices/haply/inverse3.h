@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
@@ -54,9 +55,17 @@ class Pump {
     double x = 0, y = 0, z = 0;
     std::int64_t time_ns = 0;
   };
+  struct Reply {
+    State state;
+    std::size_t hash = 0;  ///< of the message
+  };
   void run() noexcept;
+  void give_up() noexcept;
   void exchange(bool first);
-  void watch(const Vec3& sent, std::string_view message) noexcept;
+  void send(const Vec3& force, bool first = false);
+  /// The reply to the last command; none: the pump ends. Sends zeros while it does not arrive.
+  std::optional<Reply> receive();
+  void watch(const Vec3& sent, std::size_t hash) noexcept;
 
   std::unique_ptr<Link> link_;
   const Settings settings_;

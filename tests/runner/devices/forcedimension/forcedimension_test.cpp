@@ -11,6 +11,7 @@
 #include <string>
 #include <thread>
 
+#include "runner/bench/allocation_count.h"
 #include "runner/devices/self_test.h"
 #include "tests/runner/devices/forcedimension/stub_state.h"
 #include "tests/shared/temporary_folder.h"
@@ -20,6 +21,8 @@ namespace {
 
 using testing::StubDevice;
 using testing::StubState;
+
+constexpr int kMinuteOfTicks = 60'000;  // at 1 kHz
 
 class ForceDimension : public ::testing::Test {
  protected:
@@ -160,6 +163,18 @@ TEST_F(ForceDimension, EveryFaultIsTroubleAndZeroForceUntilItIsOver) {
     device->write({0, 0, 1}, Vec3(0));
     EXPECT_EQ(one().force[2], 1) << "it works again";
   }
+}
+
+TEST_F(ForceDimension, ReadsAndWritesDoNotAllocate) {
+  if (!counts_allocations()) GTEST_SKIP() << "allocations are not counted under sanitizers";
+  const auto device = open(config_);
+  ASSERT_EQ(settle(*device), DeviceTrouble::none);
+  const std::uint64_t before = allocations();
+  for (int tick = 0; tick < kMinuteOfTicks; ++tick) {
+    device->read();
+    device->write({0, 0, 1}, Vec3(0));
+  }
+  EXPECT_EQ(allocations(), before);
 }
 
 TEST_F(ForceDimension, AJumpIsImplausible) {

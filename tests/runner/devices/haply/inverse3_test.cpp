@@ -8,9 +8,11 @@
 #include <cmath>
 #include <functional>
 #include <glm/geometric.hpp>
+#include <iostream>
 #include <stdexcept>
 #include <thread>
 
+#include "runner/bench/allocation_count.h"
 #include "tests/runner/devices/haply/emulated_service.h"
 
 namespace palpate::runner::haply {
@@ -18,6 +20,8 @@ namespace {
 
 using testing::EmulatedArm;
 using testing::EmulatedService;
+
+constexpr int kMinuteOfTicks = 60'000;  // at 1 kHz
 
 constexpr const char* kState = R"({"inverse3":[{"device_id":"A","state":{"cursor_position":
   {"x":0.01,"y":0.02,"z":0.03},"current_cursor_force":{"x":1,"y":2,"z":3}},"status":{"calibrated":true}}],
@@ -190,6 +194,11 @@ TEST_F(Inverse3, EveryFaultGivesTroubleAndZeroForceAndAllowsReopening) {
     ASSERT_TRUE(until(
         *device, [this](const DeviceReading&) { return service_.arm().force[2] == 1; }, {0, 0, 1}));
     service_.with(fault);
+    const auto began = std::chrono::steady_clock::now();
+    EXPECT_TRUE(until(
+        *device, [this](const DeviceReading&) { return service_.arm().force[2] == 0; }, {0, 0, 1}));
+    const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - began;
+    std::clog << name << ": zero force after " << took.count() << " ms\n";
     const DeviceTrouble expected = trouble;
     EXPECT_TRUE(until(
         *device, [expected](const DeviceReading& r) { return r.lost && r.trouble == expected; },
@@ -201,6 +210,18 @@ TEST_F(Inverse3, EveryFaultGivesTroubleAndZeroForceAndAllowsReopening) {
     EXPECT_TRUE(until(
         *device, [this](const DeviceReading&) { return service_.arm().force[2] == 1; }, {0, 0, 1}));
   }
+}
+
+TEST_F(Inverse3, ReadsAndWritesDoNotAllocate) {
+  if (!counts_allocations()) GTEST_SKIP() << "allocations are not counted under sanitizers";
+  const auto device = open(config_);
+  ASSERT_TRUE(works(*device));
+  const std::uint64_t before = allocations();
+  for (int tick = 0; tick < kMinuteOfTicks; ++tick) {
+    device->read();
+    device->write({0, 0, 1}, Vec3(0));
+  }
+  EXPECT_EQ(allocations(), before);
 }
 
 TEST_F(Inverse3, AServiceThatEndsAndComesBackIsOpenedAgain) {

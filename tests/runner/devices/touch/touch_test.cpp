@@ -5,16 +5,19 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <chrono>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <functional>
 #include <glm/geometric.hpp>
+#include <iostream>
 #include <stdexcept>
 #include <string>
 #include <thread>
 
+#include "runner/bench/allocation_count.h"
 #include "tests/runner/devices/forcedimension/stub_state.h"
 #include "tests/shared/temporary_folder.h"
 
@@ -23,6 +26,8 @@ namespace {
 
 using testing::StubDevice;
 using testing::StubState;
+
+constexpr int kMinuteOfTicks = 60'000;  // at 1 kHz
 
 class Touch : public ::testing::Test {
  protected:
@@ -134,20 +139,36 @@ TEST_F(Touch, EveryFaultIsTroubleAndZeroForceUntilItIsOver) {
     ASSERT_TRUE(works(*device));
     ASSERT_TRUE(pushes(*device));
     one().*what = value;
+    const auto began = std::chrono::steady_clock::now();
+    if (what != &StubDevice::delay) {  // a stalled scheduler sets no force
+      EXPECT_TRUE(until(
+          *device, [this](const DeviceReading&) { return one().force[1] == 0; }, 1));
+      const std::chrono::duration<double, std::milli> took =
+          std::chrono::steady_clock::now() - began;
+      std::clog << name << ": zero force after " << took.count() << " ms\n";
+    }
     EXPECT_TRUE(until(
         *device, [trouble](const DeviceReading& read) { return read.trouble == trouble; }, 1));
     const DeviceReading reading = device->read();
     EXPECT_TRUE(reading.lost);
     EXPECT_TRUE(std::isfinite(reading.stylus.tip.x + reading.stylus.tip.y + reading.stylus.tip.z));
-    if (what != &StubDevice::delay) {  // a stalled scheduler sets no force
-      EXPECT_TRUE(until(
-          *device, [this](const DeviceReading&) { return one().force[1] == 0; }, 1));
-    }
     one().*what = well;
     if (needs_reopening(trouble)) device->reopen();
     EXPECT_TRUE(works(*device));
     EXPECT_TRUE(pushes(*device)) << "it works again";
   }
+}
+
+TEST_F(Touch, ReadsAndWritesDoNotAllocate) {
+  if (!counts_allocations()) GTEST_SKIP() << "allocations are not counted under sanitizers";
+  const auto device = open(config_);
+  ASSERT_TRUE(works(*device));
+  const std::uint64_t before = allocations();
+  for (int tick = 0; tick < kMinuteOfTicks; ++tick) {
+    device->read();
+    device->write({0, 0, 1}, Vec3(0));
+  }
+  EXPECT_EQ(allocations(), before);
 }
 
 TEST_F(Touch, ACalibrationThatIsDueIsUpdated) {
