@@ -6,7 +6,7 @@
 
 namespace palpate::runner::testing {
 
-/// Reads what a function of the tick says, keeps what was written last.
+/// Reads the value of a function of the tick, and keeps the last written forces.
 class FakeDevice final : public Device {
  public:
   /// \param drives  degrees of freedom

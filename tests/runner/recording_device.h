@@ -10,7 +10,7 @@
 
 namespace palpate::runner::testing {
 
-/// What a device was told and when, by the machine's clock; meant for memory shared with its
+/// The commands to a device and their times, by the machine's clock; for memory shared with its
 /// process.
 struct DeviceRecord {
   struct Write {
@@ -35,7 +35,7 @@ struct DeviceRecord {
   std::array<Write, kRoom> writes{};
 };
 
-/// Stands where it is told and writes down every command.
+/// Stays at a given pose and records every command.
 class RecordingDevice final : public Device {
  public:
   RecordingDevice(DeviceRecord& record, DeviceReading (*where)(int tick))

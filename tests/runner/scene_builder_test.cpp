@@ -1,5 +1,5 @@
-// What the scenes of layered objects render, built as scene files are: what is inside of an object,
-// and what gives way.
+// Rendering of layered objects, built like scene files: the inside of an object, and layers that
+// break.
 
 #include "runner/scene_builder.h"
 
@@ -45,7 +45,7 @@ stimuli::ObjectSpec compound(std::vector<stimuli::ObjectSpec> parts) {
   return spec;
 }
 
-/// One stylus in one scene, upright, led to a depth under the cube's upper face.
+/// An upright stylus in a scene, moved to a depth below the cube's upper face.
 class Press {
  public:
   explicit Press(const stimuli::ObjectSpec& object, const rendering::Tool& tool = {})
@@ -57,7 +57,7 @@ class Press {
                                           kServoPeriod);
   }
   double force(double depth, double x = 0.004) { return at(depth, x).force.z; }
-  /// N, the largest on a slow way between depths.
+  /// Largest force on a slow path between depths, N.
   double largest_force(double from, double to, double x = 0.004) {
     double most = 0;
     const int ticks = static_cast<int>(std::abs(to - from) / 2e-5);
@@ -122,7 +122,7 @@ TEST(SceneBuilder, ASurfaceWithoutStiffnessHasNoForceAndNoContact) {
 }
 
 TEST(SceneBuilder, AStylusInsideAnotherPartHasNotLeftTheCompound) {
-  // A block that is not felt at all stands on the layered one.
+  // A block without stiffness stands on the layered one.
   Press press(compound({cube(of(0, {{0.005, 500, 0, 1.0}})),
                         box({-kHalf, -kHalf, kHalf}, {kHalf, kHalf, 3 * kHalf}, of(0, {}))}));
   press.at(-3 * kHalf);
@@ -135,7 +135,7 @@ TEST(SceneBuilder, AStylusInsideAnotherPartHasNotLeftTheCompound) {
 }
 
 TEST(SceneBuilder, EachPartOfACompoundHasItsOwnBreakingForce) {
-  // Left of 1 N, right of 3 N, in the middle one that holds; in any order.
+  // Breaking at 1 N on the left, 3 N on the right, never in the middle; in any order.
   const auto part = [](double x, std::optional<double> breaks) {
     return box({x - 0.02, -kHalf, -kHalf}, {x + 0.02, kHalf, kHalf},
                of(0, {{0.002, 1000, 0, breaks}}));
@@ -188,7 +188,7 @@ TEST(SceneBuilder, ALayerContinuesFromPartToPart) {
 }
 
 TEST(SceneBuilder, ALayerOfSomePartsLiesBelowTheWholeObjectsSurface) {
-  // The lower block has the layer, a slab on it has none, or one of another kind.
+  // The lower block has the layer; a slab on it has none, or a different one.
   const auto lower = box(Vec3(-kHalf), {kHalf, kHalf, 0.02}, of(0, {{0.002, 1000, 0, {}}}));
   const auto upper = [](std::vector<stimuli::Layer> layers) {
     return box({-kHalf, -kHalf, 0.02}, {kHalf, kHalf, kHalf}, of(100, std::move(layers)));
@@ -199,7 +199,7 @@ TEST(SceneBuilder, ALayerOfSomePartsLiesBelowTheWholeObjectsSurface) {
       return turned_round ? compound({lower, upper(std::move(layers))})
                           : compound({upper(std::move(layers)), lower});
     };
-    // Between slab and block is no surface: the layer begins at once under the slab.
+    // There is no surface between slab and block: the layer begins directly below the slab.
     Press press(scene_of({}));
     press.at(-0.001);
     for (const double depth : {0.001, 0.0049, 0.0051, 0.007, 0.012}) {
@@ -215,7 +215,7 @@ TEST(SceneBuilder, ALayerOfSomePartsLiesBelowTheWholeObjectsSurface) {
 }
 
 TEST(SceneBuilder, LayersThatDifferFromPartToPartMeetAtTheSeam) {
-  // Equal but for what they bear, or deeper on the right.
+  // Equal except for the breaking force, or deeper on the right.
   for (const double deeper : {0.0, 0.002}) {
     const auto left = box(Vec3(-kHalf), {0, kHalf, kHalf}, of(0, {{0.003, 1000, 0, {}}}));
     const auto right = box({0, -kHalf, -kHalf}, Vec3(kHalf),

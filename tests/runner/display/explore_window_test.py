@@ -96,7 +96,7 @@ class ExploreWindow(unittest.TestCase):
         self.assertEqual(self.end(), 0)
 
     def test_the_tool_is_thicker_in_the_window_than_in_files(self):
-        """A view on a screen is smaller than a picture in a paper."""
+        """A view on a screen is smaller than a picture in a paper, so the tool is drawn thicker."""
         self.scene.write_text(json.dumps({"objects": SCENE["objects"][:1]}))
         path = self.folder / "still.csv"
         path.write_text("t,tip_x,tip_y,tip_z,tail_x,tail_y,tail_z\n" + "".join(
@@ -114,7 +114,7 @@ class ExploreWindow(unittest.TestCase):
         self.assertLess(ratio, 1.6)
 
     def thickness(self, picture):
-        """Of the rod before the blue cube, over the cube's height: whatever the camera's distance."""
+        """Width of the rod before the blue cube, relative to the cube's height, whatever the camera's distance."""
         wide, high = map(int, subprocess.run(["identify", "-format", "%w %h", picture], check=True, capture_output=True, text=True).stdout.split())
         seen = subprocess.run(["convert", picture, "-depth", "8", "rgb:-"], check=True, capture_output=True).stdout
         blue = [b > 90 and b - r > 40 for r, b in zip(seen[0::3], seen[2::3])]
@@ -134,7 +134,7 @@ class ExploreWindow(unittest.TestCase):
         def allowed():
             if not self.state_is_red():
                 return True
-            self.screen.point(self.window, self.width - 5, 5)  # under the pointer it has another colour
+            self.screen.point(self.window, self.width - 5, 5)  # it changes colour under the pointer
             left, top = int(0.87 * self.width), 70
             green = [top + row for row, pixel in enumerate(self.pixels(left, top, 1, 250))
                      if all(abs(value - due) < 12 for value, due in zip(pixel, (41, 107, 69)))]
@@ -172,19 +172,19 @@ class ExploreWindow(unittest.TestCase):
         self.assertEqual(self.end(), 0)
 
     def test_a_clip_has_the_pictures_that_were_shown(self):
-        # A picture each 40 ms, which a machine without a graphics card draws in seconds when it is busy.
+        # A picture every 40 ms; a busy machine without a graphics card takes seconds to draw them.
         self.press_c_after(0.4)
         clip = wait_for("the clip", lambda: list((self.folder / "kept").glob("scene-1.webp")))[0]
         self.screen.keep(self.window, "explore_clip")
         data = clip.read_bytes()
         self.assertEqual((data[:4], data[8:12]), (b"RIFF", b"WEBP"))
-        # Those in which nothing moves are one.
+        # Equal pictures are merged into one.
         self.assertGreaterEqual(data.count(b"ANMF"), 6)
         self.assertLessEqual(data.count(b"ANMF"), 11)
         self.assertEqual(self.end(), 0)
 
     def press_c_after(self, seconds):
-        """For a clip of a path that so long goes 24 mm down."""
+        """For a clip of a path that moves down by 24 mm in that time."""
         path = self.folder / "path.csv"
         steps = round(100 * seconds)
         path.write_text("t,tip_x,tip_y,tip_z,tail_x,tail_y,tail_z\n" + "".join(
@@ -194,7 +194,7 @@ class ExploreWindow(unittest.TestCase):
         self.screen.key("c")
 
     def press_c_for_a_long_clip(self):
-        """101 pictures, which take longer than the test waits before it ends the window."""
+        """101 pictures, which take longer to draw than the test waits before it ends the window."""
         self.press_c_after(4)
         time.sleep(2)
 
@@ -203,7 +203,7 @@ class ExploreWindow(unittest.TestCase):
         data = clip.read_bytes()
         self.assertEqual((data[:4], data[8:12]), (b"RIFF", b"WEBP"))
         self.assertIn("scene-1.webp", self.program.stdout.read())
-        return max(1, data.count(b"ANMF"))  # one picture is no animation
+        return max(1, data.count(b"ANMF"))  # a single picture is not an animation
 
     def test_a_clip_is_finished_when_the_window_is_closed(self):
         self.press_c_for_a_long_clip()
@@ -241,7 +241,7 @@ class ExploreWindow(unittest.TestCase):
         self.screen.go_on()
         self.assertEqual(self.end(), 0)
         ticks, missed, lost = map(int, re.findall(r"\d+", self.program.stdout.read()))
-        # Each period has a tick or was missed, which a busy machine may do; none waited for the display.
+        # Each period has a tick or was missed, as may happen on a busy machine; none waited for the display.
         self.assertGreater(ticks + missed, 1000 * stalled)
         self.assertLess(missed, 0.5 * ticks)
         self.assertEqual(lost, 0)

@@ -1,4 +1,4 @@
-// Fonts of the console: one for European scripts, then what other characters need.
+// Fonts of the console: one for European scripts, then those for other characters.
 
 #include "runner/display/fonts.h"
 
@@ -45,7 +45,7 @@ TEST(Fonts, OfOtherScriptsHaveOnlyTheirLetters) {
     EXPECT_EQ(choices[i].ranges.back(), 0) << "ends";
     EXPECT_EQ(choices[i].ranges.size() % 2, 1U) << "pairs, and the end";
   }
-  // Each letter at most once beyond the first.
+  // Beyond the first font, each letter is in at most one.
   for (const unsigned letter : {0x5D0U, 0x5D1U, 0x531U, 0x2660U}) {
     std::size_t fonts = 0;
     for (std::size_t i = 1; i < choices.size(); ++i) fonts += has(choices[i], letter);

@@ -11,7 +11,7 @@ HARNESS = sys.argv.pop() if len(sys.argv) > 1 else None
 
 
 class Windows:
-    """The harness, with what it says in order."""
+    """The harness, with its output in order."""
 
     def __init__(self, screen, *options):
         self.program = subprocess.Popen([HARNESS, *options], env=screen.environment, text=True,
@@ -32,7 +32,7 @@ class Windows:
         self.program.stdin.flush()
 
     def expect(self, line):
-        """Returns what was said before it."""
+        """Returns the output before it."""
         seen = []
         while True:
             try:

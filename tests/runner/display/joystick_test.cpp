@@ -1,4 +1,4 @@
-// What is pressed on a gamepad or a pedal, from what a fake one reports.
+// Presses on a gamepad or a pedal, from the reports of a fake one.
 
 #include "runner/display/joystick.h"
 
@@ -11,7 +11,7 @@ namespace {
 
 using Strings = std::vector<std::string>;
 
-/// Reports states one after the other, the last one again and again.
+/// Reports states one after the other, then repeats the last one.
 class FakeJoystick final : public Joystick {
  public:
   explicit FakeJoystick(std::deque<std::optional<JoystickState>> states)
@@ -52,7 +52,7 @@ TEST(Joystick, InputsHeldOnConnectionAreNoPresses) {
   EXPECT_EQ(keys_of({{"button 1", "1"}}, {buttons(true, false), buttons(true, false),
                                           buttons(false, false), buttons(true, false)}),
             Strings{"1"});
-  // Unplugged while it was held, and plugged in again.
+  // Unplugged while held, and plugged in again.
   EXPECT_EQ(keys_of({{"button 1", "1"}}, {buttons(false, false), buttons(true, false), std::nullopt,
                                           buttons(true, false)}),
             Strings{"1"});

@@ -1,4 +1,4 @@
-// Which keys a protocol may name, and what they write.
+// The keys that a protocol may name, and their characters.
 
 #include "runner/display/key_names.h"
 
@@ -16,7 +16,8 @@
 namespace palpate::runner {
 namespace {
 
-// The layout's name of a key needs a window system: without one only the US place counts.
+// The layout's name of a key needs a window system: without one only the key's place on a US
+// keyboard counts.
 std::string first_name(int key) {
   const std::vector<std::string> names = key_names(key, -1);
   return names.empty() ? "" : names.front();

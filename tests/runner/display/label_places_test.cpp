@@ -11,7 +11,7 @@ namespace {
 
 const glm::vec2 kPicture(640, 360);
 
-/// By the definition: their rectangles have no pixel in common.
+/// By definition: their rectangles have no pixel in common.
 bool share_a_pixel(const LabelBox& a, const LabelBox& b) {
   const glm::vec2 low_a = a.centre - 0.5F * a.size, high_a = a.centre + 0.5F * a.size;
   const glm::vec2 low_b = b.centre - 0.5F * b.size, high_b = b.centre + 0.5F * b.size;

@@ -64,7 +64,7 @@ TEST(MouseStylus, EveryTargetGivesAFinitePose) {
     ASSERT_NEAR(length_of(now), kLength, 1e-9);
     ASSERT_LT(glm::length(now.tip), 1);
   }
-  // The tail straight through the tip: the axis has nowhere to go but must not be lost.
+  // The tail moves straight through the tip: the axis is undefined there but must not be lost.
   const rendering::LineProbe at = device.read().stylus;
   device.set_target({at.tail, at.tip});
   for (int i = 0; i < 2000; ++i) ASSERT_NEAR(length_of(device.read().stylus), kLength, 1e-9);

@@ -24,12 +24,12 @@ class OneMonitor(unittest.TestCase):
         self.assertIn("hides shape and scene", windows.before[0])
         windows.say("state cone 0")
         wait_for("the console", lambda: self.screen.pixels(windows.console, 30, 13)[0][0] > 150)
-        time.sleep(1)  # the red button comes before the state
+        time.sleep(1)  # the red button is drawn before the state
         hidden = self.screen.settled_picture(windows.console)
         self.screen.keep(windows.console, "console_hidden")
         windows.say("state cube 0")
         time.sleep(1)
-        # Only a message says it, which is the test's own.
+        # Only the test's own message names it.
         self.assertTrue(self.top(self.screen.settled_picture(windows.console), windows) ==
                         self.top(hidden, windows))
         width, height = self.screen.size(windows.console)
@@ -54,7 +54,7 @@ class OneMonitor(unittest.TestCase):
 
         def check(word):
             seen = []
-            for shape in ["cone", "cylinder"]:  # which the newest message names
+            for shape in ["cone", "cylinder"]:  # named by the newest message
                 windows.say(f"state {shape} {384 if word == 'fault' else 0} {word}")
                 time.sleep(1)
                 self.screen.settled_picture(windows.console)

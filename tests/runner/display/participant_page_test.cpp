@@ -21,7 +21,7 @@ Page trial_page() {
   return page;
 }
 
-/// Rows that hold anything but the ground.
+/// Rows with pixels other than the background.
 int inked_rows(const Image& image) {
   int rows = 0;
   for (int y = 0; y < image.height; ++y) {
@@ -31,7 +31,7 @@ int inked_rows(const Image& image) {
   return rows;
 }
 
-/// Where key map and space bar are. \param to  share of the height; the bar begins at 0.86
+/// The region of key map and space bar. \param to  share of the height; the bar begins at 0.86
 std::vector<std::uint32_t> lower_part(const Image& image, double to = 1) {
   const std::ptrdiff_t from = image.height * 2 / 3;
   const auto end = static_cast<std::ptrdiff_t>(to * image.height);
@@ -51,7 +51,7 @@ bool border_is_clear(const Image& image) {
   return true;
 }
 
-/// For looking at: PALPATE_PAGES=folder keeps what was drawn.
+/// PALPATE_PAGES=folder keeps the drawn pages for inspection.
 void keep(const Image& image, const std::string& name) {
   const char* const folder = std::getenv("PALPATE_PAGES");
   if (folder == nullptr) return;
@@ -164,7 +164,7 @@ TEST(ParticipantPage, AChecklistInANarrowWindowKeepsItsTextSize) {
 }
 
 TEST(ParticipantPage, EachStateOfAStepHasAMarkOfDistinctShape) {
-  // Whoever sees no colours tells them apart, too.
+  // Colour-blind people can distinguish them too.
   using State = Checklist::Step::State;
   std::vector<std::vector<bool>> shapes;
   std::vector<int> bands;
@@ -242,8 +242,8 @@ TEST(ParticipantPage, HostileTextStaysOnTheScreen) {
     page.text = text;
     const Image image = draw_page(page, 1280, 800);
     keep(image, "hostile" + std::to_string(text.size()));
-    // A text of several screens is answered on the last one. Beside the bar that goes on to the
-    // next stands the number of the one on show.
+    // A text of several screens is answered on the last one. Beside the space bar is the number of
+    // the current screen.
     const bool several = screen_count(page, 1280, 800) > 1;
     EXPECT_EQ(lower_part(image, several ? 0.86 : 1), several ? bar : keys) << text.substr(0, 20);
     EXPECT_TRUE(border_is_clear(image)) << text.substr(0, 20);
@@ -255,8 +255,8 @@ TEST(ParticipantPage, HostileTextStaysOnTheScreen) {
   }
 }
 
-// An answer that is not shown to its end cannot be chosen: whatever letter of it is another one,
-// the picture is another one, and so with the question.
+// Participants must see the whole answer and question: changing any letter of them changes the
+// picture.
 TEST(ParticipantPage, TheAnswersOfAQuestionAreShownWholeBesideIt) {
   const std::string tail = ", je nachdem, was ich gerade tue, und manchmal auch keine von beiden";
   std::vector<std::vector<std::string>> answers(3);
@@ -278,7 +278,7 @@ TEST(ParticipantPage, TheAnswersOfAQuestionAreShownWholeBesideIt) {
                                {620, 800, 2},
                                {3840, 2160, 2}}) {
     for (std::size_t list = 0; list < answers.size(); ++list) {
-      const auto shown = [&](std::size_t changed) {  // the last letter of one, or of the question
+      const auto shown = [&](std::size_t changed) {  // another last letter
         Page page;
         page.kind = Page::Kind::text;
         page.text = "Wie ist es bei Ihne";
@@ -319,7 +319,7 @@ TEST(ParticipantPage, OtherKindsOfPagesAreDrawn) {
 
 TEST(MissingLetters, NamesCharactersThatNoFontHas) {
   EXPECT_EQ(missing_letters({"sphere", "Kugel", "σφαίρα"}), "");
-  // A private-use letter: in no font that a test may count on.
+  // A private-use letter, absent from common fonts.
   EXPECT_NE(missing_letters({"sphere", "\xf4\x8f\xbf\xbd"}).find("1 characters"),
             std::string::npos);
   EXPECT_NO_THROW(missing_letters({"\xff\xc3"}));

@@ -1,4 +1,4 @@
-// What a picture is made of, without drawing it.
+// The elements of a picture, without drawing it.
 
 #include "runner/display/scene/scene_drawing.h"
 
@@ -92,7 +92,7 @@ TEST(CameraTest, UnprojectIsTheInverseOfProject) {
   EXPECT_LT(glm::distance(camera.unproject(camera.project(point), point), point), 1e-5F);
 }
 
-/// The forces at the places add up to what the hand gets, whatever the scene.
+/// The forces at the places sum to the force on the hand, whatever the scene.
 TEST(ContactPlacesTest, TheirForcesSumToTheForceOnTheHand) {
   const auto check = [](const rendering::Scene& scene, const std::vector<LineProbe>& path,
                         int least) {
@@ -151,7 +151,7 @@ TEST(TorqueTest, TheArcIsProportionalAndItsScaleIsStated) {
   SceneMoment moment;
   moment.sample.probe = {{0, 0, 0}, {0.2, 0, 0}};
   const auto sweep = [&](double newton, const SceneDrawingSettings& looks) {
-    moment.sample.device1 = {0, 0, -newton};  // 0.1 m from the middle, and so is the other
+    moment.sample.device1 = {0, 0, -newton};  // 0.1 m from the middle, like the other
     moment.sample.device2 = {0, 0, newton};
     const ScenePicture picture = drawing.picture(moment, light_theme(), looks);
     return picture.turns.empty() ? 0 : picture.turns[0].sweep;
@@ -161,7 +161,7 @@ TEST(TorqueTest, TheArcIsProportionalAndItsScaleIsStated) {
   EXPECT_NEAR(sweep(0.5, looks), 1, 1e-5);
   EXPECT_EQ(sweep(0.0001, looks), 0) << "too small to be seen";
   EXPECT_LT(sweep(100, looks), 6) << "no more than a turn";
-  // What a device gives at most, 6 N at the ends of a stylus of 0.12 m, is about half of a turn.
+  // The largest torque of a device, 6 N at the ends of a stylus of 0.12 m, is about half a turn.
   moment.sample.probe.tail = {0.12, 0, 0};
   EXPECT_NEAR(sweep(3, {}), 2.9, 0.3);
   const auto [arrow, turn] =

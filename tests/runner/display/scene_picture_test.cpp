@@ -1,4 +1,4 @@
-// Pictures of scenes without a display: what must be in them is looked for where it is projected.
+// Pictures of scenes without a display: expected parts are checked at their projected places.
 
 #include <gtest/gtest.h>
 
@@ -28,7 +28,7 @@ bool reddish(const Rgb& c) { return c.r > c.g + 60 && c.r > c.b + 60; }
 bool orange(const Rgb& c) { return c.r > c.b + 60 && c.g > c.b + 20 && c.r > c.g + 25; }
 bool bluish(const Rgb& c) { return c.b > c.r + 25; }
 
-/// Draws, and tells what is seen at a point of the scene.
+/// Draws, and returns the pixel at a point of the scene.
 class ScenePictureTest : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
@@ -169,10 +169,10 @@ TEST_F(ScenePictureTest, PartsInsideATranslucentObjectAreVisible) {
 TEST_F(ScenePictureTest, ACutRemovesPartsBehindThePlane) {
   const SceneDrawing drawing({ball({0, 0, 0}, 0.03)}, {});
   ScenePicture picture = drawing.picture(away(), light_theme(), {});
-  picture.cut = glm::vec4(-1, 0, 0, 0);  // x < 0 stays
+  picture.cut = glm::vec4(-1, 0, 0, 0);  // x < 0 remains
   draw(picture);
   EXPECT_TRUE(bluish(seen({-0.02, 0, 0})));
-  picture.cut = glm::vec4(0, 0, 0, -1);  // nothing stays
+  picture.cut = glm::vec4(0, 0, 0, -1);  // nothing remains
   draw(picture);
   EXPECT_FALSE(bluish(seen({-0.02, 0, 0})));
 }

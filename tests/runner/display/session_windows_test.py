@@ -50,7 +50,7 @@ class SessionTest(WindowCase):
             self.program.wait()
 
     def start(self, device="mouse", to_the_first_trial=True):
-        """Starts a session, or goes on with it, up to its first trial."""
+        """Starts or resumes a session, up to its first trial."""
         with open(self.folder / "messages.txt", "a") as messages:
             self.program = subprocess.Popen(
                 [PALPATE, "run", self.folder / "protocol.json", "--db", self.database,
@@ -72,7 +72,7 @@ class SessionTest(WindowCase):
         self.screen.settled_picture(self.participant, differs_from=instructions)
 
     def press_until(self, key, condition):
-        """A key before time zero counts for nothing: it is pressed again."""
+        """A key before time zero does not count: press it again."""
         end = time.monotonic() + PATIENCE
         while time.monotonic() < end:
             if self.halted():
@@ -106,7 +106,7 @@ class SessionTest(WindowCase):
             self.press_until(key, lambda: self.done() > before)
 
     def wait_for_trial(self):
-        """A trial is under way, and its page is on the screen."""
+        """Waits until a trial runs and its page is on the screen."""
         wait_for("a trial", lambda: self.attempts() and self.attempts()[-1][3] == "running")
         time.sleep(1)  # "ready" is over
         return self.screen.settled_picture(self.participant)
@@ -118,7 +118,7 @@ class SessionTest(WindowCase):
         self.assertEqual(self.program.returncode, 0, self.messages())
 
     def check_whole(self, cut_off):
-        """Every trial once, whatever happened, and each attempt accounted for."""
+        """Every trial is recorded once, whatever happened, and each attempt is accounted for."""
         self.assertEqual(self.rows("PRAGMA integrity_check"), [("ok",)])
         out = self.folder / "trials.csv"
         subprocess.run([PALPATE, "export", "--db", self.database, "--format", "csv", "--out", out,
@@ -160,7 +160,7 @@ class SessionTest(WindowCase):
         self.wait_for_trial()
         width, height = self.screen.size(self.console)
         middle = int(0.3 * width), int(0.39 * height)
-        # Onto the middle of the view, where the object stands: nothing else is needed.
+        # Move to the middle of the view, where the object is; this suffices.
         self.screen.point(self.console, 40, height - 300)
         self.screen.point(self.console, *middle)
         time.sleep(2)
@@ -228,7 +228,7 @@ class SessionTest(WindowCase):
                     file.write(bytes(512))
             except OSError:
                 pass
-        # Also the note of a fault, on a busy machine, finds no room: the end in any case.
+        # On a busy machine the note of a fault may find no space either: it ends in any case.
         self.press_until("2", lambda: self.program.poll() is not None)
         self.assertEqual(self.program.returncode, 1, self.messages())
         self.assertRegex(self.messages(), "disk|space")
@@ -310,7 +310,7 @@ class SessionTest(WindowCase):
         self.assertIn("fault cleared", notes)
 
     def forces_are_on(self):
-        """A trial is felt: only then has it a time zero, and servo ticks missed or not."""
+        """Waits until a trial has forces: only then does it have a time zero and counts of ticks."""
         if self.halted():
             self.clear_and_go_on()
         running = self.rows("SELECT count(*) FROM attempts WHERE state = 'running'")
@@ -332,14 +332,14 @@ class SessionTest(WindowCase):
                    for red, green, _ in self.screen.pixels(self.console, width - 234, 537, 120, 16))
 
     def click_emergency(self):
-        """What is on record of it waits in memory until the first trial has begun."""
+        """Its record waits in memory until the first trial has begun."""
         before = self.emergencies()
         self.screen.click(self.console, 100, 25)
         wait_for("the emergency", lambda: self.emergencies() > before if self.attempts()
                  else self.forces_are_shown_off())
 
     def click_button(self, row, column):
-        """Of the six: rows from 0, columns from 0."""
+        """One of the six buttons: rows and columns from 0."""
         width, _ = self.screen.size(self.console)
         self.screen.click(self.console, width - (250 if column == 0 else 60), 420 + 40 * row)
 
@@ -355,9 +355,9 @@ class SessionTest(WindowCase):
             self.clear_and_go_on()
             self.press_until("space", lambda: page == "instructions" or self.attempts())
         homing = self.attempts()[-1]
-        self.click_emergency()  # while the stylus is waited for, or just after
+        self.click_emergency()  # while waiting for the stylus, or just after
         wait_for("the cut-off", lambda: self.attempts()[homing[0] - 1][3] != "running")
-        self.click_emergency()  # and once more in the fault
+        self.click_emergency()  # and again during the fault
         self.clear_and_go_on()
         def write_a_reason():
             self.click_button(2, 1)
@@ -381,7 +381,7 @@ class SessionTest(WindowCase):
             self.clear_and_go_on()
         wait_for("a practice trial", lambda: self.forces_are_on())
         self.answer()
-        self.click_emergency()  # the feedback, or what comes right after it
+        self.click_emergency()  # during the feedback, or right after it
         self.screen.keep(self.console, "emergency_feedback")
         self.clear_and_go_on()
         self.answer(4 - 1)  # the rest of the practice: a break follows

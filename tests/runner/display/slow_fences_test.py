@@ -1,4 +1,4 @@
-"""Pictures drawn in software, by a driver whose threads are held up where it matters.
+"""Pictures drawn in software, by a driver whose threads are delayed at the critical place.
 
 Usage: slow_fences_test.py PALPATE PROTOCOLS LIBRARY HARNESS     (LIBRARY: slow_fences.cpp)
 """

@@ -83,7 +83,7 @@ class TaskWindows(WindowCase):
         self.screen.do("type", "--delay", 60, "--", words)
 
     def press_until(self, condition, *keys):
-        """A key before time zero counts for nothing: it is pressed again."""
+        """A key before time zero does not count: press it again."""
         end = time.monotonic() + PATIENCE
         while time.monotonic() < end:
             self.screen.key(*keys)
@@ -123,7 +123,7 @@ class TaskWindows(WindowCase):
         self.assertGreater(red(), 0)
         self.press("space", then=True, name="page_second")
         self.press("space", then=True, name="consent_1")
-        # Longer than the window: nobody agrees to what has not been shown.
+        # Longer than the window: agreement is possible only after all of it was shown.
         self.screen.key("1")
         time.sleep(0.5)
         self.assertEqual(self.rows("SELECT count(*) FROM page_answers"), [(0,)])
@@ -154,7 +154,7 @@ class TaskWindows(WindowCase):
         before = self.screen.settled_picture(self.participant)
         self.type("-7,25")
         self.page("rate_typed", before)
-        # Typed into the console's note instead, it is no answer; the emergency works in the middle of it.
+        # Typed into the console's note it is not an answer; the emergency works while typing.
         self.screen.key("F12")
         wait_for("the cut-off", lambda: self.rows("SELECT 1 FROM attempts WHERE state = 'cut_off'"))
         self.screen.keep(self.console, "rate_emergency")
@@ -237,7 +237,7 @@ class TaskWindows(WindowCase):
         first = self.screen.settled_picture(self.participant)
         self.press_until(lambda: self.screen.picture(self.participant) != first, "space")
         time.sleep(1)
-        self.screen.key("2")  # the participant's own keys answer nothing
+        self.screen.key("2")  # the participant's own keys do not answer
         time.sleep(0.5)
         second = self.screen.settled_picture(self.participant)
         self.screen.click(self.console, width - 200, height - 62)

@@ -1,4 +1,4 @@
-// What is typed, byte by byte.
+// Typed input, byte by byte.
 
 #include <gtest/gtest.h>
 

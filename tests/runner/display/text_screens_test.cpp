@@ -1,4 +1,4 @@
-// What a session writes on a terminal, for participant and experimenter.
+// The output of a session on a terminal, for participant and experimenter.
 
 #include <gtest/gtest.h>
 
@@ -13,7 +13,7 @@ namespace {
 
 using Step = Checklist::Step;
 
-/// What was added since the last call; every text goes to `file`.
+/// The texts added since the last call; all must go to `file`.
 std::string written(EventQueue<Output>& out, int file) {
   std::string text;
   for (const Output& output : out.take()) {

@@ -1,4 +1,4 @@
-// The tool that the console draws is the one that is felt.
+// The console draws the tool that is rendered.
 
 #include <gtest/gtest.h>
 
@@ -40,7 +40,7 @@ TEST(ToolShape, InContactTheIdealToolRestsOnTheObjectAndTheHandsIsInside) {
   const rendering::Scene scene({cube}, true, kHook);
   rendering::RenderState state = scene.initial_state();
   Sample sample;
-  for (int i = 0; i < 600; ++i) {  // down on the cube's upper face, rolled by a quarter turn
+  for (int i = 0; i < 600; ++i) {  // down onto the cube's upper face, rolled by a quarter turn
     const double height = 0.06 - 6e-5 * i;
     sample.probe = {{0, 0, height}, {0, 0, height + 0.12}};
     state.measured_side = Vec3(0, 1, 0);

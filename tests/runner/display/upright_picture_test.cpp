@@ -1,6 +1,6 @@
-// What is up in the world is up in the picture, and the stylus goes where the pointer goes. Looked
-// for in the pixels that were drawn, not in what the camera says of itself. The view of a live
-// session has the same camera, ground and light (runner/display/scene_view.h).
+// Up in the world is up in the picture, and the stylus follows the pointer. The tests check drawn
+// pixels, not the camera's own projection. The view of a live session has the same camera, ground
+// and light (runner/display/scene_view.h).
 
 #include <gtest/gtest.h>
 
@@ -33,7 +33,7 @@ class UprightPictureTest : public ::testing::Test {
   static void TearDownTestSuite() { painter_.reset(); }
   void SetUp() override { camera_.resize(kAcross, kTall); }
 
-  /// Mean column and row of the pixels of a colour; none: there are fewer than 20.
+  /// Mean column and row of the pixels of a colour; none: fewer than 20.
   std::optional<glm::vec2> middle_of(const ScenePicture& picture, Wanted wanted) {
     painter_->draw(picture, camera_, light_theme());
     const auto* pixel = reinterpret_cast<const unsigned char*>(painter_->pixels().data());
@@ -56,7 +56,7 @@ class UprightPictureTest : public ::testing::Test {
     spec.pose.position = at;
     return SceneDrawing({spec}, {});
   }
-  /// Without a stylus: it would hide what is looked for.
+  /// Without a stylus, which would hide the objects.
   static ScenePicture bare(const SceneDrawing& drawing, const SceneMoment& moment = {}) {
     ScenePicture out = drawing.picture(moment, light_theme(), {});
     out.rods.clear();
@@ -114,7 +114,7 @@ TEST_F(UprightPictureTest, TheGroundAndItsShadowsLieBelowTheObjects) {
   const SceneDrawing drawing({low, high}, {});
   ScenePicture picture = bare(drawing);
   EXPECT_NEAR(picture.ground, -0.01, 1e-4);
-  // What hovers is above the floor of the world, unless that is far away.
+  // Hovering objects are drawn above the world's floor, unless it is far away.
   EXPECT_EQ(bare(one_ball({0, 0, 0.035})).ground, 0);
   EXPECT_NEAR(bare(one_ball({0, 0, 0.3})).ground, 0.28, 1e-4);
   camera_.look_from(0.3F, 0.5F);
@@ -130,7 +130,7 @@ TEST_F(UprightPictureTest, TheGroundAndItsShadowsLieBelowTheObjects) {
   EXPECT_LT(under + 15, open) << "the shadow under the ball";
 }
 
-/// Where the stylus is drawn once the device has followed the pointer.
+/// Place at which the stylus is drawn once the device has followed the pointer.
 class PointerOnScreenTest : public UprightPictureTest {
  protected:
   std::optional<glm::vec2> stylus_after(PointerControl& control, MouseStylus& device,
@@ -143,7 +143,7 @@ class PointerOnScreenTest : public UprightPictureTest {
     picture.objects.clear();
     picture.grid = 0;
     picture.caption.clear();
-    // The tip's end alone: the tail is often outside of the picture.
+    // The tip's end only: the tail is often outside the picture.
     for (DrawnRod& rod : picture.rods) {
       rod.to = rod.from + 0.1F * (rod.to - rod.from);
       rod.radius = 0.004F;

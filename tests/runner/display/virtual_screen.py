@@ -9,7 +9,7 @@ import tempfile
 import time
 import unittest
 
-PATIENCE = 60  # s, for what takes a moment on an idle machine; only a hang reaches it
+PATIENCE = 60  # s; only a hang takes so long
 
 PER_FRAME = 0.5  # s, more than drawing a frame takes on a busy machine without a graphics card
 
@@ -37,8 +37,8 @@ class VirtualScreen:
     next_number = 1000 + 100 * (os.getpid() % 10000)
 
     def __init__(self, size="1600x1000"):
-        # A number of this process's own. Where the server chooses, it takes one as soon as another
-        # test's server has given it up, and that one then removes the socket of both on its way out.
+        # Use a number of this process's own. If the server chooses, it may take a number that another test's server has
+        # just released, and that one then removes the common socket as it ends.
         for number in range(self.next_number, self.next_number + 20):
             if self.start(number, size):
                 break
@@ -49,12 +49,12 @@ class VirtualScreen:
         self.manager = None
         # One thread of software drawing: the tests share their machine with a servo.
         self.environment = dict(os.environ, DISPLAY=self.name, LP_NUM_THREADS="1")
-        # Graphics drivers keep memory until the end, all the more after their display died.
+        # Graphics drivers keep memory until the end, even more after their display has died.
         options = os.environ.get("ASAN_OPTIONS", "")
         self.environment["ASAN_OPTIONS"] = (options + ":" if options else "") + "detect_leaks=0"
 
     def start(self, number, size):
-        """False: the number is taken."""
+        """False: the number is in use."""
         reading, writing = os.pipe()
         self.server = subprocess.Popen(
             ["Xvfb", f":{number}", "-displayfd", str(writing), "-screen", "0", size + "x24", "-nolisten", "tcp"],
@@ -77,7 +77,7 @@ class VirtualScreen:
     def manage(self, manager):
         """Starts a window manager."""
         command = {"openbox": ["openbox"], "xfwm4": ["dbus-run-session", "--", "xfwm4", "--compositor=off"]}[manager]
-        home = tempfile.TemporaryDirectory(ignore_cleanup_errors=True)  # what it writes
+        home = tempfile.TemporaryDirectory(ignore_cleanup_errors=True)  # for its files
         self.manager = home, subprocess.Popen(
             command, env=dict(self.environment, HOME=home.name, XDG_RUNTIME_DIR=home.name), start_new_session=True,
             stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
@@ -176,14 +176,14 @@ class VirtualScreen:
         return list(zip(seen[0::3], seen[1::3], seen[2::3]))
 
     def keep(self, window, name):
-        """For looking at: PALPATE_PICTURES names a folder."""
+        """Keeps a picture for inspection: PALPATE_PICTURES names a folder."""
         folder = os.environ.get("PALPATE_PICTURES")
         if folder:
             subprocess.run(["import", "-silent", "-window", window, f"{folder}/{name}.png"],
                            env=self.environment, check=True)
 
     def settled_picture(self, window, differs_from=None):
-        """Two equal pictures in a row, of something else than before."""
+        """Waits for two equal pictures in a row that differ from the earlier one."""
         def pair():
             first = self.picture(window)
             time.sleep(0.1)

@@ -1,5 +1,5 @@
-// Windows without a session, for windows_test.py and one_monitor_test.py. Standard input says what
-// to show, a line each; standard output says what was pressed.
+// Windows without a session, for windows_test.py and one_monitor_test.py. Lines on standard input
+// are commands; standard output reports presses.
 //   page KIND TEXT      text, neutral, go, feedback, message, break or checklist; the keys are
 //                       those of the paper
 //   state SHAPE FAULTS [WORD]  a console in a trial, or in the state that the word says; "tool": a
@@ -124,7 +124,7 @@ ConsoleState state_of(std::istringstream& words, const rendering::LineProbe& sty
   return state;
 }
 
-/// What a session's thread would do.
+/// Acts as a session's thread.
 class Talk {
  public:
   Talk(DisplayLoop& windows, MouseStylus& mouse) : windows_(windows), mouse_(mouse) {}
@@ -139,7 +139,7 @@ class Talk {
       say("command " + std::to_string(static_cast<int>(command.kind)) + " " + command.text);
     }
     if (const std::lock_guard lock(state_mutex_); state_)
-      windows_.console().show(*state_);  // as a session does, time and again
+      windows_.console().show(*state_);  // repeatedly, like a session
     if (!windows_.participant().open() && !closed_) {
       closed_ = true;
       say("closed");
@@ -230,7 +230,7 @@ int main(int count, char** args) {
   try {
     return palpate::runner::show({args + 1, args + count});
   } catch (const palpate::runner::DisplayError& fault) {
-    std::cout << fault.what() << std::endl;  // with what was said before
+    std::cout << fault.what() << std::endl;  // with the earlier output
     return 3;
   }
 }

@@ -55,7 +55,7 @@ class Placed(unittest.TestCase):
         return self.screen.box(windows.participant), self.screen.box(windows.console)
 
     def bar_is_seen(self, windows):
-        """The whole of the red button, on the screen."""
+        """The whole red button on the screen."""
         left, top, right, _ = self.screen.box(windows.console)
         seen = self.screen.pixels("root", left, top + 14, right - left, 1)
         return all(red > 130 and green < 90 for red, green, _ in seen[20:-20])
@@ -104,7 +104,7 @@ class Placed(unittest.TestCase):
             self.screen.do("windowsize", windows.participant, self.width, self.height)
             wait_for("the button once more", lambda: self.bar_is_seen(windows) and
                      self.screen.box(windows.participant)[2] <= console[0])
-            # A console over the whole screen leaves the participant's window the place below the button.
+            # If the console fills the screen, the participant's window lies below the button.
             self.screen.do("windowmove", windows.console, 0, 40)
             self.screen.do("windowsize", windows.console, self.width - 10, self.height - 60)
             wait_for("the button of a large console", lambda: self.bar_is_seen(windows) and
@@ -117,7 +117,7 @@ class Placed(unittest.TestCase):
 class Remembered(WindowCase):
     def start(self):
         (self.folder / "protocol.json").write_text(json.dumps(PROTOCOL))
-        before = len(self.rows("SELECT 1 FROM attempts"))  # a session that goes on begins its trial without a key
+        before = len(self.rows("SELECT 1 FROM attempts"))  # a resumed session begins its trial without a key
         self.program = subprocess.Popen(
             [PALPATE, "run", self.folder / "protocol.json", "--db", self.database, "--participant", "P01", "--device", "mouse"] +
             ([] if before else ["--new-participant"]), env=self.screen.environment, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
@@ -164,7 +164,7 @@ class Remembered(WindowCase):
             self.assertEqual(self.boxes(), put)
             self.end()
         self.assertEqual(len(self.notes()), 1, "nobody has moved them again")
-        # On another screen they would not be seen.
+        # On another screen they would be invisible.
         self.screen.close()
         self.screen = VirtualScreen("1024x768")
         self.addCleanup(self.screen.close)

@@ -66,7 +66,7 @@ TEST(WindowPlaces, PlacesAreReadOnlyFromTheirNote) {
   EXPECT_EQ(window_places("{\"sounds\":\"left out\"}"), std::nullopt);
   for (std::size_t end = 0; end < note.size(); ++end)
     EXPECT_EQ(window_places(note.substr(0, end)), std::nullopt) << end;
-  // No number of a hostile note overflows.
+  // Numbers of a hostile note must not overflow.
   EXPECT_EQ(window_places("{\"windows\":{\"desktop_px\":[99999999999999999999,1]"), std::nullopt);
 }
 

@@ -76,7 +76,7 @@ class Soak:
         self.participant, self.console = self.window("soak, P01"), self.window("soak, P01 - console")
 
     def button(self, words):
-        """Clicks where the console has it: the six are in two columns, in a small window over its whole width."""
+        """Clicks a button of the console: the six are in two columns; in a small window they span its width."""
         wide, _ = self.screen.size(self.console)
         row, column = {"pause": (0, 0), "go on": (0, 1)}[words]
         for top in (430, 450):
@@ -128,7 +128,7 @@ class Soak:
                     self.round()
                 except AssertionError:
                     if self.runs():
-                        continue  # the pointer or the keyboard was not to be had
+                        continue  # the pointer or the keyboard was not available
                     raise
             self.close()
             return None

@@ -57,7 +57,7 @@ class WindowsTest(unittest.TestCase):
         self.windows.say("page text " + " ".join(f"word{i}" for i in range(400)))
         first = self.screen.settled_picture(self.windows.participant, differs_from=blank)
         self.screen.keep(self.windows.participant, "participant_long_text")
-        self.press("a")  # no way to turn
+        self.press("a")  # it does not turn pages
         self.assertEqual(self.expect("key")[1], "key a")
         self.press("space")
         second = self.screen.settled_picture(self.windows.participant, differs_from=first)
@@ -136,7 +136,7 @@ class WindowsTest(unittest.TestCase):
         self.click_emergency()
 
     def click_emergency(self, x=0.5, y=25):
-        """Forces off at once, then the command that says what did it."""
+        """Forces off at once, then the command with its source."""
         width, _ = self.screen.size(self.windows.console)
         self.screen.click(self.windows.console, int(x * width), y)
         self.expect("emergency")
@@ -158,7 +158,7 @@ class WindowsTest(unittest.TestCase):
             self.click_emergency(x=0.98)
         self.windows.say("state cube 0")
         self.click_emergency(x=0.01)
-        # Over the question whether to end, and while its reason is written
+        # Over the question whether to end, and while its reason is typed
         asked = self.screen.settled_picture(console)
         self.screen.click(console, *END_NOW(width))
         self.screen.settled_picture(console, differs_from=asked)
@@ -168,7 +168,7 @@ class WindowsTest(unittest.TestCase):
         self.screen.do("type", "--delay", 120, "why 1")
         self.screen.keep(console, "console_end_why")
         self.click_emergency(x=0.98)
-        # While a note is written, and while something is dragged over it
+        # While a note is typed, and while something is dragged over it
         self.screen.click(console, width - 200, height - 28)
         self.screen.do("type", "--delay", 120, "x")
         self.click_emergency()
@@ -217,7 +217,7 @@ class WindowsTest(unittest.TestCase):
         self.screen.settled_picture(self.windows.console)
 
         def distance_at(x, y):
-            """Of the tip from the centre, once it has come to rest."""
+            """Distance of the tip from the centre, once it has come to rest."""
             self.screen.point(self.windows.console, x, y)
             time.sleep(1)
             return math.dist(self.windows.where()[0], (0, 0, 0))
@@ -242,7 +242,7 @@ class WindowsTest(unittest.TestCase):
             self.windows.say(f"page message {i}")
             self.windows.say("state cone 0")
         self.windows.say("ping")
-        self.expect("pong")  # while the display still stands
+        self.expect("pong")  # while the display is still stalled
         self.screen.go_on()
         self.screen.focus(self.windows.participant)
         self.press("1")

@@ -112,7 +112,7 @@ class ManPages(unittest.TestCase):
             for section in ("NAME", "SYNOPSIS", "DESCRIPTION", "OPTIONS", "EXAMPLES", '"SEE ALSO"'):
                 self.assertIn(f".SH {section}\n", page, command)
             for option in options(command):
-                # A paragraph of its own, which a description must follow.
+                # A separate paragraph, followed by a description.
                 self.assertRegex(page, rf"\.TP\n.*\\fB{option}\\fR[^\n]*\n[^.\n]", f"{command} {option}")
                 self.assertNotRegex(page, rf"\\fB{option}\\fR[^\n]*\n[^.\n][^\n]*\n\.IP", f"{command} {option}: torn")
             examples = help_of(command).split("Examples:\n")[1]

@@ -27,7 +27,7 @@ class Adjusting : public ::testing::Test {
 TEST_F(Adjusting, FeelsBothThenTurnsAsOftenAsNeeded) {
   EXPECT_EQ(next(at(150)), "switch");
   EXPECT_EQ(judge_.judgement().turns(), 1);
-  EXPECT_EQ(next(kStandard), "switch");  // it turns where it feels what it turns
+  EXPECT_EQ(next(kStandard), "switch");  // it turns the interval that it feels
   EXPECT_EQ(next(at(150)), "up");
   EXPECT_EQ(judge_.judgement().turns(), 25);
   EXPECT_EQ(next(at(466)), "down");

@@ -16,7 +16,7 @@ using test::deepest_on_segment;
 using test::random_direction;
 using test::turned_distance;
 
-/// Calls check with the line as the first block of the only stimulus sees it.
+/// Calls `check` with the line in the frames of the only stimulus's first block.
 template <class Check>
 void for_block(const stimuli::ObjectSpec& object, const ShapeHypotheses& hypotheses,
                const Line& line, Check check) {
@@ -132,7 +132,7 @@ TEST_P(DeepestPoint, MinimumOverTheStylusIsExactToThirtyMicrometres) {
 }
 
 TEST_P(DeepestPoint, EndsOfTheStylusAreFound) {
-  // The stylus points at the centre from outside, so its tip is deepest; or its tail, turned round.
+  // The stylus points at the centre from outside, so its tip is deepest; reversed, its tail.
   const ShapeHypotheses hypotheses({object_});
   Random random(14);
   for (int n = 0; n < 50; ++n) {

@@ -45,7 +45,7 @@ TEST(DistanceField, OfAnLShapeIsExactToASpacing) {
   EXPECT_LT(std::sqrt(squares / count), 0.12 * field.spacing());
 }
 
-// Where two parts of a solid meet there is no surface.
+// There is no surface where two parts of a solid meet.
 TEST(DistanceField, ASeamIsNotASurface) {
   const DistanceField whole(test::placed(stimuli::box(Vec3(0.06, 0.04, 0.04))));
   for (const double at : {0.0, 0.0071, -0.02}) {
@@ -63,7 +63,7 @@ TEST(DistanceField, ASeamIsNotASurface) {
   }
 }
 
-// Where the surface has no stiffness, the first layer that has some is what is felt.
+// If the surface has no stiffness, the first layer with stiffness is felt.
 TEST(DistanceField, IsThatOfTheFirstLayerWithStiffness) {
   stimuli::ObjectSpec cube;
   cube.shape = stimuli::ShapeKind::cube;
@@ -105,7 +105,7 @@ TEST(DistanceField, FarAwayItGrowsWithSlopeOne) {
     EXPECT_NEAR(test::distance_at(field, Vec3(0, far, -far)), std::sqrt(2) * (far - 0.03),
                 0.03 * far);
   }
-  // A number that is none must not read beyond the grid.
+  // NaN must not read beyond the grid.
   test::distance_at(field, Vec3(std::nan(""), 0, std::numeric_limits<double>::infinity()));
 }
 
@@ -139,7 +139,7 @@ stimuli::ObjectSpec ell_of_boxes() {
   return ell;
 }
 
-/// A stylus about hypotheses of a shape, and the first one of a block.
+/// A stylus relative to hypotheses of a shape, and the first hypothesis of a block.
 struct Touch {
   Vec3 tip, along;
   Line line;
@@ -152,7 +152,7 @@ struct Touch {
         first(shape.first + ShapeHypotheses::kBlock * static_cast<int>(random.below(20))) {}
 };
 
-// The search takes a step of all hypotheses at a time; each alone would find the same bits.
+// The search advances all hypotheses together; searching each separately gives the same bits.
 TEST(SolidLine, HypothesesAreSearchedIndependently) {
   const ShapeHypotheses hypotheses({ell_of_boxes()});
   const ShapeHypotheses::Shape& shape = hypotheses.shapes()[0];
@@ -192,7 +192,7 @@ TEST(SolidLine, HypothesesAreSearchedIndependently) {
   }
 }
 
-// The least distance along a stylus, by looking everywhere.
+// The least distance along a stylus, by exhaustive search.
 TEST(SolidLine, FindsTheDeepestPlaceOfAConcaveShape) {
   const ShapeHypotheses hypotheses({ell_of_boxes()});
   const ShapeHypotheses::Shape& shape = hypotheses.shapes()[0];

@@ -1,4 +1,4 @@
-// The hand that explores, without a device: it stands where it wants to be.
+// The exploring hand, without a device: the stylus is always at the hand's target.
 
 #include "runner/participants/explorer.h"
 
@@ -18,7 +18,7 @@ rendering::LineProbe held_at(const HandTarget& target) {
   return {target.grip - kFromTip * target.axis, target.grip + (kLength - kFromTip) * target.axis};
 }
 
-/// One tick of a hand whose stylus is there.
+/// One tick of a hand whose stylus is at its target.
 HandTarget step(Explorer& hand, const TouchState& felt, const rendering::LineProbe& stylus) {
   return hand.step(felt, stylus.tip, glm::normalize(stylus.tail - stylus.tip));
 }
@@ -27,7 +27,7 @@ bool same(const HandTarget& a, const HandTarget& b) {
   return a.grip == b.grip && a.velocity == b.velocity && a.axis == b.axis;
 }
 
-// What was felt at one tick changes the motion exactly a reaction delay later.
+// Contact at one tick changes the motion exactly one reaction delay later.
 TEST(Explorer, ActsOnContactAfterTheReactionDelay) {
   for (const int ticks : {1, 2, 37, 150}) {
     SimulatedSettings settings = load_simulated_settings("");
@@ -49,12 +49,12 @@ TEST(Explorer, ActsOnContactAfterTheReactionDelay) {
   }
 }
 
-/// Felt on a level surface at height zero, by a hand without reaction delay.
+/// Contact with a horizontal surface at height zero, for a hand without reaction delay.
 TouchState felt_below(const HandTarget& target) {
   return {true, Vec3(0, 0, 1), held_at(target).tip, 0};
 }
 
-/// A hand that has slid for 0.1 s with contact and has known for one tick that it lost it.
+/// A hand that has slid for 0.1 s in contact and has known for one tick that contact was lost.
 struct AfterLossOfContact {
   explicit AfterLossOfContact(const SimulatedSettings& settings)
       : hand(settings, kFromTip, kStiffness, kPeriod), target(hand.begin(Random(6))) {

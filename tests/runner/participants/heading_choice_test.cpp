@@ -29,7 +29,7 @@ std::size_t shape_of(const ShapeHypotheses& hypotheses, int h) {
   return s;
 }
 
-/// Mean entropy over the shapes after what is predicted along a heading.
+/// Mean entropy of the shapes after the contacts predicted along a heading.
 double expected_entropy(const ShapeHypotheses& hypotheses, const ObserverSettings& o,
                         const HeadingSettings& settings, const std::vector<int>& drawn,
                         const SlidingStylus& stylus, const Vec3& heading) {
@@ -81,10 +81,10 @@ struct Choice {
   SlidingStylus stylus;
   Vec3 chosen;
   std::vector<double> entropies;  ///< of the headings at 0, 1, 2, ... steps to the left
-  int steps;                      ///< to the left that were chosen; -1: none of the headings
+  int steps;                      ///< of the chosen heading to the left; -1: none of the headings
 };
 
-/// After some touches of an object: where a hand that slides over it turns to.
+/// After some touches of an object: the heading chosen by a sliding hand.
 Choice choose_on(std::size_t shape, bool ray, int touches, std::uint64_t seed,
                  const ShapeHypotheses& hypotheses, const HeadingSettings& settings) {
   const ObserverSettings o = by_movement();

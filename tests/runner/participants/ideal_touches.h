@@ -1,5 +1,5 @@
 #pragma once
-// Percepts as they would be of an object that is really there.
+// Percepts of an object that is really present.
 
 #include <cmath>
 #include <glm/geometric.hpp>
@@ -14,7 +14,7 @@ inline Vec3 random_direction(Random& random) {
   return glm::normalize(Vec3(random.normal(), random.normal(), random.normal()));
 }
 
-/// Where a straight way out of the object leaves it.
+/// The point where a straight line leaves the object.
 inline Percept touch_with_tip(const stimuli::ObjectSpec& object, const Mat3& r, Random& random) {
   const Vec3 start = 0.01 * random.unit() * random_direction(random);
   const Vec3 out = random_direction(random);
@@ -31,8 +31,8 @@ inline Percept touch_with_tip(const stimuli::ObjectSpec& object, const Mat3& r, 
   return percept;
 }
 
-/// A stylus of 12 cm that comes sideways until it touches. Newton's steps: the distance is convex
-/// in the way, so they do not overshoot.
+/// A stylus of 12 cm that moves sideways until it touches. Newton's steps do not overshoot, because
+/// the distance is convex along the path.
 inline Percept touch_with_stylus(const stimuli::ObjectSpec& object, const Mat3& r, Random& random) {
   const Vec3 along = random_direction(random);
   const Vec3 in = glm::normalize(glm::cross(along, random_direction(random)));
@@ -55,7 +55,7 @@ inline Percept touch_with_stylus(const stimuli::ObjectSpec& object, const Mat3& 
   return percept;
 }
 
-/// A percept of a turned object with noise of so many m and rad.
+/// A percept of a rotated object with the given noise, m and rad.
 inline Percept touch(const stimuli::ObjectSpec& object, const Mat3& r, bool ray, double place_noise,
                      double direction_noise, Random& random) {
   Percept percept = ray ? touch_with_stylus(object, r, random) : touch_with_tip(object, r, random);

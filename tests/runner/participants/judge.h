@@ -1,5 +1,5 @@
 #pragma once
-// Somebody who judges the levels of one block, for tests.
+// A judge of the levels of one block, for tests.
 
 #include <cstdint>
 #include <string>
@@ -46,7 +46,7 @@ inline Trial trial_of(int stimulus = 0) {
 inline const Interval kStandard{0, {}, {}, true};
 inline Interval at(double level) { return {0, {}, level, false}; }
 
-/// Settings of somebody who never errs and feels exactly.
+/// Settings without lapses and noise.
 inline JudgementSettings exact() {
   JudgementSettings settings;
   settings.weber = settings.turn_sd = settings.lapse = settings.number_sd = 0;

@@ -1,4 +1,5 @@
-// What a person's keys mean in tasks and on pages: a screen that types a script, a virtual clock.
+// The meaning of a person's keys in tasks and on pages: a screen that types a script, a virtual
+// clock.
 
 #include <gtest/gtest.h>
 
@@ -26,7 +27,7 @@ constexpr const char* kTasks = R"({"version": 2, "name": "t", "renderers": ["poi
      "level": {"path": "/stiffness_n_per_m"}, "min": 100, "max": 500, "turn": 50, "starts": [200]}],
   "texts": {"other_key": "OTHER KEY", "other_number": "OTHER NUMBER", "answer_first": "FIRST"}})";
 
-/// A press a look, each with the time of that look.
+/// One press for each poll, with the time of the poll.
 class Scripted final : public ParticipantScreen {
  public:
   explicit Scripted(Clock& clock) : clock_(clock) {}
@@ -140,7 +141,7 @@ TEST_F(KeyboardTasks, InvalidNumbersAreRefusedAndStayInTheField) {
     EXPECT_EQ(screen_.replies, std::set<std::string>{said + " (0 \u2013 50)"}) << typed;
     EXPECT_EQ(screen_.pages.back().typed + "\n", typed);
   }
-  // Digits without end overflow no number and no field.
+  // Endless digits must overflow neither number nor field.
   person();
   begin(1, {});
   screen_.script = {{}, {}};
@@ -162,7 +163,7 @@ TEST_F(KeyboardTasks, TurnsAreCountedWhileTheNextIntervalIsPrepared) {
   ASSERT_TRUE(second);
   EXPECT_EQ(second->stimulus, 0);
   EXPECT_EQ(second->times, 2);
-  // Another key in the same breath is heard after the turn.
+  // Another key pressed at once is handled after the turn.
   begin(2, {1, 2, true, true, nullptr, true});
   screen_.script = {{"2", "4", "1"}};
   EXPECT_EQ(answer()->stimulus, 1);
@@ -200,7 +201,7 @@ TEST_F(KeyboardTasks, OnlyTheExperimenterTypesSpokenAnswers) {
   EXPECT_FALSE(answer(2));
   EXPECT_TRUE(person_->spoken("12,5", clock_.now_ns()));
   EXPECT_EQ(answer()->number, 12.5);
-  // What nothing comes of is told to who has typed it: too early, again, or no number in the range.
+  // Ineffective input is reported to the experimenter: too early, repeated, or out of range.
   begin(1, {});
   EXPECT_FALSE(person_->spoken("12", clock_.now_ns()));
   EXPECT_FALSE(answer(2));
@@ -292,14 +293,14 @@ TEST_F(KeyboardTasks, CuesSoundWhenTheyAreShown) {
             (std::vector<SoundCue>{SoundCue::ready, SoundCue::right, SoundCue::wrong}));
 }
 
-/// Looks at a button that is pressed at some looks, by number from 1.
+/// Polls a button that is pressed at some polls, numbered from 1.
 void press_at(KeyboardRespondent& person, Nobody& nobody, Clock& clock,
               const std::map<int, int>& presses) {
   const int begun = nobody.looks;
   nobody.each_look = [&person, &nobody, &clock, presses, begun] {
     Sample sample;
     sample.time_ns = clock.now_ns();
-    const auto now = presses.find((nobody.looks - begun) / 3);  // each is held for three looks
+    const auto now = presses.find((nobody.looks - begun) / 3);  // each is held for three polls
     if (now != presses.end()) sample.buttons = static_cast<std::uint8_t>(1U << (now->second - 1));
     person.look_at_buttons(sample);
   };
@@ -311,7 +312,7 @@ TEST_F(KeyboardTasks, ButtonsAnswerPagesAndConfidence) {
   press_at(one, nobody_, clock_, {{2, 5}, {4, 3}});  // there is no fifth
   EXPECT_EQ(one.confidence(sure).value().stimulus, 2);
   EXPECT_EQ(screen_.replies.count("OTHER KEY"), 1U);
-  // The same press goes no further: it is still held when the next page comes.
+  // The same press has no further effect: it is still held when the next page appears.
   const protocols::PageItem hand{protocols::PageItem::Kind::choice,
                                  "hand",
                                  "HAND?",

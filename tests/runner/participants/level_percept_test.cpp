@@ -1,5 +1,5 @@
-// What a hand tells of a level, against closed forms: the surface that passes through the places
-// that were felt.
+// Estimates of a level from exploration, against closed forms: the surface that passes through the
+// felt places.
 
 #include <gtest/gtest.h>
 
@@ -66,7 +66,7 @@ TEST(LevelPercept, StiffnessIsTheMeanOfForceOverDepth) {
   EXPECT_FALSE(percept.stiffness());
   percept.add(pressed({0, 0, 3}, 0.01));      // 300 N/m
   percept.add(pressed({0, 0.3, 0.4}, 1e-3));  // 500 N/m
-  percept.add(pressed({0, 0, 9}, 1.9e-4));    // too shallow to tell
+  percept.add(pressed({0, 0, 9}, 1.9e-4));    // too shallow to count
   percept.add(pressed({0, 0, 9}, 0.01, 0));   // not in contact
   ASSERT_TRUE(percept.stiffness());
   EXPECT_DOUBLE_EQ(*percept.stiffness(), 400);
@@ -164,7 +164,7 @@ TEST(LevelPercept, TheNearestPartOfACompoundCounts) {
                               "/parts/1/radius_m", "0.01, 0.02");
   LevelPercept percept(protocol);
   percept.begin(trial_of(), at(0.015));
-  percept.add(touch({-0.053, 0, 0}));  // of the part that does not change
+  percept.add(touch({-0.053, 0, 0}));  // on the part that does not change
   EXPECT_FALSE(percept.length());
   percept.add(touch({0.03, 0.018, 0}));
   percept.add(touch({0.03, 0, -0.014}));

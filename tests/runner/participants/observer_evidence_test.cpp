@@ -1,5 +1,5 @@
-// How evidence adds up: by percept or by movement, with and without forgetting, and draws from the
-// posterior that it gives.
+// Accumulation of evidence: by percept or by movement, with and without forgetting, and draws from
+// the resulting posterior.
 
 #include <gtest/gtest.h>
 
@@ -35,7 +35,8 @@ void expect_same(const ShapeObserver& a, const ShapeObserver& b) {
   }
 }
 
-// What weighs 1 - exp(-(moved + turn_length turned) / movement_scale) is a percept of that beta.
+// A percept with weight 1 - exp(-(moved + turn_length turned) / movement_scale) equals one with
+// that beta.
 TEST(ObserverEvidence, OfAContactGrowsWithMovementAndTurn) {
   const ShapeHypotheses hypotheses(four_shapes());
   struct {
@@ -103,8 +104,8 @@ TEST(ObserverEvidence, DoesNotFadeWithoutForgetting) {
   expect_same(observer, one);
 }
 
-// One draw from each of n equal parts of the mass: of a shape with probability p there are n p of
-// them, but for the two parts that it shares with its neighbours.
+// One draw from each of n equal parts of the mass: a shape with probability p gets n p draws, apart
+// from the two parts shared with its neighbours.
 TEST(ObserverEvidence, DrawsFollowThePosterior) {
   const ShapeHypotheses hypotheses(four_shapes());
   ShapeObserver observer(hypotheses, by_movement());
@@ -127,7 +128,7 @@ TEST(ObserverEvidence, DrawsFollowThePosterior) {
   }
 }
 
-// The orientation that is true is drawn more often than its share of the grid.
+// The true orientation is drawn more often than its share of the grid.
 TEST(ObserverEvidence, DrawsFollowThePosteriorWithinAShape) {
   const ShapeHypotheses hypotheses(four_shapes());
   ShapeObserver observer(hypotheses, by_movement());

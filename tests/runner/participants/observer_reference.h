@@ -1,5 +1,5 @@
 #pragma once
-// The observer's formulas written out once more, in double precision and without haste.
+// The observer's formulas written out again, in double precision and without optimisation.
 
 #include <algorithm>
 #include <cmath>
@@ -20,7 +20,7 @@ inline std::vector<stimuli::ObjectSpec> four_shapes() {
   return stimuli;
 }
 
-/// Of an observer that sums up evidence by movement and forgets nothing.
+/// Settings of an observer with evidence by movement and without forgetting.
 inline ObserverSettings by_movement() {
   ObserverSettings settings;
   settings.evidence = Evidence::movement;

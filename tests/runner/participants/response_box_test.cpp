@@ -106,7 +106,7 @@ TEST_F(Box, AnUnpluggedBoxIsReportedAndTheKeyboardStays) {
   EXPECT_EQ(screen.keys().front().key, "k");
 }
 
-// As of a box at another speed, whose bytes come as others.
+// As with a box at another speed, whose bytes arrive changed.
 TEST_F(Box, AnUnknownByteIsReported) {
   ResponseBox box(terminal_.path, {{"A", "1"}}, clock_, [] {});
   class Keyboard final : public ParticipantScreen {

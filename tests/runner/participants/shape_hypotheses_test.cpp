@@ -142,8 +142,8 @@ TEST(ShapeHypotheses, NamesEveryStimulusThatCannotBeSimulated) {
   EXPECT_NE(message_of({}).find("no stimuli"), std::string::npos);
 }
 
-// What has a formula is known by it; anything placed off the centre, or felt below its surface, is
-// not what the formula says.
+// A centred shape with a formula uses it; the formula does not apply to shapes off the centre or
+// felt below their surface.
 TEST(ShapeHypotheses, OnlyCentredPlainShapesHaveFormulas) {
   stimuli::ObjectSpec moved = spec(stimuli::ShapeKind::cube);
   moved.pose.position = Vec3(0.01, 0, 0);

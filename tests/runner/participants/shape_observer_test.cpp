@@ -147,8 +147,8 @@ TEST(ShapeObserver, ResetRestoresThePrior) {
   for (int s = 0; s < 4; ++s) EXPECT_EQ(observer.probability(s), fresh.probability(s));
 }
 
-// Far from a shape its orientation cannot matter, and is not looked at: from how far on is no
-// guess.
+// Far from a shape its orientation cannot matter and is not evaluated. Checks this bound from near
+// to far.
 TEST(ShapeObserver, FreeSpaceAgreesWithTheFormulasFromNearToFar) {
   std::vector<stimuli::ObjectSpec> slender = four_shapes();
   slender[1].radius = slender[2].radius = 0.01;
@@ -158,7 +158,7 @@ TEST(ShapeObserver, FreeSpaceAgreesWithTheFormulasFromNearToFar) {
   ObserverSettings settings;
   settings.free_space_weight = 1;
   Random random(16);
-  double least = 1, most = 0;  // of the spheres' probabilities: near and far are both tried
+  double least = 1, most = 0;  // of the spheres' probabilities: both near and far are tested
   for (int n = 0; n < 80; ++n) {
     ShapeObserver observer(hypotheses, settings);
     test::ReferenceObserver reference(slender, hypotheses, settings);
@@ -263,8 +263,8 @@ TEST(ShapeObserver, FreeSpaceIsEvidenceAgainstShapesThere) {
   EXPECT_GT(observer.probability(1), 0.4);
 }
 
-// A flat contact has no unique place along the stylus: it must not be held against the cube that
-// the torque puts the contact here or there on its face.
+// A flat contact has no unique place along the stylus: the place given by torque must not count
+// against the cube.
 TEST(ShapeObserver, PositionMattersOnASphereButNotOnAFlatFace) {
   std::vector<stimuli::ObjectSpec> stimuli{four_shapes()[0], four_shapes()[3]};
   const ShapeHypotheses hypotheses(stimuli);

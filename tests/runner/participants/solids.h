@@ -1,5 +1,5 @@
 #pragma once
-// Stimuli without a formula, as a simulated participant imagines them.
+// Stimuli without a formula, as the simulated participant models them.
 
 #include <memory>
 #include <utility>

@@ -1,4 +1,4 @@
-// Simulated judgements against what task_judgement.h says they are: shares of many draws against
+// Simulated judgements against their definitions in task_judgement.h: shares of many draws against
 // closed forms of the normal distribution (4 standard errors), and single ones without noise.
 
 #include "runner/participants/task_judgement.h"
@@ -72,8 +72,8 @@ TEST(TaskJudgement, DifferentMeansMoreThanAStandardDeviation) {
 }
 
 TEST(TaskJudgement, AnUntouchedIntervalIsJudgedAsARandomLevel) {
-  // Two levels at random in 300 to 500, each with noise: as often one as the other, whatever they
-  // are.
+  // Two random levels in 300 to 500, each with noise: both are chosen equally often, whatever the
+  // true levels.
   Judge judge(compare());
   expect_share(share(judge, "2", {kStandard, at(500)}, {{}, false, false}), 0.5, "untouched");
 }

@@ -48,7 +48,7 @@ def test_the_posterior_is_calibrated_and_follows_the_truth():
     for i in range(5):
         assert module.uniformity(ranks[:, i])[1] > 0.001
         assert np.corrcoef(means[:, i], shares[:, i])[0, 1] > 0.85
-    # Ranks that are not uniform are found: of a posterior that is too narrow, and of one that is off.
+    # Ranks that are not uniform are detected: of a posterior that is too narrow, and of a biased one.
     for wrong in (0.5 + 1.5 * (ranks - 0.5), ranks**1.5):
         assert module.uniformity(np.clip(wrong[:, 0], 0, 1))[1] < 0.001
 
@@ -79,5 +79,5 @@ def test_d_prime_is_that_of_normal_figures():
         figures[is_three, :2] += shift
         found, error = module.separation(figures, is_three)
         assert abs(found - shift * np.sqrt(2)) < 3 * error
-    mirrored, _ = module.separation(-figures * 7 + 3, is_three)  # the unit of a figure does not count
+    mirrored, _ = module.separation(-figures * 7 + 3, is_three)  # the unit of a figure does not matter
     assert mirrored == pytest.approx(found)

@@ -206,7 +206,7 @@ def test_parallel_threads_give_the_same_results():
         futures = [pool.submit(study, seed) for seed in (1, 2)]
         ticks = 0
         while len(together) < 2 and not any(f.done() and f.exception() for f in futures):
-            ticks += 1  # this thread goes on: the lock is free
+            ticks += 1  # this thread continues: the lock is free
             time.sleep(0.001)
         found = [f.result() for f in futures]
     assert ticks > 3

@@ -11,7 +11,7 @@
 namespace palpate::runner {
 namespace {
 
-/// The bits that a header declares, as its text has them.
+/// The bits declared in a header's text.
 std::set<std::uint32_t> declared_in(const std::string& header) {
   std::ifstream in(std::string(PALPATE_SOURCE_DIR) + "/" + header);
   const std::string text(std::istreambuf_iterator<char>(in), {});
@@ -57,7 +57,7 @@ TEST(FaultTable, TheConsoleNamesEveryDeclaredBit) {
 }
 
 TEST(FaultTable, FaultsThatSwitchForcesOffHaveAMessage) {
-  // Zero force until cleared is what the codebook says of the faults that cut the forces off.
+  // The codebook describes faults that switch forces off as "zero force until cleared".
   for (const rendering::FaultBit& fault : kFaultTable) {
     const bool cuts = std::string(fault.meaning).find("until cleared") != std::string::npos;
     const bool off = fault.bit == servo_fault::kTripped;

@@ -1,4 +1,4 @@
-// What passes through the memory that the runner and its guard process share.
+// Data passed through the memory shared by the runner and its guard process.
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 #pragma once
-// What the tests of the guard process share: a scripted hand that visits a cube, and memory shared
+// Shared by the tests of the guard process: a scripted hand that visits a cube, and memory shared
 // with a forked runner.
 
 #include <sys/mman.h>
@@ -16,7 +16,7 @@
 namespace palpate::runner::testing {
 
 inline DeviceReading stylus_at(double z) { return {{{0, 0, z}, {0, 0, z + 0.12}}, 0, false}; }
-/// At rest outside for 0.15 s at 1 kHz, then down into the cube, for a second in all.
+/// At rest outside for 0.15 s at 1 kHz, then down into the cube; a second in total.
 inline DeviceReading visiting(int tick) {
   const int at = tick % 1000;
   return stylus_at(at < 150 ? 0.1 : std::max(0.029, 0.1 - 4e-4 * (at - 150)));
@@ -25,8 +25,8 @@ inline DeviceReading visiting(int tick) {
 /// Shared with the runner's process.
 struct Shared {
   DeviceRecord record;
-  std::atomic<bool> felt{false};  ///< there has been force for a while, and is
-  std::atomic<bool> go{false};    ///< the runner is to do what ends it
+  std::atomic<bool> felt{false};  ///< there has been force for a while, and still is
+  std::atomic<bool> go{false};    ///< tells the runner to cause its end
 };
 struct Stage {
   Stage()

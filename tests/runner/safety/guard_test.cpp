@@ -1,4 +1,4 @@
-// The guard process between runner and device: what it passes on, and what it does when it or the
+// The guard process between runner and device: the data passed on, and its behaviour when it or the
 // device is lost.
 
 #include <gtest/gtest.h>
@@ -146,7 +146,7 @@ TEST(Guard, AGuardThatHasEndedCountsAsALostDevice) {
   EXPECT_EQ(reading.trouble, DeviceTrouble::guard_lost);
 }
 
-/// Reads and commands zero until the reading is as wished; the last one.
+/// Reads and commands zero until the reading satisfies the condition. \return the last reading
 template <class Wished>
 DeviceReading read_until(GuardedDevice& device, Wished wished) {
   DeviceReading reading = device.read();
@@ -193,7 +193,7 @@ TEST(Guard, AGuardThatHangsForGoodCountsAsEnded) {
   EXPECT_GE(clock.now_ns() - began, 190'000'000);
 }
 
-/// Pulled out and put in again by whoever has the stage.
+/// Unplugged and plugged in again by the test.
 class Plug final : public Device {
  public:
   explicit Plug(Stage& stage) : stage_(stage), recording_(stage.shared->record, visiting) {}

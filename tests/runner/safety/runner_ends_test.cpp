@@ -1,4 +1,4 @@
-// Whatever ends the runner, zero force is at the device within 20 ms, by the device's own record.
+// Whatever ends the runner, the device receives zero force within 20 ms, by its own record.
 
 #include <gtest/gtest.h>
 #include <sys/prctl.h>
@@ -33,9 +33,9 @@ using testing::visiting;
 
 constexpr std::int64_t kLimit_ns = 20'000'000;
 
-/// A session's thread and a servo's. Once `end` returns, or a signal has asked for the end, it is
-/// over. Trials are begun again until one has had force for a while, since a busy machine may make
-/// one trip; then no fault is cleared any more.
+/// A session's thread and a servo's. Ends once `end` returns or a signal requests the end. Restarts
+/// trials until one has had force for a while, because a busy machine may trip one; afterwards it
+/// clears no fault.
 void feel_a_cube(Shared& shared, Device& device, FaultSignals& signals,
                  const std::function<void(ServoThread&)>& end) {
   const rendering::Scene scene({{std::make_shared<const stimuli::ConvexMesh>(stimuli::cube(0.06)),
@@ -77,9 +77,9 @@ void run(Shared& shared, const std::function<void(ServoThread&)>& end) {
 }
 
 struct Outcome {
-  std::int64_t zero_after_ns = 0;  ///< the last force came so long after the event
-  std::int64_t late_ns = 0;        ///< longest oversleeping of this process meanwhile
-  int zeros = 0;                   ///< zero commands since
+  std::int64_t zero_after_ns = 0;  ///< time of the last force after the event
+  std::int64_t late_ns = 0;        ///< longest oversleeping of this process in that time
+  int zeros = 0;                   ///< number of zero commands since
 };
 
 /// Waits for force, causes the event, and looks at the record for `for_ms` after it.
@@ -180,7 +180,8 @@ INSTANTIATE_TEST_SUITE_P(
         End{"emergency_key", 0, [](ServoThread& servo) { servo.emergency_zero(); }, SIGKILL}),
     [](const auto& end) { return std::string(end.param.name); });
 
-// Without a guard, nobody but the servo's own thread can send the zero: whoever dies must wait.
+// Without a guard, only the servo's own thread can send zero force: a failing thread must wait for
+// it.
 TEST(FaultSignals, AFailingThreadWaitsForTheServosZeroForce) {
   Stage stage;
   const int runner = fork();

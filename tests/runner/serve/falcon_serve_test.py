@@ -27,7 +27,7 @@ RAMP = 20  # ticks: 0.2 s
 BALL = {"objects": [{"shape": "sphere", "radius_m": 0.02, "subdivisions": 2, "stiffness_n_per_m": 100}]}
 DEVICE_LOST, MISSED, STALLED = 32, 64, 1024  # fault bits
 FELT = 150  # counts, of the hand in the ball at full force
-# Holds the forces on, in a process of its own, until something is done to it.
+# Keeps forces on, in a separate process, until it is killed or stopped.
 PROGRAM = """
 import sys, time
 sys.path.insert(0, {folder!r})
@@ -43,7 +43,7 @@ while True:
     try:
         hand.stop()
         hand.clear()
-    except ServeError as error:  # the guard of a starved machine is late
+    except ServeError as error:  # on a busy machine the guard is late
         if error.code == "closed":
             raise
         time.sleep(0.2)
@@ -65,7 +65,7 @@ class Falcon(ServeCase):
             EMULATED, "--last", self.last, "--record", self.heard, "--control", self.control.fifo, PALPATE, "serve",
             "--device", "falcon", "--scene", self.scene, "--rate", RATE, "--calibration", calibration])
         self.server, = self.children(self.emulator.pid)
-        # First of all: the end of the bus alone would leave the server, and its pipes, behind.
+        # Do this first: ending only the bus would leave the server and its pipes behind.
         self.addCleanup(self.kill_server)
         self.eye = self.client(role="watch")
         self.eye.subscribe(1000, ("faults",))
@@ -90,7 +90,7 @@ class Falcon(ServeCase):
             self.hand_at(0.03)
             time.sleep(0.3)
             self.hand_at(0.012)
-            time.sleep(0.6)  # the way, and the ramp
+            time.sleep(0.6)  # the approach, and the ramp
             record = self.control.record()
             if min(counts for _, counts in record[-5:]) > FELT:
                 return
@@ -121,22 +121,22 @@ class Falcon(ServeCase):
             faded = event != "client_silent" or not self.was_starved()
             if said["event"] == event and before[-1] > FELT and faded:
                 return at, said, record
-            program.kill()  # the guard of a starved machine had taken the forces off
+            program.kill()  # on a busy machine the guard had ended forces
             program.wait()
             hand = None
             while hand is None:
-                with contextlib.suppress(ServeError):  # until the server knows that the program is gone
+                with contextlib.suppress(ServeError):  # until the server has noticed the end of the program
                     hand = self.client()
             with hand:
                 self.wait_until_free(hand)
 
     def was_starved(self):
-        """The machine was too busy for guard or servo, which took the forces off at once."""
+        """The machine was too busy for guard or servo, which switched forces off at once."""
         faults = [int(word) for word in self.eye.samples()["faults"]]
         return any(word & (DEVICE_LOST | STALLED) for word in faults) or sum(word & MISSED > 0 for word in faults) >= 5
 
     def wait_until_free(self, hand):
-        """Forces are allowed again."""
+        """Waits until forces are allowed again."""
         end = time.monotonic() + PATIENCE
         while True:
             try:
@@ -171,12 +171,12 @@ class Falcon(ServeCase):
               f"{(zero - silent['t_ns']) / 1e6:.0f} ms and {len(ramp)} ticks later", file=sys.stderr)
         self.assertGreaterEqual(silent["t_ns"] - silent["since_ns"], 500_000_000)
         self.assertGreater(min(waited), 0)
-        # A tick that comes late, and one that was under way.
+        # A late tick, and one that was in progress.
         self.assertLessEqual(len(ramp), RAMP + 2)
         self.assertGreaterEqual(len(ramp), RAMP // 2)
         self.assertEqual(ramp, [counts for _, counts in since[:len(ramp)]])  # it does not come back
         for one, next_one in zip(ramp, ramp[1:]):
-            self.assertLessEqual(next_one, one + 5)  # the hand sinks in while the force fades
+            self.assertLessEqual(next_one, one + 5)  # the hand moves in while the force fades
 
     def test_after_a_stop_in_contact_the_force_fades(self):
         self.assert_faded(*self.in_contact(lambda program: os.kill(program.pid, signal.SIGSTOP), "client_silent"))
@@ -189,7 +189,7 @@ class Falcon(ServeCase):
                 try:
                     hand.clear()
                     hand.start(renderer="point")
-                except ServeError as error:  # the guard of a starved machine is late
+                except ServeError as error:  # on a busy machine the guard is late
                     self.assertEqual(error.code, "forces-off")
                     continue
                 if self.one_of(self.eye, "client_silent", "forces_off")["event"] == "client_silent":

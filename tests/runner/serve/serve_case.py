@@ -34,7 +34,7 @@ class ServeCase(unittest.TestCase):
         self.path = self.dir / "socket"
 
     def serve(self, *options, scene=True, rate=100):
-        """At a rate that a busy machine keeps: forces go off where ticks are missed."""
+        """At a rate that a busy machine can keep: forces go off if ticks are missed."""
         command = [PALPATE, "serve", "--device", "simulated", "--socket", self.path, "--rate", rate, *options]
         if scene:
             command += ["--scene", self.scene]
@@ -69,13 +69,13 @@ class ServeCase(unittest.TestCase):
         raise AssertionError(f"none of {names} came")
 
     def know_the_clock(self, hand):
-        """Asks until the server knows the client's clock: on a busy machine answers may take long."""
+        """Repeats `clock` until the server knows the client's clock: on a busy machine answers may take long."""
         end = time.monotonic() + PATIENCE
         while not (hand.clock() and hand.ask("clock")["known"]):
             self.assertLess(time.monotonic(), end, "the clock stays unknown")
 
     def touch(self, hand, **more):
-        """Starts until something was felt: of a starved machine forces go off before. \return zero, the contact"""
+        """Starts until there was contact: on a busy machine forces may go off before. \return zero, the contact"""
         while True:
             zero = hand.start(**more)
             contact = self.one_of(hand, "first_contact", "forces_off")

@@ -88,11 +88,11 @@ class Clients(ServeCase):
                     first.cancel()
                     await hand.stop()
                     await hand.clear()
-                # Two questions at once have each its answer.
+                # Two requests at once each get their reply.
                 clock, marked = await asyncio.gather(hand.clock(), hand.mark(3, "x"))
                 self.assertLess(abs(clock.offset_ns), clock.round_trip_ns / 2 + 1)
                 self.assertGreater(marked, zero)
-                await asyncio.sleep(0.7)  # it says that it lives
+                await asyncio.sleep(0.7)  # it keeps sending signs of life
                 said = await hand.answer("ball")
                 self.assertEqual((said["trial"], said["zero_t_ns"]), (3, zero))
                 await asyncio.sleep(0.1)
@@ -141,7 +141,7 @@ class Clients(ServeCase):
     def test_the_trial_loop_on_record(self):
         process = self.record()
         out = self.dir / "trials.csv"
-        # A busy machine's servo may cut a trial off: then a key more is taken.
+        # On a busy machine the servo may cut a trial off: then one more key is used.
         self.run_program(sys.executable, EXAMPLES / "serve_trials.py", self.token, "--out", out, "--keys", "12" * 50)
         self.assertEqual(process.wait(PATIENCE), 0)
         with open(out, newline="") as table:
@@ -183,7 +183,7 @@ class Clients(ServeCase):
         self.assertGreater(picture.stat().st_size, 5000)
 
     def readme(self, language, words):
-        """The README's block of a language that holds these words, as it is shown."""
+        """The README's block of a language that contains these words, as shown."""
         section = README[README.index("## How to drive palpate from PsychoPy"):]
         found = [block for block in re.findall(rf"```{language}\n(.*?)```", section[:section.index("\n## ", 1)], re.DOTALL)
                  if words in block]
@@ -209,7 +209,7 @@ class Clients(ServeCase):
         return self.serve_as_in_the_readme(self.readme("sh not tested:[^\n]*", "--participant P03"))
 
     def run_until_done(self, command, **more):
-        """Again where a busy machine took forces off: the session goes on with the trial that is due."""
+        """Retries if forces went off on a busy machine: the session resumes with the trial that is due."""
         while True:
             done = subprocess.run(list(map(str, command)), capture_output=True, text=True, timeout=PATIENCE, cwd=self.dir, **more)
             if done.returncode == 0:

@@ -1,4 +1,4 @@
-"""palpate serve on the simulated device, from outside: who may come in, what may be said, and what ends forces.
+"""palpate serve on the simulated device, from outside: admission, messages, and the ends of forces.
 
 Usage: serve_test.py PALPATE PROTOCOLS CLIENT.py
 """
@@ -20,7 +20,7 @@ from serve_case import BALL, PALPATE, PATIENCE, PROTOCOLS, Client, ServeCase, Se
 
 
 def schemas():
-    """Of what a client says, and of what the server does."""
+    """Schemas of a client's messages and of the server's."""
     scene = (PROTOCOLS / "scene.schema.json").read_text().replace('"#/$defs/', '"#/$defs/scene/$defs/')
     whole = json.loads((PROTOCOLS / "serve.schema.json").read_text().replace('"scene.schema.json"', '"#/$defs/scene"'))
     whole["$defs"]["scene"] = json.loads(scene)
@@ -33,7 +33,7 @@ def schemas():
 
 class Serve(ServeCase):
     def lines(self):
-        """A connection of the Unix socket that says and hears lines as they are."""
+        """A connection of the Unix socket that sends and receives raw lines."""
         link = client._Lines(str(self.path), PATIENCE)
         link.socket.settimeout(PATIENCE)
         self.addCleanup(link.socket.close)
@@ -189,7 +189,7 @@ class Serve(ServeCase):
         self.assertEqual(self.http(*socket_, speaks), 403)
         self.assertEqual(self.http(host, *socket_), 400)
         self.assertEqual(self.http(host, *socket_, "Sec-WebSocket-Protocol: palpate.2"), 400)
-        self.assertEqual(self.http(host), 200)  # the page, which knows no token
+        self.assertEqual(self.http(host), 200)  # the page, which does not contain the token
         self.assertIsNone(self.http(host, "X: " + "x" * 20000))
 
     def test_silent_and_flooding_connections_are_closed(self):
@@ -209,7 +209,7 @@ class Serve(ServeCase):
         with contextlib.suppress(OSError):
             long.socket.sendall(b"x" * 200_000)
             self.assertEqual(long.socket.recv(10), b"")
-        # Before its hello a WebSocket gets 64 kB as well.
+        # Before its hello a WebSocket is limited to 64 kB too.
         web = client._WebSocket(self.said["url"], PATIENCE)
         self.addCleanup(web.socket.close)
         with contextlib.suppress(OSError, ConnectionError):
@@ -296,7 +296,7 @@ class Serve(ServeCase):
                 hand.ask("alive")
                 said.append(time.monotonic())
             hand.stop()
-            if max(after - before for before, after in zip(said, said[1:])) < 0.4:  # else this machine stood still
+            if max(after - before for before, after in zip(said, said[1:])) < 0.4:  # otherwise this machine stood still
                 self.assertEqual([e for e in eye.events() if e["event"] == "client_silent"], [])
 
     def test_every_client_may_request_zero_force(self):
@@ -320,11 +320,11 @@ class Serve(ServeCase):
         hand.clear()
         hand.start()
         eye.events()
-        # Who goes without a word takes the forces along.
+        # Forces end if the controller disconnects without a message.
         hand._link.socket.shutdown(socket.SHUT_RDWR)
         self.assertEqual(eye.wait_for("stopped", PATIENCE)["reason"], "the controller has left")
         other = self.client()
-        with contextlib.suppress(ServeError):  # it was not felt any more, or forces are off
+        with contextlib.suppress(ServeError):  # the trial has ended, or forces are off
             other.stop()
         other.clear()
         other.start()
@@ -354,14 +354,14 @@ class Serve(ServeCase):
 
         with self.client() as hand:
             self.assertEqual(answered(hand), "arrival")
-            for _ in range(5):  # without having seen an answer it may be anywhere before
+            for _ in range(5):  # without a seen answer its sending time has no lower bound
                 self.assertFalse(hand.ask("clock", t_client=time.monotonic_ns())["known"])
-            for seen in (1, time.monotonic_ns(), 2**62):  # no answer was sent then
+            for seen in (1, time.monotonic_ns(), 2**62):  # no answer was sent at that time
                 self.assertFalse(hand.ask("clock", t_client=time.monotonic_ns(), t_seen_ns=seen)["known"])
             self.assertEqual(answered(hand), "arrival")
             self.know_the_clock(hand)
             self.assertEqual(answered(hand), "client")
-            # Another clock's time is known as well, where it is asked for; one that was set, is not.
+            # The time of another clock is known too, after `clock` messages; that of a clock that was set is not.
             seen = hand.ask("clock", t_client=time.monotonic_ns() + 5e9)["t_sent_ns"]
             self.assertEqual(answered(hand), "arrival")
             while not (said := hand.ask("clock", t_client=time.monotonic_ns() + 5e9, t_seen_ns=seen))["known"]:
@@ -427,7 +427,7 @@ class Serve(ServeCase):
         process.kill()
         process.wait(PATIENCE)
         self.scene.write_text(json.dumps(BALL))
-        again = self.serve()  # beside the socket that was left
+        again = self.serve()  # beside the socket left behind
         with self.client() as hand:
             hand.start()
             again.send_signal(signal.SIGTERM)

@@ -24,14 +24,14 @@ from terminal import Terminal  # noqa: E402
 LEVEL = {"level": {"path": "/stiffness_n_per_m"}, "min": 20, "max": 60}
 PROTOCOL = {
     "version": 2, "name": "served", "renderers": ["point", "ray"], "seed": 5, "samples": True,
-    # Slow and soft: five ticks must not be missed in a row where many tests share a processor.
+    # Slow and soft, so that no five ticks in a row are missed while many tests share a processor.
     "servo": {"rate_hz": 100}, "home": {"rest_s": 0.1}, "material": {"stiffness_n_per_m": 50},
     "stimuli": [{"name": "ball", "shape": "sphere", "radius_m": 0.02, "subdivisions": 1},
                 {"name": "box", "shape": "cube", "edge_m": 0.03}],
 }
 IDENTIFY = {"name": "which", "task": "identify", "stimuli": ["ball", "box"], "repetitions": 1}
 EXTERNAL = {"name": "free", "task": "external", "stimuli": ["ball", "box"], "trials": 4}
-# Of when it was, and of a machine that is too busy.
+# Columns that depend on the time, or on a busy machine.
 OF_TIME = {"response_time", "first_contact_time", "onset_utc", "missed_ticks", "attempt", "ticks", "faults", "max_force", "before_contact",
            "longest_period", "contact_share", "edge_dwell", "interval_onsets", "interval_ends", "started_inside",
            "response_device", "note"}
@@ -52,7 +52,7 @@ class Served(ServeCase):
                                 "--participant", "P01", *options])
 
     def trial(self, hand, answer, **start):
-        """One that is on record: what a busy machine cuts off is shown again. \\return what it was like"""
+        """Runs a trial until it is on record: one cut off by a busy machine is repeated. \\return its facts"""
         while True:
             try:
                 hand.start(**start)
@@ -105,7 +105,7 @@ class Served(ServeCase):
             self.assertEqual({k: v for k, v in a.items() if k not in OF_TIME},
                              {k: v for k, v in b.items() if k not in OF_TIME})
         self.assertEqual(self.sql("SELECT end_reason FROM runs"), [("done",)])
-        for trial in range(1, 5):  # forces of the record are those that rendering its path gives
+        for trial in range(1, 5):  # the recorded forces equal those of rendering the path
             said = self.run_palpate("replay", "--db", self.db, "--trial", f"P01/1/{trial}", "--compare")
             self.assertRegex(said, r"(?m)(\d+) of \1 ticks|all \d+ ticks", said)
 
@@ -197,7 +197,7 @@ class Served(ServeCase):
             self.assertTrue(off["reason"])
             hand.clear()
             hand.start(stimulus="ball", renderer="ray")
-            hand._link.socket.shutdown(2)  # goes without a word
+            hand._link.socket.shutdown(2)  # disconnects without a message
         eye = self.client(role="watch")
         while eye.server["record"]["done"] != 0 or len(self.sql("SELECT 1 FROM attempts WHERE state = 'cut_off'")) < 2:
             time.sleep(0.05)
@@ -213,7 +213,7 @@ class Served(ServeCase):
                 with self.client() as hand:
                     stored = [(t["trial"], t["stimulus"], t["response"]) for t in hand.server["record"]["stored"]]
                     self.assertEqual(stored[:len(acknowledged)], acknowledged)
-                    # The last one may be on record without its answer having come through.
+                    # The last one may be on record although its reply was lost.
                     self.assertLessEqual(len(stored), len(acknowledged) + 1)
                     acknowledged = stored
                     killer.start()
@@ -225,7 +225,7 @@ class Served(ServeCase):
             if process.wait(PATIENCE) == -signal.SIGKILL:
                 kills += 1
             else:
-                break  # all trials were done before
+                break  # all trials were finished before
         self.assertGreater(kills, 3)
         rows = [(int(row["trial"]), row["shape"], row["response"]) for row in self.rows()]
         self.assertEqual(rows[:len(acknowledged)], acknowledged)

@@ -1,5 +1,5 @@
-// The passivity controller: takes out what sampling feeds, never pushes, and knows nothing of the
-// trial before.
+// The passivity controller: dissipates the energy of sampling, never pushes, and forgets the
+// previous trial.
 
 #include "runner/servo/passivity.h"
 
@@ -20,7 +20,7 @@ namespace {
 
 constexpr double kTick = 1e-3;
 
-/// A mass of 0.1 kg on a spring that is sampled and held: without damping it must grow.
+/// A mass of 0.1 kg on a sampled and held spring: without damping its oscillation must grow.
 double swing_after(double stiffness, bool controlled, int ticks) {
   PassivityController control({}, kTick);
   constexpr double kMass = 0.1;
@@ -95,7 +95,7 @@ TEST(Passivity, StartsANewAccountAtResetAndAfterPosesThatAreNotFinite) {
   const DeviceForces scene{Vec3(0, 0, 3), Vec3(0), false};
   (void)control.damping({Vec3(0), Vec3(0)}, {});
   control.commanded(scene);
-  (void)control.damping({Vec3(0, 0, 1e-3), Vec3(0)}, {});  // gave 3 mJ that were not due
+  (void)control.damping({Vec3(0, 0, 1e-3), Vec3(0)}, {});  // excess energy of 3 mJ
   EXPECT_NEAR(control.excess(), 3e-3, 1e-12);
   control.reset();
   EXPECT_EQ(control.excess(), 0);
@@ -108,7 +108,7 @@ TEST(Passivity, StartsANewAccountAtResetAndAfterPosesThatAreNotFinite) {
   EXPECT_TRUE(std::isfinite(control.excess()));
 }
 
-/// Rests 0.6 s at home, then goes up and down through the cube's face at 30 Hz.
+/// Rests 0.6 s in the home zone, then moves up and down through the cube's face at 30 Hz.
 DeviceReading knock(int tick) {
   const double z = tick < 600 ? 0.1
                               : std::max(0.0305, 0.1 - 1e-4 * (tick - 600)) +

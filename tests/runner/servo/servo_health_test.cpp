@@ -1,4 +1,4 @@
-// What a session's record says of its servo, from ticks that are known.
+// A session's record of its servo, from known ticks.
 
 #include <gtest/gtest.h>
 
@@ -22,7 +22,7 @@ Sample tick_at(std::int64_t due_ns, std::int64_t lateness_ns, std::int64_t compu
 
 TEST(ServoHealth, TheRecordHasCountsTimesAndFaults) {
   ServoHealth health;
-  // 98 ticks in time; then one that is late by less than a period and one by two periods and some.
+  // 98 ticks in time; then one late by less than a period and one by more than two periods.
   std::int64_t due_ns = 7'000'000;
   for (int i = 0; i < 98; ++i, due_ns += kPeriod_ns) health.add(tick_at(due_ns, 8, 4), kPeriod_ns);
   Sample late = tick_at(due_ns, 400'000, 12);
@@ -52,7 +52,8 @@ TEST(ServoHealth, TheRecordHasCountsTimesAndFaults) {
   EXPECT_EQ(json["compute_ns"]["p99.9"], 12);
   EXPECT_EQ(json["compute_ns"]["max"], 12);
   EXPECT_EQ(json["compute_ns"]["up_to_and_count"], nlohmann::json({{4, 99}, {12, 1}}));
-  // Of 100 ticks, 99 were late by no more than the late one: within an eighth above it.
+  // Of 100 ticks, 99 were at most as late as the late one: the quantile is within an eighth above
+  // it.
   const std::int64_t p99 = json["lateness_ns"]["p99"];
   EXPECT_GE(p99, 400'000);
   EXPECT_LE(p99, 450'000);

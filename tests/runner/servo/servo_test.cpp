@@ -1,4 +1,4 @@
-// The servo: forces go on where they should, stay within their limits, and any fault ends them.
+// The servo: forces begin as specified, stay within their limits, and end at any fault.
 
 #include "runner/servo/servo.h"
 
@@ -24,7 +24,7 @@ rendering::Scene cube_scene() {
 
 DeviceReading stylus_at(double z) { return {{{0, 0, z}, {0, 0, z + 0.12}}, 0, false}; }
 
-/// Rests at 0.1 m for 0.6 s, then goes down to `floor` at 0.1 m/s.
+/// Rests at 0.1 m for 0.6 s, then moves down to `floor` at 0.1 m/s.
 DeviceReading come_down(int tick, double floor) {
   return stylus_at(tick < 600 ? 0.1 : std::max(floor, 0.1 - 1e-4 * (tick - 600)));
 }
@@ -59,7 +59,7 @@ TEST(Servo, KeepingWarmChangesNoTick) {
     return reading;
   };
   FakeDevice device(slide), other_device(slide);
-  stimuli::Material rough;  // where it sticks is remembered from tick to tick
+  stimuli::Material rough;  // the place of sticking is carried from tick to tick
   rough.damping = 1;
   rough.friction_static = 0.6;
   rough.friction_dynamic = 0.4;
@@ -126,7 +126,7 @@ TEST(Servo, ForceIsLimitedInSizeAndChangeAndRampedAndBothForcesAreOnRecord) {
     EXPECT_NEAR(device.last1.z, std::min(6.0, device_limit), 1e-9);
     EXPECT_NEAR(servo.tick().rendering.device1.z, 16, 1e-9) << "what was rendered";
   }
-  // In contact from time zero on: the forces come up over 200 ms.
+  // In contact from time zero on: forces ramp up over 200 ms.
   FakeDevice pressed([](int tick) { return stylus_at(tick < 500 ? 0.1 : 0.0275); });
   VirtualClock clock;
   Servo servo(pressed, clock, 1000, ForceLimits{});
@@ -267,7 +267,7 @@ TEST(Servo, MissedTicksAreCountedAndFiveInARowEndTheForce) {
 }
 
 TEST(Servo, ADeviceWithThreeDrivenAxesGetsTheTotalForceWithinItsLimit) {
-  // The stylus lies on the cube's upper face, its middle above the face's: each end gets a half.
+  // The stylus lies on the cube's upper face, centred: each end gets half.
   const auto lie_down = [](double floor) {
     return [floor](int tick) {
       const double z = tick < 600 ? 0.1 : std::max(floor, 0.1 - 1e-4 * (tick - 600));
@@ -319,7 +319,7 @@ TEST(Servo, AGripWithTorqueGetsForceAndTorqueScaledTogetherWithinItsLimits) {
       ASSERT_EQ(sample.device2, device.last2) << "what was commanded";
     }
     const Sample sample = servo.tick();
-    // At the right end of the face the force is what limits it, else the torque.
+    // At the right end of the face the force is the limit, otherwise the torque.
     const double share = sample.rendering.device2.z / sample.rendering.force.z;
     EXPECT_NEAR(0.12 * device.last2.z, std::min(0.2, 0.12 * share * 6), 1e-9);
     EXPECT_EQ(0.12 * share * 6 < 0.2, middle > 0);

@@ -1,4 +1,4 @@
-// The servo in a thread of its own: every sample in order, nothing waits for anybody.
+// The servo in its own thread: every sample in order, and no thread waits for another.
 
 #include "runner/servo/servo_thread.h"
 
@@ -27,7 +27,7 @@ rendering::Scene cube_scene() {
 
 DeviceReading stylus_at(double z) { return {{{0, 0, z}, {0, 0, z + 0.12}}, 0, false}; }
 
-/// Virtual time, a little of the real one for each tick: a busy machine makes no tick late.
+/// Virtual time with a short real sleep in each tick: a busy machine makes no tick late.
 class UnhurriedClock final : public Clock {
  public:
   std::int64_t now_ns() noexcept override { return now_; }
@@ -52,7 +52,7 @@ ServoSettings fast(std::size_t ring = 1 << 15) {
 
 HomeZone quick_home() { return {0.062, 0.01, 0.005}; }
 
-/// Goes from the home zone into the cube, whenever the session gets there.
+/// Moves from the home zone into the cube when the session is ready.
 FakeDevice falling_device() {
   return FakeDevice([](int tick) { return stylus_at(std::max(0.029, 0.1 - 1e-4 * tick / 4)); });
 }
@@ -224,7 +224,7 @@ TEST(ServoThread, EmergencyZeroHoldsUntilCleared) {
   }
 }
 
-// Who dies in the servo's thread cannot wait for it; who dies in another one must.
+// A failure in the servo's thread cannot wait for it; one in another thread must.
 TEST(ServoThread, KnowsWhetherTheCallerIsItsThread) {
   std::atomic<const ServoThread*> servo_now{nullptr};
   std::atomic<int> asked_inside{0}, answered_yes{0};
@@ -246,7 +246,7 @@ TEST(ServoThread, KnowsWhetherTheCallerIsItsThread) {
   EXPECT_EQ(answered_yes, asked_inside);
 }
 
-/// Holds the servo in its transfer until told to go on.
+/// Blocks the servo in its transfer until released.
 class HangingDevice final : public Device {
  public:
   explicit HangingDevice(int motors = 5) { capabilities_.actuated_freedom = motors; }

@@ -1,5 +1,4 @@
-// What a tick of the servo's thread must not do: allocate, lock, or call the system for anything
-// but its sleep.
+// A tick of the servo's thread must not allocate, lock, or make system calls other than its sleep.
 
 #include <gtest/gtest.h>
 #include <linux/filter.h>
@@ -94,8 +93,8 @@ TEST(ServoTick, AllocatesNothing) {
   EXPECT_EQ(allocated_at_1000, allocated_at_20);
 }
 
-/// From now on this thread is killed, and with it the process, by any call of the system but those
-/// that a tick needs (sleep; the time, where it takes a call) and those that end the thread.
+/// From now on any system call of this thread kills the process, except those that a tick needs
+/// (sleep; the time, if it needs a call) and those that end the thread.
 void allow_only_sleep() {
   constexpr std::array kAllowed = {
       SYS_clock_nanosleep, SYS_clock_gettime, SYS_rt_sigreturn, SYS_exit,
@@ -108,7 +107,7 @@ void allow_only_sleep() {
   }
   filter[kAllowed.size() + 1] = BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_KILL_PROCESS);
   filter[kAllowed.size() + 2] = BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_ALLOW);
-  // The thread's end gives memory back, for which the allocator first makes itself at home here.
+  // The thread's end frees memory; let the allocator initialise itself for this thread first.
   void* volatile first = std::malloc(64);
   std::free(first);
   const sock_fprog program{static_cast<unsigned short>(filter.size()), filter.data()};
@@ -117,7 +116,7 @@ void allow_only_sleep() {
     _exit(77);
 }
 
-/// In a process of its own. \return its wait status
+/// Runs it in a separate process. \return its wait status
 int run_watched(void (*hook)(int tick)) {
   const int child = fork();
   if (child == 0) {

@@ -1,5 +1,5 @@
-// Soft bodies that are stepped beside the servo: what a hand feels does not depend on how fast
-// their threads are, but for ticks that say so; and where they do not answer, forces end.
+// Soft bodies stepped beside the servo: forces do not depend on the speed of their threads, except
+// in ticks marked as late; if a thread does not answer, forces end.
 
 #include <gtest/gtest.h>
 
@@ -47,7 +47,7 @@ struct PathTick {
   double dt = 0;  ///< s
 };
 
-/// In and out of both cubes and across; periods that jitter, some of them long.
+/// A path in and out of both cubes and across them; periods jitter, some are long.
 std::vector<PathTick> rough_path(int ticks) {
   Random random(23);
   std::vector<PathTick> path;
@@ -77,7 +77,7 @@ TEST(SoftThreads, APathGivesTheSameForcesWithoutThreadsIfLateTicksAreKnown) {
   const std::vector<PathTick> path = rough_path(1500);
   for (std::size_t i = 0; i < path.size(); ++i) {
     threads[0].stall(i % 300 > 280);
-    // Without a rest a tick takes microseconds, and every step is late.
+    // Without a sleep a tick takes microseconds, and every step is late.
     if (i % 500 > 50) std::this_thread::sleep_for(std::chrono::microseconds(300));
     const Rendering r = rendering::ray_renderer().tick(scene, live, path[i].probe, path[i].dt);
     const bool was_late = (r.faults & render_fault::kSoftLate) != 0;
@@ -171,7 +171,7 @@ TEST(SoftThreads, TicksDoNotAllocate) {
   rendering::RenderState state = scene.initial_state();
   threads.attach(state);
   const std::vector<PathTick> path = rough_path(600);
-  // What a thread allocates as it begins is over once it has stepped.
+  // A thread's initial allocations are finished after its first step.
   for (std::size_t made = 0, i = 0; made < threads.size(); ++i) {
     rendering::ray_renderer().tick(scene, state, path[i % path.size()].probe, 0.001);
     std::this_thread::sleep_for(std::chrono::microseconds(200));
@@ -184,7 +184,7 @@ TEST(SoftThreads, TicksDoNotAllocate) {
   EXPECT_EQ(allocations(), before);
 }
 
-/// Virtual time, a little of the real one for each tick.
+/// Virtual time with a short real sleep in each tick.
 class SlowClock final : public Clock {
  public:
   std::int64_t now_ns() noexcept override { return now_; }
@@ -226,7 +226,7 @@ TEST(SoftThreads, TheServoTripsIfTheyStallAndSnapshotsShowTheSurface) {
   EXPECT_NE(sample.faults & render_fault::kSoftStalled, 0U);
   EXPECT_EQ(sample.device1 + sample.device2, Vec3(0));
   (*threads)[0].stall(false);
-  // It trips again where the fault is cleared before the body has answered.
+  // It trips again if the fault is cleared before the body has answered.
   for (int i = 0; i < 3000 && (sample.faults & render_fault::kSoftStalled) != 0; ++i)
     sample = servo.next();
   servo.clear_fault();

@@ -22,7 +22,7 @@ namespace palpate::runner {
 namespace {
 
 constexpr double kStandard = 300, kLeast = 100, kMost = 600, kTurn = 20;  // N/m
-constexpr double kWeber = 0.15;  // of the difference of two estimates, the model's own
+constexpr double kWeber = 0.15;  // of the difference of two estimates, as in the model
 constexpr int kParticipants = 6, kEach = 20;
 
 struct Settings {
@@ -66,8 +66,9 @@ Settings simulated(std::uint64_t seed) {
   return found;
 }
 
-/// The same model written apart, from its description in task_judgement.h, without a hand: two
-/// estimates whose difference has the model's noise, turned by what was felt until both are "same".
+/// The same model written independently from its description in task_judgement.h, without a hand:
+/// two estimates whose difference has the model's noise, turned according to the estimates until
+/// both are "same".
 Settings expected() {
   std::mt19937_64 source(1);
   std::normal_distribution<double> normal(0, kWeber * kStandard / std::sqrt(2.0));
@@ -75,7 +76,7 @@ Settings expected() {
   for (int i = 0; i < 40'000; ++i) {
     double level = i % 2 == 0 ? 150 : 550;
     const double standard = kStandard + normal(source);
-    // The first time it was felt before the standard, and is felt once more before it is turned.
+    // At first it was felt before the standard; feel it again before turning it.
     if (std::abs(standard - (level + normal(source))) > kWeber * kStandard) {
       while (true) {
         const double apart = standard - (level + normal(source));
@@ -103,7 +104,7 @@ TEST(Adjustment, FindsTheStandardWithTheModelsSpread) {
                 static_cast<int>(seed), found.mean - kStandard, found.sd, found.unanswered, kCount);
     EXPECT_NEAR(found.mean, model.mean, 3 * model.sd / std::sqrt(kCount));
     EXPECT_NEAR(found.sd, model.sd, 3 * model.sd / std::sqrt(2 * kCount));
-    EXPECT_LE(found.unanswered, kCount / 10);  // before: 80 %, blind steps of one turn
+    EXPECT_LE(found.unanswered, kCount / 10);  // formerly 80 %, with blind steps of one turn
   }
 }
 

@@ -29,7 +29,7 @@ with open(sys.argv[2], "a") as log, socketserver.ThreadingUnixStreamServer(sys.a
 
 class Ask(Task):
     def asker(self, behaviour="answers"):
-        """Its process, the place of its socket, and a function that reads what it was sent."""
+        """Its process, the path of its socket, and a function that returns the received messages."""
         name = f"{len(list(self.dir.glob('*.sock')))}"
         place, log = self.dir / f"{name}.sock", self.dir / f"{name}.log"
         process = subprocess.Popen([sys.executable, "-c", ASKER, place, log, behaviour])

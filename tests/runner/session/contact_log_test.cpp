@@ -1,5 +1,5 @@
-// Contact share and edge dwell against what their definitions say of recorded samples and of closed
-// forms of the shapes.
+// Contact share and edge dwell against their definitions, for recorded samples and closed forms of
+// the shapes.
 
 #include <gtest/gtest.h>
 
@@ -24,7 +24,7 @@ constexpr double kNone = std::numeric_limits<double>::infinity();
 
 Vec3 vec(const std::array<double, 3>& v) { return {v[0], v[1], v[2]}; }
 
-/// To the circle of this radius about the z axis at this height.
+/// Distance to the circle of this radius about the z axis at this height.
 double distance_to_rim(const Vec3& p, double radius, double z) {
   return std::hypot(std::hypot(p.x, p.y) - radius, p.z - z);
 }
@@ -41,7 +41,7 @@ double distance_to_cube_edges(const Vec3& p, double edge) {
   return least;
 }
 
-/// From the point in the object's frame to what is sharp of it, by the formulas of the shapes.
+/// Distance from a point in the object's frame to its sharp edges, by the formulas of the shapes.
 double closed_form(const stimuli::ObjectSpec& object, const Vec3& p) {
   const double half = object.height / 2;
   switch (object.shape) {
@@ -173,7 +173,7 @@ TEST(ContactLog, WithoutDistinguishableEdgesThereIsNoDwell) {
   EXPECT_FALSE(log.edge_dwell(0.001));
 }
 
-/// What the definitions say of a recorded trial.
+/// The definitions, evaluated for a recorded trial.
 struct Recomputed {
   double contact_share = 0;
   int surely = 0, perhaps = 0;  ///< ticks near an edge; perhaps: within kSlack of the border

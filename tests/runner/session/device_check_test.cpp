@@ -1,4 +1,4 @@
-// A material that the device cannot show is refused or limited, as the protocol says.
+// A material that the device cannot render is refused or limited, as the protocol specifies.
 
 #include "runner/session/device_check.h"
 
@@ -124,7 +124,7 @@ TEST(DeviceCheck, UnknownPropertiesOfADeviceDoNotLimit) {
   EXPECT_NEAR(share(of(2500), device), 0.8, 1e-12);
 }
 
-/// Of a layer with 2 N s/m that a device shows by a quarter.
+/// A layer with 2 N s/m, of which a device can render a quarter.
 double limited_layer_damping() {
   stimuli::Material material = of(1000);
   material.layers = {{1e-3, 3000, 2}};
@@ -214,7 +214,7 @@ TEST(DeviceCheck, LayersAndPartsCount) {
 }
 
 TEST(DeviceCheck, LayersOfACompoundsPartsAddUp) {
-  // Surface of one part, layer of another: under an edge where they meet both are felt.
+  // Surface of one part, layer of another: below an edge where they meet both act.
   stimuli::ObjectSpec surface, layered, both;
   surface.material = of(1800);
   layered.material = of(0);
@@ -230,7 +230,7 @@ TEST(DeviceCheck, LayersOfACompoundsPartsAddUp) {
   EXPECT_TRUE(incompatibilities(protocol, library, some_device()).empty());  // 1400 + 600
   object.parts[0].material.stiffness = 1401;
   EXPECT_EQ(incompatibilities(protocol, library, some_device()).size(), 1u);
-  object.parts = {surface, layered, both};  // 1800 + 600 + 1600 N/m: twice what is shown
+  object.parts = {surface, layered, both};  // 1800 + 600 + 1600 N/m: twice the device's limit
   const auto refused = incompatibilities(protocol, library, some_device());
   ASSERT_EQ(refused.size(), 1u);
   EXPECT_NE(refused[0].find("'ball' has in all its parts 4000 N/m with its layers"),
@@ -287,7 +287,7 @@ TEST(DeviceCheck, RefusesUnlessLimitsAreRequested) {
   const stimuli::Material& shown = protocol.stimuli[0].object.material;
   EXPECT_NEAR(shown.stiffness / 2000 + shown.damping, 1, 1e-9);
   EXPECT_TRUE(incompatibilities(protocol, StimulusLibrary(protocol), some_device()).empty());
-  EXPECT_TRUE(limit_materials(protocol, some_device()).empty());  // nothing is left to do
+  EXPECT_TRUE(limit_materials(protocol, some_device()).empty());  // nothing remains to be limited
 }
 
 TEST(DeviceCheck, TheRecordLimitsAProtocolAgainToTheBit) {

@@ -1,5 +1,5 @@
-// Stands for liblsl: writes what it is told to the file that PALPATE_FAKE_LSL names; of a stream of
-// numbers, to the one beside it that ends in .samples.
+// A fake liblsl: writes its input to the file named by PALPATE_FAKE_LSL; a stream of numbers to the
+// file beside it that ends in .samples.
 
 #include <cstdint>
 #include <cstdio>
@@ -29,7 +29,7 @@ void* lsl_create_streaminfo(const char* name, const char* type, std::int32_t cha
   std::fprintf(file, "stream %s %s %d %g %d %s\n", name, type, channels, rate, format, source);
   return file;
 }
-// The description: what is appended, in order.
+// The description: the appended elements, in order.
 void* lsl_get_desc(void* info) { return info; }
 void* lsl_append_child(void* element, const char* name) {
   std::fprintf(static_cast<FILE*>(element), "<%s>\n", name);

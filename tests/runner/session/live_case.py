@@ -17,7 +17,7 @@ PALPATE = sys.argv.pop(1)
 
 PROTOCOL = {
     "version": 1, "name": "two", "renderers": ["ray"], "seed": 7,
-    # Slow and soft: five ticks must not be missed in a row where many tests share a processor.
+    # Slow and soft, so that no five ticks in a row are missed while many tests share a processor.
     "servo": {"rate_hz": 100}, "material": {"stiffness_n_per_m": 100},
     "stimuli": [{"name": "ball", "shape": "sphere", "radius_m": 0.02, "subdivisions": 1},
                 {"name": "box", "shape": "cube", "edge_m": 0.03}],
@@ -42,13 +42,13 @@ class Live(unittest.TestCase):
         return path
 
     def run_session(self, *options, db=None, code="P01", sure=True, columns=0, **changes):
-        """`sure`: the code is meant, nobody asks."""
+        """`sure`: the code is intended, so no question is asked."""
         new = ["--new-participant"] if sure and code not in self.codes(db or self.db) else []
         return Terminal([PALPATE, "run", self.protocol(**changes), "--db", db or self.db, "--participant", code,
                          "--device", "simulated", "--no-window", *new, *options], columns=columns)
 
     def run_piped(self, *options, code="P01", typed=b"", **changes):
-        """As a script would: no terminal."""
+        """Like a script: without a terminal."""
         return subprocess.run([PALPATE, "run", self.protocol(**changes), "--db", self.db, "--participant", code,
                                "--device", "simulated", "--no-window", *options], input=typed, capture_output=True,
                               timeout=60)
@@ -69,7 +69,7 @@ class Live(unittest.TestCase):
         return terminal
 
     def finish(self, terminal, key="1", status=0):
-        """Answers whatever trial comes from now on, until the session is over."""
+        """Answers all further trials, until the session is over."""
         while True:
             came = terminal.wait_for(FEELING, "[space bar: go on]", "[fault, ", "on record; ")
             if came == "on record; ":

@@ -1,5 +1,5 @@
 #pragma once
-// A live session in this process: a person who is a script, a console likewise.
+// A live session in this process: person and console are scripts.
 
 #include <gtest/gtest.h>
 
@@ -18,7 +18,7 @@
 
 namespace palpate::runner::testing {
 
-// 100 Hz: on a busy machine no five ticks are missed in a row.
+// 100 Hz, so that even a busy machine does not miss five ticks in a row.
 constexpr const char* kProtocol = R"({"version": 1, "name": "live", "renderers": ["point"],
   "stimuli": [{"name": "ball", "shape": "sphere", "radius_m": 0.02, "subdivisions": 1},
               {"name": "box", "shape": "cube", "edge_m": 0.03}],
@@ -50,7 +50,7 @@ class Screen final : public ParticipantScreen {
   std::vector<std::string> texts;
   std::vector<Page> pages;
   std::function<void(const Page&)> shown;
-  std::function<std::vector<KeyPress>()> pressed;  ///< in place of all else
+  std::function<std::vector<KeyPress>()> pressed;  ///< instead of everything else
   std::string wrong_key;                           ///< pressed once
   std::atomic<bool> answers{true};
   std::int64_t takes_ns = 0;  ///< to read or to answer
@@ -62,7 +62,7 @@ class Screen final : public ParticipantScreen {
   std::int64_t shown_ns_ = 0;
 };
 
-/// Clears every fault and goes on, if not told otherwise.
+/// Clears every fault and continues, unless set otherwise.
 class Console final : public ExperimenterConsole {
  public:
   explicit Console(Clock& clock) : clock_(clock) {}
@@ -101,13 +101,13 @@ class Console final : public ExperimenterConsole {
   std::function<void()> repair;
   bool goes_on = false;                    ///< after a pause
   bool clears = true;                      ///< faults
-  std::optional<ConsoleCommand> in_fault;  ///< said once
-  std::string* in_fault_sees = nullptr;    ///< what it was told then
-  /// Said once, in this state.
+  std::optional<ConsoleCommand> in_fault;  ///< sent once
+  std::string* in_fault_sees = nullptr;    ///< the reason shown at that time
+  /// Sent once, in this state.
   std::optional<std::pair<std::string, ConsoleCommand>> in_state;
   int pauses = 0;
   int faults = 0;
-  int ignored = 0;  ///< looks at the console after `in_fault`
+  int ignored = 0;  ///< polls of the console after `in_fault`
 
  private:
   Clock& clock_;

@@ -41,7 +41,7 @@ TEST_F(LiveSessions, AWithdrawalCountsInEveryStateAndSpelling) {
   protocol_.texts.instructions = "read this";
   protocol_.texts.practice = "try";
   protocol_.practice.repetitions = 1;
-  protocol_.repetitions = protocol_.blocks_per_renderer = 2;  // none is read after practice
+  protocol_.repetitions = protocol_.blocks_per_renderer = 2;  // no text is read after practice
   protocol_.texts.break_text = "have a rest";
   protocol_.breaks.every_trials = 1;
   protocol_.breaks.min_seconds = 0.05;

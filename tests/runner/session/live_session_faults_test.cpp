@@ -128,10 +128,10 @@ TEST_F(LiveSessions, ALateGuardPausesTheSessionAndAnEndedOneEndsIt) {
   EXPECT_EQ(dying.force, Vec3(0));
 }
 
-/// Shared with the player's thread, which outlives a test's own variables.
+/// Shared with the player's thread, which outlives a test's local variables.
 using Plugged = std::shared_ptr<std::atomic<bool>>;
 
-/// Takes everything, until it is pulled out.
+/// Accepts everything until unplugged.
 class Headphones final : public SoundOutput {
  public:
   explicit Headphones(Plugged plugged) : plugged_(std::move(plugged)) {}

@@ -1,4 +1,4 @@
-// A live session: what it marks, shows, takes as an answer and sends.
+// A live session: its marks, pages, accepted answers and markers.
 
 #include <gtest/gtest.h>
 
@@ -39,7 +39,7 @@ TEST_F(LiveSessions, FirstContactIsMarkedAndAnAnswerBeforeItHasNone) {
 TEST_F(LiveSessions, EveryTrialAsksForTheSameDistanceWhateverItsShape) {
   protocol_.home.rest = 0.4;
   std::atomic<bool> far{false};
-  std::vector<std::set<std::string>> seen;  // what the page has said, in each trial
+  std::vector<std::set<std::string>> seen;  // texts of the page, in each trial
   screen_.answers = false;
   screen_.shown = [&](const Page& page) {
     if (page.kind == Page::Kind::neutral && page.text.empty()) {
@@ -50,7 +50,7 @@ TEST_F(LiveSessions, EveryTrialAsksForTheSameDistanceWhateverItsShape) {
     if (page.go) screen_.answers = true;
     if (!seen.empty() && !page.text.empty()) seen.back().insert(page.text);
   };
-  // 30 mm off, the ball alone would let its trial begin.
+  // At 30 mm, the ball alone would let its trial begin.
   FakeDevice device([&](int) { return at(far ? 0.1 : 0.03); });
   EXPECT_EQ(run(device).end, data::RunEnd::done);
   ASSERT_EQ(seen.size(), 2u);

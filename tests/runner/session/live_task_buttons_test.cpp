@@ -40,7 +40,7 @@ constexpr const char* kPagesAndTasks = R"({"version": 2, "name": "pages", "rende
     {"name": "any", "task": "detect", "stimuli": ["ball"], "repetitions": 1, "question": "ANYTHING"}],
   "texts": {"instructions": "WELCOME", "end": "BYE"}})";
 
-/// Which button somebody presses who sees a page, by a word on it; others: the first.
+/// The button pressed on a page, by a word on it; otherwise the first.
 constexpr std::array<std::pair<const char*, int>, 6> kPressed{{{"YOU MAY STOP", 1},
                                                                {"WHICH HAND", 2},
                                                                {"TIRED", 3},
@@ -55,7 +55,7 @@ class LiveTaskButtons : public LiveSessions {
     library_ = StimulusLibrary(protocol_);
     participant_ = store_->enrol(info_of(protocol_), "P02");
     screen_.answers = false;
-    screen_.takes_ns = 3'600'000'000'000;  // nobody at the keyboard
+    screen_.takes_ns = 3'600'000'000'000;  // the keyboard is unattended
     screen_.shown = [this](const Page& page) {
       int button = 1;
       for (const auto& [word, number] : kPressed) {
@@ -66,8 +66,8 @@ class LiveTaskButtons : public LiveSessions {
     };
   }
 
-  /// Which button is down, at looks of 10 ms: some time after a page has come, for 40 ms, and
-  /// again. \return  0: none
+  /// The button that is down, polled every 10 ms: some time after a page has appeared, for 40 ms,
+  /// and again. \return 0: none
   int held() {
     const int since = ++since_page_ % 16;
     return since >= 6 && since < 10 ? button_.load() : 0;
@@ -131,7 +131,7 @@ TEST_F(LiveTaskButtons, OfAGamepadAnswerPagesTrialsAndConfidence) {
     next = clock_.now_ns() + 10'000'000;
     const int button = held();
     JoystickState state{{button == 1, button == 2, button == 3}, {-1}, {}};
-    // Where nothing is to be answered, a foot goes on.
+    // Where no answer is expected, the pedal continues.
     if (button == 1 && screen_.pages.back().keys.empty()) state = {{false, false, false}, {1}, {}};
     std::vector<KeyPress> all;
     for (const std::string& key : keys.pressed(state)) all.push_back({key, clock_.now_ns()});

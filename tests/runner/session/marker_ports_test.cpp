@@ -32,7 +32,7 @@ struct Put {
   Clock::time_point at;
 };
 
-/// What a parallel port was told. Its file stands for it: an empty one in /tmp.
+/// The commands to a parallel port. An empty file in /tmp stands for the port.
 struct FakePort {
   std::mutex mutex;
   std::vector<unsigned long> requests;
@@ -120,7 +120,7 @@ TEST_F(ParallelMarkers, SendingDoesNotWaitAndAFullQueueRefuses) {
     for (int i = 0; i < 40; ++i) taken += sink->send(marker(Kind::response));
     sent = Clock::now();
   }
-  // All that were taken were given; none took the time of its pulse from the sender.
+  // All accepted markers were sent; no pulse delayed the sender.
   EXPECT_GE(taken, 16);
   EXPECT_LE(taken, 17);
   EXPECT_EQ(std::ssize(bytes()), 2 * taken + 2);
@@ -137,12 +137,12 @@ TEST_F(ParallelMarkers, AFailingPortIsReported) {
     const std::lock_guard lock(fake_.mutex);
     fake_.refuses_bytes = true;
   }
-  EXPECT_TRUE(sink->send(marker(Kind::response)));  // nobody knows yet
+  EXPECT_TRUE(sink->send(marker(Kind::response)));  // the failure is not known yet
   const auto asked = [&] {
     const std::lock_guard lock(fake_.mutex);
     return fake_.requests.size();
   };
-  while (asked() < 5) usleep(1000);  // a claim that failed; claim, 0; the pulse up and down
+  while (asked() < 5) usleep(1000);  // a failed claim; claim, 0; the pulse up and down
   bool told = false;
   for (int i = 0; i < 10 && !told; ++i) {
     usleep(5000);
@@ -166,7 +166,7 @@ TEST_F(ParallelMarkers, AProtocolsOwnCodesAreSent) {
       one.response = answer;
       markers.send(one);
     }
-    one.kind = Kind::cut_off;  // its answer is an old one's
+    one.kind = Kind::cut_off;  // its answer belongs to an earlier one
     one.response = "cube";
     markers.send(one);
   }
@@ -187,7 +187,7 @@ TEST_F(ParallelMarkers, SyncMarkersKeepInStepWithTheSeconds) {
     while (seconds() < 3) usleep(1000);
   }
   EXPECT_EQ(bytes(), (std::vector<int>{0, 128, 0, 128, 0, 3, 0, 128, 0, 0}));
-  // Never early; how late they may be, the computer decides.
+  // Never early; lateness depends on the computer.
   EXPECT_GT(fake_.puts[7].at - fake_.puts[1].at, std::chrono::milliseconds(1500));
 }
 

@@ -189,7 +189,7 @@ TEST(ForceDirectionCheck, PushesToTheRightWithinTheLimitsAndReleases) {
   }
 }
 
-/// A servo whose limits do not hold.
+/// A servo that exceeds its limits.
 class WrongServo final : public TickSource {
  public:
   explicit WrongServo(const std::function<void(Sample&)>& spoil) : spoil_(spoil) {}

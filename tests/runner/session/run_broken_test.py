@@ -67,7 +67,7 @@ class Broken(Live):
         self.finish(session)
         (trial,) = [t["trial"] for t in self.export() if t["shape"] == "ball"]
 
-        # Half the size, and then gone: the record knows better.
+        # Half the size, and then deleted: the record has the original.
         mesh = self.dir / "solid.obj"
         mesh.write_text(solid.replace(".04", ".02"))
         replay = [PALPATE, "replay", "--db", self.db, "--trial", f"P01/1/{trial}"]

@@ -170,7 +170,7 @@ class Changed(Live):
                 self.sql("SELECT text FROM notes WHERE text LIKE '{\"protocol_change%' ORDER BY id")]
 
     def shown_texts(self):
-        """Of every run, where it was not the participant's own protocol."""
+        """Texts shown in every run; None: the participant's own protocol."""
         return [text and json.loads(text)["texts"]["break"] for (text,) in self.sql(
             "SELECT p.text FROM runs r LEFT JOIN protocols p ON p.id = r.protocol_id ORDER BY r.id")]
 
@@ -207,7 +207,7 @@ class Changed(Live):
             terminal.type(":stop\n1")
             self.finish(terminal)
             self.assertIn("2 of 4 trials on record", terminal.text)
-        with self.run_session(code="K1", **self.TEXTS) as terminal:  # that has been answered
+        with self.run_session(code="K1", **self.TEXTS) as terminal:  # that question was answered before
             terminal.wait_for("resuming with these texts, as in the last run")
             self.finish(terminal)
             self.assertIn("sit down", terminal.text)

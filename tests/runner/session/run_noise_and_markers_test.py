@@ -73,7 +73,7 @@ class Noise(Live):
         self.assertEqual(left, right)
         runs, start = [], 0  # of sound, in samples
         parts = [left[i:i + 480] for i in range(0, len(left), 480)]
-        loud = [any(part) for part in parts] + [False]  # nothing follows: whatever sounds must have faded out
+        loud = [any(part) for part in parts] + [False]  # at the end all sound must have faded out
         for i in range(1, len(loud)):
             if loud[i] and not loud[i - 1]:
                 start = i
@@ -116,7 +116,7 @@ class Marks(Live):
         lines = []
 
         def until(kind):
-            """The first contact is certain where it was waited for only: the hand strokes by itself."""
+            """The first contact is certain only if it was awaited: the hand strokes by itself."""
             while True:
                 line = json.loads(receiver.recv(4096))
                 if kind == line["marker"] or line["marker"] != "first_contact":
@@ -187,7 +187,7 @@ class Marks(Live):
         self.assertEqual({(line["code"], line["participant_id"], line["trial"]) for line in seconds}, {(99, None, 0)})
         for earlier, later in zip(seconds, seconds[1:]):
             self.assertGreater(later["time_ns"] - earlier["time_ns"], 0)
-        # In step with the first one: as late as the computer is busy, never drifting.
+        # In step with the first one: late on a busy computer, but without drift.
         self.assertLess((seconds[-1]["time_ns"] - seconds[0]["time_ns"]) / 1e9 - (len(seconds) - 1), 5)
         self.assertEqual(list(os.read(master, 1000)), [line["code"] for line in lines])
         noted = [json.loads(text) for (text,) in self.sql("SELECT text FROM notes") if text.startswith('{"markers"')]
@@ -307,7 +307,7 @@ while os.getppid() == runner:
         starts = [marker["time_ns"] / 1e9 for marker in map(json.loads, markers) if marker["marker"] == "trial_start"]
         for trial, start in zip(self.stored(), starts, strict=True):
             kept = [tuple(float(row[label]) for label, _ in channels) for row in trial]
-            # The stylus rests at first: its poses alone do not tell where the trial begins.
+            # The stylus rests at first: its poses alone do not show where the trial begins.
             first = min(range(len(times)), key=lambda i: abs(times[i] - start))
             self.assertAlmostEqual(times[first], start, delta=0.001)  # one clock for both streams
             self.assertEqual(streamed[first:first + len(kept)], kept)

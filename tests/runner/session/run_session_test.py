@@ -19,7 +19,7 @@ class Whole(Live):
         terminal = self.begin("--consent", "v2 2026-01", "--hand", "left", "--response-latency", "0.012")
         self.assertIn("participant P01 has number 1; session 1 of 1", terminal.text)
         self.assertIn("Welcome, \u00dcbung", terminal.text)
-        terminal.type("x1")  # a key without a meaning is none
+        terminal.type("x1")  # a key without a meaning is ignored
         self.finish(terminal, "2")
         self.assertIn("have a rest", terminal.text)
         self.assertIn("good bye", terminal.text)

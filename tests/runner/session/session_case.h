@@ -1,5 +1,5 @@
 #pragma once
-// A session of two shapes on a fake device, with a respondent who answers as told.
+// A session of two shapes on a fake device, with a scripted respondent.
 
 #include <deque>
 #include <string>
@@ -21,7 +21,7 @@ inline constexpr const char* kTwoShapes = R"({"version": 1, "name": "two", "rend
   "texts": {"instructions": "hello", "practice": "try", "break": "rest", "end": "bye"},
   "response": {"keys": {"1": "ball", "2": "box"}, "time_out_s": 2}})";
 
-/// Answers after 0.3 s, right or wrong as told; -1: never.
+/// Answers after 0.3 s, right or wrong as set; -1: never.
 class ScriptedRespondent final : public Respondent {
  public:
   explicit ScriptedRespondent(std::deque<int> right) : right_(std::move(right)) {}

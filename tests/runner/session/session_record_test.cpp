@@ -1,4 +1,4 @@
-// What is on record of a trial, and the words of faults.
+// The record of a trial, and the texts of faults.
 
 #include <gtest/gtest.h>
 
@@ -11,7 +11,7 @@
 namespace palpate::runner {
 namespace {
 
-/// A servo whose trials end with a verdict of their own.
+/// A servo whose trials end with given figures.
 class Judging final : public TickSource {
  public:
   explicit Judging(Servo& servo) : servo_(servo) {}
@@ -54,7 +54,7 @@ TEST(Session, TheServosVerdictIsInTheTrialsRecord) {
   }
 }
 
-/// Ticks of which no two numbers are alike; contact from the fifth on.
+/// Ticks with all numbers distinct; contact from the fifth on.
 class Numbered final : public TickSource {
  public:
   void prepare(const rendering::Scene&, const rendering::Renderer&, const HomeZone&) override {
@@ -141,8 +141,8 @@ TEST(Session, ATrialKeepsEverySampleAndItsInitialFacts) {
   EXPECT_EQ(record.orientation_wxyz, (std::array<double, 4>{q.w, q.x, q.y, q.z}));
 }
 
-// What passes by itself is the machine's lateness alone; stylus, device and whoever asked for zero
-// force need somebody who looks.
+// Only the machine's lateness passes by itself; faults of stylus or device and requests for zero
+// force need the experimenter.
 TEST(SessionFault, IsTransientIfOnlyTheMachineWasLate) {
   using namespace servo_fault;
   const auto transient = [](std::uint32_t faults, DeviceTrouble trouble = DeviceTrouble::none) {
@@ -185,7 +185,7 @@ TEST(SessionFault, TheReasonIsTheWorstFaultWithItsRemedy) {
                                       DeviceTrouble::guarded, DeviceTrouble::apart}) {
     EXPECT_NE(reason(kDeviceLost, trouble).find(advice(trouble)), std::string::npos);
   }
-  // Where the guard was late the device is not lost: its advice says it all.
+  // If the guard was late the device is not lost: its own advice suffices.
   EXPECT_EQ(reason(kDeviceLost, DeviceTrouble::guard_late), advice(DeviceTrouble::guard_late));
   EXPECT_NE(reason(kDeviceLost, DeviceTrouble::unplugged), advice(DeviceTrouble::unplugged));
 }

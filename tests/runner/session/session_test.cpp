@@ -20,8 +20,8 @@ TEST(Session, RunsPracticeBlocksBreaksAndEnd) {
   ScriptedRespondent respondent({});
   Session session = bench.session(respondent, SessionPlan(bench.protocol, 1, 1));
   run(session);
-  // Practice of 2, then blocks of 2. Rest between blocks, not after practice, which is not counted
-  // in the three trials until a break either.
+  // Practice of 2, then blocks of 2. A rest comes between blocks, not after practice. Practice does
+  // not count in the three trials until a break either.
   EXPECT_EQ(respondent.pages, "hello;try;right;right;rest;bye;");
   ASSERT_EQ(bench.log.finished.size(), 6u);
   for (std::size_t i = 0; i < 6; ++i) {
@@ -44,7 +44,7 @@ TEST(Session, ABreakIsDueAfterItsNumberOfTrialsOfTheBlock) {
   ScriptedRespondent respondent({});
   Session session = bench.session(respondent, SessionPlan(bench.protocol, 1, 1));
   run(session);
-  std::vector<std::size_t> after;  // so many trials a break came
+  std::vector<std::size_t> after;  // number of trials before each break
   const auto& finished = bench.log.finished;
   for (std::size_t i = 1; i < finished.size(); ++i) {
     if (finished[i].onset_ns - finished[i - 1].response_ns >= 20'000'000'000) after.push_back(i);
@@ -128,7 +128,7 @@ TEST(Session, AFaultCutsTheTrialOffWithZeroForce) {
   EXPECT_NE(bench.log.cut[0].find("not finite"), std::string::npos);
 }
 
-// The way of a live session into the store: begun on disk, cut off by a fault, shown again.
+// A live session's trial in the store: begun on disk, cut off by a fault, repeated.
 TEST(Session, ACutOffTrialIsShownAgainAndBothAttemptsAreOnRecord) {
   const palpate::testing::TemporaryFolder folder;
   {

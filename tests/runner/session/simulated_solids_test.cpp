@@ -1,4 +1,4 @@
-// Simulated studies of objects that have no formula, and of a participant that cannot begin.
+// Simulated studies of objects without formulas, and of a participant that cannot begin.
 
 #include <gtest/gtest.h>
 
@@ -59,7 +59,7 @@ TEST_F(SimulatedSolids, ConcaveObjectsAreExploredAndIdentified) {
   EXPECT_GE(found.right, 5) << "2 would be chance";
 }
 
-// Alike outside: told apart by where the first layer that is felt lies.
+// Equal outside: they differ in the depth of the first felt layer.
 TEST_F(SimulatedSolids, LayersAreFeltAtTheirDepths) {
   protocols::Protocol protocol =
       protocols::parse_protocol(PALPATE_SOURCE_DIR "/protocols/layered.json");
@@ -70,8 +70,8 @@ TEST_F(SimulatedSolids, LayersAreFeltAtTheirDepths) {
   EXPECT_GE(found.right, 8) << "4 would be chance";
 }
 
-// Approaches begin where the home zone of the cube does not: it begins 62 mm from the centre, those
-// of the other shapes at most 53 mm.
+// Approaches begin outside the cube's home zone: it begins 62 mm from the centre, those of the
+// other shapes at most at 53 mm.
 TEST_F(SimulatedSolids, ATrialThatCannotBeginEndsTheStudyAndKeepsItsData) {
   const protocols::Protocol protocol =
       protocols::parse_protocol(PALPATE_SOURCE_DIR "/protocols/quick.json");

@@ -63,14 +63,14 @@ class SimulatedStudy : public ::testing::Test {
                           {.participants = 3, .seed = seed, .jobs = jobs}, never, {});
   }
 
-  /// Settings with a patch that the text says.
+  /// Settings with the patch in the text.
   SimulatedSettings patched(const std::string& text, int version) const {
     std::ofstream(folder_ / "patch.json") << text;
     return load_simulated_settings(folder_ / "patch.json", version);
   }
 
-  /// The trials of the frozen participant against those on record; they are written beside the
-  /// study when the test fails.
+  /// Compares the trials of the frozen participant with the recorded ones; writes them beside the
+  /// study if the test fails.
   void expect_frozen(int version) const;
 
   const palpate::testing::TemporaryFolder folder_;
@@ -98,8 +98,8 @@ TEST_F(SimulatedStudy, IsTheSameHoweverOftenItIsStopped) {
     ASSERT_LT(stops, 1000);
     data::Store store = data::Store::open(db, data::Store::Mode::write_or_create);
     std::atomic<bool> stop{false};
-    // A stop before the first report still finishes and records the trials under way.
-    // Later from time to time: on a machine that is busy 40 ms may not be enough to begin.
+    // A stop before the first report still finishes and records the current trials. Stop later at
+    // times: on a busy machine 40 ms may be too short to begin.
     const auto longest = 40 + 2 * static_cast<std::uint64_t>(stops);
     std::jthread stopper([&, after = random.below(longest)] {
       std::this_thread::sleep_for(std::chrono::milliseconds(after));
@@ -156,7 +156,7 @@ void SimulatedStudy::expect_frozen(int version) const {
   if (HasFailure()) std::ofstream(::testing::TempDir() + name) << found.str();
 }
 
-// The participants are frozen: whoever changes one gives it another version, and other trials here.
+// The participants are frozen: a change requires a new version, and new trials here.
 TEST_F(SimulatedStudy, TheFrozenParticipantsTrialsDoNotChange) {
 #ifdef __clang__
   GTEST_SKIP() << "other roundings grow to other trials: the files are the release compiler's, g++";
@@ -189,7 +189,7 @@ TEST_F(SimulatedStudy, VersionsDifferOnlyByTheirSwitches) {
   EXPECT_NE(trials("1.db", load_simulated_settings("", 1)), version2);
 }
 
-// Each switch does something of its own.
+// Each switch has its own effect.
 TEST_F(SimulatedStudy, EverySwitchChangesTheTrials) {
   const protocols::Protocol p = protocol();
   std::vector<std::string> seen;
@@ -227,7 +227,7 @@ TEST_F(SimulatedStudy, KeepsSamplesWhenAsked) {
   EXPECT_GE(trials, 48);
 }
 
-// Through a stylus that reaches five times as far as it is long.
+// With a stylus that reaches five times its length.
 TEST_F(SimulatedStudy, ExploresAnObjectHalfAMetreAwayAndReplaysItToTheBit) {
   protocols::Protocol p = protocol(
       R"(, "samples": true, "reach": {"factor": 5, "pivot": "tail"},
@@ -258,7 +258,7 @@ TEST_F(SimulatedStudy, ExploresAnObjectHalfAMetreAwayAndReplaysItToTheBit) {
   EXPECT_GT(touched, trials / 2);
 }
 
-// The roll of a tool is carried along from tick to tick, and is not on record: a replay finds it.
+// The roll of a tool is carried from tick to tick and is not recorded: a replay reconstructs it.
 TEST_F(SimulatedStudy, ReplaysABentToolAndLayersToTheBit) {
   const protocols::Protocol p = protocol(
       R"(, "samples": true, "tool": {"segments": [{"from_m": [0, 0, 0], "to_m": [0, 0, 0.12]},
@@ -312,7 +312,7 @@ TEST_F(SimulatedStudy, PatchesAreCheckedAndChangeTheChecksum) {
   EXPECT_THROW(load_simulated_settings("", 4), std::invalid_argument);
 }
 
-// A checksum that stands with results is that of the file that was published with them.
+// A checksum reported with results is that of the file published with them.
 TEST_F(SimulatedStudy, ChecksumsAreThoseOfTheFrozenFiles) {
   for (const int version : participant_versions()) {
     std::ifstream file(PALPATE_SOURCE_DIR "/runner/participants/simulated_v" +
@@ -336,7 +336,7 @@ TEST_F(SimulatedStudy, VersionsAreFoundByTheirChecksums) {
   EXPECT_EQ(load_simulated_settings("").version, 3);
 }
 
-// A switch of a later version counts in an earlier one's checksum where it is moved.
+// A later version's switch counts in an earlier version's checksum if it is changed.
 TEST_F(SimulatedStudy, ChecksumsKnowEverySwitch) {
   const SimulatedSettings defaults = load_simulated_settings("", 2);
   EXPECT_EQ(patched(R"({"percept": {"place": "tip"}, "heading": {"chosen": false}})", 2).sha256,

@@ -37,7 +37,7 @@ BLOCKS = {
 }
 PROTOCOL = {
     "version": 2, "name": "live", "renderers": ["point"], "seed": 5, "orientation": "fixed",
-    # Slow and soft: five ticks must not be missed in a row where many tests share a processor.
+    # Slow and soft, so that no five ticks in a row are missed while many tests share a processor.
     "servo": {"rate_hz": 100}, "home": {"rest_s": 0.1}, "material": {"stiffness_n_per_m": 60},
     "stimuli": [{"name": "ball", "shape": "sphere", "radius_m": 0.02, "subdivisions": 1, "stiffness_n_per_m": 60},
                 {"name": "box", "shape": "cube", "edge_m": 0.03}],
@@ -70,7 +70,7 @@ class Task(unittest.TestCase):
         return terminal
 
     def play(self, terminal, *steps):
-        """Each (what comes, what is typed then). Whatever a busy machine cuts off is shown again."""
+        """Pairs of awaited output and typed input. Trials cut off by a busy machine are repeated."""
         for word, keys in steps:
             came = terminal.wait_for(word, "[fault, ")
             if came == "[fault, ":

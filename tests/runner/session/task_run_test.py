@@ -137,7 +137,7 @@ class Pages(Task):
         self.assertNotIn("[trial", terminal.text)
         self.assertEqual(self.sql("SELECT count(*) FROM attempts"), [(0,)])
         self.assertEqual(self.sql("SELECT count(*) FROM participants"), [(0,)])
-        # Asked again, with another mind.
+        # Asked again, with another answer.
         again = self.begin("number")
         self.play(again, ("1 I agree   2 I do not agree", "1"), ("WHICH HAND", ""))
         again.kill()

@@ -173,7 +173,7 @@ TEST_F(TaskSession, JudgesStiffnessByTheMeasuredForces) {
   simulate(parsed_study(document), path("a.db"));
   int right = 0;
   for (const data::TrialRecord& trial : trials_of(path("a.db"))) right += trial.correct ? 1 : 0;
-  EXPECT_GE(right, 18);  // of 20: a factor of 3, but for lapses
+  EXPECT_GE(right, 18);  // of 20: a factor of 3, apart from lapses
 }
 
 TEST_F(TaskSession, RatesAndAdjusts) {
@@ -202,7 +202,7 @@ TEST_F(TaskSession, RatesAndAdjusts) {
     EXPECT_NEAR(*task.number, 300, 150);
     EXPECT_GT(task.intervals.size(), 2U);
     EXPECT_EQ(task.intervals.front().onset_ns, trial.onset_ns);
-    // From one interval of its own to the next, the level moves by whole turns, within the limits.
+    // From one adjusted interval to the next, the level changes by whole turns, within the limits.
     double level = *task.level;
     for (const data::IntervalRecord& interval : task.intervals) {
       if (interval.standard) continue;
@@ -267,7 +267,7 @@ TEST_F(TaskSession, IdentifiesStimuliThatDifferOnlyInStiffness) {
   simulate(parsed_study(document), path("a.db"));
   int right = 0;
   for (const data::TrialRecord& trial : trials_of(path("a.db"))) right += trial.correct ? 1 : 0;
-  EXPECT_GE(right, 17);  // of 20: a factor of 3, but for lapses
+  EXPECT_GE(right, 17);  // of 20: a factor of 3, apart from lapses
   EXPECT_LE(right, 20);
 }
 
@@ -334,7 +334,7 @@ TEST_F(TaskSession, RepeatsItsTrialsToTheBit) {
       true);
   EXPECT_EQ(trials, 6);
   EXPECT_GT(intervals, 10);
-  EXPECT_GT(differences, 0);  // somewhere the side of the stylus touches
+  EXPECT_GT(differences, 0);  // the side of the stylus touches somewhere
 }
 
 TEST_F(TaskSession, ExportsTheColumnsOfTasksForVersion2Only) {

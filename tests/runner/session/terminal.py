@@ -1,4 +1,4 @@
-"""A program on a pseudo-terminal, and somebody who reads it and types."""
+"""A program on a pseudo-terminal, with functions to read and type."""
 
 import fcntl
 import os
@@ -25,7 +25,7 @@ def end_if_it_hangs(test, seconds=120):
 
 
 class Terminal:
-    """Starts `command` with a terminal of its own. Everything it says gathers in `text`."""
+    """Starts `command` with its own terminal. Its output accumulates in `text`."""
 
     def __init__(self, command, patience=60, columns=0):
         self.patience = patience
@@ -60,7 +60,7 @@ class Terminal:
         return bool(more)
 
     def wait_for(self, *words):
-        """Goes on behind the first of the words that comes; returns it."""
+        """Reads past the first of the words that appears; returns it."""
         end = time.monotonic() + self.patience
         while True:
             found = [(at, word) for word in words if (at := self.text.find(word, self.read_to)) >= 0]
@@ -72,7 +72,7 @@ class Terminal:
                 raise AssertionError(f"none of {words} came after:\n{self.text}")
 
     def hear(self):
-        """All that has been said so far."""
+        """All output so far."""
         self._gather(0)
         return self.text
 

@@ -1,4 +1,4 @@
-// The player's thread, with an output that is a script.
+// The player's thread, with a scripted output.
 
 #include <gtest/gtest.h>
 
@@ -15,7 +15,7 @@
 namespace palpate::runner {
 namespace {
 
-/// What came out, and what goes wrong; outlives the outputs.
+/// The output, and faults to inject; outlives the outputs.
 struct Ear {
   std::mutex mutex;
   std::vector<std::int16_t> heard;
@@ -191,7 +191,7 @@ TEST_F(Players, ReportAFailureAndReopen) {
 TEST_F(Players, DoNotBlockWhenTheOutputHangs) {
   const auto noise = player();
   ear_.held_up = true;
-  noise->turn_on();  // all return at once, or this test never ends
+  noise->turn_on();  // all return at once, otherwise this test never ends
   noise->turn_off();
   noise->turn_on();
   EXPECT_LT(noise->report().seconds, 1);

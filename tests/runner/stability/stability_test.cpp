@@ -1,4 +1,4 @@
-// The closed loop against theory: where it must agree, and on which side it must lie.
+// The closed loop against theory: cases that must agree, and cases with a bound.
 
 #include <gtest/gtest.h>
 
@@ -69,8 +69,8 @@ TEST(Stability, HoldsWhereTheoryPromisesPassivity) {
   }
 }
 
-// What the hand feels of a layer and of a lever is what theory asks damping for: K is the sum of
-// the stiffnesses at the depth of the contact, times the square of the lever at both ends.
+// Theory uses the effective stiffness of layers and levers: K is the sum of the stiffnesses at the
+// depth of the contact, times the square of the lever at both ends.
 TEST(Stability, LayersAndLeversBecomeUnstableWhereTheFeltStiffnessDoes) {
   for (const protocols::RendererKind renderer :
        {protocols::RendererKind::point, protocols::RendererKind::ray}) {
@@ -92,7 +92,8 @@ TEST(Stability, LayersAndLeversBecomeUnstableWhereTheFeltStiffnessDoes) {
   }
 }
 
-// A constructed loop that neither grows nor shrinks in the end: no rest, however long it lasts.
+// A constructed loop that finally neither grows nor shrinks: it is not at rest, however long it
+// lasts.
 TEST(Stability, ALimitCycleIsUnstableWhateverItsAmplitude) {
   LoopOutcome cycle;
   cycle.initial_swing = 2e-4;
@@ -100,7 +101,7 @@ TEST(Stability, ALimitCycleIsUnstableWhateverItsAmplitude) {
   for (const double amplitude : {3e-6, 1e-4, 3.26e-3}) {
     cycle.early_swing = cycle.late_swing = amplitude;
     EXPECT_EQ(verdict_on(cycle, false), Verdict::unstable) << amplitude;
-    cycle.late_swing = 0.999 * amplitude;  // a hair less is chance
+    cycle.late_swing = 0.999 * amplitude;  // a slight decrease is chance
     EXPECT_EQ(verdict_on(cycle, false), Verdict::unstable) << amplitude;
   }
   cycle.early_swing = cycle.late_swing = 1.9e-6;
@@ -113,7 +114,7 @@ TEST(Stability, ALimitCycleIsUnstableWhateverItsAmplitude) {
   EXPECT_EQ(verdict_on(cycle, true), Verdict::unstable) << "the contact is lost and found again";
 }
 
-// The swing of 3.26 mm that once counted as stable, and what lies about it.
+// The swing of 3.26 mm that once counted as stable, and its neighbourhood.
 TEST(Stability, TheControllersLoopIsUnstableOnlyAboveItsBoundary) {
   LoopSettings settings;
   settings.passivity_controller = true;
@@ -214,7 +215,7 @@ TEST(SoftMap, ScenesAllowOnlyCasesThatComeToRest) {
   EXPECT_TRUE(wild.finite);
   EXPECT_FALSE(wild.settles()) << wild.swing;
   EXPECT_FALSE(wild.accepted);
-  // Pressed elsewhere: 4 % of 7 N, however long it is held.
+  // Pressed elsewhere it swings by 4 % of 7 N, however long it is held.
   for (const SoftCase& one : soft_cases_elsewhere(18)) {
     if (one.young != 1e5 || one.stiffness != 3000 || one.rate != 62.5 || one.radius != 0.01)
       continue;

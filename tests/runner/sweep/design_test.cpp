@@ -19,7 +19,7 @@ protocols::SweepParameter choice_of(std::size_t values) {
   return one;
 }
 
-// The first points as Joe and Kuo print them for their direction numbers (new-joe-kuo-6.21201).
+// The first points as published by Joe and Kuo for their direction numbers (new-joe-kuo-6.21201).
 TEST(SobolSequence, FirstPointsAreThePublishedOnes) {
   const std::vector<std::vector<double>> published{
       {0, 0, 0, 0, 0, 0, 0, 0, 0, 0},
@@ -60,8 +60,8 @@ TEST(Design, PermutationsAreOneToOneAndDiffer) {
     EXPECT_EQ(images.size(), count);
     EXPECT_LT(*images.rbegin(), count);
   }
-  // Where 0 goes is spread evenly over keys: 5 cells, 5000 keys, chi squared with 4 degrees of
-  // freedom.
+  // The image of 0 is distributed evenly over keys: 5 cells, 5000 keys, chi squared with 4 degrees
+  // of freedom.
   std::vector<double> seen(5);
   for (std::uint64_t key = 0; key < 5000; ++key) ++seen[permuted(0, 5, key)];
   double chi2 = 0;

@@ -20,7 +20,7 @@ TEST(PatternShare, IntervalCoversTheTruthAtLeastAtItsNominalRate) {
   } cases[] = {{"x1 < 0.3", 0.3},
                {"x1 + x2 + x3 < 1.5", 0.5},
                {"x1 * x2 > 0.5", 0.5 + 0.5 * std::log(0.5)},
-               // Nothing of one parameter alone: as bad as independent points.
+               // No effect of a single parameter: as bad as independent points.
                {"(x1 < 0.5 && x2 < 0.5) || (x1 >= 0.5 && x2 >= 0.5)", 0.5},
                {"min(x1, x2, x3) > 0.7", 0.027}};
   constexpr std::uint64_t kSweeps = 300;

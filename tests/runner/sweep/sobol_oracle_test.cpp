@@ -54,8 +54,8 @@ TEST(SobolIndices, MatchIshigamisFunction) {
   expect_indices(found, {{v1 / v, (v1 + v13) / v}, {v2 / v, v2 / v}, {0, v13 / v}}, 0.01);
 }
 
-// A linear model of independent parameters: each has its squared coefficient's part, alone and in
-// all.
+// A linear model of independent parameters: first-order and total index are each the share of its
+// squared coefficient.
 TEST(SobolIndices, MatchTheSquaredCoefficientsOfALinearModel) {
   const std::vector<double> coefficients{4, 2, 1, 0};
   const Design design(DesignKind::saltelli, 2048 * 6, 7, std::vector<protocols::SweepParameter>(4));
