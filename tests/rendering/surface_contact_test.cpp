@@ -440,8 +440,9 @@ TEST_P(SurfaceContact, AFineMeshIsNotEnteredByAStylusThatTurnsFast) {
     ++contacts;
     if (i % 20 != 0) continue;
     // The blend along a facet is off the surface where the facet is not quite parallel.
-    if (r.deepest.type != ContactType::segment_face)
+    if (r.deepest.type != ContactType::segment_face) {
       ASSERT_LE(distance(surface, r.deepest.point), 1e-9) << i;
+    }
     const double rounding = 1e-10 * surface.size();
     if (settings.side) {
       ASSERT_LE(through(surface, r.ideal.tip, r.ideal.tail - r.ideal.tip), rounding) << i;

@@ -173,7 +173,9 @@ TEST(ShapeHypotheses, TheOrderByRotationHasEachOnceNearItsLikes) {
       by_order += far(order[i - 1], order[i]);
       by_index += far(shape.first + i - 1, shape.first + i);
     }
-    if (shape.field) EXPECT_LT(by_order, 0.7 * by_index);
+    if (shape.field) {
+      EXPECT_LT(by_order, 0.7 * by_index);
+    }
     std::sort(sorted.begin(), sorted.end());
     for (int i = 0; i < shape.count; ++i)
       ASSERT_EQ(sorted[static_cast<std::size_t>(i)], shape.first + i);
