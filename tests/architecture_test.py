@@ -113,7 +113,7 @@ PUBLIC = {
     "analysis/report": "html_page hypotheses movement_report plan_report report sweep_report tables "
                        "task_report",
     "runner": "",
-    "runner/servo": "device device_times force_limiter passivity realtime ring sample servo servo_thread "
+    "runner/servo": "device force_limiter passivity realtime ring sample servo servo_thread "
                     "shared_value tick_clock tick_source touched_places triple_buffer",
     "runner/safety": "fault_signals guarded_device shared_memory",
     "runner/sound": "masking_noise",
@@ -130,7 +130,7 @@ PUBLIC = {
     "runner/serve": "network served_scene served_session",
     "runner/sweep": "design swept_study",
     "runner/stability": "boundary integrators soft_map",
-    "runner/bench": "chain_timing servo_timing tick_cost",
+    "runner/bench": "servo_timing tick_cost",
     "runner/commands": "render/forces shared/command shared/task_words shared/study_options",
 }
 

@@ -1,12 +1,14 @@
 #pragma once
-// Measures whether this machine is fit for the servo loop: runs a servo thread for some seconds and
-// measures every tick.
+// Measures whether this machine is fit for the servo loop, every tick of a servo thread for some
+// seconds, and the delay from a device's pose to its force.
 
 #include <cstdint>
 #include <functional>
 #include <string>
 #include <vector>
 
+#include "runner/devices/device_delay.h"
+#include "runner/devices/registry.h"
 #include "runner/servo/realtime.h"
 
 namespace palpate::runner {
@@ -47,5 +49,10 @@ struct ServoTiming {
 /// Renders a prescribed path over a sphere of 1,280 triangles, in contact with tip and side, with
 /// the ray renderer. \param wait  called about every 0.2 s by the waiting thread; true: stop early
 ServoTiming measure_servo(const TimingSettings& settings, const std::function<bool()>& wait = {});
+
+/// Opens a device as a session does, reads and writes it at its rate, at zero force, and measures
+/// the delay from its pose to its force through the guard process.
+/// \throws std::runtime_error: the device cannot be opened, or does not report its times
+ChainTiming measure_chain(const DeviceKind& kind, const DeviceConfig& config, double seconds);
 
 }  // namespace palpate::runner

@@ -45,11 +45,7 @@ DeviceCapabilities pair_of(const DeviceCapabilities& end, const char* name) {
 PairDevice::PairDevice(std::unique_ptr<Device> tip, std::unique_ptr<Device> tail,
                        const StylusFromEnds& stylus, const char* name,
                        const std::string& calibration)
-    : tip_(std::move(tip)),
-      tail_(std::move(tail)),
-      tip_times_(dynamic_cast<const KeepsTimes*>(tip_.get())),
-      tail_times_(dynamic_cast<const KeepsTimes*>(tail_.get())),
-      stylus_(stylus) {
+    : tip_(std::move(tip)), tail_(std::move(tail)), stylus_(stylus) {
   const DeviceCapabilities &one = tip_->capabilities(), &other = tail_->capabilities();
   capabilities_ = pair_of(one, name);
   capabilities_.max_force = std::min(one.max_force, other.max_force);
@@ -86,11 +82,6 @@ void PairDevice::reopen() {
   write(Vec3(0), Vec3(0));
   tip_->reopen();
   tail_->reopen();
-}
-
-DeviceTimes PairDevice::times() const noexcept {
-  if (tip_times_ == nullptr || tail_times_ == nullptr) return {};
-  return later_of(tip_times_->times(), tail_times_->times());
 }
 
 void check_pair(const DeviceConfig& config, const char* name) {

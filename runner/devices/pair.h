@@ -8,11 +8,10 @@
 
 #include "runner/devices/falcon/stylus_from_ends.h"
 #include "runner/servo/device.h"
-#include "runner/servo/device_times.h"
 
 namespace palpate::runner {
 
-class PairDevice final : public Device, public KeepsTimes {
+class PairDevice final : public Device {
  public:
   /// \param name         name of the kind
   /// \param calibration  as in DeviceCapabilities
@@ -26,11 +25,10 @@ class PairDevice final : public Device, public KeepsTimes {
   void write(const Vec3& device1, const Vec3& device2) noexcept override;
   /// Both ends command zero force first.
   void reopen() override;
-  DeviceTimes times() const noexcept override;
+  DeviceTimes times() const noexcept override { return later_of(tip_->times(), tail_->times()); }
 
  private:
   std::unique_ptr<Device> tip_, tail_;
-  const KeepsTimes *tip_times_, *tail_times_;  ///< the same devices, where they tell
   StylusFromEnds stylus_;
   DeviceCapabilities capabilities_;
   bool lost_ = true;

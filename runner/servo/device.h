@@ -2,6 +2,7 @@
 // The servo's interface to a haptic device. The servo calls read, then write, once a tick. Both
 // must be quick and must not throw: trouble is reported in the reading.
 
+#include <algorithm>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -82,6 +83,17 @@ struct DeviceReading {
   DeviceTrouble trouble = DeviceTrouble::none;
 };
 
+/// CLOCK_MONOTONIC, ns; 0: unknown.
+struct DeviceTimes {
+  std::int64_t pose_ns = 0;   ///< request or arrival of the last reading's pose
+  std::int64_t force_ns = 0;  ///< the last force of Device::write left this program
+};
+
+/// Of two devices that hold one stylus: the older pose, the later force.
+inline DeviceTimes later_of(const DeviceTimes& one, const DeviceTimes& other) {
+  return {std::min(one.pose_ns, other.pose_ns), std::max(one.force_ns, other.force_ns)};
+}
+
 class Device {
  public:
   virtual ~Device() = default;
@@ -94,6 +106,10 @@ class Device {
   /// take seconds, without forces: do not call it in the servo thread, nor during a read or write.
   /// \throws std::runtime_error with the obstacle
   virtual void reopen() {}
+  /// When the device sensed and pushed, for measurements of its delay. A driver with a thread of
+  /// its own queues poses and forces, so its caller cannot measure them. Called between reads and
+  /// writes, in their thread.
+  virtual DeviceTimes times() const noexcept { return {}; }
 };
 
 /// The session clock: the computer's (RealClock) or a simulated one.

@@ -13,7 +13,6 @@
 
 #include "data/base/text.h"
 #include "data/files/atomic_file.h"
-#include "runner/bench/chain_timing.h"
 #include "runner/bench/servo_timing.h"
 #include "runner/commands/devices/calibrate.h"
 #include "runner/commands/devices/lab_report.h"
@@ -247,6 +246,11 @@ void write_report(const std::string& path, const Json& report, const DeviceConfi
 int time_chain(const DeviceKind& kind, const DeviceConfig& config, const po::variables_map& values,
                Json& report) {
   const double seconds = seconds_of(values);
+  for (const char* other : {"guarded", "no-fifo", "no-realtime"}) {
+    if (values.count(other) > 0)
+      throw UsageError(std::string("--") + other + " is for --timing without --device");
+  }
+  if (!values["core"].defaulted()) throw UsageError("--core is for --timing without --device");
   try {
     kind.check(config);
   } catch (const std::invalid_argument& error) {

@@ -12,7 +12,6 @@
 #include "runner/devices/falcon/parameters.h"
 #include "runner/devices/falcon/transport.h"
 #include "runner/servo/device.h"
-#include "runner/servo/device_times.h"
 #include "stimuli/vec.h"
 
 namespace palpate::runner::falcon {

@@ -11,7 +11,7 @@
 
 namespace palpate::runner::falcon {
 
-class FalconDevice final : public Device, public KeepsTimes {
+class FalconDevice final : public Device {
  public:
   /// \param calibration  state of its force calibration, for DeviceCapabilities
   explicit FalconDevice(std::unique_ptr<FalconDriver> driver, const std::string& calibration = "");
@@ -35,7 +35,7 @@ class FalconDevice final : public Device, public KeepsTimes {
 // Two Falcons that hold the ends of a stylus, like the two Phantoms of Ho, Basdogan & Srinivasan
 // (2000), section 2: five degrees of freedom, sensed and actuated. World frame: the tip's device.
 
-class Falcon2Device final : public Device, public KeepsTimes {
+class Falcon2Device final : public Device {
  public:
   Falcon2Device(std::unique_ptr<FalconDriver> tip, std::unique_ptr<FalconDriver> tail,
                 const StylusFromEnds& stylus, const std::string& calibration = "");

@@ -10,7 +10,6 @@
 
 #include "runner/devices/forcedimension/library.h"
 #include "runner/servo/device.h"
-#include "runner/servo/device_times.h"
 
 namespace palpate::runner::forcedimension {
 
@@ -20,7 +19,7 @@ inline Vec3 from_world(const Vec3& v) { return {-v.y, v.x, v.z}; }
 
 /// The firmware switches forces off after 5 ms without a command (at servo rates below 1 kHz after
 /// 5 ticks, at most 32 ms). This also covers a dead guard.
-class ForceDimensionDevice final : public Device, public KeepsTimes {
+class ForceDimensionDevice final : public Device {
  public:
   /// Opens the device with the config's serial number, or the only one.
   /// \throws std::runtime_error with the obstacle

@@ -14,7 +14,6 @@
 #include "runner/devices/haply/link.h"
 #include "runner/devices/haply/messages.h"
 #include "runner/servo/device.h"
-#include "runner/servo/device_times.h"
 #include "runner/servo/shared_value.h"
 #include "runner/servo/triple_buffer.h"
 
@@ -85,7 +84,7 @@ class Pump {
   std::thread thread_;
 };
 
-class Inverse3Device final : public Device, public KeepsTimes {
+class Inverse3Device final : public Device {
  public:
   /// \throws std::runtime_error with the obstacle
   /// \param grip  whether to sense the axis of a Verse Grip, if there is one

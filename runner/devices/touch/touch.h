@@ -10,7 +10,6 @@
 
 #include "runner/devices/touch/library.h"
 #include "runner/servo/device.h"
-#include "runner/servo/device_times.h"
 #include "runner/servo/shared_value.h"
 #include "runner/servo/triple_buffer.h"
 
@@ -23,7 +22,7 @@ inline Vec3 from_world(const Vec3& v) { return {v.x, v.z, -v.y}; }
 /// Devices are identified by the names given in the maker's setup. The library's scheduler calls
 /// every millisecond in its own thread. Every call must set the force, because the last one would
 /// persist.
-class TouchDevice final : public Device, public KeepsTimes {
+class TouchDevice final : public Device {
  public:
   /// Opens the device with the config's serial number, which is its name, or the default one.
   /// \throws std::runtime_error with the obstacle

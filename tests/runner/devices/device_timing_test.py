@@ -122,6 +122,8 @@ class Timing(unittest.TestCase):
         for kind in ("mouse", "simulated"):
             self.palpate("devices", "--timing", "--device", kind, status=2)
         self.palpate("devices", "--timing", "--device", "forcedimension", "--seconds", 0, status=2)
+        for option in (["--guarded"], ["--no-fifo"], ["--core", 0]):
+            self.palpate("devices", "--timing", "--device", "forcedimension", "--library", DRD, *option, status=2)
         self.set(connected=0)
         self.palpate("devices", "--timing", "--device", "forcedimension", "--library", DRD, status=1)
         self.palpate("devices", "--report", self.folder / "r.json", "--json", self.folder / "j.json", status=2)

@@ -83,6 +83,8 @@ class SessionTest(WindowCase):
                 if condition():
                     return
                 time.sleep(0.02)
+        self.screen.keep(self.participant, "stuck")
+        self.screen.keep(self.console, "stuck_console")
         raise AssertionError(f"key {key} did nothing; " + self.messages())
 
     def halted(self):
@@ -384,13 +386,14 @@ class SessionTest(WindowCase):
         self.click_emergency()  # during the feedback, or right after it
         self.screen.keep(self.console, "emergency_feedback")
         self.clear_and_go_on()
-        self.answer(4 - 1)  # the rest of the practice: a break follows
-        self.click_emergency()
-        self.screen.keep(self.console, "emergency_break")
-        self.screen.keep(self.participant, "emergency_break_page")
-        self.assertEqual(self.attempts()[-1][3], "completed", "no trial begins in a break")
-        self.clear_and_go_on()
+        self.answer(4 - 1)  # the rest of the practice
+        self.click_emergency()  # between the blocks
+        self.screen.keep(self.console, "emergency_between")
+        self.screen.keep(self.participant, "emergency_between_page")
+        self.assertEqual(self.attempts()[-1][3], "completed", "no trial begins before the fault is cleared")
         before = len(self.attempts())
+        self.clear_and_go_on()
+        # The next trial begins at once or, where a page is shown, with a key.
         self.press_until("space", lambda: len(self.attempts()) > before)
 
 
