@@ -220,7 +220,7 @@ class Periphery(Task):
         told = [note["input_trouble"] for note in self.notes() if "input_trouble" in note]
         self.assertEqual(len(told), 2, told)
         self.assertIn("0x00", told[0])
-        self.assertIn("gone", told[1])
+        self.assertIn("is unplugged", told[1])
         self.assertEqual(self.sql("SELECT response_device FROM runs"), [("keyboard, serial response box",)])
 
     def test_tones_have_their_pitches_and_are_recorded(self):
