@@ -63,6 +63,7 @@ export function palpate_plugin(hand) {
           display.innerHTML = '';
           return this.jsPsych.finishTrial(data);
         } catch (error) {
+          if (error.code === 'closed') display.textContent = `palpate: ${error.reason}. Forces are off.`;
           if (!trial.try_again || !['forces-off', 'stopped', 'nothing-felt'].includes(error.code)) throw error;
           await this.#go_on(display, error);
         }
@@ -74,6 +75,7 @@ export function palpate_plugin(hand) {
       display.innerHTML = trial.prompt;
       return new Promise((resolve, reject) => {
         const off = event => done(() => reject(Object.assign(new Error(event.detail.reason), {code: 'forces-off'})));
+        const gone = () => done(() => reject(Object.assign(new Error('closed'), {code: 'closed', reason: 'the server has gone'})));
         const pressed = event => {
           const at = (trial.keys ?? []).indexOf(event.key);
           if (at >= 0) done(() => resolve(trial.choices[at]));
@@ -81,6 +83,7 @@ export function palpate_plugin(hand) {
         const done = act => {
           document.removeEventListener('keydown', pressed);
           hand.removeEventListener('forces_off', off);
+          hand.removeEventListener('closed', gone);
           act();
         };
         const row = element('div', display);
@@ -92,6 +95,7 @@ export function palpate_plugin(hand) {
         });
         document.addEventListener('keydown', pressed);
         hand.addEventListener('forces_off', off);
+        hand.addEventListener('closed', gone);
       });
     }
 

@@ -21,7 +21,9 @@ export class ServeError extends Error {
   }
 }
 
-/** One connection; made by connect(). */
+const has_gone = () => new ServeError({code: 'closed', message: 'the server has gone'});
+
+/** One connection; made by connect(). A 'closed' event says that the server has gone. */
 export class Hand extends EventTarget {
   #socket;
   #number = 0;
@@ -47,7 +49,7 @@ export class Hand extends EventTarget {
 
   #end() {
     clearInterval(this.#alive);
-    for (const {reject} of this.#waiting.values()) reject(new ServeError({code: 'closed', message: 'the server has gone'}));
+    for (const {reject} of this.#waiting.values()) reject(has_gone());
     this.#waiting.clear();
     this.dispatchEvent(new Event('closed'));
   }
@@ -90,7 +92,7 @@ export class Hand extends EventTarget {
   /** Any message; resolves with its answer, rejects with ServeError where it is refused. */
   ask(type, values = {}) {
     if (this.#socket.readyState !== WebSocket.OPEN)
-      return Promise.reject(new ServeError({code: 'closed', message: 'the server has gone'}));
+      return Promise.reject(has_gone());
     const id = ++this.#number;
     return new Promise((resolve, reject) => {
       this.#waiting.set(id, {resolve, reject});
@@ -148,9 +150,15 @@ export class Hand extends EventTarget {
     }
     return best;
   }
-  /** The next event of that name, as {event, t_ns, ...}. */
+  /** The next event of that name, as {event, t_ns, ...}; rejects with ServeError if the server goes before. */
   wait_for(name) {
-    return new Promise(resolve => this.addEventListener(name, event => resolve(event.detail), {once: true}));
+    if (this.#socket.readyState !== WebSocket.OPEN) return Promise.reject(has_gone());
+    return new Promise((resolve, reject) => {
+      const heard = new AbortController();
+      const once = (what, act) => this.addEventListener(what, event => (heard.abort(), act(event)), {signal: heard.signal});
+      once(name, event => resolve(event.detail));
+      once('closed', () => reject(has_gone()));
+    });
   }
   /** Says goodbye: what is felt stops. */
   async close() {

@@ -16,6 +16,7 @@ from client import AsyncClient, ServeError  # noqa: E402  with the module: from 
 
 SCENE = {"objects": [{"shape": "sphere", "radius_m": 0.03, "stiffness_n_per_m": 100}]}
 FRAME = 1 / 60  # s
+MAY_COME_AGAIN = ("forces-off", "not-started", "stopped")  # then the scene is put there again
 
 
 def to_engine(v):
@@ -39,16 +40,24 @@ class Stylus:
 
 
 async def felt(hand):
-    """Keeps the scene before the hand, also after forces went off."""
+    """Keeps the scene before the hand, also after forces went off. Ends with what only a person can mend."""
     while True:
         try:
             await hand.start(renderer="ray")
-            await hand.wait_for("forces_off", 1e6)
+            off = await hand.wait_for(("forces_off", "fault"), 1e6)
+            print(f"forces are off: {off['reason']}", file=sys.stderr)
         except ServeError as error:
-            if error.code == "closed":
-                return
+            if error.code not in MAY_COME_AGAIN:
+                raise
+            print(error, file=sys.stderr)
         await hand.stop()
-        await hand.clear()
+        try:
+            await hand.clear()
+        except ServeError as error:  # as while the device is unplugged
+            if error.code not in MAY_COME_AGAIN:
+                raise
+            print(error, file=sys.stderr)
+            await asyncio.sleep(1)
 
 
 async def run(token_file, frames):
@@ -57,15 +66,19 @@ async def run(token_file, frames):
         await hand.subscribe(250, ("tip", "tail", "force", "object"))
         feeling = asyncio.ensure_future(felt(hand))
         stylus, shown = Stylus(), 0
-        while shown < frames:
-            await asyncio.sleep(FRAME)
-            stylus.update(hand.samples())
-            if stylus.pose is None:
-                continue
-            print(json.dumps({"frame": shown, "t": time.monotonic(), "touched": stylus.touched, **stylus.pose}), flush=True)
-            shown += 1
-        feeling.cancel()
-        await asyncio.gather(feeling, return_exceptions=True)
+        try:
+            while shown < frames:
+                await asyncio.sleep(FRAME)
+                if feeling.done():
+                    feeling.result()  # raises what ended it: there will be no more ticks
+                stylus.update(hand.samples())
+                if stylus.pose is None:
+                    continue
+                print(json.dumps({"frame": shown, "t": time.monotonic(), "touched": stylus.touched, **stylus.pose}), flush=True)
+                shown += 1
+        finally:
+            feeling.cancel()
+            await asyncio.wait([feeling])
 
 
 if __name__ == "__main__":
@@ -73,4 +86,7 @@ if __name__ == "__main__":
     parser.add_argument("token_file")
     parser.add_argument("--frames", type=int, default=600)
     given = parser.parse_args()
-    asyncio.run(run(given.token_file, given.frames))
+    try:
+        asyncio.run(run(given.token_file, given.frames))
+    except (OSError, ServeError) as reason:
+        sys.exit(f"{given.token_file}: {reason}")

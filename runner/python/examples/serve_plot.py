@@ -10,7 +10,7 @@ import sys
 import matplotlib
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "palpate"))
-from client import Client  # noqa: E402  with the module: from palpate import Client
+from client import Client, ServeError  # noqa: E402  with the module: from palpate import Client, ServeError
 
 SHOWN = 5.0  # s
 
@@ -62,7 +62,7 @@ def main():
         seconds = 0.0
         while pyplot.get_fignums() and not (given.out and seconds >= given.seconds):
             pyplot.pause(0.04)  # draws, and lets the window answer
-            plot.add(eye.samples())
+            plot.add(eye.samples())  # raises ServeError once the server has gone
             plot.draw()
             seconds = plot.rows[-1][0] - plot.rows[0][0] if plot.rows else 0.0
         if given.out:
@@ -70,4 +70,7 @@ def main():
 
 
 if __name__ == "__main__":
-    main()
+    try:
+        main()
+    except (OSError, ServeError) as reason:
+        sys.exit(str(reason))

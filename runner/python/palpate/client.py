@@ -24,11 +24,13 @@ import struct
 import sys
 import threading
 import time
-from typing import Any, Deque, Dict, Iterable, List, Mapping, NamedTuple, Optional, Sequence, Set, TextIO, Tuple, Union
+from typing import (Any, Coroutine, Deque, Dict, Iterable, List, Mapping, NamedTuple, Optional, Sequence, Set, TextIO, Tuple,
+                    TypeVar, Union)
 
 __all__ = ["AsyncClient", "Client", "Clock", "ServeError"]
 
 Path = Union[str, "os.PathLike[str]"]
+T = TypeVar("T")
 
 ALIVE_EVERY = 0.2  # s; the server waits for half a second
 WIDTHS = {"tip": 3, "tail": 3, "force": 3, "rendered": 3, "contact": 3}  # columns; else one
@@ -192,6 +194,7 @@ class _Inbox:
         self._events: Deque[Dict[str, Any]] = collections.deque(maxlen=10_000)
         self._rows: Deque[List[float]] = collections.deque(maxlen=MOST_ROWS)
         self._fields: Sequence[str] = ()
+        self._gone = False
         #: Rows that the server left out because this program did not keep up.
         self.dropped = 0
         #: What the server said of itself; with a protocol `record` has participant, session and what is stored.
@@ -223,22 +226,27 @@ class _Inbox:
         self._rows.clear()
         self.dropped = 0
 
-    def _take_event(self, name: str) -> Optional[Dict[str, Any]]:
-        """The next one of that name; those before it are dropped."""
+    def _take_event(self, wanted: Union[str, Sequence[str]]) -> Optional[Dict[str, Any]]:
+        """The next one of that name, or of one of these; those before it are dropped."""
+        names = (wanted,) if isinstance(wanted, str) else wanted
         while self._events:
             came = self._events.popleft()
-            if came["event"] == name:
+            if came["event"] in names:
                 return came
         return None
 
     def _take_rows(self) -> List[List[float]]:
         out = list(self._rows)
         self._rows.clear()
+        if not out and self._gone:  # a program that asks for more in a loop must not ask for ever
+            raise ServeError("closed", "the server has gone")
         return out
 
     def _take_events(self) -> List[Dict[str, Any]]:
         out = list(self._events)
         self._events.clear()
+        if not out and self._gone:
+            raise ServeError("closed", "the server has gone")
         return out
 
 
@@ -307,7 +315,6 @@ class Client(_Inbox):
         self._number = 0
         self._replies: Dict[int, Dict[str, Any]] = {}
         self._awaited: Set[int] = set()
-        self._gone = False
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
         try:
@@ -341,9 +348,10 @@ class Client(_Inbox):
                 self._take(json.loads(text))
         except (OSError, ConnectionError, ValueError):
             pass
-        with self._changed:
-            self._gone = True
-            self._changed.notify_all()
+        finally:
+            with self._changed:
+                self._gone = True
+                self._changed.notify_all()
 
     def _take(self, message: Dict[str, Any]) -> None:
         with self._changed:
@@ -463,18 +471,21 @@ class Client(_Inbox):
             self._begin_stream(fields)
 
     def samples(self) -> Dict[str, Any]:
-        """Rows since the last call, as numpy arrays: t_ns, tick and each field (n, or n x 3)."""
+        """Rows since the last call, as numpy arrays: t_ns, tick and each field (n, or n x 3).
+
+        Raises ServeError once the server has gone and all rows were taken.
+        """
         with self._changed:
             rows, fields = self._take_rows(), self._fields
         return _columns(rows, fields)
 
     def events(self) -> List[Dict[str, Any]]:
-        """Events since the last call."""
+        """Events since the last call. Raises ServeError once the server has gone and all events were taken."""
         with self._changed:
             return self._take_events()
 
-    def wait_for(self, event: str, time_out: float = 10) -> Dict[str, Any]:
-        """The next event of that name; those before it are dropped. Raises TimeoutError."""
+    def wait_for(self, event: Union[str, Sequence[str]], time_out: float = 10) -> Dict[str, Any]:
+        """The next event of that name, or of one of these names; those before it are dropped. Raises TimeoutError."""
         end = time.monotonic() + time_out
         with self._changed:
             while True:
@@ -503,6 +514,22 @@ class Client(_Inbox):
         self._close()
 
 
+async def _within(work: Coroutine[Any, Any, T], time_out: float) -> T:
+    """Its result. Raises TimeoutError.
+
+    Not asyncio.wait_for: before Python 3.12 it drops a cancellation that comes together with the result, and the task
+    that was to end goes on for ever.
+    """
+    task = asyncio.ensure_future(work)
+    try:
+        done, _ = await asyncio.wait([task], timeout=time_out)
+        if not done:
+            raise TimeoutError("the server does not answer")
+        return task.result()
+    finally:
+        task.cancel()
+
+
 class AsyncClient(_Inbox):
     """One connection, for asyncio: the methods of Client to be awaited. Made by connect or from_token_file."""
 
@@ -512,9 +539,9 @@ class AsyncClient(_Inbox):
         super().__init__()
         self._reader, self._writer, self._frames, self._time_out = reader, writer, frames, time_out
         self._number = 0
+        self._loop = asyncio.get_running_loop()
         self._replies: Dict[int, "asyncio.Future[Dict[str, Any]]"] = {}
-        self._came = asyncio.Condition()
-        self._gone = False
+        self._news = self._loop.create_future()
         self._tasks = [asyncio.ensure_future(self._read())]
 
     @classmethod
@@ -525,19 +552,18 @@ class AsyncClient(_Inbox):
             raise ValueError("expected either url or socket_path")
         frames = None
         if url is None:
-            reader, writer = await asyncio.open_unix_connection(socket_path, limit=LONGEST_LINE)
+            reader, writer = await _within(asyncio.open_unix_connection(socket_path, limit=LONGEST_LINE), time_out)
         else:
             host, port = _address(url)
-            reader, writer = await asyncio.open_connection(host, port)
+            reader, writer = await _within(asyncio.open_connection(host, port), time_out)
             request, accept = _request(host, port)
             writer.write(request)
             try:
-                head = await asyncio.wait_for(reader.readuntil(b"\r\n\r\n"), time_out)
-                _check_response(head, accept)
+                _check_response(await _within(reader.readuntil(b"\r\n\r\n"), time_out), accept)
             except asyncio.IncompleteReadError as error:
                 writer.close()
                 raise ServeError("closed", "the server closed the connection") from error
-            except ServeError:
+            except BaseException:
                 writer.close()
                 raise
             frames = _Frames()
@@ -582,7 +608,7 @@ class AsyncClient(_Inbox):
         try:
             while (texts := await self._texts()) is not None:
                 for text in texts:
-                    await self._take(json.loads(text))
+                    self._take(json.loads(text))
         except (OSError, ValueError):
             pass
         finally:
@@ -590,19 +616,22 @@ class AsyncClient(_Inbox):
             for reply in self._replies.values():
                 if not reply.done():
                     reply.cancel()
-            async with self._came:
-                self._came.notify_all()
+            self._tell_waiting()
 
-    async def _take(self, message: Dict[str, Any]) -> None:
+    def _tell_waiting(self) -> None:
+        news, self._news = self._news, self._loop.create_future()
+        news.set_result(None)
+
+    def _take(self, message: Dict[str, Any]) -> None:
         number = message.get("re")
         if number is not None:
             reply = self._replies.pop(number, None)
             if reply is not None and not reply.done():
                 reply.set_result(message)
             return
-        async with self._came:
-            self._keep(message)
-            self._came.notify_all()
+        self._keep(message)
+        if "stream" not in message:
+            self._tell_waiting()
 
     def _send(self, kind: str, values: Mapping[str, Any]) -> int:
         if self._gone:
@@ -702,20 +731,19 @@ class AsyncClient(_Inbox):
         """As Client.events."""
         return self._take_events()
 
-    async def wait_for(self, event: str, time_out: float = 10) -> Dict[str, Any]:
+    async def wait_for(self, event: Union[str, Sequence[str]], time_out: float = 10) -> Dict[str, Any]:
         """As Client.wait_for."""
         end = time.monotonic() + time_out
-        async with self._came:
-            while True:
-                came = self._take_event(event)
-                if came is not None:
-                    return came
-                if self._gone:
-                    raise ServeError("closed", "the server has gone")
-                try:
-                    await asyncio.wait_for(self._came.wait(), end - time.monotonic())
-                except asyncio.TimeoutError:
-                    raise TimeoutError(f"no event {event}") from None
+        while True:
+            came = self._take_event(event)
+            if came is not None:
+                return came
+            if self._gone:
+                raise ServeError("closed", "the server has gone")
+            # Not asyncio.wait_for, as in _within().
+            done, _ = await asyncio.wait([self._news], timeout=max(0, end - time.monotonic()))
+            if not done:
+                raise TimeoutError(f"no event {event}")
 
     async def _close(self) -> None:
         for task in self._tasks:

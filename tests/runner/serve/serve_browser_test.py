@@ -150,6 +150,24 @@ class Pages(ServeCase):
             self.assertEqual(one["trial_type"], "palpate")
         self.assertEqual({one["response"] for one in data}, {"ball", "box"})
 
+    def test_a_block_ends_with_the_server(self):
+        origin = self.pages({"index.html": PAGE.encode(), "jspsych.js": jspsych()})
+        (self.dir / "p.json").write_text(json.dumps(PROTOCOL))
+        process = self.run_server([PALPATE, "serve", "--device", "simulated", "--protocol", self.dir / "p.json", "--db",
+                                   self.dir / "page.db", "--participant", "P01", "--allow-origin", origin])
+        self.browser.open_url(origin + "/index.html")
+        self.until("window.ready === true")
+        self.browser.run(f"""void (async () => {{
+          const {{connect}} = await import('./palpate.js');
+          const eye = await connect({json.dumps(self.said["url"])}, {json.dumps(self.said["token"])}, {{role: 'watch'}});
+          window.late = eye.wait_for('never').catch(error => error.code).then(code => window.late = code);
+          run({json.dumps(self.said["url"])}, {json.dumps(self.said["token"])}).catch(error => window.failed = error.code);
+        }})()""")
+        self.until("document.querySelector('[data-choice=ball]') !== null")
+        process.kill()
+        self.until("window.failed === 'closed' && window.late === 'closed'")
+        self.assertIn("the server has gone. Forces are off.", self.browser.run("document.body.textContent"))
+
     def test_the_block_of_the_readme(self):
         readme = (SOURCES / "runner" / "README.md").read_text(encoding="utf-8")
         block, = re.findall(r"```js\n(import .*?)```", readme, re.DOTALL)

@@ -52,7 +52,10 @@ class Clients(ServeCase):
             return list(csv.DictReader(table))
 
     def run_program(self, *command, **more):
-        done = subprocess.run(list(map(str, command)), capture_output=True, text=True, timeout=PATIENCE, cwd=self.dir, **more)
+        try:
+            done = subprocess.run(list(map(str, command)), capture_output=True, text=True, timeout=PATIENCE, cwd=self.dir, **more)
+        except subprocess.TimeoutExpired as hang:
+            raise AssertionError(f"it does not end; it said: {hang.stdout}\n{hang.stderr}") from hang
         self.assertEqual(done.returncode, 0, done.stderr)
         return done.stdout
 
@@ -115,6 +118,53 @@ class Clients(ServeCase):
         asyncio.run(session(url=self.said["url"]))
         asyncio.run(session(socket_path=str(self.path)))
 
+    def test_a_task_that_waits_ends_when_it_is_cancelled_whatever_comes_meanwhile(self):
+        self.serve()
+
+        async def session():
+            async with await client.AsyncClient.connect(socket_path=str(self.path), token=self.said["token"], role="watch",
+                                                        time_out=PATIENCE) as eye:
+                for turns in range(8):  # of the loop, between the event and the cancellation
+                    waiting = asyncio.ensure_future(eye.wait_for("never", PATIENCE))
+                    await asyncio.sleep(0)
+                    await asyncio.sleep(0)
+                    kept = eye._take({"event": "left", "t_ns": 1})
+                    if asyncio.iscoroutine(kept):
+                        await kept
+                    for _ in range(turns):
+                        await asyncio.sleep(0)
+                    waiting.cancel()
+                    await asyncio.wait([waiting], timeout=5)
+                    self.assertTrue(waiting.cancelled(), f"after {turns} turns")
+
+        asyncio.run(session())
+
+    def test_a_program_hears_that_the_server_has_gone(self):
+        process = self.serve()
+        hand = self.client()
+        hand.subscribe()
+        self.touch(hand)
+
+        async def session():
+            async with await client.AsyncClient.connect(self.said["url"], self.said["token"], role="watch", time_out=PATIENCE) as eye:
+                hand.note("the last")
+                await eye.wait_for("note", PATIENCE)
+                hand.note("after the last")
+                waiting = asyncio.ensure_future(eye.wait_for("never", PATIENCE))
+                process.kill()
+                with self.assertRaises(ServeError):
+                    await waiting
+                for ask in (eye.samples, eye.events):
+                    with self.assertRaises(ServeError) as caught:
+                        ask()
+                    self.assertEqual(caught.exception.code, "closed")
+
+        asyncio.run(session())
+        self.refused("closed", hand.wait_for, "never", PATIENCE)
+        self.assertGreater(len(hand.samples()["tick"]), 0)  # what had come is not lost
+        for ask in (hand.samples, hand.events):
+            self.refused("closed", ask)
+
     def test_a_pipe_passes_messages_on(self):
         self.serve("--token-file", self.token)
         lines = ['{"type": "start"}', '{"type": "stop"}', '{"type": "jump"}', "nonsense", '{"type": "subscribe", "rate_hz": 50}',
@@ -156,6 +206,26 @@ class Clients(ServeCase):
             self.assertLess(max(map(abs, frame["tip"])), 0.3)
             length = sum(x * x for x in frame["points_to"]) ** 0.5
             self.assertAlmostEqual(length, 0.12, places=3)
+
+    def test_frames_go_on_after_forces_were_off_and_end_with_the_server(self):
+        process = self.serve("--token-file", self.token, scene=False)
+        self.said = json.loads(self.token.read_text())
+        program = subprocess.Popen([sys.executable, EXAMPLES / "serve_frames.py", self.token, "--frames", "1000000"],
+                                   stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        self.addCleanup(lambda: (program.kill(), program.communicate()))
+        with self.client(role="watch") as eye:
+            for _ in range(2):
+                self.one_of(eye, "started")
+                self.assertTrue(program.stdout.readline())
+                eye.emergency()
+                self.one_of(eye, "forces_off", "stopped")
+            self.one_of(eye, "started")
+        process.kill()
+        _, said = program.communicate(timeout=PATIENCE)
+        self.assertEqual(program.returncode, 1)
+        self.assertIn("the server has gone", said)
+        self.assertIn("forces are off", said)
+        self.assertNotIn("Traceback", said)
 
     def test_a_live_plot(self):
         if importlib.util.find_spec("matplotlib") is None:
