@@ -105,6 +105,13 @@ class TaskRow {
     faults_.push_back({file_, "line " + std::to_string(reader_.line()) + ", " + std::string(column),
                        expected + ", found '" + shortened(printable(text(column)), 40) + "'"});
   }
+  /// For a column that the whole table lacks: one fault, however many rows need it.
+  void add_header_fault(const std::string& expected) {
+    for (const protocols::Fault& fault : faults_) {
+      if (fault.expected == expected) return;
+    }
+    faults_.push_back({file_, "line 1", expected});
+  }
 
  private:
   const std::string& file_;
@@ -167,10 +174,9 @@ TaskTrial read_trial(TaskRow& row) {
   trial.intervals = intervals_of(row);
   trial.protocol_sha256 = row.value("protocol_sha256");
   if (!row.has("success") && !success_of(row, trial))
-    row.add_fault(
-        "success",
+    row.add_header_fault(
         "expected a column success (1: the comparison was chosen), or comparison_interval" +
-            row.hint("success") + row.hint("comparison_interval"));
+        row.hint("success") + row.hint("comparison_interval"));
   if (trial.participant.empty()) row.add_fault("participant_id", "expected a participant");
   if (std::find(std::begin(kTasks), std::end(kTasks), trial.task) == std::end(kTasks))
     row.add_fault("task", "expected identify, compare, detect, rate, adjust or external");

@@ -616,6 +616,10 @@ std::string cell_text(const TaskCell& cell) {
     text += cell.scale == protocols::LevelScale::linear
                 ? "  functions over the untransformed levels\n"
                 : "  functions over the logarithm (base 10) of the levels\n";
+  if (!cell.expected_easier && !cell.functions.empty() && cell.no_function.empty() &&
+      (cell.functions.front().model.function.easier == protocols::Easier::lower) !=
+          cell.functions.front().reversed)
+    text += "  successes fall as the level rises; no protocol here says which was asked for\n";
   for (const ParticipantFunction& one : cell.functions)
     text += function_text(one, cell.expected_easier);
   if (cell.magnitude) text += magnitude_text(cell);

@@ -220,6 +220,18 @@ class Tasks(TaskStudy):
                     self.assertEqual(one["fit"]["reversed"], (one["participant_id"], cell["renderer"]) == ("T3", "ray"))
                     self.assertEqual(one["fit"]["guess"], one["fit"]["lapse"])
             self.assertIn("although those of the others rise", self.analyze().stdout)
+            self.assertNotIn("successes fall as", self.analyze().stdout)
+            # All alike: it may be what the task asked for.
+            self.found([row | {"success": 1 - row["success"]} for row in rows_of_a_study(seed) if row["task"] == "compare"])
+            self.assertEqual(self.analyze().stdout.count(
+                "successes fall as the level rises; no protocol here says which was asked for"), 2)
+
+    def test_a_column_that_the_table_lacks_is_named_once(self):
+        rows = [row for row in rows_of_a_study(1) if row["task"] == "compare"]
+        self.write([{key: value for key, value in row.items() if key != "success"} for row in rows])
+        refused = self.analyze()
+        self.assertEqual(refused.returncode, 2)
+        self.assertEqual(refused.stderr.count("expected a column success"), 1, refused.stderr)
 
     def test_answers_by_chance_are_not_called_swapped(self):
         called = 0
