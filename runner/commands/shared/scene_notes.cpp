@@ -68,10 +68,10 @@ std::vector<std::string> mesh_notes(const stimuli::ObjectSpec& object) {
   const Vec3 size = 1000.0 * (high - low);
   char text[160];
   const double largest = std::max({size.x, size.y, size.z});
-  std::snprintf(text, sizeof text,
-                largest < 1000 ? "%.4g x %.4g x %.4g mm, %zu faces"
-                               : "%.0f x %.0f x %.0f mm, %zu faces",
-                size.x, size.y, size.z, soup.faces.size());
+  std::snprintf(
+      text, sizeof text,
+      largest < 1000 ? "%.4g x %.4g x %.4g mm, %zu faces" : "%.0f x %.0f x %.0f mm, %zu faces",
+      size.x, size.y, size.z, soup.faces.size());
   std::string note = printable(object.file_name) + ": " + text;
   if (largest > kBeyondHands) {
     note +=
