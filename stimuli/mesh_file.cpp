@@ -43,7 +43,7 @@ std::string contents(const std::string& path, FileFaults& faults) {
   return bytes;
 }
 
-enum class MeshFormat { obj, stl, gltf, ply, off, none };
+enum class MeshFormat { obj, stl, gltf, ply, off, three_mf, none };
 
 MeshFormat format_of(const std::string& path, FileFaults& faults) {
   const std::string extension = lower_extension(path);
@@ -52,6 +52,7 @@ MeshFormat format_of(const std::string& path, FileFaults& faults) {
   if (extension == ".gltf" || extension == ".glb") return MeshFormat::gltf;
   if (extension == ".ply") return MeshFormat::ply;
   if (extension == ".off") return MeshFormat::off;
+  if (extension == ".3mf") return MeshFormat::three_mf;
   faults.add("", std::string("a name that ends in ") + kMeshExtensions, in_quotes(extension));
   return MeshFormat::none;
 }
@@ -164,6 +165,11 @@ PolygonSoup read_mesh(const std::string& path, const std::string& bytes) {
   FileFaults faults(path);
   const MeshFormat format = format_of(path, faults);
   faults.throw_if_any();
+  if (format == MeshFormat::three_mf) {
+    PolygonSoup soup = read_3mf(bytes, faults);
+    faults.throw_if_any();
+    return soup;
+  }
   std::string_view text = bytes;
   // Some editors begin a text with a byte order mark. In a binary file the bytes are data.
   if (text.starts_with("\xEF\xBB\xBF") &&

@@ -1,5 +1,5 @@
 #pragma once
-// Reading of mesh files: Wavefront .obj, .stl, glTF 2.0, .ply, .off.
+// Reading of mesh files: Wavefront .obj, .stl, glTF 2.0, .ply, .off, .3mf.
 
 #include <string>
 #include <vector>
@@ -8,7 +8,7 @@
 
 namespace palpate::stimuli {
 
-inline constexpr const char* kMeshExtensions = ".obj, .stl, .gltf, .glb, .ply or .off";
+inline constexpr const char* kMeshExtensions = ".obj, .stl, .gltf, .glb, .ply, .off or .3mf";
 
 /// Whether the path ends in one of them.
 bool is_mesh_file_name(const std::string& path);
@@ -17,8 +17,9 @@ bool is_mesh_file_name(const std::string& path);
 /// .stl (ASCII or binary) or glTF 2.0 (.gltf, .glb: triangles, strips and fans of the default scene
 /// or else the first, node transforms applied, each primitive a group; turned from +y up to +z up;
 /// no sparse accessors, morph targets or required extensions), a .ply (ASCII, binary in both byte
-/// orders; properties that are no coordinates or corners skipped) or an .off (text; colours and
-/// normals skipped). Units are metres as they stand.
+/// orders; properties that are no coordinates or corners skipped) an .off (text; colours and
+/// normals skipped) or a .3mf (items of the build with their components and transforms, in the unit
+/// that it names). Units of the others are metres as they stand.
 /// Whether it is a solid is checked by convex_parts(), not here.
 /// \throws MeshError with file, line (text formats) or byte (binary) and what was expected.
 PolygonSoup read_mesh_file(const std::string& path);

@@ -61,6 +61,7 @@ PolygonSoup read_stl(std::string_view bytes, FileFaults& faults);
 PolygonSoup read_gltf(std::string_view bytes, FileFaults& faults);
 PolygonSoup read_ply(std::string_view bytes, FileFaults& faults);
 PolygonSoup read_off(std::string_view text, FileFaults& faults);
+PolygonSoup read_3mf(std::string_view bytes, FileFaults& faults);
 
 /// Contents of a buffer's file. \param place  where it is named, a JSON pointer \param uri  the
 /// name

@@ -6,7 +6,7 @@ cd "$(dirname "$0")/../.."
 seconds="${1:-10}"
 shift || true
 targets=("$@")
-[ ${#targets[@]} -gt 0 ] || targets=(protocol scene unions surface csv obj stl ply off packets samples database settings printable trajectory
+[ ${#targets[@]} -gt 0 ] || targets=(protocol scene unions surface csv obj stl ply off 3mf packets samples database settings printable trajectory
   gltf msh pattern sweep_space advisor haply serve_messages)
 
 cmake --preset asan > /dev/null

@@ -5,6 +5,7 @@ Usage: schema_test.py SOURCE_DIR
 
 import json
 import pathlib
+import re
 import sys
 
 import jsonschema
@@ -154,6 +155,10 @@ def main(source):
     unused = properties(own) - keys(read(tests / "good" / "everything-v2.json")) - keys(read(tests / "good" / "external-v2.json"))
     if unused:
         failures.append(f"everything-v2.json and external-v2.json lack {sorted(unused)}")
+    endings = re.findall(r"\.\w+", re.search(r'kMeshExtensions = "(.*)"', (source / "stimuli" / "mesh_file.h").read_text())[1])
+    for name in [f"mesh{ending}" for ending in endings] + ["MESH.3MF", "mesh.msh"]:
+        if next(scene.iter_errors({"objects": [{"shape": "mesh", "file": name}]}), None):
+            failures.append(f"the schema refuses the mesh file {name}")
     if len(good) < 7 or len(bad) < 40:
         failures.append(f"only {len(good)} good and {len(bad)} bad files were found")
 

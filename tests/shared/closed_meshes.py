@@ -4,6 +4,7 @@ A mesh is (vertices, faces): an array of n x 3 in m and an array of m x 3, or a 
 """
 
 import struct
+import zipfile
 
 import numpy as np
 
@@ -251,7 +252,7 @@ def mesh(n, seed):
 
 def write(path, v, f, digits=None):
     """By the ending of the path: .obj and .off with digits after the point (None: all 17), .ply of doubles in big-endian
-    order, or binary .stl (single precision)."""
+    order, .3mf in millimetres, or binary .stl (single precision)."""
     f = triangles(f)
     number = "%.17g" if digits is None else f"%.{digits}f"
     if path.endswith(".stl"):
@@ -266,6 +267,16 @@ def write(path, v, f, digits=None):
             out.write((f"ply\nformat binary_big_endian 1.0\nelement vertex {len(v)}\nproperty double x\nproperty double y\nproperty double z\n"
                        f"element face {len(f)}\nproperty list uchar int vertex_indices\nend_header\n").encode())
             out.write(v.astype(">f8").tobytes() + rows.tobytes())
+    elif path.endswith(".3mf"):
+        text = ('<model unit="millimeter" xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02"><resources><object id="1"><mesh><vertices>'
+                + "".join(f'<vertex x="{number}" y="{number}" z="{number}"/>' % tuple(1000 * p) for p in v) + "</vertices>\n<triangles>"
+                + "".join('<triangle v1="%d" v2="%d" v3="%d"/>' % tuple(t) for t in f)
+                + '</triangles></mesh></object></resources><build><item objectid="1"/></build></model>')
+        kind = "http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"
+        with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as out:
+            out.writestr("_rels/.rels", '<Relationships xmlns="http://schemas.openxmlformats.org/package/2006/relationships">'
+                         f'<Relationship Target="/3D/3dmodel.model" Id="r" Type="{kind}"/></Relationships>')
+            out.writestr("3D/3dmodel.model", text)
     elif path.endswith(".off"):
         with open(path, "w") as out:
             out.write(f"OFF\n{len(v)} {len(f)} 0\n")

@@ -41,7 +41,7 @@ class ClosedMeshes(unittest.TestCase):
             folder = pathlib.Path(scratch)
             for n in range(20 * ROUNDS):
                 kind, v, f = closed_meshes.mesh(n, 1)
-                name = f"{n}-{kind}." + ("obj", "stl", "ply", "off")[n // 10 % 4]
+                name = f"{n}-{kind}." + ("obj", "stl", "ply", "off", "3mf")[n // 4 % 5]
                 closed_meshes.write(str(folder / name), v, f, (None, 6, 8, 9)[n % 4])
                 text, _ = self.explained(folder, name)
                 self.assertIn(f"{name}: ", text)

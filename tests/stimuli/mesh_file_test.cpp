@@ -351,7 +351,7 @@ TEST_F(MeshFileSurface, FaultsOfAnStlHaveItsPlacesAndCoordinates) {
 }
 
 TEST_F(MeshFile, OtherFilesAreRefused) {
-  expect_fault("a.3ds", "ply", ".obj, .stl, .gltf, .glb, .ply or .off");
+  expect_fault("a.3ds", "ply", ".obj, .stl, .gltf, .glb, .ply, .off or .3mf");
   EXPECT_THROW(read_mesh_file(folder_ / "none.obj"), MeshError);
   std::filesystem::create_directory(folder_ / "folder.stl");
   EXPECT_THROW(read_mesh_file(folder_ / "folder.stl"), MeshError);

@@ -86,7 +86,7 @@ std::string uri_of(std::string_view path) {
 }
 
 std::string format_of(std::string_view name) {
-  constexpr std::array<std::pair<std::string_view, const char*>, 13> kFormats = {{
+  constexpr std::array<std::pair<std::string_view, const char*>, 14> kFormats = {{
       {".csv", "text/csv"},
       {".tsv", "text/tab-separated-values"},
       {".json", "application/json"},
@@ -99,6 +99,7 @@ std::string format_of(std::string_view name) {
       {".stl", "model/stl"},
       {".glb", "model/gltf-binary"},
       {".gltf", "model/gltf+json"},
+      {".3mf", "model/3mf"},
       {".png", "image/png"},
   }};
   for (const auto& [end, format] : kFormats) {
