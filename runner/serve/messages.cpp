@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <string_view>
 #include <utility>
 
@@ -149,7 +150,10 @@ void read_orientation(MemberReader& reader, Message& out) {
   const double size = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
   if (!good || !(std::abs(size - 1) <= kRoundings))
     return reader.fault("orientation_wxyz", "expected a unit quaternion, four numbers");
-  out.orientation = Quat(q[0] / size, q[1] / size, q[2] / size, q[3] / size);
+  // Keep a unit quaternion to the bit: it may come from a schedule or a record.
+  constexpr double kLastBits = 4 * std::numeric_limits<double>::epsilon();
+  const double scale = std::abs(size - 1) <= kLastBits ? 1 : size;
+  out.orientation = Quat(q[0] / scale, q[1] / scale, q[2] / scale, q[3] / scale);
 }
 
 void read_rest(MemberReader& reader, Message& out) {

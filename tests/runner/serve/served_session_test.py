@@ -7,12 +7,10 @@ import contextlib
 import csv
 import json
 import pathlib
-import random
 import signal
 import sqlite3
 import subprocess
 import sys
-import threading
 import time
 import unittest
 
@@ -31,10 +29,14 @@ PROTOCOL = {
 }
 IDENTIFY = {"name": "which", "task": "identify", "stimuli": ["ball", "box"], "repetitions": 1}
 EXTERNAL = {"name": "free", "task": "external", "stimuli": ["ball", "box"], "trials": 4}
+# Where a server is killed.
+POINTS = ("served", "greeted", "waiting for home", "felt", "touched", "noted", "stopped", "answered", "a millisecond later",
+          "written", "acknowledged", "the next one asked for")
 # Columns that depend on the time, or on a busy machine.
 OF_TIME = {"response_time", "first_contact_time", "onset_utc", "missed_ticks", "attempt", "ticks", "faults", "max_force", "before_contact",
            "longest_period", "contact_share", "edge_dwell", "interval_onsets", "interval_ends", "started_inside",
            "response_device", "note"}
+OF_PLAN = {"task", "protocol_sha256"}  # that differ between a block of palpate's and one of the program's
 
 
 class Served(ServeCase):
@@ -52,7 +54,7 @@ class Served(ServeCase):
                                 "--participant", "P01", *options])
 
     def trial(self, hand, answer, **start):
-        """Runs a trial until it is on record: one cut off by a busy machine is repeated. \\return its facts"""
+        """Runs a trial until it is on record: one cut off by a busy machine is repeated. \return its facts"""
         while True:
             try:
                 hand.start(**start)
@@ -80,8 +82,8 @@ class Served(ServeCase):
         with open(out, newline="", encoding="utf-8") as table:
             return list(csv.DictReader(table))
 
-    def test_rows_equal_those_of_run_with_the_same_answers(self):
-        protocol = self.protocol(IDENTIFY)
+    def run_live(self, protocol):
+        """The database of palpate run, where every answer is box."""
         live = self.dir / "live.db"
         with Terminal([PALPATE, "run", protocol, "--db", live, "--participant", "P01", "--device", "simulated", "--no-window",
                        "--new-participant"]) as terminal:
@@ -91,6 +93,11 @@ class Served(ServeCase):
                     break
                 terminal.type(":clear\n:go\n" if came == "[fault, " else "2")
             self.assertEqual(terminal.finish(), 0, terminal.text)
+        return live
+
+    def test_rows_equal_those_of_run_with_the_same_answers(self):
+        protocol = self.protocol(IDENTIFY)
+        live = self.run_live(protocol)
         process = self.begin(protocol)
         with self.client() as hand:
             self.assertEqual(hand.server["record"]["trials"], 4)
@@ -202,35 +209,98 @@ class Served(ServeCase):
         while eye.server["record"]["done"] != 0 or len(self.sql("SELECT 1 FROM attempts WHERE state = 'cut_off'")) < 2:
             time.sleep(0.05)
 
-    def test_twelve_kills_lose_no_acknowledged_trial(self):
-        protocol = self.protocol({**EXTERNAL, "trials": 30})
-        chance = random.Random(34)
-        acknowledged, kills = [], 0
-        while kills < 12:
+    def begun(self, hand, due, **start):
+        """Starts the trial until forces are on."""
+        while True:
+            try:
+                return hand.start(trial=due["trial"], **start)
+            except ServeError as error:
+                if error.code != "forces-off":
+                    raise
+                hand.clear()
+
+    def kill_at(self, point, process, hand, due, answer, start):
+        """Kills the server at a point of the trial that is due.
+        \return the trial's facts where it was acknowledged, whether its answer was sent"""
+        wal = self.db.with_name(self.db.name + "-wal")
+        said, sent = None, False
+        if point == "waiting for home":
+            hand._send("start", False, {"trial": due["trial"], **start})
+            time.sleep(0.02)
+        elif point not in ("greeted", "acknowledged", "the next one asked for"):
+            self.begun(hand, due, **start)
+        if point == "touched":
+            self.one_of(hand, "first_contact", "forces_off")
+        elif point == "noted":
+            hand.mark(40, "kept")
+        elif point == "stopped":
+            hand.stop("stopped before the kill")
+        elif point in ("answered", "a millisecond later", "written"):
+            before, sent = wal.stat().st_size, True
+            number = hand._send("answer", True, {"response": answer})
+            time.sleep(0.001 if point == "a millisecond later" else 0)
+            while point == "written" and wal.stat().st_size == before and number not in hand._replies:
+                pass  # it is being written
+        elif point in ("acknowledged", "the next one asked for"):
+            said = self.trial(hand, answer, trial=due["trial"], **start)
+            if point == "the next one asked for" and hand.next is not None:
+                hand._send("start", False, {"trial": hand.next["trial"], **start})
+        process.kill()
+        self.assertEqual(process.wait(PATIENCE), -signal.SIGKILL)
+        return said, sent
+
+    def kill_at_every_point(self, protocol, answer_of, start_of):
+        """A session whose server is killed at every point; the last server finishes it.
+        \return what was acknowledged, by trial"""
+        acknowledged, maybe = {}, None  # facts by trial; the trial whose answer was sent before a kill
+        for point in [*POINTS, None]:
             process = self.begin(protocol)
-            killer = threading.Timer(chance.uniform(0.3, 1.2), process.kill)
-            with contextlib.suppress(ServeError, OSError, ConnectionError):
-                with self.client() as hand:
-                    stored = [(t["trial"], t["stimulus"], t["response"]) for t in hand.server["record"]["stored"]]
-                    self.assertEqual(stored[:len(acknowledged)], acknowledged)
-                    # The last one may be on record although its reply was lost.
-                    self.assertLessEqual(len(stored), len(acknowledged) + 1)
-                    acknowledged = stored
-                    killer.start()
-                    while hand.next is not None:
-                        said = self.trial(hand, chance.choice(["ball", "box"]), renderer="point",
-                                          stimulus=chance.choice(["ball", "box"]), trial=hand.next["trial"])
-                        acknowledged.append((said["trial"], said["stimulus"], said["response"]))
-            killer.cancel()
-            if process.wait(PATIENCE) == -signal.SIGKILL:
-                kills += 1
-            else:
-                break  # all trials were finished before
-        self.assertGreater(kills, 3)
-        rows = [(int(row["trial"]), row["shape"], row["response"]) for row in self.rows()]
-        self.assertEqual(rows[:len(acknowledged)], acknowledged)
-        self.assertLessEqual(len(rows), len(acknowledged) + 1)
-        self.assertGreater(len(acknowledged), 5)
+            if point == "served":
+                process.kill()
+                process.wait(PATIENCE)
+                continue
+            with contextlib.suppress(OSError), self.client() as hand:
+                stored = {t["trial"]: (t["stimulus"], t["response"]) for t in hand.server["record"]["stored"]}
+                self.assertEqual(len(stored), len(hand.server["record"]["stored"]))
+                if maybe is not None and maybe["trial"] in stored:  # its reply alone was lost
+                    acknowledged[maybe["trial"]] = maybe
+                self.assertEqual(stored, {k: (t["stimulus"], t["response"]) for k, t in acknowledged.items()}, point)
+                maybe = None
+                while (due := hand.next) is not None:
+                    start, answer = start_of(due["trial"]), answer_of(due["trial"])
+                    if point is not None:
+                        said, sent = self.kill_at(point, process, hand, due, answer, start)
+                        if said is not None:
+                            acknowledged[due["trial"]] = said
+                        if sent:
+                            maybe = {"trial": due["trial"], "stimulus": start["stimulus"], "response": answer}
+                        break
+                    acknowledged[due["trial"]] = self.trial(hand, answer, trial=due["trial"], **start)
+        self.assertEqual(process.wait(PATIENCE), 0)
+        return acknowledged
+
+    def test_kills_at_twelve_points_lose_no_acknowledged_trial(self):
+        ran = self.rows(self.run_live(self.protocol({**IDENTIFY, "repetitions": 2})))
+        self.assertEqual(len(ran), 8)
+
+        def start_of(trial):  # as palpate run showed it
+            row = ran[trial - 1]
+            return {"stimulus": row["shape"], "renderer": row["renderer"],
+                    "orientation_wxyz": [float(row[f"orientation_{axis}"]) for axis in "wxyz"]}
+
+        acknowledged = self.kill_at_every_point(self.protocol({**EXTERNAL, "name": "which", "trials": 8}), lambda trial: "box", start_of)
+        rows = self.rows()
+        self.assertEqual([int(row["trial"]) for row in rows], list(range(1, 9)))
+        self.assertEqual(sorted(acknowledged), list(range(1, 9)))
+        for row, asked in zip(rows, ran):
+            said = acknowledged[int(row["trial"])]
+            self.assertEqual((row["shape"], row["response"]), (said["stimulus"], said["response"]))
+            if "response_time_s" in said:
+                self.assertEqual(float(row["response_time"]), said["response_time_s"])
+            self.assertEqual({k: v for k, v in row.items() if k not in OF_TIME | OF_PLAN},
+                             {k: v for k, v in asked.items() if k not in OF_TIME | OF_PLAN})
+        self.assertIn(('{"mark":{"code":40,"text":"kept"}}',), self.sql("SELECT text FROM notes"))
+        self.assertIn(("stopped before the kill",), self.sql("SELECT cut_off_reason FROM attempts"))
 
 
 if __name__ == "__main__":
