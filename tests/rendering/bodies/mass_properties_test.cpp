@@ -1,15 +1,20 @@
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/gtc/quaternion.hpp>
 #include <numbers>
 #include <vector>
 
+#include "data/base/random.h"
 #include "rendering/bodies/rigid_motion.h"
 #include "stimuli/closed_surface.h"
 #include "stimuli/orientation.h"
+#include "stimuli/parts/convex_parts.h"
 #include "tests/rendering/bodies/body_fixtures.h"
+#include "tests/stimuli/concave_solids.h"
 
 namespace palpate::rendering::test {
 namespace {
@@ -158,6 +163,39 @@ TEST(MassProperties, OfAClosedSurface) {
     EXPECT_LT(glm::distance(found.centre, expected.centre), slack * 0.1);
     expect_matrix(found.inertia, expected.inertia, slack * expected.inertia[0][0]);
   }
+}
+
+/// Convex parts of a mesh with rounded coordinates abut with steps and gaps.
+TEST(MassProperties, OfPartsOfARoundedFile) {
+  Random random(11);
+  int cut = 0;
+  for (int round = 0; round < 60; ++round) {
+    stimuli::PolygonSoup soup = round % 3 == 0   ? stimuli::solids::random_blocks(random, 8).soup
+                                : round % 3 == 1 ? stimuli::solids::torus(0.03, 0.01, 12, 8).soup
+                                                 : stimuli::solids::stair(3 + round % 4).soup;
+    if (round % 3 != 2) stimuli::solids::split_polygons(soup);
+    const Quat turn = stimuli::uniform_rotation(random);
+    const double grain = std::array{0x1p-30, 1e-8, 1e-6}[random.below(3)];  // m
+    for (Vec3& v : soup.vertices) v = glm::round((turn * v) / grain) * grain;
+    soup.coordinate_error = 0.5 * grain;
+    std::vector<stimuli::ConvexMesh> parts;
+    try {
+      parts = stimuli::convex_parts(soup);
+    } catch (const stimuli::MeshError&) {
+      continue;
+    }
+    std::vector<PlacedMesh> placed;
+    for (const stimuli::ConvexMesh& part : parts) placed.push_back({&part, {}});
+    const MassProperties expected =
+        with_density(moments_of_surface(surface_of({{soup, {}}}), {}), 1000);
+    const MassProperties found = with_density(moments_of_union(placed), 1000);
+    const double slack = 1e3 * grain;  // of the size: some hundred times that of the grain
+    EXPECT_NEAR(found.mass / expected.mass, 1, slack) << round;
+    EXPECT_LT(glm::distance(found.centre, expected.centre), 0.1 * slack) << round;
+    expect_matrix(found.inertia, expected.inertia, slack * expected.inertia[0][0]);
+    ++cut;
+  }
+  EXPECT_GT(cut, 30);
 }
 
 }  // namespace
