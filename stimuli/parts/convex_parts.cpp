@@ -1,6 +1,7 @@
 #include "stimuli/parts/convex_parts.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
@@ -334,12 +335,12 @@ std::vector<ConvexMesh> one_part(const PolygonSoup& soup) {
   }
 }
 
-}  // namespace
-
-std::vector<ConvexMesh> cut_into_convex_parts(const PolygonSoup& soup) {
+/// \param is_surface  set where the faces are a surface, whether or not it can be cut
+std::vector<ConvexMesh> cut_once(const PolygonSoup& soup, bool& is_surface) {
   MeshFaults faults;
   const HalfEdges mesh = link_half_edges(soup, faults, Pieces::any);
   faults.throw_if_any();
+  is_surface = true;
   PlaneTable planes(kErrors * mesh.error);
   const FacetedSolid solid = faceted_solid(mesh, planes, faults);
   faults.throw_if_any();
@@ -363,6 +364,42 @@ std::vector<ConvexMesh> cut_into_convex_parts(const PolygonSoup& soup) {
   check_cover(solid.triangles, parts, kErrors * soup.coordinate_error, faults);
   faults.throw_if_any();
   return parts;
+}
+
+// m; diagonal of the bounding box.
+double diagonal_of(const PolygonSoup& soup) {
+  Vec3 low(std::numeric_limits<double>::max()), high = -low;
+  for (const Vec3& v : soup.vertices) {
+    low = glm::min(low, v);
+    high = glm::max(high, v);
+  }
+  return glm::length(high - low);
+}
+
+}  // namespace
+
+std::vector<ConvexMesh> cut_into_convex_parts(const PolygonSoup& soup) {
+  // A file may show more digits than it has, and planes that meet at small angles miss corners by
+  // more than the digits: then it is read as less exact.
+  constexpr std::array kShares = {1e-7, 1e-6, 1e-5};  // of the size
+  bool is_surface = false;
+  try {
+    return cut_once(soup, is_surface);
+  } catch (const MeshError&) {
+    if (!is_surface) throw;
+    PolygonSoup rough = soup;
+    const double size = diagonal_of(soup);
+    for (const double share : kShares) {
+      if (!(share * size > 2 * soup.coordinate_error)) continue;
+      rough.coordinate_error = share * size;
+      try {
+        return cut_once(rough, is_surface);
+      } catch (const MeshError&) {
+        // The first one says what is wrong.
+      }
+    }
+    throw;
+  }
 }
 
 std::vector<ConvexMesh> convex_parts(const PolygonSoup& soup) {

@@ -56,8 +56,9 @@ std::optional<std::vector<ConvexMesh>> convex_as_it_is(const PolygonSoup& soup);
 /// convex parts with disjoint interiors. Before it returns, the parts are checked against the
 /// surface: their volumes must add up to its volume (divergence theorem) within 1e-9 and the error
 /// of the coordinates times the area, and of 256 points each must lie in as many parts as the
-/// surface winds round it, 0 or 1. \throws MeshError: not closed, turned or crossed faces, a
-/// surface that passes through itself, too many concave edges (kMostConcaveEdges) or parts
+/// surface winds round it, 0 or 1. A surface that cannot be cut is tried again with coordinates
+/// less exact than it says (to 1e-5 of its size). \throws MeshError: not closed, turned or crossed
+/// faces, a surface that passes through itself, too many concave edges (kMostConcaveEdges) or parts
 /// (kMostParts), parts that do not add up
 std::vector<ConvexMesh> cut_into_convex_parts(const PolygonSoup& soup);
 

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
@@ -133,6 +134,36 @@ TEST(ConvexParts, OfSinglePrecisionSolids) {
   solids::Solid ring = solids::torus(0.04, 0.015, 24, 12);
   expect_cover(in_single_precision(ring), "torus", 1e-5);
   EXPECT_EQ(cut_into_convex_parts(in_single_precision(ring).soup).size(), 24U);
+}
+
+/// As files hold them: turned, so that no face is parallel to an axis, with some decimals.
+TEST(ConvexParts, OfRoundedSolids) {
+  Random random(23);
+  for (int i = 0; i < 200; ++i) {
+    const int kind = static_cast<int>(random.below(4));
+    solids::Solid solid =
+        kind == 0   ? solids::random_blocks(random, 4 + static_cast<int>(random.below(12)))
+        : kind == 1 ? solids::torus(0.03, 0.009, 8 + static_cast<int>(random.below(24)), 10)
+        : kind == 2
+            ? solids::prism(solids::random_outline(random, 6 + static_cast<int>(random.below(12))),
+                            0.03)
+            : solids::stair(2 + static_cast<int>(random.below(8)));
+    if (kind < 2) solids::split_polygons(solid.soup);
+    solid = solids::moved(solid, uniform_rotation(random), 1, Vec3(0));
+    const double grain = std::array{0x1p-29, 1e-6, 1e-7, 1e-8}[random.below(4)];  // m
+    for (Vec3& v : solid.soup.vertices) v = glm::round(v / grain) * grain;
+    // A file may show more digits than it has: 0.012344999999999999.
+    solid.soup.coordinate_error = random.below(2) == 0 ? 0.5 * grain : 0;
+    try {
+      const std::vector<ConvexMesh> parts = cut_into_convex_parts(solid.soup);
+      EXPECT_NEAR(volume(parts) / solid.volume, 1, 1e-3) << i;
+      if (solid.holds) {
+        EXPECT_EQ(wrong_points(solid, parts, 1e-4), 0) << i;
+      }
+    } catch (const MeshError& error) {
+      ADD_FAILURE() << i << " kind " << kind << " grain " << grain << ": " << error.faults()[0];
+    }
+  }
 }
 
 TEST(ConvexParts, ADentOfAnyDepth) {
