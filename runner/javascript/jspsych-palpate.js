@@ -6,7 +6,10 @@
 //   const trial = {type: palpate_plugin(hand), choices: ['ball', 'box'], stimulus: 'ball', renderer: 'ray'};
 //
 // `data` gets what palpate has on record: trial, stimulus, renderer, response, correct, response_time_s,
-// first_contact_s, missed_ticks and more; `rt` in ms, as other plugins have it.
+// first_contact_s, missed_ticks and more; `rt` in ms, as other plugins have it. Times: `t_ns` of the answer by palpate's
+// clock (CLOCK_MONOTONIC, as in its record), `at_ms` of the click or key by the page's (performance.now()); the one is the
+// other plus `clock_offset_ms`, within `clock_within_ms`. `stamped` says which of them counts: 'client' is the page's,
+// 'arrival' that the page's clock was not known within 1 ms and the answer counts from when it came.
 
 const TEXT = 'STRING', YES = 'BOOL', NUMBER = 'FLOAT';  // jsPsych's ParameterType, without its module
 
@@ -28,6 +31,8 @@ export const info = {
   data: {
     trial: {type: 'INT'}, stimulus: {type: TEXT}, renderer: {type: TEXT}, response: {type: TEXT}, correct: {type: YES},
     response_time_s: {type: NUMBER}, first_contact_s: {type: NUMBER}, missed_ticks: {type: 'INT'}, rt: {type: NUMBER},
+    t_ns: {type: 'INT'}, at_ms: {type: NUMBER}, clock_offset_ms: {type: NUMBER}, clock_within_ms: {type: NUMBER},
+    stamped: {type: TEXT},
   },
   citations: {apa: '', bibtex: ''},
 };
@@ -56,9 +61,12 @@ export function palpate_plugin(hand) {
       for (;;) {
         try {
           display.innerHTML = trial.waiting;
+          await hand.clock(5);
           await hand.start(what);
-          const said = await hand.answer(await this.#choice(display, trial));
-          const data = {...said, rt: 1000 * said.response_time_s};
+          const {choice, at_ms} = await this.#choice(display, trial);
+          const said = await hand.answer(choice, {at_ms});
+          const {offset_ms, within_ms} = hand.best_clock;
+          const data = {...said, rt: 1000 * said.response_time_s, at_ms, clock_offset_ms: offset_ms, clock_within_ms: within_ms};
           for (const name of ['re', 'ok', 'next', 'record']) delete data[name];
           display.innerHTML = '';
           return this.jsPsych.finishTrial(data);
@@ -70,7 +78,7 @@ export function palpate_plugin(hand) {
       }
     }
 
-    /** Resolves with one of the choices. */
+    /** Resolves with {choice, at_ms}: one of the choices, and when. */
     #choice(display, trial) {
       display.innerHTML = trial.prompt;
       return new Promise((resolve, reject) => {
@@ -78,7 +86,7 @@ export function palpate_plugin(hand) {
         const gone = () => done(() => reject(Object.assign(new Error('closed'), {code: 'closed', reason: 'the server has gone'})));
         const pressed = event => {
           const at = (trial.keys ?? []).indexOf(event.key);
-          if (at >= 0) done(() => resolve(trial.choices[at]));
+          if (at >= 0) done(() => resolve({choice: trial.choices[at], at_ms: event.timeStamp}));
         };
         const done = act => {
           document.removeEventListener('keydown', pressed);
@@ -91,7 +99,7 @@ export function palpate_plugin(hand) {
           const button = element('button', row, trial.labels?.[i] ?? choice);
           button.className = 'jspsych-btn';
           button.dataset.choice = choice;
-          button.addEventListener('click', () => done(() => resolve(choice)));
+          button.addEventListener('click', event => done(() => resolve({choice, at_ms: event.timeStamp})));
         });
         document.addEventListener('keydown', pressed);
         hand.addEventListener('forces_off', off);

@@ -10,6 +10,7 @@
 
 const ALIVE_EVERY = 200;  // ms; the server waits for half a second
 const CLOCK_FOR = 5000;   // ms; the server takes two clocks for drifting apart
+const CLOCK_DRIFT = 50e-6;  // of two quartz clocks
 const WIDTHS = {tip: 3, tail: 3, force: 3, rendered: 3, contact: 3};  // columns; else one
 
 /** The server refused a message, or has gone. `code` is for programs, `place` a JSON pointer. */
@@ -30,7 +31,7 @@ export class Hand extends EventTarget {
   #waiting = new Map();
   #fields = [];
   #alive = null;
-  #clock_asked = 0;  // ms, of performance.now()
+  #clock_asked = -Infinity;  // ms, of performance.now()
   #clock_seen = 0;   // ns: when the server sent the newest answer of clock()
 
   /** What the server said of itself; with a protocol `server.record` has participant, session and what is stored. */
@@ -39,6 +40,8 @@ export class Hand extends EventTarget {
   next = null;
   /** Rows that the server left out because this page did not keep up. */
   dropped = 0;
+  /** As clock() found it: {offset_ms, within_ms, round_trip_ms, asked_ms}; null before. */
+  best_clock = null;
 
   constructor(socket) {
     super();
@@ -113,11 +116,22 @@ export class Hand extends EventTarget {
   load(scene) { return this.ask('load', {scene}); }
   /** Forces on: {stimulus, renderer, trial, level, orientation_wxyz}, each may be left out. Resolves once they are. */
   start(what = {}) { return this.ask('start', what); }
-  /** Ends the trial; resolves with what it was like. `more`: {correct, t_ns}; a time is taken once clock() was asked for:
-      `stamped` says 'client', else 'arrival'. */
-  async answer(response, more = {}) {
-    if (more.t_ns !== undefined && this.#clock_seen && performance.now() - this.#clock_asked > CLOCK_FOR) await this.clock(3);
-    return this.#next(await this.ask('answer', {response, ...more}));
+  /** Ends the trial; resolves with what it was like. `more`: {correct, at_ms, t_ns}. `at_ms`: when it was given, by the
+      page's clock, as event.timeStamp; `t_ns`: by the server's. The server takes the time if it knows the page's clock
+      within 1 ms: `stamped` says 'client', else 'arrival'. */
+  async answer(response, {at_ms, ...more} = {}) {
+    const timed = at_ms !== undefined || (more.t_ns !== undefined && this.best_clock);
+    if (timed && performance.now() - this.#clock_asked > CLOCK_FOR) await this.clock(this.best_clock ? 3 : 10);
+    if (at_ms === undefined) return this.#next(await this.ask('answer', {response, ...more}));
+    const t_ns = this.server_ns(at_ms);
+    try {
+      return this.#next(await this.ask('answer', {response, ...more, t_ns}));
+    } catch (error) {
+      // An answer of just now lies in the server's future if the offset is too large by more than its way there.
+      const is_new = this.server_ns() - t_ns < 1e6 * (this.best_clock.round_trip_ms + 1);
+      if (error.place !== '/t_ns' || !is_new) throw error;
+      return this.#next(await this.ask('answer', {response, ...more}));
+    }
   }
   /** Changes the scene at a JSON pointer. */
   set(path, value) { return this.ask('set', {path, value}); }
@@ -135,9 +149,13 @@ export class Hand extends EventTarget {
     this.#fields = fields;
     return said;
   }
-  /** The server's clock less performance.now(), in ms, by the quickest of so many questions. */
+  /** The server's clock less performance.now(), by the quickest of so many questions: {offset_ms, within_ms, ...}; it is
+      kept as best_clock. */
   async clock(times = 10) {
-    let best = null;
+    const known = this.best_clock;
+    // A quicker answer of before counts for less with time.
+    const now = performance.now();
+    let best = known && {...known, round_trip_ms: known.round_trip_ms + 2 * CLOCK_DRIFT * (now - known.asked_ms), asked_ms: now};
     for (let i = 0; i < times; ++i) {
       const sent = performance.now();
       this.#clock_asked = sent;
@@ -146,9 +164,21 @@ export class Hand extends EventTarget {
       const came = performance.now();
       const round_trip_ms = came - sent - (said.t_sent_ns - said.t_received_ns) / 1e6;
       const offset_ms = (said.t_received_ns + said.t_sent_ns) / 2e6 - (sent + came) / 2;
-      if (!best || round_trip_ms < best.round_trip_ms) best = {offset_ms, round_trip_ms};
+      if (!best || round_trip_ms < best.round_trip_ms)
+        best = {offset_ms, within_ms: round_trip_ms / 2, round_trip_ms, asked_ms: sent};
     }
-    return best;
+    this.best_clock = {...best, within_ms: best.round_trip_ms / 2};
+    return this.best_clock;
+  }
+  /** The server's time, ns, at a time of the page's clock (performance.now(), event.timeStamp), as far as clock() knows. */
+  server_ns(at_ms = performance.now()) {
+    if (!this.best_clock) throw new Error('the server\'s clock is not known: ask clock() first');
+    return Math.round(1e6 * (at_ms + this.best_clock.offset_ms));
+  }
+  /** The page's time, ms, at a time of the server's: `t_ns` of events and rows. */
+  page_ms(t_ns) {
+    if (!this.best_clock) throw new Error('the server\'s clock is not known: ask clock() first');
+    return t_ns / 1e6 - this.best_clock.offset_ms;
   }
   /** The next event of that name, as {event, t_ns, ...}; rejects with ServeError if the server goes before. */
   wait_for(name) {

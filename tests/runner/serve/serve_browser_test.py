@@ -148,6 +148,14 @@ class Pages(ServeCase):
             self.assertAlmostEqual(one["response_time_s"], float(row["response_time"]), places=9)
             self.assertAlmostEqual(one["rt"], 1000 * float(row["response_time"]), places=5)
             self.assertEqual(one["trial_type"], "palpate")
+            # The answer's time by both clocks, as on record.
+            self.assertAlmostEqual((one["t_ns"] - one["zero_t_ns"]) * 1e-9, float(row["response_time"]), places=8)
+            self.assertIn(one["stamped"], ("client", "arrival"))
+            of_page = 1e6 * (one["at_ms"] + one["clock_offset_ms"])
+            if one["stamped"] == "client":
+                self.assertLess(abs(one["t_ns"] - of_page), 2)
+            else:
+                self.assertGreater(one["t_ns"], of_page - 1e6 * one["clock_within_ms"])
         self.assertEqual({one["response"] for one in data}, {"ball", "box"})
 
     def test_a_block_ends_with_the_server(self):
@@ -220,9 +228,20 @@ window.ready = true;
           await hand.start();
           await new Promise(r => setTimeout(r, 700));  // longer than silence may last
           const stopped = await hand.stop();
+          const unknown = (() => {{ try {{ return hand.server_ns(); }} catch (error) {{ return error.message; }} }})();
           const clock = await hand.clock();
-          await hand.close();
-          return {{rows, refused, stopped, clock}};
+          const again = await hand.clock(1);
+          window.hand = hand;
+          while (!(await hand.ask('clock')).known) await hand.clock();  // a busy machine answers late
+          await hand.start();
+          const at_ms = performance.now();
+          await new Promise(r => setTimeout(r, 30));
+          const said = await hand.answer('ball', {{at_ms}});
+          const apart_ms = Math.abs(said.t_ns / 1e6 - at_ms - hand.best_clock.offset_ms);
+          const early = await hand.start().then(() => hand.answer('ball', {{at_ms: 1}})).catch(error => error.place);
+          await hand.stop();
+          return {{rows, refused, stopped, clock, again, unknown, there_and_back: hand.page_ms(hand.server_ns(1234.5)),
+                   stamped: said.stamped, apart_ms, early}};
         }})()""")
         self.assertEqual(got["refused"], ["bad-message", "/renderer"])
         self.assertGreater(len(got["rows"]), 10)
@@ -230,6 +249,17 @@ window.ready = true;
         self.assertEqual(len(got["rows"][0]["tip"]), 3)
         self.assertLess(got["clock"]["round_trip_ms"], 1000)
         self.assertGreater(got["stopped"]["ticks"], 0)
+        self.assertIn("ask clock() first", got["unknown"])
+        self.assertEqual((got["stamped"], got["early"]), ("client", "/t_ns"))
+        self.assertLess(got["apart_ms"], 1e-3)
+        self.assertAlmostEqual(got["there_and_back"], 1234.5, places=5)
+        self.assertLess(got["again"]["within_ms"], got["clock"]["within_ms"] + 0.1)  # one slow question does not spoil it
+        self.assertEqual(got["clock"]["within_ms"], got["clock"]["round_trip_ms"] / 2)
+        before = time.monotonic_ns()
+        page, kept = self.browser.run("[window.hand.server_ns(), window.hand.best_clock.within_ms]")
+        after = time.monotonic_ns()
+        self.assertGreater(page, before - 1e6 * kept - 200_000)  # a page's clock has steps of 0.1 ms
+        self.assertLess(page, after + 1e6 * kept + 200_000)
 
     def test_the_watchers_page(self):
         self.serve()
