@@ -34,37 +34,44 @@ struct Command {
 
 constexpr Command kCommands[] = {
     {"accuracy", "error of the renderers against run time; which tessellation to choose",
-     palpate::runner::accuracy_command},
+     palpate::runner::commands::accuracy_command},
     {"analyze", "per-shape speed-ups with inference, from a database or a CSV file",
-     palpate::runner::analyze_command},
-    {"bench", "run time of the renderers' ticks on this machine", palpate::runner::bench_command},
+     palpate::runner::commands::analyze_command},
+    {"bench", "run time of the renderers' ticks on this machine",
+     palpate::runner::commands::bench_command},
     {"bundle", "data, registration, check and analysis as one folder to deposit",
-     palpate::runner::bundle_command},
-    {"check", "whether a study was run as it was registered", palpate::runner::check_command},
+     palpate::runner::commands::bundle_command},
+    {"check", "whether a study was run as it was registered",
+     palpate::runner::commands::check_command},
     {"cluster", "a sweep, a study or a plan as one array job on Slurm",
-     palpate::runner::cluster_command},
+     palpate::runner::commands::cluster_command},
     {"devices", "connected devices and their limits; timing of this machine; calibration",
-     palpate::runner::devices_command},
-    {"explore", "a window to touch a scene; pictures of it", palpate::runner::explore_command},
-    {"export", "a database's trials as CSV, BIDS or Psych-DS", palpate::runner::export_command},
-    {"forget", "remove a participant who has withdrawn", palpate::runner::forget_command},
-    {"merge", "merge the databases of several stations", palpate::runner::merge_command},
+     palpate::runner::commands::devices_command},
+    {"explore", "a window to touch a scene; pictures of it",
+     palpate::runner::commands::explore_command},
+    {"export", "a database's trials as CSV, BIDS or Psych-DS",
+     palpate::runner::commands::export_command},
+    {"forget", "remove a participant who has withdrawn", palpate::runner::commands::forget_command},
+    {"merge", "merge the databases of several stations", palpate::runner::commands::merge_command},
     {"plan", "how many participants and trials find a wanted effect",
-     palpate::runner::plan_command},
+     palpate::runner::commands::plan_command},
     {"register", "a registration of a study before its first session",
-     palpate::runner::register_command},
-    {"render", "forces along a recorded path, offline", palpate::runner::render_command},
-    {"replay", "render a stored trial again", palpate::runner::replay_command},
-    {"run", "a live session with a person and a device", palpate::runner::run_command},
+     palpate::runner::commands::register_command},
+    {"render", "forces along a recorded path, offline", palpate::runner::commands::render_command},
+    {"replay", "render a stored trial again", palpate::runner::commands::replay_command},
+    {"run", "a live session with a person and a device", palpate::runner::commands::run_command},
     {"schedule", "the order of trials that a participant will get",
-     palpate::runner::schedule_command},
-    {"serve", "a safe haptic server for other programs", palpate::runner::serve_command},
-    {"simulate", "the whole study with simulated participants", palpate::runner::simulate_command},
+     palpate::runner::commands::schedule_command},
+    {"serve", "a safe haptic server for other programs", palpate::runner::commands::serve_command},
+    {"simulate", "the whole study with simulated participants",
+     palpate::runner::commands::simulate_command},
     {"stability", "at what stiffness a loop of hand, device and renderer buzzes",
-     palpate::runner::stability_command},
-    {"sweep", "simulated studies over a space of settings", palpate::runner::sweep_command},
-    {"validate", "check a protocol and list all its faults", palpate::runner::validate_command},
-    {"watch", "a page that shows a stored trial", palpate::runner::watch_command},
+     palpate::runner::commands::stability_command},
+    {"sweep", "simulated studies over a space of settings",
+     palpate::runner::commands::sweep_command},
+    {"validate", "check a protocol and list all its faults",
+     palpate::runner::commands::validate_command},
+    {"watch", "a page that shows a stored trial", palpate::runner::commands::watch_command},
 };
 
 void print_help(std::ostream& out) {
@@ -98,9 +105,9 @@ const Command& command_named(const std::string& name) {
   }
   constexpr std::size_t kLongest = 40;  // of what may be a misspelt command
   const std::string meant = name.size() > kLongest ? "" : palpate::nearest_word(name, names);
-  throw palpate::runner::UsageError("no command '" + name + "'; " +
-                                    (meant.empty() ? "" : "did you mean '" + meant + "'? ") +
-                                    "'palpate --help' lists them");
+  throw palpate::runner::commands::UsageError(
+      "no command '" + name + "'; " + (meant.empty() ? "" : "did you mean '" + meant + "'? ") +
+      "'palpate --help' lists them");
 }
 
 int run(int argc, char** argv) {
@@ -133,7 +140,7 @@ int main(int argc, char** argv) {
     if (!std::cout)
       throw std::runtime_error("standard output could not be written (disk full or pipe closed)");
     return status;
-  } catch (const palpate::runner::UsageError& error) {
+  } catch (const palpate::runner::commands::UsageError& error) {
     std::cerr << "palpate: " << palpate::printable_lines(error.what()) << "\n";
     return 2;
   } catch (const palpate::protocols::InputError& error) {

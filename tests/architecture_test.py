@@ -200,7 +200,9 @@ class Architecture(unittest.TestCase):
         faults = []
         for name, path in SOURCES.items():
             common = room_of(name) == GROUND or name == "stimuli/vec.h"
-            expected = "palpate" if common else "palpate::" + name.split("/")[0]
+            rooms = name.split("/")[:-1]
+            depth = 2 if rooms[0] == "runner" and rooms[1:2] != ["python"] else 1
+            expected = "palpate" if common else "palpate::" + "::".join(rooms[:depth])
             for opened in re.findall(r"^namespace (palpate[\w:]*) \{", path.read_text(), re.M):
                 if opened != expected and not opened.startswith(expected + "::") and not is_declaration(path, opened):
                     faults.append(f"{name}: namespace {opened}, must be {expected}")

@@ -13,12 +13,12 @@ namespace {
 thread_local std::uint64_t count = 0;
 }  // namespace
 
-namespace palpate::runner {
+namespace palpate::runner::bench {
 
 std::uint64_t allocations() { return count; }
 bool counts_allocations() { return PALPATE_COUNT_ALLOCATIONS; }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::bench
 
 #if PALPATE_COUNT_ALLOCATIONS
 

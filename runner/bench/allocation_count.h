@@ -3,7 +3,7 @@
 
 #include <cstdint>
 
-namespace palpate::runner {
+namespace palpate::runner::bench {
 
 /// Heap allocations of this thread so far, counted by a replaced operator new. Always 0 under
 /// sanitizers, which have their own operator new.
@@ -12,4 +12,4 @@ std::uint64_t allocations();
 /// Whether allocations() counts.
 bool counts_allocations();
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::bench

@@ -18,7 +18,7 @@
 #include "runner/servo/servo_thread.h"
 #include "stimuli/primitives.h"
 
-namespace palpate::runner {
+namespace palpate::runner::bench {
 namespace {
 
 constexpr double kRadius = 0.03;             // m
@@ -37,11 +37,11 @@ std::int64_t thread_time_ns() noexcept {
   return time.tv_sec * 1'000'000'000LL + time.tv_nsec;
 }
 
-using Go = SharedMemory<std::atomic<bool>>;
+using Go = safety::SharedMemory<std::atomic<bool>>;
 
 /// Rests outside the sphere until forces are on, then follows a path on it, 1.5 mm deep, while
 /// turning.
-class ScriptedStylus final : public Device {
+class ScriptedStylus final : public servo::Device {
  public:
   ScriptedStylus(double rate, const std::atomic<bool>& go) : rate_(rate), go_(go) {
     capabilities_.name = "led";
@@ -49,8 +49,8 @@ class ScriptedStylus final : public Device {
     capabilities_.max_force = 8.5;
     capabilities_.max_rate = rate;
   }
-  const DeviceCapabilities& capabilities() const override { return capabilities_; }
-  DeviceReading read() noexcept override {
+  const servo::DeviceCapabilities& capabilities() const override { return capabilities_; }
+  servo::DeviceReading read() noexcept override {
     if (!go_.load(std::memory_order_relaxed)) return at({0, 0, 0.1}, 0);
     const double t = ++tick_ / rate_;
     const double angle = t * kSpeed / kRadius;
@@ -62,7 +62,7 @@ class ScriptedStylus final : public Device {
   void write(const Vec3&, const Vec3&) noexcept override {}
 
  private:
-  DeviceReading at(const Vec3& tip, double angle) const noexcept {
+  servo::DeviceReading at(const Vec3& tip, double angle) const noexcept {
     // The axis swings between the surface normal and the tangent.
     const Vec3 out = tip / std::sqrt(tip.x * tip.x + tip.y * tip.y + tip.z * tip.z);
     const double lean = 1.2 * std::sin(0.7 * angle) * std::sin(0.7 * angle);
@@ -75,25 +75,25 @@ class ScriptedStylus final : public Device {
   double rate_;
   const std::atomic<bool>& go_;
   int tick_ = 0;
-  DeviceCapabilities capabilities_;
+  servo::DeviceCapabilities capabilities_;
 };
 
 /// Wraps a device and records the servo thread's CPU time before and after its transfers.
-class MeteredDevice final : public Device {
+class MeteredDevice final : public servo::Device {
  public:
   /// \param go  whether ticks are recorded; \param ticks  largest number of recorded ticks
-  MeteredDevice(Device& device, const std::atomic<bool>& go, std::size_t ticks)
+  MeteredDevice(servo::Device& device, const std::atomic<bool>& go, std::size_t ticks)
       : device_(device), go_(go) {
     compute_.reserve(ticks);
     tick_.reserve(ticks);
     asking_.reserve(ticks);
   }
-  const DeviceCapabilities& capabilities() const override { return device_.capabilities(); }
-  DeviceReading read() noexcept override {
+  const servo::DeviceCapabilities& capabilities() const override { return device_.capabilities(); }
+  servo::DeviceReading read() noexcept override {
     const std::int64_t began = thread_time_ns();
     if (recording_ && tick_.size() < tick_.capacity())
       tick_.push_back(began - written_ + last_compute_);
-    DeviceReading reading = device_.read();
+    servo::DeviceReading reading = device_.read();
     read_ = thread_time_ns();
     return reading;
   }
@@ -115,7 +115,7 @@ class MeteredDevice final : public Device {
   const std::vector<std::int64_t>& whole() const { return tick_; }
 
  private:
-  Device& device_;
+  servo::Device& device_;
   const std::atomic<bool>& go_;
   bool recording_ = false;
   std::int64_t read_ = 0, written_ = 0, last_compute_ = 0;
@@ -135,7 +135,7 @@ std::vector<std::int64_t> sorted(std::vector<std::int64_t> values) {
 }
 
 /// One long trial; records every tick with forces on.
-void run_trial(ServoThread& servo, double rate, std::size_t wanted,
+void run_trial(servo::ServoThread& servo, double rate, std::size_t wanted,
                const std::function<bool()>& wait, std::atomic<bool>& go, ServoTiming& out,
                std::vector<std::int64_t>& compute, std::vector<std::int64_t>& warm_up) {
   const rendering::Scene scene(
@@ -147,15 +147,15 @@ void run_trial(ServoThread& servo, double rate, std::size_t wanted,
   int run = 0;
   bool tripped = false;
   while (out.lateness.size() < wanted) {
-    const Sample& sample = servo.next();
-    if (sample.faults & servo_fault::kStalled) break;
-    const bool trips = (sample.faults & servo_fault::kTripped) != 0;
+    const servo::Sample& sample = servo.next();
+    if (sample.faults & servo::servo_fault::kStalled) break;
+    const bool trips = (sample.faults & servo::servo_fault::kTripped) != 0;
     if (trips && !tripped) {
       ++out.trips;
       servo.clear_fault();
     }
     tripped = trips;
-    if (sample.phase != Phase::feeling) continue;
+    if (sample.phase != servo::Phase::feeling) continue;
     go.store(true, std::memory_order_relaxed);
     out.lateness.push_back(sample.lateness_ns);
     compute.push_back(sample.compute_ns);
@@ -164,7 +164,7 @@ void run_trial(ServoThread& servo, double rate, std::size_t wanted,
     out.missed_ticks += static_cast<std::uint64_t>(missed);
     run = missed > 0 ? run + static_cast<int>(missed) : 0;
     out.worst_run = std::max(out.worst_run, run);
-    out.old_readings += (sample.faults & servo_fault::kOldReading) != 0 ? 1 : 0;
+    out.old_readings += (sample.faults & servo::servo_fault::kOldReading) != 0 ? 1 : 0;
     const auto now = std::chrono::steady_clock::now();
     if (!wait || now - shown < std::chrono::milliseconds(200)) continue;
     shown = now;
@@ -180,17 +180,17 @@ ServoTiming measure_servo(const TimingSettings& settings, const std::function<bo
   const Go go;
   go->store(false);
   ScriptedStylus own(rate, *go);
-  std::unique_ptr<GuardedDevice> guarded;
+  std::unique_ptr<safety::GuardedDevice> guarded;
   if (settings.guarded) {
-    GuardSettings guard;
+    safety::GuardSettings guard;
     guard.rate = rate;
     guard.priority = settings.realtime.priority > 0 ? settings.realtime.priority + 5 : 0;
-    guarded = std::make_unique<GuardedDevice>(
+    guarded = std::make_unique<safety::GuardedDevice>(
         [rate, &go] { return std::make_unique<ScriptedStylus>(rate, *go); }, guard);
   }
-  MeteredDevice device(guarded ? static_cast<Device&>(*guarded) : own, *go, wanted);
-  RealClock clock;
-  ServoSettings servo_settings;
+  MeteredDevice device(guarded ? static_cast<servo::Device&>(*guarded) : own, *go, wanted);
+  servo::RealClock clock;
+  servo::ServoSettings servo_settings;
   servo_settings.rate = rate;
   servo_settings.realtime = settings.realtime;
   ServoTiming out;
@@ -200,7 +200,7 @@ ServoTiming measure_servo(const TimingSettings& settings, const std::function<bo
   by_clock.reserve(wanted);
   warm_up.reserve(wanted);
   {
-    ServoThread servo(device, clock, servo_settings);
+    servo::ServoThread servo(device, clock, servo_settings);
     out.rights = servo.rights();
     run_trial(servo, rate, wanted, wait, *go, out, by_clock, warm_up);
   }
@@ -262,14 +262,14 @@ struct SharedTimes {
 };
 
 /// In the guard process: shares the device's times with the runner.
-class TimedDevice final : public Device {
+class TimedDevice final : public servo::Device {
  public:
-  TimedDevice(std::unique_ptr<Device> device, SharedTimes& shared)
+  TimedDevice(std::unique_ptr<servo::Device> device, SharedTimes& shared)
       : device_(std::move(device)), shared_(shared) {}
-  const DeviceCapabilities& capabilities() const override { return device_->capabilities(); }
-  DeviceReading read() noexcept override {
-    DeviceReading reading = device_->read();
-    const DeviceTimes times = device_->times();
+  const servo::DeviceCapabilities& capabilities() const override { return device_->capabilities(); }
+  servo::DeviceReading read() noexcept override {
+    servo::DeviceReading reading = device_->read();
+    const servo::DeviceTimes times = device_->times();
     shared_.pose_ns.store(times.pose_ns);
     shared_.force_ns.store(times.force_ns);
     return reading;
@@ -280,11 +280,11 @@ class TimedDevice final : public Device {
   void reopen() override { device_->reopen(); }
 
  private:
-  std::unique_ptr<Device> device_;
+  std::unique_ptr<servo::Device> device_;
   SharedTimes& shared_;
 };
 
-Percentiles percentiles(std::vector<std::int64_t> values) {
+devices::Percentiles percentiles(std::vector<std::int64_t> values) {
   values = sorted(std::move(values));
   return {quantile(values, 0.5), quantile(values, 0.99), quantile(values, 0.999),
           quantile(values, 1)};
@@ -296,10 +296,10 @@ struct ChainTicks {
 };
 
 /// Reads and writes the device at its rate, with the rights of a servo thread.
-void run_chain(GuardedDevice& device, const SharedTimes& shared, double rate, double seconds,
-               ChainTicks& ticks, ChainTiming& out) {
-  request_realtime({});
-  RealClock clock;
+void run_chain(safety::GuardedDevice& device, const SharedTimes& shared, double rate,
+               double seconds, ChainTicks& ticks, devices::ChainTiming& out) {
+  servo::request_realtime({});
+  servo::RealClock clock;
   const auto period = static_cast<std::int64_t>(1e9 / rate);
   const auto warm_up = static_cast<std::uint64_t>(kUncounted * rate);
   const auto last = warm_up + static_cast<std::uint64_t>(seconds * rate);
@@ -310,7 +310,7 @@ void run_chain(GuardedDevice& device, const SharedTimes& shared, double rate, do
     due = std::max(due + period, clock.now_ns() - period);
     clock.wait_until(due);
     const std::int64_t began = clock.now_ns();
-    const DeviceReading reading = device.read();
+    const servo::DeviceReading reading = device.read();
     const std::int64_t used = clock.now_ns();
     const bool counts = tick >= warm_up;
     if (counts) {
@@ -328,7 +328,7 @@ void run_chain(GuardedDevice& device, const SharedTimes& shared, double rate, do
       if (counts) ++out.lost;
       wrote_ns = 0;
     } else {
-      if (counts && reading.trouble == DeviceTrouble::late) ++out.late;
+      if (counts && reading.trouble == servo::DeviceTrouble::late) ++out.late;
       age = used - shared.pose_ns.load();
       if (counts) ticks.ages.push_back(age);
       wrote_ns = clock.now_ns();
@@ -339,23 +339,24 @@ void run_chain(GuardedDevice& device, const SharedTimes& shared, double rate, do
 
 }  // namespace
 
-ChainTiming measure_chain(const DeviceKind& kind, const DeviceConfig& config, double seconds) {
-  const SharedMemory<SharedTimes> memory;
+devices::ChainTiming measure_chain(const devices::DeviceKind& kind,
+                                   const servo::DeviceConfig& config, double seconds) {
+  const safety::SharedMemory<SharedTimes> memory;
   SharedTimes& shared = *memory;
-  GuardSettings settings;
+  safety::GuardSettings settings;
   settings.rate = config.rate;
-  GuardedDevice device(
-      [&kind, &config, &shared]() -> std::unique_ptr<Device> {
+  safety::GuardedDevice device(
+      [&kind, &config, &shared]() -> std::unique_ptr<servo::Device> {
         return std::make_unique<TimedDevice>(kind.open(config), shared);
       },
       settings);
-  ChainTiming out;
+  devices::ChainTiming out;
   ChainTicks ticks;
   // A thread of its own: the caller keeps its ordinary priority.
   std::thread([&] { run_chain(device, shared, config.rate, seconds, ticks, out); }).join();
   if (ticks.ages.empty())
     throw std::runtime_error(std::string(kind.name) +
-                             " gave no pose: " + advice(device.read().trouble));
+                             " gave no pose: " + servo::advice(device.read().trouble));
   if (shared.pose_ns.load() == 0)
     throw std::runtime_error(std::string(kind.name) +
                              " does not report when it senses and pushes: its delay cannot be "
@@ -372,4 +373,4 @@ ChainTiming measure_chain(const DeviceKind& kind, const DeviceConfig& config, do
   return out;
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::bench

@@ -11,18 +11,18 @@
 #include "runner/devices/registry.h"
 #include "runner/servo/realtime.h"
 
-namespace palpate::runner {
+namespace palpate::runner::bench {
 
 struct TimingSettings {
   double rate = 1000;   ///< Hz
   double seconds = 10;  ///< of ticks with forces on
-  RealtimeSettings realtime;
+  servo::RealtimeSettings realtime;
   bool guarded = false;  ///< with the device in a guard process, like a real one
 };
 
 /// Of ticks with forces on; times in ns. Quantiles are exact.
 struct ServoTiming {
-  RealtimeRights rights;
+  servo::RealtimeRights rights;
   double rate = 0;
   std::uint64_t ticks = 0, missed_ticks = 0, old_readings = 0;
   std::int64_t lateness_median = 0, lateness_p99 = 0, lateness_p999 = 0, lateness_max = 0;
@@ -53,6 +53,7 @@ ServoTiming measure_servo(const TimingSettings& settings, const std::function<bo
 /// Opens a device as a session does, reads and writes it at its rate, at zero force, and measures
 /// the delay from its pose to its force through the guard process.
 /// \throws std::runtime_error: the device cannot be opened, or does not report its times
-ChainTiming measure_chain(const DeviceKind& kind, const DeviceConfig& config, double seconds);
+devices::ChainTiming measure_chain(const devices::DeviceKind& kind,
+                                   const servo::DeviceConfig& config, double seconds);
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::bench

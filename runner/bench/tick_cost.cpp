@@ -18,7 +18,7 @@
 #include "runner/servo/tick_clock.h"
 #include "stimuli/primitives.h"
 
-namespace palpate::runner {
+namespace palpate::runner::bench {
 
 // Times ticks one by one. For runner/bench only.
 
@@ -26,11 +26,11 @@ class TickTimer {
  public:
   static constexpr double kTick = 1e-3;  ///< s
 
-  TickTimer() : ns_(nanoseconds_per_count()) {
+  TickTimer() : ns_(servo::nanoseconds_per_count()) {
     std::vector<std::uint64_t> empty(100'000);
     for (auto& count : empty) {
-      const std::uint64_t start = begin_count();
-      count = end_count() - start;
+      const std::uint64_t start = servo::begin_count();
+      count = servo::end_count() - start;
     }
     empty_ns_ = at(empty, 0.5);
   }
@@ -40,9 +40,9 @@ class TickTimer {
                             rendering::RenderState& state, const rendering::LineProbe& probe,
                             bool touching_wanted) {
     const std::uint64_t allocated = allocations();
-    const std::uint64_t start = begin_count();
+    const std::uint64_t start = servo::begin_count();
     rendering::Rendering rendering = renderer.tick(scene, state, probe, kTick);
-    const std::uint64_t count = end_count() - start;
+    const std::uint64_t count = servo::end_count() - start;
     allocations_ += allocations() - allocated;
     if ((rendering.contacts > 0) == touching_wanted) counts_.push_back(count);
     return rendering;
@@ -429,4 +429,4 @@ std::vector<TickCost> measure_tick_costs(
   return rows;
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::bench

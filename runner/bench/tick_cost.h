@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-namespace palpate::runner {
+namespace palpate::runner::bench {
 
 constexpr int kTickRounds = 5;
 
@@ -49,4 +49,4 @@ std::vector<TickCost> measure_tick_costs(
     const TickCostSettings& settings,
     const std::function<void(std::size_t, std::size_t)>& done = {});
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::bench

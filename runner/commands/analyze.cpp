@@ -27,7 +27,7 @@
 #include "runner/commands/shared/study_options.h"
 #include "runner/commands/sweep/sweep.h"
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 
 namespace {
 
@@ -281,4 +281,4 @@ int analyze_command(const std::vector<std::string>& args) {
   return 0;
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

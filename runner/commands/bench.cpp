@@ -12,18 +12,18 @@
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/outputs.h"
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 namespace {
 
 namespace po = boost::program_options;
 
-std::string table(const std::vector<TickCost>& rows) {
+std::string table(const std::vector<bench::TickCost>& rows) {
   std::string out;
   char line[200];
   std::snprintf(line, sizeof line, "%-24s%10s  %-7s%-14s%8s%8s%8s%9s%7s%8s\n", "mesh", "triangles",
                 "probe", "state", "median", "p99", "max us", "net", "target", "allocs");
   out += line;
-  for (const TickCost& r : rows) {
+  for (const bench::TickCost& r : rows) {
     if (r.ticks == 0) {
       std::snprintf(line, sizeof line, "%-24s%10zu  %-7s%-14s did not occur\n", r.mesh.c_str(),
                     r.triangles, r.renderer.c_str(), r.state.c_str());
@@ -38,9 +38,9 @@ std::string table(const std::vector<TickCost>& rows) {
   return out;
 }
 
-const TickCost* find(const std::vector<TickCost>& rows, std::size_t triangles,
-                     const char* renderer) {
-  for (const TickCost& r : rows) {
+const bench::TickCost* find(const std::vector<bench::TickCost>& rows, std::size_t triangles,
+                            const char* renderer) {
+  for (const bench::TickCost& r : rows) {
     if (r.mesh == "icosphere" && r.triangles == triangles && r.renderer == renderer &&
         r.state == "contact") {
       return &r;
@@ -49,9 +49,9 @@ const TickCost* find(const std::vector<TickCost>& rows, std::size_t triangles,
   return nullptr;
 }
 
-const TickCost* find_union(const std::vector<TickCost>& rows, std::size_t triangles,
-                           std::size_t parts) {
-  for (const TickCost& r : rows) {
+const bench::TickCost* find_union(const std::vector<bench::TickCost>& rows, std::size_t triangles,
+                                  std::size_t parts) {
+  for (const bench::TickCost& r : rows) {
     if (r.target_is_p99 && r.near_parts == 10 && r.segments == 3 && r.triangles == triangles &&
         r.parts == parts && r.ticks > 0) {
       return &r;
@@ -61,10 +61,10 @@ const TickCost* find_union(const std::vector<TickCost>& rows, std::size_t triang
 }
 
 /// Ten near parts and three segments: the cost, and its growth.
-std::string growth_of_unions(const std::vector<TickCost>& rows) {
-  const TickCost* const ten = find_union(rows, 1280, 10);
-  const TickCost* const many = find_union(rows, 1280, 1000);
-  const TickCost* const fine = find_union(rows, 327680, 10);
+std::string growth_of_unions(const std::vector<bench::TickCost>& rows) {
+  const bench::TickCost* const ten = find_union(rows, 1280, 10);
+  const bench::TickCost* const many = find_union(rows, 1280, 1000);
+  const bench::TickCost* const fine = find_union(rows, 327680, 10);
   if (ten == nullptr || many == nullptr || fine == nullptr) return "";
   char text[300];
   std::snprintf(text, sizeof text,
@@ -77,12 +77,12 @@ std::string growth_of_unions(const std::vector<TickCost>& rows) {
 }
 
 /// The meaning of the numbers for a lab.
-std::string conclusions(const std::vector<TickCost>& rows) {
+std::string conclusions(const std::vector<bench::TickCost>& rows) {
   std::string out;
   char text[300];
   for (const char* renderer : {"point", "ray"}) {
-    const TickCost* const small = find(rows, 1280, renderer);
-    const TickCost* const large = find(rows, 327680, renderer);
+    const bench::TickCost* const small = find(rows, 1280, renderer);
+    const bench::TickCost* const large = find(rows, 327680, renderer);
     if (small == nullptr || large == nullptr) continue;
     std::snprintf(text, sizeof text,
                   "Growth from 1,280 to 327,680 triangles in contact, %s: %.2fx as read, %.2fx "
@@ -92,7 +92,7 @@ std::string conclusions(const std::vector<TickCost>& rows) {
   }
   out += growth_of_unions(rows);
   double p99 = 0;
-  for (const TickCost& r : rows) p99 = std::max(p99, r.p99_highest_ns);
+  for (const bench::TickCost& r : rows) p99 = std::max(p99, r.p99_highest_ns);
   const double percent = p99 / 100'000 * 100;
   std::snprintf(
       text, sizeof text,
@@ -106,9 +106,9 @@ std::string conclusions(const std::vector<TickCost>& rows) {
   return out + text;
 }
 
-nlohmann::ordered_json to_json(const std::vector<TickCost>& rows) {
+nlohmann::ordered_json to_json(const std::vector<bench::TickCost>& rows) {
   auto list = nlohmann::ordered_json::array();
-  for (const TickCost& r : rows) {
+  for (const bench::TickCost& r : rows) {
     nlohmann::ordered_json row = {{"mesh", r.mesh},
                                   {"triangles", r.triangles},
                                   {"renderer", r.renderer},
@@ -157,18 +157,18 @@ int bench_command(const std::vector<std::string>& args) {
   const long ticks = (*values)["ticks"].as<long>();
   if (ticks < 1000 || ticks > 100'000'000)
     throw UsageError("--ticks: must be 1000 to 100000000, not " + std::to_string(ticks));
-  TickCostSettings settings;
+  bench::TickCostSettings settings;
   settings.ticks = static_cast<std::size_t>(ticks);
   settings.approaches = std::max<std::size_t>(50, settings.ticks / 200);
   const bool terminal = isatty(STDERR_FILENO) != 0;
-  const auto rows = measure_tick_costs(settings, [&](std::size_t so_far, std::size_t all) {
+  const auto rows = bench::measure_tick_costs(settings, [&](std::size_t so_far, std::size_t all) {
     if (terminal)
       std::fprintf(stderr, "\r%zu of %zu rows%s", so_far, all, so_far == all ? "\n" : "");
   });
   std::cout
       << "A tick, ns (max: us). An empty tick takes " << rows[0].empty_loop_ns
       << ", which is subtracted in the net median. The lowest median and the lowest p99 of "
-      << kTickRounds
+      << bench::kTickRounds
       << " rounds of the same ticks;\nthe maximum is mostly due to the operating system.\n"
          "Stylus at 0.1 m/s; contact 1 to 2 mm deep; free: 1 to 2 mm off the bounding sphere; "
          "first_contact: in a new trial each. Where a tool is named, the target is that of p99.\n\n"
@@ -179,4 +179,4 @@ int bench_command(const std::vector<std::string>& args) {
   return 0;
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

@@ -17,7 +17,7 @@
 #include "runner/commands/shared/progress_line.h"
 #include "runner/commands/shared/protocol_choice.h"
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 namespace {
 
 namespace po = boost::program_options;
@@ -245,4 +245,4 @@ int export_command(const std::vector<std::string>& args) {
   return 0;
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

@@ -9,7 +9,7 @@
 #include "data/store/store.h"
 #include "runner/commands/shared/command.h"
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 namespace {
 
 namespace po = boost::program_options;
@@ -120,4 +120,4 @@ int forget_command(const std::vector<std::string>& args) {
   return remove(store, code, database) ? 0 : 1;
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

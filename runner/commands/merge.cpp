@@ -12,7 +12,7 @@
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/progress_line.h"
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 namespace {
 
 namespace po = boost::program_options;
@@ -134,4 +134,4 @@ int merge_command(const std::vector<std::string>& args) {
   return 0;
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

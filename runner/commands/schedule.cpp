@@ -12,7 +12,7 @@
 #include "runner/commands/shared/outputs.h"
 #include "runner/commands/shared/task_words.h"
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 namespace {
 
 namespace po = boost::program_options;
@@ -125,4 +125,4 @@ int schedule_command(const std::vector<std::string>& args) {
   return 0;
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

@@ -23,7 +23,7 @@
 #include "runner/commands/shared/study_options.h"
 #include "runner/session/simulated_study.h"
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 namespace {
 
 namespace po = boost::program_options;
@@ -80,10 +80,10 @@ std::optional<SimulateSettings> parse_simulate_settings(const std::vector<std::s
 }
 
 /// \throws UsageError: no such shard
-StudyPlan plan_of(const SimulateSettings& settings) {
+session::StudyPlan plan_of(const SimulateSettings& settings) {
   const Shard shard =
       parse_shard(settings.shard, [](const char* name) { return std::getenv(name); });
-  StudyPlan plan;
+  session::StudyPlan plan;
   plan.seed = settings.study.seed;
   plan.jobs = settings.jobs;
   plan.advisor = settings.advisor;
@@ -104,7 +104,7 @@ int version_begun_with(data::Store& store, const std::string& protocol_sha256,
     if (sha256.empty()) continue;  // a human participant
     auto known = version_of.find(sha256);
     if (known == version_of.end())
-      known = version_of.emplace(sha256, participant_version_of(sha256, patch)).first;
+      known = version_of.emplace(sha256, participants::participant_version_of(sha256, patch)).first;
     if (!known->second) continue;
     all.insert(*known->second);
     if (run.protocol_sha256 == protocol_sha256) own.insert(*known->second);
@@ -114,8 +114,8 @@ int version_begun_with(data::Store& store, const std::string& protocol_sha256,
 
 /// \param seconds  run time
 void print_summary(const protocols::Protocol& protocol, const std::string& database,
-                   const SimulatedSettings& simulated, std::uint64_t seed,
-                   const StudyProgress& progress, double seconds) {
+                   const participants::SimulatedSettings& simulated, std::uint64_t seed,
+                   const session::StudyProgress& progress, double seconds) {
   std::printf("%s, SIMULATED participants: %lld of %lld trials in %s\n", protocol.name.c_str(),
               static_cast<long long>(progress.recorded), static_cast<long long>(progress.expected),
               printable(database).c_str());
@@ -128,7 +128,7 @@ void print_summary(const protocols::Protocol& protocol, const std::string& datab
 }
 
 /// Prints blocks with no answer in a tenth or more of the trials, and remedies.
-void print_unanswered(const protocols::Protocol& protocol, const StudyProgress& progress) {
+void print_unanswered(const protocols::Protocol& protocol, const session::StudyProgress& progress) {
   for (const protocols::TaskBlock& block : protocol.blocks) {
     const auto found = progress.by_block.find(block.name);
     if (found == progress.by_block.end()) continue;
@@ -160,7 +160,7 @@ int simulate_command(const std::vector<std::string>& args) {
   const std::optional<SimulateSettings> given = parse_simulate_settings(args);
   if (!given) return 0;
   const StudyOptions& options = given->study;
-  StudyPlan plan = plan_of(*given);
+  session::StudyPlan plan = plan_of(*given);
   protocols::Protocol protocol = protocols::parse_protocol(options.protocol);
   std::optional<data::Store> store;
   const auto open = [&] {
@@ -172,10 +172,11 @@ int simulate_command(const std::vector<std::string>& args) {
     store.emplace(open());
     version = version_begun_with(*store, protocol.sha256, options.patch);
   }
-  if (version == 0) version = kDefaultParticipantVersion;
-  const SimulatedSettings simulated = load_simulated_settings(options.patch, version);
+  if (version == 0) version = participants::kDefaultParticipantVersion;
+  const participants::SimulatedSettings simulated =
+      participants::load_simulated_settings(options.patch, version);
   // Check before creating a database, so that a refusal leaves none behind.
-  const LimitedForSimulation limited = fit_to_simulation(protocol, simulated);
+  const session::LimitedForSimulation limited = fit_to_simulation(protocol, simulated);
   for (const std::string& text : limited.texts)
     std::fprintf(stderr, "%s\n", printable(text).c_str());
   plan.event = limited.event;
@@ -184,8 +185,9 @@ int simulate_command(const std::vector<std::string>& args) {
 
   const auto start = std::chrono::steady_clock::now();
   ProgressLine line("trials");
-  const StudyProgress progress = simulate_study(
-      protocol, *store, simulated, plan, catch_stop_signals(), [&line](const StudyProgress& p) {
+  const session::StudyProgress progress = session::simulate_study(
+      protocol, *store, simulated, plan, catch_stop_signals(),
+      [&line](const session::StudyProgress& p) {
         line.show(static_cast<double>(p.recorded) / static_cast<double>(p.expected));
       });
   line.clear();
@@ -199,4 +201,4 @@ int simulate_command(const std::vector<std::string>& args) {
   return 0;
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

@@ -22,7 +22,7 @@
 #include "stimuli/parts/overlaps.h"
 #include "stimuli/primitives.h"
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 namespace {
 
 constexpr double kTypicalTrial = 10;  // s; a little more than in the paper
@@ -141,41 +141,44 @@ void print_summary(const protocols::Protocol& protocol, std::ostream& out) {
 }
 
 void print_verdict(const std::string& what, const std::vector<std::string>& reasons,
-                   const std::vector<LimitedMaterial>& limited, std::ostream& out) {
+                   const std::vector<session::LimitedMaterial>& limited, std::ostream& out) {
   out << "    " << std::left << std::setw(15) << what
       << (reasons.empty() ? limited.empty() ? "yes" : "yes, with limits:" : "no:") << "\n";
   for (const std::string& reason : reasons) out << "      " << printable(reason) << "\n";
   if (!reasons.empty()) return;
-  for (const LimitedMaterial& one : limited) out << "      " << printable(one.text) << "\n";
+  for (const session::LimitedMaterial& one : limited)
+    out << "      " << printable(one.text) << "\n";
 }
 
 /// Prints whether each kind of device and simulated participants can run the protocol, or why not.
 /// \param measured  delays of devices, which lower the stiffness that they can show
 void print_fitness(const protocols::Protocol& protocol, const StimulusLibrary& library,
-                   const std::vector<ChainTiming>& measured, std::ostream& out) {
-  DeviceConfig config;
+                   const std::vector<devices::ChainTiming>& measured, std::ostream& out) {
+  servo::DeviceConfig config;
   config.rate = protocol.servo_rate;
   config.stylus_length = protocol.stylus.length;
   config.stylus_grip = protocol.stylus.grip;
   out << "  can be shown by (run --device NAME)\n";
-  for (const DeviceKind& kind : device_kinds()) {
-    DeviceCapabilities can = kind.nominal(config);
-    const auto chain = std::ranges::find(measured, kind.name, &ChainTiming::device);
-    if (chain != measured.end()) can = with_delay(can, chain->counted(), protocol.servo_rate);
+  for (const devices::DeviceKind& kind : devices::device_kinds()) {
+    servo::DeviceCapabilities can = kind.nominal(config);
+    const auto chain = std::ranges::find(measured, kind.name, &devices::ChainTiming::device);
+    if (chain != measured.end())
+      can = devices::with_delay(can, chain->counted(), protocol.servo_rate);
     protocols::Protocol shown = protocol;
-    const std::vector<LimitedMaterial> limited = limit_materials(shown, can);
-    print_verdict(kind.name, incompatibilities(shown, library, can), limited, out);
+    const std::vector<session::LimitedMaterial> limited = session::limit_materials(shown, can);
+    print_verdict(kind.name, session::incompatibilities(shown, library, can), limited, out);
     if (chain != measured.end())
       out << "      with its delay of " << chain->counted() * 1e3
           << " ms from pose to force, measured " << printable(chain->made_utc) << "\n";
   }
-  const SimulatedSettings settings = load_simulated_settings("");
-  const SimulatedStylus stylus(settings.device, settings.hand, protocol.stylus.length,
-                               protocol.stylus.grip, 1 / protocol.servo_rate);
+  const participants::SimulatedSettings settings = participants::load_simulated_settings("");
+  const devices::SimulatedStylus stylus(settings.device, settings.hand, protocol.stylus.length,
+                                        protocol.stylus.grip, 1 / protocol.servo_rate);
   protocols::Protocol shown = protocol;
-  const std::vector<LimitedMaterial> limited = limit_materials(shown, stylus.capabilities());
+  const std::vector<session::LimitedMaterial> limited =
+      session::limit_materials(shown, stylus.capabilities());
   out << "  can be tried with simulated participants\n";
-  print_verdict("simulate", simulation_faults(shown, library, settings), limited, out);
+  print_verdict("simulate", session::simulation_faults(shown, library, settings), limited, out);
 }
 
 }  // namespace
@@ -204,10 +207,11 @@ int validate_command(const std::vector<std::string>& args) {
   if (!values) return 0;
   const auto file = (*values)["PROTOCOL.json"].as<std::string>();
 
-  const std::vector<ChainTiming> measured =
-      calibration.empty() ? std::vector<ChainTiming>() : stored_chains(chain_file(calibration));
+  const std::vector<devices::ChainTiming> measured =
+      calibration.empty() ? std::vector<devices::ChainTiming>()
+                          : devices::stored_chains(devices::chain_file(calibration));
   if (!calibration.empty() && measured.empty())
-    throw UsageError("--calibration: there is no " + printable(chain_file(calibration)) +
+    throw UsageError("--calibration: there is no " + printable(devices::chain_file(calibration)) +
                      "; make it with palpate devices --timing --device NAME --calibration FILE");
   protocols::Protocol protocol = protocols::parse_protocol(file);
   if (!language.empty()) protocols::translate(protocol, file, language);
@@ -242,4 +246,4 @@ int validate_command(const std::vector<std::string>& args) {
   return 0;
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

@@ -8,7 +8,7 @@
 #include "data/files/atomic_file.h"
 #include "protocols/json_document.h"
 
-namespace palpate::runner {
+namespace palpate::runner::devices {
 namespace {
 
 using nlohmann::ordered_json;
@@ -76,7 +76,7 @@ ordered_json to_json(const ChainTiming& chain) {
           {"made_utc", chain.made_utc}};
 }
 
-DeviceCapabilities with_delay(DeviceCapabilities device, double delay, double rate) {
+servo::DeviceCapabilities with_delay(servo::DeviceCapabilities device, double delay, double rate) {
   const double half = 0.5 / rate, share = half / (half + delay);
   device.max_stiffness *= share;
   device.damping *= share;
@@ -120,4 +120,4 @@ void store_chain(const std::string& path, const ChainTiming& timing) {
   file.commit(true);
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::devices

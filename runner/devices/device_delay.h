@@ -9,7 +9,7 @@
 
 #include "runner/servo/device.h"
 
-namespace palpate::runner {
+namespace palpate::runner::devices {
 
 struct Percentiles {
   std::int64_t median = 0, p99 = 0, p999 = 0, max = 0;  ///< ns
@@ -36,7 +36,7 @@ struct ChainTiming {
 /// Limits of a device with this delay (s). A sampled spring with a delay needs damping K (T/2 +
 /// delay) instead of K T/2 (Colgate & Schenkel 1997), so the device's damping and its largest
 /// stiffness shrink by T/2 over T/2 + delay. \param rate  1/T, Hz, of the servo
-DeviceCapabilities with_delay(DeviceCapabilities device, double delay, double rate);
+servo::DeviceCapabilities with_delay(servo::DeviceCapabilities device, double delay, double rate);
 
 nlohmann::ordered_json to_json(const ChainTiming& chain);
 
@@ -48,4 +48,4 @@ void store_chain(const std::string& path, const ChainTiming& timing);
 /// Empty where there is no such file. \throws protocols::InputError
 std::vector<ChainTiming> stored_chains(const std::string& path);
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::devices

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
-namespace palpate::runner {
+namespace palpate::runner::devices {
 namespace {
 
 constexpr double kReach = 0.25;       // m; limit of the tip's coordinates
@@ -71,7 +71,7 @@ StylusTarget MouseStylus::initial_target() const {
   return target;
 }
 
-DeviceReading MouseStylus::read() noexcept {
+servo::DeviceReading MouseStylus::read() noexcept {
   target_.read(wanted_);
   now_.tip = towards(now_.tip, wanted_.tip, follow_, longest_step_);
   // The tail follows separately and is then set back to the stylus' length.
@@ -82,4 +82,4 @@ DeviceReading MouseStylus::read() noexcept {
   return {now_, 0, false};
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::devices

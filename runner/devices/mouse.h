@@ -5,7 +5,7 @@
 #include "runner/servo/device.h"
 #include "runner/servo/triple_buffer.h"
 
-namespace palpate::runner {
+namespace palpate::runner::devices {
 
 /// Target pose of the stylus, set by pointer, wheel and modifiers. Belongs to the window's thread.
 /// Device frame, which is the world's: x to the right, y away from the viewer, z up.
@@ -27,7 +27,7 @@ struct StylusTarget {
 
 /// The device. set_target() is called by the window's thread, the rest by the servo's; neither
 /// waits for the other.
-class MouseStylus final : public Device {
+class MouseStylus final : public servo::Device {
  public:
   /// \param length  m, of the stylus; \param rate  Hz, of the servo
   MouseStylus(double length, double rate);
@@ -36,15 +36,15 @@ class MouseStylus final : public Device {
   StylusTarget initial_target() const;
   void set_target(const rendering::LineProbe& target) noexcept { target_.write(target); }
 
-  const DeviceCapabilities& capabilities() const override { return capabilities_; }
-  DeviceReading read() noexcept override;
+  const servo::DeviceCapabilities& capabilities() const override { return capabilities_; }
+  servo::DeviceReading read() noexcept override;
   void write(const Vec3&, const Vec3&) noexcept override {}  // no motors
 
  private:
   double length_, follow_, longest_step_;
-  DeviceCapabilities capabilities_;
-  TripleBuffer<rendering::LineProbe> target_;
+  servo::DeviceCapabilities capabilities_;
+  servo::TripleBuffer<rendering::LineProbe> target_;
   rendering::LineProbe wanted_, now_;
 };
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::devices

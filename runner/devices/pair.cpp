@@ -8,7 +8,7 @@
 #include "protocols/parse.h"
 #include "runner/devices/falcon/calibration.h"
 
-namespace palpate::runner {
+namespace palpate::runner::devices {
 namespace {
 
 using falcon::Calibration;
@@ -16,13 +16,13 @@ using falcon::CalibrationState;
 using falcon::CalibrationVerdict;
 using falcon::PairRegistration;
 
-Calibration calibration_of_pair(const DeviceConfig& config) {
+Calibration calibration_of_pair(const servo::DeviceConfig& config) {
   return config.calibration.empty() ? Calibration{} : falcon::read_calibration(config.calibration);
 }
 
 /// \throws InputError if there is none
-const PairRegistration& registration_of(const Calibration& calibration, const DeviceConfig& config,
-                                        const char* name) {
+const PairRegistration& registration_of(const Calibration& calibration,
+                                        const servo::DeviceConfig& config, const char* name) {
   const std::string &tip = config.serials[0], &tail = config.serials[1];
   if (const PairRegistration* pair = calibration.pair_of(tip, tail)) return *pair;
   throw protocols::InputError(
@@ -34,19 +34,19 @@ const PairRegistration& registration_of(const Calibration& calibration, const De
 
 }  // namespace
 
-DeviceCapabilities pair_of(const DeviceCapabilities& end, const char* name) {
-  DeviceCapabilities can = end;
+servo::DeviceCapabilities pair_of(const servo::DeviceCapabilities& end, const char* name) {
+  servo::DeviceCapabilities can = end;
   can.name = name;
   can.sensed_freedom = can.actuated_freedom = 5;
   can.max_torque = 0;  // forces at both ends produce it
   return can;
 }
 
-PairDevice::PairDevice(std::unique_ptr<Device> tip, std::unique_ptr<Device> tail,
+PairDevice::PairDevice(std::unique_ptr<servo::Device> tip, std::unique_ptr<servo::Device> tail,
                        const StylusFromEnds& stylus, const char* name,
                        const std::string& calibration)
     : tip_(std::move(tip)), tail_(std::move(tail)), stylus_(stylus) {
-  const DeviceCapabilities &one = tip_->capabilities(), &other = tail_->capabilities();
+  const servo::DeviceCapabilities &one = tip_->capabilities(), &other = tail_->capabilities();
   capabilities_ = pair_of(one, name);
   capabilities_.max_force = std::min(one.max_force, other.max_force);
   capabilities_.max_stiffness = std::min(one.max_stiffness, other.max_stiffness);
@@ -57,15 +57,15 @@ PairDevice::PairDevice(std::unique_ptr<Device> tip, std::unique_ptr<Device> tail
   capabilities_.calibration = calibration;
 }
 
-DeviceReading PairDevice::read() noexcept {
-  const DeviceReading tip = tip_->read(), tail = tail_->read();
+servo::DeviceReading PairDevice::read() noexcept {
+  const servo::DeviceReading tip = tip_->read(), tail = tail_->read();
   // Report the trouble of a lost end before that of a late one.
-  DeviceTrouble trouble = tip.trouble;
-  if (!tip.lost && tail.trouble != DeviceTrouble::none) trouble = tail.trouble;
+  servo::DeviceTrouble trouble = tip.trouble;
+  if (!tip.lost && tail.trouble != servo::DeviceTrouble::none) trouble = tail.trouble;
   lost_ = tip.lost || tail.lost;
   if (!lost_ && !stylus_.update(tip.stylus.tip, tail.stylus.tip)) {
     lost_ = true;
-    trouble = DeviceTrouble::apart;
+    trouble = servo::DeviceTrouble::apart;
   }
   return {stylus_.stylus(), static_cast<std::uint8_t>((tip.buttons & 15U) | tail.buttons << 4U),
           lost_, trouble};
@@ -84,7 +84,7 @@ void PairDevice::reopen() {
   tail_->reopen();
 }
 
-void check_pair(const DeviceConfig& config, const char* name) {
+void check_pair(const servo::DeviceConfig& config, const char* name) {
   if (config.serials.size() != 2 || config.serials[0] == config.serials[1]) {
     throw std::invalid_argument(std::string(name) +
                                 " needs the serial numbers of two devices: first the one at the "
@@ -94,14 +94,15 @@ void check_pair(const DeviceConfig& config, const char* name) {
   registration_of(calibration_of_pair(config), config, name);
 }
 
-std::unique_ptr<Device> open_pair(const DeviceConfig& config, const char* name, OpenEnd open_end) {
+std::unique_ptr<servo::Device> open_pair(const servo::DeviceConfig& config, const char* name,
+                                         OpenEnd open_end) {
   const Calibration calibration = calibration_of_pair(config);
   const PairRegistration& pair = registration_of(calibration, config, name);
-  DeviceConfig one = config;
+  servo::DeviceConfig one = config;
   one.serials = {config.serials[0]};
-  std::unique_ptr<Device> tip = open_end(one);
+  std::unique_ptr<servo::Device> tip = open_end(one);
   one.serials = {config.serials[1]};
-  std::unique_ptr<Device> tail = open_end(one);
+  std::unique_ptr<servo::Device> tail = open_end(one);
   const CalibrationVerdict known =
       judge_pair(calibration, config.serials[0], config.serials[1],
                  std::chrono::system_clock::now().time_since_epoch() / std::chrono::nanoseconds(1));
@@ -113,4 +114,4 @@ std::unique_ptr<Device> open_pair(const DeviceConfig& config, const char* name, 
                                       text);
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::devices

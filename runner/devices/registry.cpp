@@ -22,25 +22,27 @@
 #include "runner/devices/stroking.h"
 #include "runner/devices/touch/touch.h"
 
-namespace palpate::runner {
+namespace palpate::runner::devices {
 namespace {
 
 using Json = nlohmann::json;
 constexpr auto kListingPatience = std::chrono::seconds(3);
 
-std::vector<ConnectedDevice> always_there(const DeviceConfig& /*config*/) { return {{}}; }
-void nothing_to_check(const DeviceConfig& /*config*/) {}
+std::vector<servo::ConnectedDevice> always_there(const servo::DeviceConfig& /*config*/) {
+  return {{}};
+}
+void nothing_to_check(const servo::DeviceConfig& /*config*/) {}
 
-std::unique_ptr<Device> open_simulated(const DeviceConfig& config) {
+std::unique_ptr<servo::Device> open_simulated(const servo::DeviceConfig& config) {
   return std::make_unique<StrokingStylus>(config.stylus_length, config.stylus_grip, config.rate);
 }
 
-std::unique_ptr<Device> open_mouse(const DeviceConfig& config) {
+std::unique_ptr<servo::Device> open_mouse(const servo::DeviceConfig& config) {
   return std::make_unique<MouseStylus>(config.stylus_length, config.rate);
 }
 
-template <std::unique_ptr<Device> (*open)(const DeviceConfig&)>
-DeviceCapabilities as_opened(const DeviceConfig& config) {
+template <std::unique_ptr<servo::Device> (*open)(const servo::DeviceConfig&)>
+servo::DeviceCapabilities as_opened(const servo::DeviceConfig& config) {
   return open(config)->capabilities();
 }
 
@@ -50,17 +52,17 @@ DeviceCapabilities as_opened(const DeviceConfig& config) {
 [[maybe_unused]] constexpr char kTouch2[] = "touch2";
 
 template <const char* name>
-void check_named(const DeviceConfig& config) {
+void check_named(const servo::DeviceConfig& config) {
   check_pair(config, name);
 }
 
-template <const char* name, DeviceCapabilities (*nominal)(const DeviceConfig&)>
-DeviceCapabilities nominal_pair(const DeviceConfig& config) {
+template <const char* name, servo::DeviceCapabilities (*nominal)(const servo::DeviceConfig&)>
+servo::DeviceCapabilities nominal_pair(const servo::DeviceConfig& config) {
   return pair_of(nominal(config), name);
 }
 
 template <const char* name, OpenEnd open_end>
-std::unique_ptr<Device> open_named(const DeviceConfig& config) {
+std::unique_ptr<servo::Device> open_named(const servo::DeviceConfig& config) {
   return open_pair(config, name, open_end);
 }
 
@@ -101,11 +103,11 @@ constexpr DeviceKind kKinds[] = {
 };
 
 /// The message of a listing process: {"found": [...]} or {"error": "..."}.
-std::string listing_of(const DeviceKind& kind, const DeviceConfig& config) noexcept {
+std::string listing_of(const DeviceKind& kind, const servo::DeviceConfig& config) noexcept {
   Json out;
   try {
     out["found"] = Json::array();
-    for (const ConnectedDevice& one : kind.connected(config))
+    for (const servo::ConnectedDevice& one : kind.connected(config))
       out["found"].push_back({{"serial", one.serial}, {"trouble", one.trouble}});
   } catch (const std::exception& error) {
     out = {{"error", error.what()}};
@@ -145,7 +147,8 @@ std::optional<std::string> read_all(int from) {
 
 }  // namespace
 
-std::vector<ConnectedDevice> list_connected(const DeviceKind& kind, const DeviceConfig& config) {
+std::vector<servo::ConnectedDevice> list_connected(const DeviceKind& kind,
+                                                   const servo::DeviceConfig& config) {
   if (!kind.has_force_feedback) return kind.connected(config);
   int ends[2];
   if (pipe2(ends, O_CLOEXEC) != 0)
@@ -173,7 +176,7 @@ std::vector<ConnectedDevice> list_connected(const DeviceKind& kind, const Device
   if (!listing.is_object())
     throw std::runtime_error("the program that lists these devices crashed");
   if (listing.contains("error")) throw std::runtime_error(listing["error"].get<std::string>());
-  std::vector<ConnectedDevice> found;
+  std::vector<servo::ConnectedDevice> found;
   for (const Json& one : listing["found"])
     found.push_back({one["serial"].get<std::string>(), one["trouble"].get<std::string>()});
   return found;
@@ -191,4 +194,4 @@ const DeviceKind& device_kind(const std::string& name) {
   throw std::invalid_argument("no device '" + name + "'; there are: " + known);
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::devices

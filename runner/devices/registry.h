@@ -9,7 +9,7 @@
 #include "runner/devices/pair.h"
 #include "runner/servo/device.h"
 
-namespace palpate::runner {
+namespace palpate::runner::devices {
 
 struct DeviceKind {
   const char* name;
@@ -18,16 +18,16 @@ struct DeviceKind {
   /// Checks a config before any device is opened. Called in this process, because exceptions lose
   /// their type on the way from the guard process.
   /// \throws std::invalid_argument (usage), InputError (files)
-  void (*check)(const DeviceConfig& config);
+  void (*check)(const servo::DeviceConfig& config);
   /// Capabilities common to all such devices, without opening one. Those that differ between
   /// devices (force, serial, calibration) keep their defaults.
-  DeviceCapabilities (*nominal)(const DeviceConfig& config);
+  servo::DeviceCapabilities (*nominal)(const servo::DeviceConfig& config);
   /// May load a maker's library, which starts threads: call list_connected.
   /// \throws std::runtime_error if this computer cannot list such devices
-  std::vector<ConnectedDevice> (*connected)(const DeviceConfig& config);
+  std::vector<servo::ConnectedDevice> (*connected)(const servo::DeviceConfig& config);
   /// Opens a device, ready to be read and written. \throws std::runtime_error with the reason and
   /// the remedy
-  std::unique_ptr<Device> (*open)(const DeviceConfig& config);
+  std::unique_ptr<servo::Device> (*open)(const servo::DeviceConfig& config);
   /// For a pair: opens one of the two as a point; else nullptr.
   OpenEnd open_end = nullptr;
 };
@@ -37,8 +37,9 @@ std::span<const DeviceKind> device_kinds();
 /// three seconds: a maker's library can hang, crash, or start threads before the guard forks. Call
 /// it before creating other threads. \throws std::runtime_error as DeviceKind::connected, or
 /// because the listing hung or crashed
-std::vector<ConnectedDevice> list_connected(const DeviceKind& kind, const DeviceConfig& config);
+std::vector<servo::ConnectedDevice> list_connected(const DeviceKind& kind,
+                                                   const servo::DeviceConfig& config);
 /// \throws std::invalid_argument listing the known names
 const DeviceKind& device_kind(const std::string& name);
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::devices

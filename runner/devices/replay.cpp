@@ -3,7 +3,7 @@
 #include <cmath>
 #include <limits>
 
-namespace palpate::runner {
+namespace palpate::runner::devices {
 namespace {
 
 Vec3 vec(const std::array<double, 3>& v) { return {v[0], v[1], v[2]}; }
@@ -19,8 +19,8 @@ ReplayDevice::ReplayDevice(std::span<const data::SampleRecord> samples, double r
   capabilities_.max_rate = rate;
 }
 
-DeviceReading ReplayDevice::read() noexcept {
-  DeviceReading reading;
+servo::DeviceReading ReplayDevice::read() noexcept {
+  servo::DeviceReading reading;
   if (next_ >= samples_.size()) {
     reading.lost = true;
     return reading;
@@ -41,4 +41,4 @@ void ReplayDevice::wait_until(std::int64_t when_ns) noexcept {
   }
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::devices

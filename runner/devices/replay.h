@@ -6,18 +6,18 @@
 #include "data/record.h"
 #include "runner/servo/device.h"
 
-namespace palpate::runner {
+namespace palpate::runner::devices {
 
 /// Device and clock in one: each tick is one recorded period after the last. Its readings are in
 /// the virtual frame, so the servo needs no workspace map. `samples` must outlive it. After the
 /// last sample the device is lost.
-class ReplayDevice final : public Device, public Clock {
+class ReplayDevice final : public servo::Device, public servo::Clock {
  public:
   /// \param rate  Hz, for samples whose period is not on record
   ReplayDevice(std::span<const data::SampleRecord> samples, double rate);
 
-  const DeviceCapabilities& capabilities() const override { return capabilities_; }
-  DeviceReading read() noexcept override;
+  const servo::DeviceCapabilities& capabilities() const override { return capabilities_; }
+  servo::DeviceReading read() noexcept override;
   void write(const Vec3&, const Vec3&) noexcept override {}  // forces are discarded
 
   std::int64_t now_ns() noexcept override { return now_ns_; }
@@ -27,7 +27,7 @@ class ReplayDevice final : public Device, public Clock {
   std::span<const data::SampleRecord> samples_;
   std::size_t next_ = 0;
   std::int64_t nominal_ns_, now_ns_;
-  DeviceCapabilities capabilities_;
+  servo::DeviceCapabilities capabilities_;
 };
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::devices

@@ -8,29 +8,29 @@
 
 #include "runner/servo/realtime.h"
 
-namespace palpate::runner {
+namespace palpate::runner::devices {
 namespace {
 
 /// Statistics over a second of readings.
 struct Readings {
   int ticks = 0, lost = 0, late = 0, not_finite = 0;
-  DeviceTrouble trouble = DeviceTrouble::none;
+  servo::DeviceTrouble trouble = servo::DeviceTrouble::none;
   double furthest = 0;       ///< m, of tip or tail from the centre
   double largest_step = 0;   ///< m, of the tip between two readings
   std::uint8_t buttons = 0;  ///< pressed at any time
 };
 
-Readings read_for_a_second(Device& device, double rate) {
-  RealClock clock;
+Readings read_for_a_second(servo::Device& device, double rate) {
+  servo::RealClock clock;
   Readings out;
   const auto period_ns = static_cast<std::int64_t>(1e9 / rate);
   std::optional<Vec3> last;
   std::int64_t due = clock.now_ns();
   for (; out.ticks < rate; ++out.ticks, due += period_ns) {
     clock.wait_until(due);
-    const DeviceReading reading = device.read();
+    const servo::DeviceReading reading = device.read();
     device.write(Vec3(0), Vec3(0));
-    if (reading.trouble == DeviceTrouble::late) ++out.late;
+    if (reading.trouble == servo::DeviceTrouble::late) ++out.late;
     if (reading.lost) {
       ++out.lost;
       out.trouble = reading.trouble;
@@ -58,16 +58,16 @@ std::string text(const char* format, double a, double b) {
 
 }  // namespace
 
-std::vector<SelfTestResult> self_test(Device& device, double rate) {
+std::vector<SelfTestResult> self_test(servo::Device& device, double rate) {
   constexpr double kTopSpeed = 2;  // m/s, of a hand
-  const DeviceCapabilities& can = device.capabilities();
+  const servo::DeviceCapabilities& can = device.capabilities();
   const double at = std::min(rate, can.max_rate);
   const Readings r = read_for_a_second(device, at);
   std::vector<SelfTestResult> out;
   std::string lost = text("%.0f of %.0f readings were lost", r.lost, r.ticks);
-  if (r.lost > 0 && r.trouble != DeviceTrouble::none) {
+  if (r.lost > 0 && r.trouble != servo::DeviceTrouble::none) {
     lost += ": ";
-    lost += advice(r.trouble);
+    lost += servo::advice(r.trouble);
   }
   out.push_back({"readings arrive", r.lost == 0, lost});
   out.push_back({"readings arrive in time", r.late <= at / 100,
@@ -85,4 +85,4 @@ std::vector<SelfTestResult> self_test(Device& device, double rate) {
   return out;
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::devices

@@ -5,7 +5,7 @@
 
 #include "runner/servo/device.h"
 
-namespace palpate::runner {
+namespace palpate::runner::devices {
 
 struct SelfTestResult {
   std::string what;
@@ -16,6 +16,6 @@ struct SelfTestResult {
 /// Reads a device for a second with zero force and checks that readings arrive in time and are
 /// finite, within reach and without jumps. \param rate  Hz, of the servo; limited to the device's
 /// own
-std::vector<SelfTestResult> self_test(Device& device, double rate);
+std::vector<SelfTestResult> self_test(servo::Device& device, double rate);
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::devices

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
-namespace palpate::runner {
+namespace palpate::runner::devices {
 namespace {
 
 Vec3 round_to(const Vec3& v, double step) {
@@ -126,7 +126,7 @@ void SimulatedStylus::set_target(const HandTarget& target) {
   find_away();
 }
 
-DeviceReading SimulatedStylus::read() noexcept {
+servo::DeviceReading SimulatedStylus::read() noexcept {
   // Translation, about the equilibrium of the hand's spring, its damper (relative to the moving
   // target) and the force held since the last tick.
   const Vec3 balance = target_.grip + (force_ + hand_.damping * target_.velocity) / hand_.stiffness;
@@ -157,7 +157,7 @@ DeviceReading SimulatedStylus::read() noexcept {
   // renderer. A turning target would make it invalid.
   if (!target_turns_) find_away();
 
-  DeviceReading reading;
+  servo::DeviceReading reading;
   reading.stylus.tip = round_to(position_ - grip_ * axis_, settings_.resolution);
   reading.stylus.tail = round_to(position_ + (length_ - grip_) * axis_, settings_.resolution);
   return reading;
@@ -168,4 +168,4 @@ void SimulatedStylus::write(const Vec3& device1, const Vec3& device2) noexcept {
   torque_ = glm::cross(axis_, (length_ - grip_) * device2 - grip_ * device1);
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::devices

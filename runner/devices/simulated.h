@@ -5,7 +5,7 @@
 
 #include "runner/servo/device.h"
 
-namespace palpate::runner {
+namespace palpate::runner::devices {
 
 /// Each end of the stylus is held by one device.
 struct SimulatedDeviceSettings {
@@ -50,7 +50,7 @@ class SpringDamper {
 };
 
 /// Five degrees of freedom, sensed and actuated. Deterministic. read() advances time by one tick.
-class SimulatedStylus final : public Device {
+class SimulatedStylus final : public servo::Device {
  public:
   /// \param length, grip  m; grip measured from the tip, taken as the centre of mass
   SimulatedStylus(const SimulatedDeviceSettings& device, const HandImpedance& hand, double length,
@@ -62,8 +62,8 @@ class SimulatedStylus final : public Device {
   /// True position of the grip, m, not quantised.
   const Vec3& grip() const { return position_; }
 
-  const DeviceCapabilities& capabilities() const override { return capabilities_; }
-  DeviceReading read() noexcept override;
+  const servo::DeviceCapabilities& capabilities() const override { return capabilities_; }
+  servo::DeviceReading read() noexcept override;
   void write(const Vec3& device1, const Vec3& device2) noexcept override;
 
  private:
@@ -74,7 +74,7 @@ class SimulatedStylus final : public Device {
   double length_, grip_;
   double mass_, friction_step_;
   SpringDamper shift_, turn_;
-  DeviceCapabilities capabilities_;
+  servo::DeviceCapabilities capabilities_;
   HandTarget target_;
   Vec3 position_, velocity_;   ///< m, m/s, of the grip
   Vec3 axis_{0, 0, 1}, spin_;  ///< unit tip to tail; rad/s
@@ -83,4 +83,4 @@ class SimulatedStylus final : public Device {
   Vec3 force_, torque_;  ///< N; N m about the grip, held over the tick
 };
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::devices

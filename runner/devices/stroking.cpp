@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-namespace palpate::runner {
+namespace palpate::runner::devices {
 
 StrokingStylus::StrokingStylus(double length, double grip, double rate,
                                const StrokeSettings& settings)
@@ -22,11 +22,11 @@ HandTarget StrokingStylus::target_at(double time) const {
   return target;
 }
 
-DeviceReading StrokingStylus::read() noexcept {
+servo::DeviceReading StrokingStylus::read() noexcept {
   time_ += tick_;
   if (time_ >= settings_.rest + settings_.stroke) time_ = 0;
   stylus_.set_target(target_at(time_));
   return stylus_.read();
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::devices

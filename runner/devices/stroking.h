@@ -4,7 +4,7 @@
 
 #include "runner/devices/simulated.h"
 
-namespace palpate::runner {
+namespace palpate::runner::devices {
 
 struct StrokeSettings {
   double distance = 0.1;  ///< m, from the centre of the workspace, at rest
@@ -12,13 +12,13 @@ struct StrokeSettings {
   double stroke = 1.5;    ///< s, forth and back
 };
 
-class StrokingStylus final : public Device {
+class StrokingStylus final : public servo::Device {
  public:
   /// \param rate  Hz, of the servo
   StrokingStylus(double length, double grip, double rate, const StrokeSettings& settings = {});
 
-  const DeviceCapabilities& capabilities() const override { return stylus_.capabilities(); }
-  DeviceReading read() noexcept override;
+  const servo::DeviceCapabilities& capabilities() const override { return stylus_.capabilities(); }
+  servo::DeviceReading read() noexcept override;
   void write(const Vec3& device1, const Vec3& device2) noexcept override {
     stylus_.write(device1, device2);
   }
@@ -32,4 +32,4 @@ class StrokingStylus final : public Device {
   SimulatedStylus stylus_;
 };
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::devices

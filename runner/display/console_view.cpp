@@ -13,7 +13,7 @@
 #include "runner/display/console_words.h"
 #include "runner/safety/fault_signals.h"
 
-namespace palpate::runner {
+namespace palpate::runner::display {
 
 using namespace console_colour;
 
@@ -271,7 +271,9 @@ void draw_scores(const std::vector<ShapeScore>& scores, float width, float heigh
 using namespace console_colour;
 namespace {
 
-bool off(const ConsoleState& state) { return (state.sample.faults & servo_fault::kTripped) != 0; }
+bool off(const ConsoleState& state) {
+  return (state.sample.faults & servo::servo_fault::kTripped) != 0;
+}
 
 void progress(const ConsoleState& state) {
   ImGui::ProgressBar(static_cast<float>(fraction_done(state)), {-1, 6}, "");
@@ -425,11 +427,11 @@ void draw_forces_off(const ConsoleState& state, double silence,
 }
 
 void draw_health(const ConsoleState& state, bool brief) {
-  const Sample& sample = state.sample;
+  const servo::Sample& sample = state.sample;
   if (!ImGui::BeginTable("health", 2)) return;
   ImGui::TableSetupColumn("name", ImGuiTableColumnFlags_WidthFixed, 7.5F * ImGui::GetFontSize());
   ImGui::TableSetupColumn("value");
-  const std::string faults = fault_words(sample.faults);
+  const std::string faults = safety::fault_words(sample.faults);
   table_row("Servo", faults.empty() ? "no fault" : faults,
             faults.empty()             ? kGood
             : forces_not_yet_on(state) ? kQuiet
@@ -676,4 +678,4 @@ void ConsoleView::draw_notes(std::vector<ConsoleCommand>& commands) {
   }
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::display

@@ -12,7 +12,7 @@
 #include "runner/display/scene_view.h"
 #include "runner/display/window.h"
 
-namespace palpate::runner {
+namespace palpate::runner::display {
 
 // Colours and small elements of the console's panels, in Dear ImGui.
 
@@ -136,4 +136,4 @@ void draw_forces(const std::deque<ForcePoint>& forces, float width, float height
 void draw_times(const std::vector<double>& times, float width, float height);
 void draw_scores(const std::vector<ShapeScore>& scores, float width, float height);
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::display

@@ -15,7 +15,7 @@
 #include "runner/display/key_names.h"
 #include "runner/display/x11_errors.h"
 
-namespace palpate::runner {
+namespace palpate::runner::display {
 
 ConsoleWindow::ConsoleWindow(const WindowSettings& settings, const WindowLayout& layout,
                              ParticipantWindow& participant)
@@ -157,4 +157,4 @@ void ConsoleWindow::draw() {
   glfwSwapBuffers(window_);
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::display

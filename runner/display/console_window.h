@@ -11,7 +11,7 @@
 struct GLFWwindow;
 struct ImGuiContext;
 
-namespace palpate::runner {
+namespace palpate::runner::display {
 
 /// The experimenter's window. Made and drawn by the display's thread.
 class ConsoleWindow final : public ExperimenterConsole {
@@ -66,4 +66,4 @@ class ConsoleWindow final : public ExperimenterConsole {
   std::string places_;
 };
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::display

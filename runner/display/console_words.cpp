@@ -6,7 +6,7 @@
 
 #include "runner/safety/fault_signals.h"
 
-namespace palpate::runner {
+namespace palpate::runner::display {
 
 const char* button_label(ConsoleCommand::Kind kind) {
   using Kind = ConsoleCommand::Kind;
@@ -37,8 +37,9 @@ const char* button_label(ConsoleCommand::Kind kind) {
 
 std::string forces_off_reason(const ConsoleState& state) {
   if (!state.fault.empty()) return state.fault;
-  const std::string words = fault_words(state.sample.faults & ~servo_fault::kTripped);
-  return words.empty() ? fault_row(servo_fault::kTripped).why : words;
+  const std::string words =
+      safety::fault_words(state.sample.faults & ~servo::servo_fault::kTripped);
+  return words.empty() ? safety::fault_row(servo::servo_fault::kTripped).why : words;
 }
 
 std::string state_title(const ConsoleState& state) {
@@ -59,8 +60,8 @@ std::string state_detail(const ConsoleState& state) {
   }
   if (state.state == "end") return "space bar ends it";
   if (state.state != "homing") return {};
-  if (state.sample.waiting == Waiting::for_distance) return "stylus too near: move it away";
-  if (state.sample.waiting == Waiting::for_rest) return "stylus must rest: hold it still";
+  if (state.sample.waiting == servo::Waiting::for_distance) return "stylus too near: move it away";
+  if (state.sample.waiting == servo::Waiting::for_rest) return "stylus must rest: hold it still";
   return {};
 }
 
@@ -73,13 +74,13 @@ double fraction_done(const ConsoleState& state) {
 }
 
 bool forces_not_yet_on(const ConsoleState& state) {
-  const DeviceTrouble trouble = state.sample.trouble;
+  const servo::DeviceTrouble trouble = state.sample.trouble;
   return !state.checklist.steps.empty() && state.fault.empty() &&
-         trouble != DeviceTrouble::unplugged && trouble != DeviceTrouble::silent;
+         trouble != servo::DeviceTrouble::unplugged && trouble != servo::DeviceTrouble::silent;
 }
 
 std::string forces_text(const ConsoleState& state) {
-  const bool off = (state.sample.faults & servo_fault::kTripped) != 0;
+  const bool off = (state.sample.faults & servo::servo_fault::kTripped) != 0;
   if (!off) return state.held_by.empty() ? "No fault" : state.held_by;
   if (forces_not_yet_on(state)) return "Forces are off: none is needed yet";
   if (!state.held_by.empty()) return "Forces are off: " + state.held_by;
@@ -102,4 +103,4 @@ std::string duration_text(double seconds) {
   return std::to_string(all / 3600) + " h " + two(all % 3600 / 60) + " min";
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::display

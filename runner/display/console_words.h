@@ -5,7 +5,7 @@
 
 #include "runner/display/display.h"
 
-namespace palpate::runner {
+namespace palpate::runner::display {
 
 /// The label of the button for a command.
 const char* button_label(ConsoleCommand::Kind kind);
@@ -25,4 +25,4 @@ std::string axis_label(double value);
 /// "1 h 05 min", "3 min 20 s"
 std::string duration_text(double seconds);
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::display

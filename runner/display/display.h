@@ -14,7 +14,7 @@
 #include "runner/servo/servo.h"
 #include "stimuli/shapes.h"
 
-namespace palpate::runner {
+namespace palpate::runner::display {
 
 // Source of the moments that a window shows.
 
@@ -145,7 +145,7 @@ struct ConsoleState {
   std::vector<double> times;                ///< s, identification times so far, in order
   std::vector<std::string> messages;        ///< newest last: faults, notes, actions
   std::size_t older_messages = 0;           ///< number of messages dropped before these
-  Sample sample;                            ///< the servo's newest
+  servo::Sample sample;                     ///< the servo's newest
   std::vector<rendering::BodyPose> bodies;  ///< last known poses of the objects that move
   std::shared_ptr<const std::vector<stimuli::ObjectSpec>>
       objects;                                ///< objects of the current trial, virtual frame
@@ -171,4 +171,4 @@ class ExperimenterConsole {
   virtual std::string places() const { return {}; }
 };
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::display

@@ -33,7 +33,7 @@
 #include "runner/safety/fault_signals.h"
 #include "runner/servo/sample.h"
 
-namespace palpate::runner {
+namespace palpate::runner::display {
 
 // Contents of the window of a scene: its panels, and their state between frames.
 
@@ -392,7 +392,7 @@ void ExploreView::draw_plot(float width, float height) {
         columns - 1,
         static_cast<std::size_t>(static_cast<double>(columns) * (time_of(moment) - first) / span));
     const double force = force_of(moment);
-    if ((moment.sample.faults & ~servo_fault::kForceLimited) != 0 && column != marked) {
+    if ((moment.sample.faults & ~servo::servo_fault::kForceLimited) != 0 && column != marked) {
       marked = column;
       const float at_x = from + static_cast<float>(column);
       list.AddLine({at_x, low}, {at_x, low + 0.4F * font}, IM_COL32(247, 117, 102, 255), 2);
@@ -421,7 +421,7 @@ void ExploreView::draw_plot(float width, float height) {
 void ExploreView::draw_values() {
   if (!ImGui::BeginTable("values", 2)) return;
   const SceneMoment* const moment = timeline_.shown();
-  const Sample sample = moment != nullptr ? moment->sample : Sample();
+  const servo::Sample sample = moment != nullptr ? moment->sample : servo::Sample();
   const rendering::Rendering& r = sample.rendering;
   table_row("Time", fixed_point(timeline_.now() - timeline_.first(), 3) + " s");
   table_row("Force", moment == nullptr ? "-" : fixed_point(force_of(*moment), 3) + " N");
@@ -431,7 +431,7 @@ void ExploreView::draw_values() {
   const auto [force_scale, torque_scale] = settings_.drawing.scale_words(settings_.looks);
   table_row("Arrows", force_scale);
   table_row("Turns", torque_scale);
-  table_row("Faults", sample.faults == 0 ? "none" : fault_words(sample.faults),
+  table_row("Faults", sample.faults == 0 ? "none" : safety::fault_words(sample.faults),
             sample.faults == 0 ? console_colour::kBright : console_colour::kBad);
   table_row("Contacts", std::to_string(r.contacts));
   table_row("Depth", fixed_point(1000 * r.deepest.depth, 3) + " mm");
@@ -731,7 +731,7 @@ void ExploreView::draw_state() {
   const SceneMoment* const newest = timeline_.empty() ? nullptr : &timeline_.moments().back();
   const std::uint32_t faults = newest != nullptr ? newest->sample.faults : 0;
   coloured_text(console_colour::kQuiet, settings_.title);
-  if ((faults & (servo_fault::kTripped | servo_fault::kEmergency)) != 0) {
+  if ((faults & (servo::servo_fault::kTripped | servo::servo_fault::kEmergency)) != 0) {
     wrapped_text(console_colour::kBad, "Forces are off: " + why_off());
     if (wide_button("Allow forces again", ImGui::GetContentRegionAvail().x, Look::due))
       source_.clear_fault();
@@ -751,15 +751,15 @@ std::string ExploreView::why_off() const {
   std::uint32_t bits = 0;
   const auto& moments = timeline_.moments();
   for (auto it = moments.rbegin(); it != moments.rend(); ++it) {
-    if ((it->sample.faults & servo_fault::kTripped) == 0) break;
-    bits |= it->sample.faults & ~servo_fault::kTripped;
+    if ((it->sample.faults & servo::servo_fault::kTripped) == 0) break;
+    bits |= it->sample.faults & ~servo::servo_fault::kTripped;
   }
   std::string words;
-  for (const rendering::FaultBit& fault : kFaultTable) {
+  for (const rendering::FaultBit& fault : safety::kFaultTable) {
     if ((bits & fault.bit) == 0 || fault.why[0] == 0) continue;
     words += (words.empty() ? "" : "; ") + std::string(fault.why);
   }
-  return words.empty() ? fault_row(servo_fault::kTripped).why : words;
+  return words.empty() ? safety::fault_row(servo::servo_fault::kTripped).why : words;
 }
 
 /// Lists all faults of the kept moments: a single tick would be too short to see.
@@ -768,9 +768,9 @@ void ExploreView::draw_faults() {
   if (faults.empty()) return;
   coloured_text(console_colour::kQuiet, "Faults in these ticks; click: show the last");
   for (const Timeline::Fault& fault : faults) {
-    const bool ordinary = fault.bit == servo_fault::kForceLimited;
+    const bool ordinary = fault.bit == servo::servo_fault::kForceLimited;
     ImGui::PushStyleColor(ImGuiCol_Text, ordinary ? console_colour::kBright : console_colour::kBad);
-    const std::string words = fault_words(fault.bit) + ": " + std::to_string(fault.count) +
+    const std::string words = safety::fault_words(fault.bit) + ": " + std::to_string(fault.count) +
                               ", last at " + fixed_point(fault.last - timeline_.first(), 3) + " s";
     if (ImGui::Selectable(words.c_str())) {
       steps_ = false;
@@ -957,4 +957,4 @@ void explore_in_window(ExploreSettings settings, TouchSource& source) {
   ExploreWindow(std::move(settings), source).run();
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::display

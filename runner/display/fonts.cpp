@@ -13,7 +13,7 @@
 
 #include "runner/display/console_view.h"
 
-namespace palpate::runner {
+namespace palpate::runner::display {
 namespace {
 
 constexpr float kFontSize = 16, kTitleFontSize = 28;  // px at scale 1
@@ -194,4 +194,4 @@ std::vector<FontChoice> choose_fonts(const std::vector<std::string>& texts) {
   return choices;
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::display

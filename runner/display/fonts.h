@@ -9,7 +9,7 @@
 struct GLFWwindow;
 struct ImGuiContext;
 
-namespace palpate::runner {
+namespace palpate::runner::display {
 
 /// \param window  its OpenGL context must be current; its owner
 ///                passes keys, characters, pointer and buttons on
@@ -31,4 +31,4 @@ struct FontChoice {
 /// (UTF-8). Empty if fontconfig finds no TrueType font.
 std::vector<FontChoice> choose_fonts(const std::vector<std::string>& texts);
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::display

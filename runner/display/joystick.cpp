@@ -5,7 +5,7 @@
 #include <string_view>
 #include <utility>
 
-namespace palpate::runner {
+namespace palpate::runner::display {
 namespace {
 
 constexpr double kPressed = 0.6, kReleased = 0.4;  // of an axis
@@ -52,4 +52,4 @@ std::vector<std::string> JoystickKeys::pressed(const std::optional<JoystickState
   return out;
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::display

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-namespace palpate::runner {
+namespace palpate::runner::display {
 
 struct JoystickState {
   std::vector<bool> buttons;
@@ -46,4 +46,4 @@ class JoystickKeys {
   bool connected_ = false;
 };
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::display

@@ -2,7 +2,7 @@
 
 #include "runner/display/joystick.h"
 
-namespace palpate::runner {
+namespace palpate::runner::display {
 namespace {
 
 class GlfwJoystick final : public Joystick {
@@ -30,4 +30,4 @@ class GlfwJoystick final : public Joystick {
 
 std::unique_ptr<Joystick> make_joystick() { return std::make_unique<GlfwJoystick>(); }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::display

@@ -6,7 +6,7 @@
 
 #include "protocols/answer_keys.h"
 
-namespace palpate::runner {
+namespace palpate::runner::display {
 namespace {
 
 const char* special(int key) {
@@ -87,4 +87,4 @@ std::string match_key(const std::vector<std::string>& names,
   return names.empty() ? std::string() : names.front();
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::display

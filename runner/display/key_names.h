@@ -4,7 +4,7 @@
 #include <utility>
 #include <vector>
 
-namespace palpate::runner {
+namespace palpate::runner::display {
 
 /// The names that a key may have in a protocol, most likely first: that of the keyboard layout,
 /// then that of the same key on a US keyboard (so that the row of digits answers "1" to "9" on a
@@ -27,4 +27,4 @@ std::string keypad_character(int key);
 /// Whether a key is on the numeric pad; that pad belongs to the participant.
 bool on_keypad(int key);
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::display

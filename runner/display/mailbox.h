@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-namespace palpate::runner {
+namespace palpate::runner::display {
 
 /// Holds the newest value only.
 template <class T>
@@ -52,4 +52,4 @@ class EventQueue {
   std::vector<T> values_;
 };
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::display

@@ -3,7 +3,7 @@
 #include "runner/display/scene/picture.h"
 #include "runner/display/window.h"
 
-namespace palpate::runner {
+namespace palpate::runner::display {
 namespace {
 
 constexpr const char* kNotBuiltIn = "this palpate was built without windows and pictures";
@@ -20,4 +20,4 @@ void explore_in_window(ExploreSettings, TouchSource&) { throw DisplayError(kNotB
 
 std::unique_ptr<ScenePainter> make_painter(int, int) { throw DisplayError(kNotBuiltIn); }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::display

@@ -5,7 +5,7 @@
 
 #include "runner/display/window.h"
 
-namespace palpate::runner {
+namespace palpate::runner::display {
 namespace {
 
 constexpr const char* kFonts = "Noto Sans, DejaVu Sans, Sans";
@@ -98,4 +98,4 @@ std::string missing_letters(const std::vector<std::string>& texts) {
          ": install one that has them, for example the package fonts-noto-core or fonts-noto-cjk";
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::display

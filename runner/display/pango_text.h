@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-namespace palpate::runner {
+namespace palpate::runner::display {
 
 struct Colour {
   double red, green, blue;
@@ -56,4 +56,4 @@ class TextBlock {
   Layout layout_;
 };
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::display

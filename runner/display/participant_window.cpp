@@ -17,7 +17,7 @@
 #include "runner/display/pango_text.h"
 #include "runner/display/x11_errors.h"
 
-namespace palpate::runner {
+namespace palpate::runner::display {
 
 // Elements of a participant's page: answer keys, progress bar, checklist, the symbol of the space
 // bar. Sizes are in a unit (px) that grows with the page.
@@ -622,4 +622,4 @@ void ParticipantWindow::paint(int width, int height) {
   needs_redraw_ = false;
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::display

@@ -9,7 +9,7 @@
 #include "runner/display/window.h"
 #include "runner/display/window_layout.h"
 
-namespace palpate::runner {
+namespace palpate::runner::display {
 
 // Draws a page of the participant's screen into an image, without a display. Pango sets the text:
 // it finds a font for every character and handles right-to-left and joined scripts.
@@ -35,11 +35,11 @@ int screen_count(const Page& page, int width, int height, double ui_scale = 1);
 /// The background colour of pages, 0xffRRGGBB.
 std::uint32_t ground_colour();
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::display
 
 struct GLFWwindow;
 
-namespace palpate::runner {
+namespace palpate::runner::display {
 
 /// The participant's window. Created, drawn and given its keys by the display's thread.
 class ParticipantWindow final : public ParticipantScreen {
@@ -99,4 +99,4 @@ class ParticipantWindow final : public ParticipantScreen {
   std::atomic<bool> open_{true};
 };
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::display

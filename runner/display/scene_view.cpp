@@ -4,7 +4,7 @@
 #include <exception>
 #include <glm/geometric.hpp>
 
-namespace palpate::runner {
+namespace palpate::runner::display {
 namespace {
 
 constexpr double kNotch = 0.001;         // m
@@ -17,7 +17,7 @@ constexpr double kTurnPerPixel = 0.006;               // rad
 
 }  // namespace
 
-PointerControl::PointerControl(MouseStylus& device, const WorkspaceMap& workspace)
+PointerControl::PointerControl(devices::MouseStylus& device, const WorkspaceMap& workspace)
     : device_(device),
       workspace_(workspace),
       target_(device.initial_target()),
@@ -95,9 +95,9 @@ std::optional<glm::vec3> SceneView::hit(const glm::vec3& from, const glm::vec3& 
   return found->place;
 }
 
-unsigned SceneView::draw(const Objects& objects, const rendering::Tool& tool, const Sample& sample,
-                         std::span<const rendering::BodyPose> bodies, const Camera& camera,
-                         int width, int height) {
+unsigned SceneView::draw(const Objects& objects, const rendering::Tool& tool,
+                         const servo::Sample& sample, std::span<const rendering::BodyPose> bodies,
+                         const Camera& camera, int width, int height) {
   if (objects != shown_ || !drawing_) {
     trouble_.clear();
     shown_ = objects;
@@ -120,4 +120,4 @@ unsigned SceneView::draw(const Objects& objects, const rendering::Tool& tool, co
   return renderer_.draw(picture, camera, dark_theme(), width, height);
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::display

@@ -15,7 +15,7 @@
 #include "runner/servo/sample.h"
 #include "runner/servo/servo.h"
 
-namespace palpate::runner {
+namespace palpate::runner::display {
 
 /// Pointer input over the console's view since the last frame. Pixels of the view.
 struct PointerMotion {
@@ -36,7 +36,7 @@ using LineOfSight =
 /// zone. The wheel changes the penetration depth or, beside the object, the distance of the plane.
 class PointerControl {
  public:
-  PointerControl(MouseStylus& device, const WorkspaceMap& workspace);
+  PointerControl(devices::MouseStylus& device, const WorkspaceMap& workspace);
   void step(const PointerMotion& pointer, const Camera& camera, const LineOfSight& object);
   /// Puts the stylus there until the next step. \param stylus  m, virtual frame
   void rest_at(const rendering::LineProbe& stylus);
@@ -44,9 +44,9 @@ class PointerControl {
  private:
   Vec3 wanted(const glm::vec2& pixel, const Camera& camera, const LineOfSight& object);
 
-  MouseStylus& device_;
+  devices::MouseStylus& device_;
   WorkspaceMap workspace_;
-  StylusTarget target_;
+  devices::StylusTarget target_;
   glm::vec2 pointer_offset_{0, 0};  ///< px, from the tip to the pointer, kept after a turn
   bool was_over_ = false, touches_ = false;
   double press_depth_ = 0;     ///< m, penetration depth along the line of sight
@@ -62,7 +62,7 @@ class SceneView {
   using Objects = std::shared_ptr<const std::vector<stimuli::ObjectSpec>>;
   /// \return the OpenGL texture, `width` by `height` px, valid until the next draw
   /// \param bodies  poses of objects that move
-  unsigned draw(const Objects& objects, const rendering::Tool& tool, const Sample& sample,
+  unsigned draw(const Objects& objects, const rendering::Tool& tool, const servo::Sample& sample,
                 std::span<const rendering::BodyPose> bodies, const Camera& camera, int width,
                 int height);
   /// The first point where a line meets the objects drawn last from outside.
@@ -78,4 +78,4 @@ class SceneView {
   std::string trouble_;
 };
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::display

@@ -15,7 +15,7 @@
 
 #include "data/base/text.h"
 
-namespace palpate::runner {
+namespace palpate::runner::display {
 
 std::string wrapped(const std::string& text, std::size_t columns) {
   if (columns < 20) return text;
@@ -436,4 +436,4 @@ std::unique_ptr<DisplayLoop> make_text_display(const TextSettings& settings) {
   return std::make_unique<TextDisplay>(settings);
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::display

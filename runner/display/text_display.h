@@ -20,7 +20,7 @@
 #include "runner/display/mailbox.h"
 #include "runner/display/window.h"
 
-namespace palpate::runner {
+namespace palpate::runner::display {
 
 // The terminal of the text display: its mode, its width, and waking the thread that waits for keys.
 
@@ -159,7 +159,8 @@ class TextConsole final : public ExperimenterConsole {
 };
 
 struct TextSettings {
-  Clock* clock = nullptr;  ///< time-stamps keys and commands; required; must outlive the display
+  servo::Clock* clock =
+      nullptr;  ///< time-stamps keys and commands; required; must outlive the display
   /// Called at once, in the display's thread, when the emergency key is pressed; the command
   /// follows through commands().
   std::function<void()> emergency;
@@ -170,4 +171,4 @@ struct TextSettings {
 /// destructor restores the terminal.
 std::unique_ptr<DisplayLoop> make_text_display(const TextSettings& settings);
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::display

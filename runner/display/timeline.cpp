@@ -5,7 +5,7 @@
 #include <cmath>
 #include <utility>
 
-namespace palpate::runner {
+namespace palpate::runner::display {
 
 void Timeline::clear() {
   moments_.clear();
@@ -103,4 +103,4 @@ void Timeline::advance(double seconds) {
   }
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::display

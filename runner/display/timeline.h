@@ -9,7 +9,7 @@
 
 #include "runner/display/scene/scene_drawing.h"
 
-namespace palpate::runner {
+namespace palpate::runner::display {
 
 /// Belongs to the display's thread. Times in s, of the moments.
 class Timeline {
@@ -76,4 +76,4 @@ inline double time_of(const SceneMoment& moment) {
   return 1e-9 * static_cast<double>(moment.sample.time_ns);
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::display

@@ -17,7 +17,7 @@
 #include "runner/display/window_placing.h"
 #include "runner/display/x11_errors.h"
 
-namespace palpate::runner {
+namespace palpate::runner::display {
 namespace {
 
 constexpr double kFrame = 1.0 / 60;      // s, between frames of the console
@@ -183,4 +183,4 @@ std::unique_ptr<DisplayLoop> make_windows(const WindowSettings& settings) {
   return std::make_unique<Windows>(settings);
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::display

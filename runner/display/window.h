@@ -13,7 +13,7 @@
 #include "runner/display/scene/picture.h"
 #include "runner/display/window_places.h"
 
-namespace palpate::runner {
+namespace palpate::runner::display {
 
 struct WindowSettings {
   std::string title;            ///< UTF-8, of the window frames: study and participant
@@ -25,11 +25,13 @@ struct WindowSettings {
   /// Called at once, in the display's thread, when the emergency key or button is pressed; the
   /// command follows through commands().
   std::function<void()> emergency;
-  MouseStylus* mouse = nullptr;  ///< moved by the pointer over the console's view; nullptr: none
-  WorkspaceMap workspace;        ///< the servo's, for the mouse
+  devices::MouseStylus* mouse =
+      nullptr;             ///< moved by the pointer over the console's view; nullptr: none
+  WorkspaceMap workspace;  ///< the servo's, for the mouse
   std::map<std::string, std::string> joystick;  ///< its inputs -> keys; empty: not used
   std::optional<WindowPlaces> places;           ///< places of the windows in an earlier session
-  Clock* clock = nullptr;  ///< time-stamps keys and commands; required; must outlive the windows
+  servo::Clock* clock =
+      nullptr;  ///< time-stamps keys and commands; required; must outlive the windows
 };
 
 /// Participant's screen and console with the loop that draws them. All functions but run() may be
@@ -56,4 +58,4 @@ std::unique_ptr<DisplayLoop> make_windows(const WindowSettings& settings);
 /// A warning about characters of the texts that no installed font has; empty: none.
 std::string missing_letters(const std::vector<std::string>& texts);
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::display

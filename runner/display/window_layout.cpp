@@ -8,7 +8,7 @@
 #include <cstdint>
 #include <vector>
 
-namespace palpate::runner {
+namespace palpate::runner::display {
 namespace {
 
 constexpr double kParticipantFraction = 0.4;  // share of the width of a monitor with both windows
@@ -250,4 +250,4 @@ GLFWwindow* make_window(const std::string& title, const WindowGeometry& geometry
   return window;
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::display

@@ -8,7 +8,7 @@
 struct GLFWmonitor;
 struct GLFWwindow;
 
-namespace palpate::runner {
+namespace palpate::runner::display {
 
 /// The planned place of a window, without its frame.
 struct WindowGeometry {
@@ -52,4 +52,4 @@ GLFWwindow* make_window(const std::string& title, const WindowGeometry& geometry
 /// GLFW's description of its latest error.
 std::string glfw_reason();
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::display

@@ -5,7 +5,7 @@
 #include <cstdio>
 #include <initializer_list>
 
-namespace palpate::runner {
+namespace palpate::runner::display {
 namespace {
 
 /// Format for writing and reading: JSON, like the other events among a run's notes.
@@ -76,4 +76,4 @@ std::optional<WindowPlaces> window_places(const std::string& note) {
   return out;
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::display

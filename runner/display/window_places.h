@@ -4,7 +4,7 @@
 #include <optional>
 #include <string>
 
-namespace palpate::runner {
+namespace palpate::runner::display {
 
 /// px, from the desktop's upper left corner.
 struct ScreenBox {
@@ -42,4 +42,4 @@ std::string to_note(const WindowPlaces& places);
 /// None: the note is of another kind.
 std::optional<WindowPlaces> window_places(const std::string& note);
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::display

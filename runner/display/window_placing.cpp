@@ -10,7 +10,7 @@
 extern "C" Display* glfwGetX11Display();
 extern "C" Window glfwGetX11Window(GLFWwindow* window);
 
-namespace palpate::runner {
+namespace palpate::runner::display {
 namespace {
 
 constexpr double kEvery = 0.1;     // s, between two checks of the windows' places
@@ -149,4 +149,4 @@ std::optional<WindowPlaces> WindowPlacing::moved_to() const {
   return WindowPlaces{all.width, all.height, wish(participant_), wish(console_)};
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::display

@@ -4,7 +4,7 @@
 
 #include "runner/display/window_layout.h"
 
-namespace palpate::runner {
+namespace palpate::runner::display {
 
 /// Keeps a session's two windows in place: at the requested places, even if the window manager
 /// moves them at first, and the participant's never over the console's emergency button. Belongs to
@@ -38,4 +38,4 @@ class WindowPlacing {
   double began_ = -1, next_ = 0, moved_at_ = 0, raised_at_ = 0;  ///< s
 };
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::display

@@ -11,7 +11,7 @@
 extern "C" Display* glfwGetX11Display();
 extern "C" Window glfwGetX11Window(GLFWwindow* window);
 
-namespace palpate::runner {
+namespace palpate::runner::display {
 namespace {
 
 /// The context under which Xlib stores our flags with the windows.
@@ -69,4 +69,4 @@ bool connection_lost() {
   return poll(&connection, 1, 0) > 0 && (connection.revents & (POLLHUP | POLLERR)) != 0;
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::display

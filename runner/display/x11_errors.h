@@ -3,7 +3,7 @@
 
 struct GLFWwindow;
 
-namespace palpate::runner {
+namespace palpate::runner::display {
 
 /// Thrown when the connection to the display is lost.
 class DisplayLost {};
@@ -24,4 +24,4 @@ bool was_destroyed(GLFWwindow* window);
 /// Whether the connection is known to be lost; sends nothing and does not wait.
 bool connection_lost();
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::display

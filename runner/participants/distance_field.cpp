@@ -6,7 +6,7 @@
 #include <limits>
 #include <utility>
 
-namespace palpate::runner {
+namespace palpate::runner::participants {
 namespace {
 
 constexpr double kNodesAcross = 72;     // across the object's longest side and its margins
@@ -337,4 +337,4 @@ DistanceField::DistanceField(const std::vector<PlacedPart>& parts) {
   }
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::participants

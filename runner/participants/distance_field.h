@@ -16,7 +16,7 @@
 #include "stimuli/large_array.h"
 #include "stimuli/vec.h"
 
-namespace palpate::runner {
+namespace palpate::runner::participants {
 
 /// A convex part, or a closed surface, in the frame of its stimulus.
 struct PlacedPart {
@@ -190,4 +190,4 @@ class DistanceField {
   stimuli::LargeArray<float> nodes_;  // m, x fastest
 };
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::participants

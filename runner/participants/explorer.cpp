@@ -5,7 +5,7 @@
 #include <glm/geometric.hpp>
 #include <numbers>
 
-namespace palpate::runner {
+namespace palpate::runner::participants {
 namespace {
 
 Vec3 unit_or(const Vec3& v, const Vec3& otherwise) {
@@ -40,7 +40,7 @@ Explorer::Explorer(const SimulatedSettings& settings, double grip, double wall_s
       past_(static_cast<std::size_t>(
           std::max(1.0, std::round(settings.motor.reaction_delay / tick)))) {}
 
-HandTarget Explorer::begin(Random random) {
+devices::HandTarget Explorer::begin(Random random) {
   random_ = random;
   std::fill(past_.begin(), past_.end(), TouchState{});
   now_ = 0;
@@ -69,7 +69,8 @@ void Explorer::draw_approach() {
   goal_axis_ = glm::normalize(goal_axis_);
 }
 
-HandTarget Explorer::step(const TouchState& now, const Vec3& stylus_tip, const Vec3& stylus_axis) {
+devices::HandTarget Explorer::step(const TouchState& now, const Vec3& stylus_tip,
+                                   const Vec3& stylus_axis) {
   TouchState& oldest = past_[now_];
   const Vec3 v = velocity(oldest);
   oldest.contact = now.contact;
@@ -205,4 +206,4 @@ void Explorer::limit_force(const Vec3& held) {
   if (length > max_offset_) tip_ -= (1 - max_offset_ / length) * offset;
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::participants

@@ -10,7 +10,7 @@
 #include "data/base/random.h"
 #include "runner/participants/simulated_settings.h"
 
-namespace palpate::runner {
+namespace palpate::runner::participants {
 
 /// Contact that the hand senses at one tick.
 struct TouchState {
@@ -27,10 +27,10 @@ class Explorer {
   Explorer(const SimulatedSettings& settings, double grip, double wall_stiffness, double tick);
 
   /// Starts a trial with a random approach. \return its start pose
-  HandTarget begin(Random random);
+  devices::HandTarget begin(Random random);
   /// One tick. `now` and the stylus belong to this tick; contact in `now` takes effect only after
   /// the reaction delay. \param stylus_axis  unit, tip to tail
-  HandTarget step(const TouchState& now, const Vec3& stylus_tip, const Vec3& stylus_axis);
+  devices::HandTarget step(const TouchState& now, const Vec3& stylus_tip, const Vec3& stylus_axis);
 
   /// Whether the sliding hand needs a new heading (settings.heading). Stays true until turn_to.
   bool wants_heading() const;
@@ -73,4 +73,4 @@ class Explorer {
   double left_ = 0;                        ///< s left of this motion
 };
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::participants

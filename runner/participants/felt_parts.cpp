@@ -10,7 +10,7 @@
 #include "stimuli/primitives.h"
 #include "stimuli/shapes.h"
 
-namespace palpate::runner {
+namespace palpate::runner::participants {
 namespace {
 
 /// Depth of the felt surface, m; none: the object has no stiffness anywhere.
@@ -60,4 +60,4 @@ std::vector<PlacedPart> felt_parts(const stimuli::ObjectSpec& stimulus) {
   return parts;
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::participants

@@ -6,7 +6,7 @@
 #include "runner/participants/distance_field.h"
 #include "stimuli/shapes.h"
 
-namespace palpate::runner {
+namespace palpate::runner::participants {
 
 /// The convex parts of the outermost surface that has a stiffness, relative to the centre of the
 /// workspace. That is the object's surface or, if its stiffness is 0, the uppermost layer with a
@@ -17,4 +17,4 @@ std::vector<PlacedPart> felt_parts(const stimuli::ObjectSpec& stimulus);
 /// Whether there is such a surface.
 bool can_be_felt(const stimuli::ObjectSpec& stimulus);
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::participants

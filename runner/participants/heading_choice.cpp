@@ -13,7 +13,7 @@
 
 // The loops over the drawn hypotheses are written to be vectorised, as in shape_observer.cpp.
 
-namespace palpate::runner {
+namespace palpate::runner::participants {
 namespace {
 
 void check(const HeadingSettings& s) {
@@ -175,4 +175,4 @@ float HeadingChoice::entropy(const float* log_likelihood) const {
   return lane::log(total) - sum / total;
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::participants

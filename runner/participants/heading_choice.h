@@ -22,7 +22,7 @@
 #include "runner/participants/shape_lines.h"
 #include "runner/participants/shape_observer.h"
 
-namespace palpate::runner {
+namespace palpate::runner::participants {
 
 struct HeadingSettings {
   bool chosen = false;        ///< choose by expected information; false: wander at random only
@@ -86,4 +86,4 @@ class HeadingChoice {
   std::vector<Prediction> seen_;    // at each place
 };
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::participants

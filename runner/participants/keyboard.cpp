@@ -13,7 +13,7 @@
 #include "protocols/answer_keys.h"
 #include "protocols/tasks/levels.h"
 
-namespace palpate::runner {
+namespace palpate::runner::participants {
 namespace {
 
 constexpr std::int64_t kSecond_ns = 1'000'000'000;
@@ -25,8 +25,8 @@ constexpr std::int64_t kSteady_ns = 150'000'000;  // debounces the cue at the ed
 }  // namespace
 
 KeyboardRespondent::KeyboardRespondent(const protocols::Protocol& protocol,
-                                       ParticipantScreen& screen, Attendant& attendant,
-                                       Clock& clock, AnswerBy by)
+                                       display::ParticipantScreen& screen, Attendant& attendant,
+                                       servo::Clock& clock, AnswerBy by)
     : protocol_(protocol), screen_(screen), attendant_(attendant), clock_(clock), by_(by) {
   for (const auto& [key, name] : protocol.response.keys) {
     const auto stimulus = std::find_if(
@@ -43,7 +43,7 @@ void KeyboardRespondent::set_progress(std::size_t done, std::size_t trials) {
   trials_ = static_cast<int>(trials);
 }
 
-void KeyboardRespondent::show(Page page) {
+void KeyboardRespondent::show(display::Page page) {
   page_ = std::move(page);
   reply_until_ns_ = 0;
   early_ = false;
@@ -59,16 +59,17 @@ void KeyboardRespondent::reply_with(const std::string& text) {
   screen_.show(page_);
 }
 
-std::vector<KeyPress> KeyboardRespondent::take_keys() {
-  std::vector<KeyPress> keys = std::exchange(spoken_, {});  // these arrived before the others
-  std::vector<KeyPress> pressed = screen_.keys();
+std::vector<display::KeyPress> KeyboardRespondent::take_keys() {
+  std::vector<display::KeyPress> keys =
+      std::exchange(spoken_, {});  // these arrived before the others
+  std::vector<display::KeyPress> pressed = screen_.keys();
   if (by_ == AnswerBy::experimenter) {
     // Only the experimenter answers; the participant's keys turn pages.
-    std::erase_if(pressed, [](const KeyPress& press) {
+    std::erase_if(pressed, [](const display::KeyPress& press) {
       return press.key != "space" && press.key != "enter" && press.key != "left" &&
              press.key != "right";
     });
-    if (page_.typing != Page::Typing::none) pressed.clear();
+    if (page_.typing != display::Page::Typing::none) pressed.clear();
   }
   keys.insert(keys.end(), pressed.begin(), pressed.end());
   return keys;
@@ -86,8 +87,9 @@ void KeyboardRespondent::tend() {
   end_reply();
 }
 
-Page KeyboardRespondent::between_trials(Page::Kind kind, const std::string& text) const {
-  Page page;
+display::Page KeyboardRespondent::between_trials(display::Page::Kind kind,
+                                                 const std::string& text) const {
+  display::Page page;
   page.kind = kind;
   page.text = text;
   page.done = done_;
@@ -96,7 +98,7 @@ Page KeyboardRespondent::between_trials(Page::Kind kind, const std::string& text
 }
 
 void KeyboardRespondent::show_message(const std::string& text) {
-  show(between_trials(Page::Kind::message, text));
+  show(between_trials(display::Page::Kind::message, text));
 }
 
 void KeyboardRespondent::wait_until(std::int64_t when_ns) {
@@ -109,7 +111,7 @@ void KeyboardRespondent::wait_until(std::int64_t when_ns) {
 
 void KeyboardRespondent::wait_for_space(std::int64_t since_ns) {
   while (true) {
-    for (const KeyPress& press : take_keys()) {
+    for (const display::KeyPress& press : take_keys()) {
       if (press.time_ns < since_ns) continue;
       if (press.key == "space" || press.key == "enter") return;
       reply();
@@ -124,7 +126,7 @@ void KeyboardRespondent::read(const std::string& text) {
   if (text.empty()) return;
   // Read the clock before showing the page, so that a very early key press counts.
   const std::int64_t before_ns = clock_.now_ns();
-  Page page = between_trials(Page::Kind::text, text);
+  display::Page page = between_trials(display::Page::Kind::text, text);
   // The end page is shown before set_progress() counts the last trial.
   if (&text == &protocol_.texts.end) page.done = page.trials;
   show(std::move(page));
@@ -135,7 +137,7 @@ void KeyboardRespondent::rest(const std::string& text, std::int64_t until_ns) {
   page_.reply.clear();
   reply_until_ns_ = 0;
   for (std::int64_t now = clock_.now_ns(); now < until_ns; now = clock_.now_ns()) {
-    Page page = between_trials(Page::Kind::message, text);
+    display::Page page = between_trials(display::Page::Kind::message, text);
     page.seconds_left = static_cast<int>((until_ns - now + kSecond_ns - 1) / kSecond_ns);
     page.reply = page_.reply;
     std::swap(page, page_);
@@ -147,8 +149,8 @@ void KeyboardRespondent::rest(const std::string& text, std::int64_t until_ns) {
 }
 
 void KeyboardRespondent::feedback(bool correct) {
-  Page page;
-  page.kind = Page::Kind::feedback;
+  display::Page page;
+  page.kind = display::Page::Kind::feedback;
   page.text = correct ? "\u2713" : "\u2717";
   show(std::move(page));
   attendant_.sound(correct ? SoundCue::right : SoundCue::wrong);
@@ -158,8 +160,8 @@ void KeyboardRespondent::feedback(bool correct) {
 
 void KeyboardRespondent::begin_trial(const protocols::Trial& trial) {
   task_block_ = trial.task_block;
-  Page page;
-  page.kind = Page::Kind::neutral;
+  display::Page page;
+  page.kind = display::Page::Kind::neutral;
   page.keys = keys_;
   show(std::move(page));
   early_ = true;
@@ -171,23 +173,23 @@ void KeyboardRespondent::begin_trial(const protocols::Trial& trial) {
   pending_.reset();
 }
 
-void KeyboardRespondent::show_cue(const Sample& sample) {
+void KeyboardRespondent::show_cue(const servo::Sample& sample) {
   const auto& texts = protocol_.texts;
   Cue cue = cue_;
-  if (sample.phase == Phase::feeling) cue = Cue::go;
-  if (sample.waiting == Waiting::for_rest) cue = Cue::ready;
-  if (sample.waiting == Waiting::for_distance) cue = Cue::move_away;
+  if (sample.phase == servo::Phase::feeling) cue = Cue::go;
+  if (sample.waiting == servo::Waiting::for_rest) cue = Cue::ready;
+  if (sample.waiting == servo::Waiting::for_distance) cue = Cue::move_away;
   if (cue == cue_ || (cue != Cue::go && sample.time_ns - cue_since_ns_ < kSteady_ns)) return;
   cue_ = cue;
   cue_since_ns_ = sample.time_ns;
-  page_.kind = cue == Cue::move_away ? Page::Kind::message : Page::Kind::neutral;
+  page_.kind = cue == Cue::move_away ? display::Page::Kind::message : display::Page::Kind::neutral;
   page_.go = cue == Cue::go;
   page_.text = cue == Cue::go ? texts.go : cue == Cue::ready ? texts.ready : texts.move_away;
   if (cue == Cue::ready) attendant_.sound(SoundCue::ready);
   if (task() != nullptr) {
     if (cue == Cue::go) page_.text = interval_text();
     const bool types = cue == Cue::go && view_.answers && task()->answers.empty();
-    page_.typing = types ? Page::Typing::number : Page::Typing::none;
+    page_.typing = types ? display::Page::Typing::number : display::Page::Typing::none;
     least_ = task()->least;
     most_ = task()->most;
     page_.wheel =
@@ -204,10 +206,10 @@ std::optional<int> KeyboardRespondent::meaning(const std::string& key) const {
   return std::nullopt;
 }
 
-void KeyboardRespondent::listen(const Sample& sample) {
-  const std::vector<KeyPress> presses = take_keys();
+void KeyboardRespondent::listen(const servo::Sample& sample) {
+  const std::vector<display::KeyPress> presses = take_keys();
   for (std::size_t i = 0; i < presses.size(); ++i) {
-    const KeyPress& press = presses[i];
+    const display::KeyPress& press = presses[i];
     if (task() != nullptr) {
       if (listen_to_task(press)) continue;
       spoken_.assign(presses.begin() + static_cast<std::ptrdiff_t>(i), presses.end());
@@ -237,8 +239,8 @@ void KeyboardRespondent::listen(const Sample& sample) {
   }
 }
 
-std::optional<Answer> KeyboardRespondent::step(const Sample& sample) {
-  if (sample.phase == Phase::feeling && onset_ns_ == 0) {
+std::optional<Answer> KeyboardRespondent::step(const servo::Sample& sample) {
+  if (sample.phase == servo::Phase::feeling && onset_ns_ == 0) {
     onset_ns_ = sample.time_ns;
     early_ = false;
   }
@@ -323,8 +325,8 @@ void KeyboardRespondent::begin_interval(const protocols::Trial&, const IntervalV
       keys_.emplace_back(by_ == AnswerBy::buttons ? button : answer.key, answer.label);
     }
   }
-  Page page;
-  page.kind = Page::Kind::neutral;
+  display::Page page;
+  page.kind = display::Page::Kind::neutral;
   page.keys = keys_;
   if (!view.felt) page.text = interval_text();
   show(std::move(page));
@@ -347,7 +349,7 @@ std::string KeyboardRespondent::interval_text() const {
   return text;
 }
 
-bool KeyboardRespondent::listen_to_task(const KeyPress& press) {
+bool KeyboardRespondent::listen_to_task(const display::KeyPress& press) {
   const bool in_time = view_.continues || (onset_ns_ > 0 && press.time_ns >= onset_ns_);
   if (!in_time) {
     reply();
@@ -369,7 +371,7 @@ bool KeyboardRespondent::listen_to_task(const KeyPress& press) {
 
 /// Takes a character of a typed answer. Numbers have digits, a point or comma and a minus.
 bool KeyboardRespondent::type(const std::string& key) {
-  const bool text = page_.typing == Page::Typing::text;
+  const bool text = page_.typing == display::Page::Typing::text;
   std::string& typed = page_.typed;
   if (key == "backspace") {
     remove_last_character(typed);
@@ -459,10 +461,11 @@ void KeyboardRespondent::listen_to_buttons(unsigned pressed, std::int64_t time_n
   }
 }
 
-void KeyboardRespondent::look_at_buttons(const Sample& newest) {
+void KeyboardRespondent::look_at_buttons(const servo::Sample& newest) {
   const unsigned pressed = newest.buttons & ~static_cast<unsigned>(buttons_);
   buttons_ = newest.buttons;
-  if (by_ != AnswerBy::buttons || pressed == 0 || page_.typing != Page::Typing::none) return;
+  if (by_ != AnswerBy::buttons || pressed == 0 || page_.typing != display::Page::Typing::none)
+    return;
   const auto button = static_cast<std::size_t>(std::countr_zero(pressed));
   if (page_.keys.empty()) {
     spoken_.push_back({"space", newest.time_ns});
@@ -479,12 +482,12 @@ bool KeyboardRespondent::spoken(const std::string& answer, std::int64_t time_ns)
     spoken_.push_back({"space", time_ns});
     return true;
   }
-  if (page_.typing == Page::Typing::number) {
+  if (page_.typing == display::Page::Typing::number) {
     std::string number = answer;
     std::replace(number.begin(), number.end(), ',', '.');
     if (!number_in(number, least_, most_)) return false;
   }
-  if (page_.typing != Page::Typing::none) {
+  if (page_.typing != display::Page::Typing::none) {
     while (!page_.typed.empty()) type("backspace");
     std::string character;
     for (const char c : answer) {
@@ -506,9 +509,9 @@ bool KeyboardRespondent::spoken(const std::string& answer, std::int64_t time_ns)
   return false;
 }
 
-KeyPress KeyboardRespondent::wait_for_key(std::int64_t since_ns) {
+display::KeyPress KeyboardRespondent::wait_for_key(std::int64_t since_ns) {
   while (true) {
-    std::vector<KeyPress> keys = take_keys();
+    std::vector<display::KeyPress> keys = take_keys();
     for (std::size_t i = 0; i < keys.size(); ++i) {
       if (keys[i].time_ns < since_ns) continue;
       // Keep the others for the next call: keys may arrive faster than they are polled.
@@ -522,12 +525,13 @@ KeyPress KeyboardRespondent::wait_for_key(std::int64_t since_ns) {
 }
 
 int KeyboardRespondent::page_through(const std::vector<ReadScreen>& screens, const Keys& keys,
-                                     Page::Kind kind, std::int64_t& time_ns) {
+                                     display::Page::Kind kind, std::int64_t& time_ns) {
   std::size_t at = 0;
   while (true) {
     const bool last = at + 1 == screens.size();
     const std::int64_t since_ns = clock_.now_ns();
-    Page page = kind == Page::Kind::text ? between_trials(kind, screens[at].text) : Page{};
+    display::Page page = kind == display::Page::Kind::text ? between_trials(kind, screens[at].text)
+                                                           : display::Page{};
     page.kind = kind;
     page.text = screens[at].text;
     page.picture = screens[at].picture;
@@ -536,7 +540,7 @@ int KeyboardRespondent::page_through(const std::vector<ReadScreen>& screens, con
     if (last) page.keys = keys;
     show(std::move(page));
     for (const std::size_t shown = at; at == shown;) {
-      const KeyPress press = wait_for_key(since_ns);
+      const display::KeyPress press = wait_for_key(since_ns);
       time_ns = press.time_ns;
       const auto key = std::find_if(keys.begin(), keys.end(), [&press](const auto& entry) {
         return protocols::one_key(entry.first) == protocols::one_key(press.key);
@@ -562,7 +566,7 @@ void KeyboardRespondent::read_screens(const std::vector<ReadScreen>& screens) {
     if (!screen.text.empty() || screen.picture) shown.push_back(screen);
   }
   std::int64_t time_ns = 0;
-  if (!shown.empty()) page_through(shown, {}, Page::Kind::text, time_ns);
+  if (!shown.empty()) page_through(shown, {}, display::Page::Kind::text, time_ns);
 }
 
 std::optional<Answer> KeyboardRespondent::confidence(const protocols::ConfidenceSpec& asked) {
@@ -570,21 +574,21 @@ std::optional<Answer> KeyboardRespondent::confidence(const protocols::Confidence
   labels.reserve(asked.scale.size());
   for (const protocols::ScaleStep& step : asked.scale) labels.push_back(step.label);
   Answer answer;
-  answer.stimulus = page_through({{asked.question, nullptr}}, numbered(labels), Page::Kind::message,
-                                 answer.time_ns);
+  answer.stimulus = page_through({{asked.question, nullptr}}, numbered(labels),
+                                 display::Page::Kind::message, answer.time_ns);
   return answer;
 }
 
 std::string KeyboardRespondent::ask_typed(const protocols::PageItem& item) {
   const std::int64_t since_ns = clock_.now_ns();
   const bool text = item.kind == protocols::PageItem::Kind::text;
-  Page page = between_trials(Page::Kind::message, item.question);
-  page.typing = text ? Page::Typing::text : Page::Typing::number;
+  display::Page page = between_trials(display::Page::Kind::message, item.question);
+  page.typing = text ? display::Page::Typing::text : display::Page::Typing::number;
   least_ = item.least;
   most_ = item.most;
   show(std::move(page));
   while (true) {
-    const KeyPress press = wait_for_key(since_ns);
+    const display::KeyPress press = wait_for_key(since_ns);
     if (press.key != "enter") {
       if (!type(press.key)) reply();
       continue;
@@ -607,15 +611,16 @@ std::string KeyboardRespondent::ask(const protocols::PageSpec& page,
   std::int64_t time_ns = 0;
   if (page.kind == protocols::PageSpec::Kind::consent) {
     const Keys keys = numbered({protocol_.texts.agree, protocol_.texts.disagree});
-    const int at = page_through(screens_of_text(page.text), keys, Page::Kind::text, time_ns);
+    const int at =
+        page_through(screens_of_text(page.text), keys, display::Page::Kind::text, time_ns);
     return at == 0 ? "agree" : "disagree";
   }
   if (item.kind != protocols::PageItem::Kind::choice &&
       item.kind != protocols::PageItem::Kind::scale)
     return ask_typed(item);
-  const int at =
-      page_through({{item.question, nullptr}}, numbered(item.shown), Page::Kind::text, time_ns);
+  const int at = page_through({{item.question, nullptr}}, numbered(item.shown),
+                              display::Page::Kind::text, time_ns);
   return item.choices[static_cast<std::size_t>(at)];
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::participants

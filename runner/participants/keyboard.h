@@ -11,7 +11,7 @@
 #include "runner/display/display.h"
 #include "runner/participants/respondent.h"
 
-namespace palpate::runner {
+namespace palpate::runner::participants {
 
 /// Work to be done while waiting for the participant: device, console, markers.
 class Attendant {
@@ -32,8 +32,8 @@ enum class AnswerBy {
 class KeyboardRespondent final : public Respondent {
  public:
   /// All arguments must outlive it. \param clock  the clock that time-stamps keys
-  KeyboardRespondent(const protocols::Protocol& protocol, ParticipantScreen& screen,
-                     Attendant& attendant, Clock& clock, AnswerBy by);
+  KeyboardRespondent(const protocols::Protocol& protocol, display::ParticipantScreen& screen,
+                     Attendant& attendant, servo::Clock& clock, AnswerBy by);
 
   void read(const std::string& text) override;
   void read_screens(const std::vector<ReadScreen>& screens) override;
@@ -41,7 +41,7 @@ class KeyboardRespondent final : public Respondent {
   void feedback(bool correct) override;
   void begin_trial(const protocols::Trial& trial) override;
   void begin_interval(const protocols::Trial& trial, const IntervalView& view) override;
-  std::optional<Answer> step(const Sample& sample) override;
+  std::optional<Answer> step(const servo::Sample& sample) override;
   std::optional<Answer> confidence(const protocols::ConfidenceSpec& asked) override;
   std::string ask(const protocols::PageSpec& page, const protocols::PageItem& item) override;
 
@@ -50,7 +50,7 @@ class KeyboardRespondent final : public Respondent {
   bool spoken(const std::string& answer, std::int64_t time_ns);
   /// Call it between trials if the device's buttons answer: button n stands for the n-th key of a
   /// page; without keys any button continues. \param newest  sample of the servo
-  void look_at_buttons(const Sample& newest);
+  void look_at_buttons(const servo::Sample& newest);
   /// Shows a page without answer keys.
   void show_message(const std::string& text);
   /// Call it repeatedly while such a page is shown: replies to keys.
@@ -62,14 +62,14 @@ class KeyboardRespondent final : public Respondent {
 
  private:
   enum class Cue { none, move_away, ready, go };
-  Page between_trials(Page::Kind kind, const std::string& text) const;
-  void show(Page page);
-  void show_cue(const Sample& sample);
+  display::Page between_trials(display::Page::Kind kind, const std::string& text) const;
+  void show(display::Page page);
+  void show_cue(const servo::Sample& sample);
   void reply();
   void end_reply();
   void wait_until(std::int64_t when_ns);
   void wait_for_space(std::int64_t since_ns);
-  void listen(const Sample& sample);
+  void listen(const servo::Sample& sample);
   std::optional<int> meaning(const std::string& key) const;
   // Version 2
   using Keys = std::vector<std::pair<std::string, std::string>>;
@@ -78,29 +78,29 @@ class KeyboardRespondent final : public Respondent {
   /// \return the answer, if the key ends the interval
   std::optional<Answer> meaning_in_interval(const std::string& key);
   void listen_to_buttons(unsigned pressed, std::int64_t time_ns);
-  std::vector<KeyPress> take_keys();           ///< pressed, or typed by the experimenter
-  bool listen_to_task(const KeyPress& press);  ///< false: to be handled after a turn
+  std::vector<display::KeyPress> take_keys();           ///< pressed, or typed by the experimenter
+  bool listen_to_task(const display::KeyPress& press);  ///< false: to be handled after a turn
   std::optional<Answer> typed_answer(const std::string& key);
   bool type(const std::string& key);  ///< false: the key does not type
   static std::optional<double> number_in(const std::string& typed, std::optional<double> least,
                                          std::optional<double> most);
   void reply_with(const std::string& text);
   void refuse_number(std::optional<double> least, std::optional<double> most);
-  KeyPress wait_for_key(std::int64_t since_ns);
+  display::KeyPress wait_for_key(std::int64_t since_ns);
   /// \return  index into keys, which are shown with the last screen; -1: continued without an
   /// answer
-  int page_through(const std::vector<ReadScreen>& screens, const Keys& keys, Page::Kind kind,
-                   std::int64_t& time_ns);
+  int page_through(const std::vector<ReadScreen>& screens, const Keys& keys,
+                   display::Page::Kind kind, std::int64_t& time_ns);
   std::string ask_typed(const protocols::PageItem& item);
 
   const protocols::Protocol& protocol_;
-  ParticipantScreen& screen_;
+  display::ParticipantScreen& screen_;
   Attendant& attendant_;
-  Clock& clock_;
+  servo::Clock& clock_;
   AnswerBy by_;
   std::vector<std::pair<std::string, std::string>> keys_;  ///< as displayed
   std::vector<int> stimuli_;                               ///< of keys_, in order
-  Page page_;                                              ///< displayed now
+  display::Page page_;                                     ///< displayed now
   int done_ = 0, trials_ = 0;
   std::int64_t reply_until_ns_ = 0;  ///< 0: no reply is shown
   Cue cue_ = Cue::none;
@@ -111,8 +111,8 @@ class KeyboardRespondent final : public Respondent {
   int task_block_ = -1;            ///< of the trial; -1: version 1
   IntervalView view_;
   bool early_ = false;  ///< a trial or interval is prepared but cannot be answered yet
-  std::optional<double> least_, most_;  ///< range of the number being typed
-  std::vector<KeyPress> spoken_;        ///< spoken answers as keys, and keys not handled yet
+  std::optional<double> least_, most_;     ///< range of the number being typed
+  std::vector<display::KeyPress> spoken_;  ///< spoken answers as keys, and keys not handled yet
 };
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::participants

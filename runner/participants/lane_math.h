@@ -7,7 +7,7 @@
 #include <cmath>
 #include <cstdint>
 
-namespace palpate::runner::lane {
+namespace palpate::runner::participants::lane {
 
 inline float max(float a, float b) { return a > b ? a : b; }
 inline float min(float a, float b) { return a < b ? a : b; }
@@ -73,4 +73,4 @@ inline float log_normal_cdf(float x) {
   return x < 0.0f ? lower : upper;
 }
 
-}  // namespace palpate::runner::lane
+}  // namespace palpate::runner::participants::lane

@@ -11,7 +11,7 @@
 #include "protocols/tasks/task_plan.h"
 #include "runner/servo/servo.h"
 
-namespace palpate::runner {
+namespace palpate::runner::participants {
 
 struct Answer {
   int stimulus = 0;          ///< index into Protocol::stimuli; version 2: into TaskBlock::answers
@@ -82,7 +82,7 @@ class Respondent {
   }
   /// Called with every sample of the servo. Returns the answer once there is one; answers before
   /// time zero do not count. \throws TrialCutOff if the trial is to be repeated.
-  virtual std::optional<Answer> step(const Sample& sample) = 0;
+  virtual std::optional<Answer> step(const servo::Sample& sample) = 0;
 };
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::participants

@@ -14,7 +14,7 @@
 #include <stdexcept>
 #include <utility>
 
-namespace palpate::runner {
+namespace palpate::runner::participants {
 namespace {
 
 constexpr int kUsualBaud = 9600;
@@ -63,7 +63,7 @@ std::map<unsigned char, std::string> bytes_of(const std::map<std::string, std::s
 }  // namespace
 
 ResponseBox::ResponseBox(const std::string& name, const std::map<std::string, std::string>& keys,
-                         Clock& clock, std::function<void()> emergency)
+                         servo::Clock& clock, std::function<void()> emergency)
     : keys_(bytes_of(keys)), clock_(clock), emergency_(std::move(emergency)) {
   const std::pair<std::string, speed_t> port = port_of(name);
   const std::string& path = port.first;
@@ -146,13 +146,14 @@ std::string ScreenWithBox::trouble() const {
   return {};
 }
 
-std::vector<KeyPress> ScreenWithBox::keys() {
-  std::vector<KeyPress> keys = screen_.keys();
-  const std::vector<KeyPress> more = box_.take();
+std::vector<display::KeyPress> ScreenWithBox::keys() {
+  std::vector<display::KeyPress> keys = screen_.keys();
+  const std::vector<display::KeyPress> more = box_.take();
   keys.insert(keys.end(), more.begin(), more.end());
-  std::stable_sort(keys.begin(), keys.end(),
-                   [](const KeyPress& a, const KeyPress& b) { return a.time_ns < b.time_ns; });
+  std::stable_sort(
+      keys.begin(), keys.end(),
+      [](const display::KeyPress& a, const display::KeyPress& b) { return a.time_ns < b.time_ns; });
   return keys;
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::participants

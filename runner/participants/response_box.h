@@ -14,7 +14,7 @@
 #include "runner/display/display.h"
 #include "runner/display/mailbox.h"
 
-namespace palpate::runner {
+namespace palpate::runner::participants {
 
 class ResponseBox {
  public:
@@ -26,14 +26,14 @@ class ResponseBox {
   /// \param emergency  called at once, in the box's own thread
   /// \throws std::invalid_argument: not a speed of a serial port; std::runtime_error: cannot be
   /// opened
-  ResponseBox(const std::string& name, const std::map<std::string, std::string>& keys, Clock& clock,
-              std::function<void()> emergency);
+  ResponseBox(const std::string& name, const std::map<std::string, std::string>& keys,
+              servo::Clock& clock, std::function<void()> emergency);
   ~ResponseBox();
   ResponseBox(const ResponseBox&) = delete;
   ResponseBox& operator=(const ResponseBox&) = delete;
 
   /// Keys pressed since the last call, in order of arrival.
-  std::vector<KeyPress> take() { return presses_.take(); }
+  std::vector<display::KeyPress> take() { return presses_.take(); }
   /// It was unplugged or its port failed; it sends no more keys.
   bool failed() const { return failed_.load(); }
   /// The first byte that stands for no key, line ends ignored. nullopt: there was none
@@ -43,29 +43,30 @@ class ResponseBox {
   void listen() noexcept;
 
   std::map<unsigned char, std::string> keys_;
-  Clock& clock_;
+  servo::Clock& clock_;
   const std::function<void()> emergency_;
   int port_ = -1, wake_ = -1;
   termios before_{};
-  EventQueue<KeyPress> presses_;
+  display::EventQueue<display::KeyPress> presses_;
   std::atomic<bool> failed_{false};
   std::atomic<int> unknown_{-1};  ///< byte; -1: none
   std::jthread thread_;
 };
 
 /// The participant's screen with a box beside its keyboard.
-class ScreenWithBox final : public ParticipantScreen {
+class ScreenWithBox final : public display::ParticipantScreen {
  public:
   /// Both must outlive it.
-  ScreenWithBox(ParticipantScreen& screen, ResponseBox& box) : screen_(screen), box_(box) {}
-  void show(const Page& page) override { screen_.show(page); }
-  std::vector<KeyPress> keys() override;
+  ScreenWithBox(display::ParticipantScreen& screen, ResponseBox& box)
+      : screen_(screen), box_(box) {}
+  void show(const display::Page& page) override { screen_.show(page); }
+  std::vector<display::KeyPress> keys() override;
   bool open() const override { return screen_.open(); }
   std::string trouble() const override;
 
  private:
-  ParticipantScreen& screen_;
+  display::ParticipantScreen& screen_;
   ResponseBox& box_;
 };
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::participants

@@ -8,7 +8,7 @@
 #include "data/base/random.h"
 #include "stimuli/grid_hull.h"
 
-namespace palpate::runner {
+namespace palpate::runner::participants {
 namespace {
 
 constexpr int kFine = 9120;    // 11 degrees apart
@@ -128,4 +128,4 @@ std::vector<Mat3> distinct_rotations(const std::vector<Quat>& group) {
   return rotations;
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::participants

@@ -6,7 +6,7 @@
 #include "runner/participants/distance_field.h"
 #include "stimuli/vec.h"
 
-namespace palpate::runner {
+namespace palpate::runner::participants {
 
 /// Point i of n of a super-Fibonacci spiral, evenly spread over all rotations (Alexa 2022,
 /// "Super-Fibonacci Spirals: Fast, Low-Discrepancy Sampling of SO(3)", algorithm 1).
@@ -21,4 +21,4 @@ std::vector<Quat> symmetries(const std::vector<PlacedPart>& parts, const Distanc
 /// Rotations some 11 to 14 degrees apart: of each set that is equivalent by symmetry, the smallest.
 std::vector<Mat3> distinct_rotations(const std::vector<Quat>& group);
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::participants

@@ -13,7 +13,7 @@
 #include "runner/participants/rotation_grid.h"
 #include "stimuli/shapes.h"
 
-namespace palpate::runner {
+namespace palpate::runner::participants {
 namespace {
 
 constexpr int kConeAxes = 380;
@@ -202,4 +202,4 @@ Mat3 ShapeHypotheses::rotation(int hypothesis) const {
   return r;
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::participants

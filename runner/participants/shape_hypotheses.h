@@ -11,7 +11,7 @@
 #include "stimuli/shapes.h"
 #include "stimuli/vec.h"
 
-namespace palpate::runner {
+namespace palpate::runner::participants {
 
 /// Shape x rotation grid modulo the shape's symmetry. Immutable, so threads can share it. A
 /// stimulus is represented by the surface that is felt first (felt_parts.h), placed relative to the
@@ -73,4 +73,4 @@ class ShapeHypotheses {
   std::vector<int> nearby_order_;
 };
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::participants

@@ -21,7 +21,7 @@
 #include "stimuli/shapes.h"
 #include "stimuli/vec.h"
 
-namespace palpate::runner {
+namespace palpate::runner::participants {
 
 struct FloatVec {
   float x, y, z;
@@ -572,4 +572,4 @@ void visit_line_class(const ShapeHypotheses::Shape& shape, Visit&& visit) {
   }
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::participants

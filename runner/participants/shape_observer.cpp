@@ -14,7 +14,7 @@
 // The loops over the hypotheses of a block are written for the compiler to vectorise; the build
 // gives this file -fno-math-errno and -fno-trapping-math, which change no value.
 
-namespace palpate::runner {
+namespace palpate::runner::participants {
 namespace {
 
 constexpr int kBlock = ShapeHypotheses::kBlock;
@@ -352,4 +352,4 @@ void ShapeObserver::draw(Random& random, std::span<int> hypotheses) {
   while (drawn < hypotheses.size()) hypotheses[drawn++] = last;  // if the sum was rounded down
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::participants

@@ -31,7 +31,7 @@
 #include "runner/participants/shape_hypotheses.h"
 #include "stimuli/vec.h"
 
-namespace palpate::runner {
+namespace palpate::runner::participants {
 
 /// Basis of a percept's weight.
 enum class Evidence { percept, movement };
@@ -104,4 +104,4 @@ class ShapeObserver {
   int best_ = 0;
 };
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::participants

@@ -6,7 +6,7 @@
 #include "runner/participants/lane_math.h"
 #include "runner/participants/shape_hypotheses.h"
 
-namespace palpate::runner {
+namespace palpate::runner::participants {
 
 /// A vector in the half-plane of a solid of revolution.
 struct ProfileVec {
@@ -90,4 +90,4 @@ class ConeProfile {
   ProfileVec normal_, up_;
 };
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::participants

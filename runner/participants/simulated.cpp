@@ -8,7 +8,7 @@
 
 #include "runner/scene_builder.h"
 
-namespace palpate::runner {
+namespace palpate::runner::participants {
 namespace {
 
 constexpr double kLongestWait = 60;  // s of simulated time, from the start of a trial to time zero
@@ -52,7 +52,7 @@ SimulatedSettings as_far_hand(SimulatedSettings own, const protocols::Protocol& 
 
 SimulatedParticipant::SimulatedParticipant(const SimulatedSettings& own,
                                            const ShapeHypotheses& hypotheses,
-                                           SimulatedStylus& stylus,
+                                           devices::SimulatedStylus& stylus,
                                            const protocols::Protocol& protocol, std::uint64_t seed,
                                            int number)
     : settings_(own),
@@ -81,7 +81,7 @@ void SimulatedParticipant::begin_trial(const protocols::Trial& trial) {
   trial_ = trial;
   ticks_before_ = 0;
   random_ = stream(1);
-  HandTarget start = explorer_.begin(stream(2));
+  devices::HandTarget start = explorer_.begin(stream(2));
   put_in_device(start);
   stylus_.reset(start);
   heading_random_ = stream(3);  // separate from hand and percepts
@@ -94,9 +94,9 @@ void SimulatedParticipant::begin_trial(const protocols::Trial& trial) {
   touched_ = false;
 }
 
-std::optional<Answer> SimulatedParticipant::step(const Sample& sample) {
+std::optional<Answer> SimulatedParticipant::step(const servo::Sample& sample) {
   percept_.reset();
-  if (sample.phase != Phase::feeling) {
+  if (sample.phase != servo::Phase::feeling) {
     wait_for_time_zero(sample);
     return std::nullopt;  // rests in the home zone
   }
@@ -120,7 +120,7 @@ std::optional<Answer> SimulatedParticipant::step(const Sample& sample) {
 
 // The hand rests at the start of the first approach: if that is not in the home zone, it will never
 // be.
-void SimulatedParticipant::wait_for_time_zero(const Sample& sample) {
+void SimulatedParticipant::wait_for_time_zero(const servo::Sample& sample) {
   const double waited = static_cast<double>(++ticks_before_) * period_;
   if (waited < kLongestWait + protocol_.home.rest) return;
   char text[600];
@@ -135,7 +135,8 @@ void SimulatedParticipant::wait_for_time_zero(const Sample& sample) {
       "in the home zone",
       number_, trial_.session, trial_.trial, protocols::to_string(trial_.renderer),
       protocol_.stimuli[static_cast<std::size_t>(trial_.stimulus)].name.c_str(), waited,
-      sample.waiting == Waiting::for_rest ? "does not come to rest" : "is not in the home zone",
+      sample.waiting == servo::Waiting::for_rest ? "does not come to rest"
+                                                 : "is not in the home zone",
       settings_.motor.approach_distance, settings_.stylus.tilt * 180 / std::numbers::pi,
       settings_.stylus.tilt_sd * 180 / std::numbers::pi, settings_.motor.approach_min_rise);
   throw StuckParticipant(text);
@@ -151,7 +152,7 @@ Vec3 SimulatedParticipant::explored_in_world(const Vec3& explored) const {
 }
 
 void SimulatedParticipant::move_hand(const TouchState& touch, const Vec3& tip, const Vec3& axis) {
-  HandTarget target;
+  devices::HandTarget target;
   if (far_) {
     const TouchState known{touch.contact, explored(touch.normal), explored(touch.surface),
                            touch.along};
@@ -163,7 +164,7 @@ void SimulatedParticipant::move_hand(const TouchState& touch, const Vec3& tip, c
   stylus_.set_target(target);
 }
 
-void SimulatedParticipant::put_in_device(HandTarget& target) const {
+void SimulatedParticipant::put_in_device(devices::HandTarget& target) const {
   if (far_) {
     target.grip = explored_in_world(target.grip);
     target.velocity = explored_in_world(target.velocity);
@@ -178,7 +179,8 @@ void SimulatedParticipant::put_in_device(HandTarget& target) const {
 SimulatedParticipant::SensedStylus::SensedStylus(const rendering::LineProbe& probe)
     : span(probe.tail - probe.tip), length(glm::length(span)), axis(span / length) {}
 
-TouchState SimulatedParticipant::sense_touch(const Sample& sample, const SensedStylus& stylus) {
+TouchState SimulatedParticipant::sense_touch(const servo::Sample& sample,
+                                             const SensedStylus& stylus) {
   // A person who holds a stylus knows its lever, and infers the forces at its ends from the hand.
   const rendering::EndForces ends{sample.device1, sample.device2};
   const rendering::EndForces forces =
@@ -205,7 +207,7 @@ Vec3 SimulatedParticipant::perceived_shift() const {
   return settings_.percept.place == PerceivedPlace::surface ? force_ / wall_stiffness_ : Vec3(0);
 }
 
-void SimulatedParticipant::choose_heading(const Sample& sample, const TouchState& touch) {
+void SimulatedParticipant::choose_heading(const servo::Sample& sample, const TouchState& touch) {
   const Vec3 shift = (touch.contact ? perceived_shift() : Vec3(0)) - centre_error_;
   const SlidingStylus stylus{ray_, sample.probe.tip + shift, sample.probe.tail + shift,
                              explored_in_world(explorer_.known_normal()),
@@ -213,7 +215,7 @@ void SimulatedParticipant::choose_heading(const Sample& sample, const TouchState
   explorer_.turn_to(explored(heading_choice_.choose(observer_, stylus, heading_random_)));
 }
 
-Percept SimulatedParticipant::perceive(const Sample& sample, const SensedStylus& stylus,
+Percept SimulatedParticipant::perceive(const servo::Sample& sample, const SensedStylus& stylus,
                                        const TouchState& touch) {
   const auto noise = [this](double sd) {
     return sd * Vec3(random_.normal(), random_.normal(), random_.normal());
@@ -245,4 +247,4 @@ Percept SimulatedParticipant::perceive(const Sample& sample, const SensedStylus&
   return percept;
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::participants

@@ -12,7 +12,7 @@
 #include "runner/participants/respondent.h"
 #include "runner/participants/shape_observer.h"
 
-namespace palpate::runner {
+namespace palpate::runner::participants {
 
 /// A trial cannot begin: the stylus rests outside the home zone. what() names participant, trial
 /// and settings.
@@ -26,21 +26,21 @@ class SimulatedParticipant final : public Respondent {
   /// random stream, seeded with `seed`, number, session and trial, so it does not depend on earlier
   /// trials. \param hypotheses, stylus, protocol  must outlive it
   SimulatedParticipant(const SimulatedSettings& own, const ShapeHypotheses& hypotheses,
-                       SimulatedStylus& stylus, const protocols::Protocol& protocol,
+                       devices::SimulatedStylus& stylus, const protocols::Protocol& protocol,
                        std::uint64_t seed, int number);
 
   void read(const std::string&) override {}
   void feedback(bool) override {}  // without effect: it does not learn
   void begin_trial(const protocols::Trial& trial) override;
   /// \throws StuckParticipant
-  std::optional<Answer> step(const Sample& sample) override;
+  std::optional<Answer> step(const servo::Sample& sample) override;
   /// The percept of the last step; none: nothing new.
   const std::optional<Percept>& percept() const { return percept_; }
   /// Posterior of the most probable shape.
   double certainty() const { return observer_.probability(observer_.best()); }
 
  private:
-  void wait_for_time_zero(const Sample& sample);
+  void wait_for_time_zero(const servo::Sample& sample);
   /// The stylus of a sample, in the form that hand and percepts need.
   struct SensedStylus {
     explicit SensedStylus(const rendering::LineProbe& probe);
@@ -50,16 +50,17 @@ class SimulatedParticipant final : public Respondent {
   };
   void move_hand(const TouchState& touch, const Vec3& tip, const Vec3& axis);
   /// Converts from the explorer's frame to the device's.
-  void put_in_device(HandTarget& target) const;
+  void put_in_device(devices::HandTarget& target) const;
   Vec3 explored(const Vec3& world) const;
   Vec3 explored_in_world(const Vec3& explored) const;
-  TouchState sense_touch(const Sample& sample, const SensedStylus& stylus);
+  TouchState sense_touch(const servo::Sample& sample, const SensedStylus& stylus);
   Vec3 perceived_shift() const;
-  Percept perceive(const Sample& sample, const SensedStylus& stylus, const TouchState& touch);
-  void choose_heading(const Sample& sample, const TouchState& touch);
+  Percept perceive(const servo::Sample& sample, const SensedStylus& stylus,
+                   const TouchState& touch);
+  void choose_heading(const servo::Sample& sample, const TouchState& touch);
 
   SimulatedSettings settings_;
-  SimulatedStylus& stylus_;
+  devices::SimulatedStylus& stylus_;
   const protocols::Protocol& protocol_;
   double wall_stiffness_, period_, low_pass_;
   double surely_unfelt2_;  ///< N^2; below it a force is certainly not felt
@@ -85,4 +86,4 @@ class SimulatedParticipant final : public Respondent {
   std::optional<Percept> percept_;     ///< of the last step
 };
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::participants

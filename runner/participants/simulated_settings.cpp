@@ -18,7 +18,7 @@
 #include "protocols/json_document.h"
 #include "protocols/parse.h"
 
-namespace palpate::runner {
+namespace palpate::runner::participants {
 
 // Ranges of the simulated participant's numbers: physically possible hands, styli and devices, and
 // the domain of the model. The ranges are wide; plausible values are up to the study.
@@ -419,4 +419,4 @@ SimulatedSettings individual(const SimulatedSettings& settings, std::uint64_t se
   return own;
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::participants

@@ -12,7 +12,7 @@
 #include "runner/participants/heading_choice.h"
 #include "runner/participants/shape_observer.h"
 
-namespace palpate::runner {
+namespace palpate::runner::participants {
 
 /// A frozen settings file, embedded by the build.
 struct FrozenSettings {
@@ -89,8 +89,8 @@ struct SimulatedSettings {
     double tilt, tilt_sd;  ///< rad, from the direction of approach
     double turning;        ///< rad/s, at most
   } stylus;
-  HandImpedance hand;
-  SimulatedDeviceSettings device;
+  devices::HandImpedance hand;
+  devices::SimulatedDeviceSettings device;
   struct Between {
     double slide_speed, percept_noise, reaction_delay, non_decision;  ///< sd of the log
     double threshold;                                                 ///< sd of the logit
@@ -122,4 +122,4 @@ SimulatedSettings read_simulated_settings(const std::string& text);
 /// threshold.
 SimulatedSettings individual(const SimulatedSettings& settings, std::uint64_t seed, int number);
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::participants

@@ -13,7 +13,7 @@
 #include "protocols/tasks/levels.h"
 #include "stimuli/signed_distance.h"
 
-namespace palpate::runner {
+namespace palpate::runner::participants {
 namespace {
 
 constexpr double kLeastDepth = 2e-4;        // m; below it force over depth is noise
@@ -111,7 +111,7 @@ void LevelPercept::know_object(const protocols::TaskBlock& block,
   }
 }
 
-void LevelPercept::add(const Sample& sample) {
+void LevelPercept::add(const servo::Sample& sample) {
   const rendering::Rendering& felt = sample.rendering;
   if (felt.contacts == 0 || !(felt.deepest.depth > kLeastDepth)) return;
   stiffness_sum_ += glm::length(felt.force) / felt.deepest.depth;
@@ -305,4 +305,4 @@ int TaskJudgement::confidence(int steps) const {
   return static_cast<int>(share * steps);
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::participants

@@ -24,7 +24,7 @@
 #include "runner/participants/shape_observer.h"
 #include "runner/servo/sample.h"
 
-namespace palpate::runner {
+namespace palpate::runner::participants {
 
 // Estimates a level from exploration: one estimate for each interval.
 //
@@ -42,7 +42,7 @@ class LevelPercept {
 
   /// Before an interval. \param trial  of version 2
   void begin(const protocols::Trial& trial, const protocols::Interval& interval);
-  void add(const Sample& sample);
+  void add(const servo::Sample& sample);
   void add(const Percept& percept);
   int contact_ticks() const { return contact_ticks_; }
 
@@ -131,4 +131,4 @@ class TaskJudgement {
   double evidence_ = 0;    ///< how clear the answer was, in sd
 };
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::participants

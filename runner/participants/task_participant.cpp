@@ -6,7 +6,7 @@
 
 #include "protocols/tasks/levels.h"
 
-namespace palpate::runner {
+namespace palpate::runner::participants {
 namespace {
 
 constexpr double kLook = 1.5;       // s of exploration in each interval after the first contact
@@ -58,7 +58,7 @@ BlockHypotheses block_hypotheses(const protocols::Protocol& protocol) {
 }
 
 TaskParticipant::TaskParticipant(const SimulatedSettings& own, const ShapeHypotheses& hypotheses,
-                                 const BlockHypotheses& of_blocks, SimulatedStylus& stylus,
+                                 const BlockHypotheses& of_blocks, devices::SimulatedStylus& stylus,
                                  const protocols::Protocol& protocol, std::uint64_t seed,
                                  int number)
     : protocol_(protocol),
@@ -120,7 +120,7 @@ Answer TaskParticipant::answer(std::int64_t time_ns) {
 }
 
 /// As in version 1; the shape found is converted to an answer by its name.
-std::optional<Answer> TaskParticipant::identify(const Sample& sample) {
+std::optional<Answer> TaskParticipant::identify(const servo::Sample& sample) {
   std::optional<Answer> found = identifier_->step(sample);
   if (!found) return found;
   const int stimulus = block().stimuli[static_cast<std::size_t>(found->stimulus)];
@@ -133,11 +133,11 @@ std::optional<Answer> TaskParticipant::identify(const Sample& sample) {
   return found;
 }
 
-std::optional<Answer> TaskParticipant::step(const Sample& sample) {
+std::optional<Answer> TaskParticipant::step(const servo::Sample& sample) {
   if (!view_.felt) return answer(sample.time_ns);
   if (identifier_ != nullptr) return identify(sample);
   hand_.step(sample);
-  if (sample.phase != Phase::feeling) return std::nullopt;
+  if (sample.phase != servo::Phase::feeling) return std::nullopt;
   percept_.add(sample);
   if (hand_.percept()) percept_.add(*hand_.percept());
   const double time = sample.tick * period_;
@@ -183,4 +183,4 @@ std::string TaskParticipant::ask(const protocols::PageSpec& page, const protocol
   return "simulated";
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::participants

@@ -14,7 +14,7 @@
 #include "runner/participants/simulated.h"
 #include "runner/participants/task_judgement.h"
 
-namespace palpate::runner {
+namespace palpate::runner::participants {
 
 /// Hypotheses for each block of a protocol; null: nothing to identify, or stimuli of one shape.
 using BlockHypotheses = std::vector<std::shared_ptr<const ShapeHypotheses>>;
@@ -26,21 +26,21 @@ class TaskParticipant final : public Respondent {
   /// As SimulatedParticipant. \param hypotheses  for exploration. \param of_blocks  for
   /// identification; must outlive it, too
   TaskParticipant(const SimulatedSettings& own, const ShapeHypotheses& hypotheses,
-                  const BlockHypotheses& of_blocks, SimulatedStylus& stylus,
+                  const BlockHypotheses& of_blocks, devices::SimulatedStylus& stylus,
                   const protocols::Protocol& protocol, std::uint64_t seed, int number);
 
   void read(const std::string&) override {}
   void feedback(bool) override {}
   void begin_trial(const protocols::Trial& trial) override;
   void begin_interval(const protocols::Trial& trial, const IntervalView& view) override;
-  std::optional<Answer> step(const Sample& sample) override;
+  std::optional<Answer> step(const servo::Sample& sample) override;
   std::optional<Answer> confidence(const protocols::ConfidenceSpec& asked) override;
   std::string ask(const protocols::PageSpec& page, const protocols::PageItem& item) override;
 
  private:
   Answer answer(std::int64_t time_ns);
   const protocols::TaskBlock& block() const;
-  std::optional<Answer> identify(const Sample& sample);
+  std::optional<Answer> identify(const servo::Sample& sample);
 
   const protocols::Protocol& protocol_;
   SimulatedParticipant hand_;
@@ -62,4 +62,4 @@ class TaskParticipant final : public Respondent {
   bool limited_ = false;  ///< it ends by itself
 };
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::participants

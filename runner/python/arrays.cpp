@@ -40,7 +40,7 @@ py::dict arrays_of(const data::ColumnTable& table) {
   return out;
 }
 
-std::vector<TimedPose> poses_of(const std::vector<Coordinates>& columns) {
+std::vector<commands::TimedPose> poses_of(const std::vector<Coordinates>& columns) {
   constexpr std::size_t kFaultsShown = 20;
   std::vector<protocols::Fault> faults;
   const py::ssize_t rows = columns.at(0).size();
@@ -51,15 +51,15 @@ std::vector<TimedPose> poses_of(const std::vector<Coordinates>& columns) {
   }
   if (rows == 0)
     throw protocols::InputError({{"trajectory", "(columns)", "expected at least one row"}});
-  std::vector<TimedPose> poses;
+  std::vector<commands::TimedPose> poses;
   for (py::ssize_t i = 0; i < rows && faults.size() < kFaultsShown; ++i) {
     const auto at = [&](std::size_t column) { return columns[column].data()[i]; };
-    TimedPose pose{at(0), {{at(1), at(2), at(3)}, {at(4), at(5), at(6)}}};
+    commands::TimedPose pose{at(0), {{at(1), at(2), at(3)}, {at(4), at(5), at(6)}}};
     if (columns.size() > 7) pose.side = {at(7), at(8), at(9)};
     pose.line = static_cast<std::size_t>(i);
-    if (const std::string fault = fault_of(pose, poses); !fault.empty()) {
+    if (const std::string fault = commands::fault_of(pose, poses); !fault.empty()) {
       faults.push_back({"trajectory", "row " + std::to_string(i), fault});
-      if (poses.size() == kMostPoses) break;
+      if (poses.size() == commands::kMostPoses) break;
     } else {
       poses.push_back(pose);
     }

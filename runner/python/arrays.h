@@ -20,6 +20,6 @@ using Coordinates =
 
 /// \param columns  t (s), tip and tail (m) and, with ten, the tool's +x, each of one length.
 /// \throws protocols::InputError naming what is wrong, as read_trajectory does of a file
-std::vector<TimedPose> poses_of(const std::vector<Coordinates>& columns);
+std::vector<commands::TimedPose> poses_of(const std::vector<Coordinates>& columns);
 
 }  // namespace palpate::runner

@@ -61,64 +61,67 @@ py::tuple simulate(const Document& given, const std::string& settings_text, int 
   std::vector<std::string> limited;
   {
     const py::gil_scoped_release unlocked;
-    check_simulated_participants(participants);
+    commands::check_simulated_participants(participants);
     protocols::Protocol protocol = parse(given);
-    const SimulatedSettings settings = read_simulated_settings(settings_text);
-    limited = fit_to_simulation(protocol, settings).texts;
+    const participants::SimulatedSettings settings =
+        participants::read_simulated_settings(settings_text);
+    limited = commands::fit_to_simulation(protocol, settings).texts;
     Interruption interruption;
     const std::atomic<bool> stop{false};  // an exception ends it
-    simulate_in_memory(protocol, settings, participants, seed, stop,
-                       [&](int number, const data::TrialRecord& record, std::uint64_t) {
-                         data::StoredTrial trial;
-                         trial.participant.code = simulated_code(number);
-                         trial.participant.number = number;
-                         trial.participant.enrolled_number = number;
-                         trial.participant.simulated = true;
-                         trial.participant.seed = seed;
-                         trial.protocol_name = protocol.name;
-                         trial.protocol_sha256 = protocol.sha256;
-                         trial.run = simulated_run(protocol, settings, number, record.session);
-                         trial.record = record;
-                         trials.add(trial);
-                         interruption.check();
-                       });
+    session::simulate_in_memory(protocol, settings, participants, seed, stop,
+                                [&](int number, const data::TrialRecord& record, std::uint64_t) {
+                                  data::StoredTrial trial;
+                                  trial.participant.code = session::simulated_code(number);
+                                  trial.participant.number = number;
+                                  trial.participant.enrolled_number = number;
+                                  trial.participant.simulated = true;
+                                  trial.participant.seed = seed;
+                                  trial.protocol_name = protocol.name;
+                                  trial.protocol_sha256 = protocol.sha256;
+                                  trial.run = session::simulated_run(protocol, settings, number,
+                                                                     record.session);
+                                  trial.record = record;
+                                  trials.add(trial);
+                                  interruption.check();
+                                });
   }
   return py::make_tuple(arrays_of(trials.table()), limited);
 }
 
-py::dict render(const Document& given, const std::vector<TimedPose>& poses,
+py::dict render(const Document& given, const std::vector<commands::TimedPose>& poses,
                 const std::string& renderer_name) {
   std::unique_ptr<data::ColumnTable> table;
   {
     const py::gil_scoped_release unlocked;
-    const rendering::Renderer& renderer = renderer_named(renderer_name);
+    const rendering::Renderer& renderer = commands::renderer_named(renderer_name);
     const protocols::SceneSpec spec = protocols::parse_scene_text(given.text, given.file);
-    const rendering::Scene scene = build_scene(given.file, spec, renderer);
+    const rendering::Scene scene = commands::build_scene(given.file, spec, renderer);
     const bool tool = scene.tool() != nullptr;
-    table = std::make_unique<data::ColumnTable>(force_columns(tool));
+    table = std::make_unique<data::ColumnTable>(commands::force_columns(tool));
     Interruption interruption;
-    render_along(scene, spec, renderer, poses,
-                 [&](const TimedPose& pose, const rendering::Rendering& rendering,
-                     const rendering::RenderState&) {
-                   put_forces(*table, pose.t, rendering, tool);
-                   interruption.check();
-                 });
+    commands::render_along(
+        scene, spec, renderer, poses,
+        [&](const commands::TimedPose& pose, const rendering::Rendering& rendering,
+            const rendering::RenderState&) {
+          commands::put_forces(*table, pose.t, rendering, tool);
+          interruption.check();
+        });
   }
   return arrays_of(*table);
 }
 
 py::dict schedule(const Document& given, int participant) {
-  check_participant_number(participant);
+  commands::check_participant_number(participant);
   const protocols::Protocol protocol = parse(given);
-  data::ColumnTable table(schedule_columns());
+  data::ColumnTable table(commands::schedule_columns());
   for (const protocols::Trial& trial : protocols::schedule(protocol, participant))
-    put_scheduled(table, protocol, trial, participant);
+    commands::put_scheduled(table, protocol, trial, participant);
   return arrays_of(table);
 }
 
 /// The program prints these with status 2; \return false: another kind
 bool is_bad_input(const std::exception& error) {
-  return dynamic_cast<const UsageError*>(&error) != nullptr ||
+  return dynamic_cast<const commands::UsageError*>(&error) != nullptr ||
          dynamic_cast<const protocols::InputError*>(&error) != nullptr ||
          dynamic_cast<const stimuli::MeshError*>(&error) != nullptr ||
          dynamic_cast<const data::StoreRefused*>(&error) != nullptr;
@@ -128,8 +131,9 @@ bool is_bad_input(const std::exception& error) {
 
 PYBIND11_MODULE(_palpate, module) {
   module.attr("__version__") = PALPATE_VERSION;
-  module.attr("DEFAULT_VERSION") = kDefaultParticipantVersion;
-  static const py::exception<UsageError> input_error(module, "InputError", PyExc_ValueError);
+  module.attr("DEFAULT_VERSION") = participants::kDefaultParticipantVersion;
+  static const py::exception<commands::UsageError> input_error(module, "InputError",
+                                                               PyExc_ValueError);
   py::register_exception_translator([](std::exception_ptr thrown) {
     try {
       if (thrown) std::rethrow_exception(std::move(thrown));
@@ -147,10 +151,11 @@ PYBIND11_MODULE(_palpate, module) {
   });
   module.def("render_file",
              [](const Document& scene, const std::string& trajectory, const std::string& renderer) {
-               return render(scene, read_trajectory(trajectory), renderer);
+               return render(scene, commands::read_trajectory(trajectory), renderer);
              });
   module.def("schedule", &schedule);
-  module.def("settings", [](int version) { return simulated_settings_text("", version); });
+  module.def("settings",
+             [](int version) { return participants::simulated_settings_text("", version); });
   module.def("read", &protocols::read_text_file);
 }
 

@@ -5,7 +5,7 @@
 #include <ctime>
 #include <stdexcept>
 
-namespace palpate::runner {
+namespace palpate::runner::safety {
 namespace {
 
 constexpr int kAsked[] = {SIGINT, SIGTERM, SIGHUP};
@@ -41,7 +41,7 @@ FaultSignals::~FaultSignals() {
 
 void FaultSignals::zero_force() noexcept {
   if (GuardedDevice* const guard = guard_.load()) guard->emergency_zero();
-  if (ServoThread* const servo = servo_.load()) servo->emergency_zero();
+  if (servo::ServoThread* const servo = servo_.load()) servo->emergency_zero();
 }
 
 void FaultSignals::asked_to_end(int signal) {
@@ -57,7 +57,7 @@ void FaultSignals::asked_to_end(int signal) {
 void FaultSignals::dying(int signal) {
   if (FaultSignals* const self = installed.load()) {
     self->zero_force();
-    ServoThread* const servo = self->servo_.load();
+    servo::ServoThread* const servo = self->servo_.load();
     // If the servo's own thread is failing, do not wait: the guard has the request.
     const timespec millisecond{0, 1'000'000};
     for (int i = 0; i < kZeroPatience_ms && servo != nullptr && !servo->in_this_thread() &&
@@ -69,4 +69,4 @@ void FaultSignals::dying(int signal) {
   raise(signal);  // SA_RESETHAND: ends the program as usual, with a core dump
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::safety

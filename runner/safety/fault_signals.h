@@ -12,33 +12,33 @@
 #include "runner/servo/sample.h"
 #include "runner/servo/servo_thread.h"
 
-namespace palpate::runner {
+namespace palpate::runner::safety {
 
 // The meaning of every fault bit of a sample: the one table for the console, a session's messages
 // and the codebook of exports.
 
 inline constexpr std::array<rendering::FaultBit, 8> kServoFaults = {{
-    {servo_fault::kForceLimited, "force-limited", "force limited",
+    {servo::servo_fault::kForceLimited, "force-limited", "force limited",
      "the command was cut in size (6 N, or what the device can) or in change (0.5 N a tick). "
      "Ordinary: where the stylus slips off an edge while it presses, the force falls to zero in "
      "some ticks instead of one"},
-    {servo_fault::kDeviceLost, "device-lost", "device lost",
+    {servo::servo_fault::kDeviceLost, "device-lost", "device lost",
      "the device did not answer: zero force until cleared", "the device was lost"},
-    {servo_fault::kMissedTicks, "missed-ticks", "ticks missed",
+    {servo::servo_fault::kMissedTicks, "missed-ticks", "ticks missed",
      "too many ticks in a row came too late: zero force until cleared, where the device has motors",
      "too many ticks were missed in a row"},
-    {servo_fault::kTripped, "forces-off", "forces off",
+    {servo::servo_fault::kTripped, "forces-off", "forces off",
      "forces were off, by another fault of this list or of an earlier tick, until the experimenter "
      "cleared it",
      "they have not been cleared since the last fault"},
-    {servo_fault::kEmergency, "emergency", "emergency",
+    {servo::servo_fault::kEmergency, "emergency", "emergency",
      "zero force was asked for (emergency key or button, or a signal): zero force until cleared",
      "zero force was asked for"},
-    {servo_fault::kSamplesLost, "samples-lost", "samples lost",
+    {servo::servo_fault::kSamplesLost, "samples-lost", "samples lost",
      "the ticks before this one were rendered, but are not on record"},
-    {servo_fault::kStalled, "stalled", "servo stalled",
+    {servo::servo_fault::kStalled, "stalled", "servo stalled",
      "the servo gave no more samples: zero force until cleared", "the servo gives no more samples"},
-    {servo_fault::kOldReading, "old-reading", "old reading",
+    {servo::servo_fault::kOldReading, "old-reading", "old reading",
      "the device's reading was late: the one before was used again"},
 }};
 
@@ -90,7 +90,7 @@ class FaultSignals {
   FaultSignals& operator=(const FaultSignals&) = delete;
 
   /// Sets the servo or guard to command; null: none. It must outlive its use here.
-  void watch(ServoThread* servo) noexcept { servo_.store(servo); }
+  void watch(servo::ServoThread* servo) noexcept { servo_.store(servo); }
   void watch(GuardedDevice* guard) noexcept { guard_.store(guard); }
   /// The signal that requested the end; 0: none.
   int end_requested() const noexcept { return end_requested_.load(); }
@@ -100,9 +100,9 @@ class FaultSignals {
   static void dying(int signal);
   void zero_force() noexcept;
 
-  std::atomic<ServoThread*> servo_{nullptr};
+  std::atomic<servo::ServoThread*> servo_{nullptr};
   std::atomic<GuardedDevice*> guard_{nullptr};
   std::atomic<int> end_requested_{0};
 };
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::safety

@@ -15,7 +15,7 @@
 
 #include "runner/servo/realtime.h"
 
-namespace palpate::runner {
+namespace palpate::runner::safety {
 namespace {
 
 constexpr std::int64_t kNsPerSecond = 1'000'000'000;
@@ -28,7 +28,7 @@ void keep(std::array<char, kSize>& to, const std::string& from) {
 
 }  // namespace
 
-GuardedReading::GuardedReading(const DeviceReading& from, std::uint32_t request_,
+GuardedReading::GuardedReading(const servo::DeviceReading& from, std::uint32_t request_,
                                std::uint32_t trips_)
     : tip_and_tail{from.stylus.tip.x,  from.stylus.tip.y,  from.stylus.tip.z,
                    from.stylus.tail.x, from.stylus.tail.y, from.stylus.tail.z},
@@ -38,18 +38,18 @@ GuardedReading::GuardedReading(const DeviceReading& from, std::uint32_t request_
       lost(from.lost),
       trouble(from.trouble) {}
 
-DeviceReading GuardedReading::reading() const {
+servo::DeviceReading GuardedReading::reading() const {
   const auto& p = tip_and_tail;
   return {{{p[0], p[1], p[2]}, {p[3], p[4], p[5]}}, buttons, lost, trouble};
 }
 
-DeviceCapabilities FixedCapabilities::numbers() const {
+servo::DeviceCapabilities FixedCapabilities::numbers() const {
   return {name.data(),        sensed_freedom,   actuated_freedom, max_force, max_stiffness,
           max_rate,           workspace_radius, resolution,       simulated, serial.data(),
           calibration.data(), damping,          friction,         any_rate,  max_torque};
 }
 
-void FixedCapabilities::set(const DeviceCapabilities& from) {
+void FixedCapabilities::set(const servo::DeviceCapabilities& from) {
   keep(name, from.name);
   keep(serial, from.serial);
   keep(calibration, from.calibration);
@@ -91,7 +91,7 @@ void keep(GuardChannel& channel, const char* message) {
 
 class Guard {
  public:
-  Guard(GuardChannel& channel, Device& device, const GuardSettings& settings, int runner)
+  Guard(GuardChannel& channel, servo::Device& device, const GuardSettings& settings, int runner)
       : channel_(channel),
         device_(device),
         silence_ns_(to_ns(std::max(settings.silence, 5 / settings.rate))),
@@ -189,8 +189,8 @@ class Guard {
   }
 
   GuardChannel& channel_;
-  Device& device_;
-  RealClock clock_;
+  servo::Device& device_;
+  servo::RealClock clock_;
   const std::int64_t silence_ns_, linger_ns_;
   const int runner_;
   const bool spins_;
@@ -231,8 +231,8 @@ void run_guard(GuardChannel& channel, const DeviceFactory& factory, const GuardS
   stand_alone();
   prctl(PR_SET_NAME, "palpate-guard");
   try {
-    const std::unique_ptr<Device> device = factory();
-    request_realtime({settings.priority, true, -1});
+    const std::unique_ptr<servo::Device> device = factory();
+    servo::request_realtime({settings.priority, true, -1});
     prctl(PR_SET_PDEATHSIG, 0);
     channel.capabilities.set(device->capabilities());
     channel.state.store(GuardState::ready);
@@ -247,4 +247,4 @@ void run_guard(GuardChannel& channel, const DeviceFactory& factory, const GuardS
   channel.state.store(GuardState::ended);
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::safety

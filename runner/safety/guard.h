@@ -12,22 +12,22 @@
 #include "runner/servo/device.h"
 #include "runner/servo/shared_value.h"
 
-namespace palpate::runner {
+namespace palpate::runner::safety {
 
 // Memory shared by the runner and its guard process. No locks: either may die at any point.
 
 /// A DeviceReading in plain numbers.
 struct GuardedReading {
   GuardedReading() = default;
-  GuardedReading(const DeviceReading& from, std::uint32_t request_, std::uint32_t trips_);
-  DeviceReading reading() const;
+  GuardedReading(const servo::DeviceReading& from, std::uint32_t request_, std::uint32_t trips_);
+  servo::DeviceReading reading() const;
 
   std::array<double, 6> tip_and_tail{};  ///< m
   std::uint32_t request = 0;             ///< number of the request that it answers
   std::uint32_t trips = 0;               ///< number of times that the guard has cut off forces
   std::uint8_t buttons = 0;
   bool lost = false;
-  DeviceTrouble trouble = DeviceTrouble::none;
+  servo::DeviceTrouble trouble = servo::DeviceTrouble::none;
 };
 
 struct GuardedCommand {
@@ -37,8 +37,8 @@ struct GuardedCommand {
 
 /// Capabilities of fixed size, for shared memory.
 struct FixedCapabilities {
-  DeviceCapabilities numbers() const;
-  void set(const DeviceCapabilities& from);
+  servo::DeviceCapabilities numbers() const;
+  void set(const servo::DeviceCapabilities& from);
 
   std::array<char, 64> name{};
   std::array<char, 256> serial{}, calibration{};
@@ -57,11 +57,11 @@ struct GuardChannel {
   std::atomic<std::uint32_t> reads{0}, commands{0}, zeros{0};
   std::atomic<std::uint32_t> reopens{0};  ///< number of requests to open the device again
   std::atomic<bool> quit{false};
-  SharedValue<GuardedCommand> command;
+  servo::SharedValue<GuardedCommand> command;
   // Written by the guard.
   std::atomic<GuardState> state{GuardState::opening};
   std::atomic<std::uint32_t> answered{0};  ///< futex: the last answered of `reads`
-  SharedValue<GuardedReading> reading;
+  servo::SharedValue<GuardedReading> reading;
   std::atomic<std::uint32_t> reopened{0};  ///< the last finished of `reopens`
   FixedCapabilities capabilities;          ///< written before state becomes ready
   std::array<char, 1024> message{};        ///< written before state failed or `reopened`
@@ -87,7 +87,7 @@ struct GuardSettings {
   int priority = 85;      ///< of SCHED_FIFO, if allowed; above the servo's. 0: do not ask
 };
 
-using DeviceFactory = std::function<std::unique_ptr<Device>()>;
+using DeviceFactory = std::function<std::unique_ptr<servo::Device>()>;
 
 /// Runs the guard in a newly forked process; returns when the process should exit. Passes forces
 /// only after a zero command from a runner that knows of all trips of the guard, so no stale force
@@ -95,4 +95,4 @@ using DeviceFactory = std::function<std::unique_ptr<Device>()>;
 void run_guard(GuardChannel& channel, const DeviceFactory& factory, const GuardSettings& settings,
                int runner) noexcept;
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::safety

@@ -13,7 +13,7 @@
 
 #include "runner/servo/realtime.h"
 
-namespace palpate::runner {
+namespace palpate::runner::safety {
 namespace {
 
 constexpr std::int64_t kReadingSpin_ns = 20'000;  // before sleeping for the reading
@@ -78,12 +78,12 @@ void GuardedDevice::end() noexcept {
   }
 }
 
-DeviceReading GuardedDevice::read() noexcept {
+servo::DeviceReading GuardedDevice::read() noexcept {
   const std::uint32_t asked = channel_->reads.load(std::memory_order_relaxed) + 1;
   channel_->reads.store(asked, std::memory_order_release);
   channel_->calls.fetch_add(1, std::memory_order_release);
   futex_wake(channel_->calls);
-  RealClock clock;
+  servo::RealClock clock;
   const std::int64_t began = clock.now_ns();
   const auto patience = static_cast<std::int64_t>(0.5e9 / settings_.rate);
   for (std::int64_t waited = 0; waited < patience; waited = clock.now_ns() - began) {
@@ -100,27 +100,27 @@ DeviceReading GuardedDevice::read() noexcept {
     if (reading.trips != trips_seen_) {
       trips_seen_ = reading.trips;
       last_.lost = true;
-      last_.trouble = DeviceTrouble::guarded;
+      last_.trouble = servo::DeviceTrouble::guarded;
     }
     return last_;
   }
   ++unanswered_;
-  DeviceReading old = last_;
+  servo::DeviceReading old = last_;
   old.trouble = without_answer();
-  old.lost = old.trouble != DeviceTrouble::late;
+  old.lost = old.trouble != servo::DeviceTrouble::late;
   return old;
 }
 
-DeviceTrouble GuardedDevice::without_answer() noexcept {
-  if (ended()) return DeviceTrouble::guard_lost;
-  const std::int64_t now = RealClock().now_ns();
+servo::DeviceTrouble GuardedDevice::without_answer() noexcept {
+  if (ended()) return servo::DeviceTrouble::guard_lost;
+  const std::int64_t now = servo::RealClock().now_ns();
   if (reopening()) {
     answered_ns_ = now;  // the guard is at work
-    return DeviceTrouble::reopening;
+    return servo::DeviceTrouble::reopening;
   }
-  if (unanswered_ < kUnanswered) return DeviceTrouble::late;
+  if (unanswered_ < kUnanswered) return servo::DeviceTrouble::late;
   const bool given_up = static_cast<double>(now - answered_ns_) * 1e-9 >= settings_.given_up;
-  return given_up ? DeviceTrouble::guard_lost : DeviceTrouble::guard_late;
+  return given_up ? servo::DeviceTrouble::guard_lost : servo::DeviceTrouble::guard_late;
 }
 
 void GuardedDevice::write(const Vec3& device1, const Vec3& device2) noexcept {
@@ -149,4 +149,4 @@ void GuardedDevice::emergency_zero() noexcept {
   futex_wake(channel_->calls);
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::safety

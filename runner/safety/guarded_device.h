@@ -9,13 +9,13 @@
 #include "runner/safety/shared_memory.h"
 #include "runner/servo/device.h"
 
-namespace palpate::runner {
+namespace palpate::runner::safety {
 
 /// The runner's side of the watchdog. If a reading takes longer than half a period, the last one is
 /// repeated (DeviceTrouble::late). After many such readings in a row the device counts as lost
 /// (guard_late) until readings arrive again. A guard that has ended, or hangs longer than a busy
 /// machine explains, is lost for good (guard_lost).
-class GuardedDevice final : public Device {
+class GuardedDevice final : public servo::Device {
  public:
   /// Forks: call it before creating other threads. `factory` runs in the guard. Returns once the
   /// device has been read for the first time, even if that reading reports trouble.
@@ -26,8 +26,8 @@ class GuardedDevice final : public Device {
   GuardedDevice(const GuardedDevice&) = delete;
   GuardedDevice& operator=(const GuardedDevice&) = delete;
 
-  const DeviceCapabilities& capabilities() const override { return capabilities_; }
-  DeviceReading read() noexcept override;
+  const servo::DeviceCapabilities& capabilities() const override { return capabilities_; }
+  servo::DeviceReading read() noexcept override;
   void write(const Vec3& device1, const Vec3& device2) noexcept override;
 
   /// Makes the guard itself command zero force, whatever the servo does. From any thread or signal
@@ -45,18 +45,18 @@ class GuardedDevice final : public Device {
 
  private:
   bool ended() noexcept;
-  DeviceTrouble without_answer() noexcept;
+  servo::DeviceTrouble without_answer() noexcept;
   void end() noexcept;
 
   SharedMemory<GuardChannel> channel_;
   const GuardSettings settings_;
   int guard_ = -1;
   bool ended_ = false;
-  DeviceCapabilities capabilities_;
-  DeviceReading last_;
+  servo::DeviceCapabilities capabilities_;
+  servo::DeviceReading last_;
   std::uint32_t trips_seen_ = 0;
   int unanswered_ = 0;            ///< reads in a row
   std::int64_t answered_ns_ = 0;  ///< time of the last answer
 };
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::safety

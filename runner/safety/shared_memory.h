@@ -10,7 +10,7 @@
 #include <string>
 #include <type_traits>
 
-namespace palpate::runner {
+namespace palpate::runner::safety {
 
 /// A T in shared memory, unmapped with this object. Each process has its own object.
 template <class T>
@@ -37,4 +37,4 @@ class SharedMemory {
   T* value_ = nullptr;
 };
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::safety

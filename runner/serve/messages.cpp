@@ -11,7 +11,7 @@
 #include "protocols/json_document.h"
 #include "protocols/parse.h"
 
-namespace palpate::runner {
+namespace palpate::runner::serve {
 namespace {
 
 using nlohmann::json;
@@ -338,4 +338,4 @@ std::string event(const std::string& name, std::int64_t t_ns, const ordered_json
   return out.dump(-1, ' ', false, json::error_handler_t::replace);
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::serve

@@ -12,7 +12,7 @@
 
 #include "stimuli/vec.h"
 
-namespace palpate::runner {
+namespace palpate::runner::serve {
 
 inline constexpr int kServeVersion = 1;
 inline constexpr std::size_t kLongestMessage = 64 << 10;  ///< bytes; kLongestScene for `load`
@@ -127,4 +127,4 @@ std::string refused(const std::optional<std::int64_t>& id, const std::vector<Ref
 std::string event(const std::string& name, std::int64_t t_ns,
                   const nlohmann::ordered_json& more = nlohmann::ordered_json::object());
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::serve

@@ -28,7 +28,7 @@
 
 #include "runner/servo/realtime.h"
 
-namespace palpate::runner {
+namespace palpate::runner::serve {
 namespace {
 
 namespace asio = boost::asio;
@@ -52,7 +52,7 @@ constexpr std::size_t kMostRows = 1024;    // rows in a stream's message
 constexpr const char* kSubprotocol = "palpate.1";
 
 std::int64_t now_ns() {
-  RealClock clock;
+  servo::RealClock clock;
   return clock.now_ns();
 }
 
@@ -728,4 +728,4 @@ void Network::reply(std::uint64_t client, std::string text) {
 }
 void Network::tell(std::string text) { impl_->tell(std::move(text)); }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::serve

@@ -12,7 +12,7 @@
 
 #include "runner/serve/outlets.h"
 
-namespace palpate::runner {
+namespace palpate::runner::serve {
 
 struct NetworkSettings {
   std::uint16_t port = 0;  ///< of 127.0.0.1; 0: any free port
@@ -59,4 +59,4 @@ class Network final : public ServeOutput {
   std::unique_ptr<Impl> impl_;
 };
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::serve

@@ -13,7 +13,7 @@
 #include "runner/servo/sample.h"
 #include "stimuli/shapes.h"
 
-namespace palpate::runner {
+namespace palpate::runner::serve {
 
 /// A tick in a stream.
 struct StreamSample {
@@ -30,7 +30,7 @@ struct StreamSample {
 /// Passes ticks from the session's thread to the network's. If that is late, ticks are lost.
 class TickStream {
  public:
-  void push(const Sample& sample) noexcept {
+  void push(const servo::Sample& sample) noexcept {
     const bool contact = sample.rendering.contacts > 0;
     const StreamSample out{.time_ns = sample.time_ns,
                            .lateness_ns = sample.lateness_ns,
@@ -51,7 +51,7 @@ class TickStream {
   std::uint64_t lost() const noexcept { return lost_.load(); }
 
  private:
-  Ring<StreamSample> ring_{4096};
+  servo::Ring<StreamSample> ring_{4096};
   std::atomic<std::uint64_t> lost_{0};
 };
 
@@ -75,4 +75,4 @@ struct ServeCommand {
   Message message;
 };
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::serve

@@ -8,14 +8,14 @@
 #include "runner/scene_builder.h"
 #include "runner/session/device_check.h"
 
-namespace palpate::runner {
+namespace palpate::runner::serve {
 namespace {
 
 using nlohmann::json;
 using nlohmann::ordered_json;
 
 // Forces begin wherever the stylus is: an object around it gives none until the stylus has left it.
-constexpr HomeZone kFromHere{.radius = 0, .rest = 0};
+constexpr servo::HomeZone kFromHere{.radius = 0, .rest = 0};
 constexpr std::int64_t kStartPatience = 2'000'000'000;  // ns, for the first tick with forces
 constexpr int kLeft = 20;  // ticks without contact, longer than chatter at an edge
 
@@ -25,17 +25,18 @@ const rendering::Renderer& named_renderer(const std::string& name) {
 }
 
 /// \throws MessageRefused with every reason why the device cannot render it
-void hold_against(const DeviceCapabilities& device, const protocols::Protocol& protocol) {
+void hold_against(const servo::DeviceCapabilities& device, const protocols::Protocol& protocol) {
   std::vector<Refusal> why;
   for (std::size_t i = 0; i < protocol.stimuli.size(); ++i) {
-    const ShowableMaterial can =
-        showable(protocol.stimuli[i].object.material, device, protocol.servo_rate,
-                 felt_gain(protocol), protocol.passivity_controller);
+    const session::ShowableMaterial can =
+        session::showable(protocol.stimuli[i].object.material, device, protocol.servo_rate,
+                          session::felt_gain(protocol), protocol.passivity_controller);
     if (can.fraction < 1)
       why.push_back({"too-stiff", can.reason, protocols::child_pointer("/objects", i)});
   }
   if (why.empty()) {
-    for (const std::string& reason : incompatibilities(protocol, StimulusLibrary(protocol), device))
+    for (const std::string& reason :
+         session::incompatibilities(protocol, StimulusLibrary(protocol), device))
       why.push_back({"cannot-be-shown", reason, ""});
   }
   if (!why.empty()) throw MessageRefused(std::move(why));
@@ -57,12 +58,13 @@ protocols::Protocol protocol_of(const protocols::SceneSpec& spec,
   return out;
 }
 
-ServedScene::ServedScene(Device& device, GuardedDevice* guard, Clock& clock, Settings settings)
+ServedScene::ServedScene(servo::Device& device, safety::GuardedDevice* guard, servo::Clock& clock,
+                         Settings settings)
     : device_(device.capabilities()),
       guard_(guard),
       clock_(clock),
       settings_(std::move(settings)),
-      patience_(has_motors(device_)),
+      patience_(servo::has_motors(device_)),
       servo_(device, clock, settings_.servo),
       forces_(servo_, guard, clock) {
   if (settings_.scene.empty()) return;
@@ -183,7 +185,7 @@ void ServedScene::set(std::uint64_t client, const Message& message) {
 }
 
 ordered_json ServedScene::end_trial() {
-  const ServoQuality quality = servo_.stop();
+  const servo::ServoQuality quality = servo_.stop();
   attend();
   const Trial trial = *std::exchange(trial_, {});
   ordered_json out;
@@ -198,7 +200,7 @@ ordered_json ServedScene::end_trial() {
   out["ticks"] = quality.ticks;
   out["missed_ticks"] = quality.missed_ticks;
   out["max_force_n"] = quality.max_force;
-  out["faults"] = fault_words(quality.faults);
+  out["faults"] = safety::fault_words(quality.faults);
   return out;
 }
 
@@ -280,17 +282,17 @@ void ServedScene::controller_left() {
 }
 
 /// The reason, from the first tick without forces.
-std::string ServedScene::why_off(const Sample& sample) {
+std::string ServedScene::why_off(const servo::Sample& sample) {
   if (silent_.exchange(false)) return "the client was silent";
-  return fault_words(sample.faults & ~servo_fault::kForceLimited);
+  return safety::fault_words(sample.faults & ~servo::servo_fault::kForceLimited);
 }
 
-void ServedScene::take_first(const Sample& sample) {
-  if (sample.faults & servo_fault::kTripped) {
+void ServedScene::take_first(const servo::Sample& sample) {
+  if (sample.faults & servo::servo_fault::kTripped) {
     held_by_ = why_off(sample);
     return drop_pending("forces-off", "forces are off (" + held_by_ + "): clear first");
   }
-  if (sample.phase != Phase::feeling) {
+  if (sample.phase != servo::Phase::feeling) {
     if (clock_.now_ns() - trial_->asked_ns > kStartPatience)
       drop_pending("not-started", "forces did not begin: the servo gives no ticks with forces");
     return;
@@ -304,11 +306,11 @@ void ServedScene::take_first(const Sample& sample) {
   tell("started", sample.time_ns, out);
 }
 
-void ServedScene::take(const Sample& sample) {
+void ServedScene::take(const servo::Sample& sample) {
   last_ns_ = sample.time_ns;
   if (trial_ && !trial_->holds) take_first(sample);
-  if (!trial_ || sample.phase != Phase::feeling) return;
-  if ((sample.faults & servo_fault::kTripped) != 0 && !trial_->told_off) {
+  if (!trial_ || sample.phase != servo::Phase::feeling) return;
+  if ((sample.faults & servo::servo_fault::kTripped) != 0 && !trial_->told_off) {
     trial_->told_off = true;
     held_by_ = why_off(sample);
     tell("forces_off", sample.time_ns, {{"reason", held_by_}});
@@ -328,12 +330,12 @@ void ServedScene::take(const Sample& sample) {
 }
 
 void ServedScene::attend() {
-  while (const Sample* const sample = servo_.next_now()) {
+  while (const servo::Sample* const sample = servo_.next_now()) {
     if (sample->time_ns == last_ns_) continue;
     patience_.begin();
     take(*sample);
   }
-  if (forces_.newest().trouble == DeviceTrouble::guard_lost) {
+  if (forces_.newest().trouble == servo::DeviceTrouble::guard_lost) {
     held_by_ = "the guard process has ended";
     tell("fault", clock_.now_ns(), {{"reason", held_by_}});
     forces_.end_without_guard();
@@ -345,4 +347,4 @@ void ServedScene::attend() {
   patience_.begin();
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::serve

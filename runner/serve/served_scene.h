@@ -17,7 +17,7 @@
 #include "runner/servo/servo_thread.h"
 #include "runner/session/live_forces.h"
 
-namespace palpate::runner {
+namespace palpate::runner::serve {
 
 /// A scene as a protocol with one stimulus for each object, so that checks of protocols against
 /// devices apply.
@@ -30,13 +30,14 @@ class ServedScene {
   struct Settings {
     std::string scene_path;  ///< its folder has the meshes; faults name this path
     std::string scene;       ///< JSON; empty: none yet
-    ServoSettings servo;
+    servo::ServoSettings servo;
     PictureOf picture;
   };
 
   /// \param guard  may be null. \throws InputError, MeshError, MessageRefused: the first scene
   /// cannot be shown on this device
-  ServedScene(Device& device, GuardedDevice* guard, Clock& clock, Settings settings);
+  ServedScene(servo::Device& device, safety::GuardedDevice* guard, servo::Clock& clock,
+              Settings settings);
   ~ServedScene();  ///< zero force
   ServedScene(const ServedScene&) = delete;
   ServedScene& operator=(const ServedScene&) = delete;
@@ -67,7 +68,7 @@ class ServedScene {
   nlohmann::json state() const;
   /// Members of the answer to `picture`. From any thread.
   std::string picture() const;
-  ServoThread& servo() { return servo_; }  ///< for signal handlers
+  servo::ServoThread& servo() { return servo_; }  ///< for signal handlers
 
  private:
   struct Trial {
@@ -88,16 +89,16 @@ class ServedScene {
   void show(const protocols::SceneSpec& spec, const rendering::Renderer& renderer);
   nlohmann::ordered_json end_trial();
   void clear(std::uint64_t client, const Message& message);
-  void take(const Sample& sample);
-  void take_first(const Sample& sample);
-  std::string why_off(const Sample& sample);
+  void take(const servo::Sample& sample);
+  void take_first(const servo::Sample& sample);
+  std::string why_off(const servo::Sample& sample);
   void drop_pending(const std::string& code, const std::string& why);
   void tell(const std::string& name, std::int64_t t_ns,
             const nlohmann::ordered_json& more = nlohmann::ordered_json::object());
 
-  const DeviceCapabilities device_;
-  GuardedDevice* guard_;
-  Clock& clock_;
+  const servo::DeviceCapabilities device_;
+  safety::GuardedDevice* guard_;
+  servo::Clock& clock_;
   const Settings settings_;
   ServeOutput* output_ = nullptr;
   std::function<bool()> stop_ = [] { return false; };
@@ -110,9 +111,9 @@ class ServedScene {
   std::string held_by_;       ///< reason why forces are off, until `clear`
   TickStream ticks_;
   std::atomic<bool> silent_{false};
-  Patience patience_;
-  ServoThread servo_;
-  LiveForces forces_;
+  servo::Patience patience_;
+  servo::ServoThread servo_;
+  session::LiveForces forces_;
 };
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::serve

@@ -10,7 +10,7 @@
 #include "runner/session/session_plan.h"
 #include "stimuli/shapes.h"
 
-namespace palpate::runner {
+namespace palpate::runner::serve {
 namespace {
 
 using nlohmann::ordered_json;
@@ -88,7 +88,8 @@ void ServedSession::draw(const protocols::Trial& trial) {
   const protocols::Protocol& protocol = parts_.station.protocol;
   if (trial.task_block >= 0) {
     for (const protocols::Interval& interval : trial.intervals) {
-      if (interval.stimulus >= 0) objects.push_back(shown_object(protocol, trial, interval));
+      if (interval.stimulus >= 0)
+        objects.push_back(session::shown_object(protocol, trial, interval));
     }
   } else {
     objects.push_back(protocol.stimuli[static_cast<std::size_t>(trial.stimulus)].object);
@@ -158,7 +159,8 @@ ServedSession::Outcome ServedSession::run(ServeOutput& output,
   }
   const std::int64_t now = clock_.now_ns();
   if (!outcome.reason.empty()) parts_.record.note(now, "ended: " + outcome.reason);
-  parts_.record.note(now, to_json_text(parts_.servo.health(), parts_.station.protocol.servo_rate));
+  parts_.record.note(
+      now, servo::to_json_text(parts_.servo.health(), parts_.station.protocol.servo_rate));
   parts_.record.end(outcome.end, now);
   tell("over", now,
        {{"done", session_.plan().done()},
@@ -169,20 +171,20 @@ ServedSession::Outcome ServedSession::run(ServeOutput& output,
 }
 
 ServedSession::Outcome ServedSession::run_trials() {
-  while (session_.state() != Session::State::end) {
+  while (session_.state() != session::Session::State::end) {
     try {
       session_.step();
-    } catch (const SessionFault& fault) {
+    } catch (const session::SessionFault& fault) {
       in_trial_ = false;
       held(silent_.exchange(false) ? "the client was silent" : fault.reason);
-      if (fault.trouble == DeviceTrouble::guard_lost)
+      if (fault.trouble == servo::DeviceTrouble::guard_lost)
         return {data::RunEnd::aborted, fault.reason, true};
-    } catch (const EndOfSession& end) {
+    } catch (const session::EndOfSession& end) {
       in_trial_ = false;
       if (session_.plan().finished()) break;
       return {end.end, end.what(), end.failed};
     }
-    in_trial_ = in_trial_ && session_.state() == Session::State::response;
+    in_trial_ = in_trial_ && session_.state() == session::Session::State::response;
     if (!stored_) continue;
     keep_state();
     ordered_json said = short_json(*stored_);
@@ -193,7 +195,7 @@ ServedSession::Outcome ServedSession::run_trials() {
     said["ticks"] = stored_->ticks;
     said["missed_ticks"] = stored_->missed_ticks;
     said["max_force_n"] = stored_->max_force;
-    said["faults"] = fault_words(stored_->faults);
+    said["faults"] = safety::fault_words(stored_->faults);
     said["next"] = next_trial();
     tell("stored", clock_.now_ns(), said);
     if (answer_) said["stamped"] = stamped_by(answer_->message);
@@ -210,10 +212,10 @@ void ServedSession::wait_for_the_end() {
   while (controller_ != 0) {
     try {
       attend();
-    } catch (const EndOfSession&) {
+    } catch (const session::EndOfSession&) {
       return;
     }
-    clock_.wait_until(clock_.now_ns() + kSessionNap_ns);
+    clock_.wait_until(clock_.now_ns() + session::kSessionNap_ns);
   }
 }
 
@@ -228,7 +230,7 @@ void ServedSession::held(const std::string& reason) {
 /// \throws EndOfSession, TrialCutOff
 void ServedSession::attend() {
   if (const int signal = parts_.end_requested())
-    throw EndOfSession(data::RunEnd::paused, std::string("signal: ") + strsignal(signal));
+    throw session::EndOfSession(data::RunEnd::paused, std::string("signal: ") + strsignal(signal));
   for (ServeCommand& command : source_()) commands_.push_back(std::move(command));
   while (!commands_.empty()) {  // one of them may throw: the others are obeyed later
     ServeCommand command = std::move(commands_.front());
@@ -253,7 +255,7 @@ void ServedSession::attend() {
 void ServedSession::left() {
   start_.reset();
   answer_.reset();
-  if (in_trial_) throw TrialCutOff("the controller has left");
+  if (in_trial_) throw participants::TrialCutOff("the controller has left");
 }
 
 void ServedSession::obey(const Asked& asked) {
@@ -269,7 +271,8 @@ void ServedSession::obey(const Asked& asked) {
         return output_->reply(asked.client, accepted(message.id));
       }
       stop_ = asked;
-      throw TrialCutOff(message.text.empty() ? "stopped by the program" : message.text);
+      throw participants::TrialCutOff(message.text.empty() ? "stopped by the program"
+                                                           : message.text);
     case MessageType::mark:
     case MessageType::note: {
       const std::int64_t now = clock_.now_ns();
@@ -346,9 +349,9 @@ std::optional<protocols::TrialChoice> ServedSession::choice_of(const Message& me
   return choice;
 }
 
-Answer ServedSession::answer_of(const Message& message) const {
+participants::Answer ServedSession::answer_of(const Message& message) const {
   const TaskBlock* const block = block_of(trial_);
-  Answer out;
+  participants::Answer out;
   if (message.correct && (block == nullptr || block->task != TaskKind::external))
     throw MessageRefused("bad-answer", "expected none: palpate judges the answer", "/correct");
   out.correct = message.correct;
@@ -382,7 +385,7 @@ void ServedSession::answer(const Asked& asked) {
   if (!in_trial_ || onset_ns_ == 0)
     throw MessageRefused("nothing-felt", "no trial is running: start first");
   if (given_) throw MessageRefused("answered", "the trial is answered");
-  Answer given = answer_of(asked.message);
+  participants::Answer given = answer_of(asked.message);
   const std::int64_t now = clock_.now_ns();
   given.time_ns = answer_time(asked.message, now);
   if (given.time_ns < onset_ns_ || given.time_ns > now)
@@ -418,7 +421,7 @@ void ServedSession::rest(const std::string& text, std::int64_t until_ns) {
   tell("rest", clock_.now_ns(), {{"text", text}, {"until_ns", until_ns}});
   while (clock_.now_ns() < until_ns) {
     attend();
-    clock_.wait_until(std::min(until_ns, clock_.now_ns() + kSessionNap_ns));
+    clock_.wait_until(std::min(until_ns, clock_.now_ns() + session::kSessionNap_ns));
   }
 }
 
@@ -432,7 +435,7 @@ std::optional<protocols::TrialChoice> ServedSession::choose(const protocols::Tri
       output_->reply(start_->client, refused(start_->message.id, error.why()));
       start_.reset();
     }
-    clock_.wait_until(clock_.now_ns() + kSessionNap_ns / 5);
+    clock_.wait_until(clock_.now_ns() + session::kSessionNap_ns / 5);
   }
 }
 
@@ -442,12 +445,12 @@ void ServedSession::begin_trial(const protocols::Trial& trial) {
   onset_ns_ = 0;
   draw(trial);
   given_.reset();
-  waits_for_ = Waiting::nothing;
+  waits_for_ = servo::Waiting::nothing;
 }
 
-std::optional<Answer> ServedSession::step(const Sample& sample) {
+std::optional<participants::Answer> ServedSession::step(const servo::Sample& sample) {
   ticks_.push(sample);
-  if (sample.phase == Phase::feeling && onset_ns_ == 0) {
+  if (sample.phase == servo::Phase::feeling && onset_ns_ == 0) {
     onset_ns_ = sample.time_ns;
     const ordered_json more = {{"trial", trial_.trial}};
     if (start_) {
@@ -462,7 +465,7 @@ std::optional<Answer> ServedSession::step(const Sample& sample) {
     waits_for_ = sample.waiting;
     waits_since_ns_ = sample.time_ns;
     tell("waiting", sample.time_ns,
-         {{"for", sample.waiting == Waiting::for_distance ? "distance" : "rest"}});
+         {{"for", sample.waiting == servo::Waiting::for_distance ? "distance" : "rest"}});
   }
   attend();
   if (given_ && sample.time_ns >= given_->time_ns) return given_;
@@ -493,4 +496,4 @@ void ServedSession::recorded(const data::TrialRecord& record) {
   trials_.push_back(short_json(record));
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::serve

@@ -17,21 +17,21 @@
 #include "runner/session/session.h"
 #include "runner/session/station.h"
 
-namespace palpate::runner {
+namespace palpate::runner::serve {
 
 /// The reason why a program cannot run this protocol, in words; empty: it can. Questions on pages,
 /// confidence and trials of several intervals need the displays of `palpate run`.
 std::string unserved(const protocols::Protocol& protocol);
 
 /// Call all functions in one thread, the session's, unless stated otherwise.
-class ServedSession final : public Respondent, public SessionEvents {
+class ServedSession final : public participants::Respondent, public session::SessionEvents {
  public:
   /// The parts that it uses. All must outlive it.
   struct Parts {
-    const Station& station;
-    RunRecord& record;
-    ServoThread& servo;
-    GuardedDevice* guard;  ///< null without force feedback
+    const session::Station& station;
+    session::RunRecord& record;
+    servo::ServoThread& servo;
+    safety::GuardedDevice* guard;  ///< null without force feedback
     std::function<int()> end_requested;
     const std::vector<data::TrialRecord>& stored;  ///< completed trials of the session
     PictureOf picture;
@@ -68,7 +68,7 @@ class ServedSession final : public Respondent, public SessionEvents {
   void feedback(bool /*correct*/) override {}  // the reply to `answer` has it
   std::optional<protocols::TrialChoice> choose(const protocols::Trial& next) override;
   void begin_trial(const protocols::Trial& trial) override;
-  std::optional<Answer> step(const Sample& sample) override;
+  std::optional<participants::Answer> step(const servo::Sample& sample) override;
   // As SessionEvents:
   void began(const protocols::Trial& /*trial*/) override {}
   void onset(const data::TrialRecord& so_far) override;
@@ -93,7 +93,7 @@ class ServedSession final : public Respondent, public SessionEvents {
   void left();
   std::optional<protocols::TrialChoice> choice_of(const Message& message,
                                                   const protocols::Trial& next) const;
-  Answer answer_of(const Message& message) const;
+  participants::Answer answer_of(const Message& message) const;
   const protocols::TaskBlock* block_of(const protocols::Trial& trial) const;
   nlohmann::ordered_json next_trial() const;
   void keep_state();
@@ -104,9 +104,9 @@ class ServedSession final : public Respondent, public SessionEvents {
             const nlohmann::ordered_json& more = nlohmann::ordered_json::object());
 
   const Parts parts_;
-  Clock& clock_;
-  LiveForces forces_;
-  Session session_;
+  servo::Clock& clock_;
+  session::LiveForces forces_;
+  session::Session session_;
   TickStream ticks_;
   ServeOutput* output_ = nullptr;
   std::function<std::vector<ServeCommand>()> source_;
@@ -117,9 +117,9 @@ class ServedSession final : public Respondent, public SessionEvents {
   std::optional<Asked> start_;   ///< waits for forces
   std::optional<Asked> answer_;  ///< waits until the trial is on record
   std::optional<Asked> stop_;    ///< waits for forces off
-  std::optional<Answer> given_;
+  std::optional<participants::Answer> given_;
   std::int64_t onset_ns_ = 0;  ///< 0: not yet
-  Waiting waits_for_ = Waiting::nothing;
+  servo::Waiting waits_for_ = servo::Waiting::nothing;
   std::int64_t waits_since_ns_ = 0;
 
   std::optional<data::TrialRecord> stored_;  ///< the trial stored last, without samples
@@ -132,4 +132,4 @@ class ServedSession final : public Respondent, public SessionEvents {
   nlohmann::ordered_json trials_ = nlohmann::ordered_json::array();  ///< on record
 };
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::serve

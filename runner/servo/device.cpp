@@ -1,6 +1,6 @@
 #include "runner/servo/device.h"
 
-namespace palpate::runner {
+namespace palpate::runner::servo {
 
 const char* advice(DeviceTrouble trouble) noexcept {
   switch (trouble) {
@@ -47,4 +47,4 @@ bool needs_reopening(DeviceTrouble trouble) noexcept {
          trouble == DeviceTrouble::in_use;
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::servo

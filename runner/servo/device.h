@@ -9,7 +9,7 @@
 
 #include "rendering/probe.h"
 
-namespace palpate::runner {
+namespace palpate::runner::servo {
 
 // Settings to open a device, and the results of looking for devices.
 
@@ -134,4 +134,4 @@ class VirtualClock final : public Clock {
   std::int64_t now_;
 };
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::servo

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
-namespace palpate::runner {
+namespace palpate::runner::servo {
 namespace {
 
 /// Whether both are certainly shorter than the limit, rounding included: most ticks then need no
@@ -57,4 +57,4 @@ void ForceLimiter::trip() noexcept {
   tripped_ = true;
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::servo

@@ -4,7 +4,7 @@
 
 #include "stimuli/vec.h"
 
-namespace palpate::runner {
+namespace palpate::runner::servo {
 
 struct ForceLimits {
   double max_force = 6;     ///< N, of each device
@@ -42,4 +42,4 @@ class ForceLimiter {
   bool tripped_ = false, fading_ = false;
 };
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::servo

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
-namespace palpate::runner {
+namespace palpate::runner::servo {
 namespace {
 
 /// The part of `motion` along the force. Only this part is damped, so that a stylus slides freely
@@ -55,4 +55,4 @@ void PassivityController::reset() noexcept {
   excess_ = taken_ = 0;
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::servo

@@ -5,7 +5,7 @@
 #include "runner/servo/force_limiter.h"
 #include "stimuli/vec.h"
 
-namespace palpate::runner {
+namespace palpate::runner::servo {
 
 struct PassivitySettings {
   /// N s/m, largest damping. More would itself be unstable with a light stylus (half of mass over
@@ -51,4 +51,4 @@ class PassivityController {
   double excess_ = 0, taken_ = 0;
 };
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::servo

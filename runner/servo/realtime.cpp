@@ -15,7 +15,7 @@
 #include <cstring>
 #include <ctime>
 
-namespace palpate::runner {
+namespace palpate::runner::servo {
 namespace {
 
 constexpr std::int64_t kOneSecond_ns = 1'000'000'000;
@@ -110,4 +110,4 @@ RealtimeRights request_realtime(const RealtimeSettings& settings) {
   return rights;
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::servo

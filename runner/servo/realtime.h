@@ -5,7 +5,7 @@
 
 #include "runner/servo/device.h"
 
-namespace palpate::runner {
+namespace palpate::runner::servo {
 
 /// CLOCK_MONOTONIC; waits by absolute time (clock_nanosleep).
 class RealClock final : public Clock {
@@ -47,4 +47,4 @@ class AwakeProcessors {
 /// grants.
 RealtimeRights request_realtime(const RealtimeSettings& settings);
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::servo

@@ -6,7 +6,7 @@
 #include <cstddef>
 #include <vector>
 
-namespace palpate::runner {
+namespace palpate::runner::servo {
 
 /// A queue of fixed size from one thread to another. Neither thread ever waits.
 template <class T>
@@ -46,4 +46,4 @@ class Ring {
   alignas(kLine) std::atomic<std::size_t> read_{0};
 };
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::servo

@@ -8,7 +8,7 @@
 #include "rendering/renderer.h"
 #include "runner/servo/device.h"
 
-namespace palpate::runner::servo_fault {
+namespace palpate::runner::servo::servo_fault {
 
 // The fault bits of a servo tick in addition to the renderer's (rendering/render_fault.h). Each bit
 // needs a row in runner/safety/fault_signals.h, which explains it; a test checks that.
@@ -23,9 +23,9 @@ inline constexpr std::uint32_t kSamplesLost = 512;
 inline constexpr std::uint32_t kStalled = 1024;
 inline constexpr std::uint32_t kOldReading = 2048;
 
-}  // namespace palpate::runner::servo_fault
+}  // namespace palpate::runner::servo::servo_fault
 
-namespace palpate::runner {
+namespace palpate::runner::servo {
 
 enum class Phase : std::uint8_t {
   idle,     ///< no forces
@@ -81,4 +81,4 @@ struct ServoQuality {
   double max_force = 0;  ///< N, commanded to the hand
 };
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::servo

@@ -11,7 +11,7 @@
 
 #include "rendering/tool.h"
 
-namespace palpate::runner {
+namespace palpate::runner::servo {
 namespace {
 
 double distance_of_segment(const rendering::LineProbe& probe) {  // from the origin, m
@@ -256,4 +256,4 @@ ServoQuality Servo::stop() noexcept {
   return std::exchange(quality_, {});
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::servo

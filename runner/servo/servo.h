@@ -20,7 +20,7 @@
 #include "runner/servo/tick_source.h"
 #include "runner/workspace_map.h"
 
-namespace palpate::runner {
+namespace palpate::runner::servo {
 
 /// The scene of one trial with its renderer and the renderer's state.
 struct TrialScene {
@@ -147,4 +147,4 @@ class Servo final : public TickSource {
   static_assert(std::atomic<bool>::is_always_lock_free);  // set from signal handlers
 };
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::servo

@@ -12,7 +12,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-namespace palpate::runner {
+namespace palpate::runner::servo {
 namespace {
 
 // Only one thread writes, so a load and a store suffice, without a locked increment.
@@ -406,4 +406,4 @@ ServoQuality ServoThread::stop() noexcept {
   return quality_;
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::servo

@@ -27,7 +27,7 @@
 #include "runner/servo/touched_places.h"
 #include "runner/servo/triple_buffer.h"
 
-namespace palpate::runner {
+namespace palpate::runner::servo {
 
 // Timing statistics of the servo loop over every tick: lateness, computing time, missed ticks.
 
@@ -311,4 +311,4 @@ class ServoThread final : public TickSource {
   std::jthread thread_;
 };
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::servo

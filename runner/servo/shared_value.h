@@ -7,7 +7,7 @@
 #include <cstring>
 #include <type_traits>
 
-namespace palpate::runner {
+namespace palpate::runner::servo {
 
 /// A value written by one thread or process. Others read it whole or not at all: a sequence count
 /// is odd during writing (H.-J. Boehm, "Can seqlocks get along with programming language memory
@@ -42,4 +42,4 @@ class SharedValue {
   std::array<std::atomic<std::uint64_t>, kWords> words_{};
 };
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::servo

@@ -8,7 +8,7 @@
 #include <x86intrin.h>
 #endif
 
-namespace palpate::runner {
+namespace palpate::runner::servo {
 
 /// Counts of a fast clock. On x86 the time stamp counter: reading it costs some 10 ns.
 inline std::uint64_t begin_count() {
@@ -42,4 +42,4 @@ inline double nanoseconds_per_count() {
   return passed.count() / counts;
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::servo

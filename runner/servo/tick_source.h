@@ -5,7 +5,7 @@
 
 #include "runner/servo/sample.h"
 
-namespace palpate::runner {
+namespace palpate::runner::servo {
 
 /// Runs in the caller's thread for a simulated participant, in its own thread for a live one.
 class TickSource {
@@ -23,4 +23,4 @@ class TickSource {
   virtual ServoQuality stop() noexcept = 0;
 };
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::servo

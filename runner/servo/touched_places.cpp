@@ -4,7 +4,7 @@
 
 #include "rendering/bodies/soft/soft_scene.h"
 
-namespace palpate::runner {
+namespace palpate::runner::servo {
 namespace {
 
 constexpr double kOwnForce = 1e-9;  // N; on rigid objects beside soft ones, less is rounding
@@ -57,4 +57,4 @@ std::size_t find_contact_places(const rendering::Scene& scene, const rendering::
   return places.count();
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::servo

@@ -8,7 +8,7 @@
 
 #include "rendering/renderer.h"
 
-namespace palpate::runner {
+namespace palpate::runner::servo {
 
 /// A place where the tool touches with force.
 struct ContactPlace {
@@ -30,4 +30,4 @@ struct TouchedPlaces {
   std::array<ContactPlace, 32> places{};
 };
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::servo

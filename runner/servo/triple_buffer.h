@@ -5,7 +5,7 @@
 #include <atomic>
 #include <cstdint>
 
-namespace palpate::runner {
+namespace palpate::runner::servo {
 
 /// Passes the newest value from one thread to another and drops older ones. Neither thread ever
 /// waits.
@@ -39,4 +39,4 @@ class TripleBuffer {
   std::atomic<std::uint8_t> middle_{2};  ///< the slot between them, and whether it is unread
 };
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::servo

@@ -12,7 +12,7 @@
 #include "data/files/utc.h"
 #include "protocols/tasks/levels.h"
 
-namespace palpate::runner {
+namespace palpate::runner::session {
 namespace {
 
 constexpr double kRounding = 1e-9;  // N
@@ -30,12 +30,12 @@ class CommandCheck {
   explicit CommandCheck(const ForceDirectionCheck& settings) : settings_(settings) {}
 
   /// \return the fault of the tick; empty: none
-  std::string check(const Sample& sample) {
-    if (sample.faults & servo_fault::kTripped) {
-      const std::string why = advice(sample.trouble);
+  std::string check(const servo::Sample& sample) {
+    if (sample.faults & servo::servo_fault::kTripped) {
+      const std::string why = servo::advice(sample.trouble);
       return "the forces went off" + (why.empty() ? why : ": " + why);
     }
-    if (sample.phase != Phase::feeling) return "";
+    if (sample.phase != servo::Phase::feeling) return "";
     if (sample.tick == 0) began_ns_ = sample.time_ns;
     elapsed_ = static_cast<double>(sample.time_ns - began_ns_) * 1e-9;
     size_ = std::max(glm::length(sample.device1), glm::length(sample.device2));
@@ -43,12 +43,12 @@ class CommandCheck {
         std::max(glm::length(sample.device1 - last1_), glm::length(sample.device2 - last2_));
     last1_ = sample.device1;
     last2_ = sample.device2;
-    const ForceLimits& limits = settings_.limits();
+    const servo::ForceLimits& limits = settings_.limits();
     if (size_ > limits.max_force + kRounding)
       return newtons("", size_, " were commanded, above the limit of ", limits.max_force);
     if (size_ > settings_.force() + kRounding)
       return newtons("", size_, " were commanded for a push of ", settings_.force());
-    const bool gap = (sample.faults & servo_fault::kSamplesLost) != 0;
+    const bool gap = (sample.faults & servo::servo_fault::kSamplesLost) != 0;
     if (change > limits.max_change + kRounding && !gap)
       return newtons("the force changed by ", change, " in a tick, above the limit of ",
                      limits.max_change);
@@ -69,7 +69,7 @@ class CommandCheck {
 
 }  // namespace
 
-ForceDirectionCheck::ForceDirectionCheck(const ForceLimits& limits, int driven)
+ForceDirectionCheck::ForceDirectionCheck(const servo::ForceLimits& limits, int driven)
     : limits_(limits), force_(std::min(1.0, 0.5 * limits.max_force)), both_ends_(driven >= 5) {}
 
 rendering::Rendering ForceDirectionCheck::tick(const rendering::Scene&, rendering::RenderState&,
@@ -83,9 +83,10 @@ rendering::Rendering ForceDirectionCheck::tick(const rendering::Scene&, renderin
   return out;
 }
 
-std::string ForceDirectionCheck::push(TickSource& servo, const std::function<bool()>& stop) const {
+std::string ForceDirectionCheck::push(servo::TickSource& servo,
+                                      const std::function<bool()>& stop) const {
   const rendering::Scene nothing({}, false);
-  constexpr HomeZone kAnywhere{0, 0};
+  constexpr servo::HomeZone kAnywhere{0, 0};
   CommandCheck check(*this);
   std::string fault;
   servo.prepare(nothing, *this, kAnywhere);
@@ -236,13 +237,14 @@ stimuli::Material& material_of(protocols::Protocol& protocol, const std::string&
 
 /// Hz: the protocol's, or the device's highest (a protocol that asks for more is refused
 /// elsewhere).
-double shown_rate(const protocols::Protocol& protocol, const DeviceCapabilities& device) {
+double shown_rate(const protocols::Protocol& protocol, const servo::DeviceCapabilities& device) {
   return std::min(protocol.servo_rate, device.max_rate);
 }
 
 /// How the passivity controller could help with a material that cannot be shown whole.
 std::string passivity_advice(const protocols::Protocol& protocol, const stimuli::Material& material,
-                             const DeviceCapabilities& device, const ShowableMaterial& without) {
+                             const servo::DeviceCapabilities& device,
+                             const ShowableMaterial& without) {
   if (protocol.passivity_controller) return "";
   const double with =
       showable(material, device, shown_rate(protocol, device), felt_gain(protocol), true).fraction;
@@ -256,7 +258,7 @@ std::string passivity_advice(const protocols::Protocol& protocol, const stimuli:
 /// The reason that the virtual tip cannot reach all sides of a stimulus of this radius about the
 /// workspace's origin (m, device frame); empty: it can.
 std::string workspace_fault(const protocols::Protocol& protocol, double radius,
-                            const DeviceCapabilities& device) {
+                            const servo::DeviceCapabilities& device) {
   constexpr double kDecimalRounding = 1e-9;  // m: sums of decimal fractions are rounded
   const WorkspaceMap map = workspace_of(protocol);
   const double far = glm::length(protocol.workspace.centre), held = device.workspace_radius;
@@ -357,8 +359,9 @@ double felt_gain(const protocols::Protocol& protocol) {
   return map.scale * lever2;
 }
 
-ShowableMaterial showable(const stimuli::Material& material, const DeviceCapabilities& device,
-                          double rate, double gain, bool passivity_controller) {
+ShowableMaterial showable(const stimuli::Material& material,
+                          const servo::DeviceCapabilities& device, double rate, double gain,
+                          bool passivity_controller) {
   ShowableMaterial out;
   const double whole = whole_stiffness(material), stiffness = whole * gain;
   const double damping = std::abs(whole_damping(material)) * gain;
@@ -391,12 +394,12 @@ ShowableMaterial showable(const stimuli::Material& material, const DeviceCapabil
   return out;
 }
 
-bool torque_is_left_out(const DeviceCapabilities& device) {
+bool torque_is_left_out(const servo::DeviceCapabilities& device) {
   return device.sensed_freedom >= 5 && device.actuated_freedom == 3;
 }
 
 std::vector<LimitedMaterial> limit_materials(protocols::Protocol& protocol,
-                                             const DeviceCapabilities& device) {
+                                             const servo::DeviceCapabilities& device) {
   std::vector<LimitedMaterial> out;
   if (protocol.material_limit != protocols::MaterialLimit::limit || device.actuated_freedom == 0)
     return out;
@@ -435,7 +438,7 @@ std::vector<LimitedMaterial> limit_materials(protocols::Protocol& protocol,
 }
 
 std::string to_json_text(const std::vector<LimitedMaterial>& limited,
-                         const DeviceCapabilities& device, double rate) {
+                         const servo::DeviceCapabilities& device, double rate) {
   Json materials = Json::array();
   for (const LimitedMaterial& one : limited) {
     materials.push_back({{"stimulus", one.stimulus},
@@ -472,7 +475,7 @@ bool limit_as_recorded(protocols::Protocol& protocol, const std::string& event) 
 
 std::vector<std::string> incompatibilities(const protocols::Protocol& protocol,
                                            const StimulusLibrary& library,
-                                           const DeviceCapabilities& device) {
+                                           const servo::DeviceCapabilities& device) {
   std::vector<std::string> out;
   const auto add = [&out](const auto&... parts) {
     std::ostringstream text;
@@ -534,4 +537,4 @@ std::vector<std::string> incompatibilities(const protocols::Protocol& protocol,
   return out;
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::session

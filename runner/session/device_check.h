@@ -14,7 +14,7 @@
 #include "runner/servo/force_limiter.h"
 #include "runner/servo/tick_source.h"
 
-namespace palpate::runner {
+namespace palpate::runner::session {
 
 // The check of the force's direction: a weak push to the right before the first trial. The
 // participant feels whether forces have the right direction, and the commands are checked against
@@ -28,17 +28,17 @@ class ForceDirectionCheck final : public rendering::Renderer {
   /// \param limits  in force: the smaller of the program's and the device's
   /// \param driven  degrees of freedom that the device drives. 5: push both ends of the stylus;
   ///                fewer: all of it at the grip, even where the device senses an axis
-  ForceDirectionCheck(const ForceLimits& limits, int driven);
+  ForceDirectionCheck(const servo::ForceLimits& limits, int driven);
 
   double force() const { return force_; }  ///< N, at each end
   bool both_ends() const { return both_ends_; }
-  const ForceLimits& limits() const { return limits_; }
+  const servo::ForceLimits& limits() const { return limits_; }
 
   /// Pushes for kSeconds through the servo and its limits as in a trial, then takes the force off.
   /// Must outlive the servo, which may still use it after an unanswered stop().
   /// \param stop  asked at each tick; true ends it at once
   /// \return the fault of the commands; empty: none
-  std::string push(TickSource& servo, const std::function<bool()>& stop) const;
+  std::string push(servo::TickSource& servo, const std::function<bool()>& stop) const;
 
   const char* name() const override { return "push"; }
   bool side_contact() const override { return false; }
@@ -46,7 +46,7 @@ class ForceDirectionCheck final : public rendering::Renderer {
                             const rendering::LineProbe& probe, double dt) const noexcept override;
 
  private:
-  ForceLimits limits_;
+  servo::ForceLimits limits_;
   double force_;
   bool both_ends_;
 };
@@ -67,11 +67,11 @@ std::string clock_warning(const ClockEvidence& evidence);
 /// can.
 std::vector<std::string> incompatibilities(const protocols::Protocol& protocol,
                                            const StimulusLibrary& library,
-                                           const DeviceCapabilities& device);
+                                           const servo::DeviceCapabilities& device);
 
 /// Whether the device senses the axis of the stylus but drives force alone, so that a side contact
 /// is felt without its torque.
-bool torque_is_left_out(const DeviceCapabilities& device);
+bool torque_is_left_out(const servo::DeviceCapabilities& device);
 
 /// The share of a material that a device can show at a rate without feeding energy to the hand.
 struct ShowableMaterial {
@@ -87,8 +87,9 @@ struct ShowableMaterial {
 /// layers at once. For a compound the stiffest part counts for the surface and for each layer, and
 /// then the sum of these.
 /// \param gain  factor on stiffness and damping at the hand: felt_gain
-ShowableMaterial showable(const stimuli::Material& material, const DeviceCapabilities& device,
-                          double rate, double gain, bool passivity_controller);
+ShowableMaterial showable(const stimuli::Material& material,
+                          const servo::DeviceCapabilities& device, double rate, double gain,
+                          bool passivity_controller);
 
 /// The factor by which a stimulus's stiffness is multiplied at the ends of the stylus: virtual
 /// metres in a metre of the device, times the square of the lever of a reach and of a tool that
@@ -112,15 +113,15 @@ struct LimitedMaterial {
 /// Where the protocol asks for limits (servo.material_limit), scales down the materials that the
 /// device cannot show. Call before its stimuli are made. Returns the changes, in order.
 std::vector<LimitedMaterial> limit_materials(protocols::Protocol& protocol,
-                                             const DeviceCapabilities& device);
+                                             const servo::DeviceCapabilities& device);
 
 /// An event for the session's record, one line of JSON: the materials as asked and as shown, the
 /// device and the rate.
 std::string to_json_text(const std::vector<LimitedMaterial>& limited,
-                         const DeviceCapabilities& device, double rate);
+                         const servo::DeviceCapabilities& device, double rate);
 
 /// Repeats the limiting that an event of to_json_text describes, to the bit; false: the note is of
 /// another kind. \throws std::invalid_argument: the event is of another protocol, or damaged
 bool limit_as_recorded(protocols::Protocol& protocol, const std::string& event);
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::session

@@ -7,7 +7,7 @@
 #include "runner/session/session.h"
 #include "runner/session/station.h"
 
-namespace palpate::runner {
+namespace palpate::runner::session {
 
 void ContactLog::begin(const SharpEdges& edges, const Quat& orientation) {
   *this = {};
@@ -15,7 +15,7 @@ void ContactLog::begin(const SharpEdges& edges, const Quat& orientation) {
   to_object_ = glm::conjugate(orientation);
 }
 
-void ContactLog::add(const Sample& sample) noexcept {
+void ContactLog::add(const servo::Sample& sample) noexcept {
   ++ticks_;
   if (sample.rendering.contacts == 0) return;
   ++contact_ticks_;
@@ -49,13 +49,15 @@ namespace {
 constexpr double kReadingPatience = 0.5;  // s, for a reading; a servo gives several in that time
 constexpr double kPlugging = 2;           // s; a bus reports a new device with some delay
 
-bool is_well(const Sample& sample) { return (sample.faults & servo_fault::kDeviceLost) == 0; }
+bool is_well(const servo::Sample& sample) {
+  return (sample.faults & servo::servo_fault::kDeviceLost) == 0;
+}
 
 /// Whether the sample shows a lasting state, not a transient one.
-bool is_settled(const Sample& sample) {
-  return is_well(sample) ||
-         (sample.trouble != DeviceTrouble::guarded && sample.trouble != DeviceTrouble::guard_late &&
-          sample.trouble != DeviceTrouble::reopening);
+bool is_settled(const servo::Sample& sample) {
+  return is_well(sample) || (sample.trouble != servo::DeviceTrouble::guarded &&
+                             sample.trouble != servo::DeviceTrouble::guard_late &&
+                             sample.trouble != servo::DeviceTrouble::reopening);
 }
 
 }  // namespace
@@ -65,18 +67,20 @@ void LiveForces::off() noexcept {
   servo_.emergency_zero();
 }
 
-const Sample& LiveForces::newest() noexcept {
+const servo::Sample& LiveForces::newest() noexcept {
   servo_.latest(sample_);
   return sample_;
 }
 
 bool LiveForces::device_is_gone() noexcept {
-  return !is_well(newest()) && is_settled(sample_) && sample_.trouble != DeviceTrouble::guard_lost;
+  return !is_well(newest()) && is_settled(sample_) &&
+         sample_.trouble != servo::DeviceTrouble::guard_lost;
 }
 
 void LiveForces::end_without_guard() const {
-  if (sample_.trouble == DeviceTrouble::guard_lost)
-    throw EndOfSession(data::RunEnd::aborted, advice(DeviceTrouble::guard_lost), true);
+  if (sample_.trouble == servo::DeviceTrouble::guard_lost)
+    throw EndOfSession(data::RunEnd::aborted, servo::advice(servo::DeviceTrouble::guard_lost),
+                       true);
 }
 
 /// Whether a later sample satisfies the wish. The newest sample stays.
@@ -85,7 +89,7 @@ bool LiveForces::await(Wished wished, double seconds, const std::function<bool()
   const std::int64_t began_ns = clock_.now_ns();
   const std::int64_t end_ns = began_ns + static_cast<std::int64_t>(seconds * 1e9);
   while (!stop()) {
-    const Sample& sample = newest();
+    const servo::Sample& sample = newest();
     if (sample.time_ns > began_ns && wished(sample)) return true;
     if (clock_.now_ns() >= end_ns) return false;
     clock_.wait_until(clock_.now_ns() + kSessionNap_ns);
@@ -97,9 +101,9 @@ std::string LiveForces::open_again(const std::function<bool()>& stop) {
   const std::int64_t end_ns = clock_.now_ns() + static_cast<std::int64_t>(kPlugging * 1e9);
   while (true) {
     guard_->ask_to_reopen();
-    while (guard_->reopening() && newest().trouble != DeviceTrouble::guard_lost && !stop())
+    while (guard_->reopening() && newest().trouble != servo::DeviceTrouble::guard_lost && !stop())
       clock_.wait_until(clock_.now_ns() + kSessionNap_ns);
-    if (guard_->reopening()) return advice(sample_.trouble);
+    if (guard_->reopening()) return servo::advice(sample_.trouble);
     std::string trouble = guard_->reopen_trouble();
     if (trouble.empty() || clock_.now_ns() >= end_ns || stop()) return trouble;
     clock_.wait_until(clock_.now_ns() + 20 * kSessionNap_ns);
@@ -111,20 +115,20 @@ std::string LiveForces::allow(const std::function<bool()>& stop) {
   // A request for zero force from now on is kept, however long this takes.
   servo_.clear_fault();
   await(is_settled, kReadingPatience, stop);
-  if (guard_ != nullptr && needs_reopening(sample_.trouble)) {
+  if (guard_ != nullptr && servo::needs_reopening(sample_.trouble)) {
     std::string trouble = open_again(stop);
     if (!trouble.empty()) return trouble;
     await(is_well, kReadingPatience, stop);
   }
   if (sample_.time_ns <= asked_ns)
     return "the servo gives no more samples: start the program again";
-  if (!is_well(sample_)) return advice(sample_.trouble);
+  if (!is_well(sample_)) return servo::advice(sample_.trouble);
   servo_.clear_trip();
-  const auto is_on = [](const Sample& sample) {
-    return (sample.faults & servo_fault::kTripped) == 0;
+  const auto is_on = [](const servo::Sample& sample) {
+    return (sample.faults & servo::servo_fault::kTripped) == 0;
   };
   if (await(is_on, kReadingPatience, stop)) return "";
   return trip_reason(sample_.faults, sample_.trouble);
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::session

@@ -13,7 +13,7 @@
 #include "runner/sharp_edges.h"
 #include "stimuli/vec.h"
 
-namespace palpate::runner {
+namespace palpate::runner::session {
 
 // Measures how a trial's object was touched, to distinguish active from passive exploration.
 // Defined here for live and simulated sessions alike.
@@ -30,7 +30,7 @@ class ContactLog {
   /// \param edges  of the trial's stimulus; must outlive the trial. \param orientation  of it
   void begin(const SharpEdges& edges, const Quat& orientation);
   /// A tick with forces on. Does not allocate.
-  void add(const Sample& sample) noexcept;
+  void add(const servo::Sample& sample) noexcept;
 
   double contact_share() const;  ///< 0 where there was no tick
   /// s; none where the stimulus has too many edges (SharpEdges::kMost).
@@ -53,7 +53,7 @@ class ContactLog {
 class LiveForces {
  public:
   /// \param guard  may be null. All must outlive it.
-  LiveForces(ServoThread& servo, GuardedDevice* guard, Clock& clock)
+  LiveForces(servo::ServoThread& servo, safety::GuardedDevice* guard, servo::Clock& clock)
       : servo_(servo), guard_(guard), clock_(clock) {}
 
   /// Zero force at once, until allow().
@@ -67,7 +67,7 @@ class LiveForces {
   std::string allow(const std::function<bool()>& stop);
 
   /// The servo's newest sample.
-  const Sample& newest() noexcept;
+  const servo::Sample& newest() noexcept;
   /// Whether the device gives no readings, not only for a moment.
   bool device_is_gone() noexcept;
   /// \throws EndOfSession if the watchdog has ended or hangs, judged by the last sample of
@@ -79,10 +79,10 @@ class LiveForces {
   bool await(Wished wished, double seconds, const std::function<bool()>& stop);
   std::string open_again(const std::function<bool()>& stop);
 
-  ServoThread& servo_;
-  GuardedDevice* guard_;
-  Clock& clock_;
-  Sample sample_;
+  servo::ServoThread& servo_;
+  safety::GuardedDevice* guard_;
+  servo::Clock& clock_;
+  servo::Sample sample_;
 };
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::session

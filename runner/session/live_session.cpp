@@ -4,7 +4,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-namespace palpate::runner {
+namespace palpate::runner::session {
 namespace {
 
 EndOfSession end_by_signal(int signal) {
@@ -41,7 +41,8 @@ LiveSession::Outcome LiveSession::run() {
     if (text.front() != '{') outcome.unkept.push_back(text);
   }
   if (!outcome.reason.empty()) record.note(now, "ended: " + outcome.reason);
-  record.note(now, to_json_text(station_.servo_thread.health(), station_.protocol.servo_rate));
+  record.note(now,
+              servo::to_json_text(station_.servo_thread.health(), station_.protocol.servo_rate));
   if (const std::string places = station_.console.places(); !places.empty())
     record.note(now, places);
   record.end(outcome.end, now);
@@ -62,7 +63,7 @@ LiveSession::Outcome LiveSession::run_trials() {
         return {end.end, end.what(), 0, 0, end.failed};
       }
       noise_.stop();
-      if (fault.trouble == DeviceTrouble::guard_lost)
+      if (fault.trouble == servo::DeviceTrouble::guard_lost)
         return {data::RunEnd::aborted, fault.reason, 0, 0, true};
       hold_.hold(fault.reason, fault.is_transient(), fault.trouble);
       say(std::string(fault.what()) + "; " + hold_.how_to_continue());
@@ -77,11 +78,11 @@ LiveSession::Outcome LiveSession::run_trials() {
 
 /// Commands given at the time of the end, or right after it, count as well.
 void LiveSession::take_last_commands(Outcome& outcome) {
-  for (ConsoleCommand& command : station_.console.commands())
+  for (display::ConsoleCommand& command : station_.console.commands())
     commands_.push_back(std::move(command));
-  for (const ConsoleCommand& command : std::exchange(commands_, {})) {
-    if (command.kind == ConsoleCommand::Kind::note) note(command.time_ns, command.text);
-    if (command.kind != ConsoleCommand::Kind::quit) continue;
+  for (const display::ConsoleCommand& command : std::exchange(commands_, {})) {
+    if (command.kind == display::ConsoleCommand::Kind::note) note(command.time_ns, command.text);
+    if (command.kind != display::ConsoleCommand::Kind::quit) continue;
     const EndOfSession end = end_by_experimenter(command.text);
     if (end.end == data::RunEnd::withdrawn) outcome = {end.end, end.what(), 0, 0, false};
   }
@@ -134,10 +135,10 @@ void LiveSession::wait_while_held() {
 
 void LiveSession::attend() {
   if (const int signal = station_.end_requested()) throw end_by_signal(signal);
-  for (ConsoleCommand& command : station_.console.commands())
+  for (display::ConsoleCommand& command : station_.console.commands())
     commands_.push_back(std::move(command));
   while (!commands_.empty()) {  // a command may throw: the others are obeyed later
-    const ConsoleCommand command = std::move(commands_.front());
+    const display::ConsoleCommand command = std::move(commands_.front());
     commands_.pop_front();
     obey(command);
   }
@@ -161,7 +162,7 @@ void LiveSession::attend() {
 void LiveSession::check_noise() {
   if (!noise_.has_failed()) return;
   hold_.pause();
-  if (monitor_.in_trial()) throw TrialCutOff("the masking noise stopped");
+  if (monitor_.in_trial()) throw participants::TrialCutOff("the masking noise stopped");
 }
 
 /// In a break there are no trials, so check here whether the device is gone.
@@ -169,14 +170,14 @@ void LiveSession::check_device() {
   if (monitor_.in_trial() || hold_.kind() >= SessionHold::Kind::transient_fault ||
       !forces_.device_is_gone())
     return;
-  const DeviceTrouble trouble = forces_.newest().trouble;
-  const std::string reason = trip_reason(servo_fault::kDeviceLost, trouble);
+  const servo::DeviceTrouble trouble = forces_.newest().trouble;
+  const std::string reason = trip_reason(servo::servo_fault::kDeviceLost, trouble);
   hold_.hold(reason, false, trouble);
   say(reason + "; " + hold_.how_to_continue());
 }
 
-void LiveSession::obey(const ConsoleCommand& command) {
-  using Kind = ConsoleCommand::Kind;
+void LiveSession::obey(const display::ConsoleCommand& command) {
+  using Kind = display::ConsoleCommand::Kind;
   const bool in_trial = monitor_.in_trial();
   switch (command.kind) {
     case Kind::pause:
@@ -187,7 +188,7 @@ void LiveSession::obey(const ConsoleCommand& command) {
       hold_.go_on();
       break;
     case Kind::repeat_trial:
-      if (in_trial) throw TrialCutOff("repeated by the experimenter");
+      if (in_trial) throw participants::TrialCutOff("repeated by the experimenter");
       say("no trial is under way");
       break;
     case Kind::stop_after_trial:
@@ -200,7 +201,8 @@ void LiveSession::obey(const ConsoleCommand& command) {
       note(command.time_ns, "emergency zero: " + command.text);
       say("EMERGENCY by " + command.text + ": forces are off until the fault is cleared");
       if (monitor_.asking())
-        throw TrialCutOff(trip_reason(servo_fault::kEmergency, DeviceTrouble::none));
+        throw participants::TrialCutOff(
+            trip_reason(servo::servo_fault::kEmergency, servo::DeviceTrouble::none));
       break;
     case Kind::clear_fault:
       if (in_trial) {
@@ -214,7 +216,7 @@ void LiveSession::obey(const ConsoleCommand& command) {
       note(command.time_ns, command.text);
       break;
     case Kind::answer:
-      if (station_.answer_by != AnswerBy::experimenter) {
+      if (station_.answer_by != participants::AnswerBy::experimenter) {
         say("the participant answers; --spoken lets the experimenter do it");
       } else if (!respondent_.spoken(command.text, command.time_ns)) {
         say("'" + command.text +
@@ -227,9 +229,9 @@ void LiveSession::obey(const ConsoleCommand& command) {
   }
 }
 
-void LiveSession::plan_stop(ConsoleCommand::Kind kind) {
-  const Stop asked =
-      kind == ConsoleCommand::Kind::stop_after_trial ? Stop::after_trial : Stop::after_block;
+void LiveSession::plan_stop(display::ConsoleCommand::Kind kind) {
+  const Stop asked = kind == display::ConsoleCommand::Kind::stop_after_trial ? Stop::after_trial
+                                                                             : Stop::after_block;
   if (stop_ == asked) {
     stop_ = Stop::no;
     monitor_.plan_stop("");
@@ -252,4 +254,4 @@ void LiveSession::note(std::int64_t at_ns, const std::string& text) {
   }
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::session

@@ -12,9 +12,9 @@
 #include "runner/session/session_monitor.h"
 #include "runner/session/station.h"
 
-namespace palpate::runner {
+namespace palpate::runner::session {
 
-class LiveSession final : public Attendant {
+class LiveSession final : public participants::Attendant {
  public:
   /// How the session ended.
   struct Outcome {
@@ -35,7 +35,7 @@ class LiveSession final : public Attendant {
 
   /// For the session's own thread. \throws EndOfSession, TrialCutOff
   void attend() override;
-  void sound(SoundCue cue) override { noise_.cue(cue); }
+  void sound(participants::SoundCue cue) override { noise_.cue(cue); }
   /// Shows a message to the experimenter.
   void say(const std::string& message) { monitor_.say(message); }
   /// Counts a recorded trial, for the accuracy so far.
@@ -46,8 +46,8 @@ class LiveSession final : public Attendant {
   void before_step();
   void stop_if_due();  ///< only between trials. \throws EndOfSession
   void wait_while_held();
-  void obey(const ConsoleCommand& command);
-  void plan_stop(ConsoleCommand::Kind kind);
+  void obey(const display::ConsoleCommand& command);
+  void plan_stop(display::ConsoleCommand::Kind kind);
   void take_last_commands(Outcome& outcome);
   void check_noise();
   void check_device();
@@ -58,11 +58,11 @@ class LiveSession final : public Attendant {
   SessionHold hold_;
   SessionNoise noise_;
   SessionMonitor monitor_;
-  KeyboardRespondent respondent_;
+  participants::KeyboardRespondent respondent_;
   Session session_;
-  std::deque<ConsoleCommand> commands_;  ///< not obeyed yet
-  std::string told_trouble_;             ///< of the participant's inputs, as shown last
+  std::deque<display::ConsoleCommand> commands_;  ///< not obeyed yet
+  std::string told_trouble_;                      ///< of the participant's inputs, as shown last
   enum class Stop { no, after_trial, after_block } stop_ = Stop::no;
 };
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::session

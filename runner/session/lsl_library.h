@@ -6,7 +6,7 @@
 #include <stdexcept>
 #include <string>
 
-namespace palpate::runner {
+namespace palpate::runner::session {
 
 /// Stays loaded until the program ends: it has threads of its own.
 class LslLibrary {
@@ -36,4 +36,4 @@ class LslLibrary {
   void* handle_ = nullptr;
 };
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::session

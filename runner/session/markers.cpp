@@ -27,7 +27,7 @@
 #include "runner/servo/realtime.h"
 #include "runner/session/lsl_library.h"
 
-namespace palpate::runner {
+namespace palpate::runner::session {
 namespace {
 
 constexpr std::size_t kMostWaiting = 1000;
@@ -112,7 +112,7 @@ void Markers::send(const Marker& marker) {
 void Markers::work() {
   using std::chrono::steady_clock;
   constexpr std::chrono::seconds kSecond(1);
-  RealClock clock;
+  servo::RealClock clock;
   Marker second;
   second.kind = Marker::Kind::sync;
   second.code = code_of(second, codes_);
@@ -164,7 +164,7 @@ class File {
 }
 
 std::int64_t now_ns() {
-  RealClock clock;
+  servo::RealClock clock;
   return clock.now_ns();
 }
 
@@ -479,4 +479,4 @@ std::unique_ptr<MarkerSink> open_marker_sink(const std::string& name, MarkerCode
   refuse(name);
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::session

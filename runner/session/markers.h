@@ -14,7 +14,7 @@
 
 #include "protocols/answer_keys.h"
 
-namespace palpate::runner {
+namespace palpate::runner::session {
 
 struct Marker {
   enum class Kind : std::uint8_t {
@@ -86,4 +86,4 @@ class Markers {
   std::jthread thread_;  ///< not running without sinks
 };
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::session

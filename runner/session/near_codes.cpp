@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cstddef>
 
-namespace palpate::runner {
+namespace palpate::runner::session {
 namespace {
 
 bool is_digit(char c) { return c >= '0' && c <= '9'; }
@@ -75,4 +75,4 @@ std::vector<std::string> near_codes(const std::string& code,
   return near;
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::session

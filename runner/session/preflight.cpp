@@ -9,7 +9,7 @@
 #include "runner/session/live_forces.h"
 #include "runner/session/session.h"
 
-namespace palpate::runner {
+namespace palpate::runner::session {
 namespace {
 
 constexpr int kHomedLongEnough = 20;  // samples in a row
@@ -49,10 +49,10 @@ void Preflight::finish(const std::string& finding, bool left_out) {
   } while (step_ != Step::done && !asked_for(step_));
 }
 
-void Preflight::add(const Sample& sample) {
+void Preflight::add(const servo::Sample& sample) {
   // If forces were turned off on request or by the guard, the device stays homed.
-  if (sample.trouble == DeviceTrouble::guarded && step_ != Step::homing) return;
-  const bool lost = (sample.faults & servo_fault::kDeviceLost) != 0;
+  if (sample.trouble == servo::DeviceTrouble::guarded && step_ != Step::homing) return;
+  const bool lost = (sample.faults & servo::servo_fault::kDeviceLost) != 0;
   trouble_ = sample.trouble;
   if (lost) {  // also later: a lost device must be homed again
     homed_ = 0;
@@ -109,7 +109,7 @@ int Preflight::missing_button() const {
 }
 
 std::string Preflight::limits_in_words() const {
-  const ForceLimits& limits = needs_.push->limits();
+  const servo::ForceLimits& limits = needs_.push->limits();
   return "forces of up to " + newtons(limits.max_force) +
          (needs_.push->both_ends() ? " at each end" : " at the grip") +
          " (the device's own limit: " + newtons(needs_.device_limit) + "), " +
@@ -143,9 +143,9 @@ void Preflight::skip() {
 std::string Preflight::instruction() const {
   switch (step_) {
     case Step::homing:
-      if (trouble_ != DeviceTrouble::none && trouble_ != DeviceTrouble::not_homed &&
-          trouble_ != DeviceTrouble::guarded)
-        return advice(trouble_);
+      if (trouble_ != servo::DeviceTrouble::none && trouble_ != servo::DeviceTrouble::not_homed &&
+          trouble_ != servo::DeviceTrouble::guarded)
+        return servo::advice(trouble_);
       return "home the device: pull the grip fully out, then push it straight in";
     case Step::limits:
       if (push_ == Push::given) return "was a weak push to the right felt?";
@@ -164,10 +164,10 @@ std::string Preflight::instruction() const {
   return "";
 }
 
-Checklist Preflight::checklist() const {
-  using State = Checklist::Step::State;
-  using Kind = ConsoleCommand::Kind;
-  Checklist list;
+display::Checklist Preflight::checklist() const {
+  using State = display::Checklist::Step::State;
+  using Kind = display::ConsoleCommand::Kind;
+  display::Checklist list;
   for (const auto& [step, words] : {std::pair(Step::homing, "Home the device"),
                                     std::pair(Step::limits, "Feel a weak push to the right"),
                                     std::pair(Step::range, "Move to every side"),
@@ -192,7 +192,7 @@ Checklist Preflight::checklist() const {
 
 namespace {
 
-using Kind = ConsoleCommand::Kind;
+using Kind = display::ConsoleCommand::Kind;
 
 // The missing items change while the stylus moves: keep an instruction long enough to be read.
 constexpr std::int64_t kReading_ns = 1'000'000'000;
@@ -203,7 +203,7 @@ PreflightNeeds needs_of(const LiveStation& station) {
   needs.reach = largest_reach(station);
   needs.push = station.direction_check;
   needs.device_limit = station.device.max_force;
-  if (station.answer_by == AnswerBy::buttons)
+  if (station.answer_by == participants::AnswerBy::buttons)
     needs.buttons = static_cast<int>(station.protocol.response.keys.size());
   return needs;
 }
@@ -240,9 +240,10 @@ class PreflightDialogue {
 
  private:
   void take_commands() {
-    std::vector<ConsoleCommand> commands = std::exchange(while_pushed_, {});
-    for (ConsoleCommand& more : station_.console.commands()) commands.push_back(std::move(more));
-    for (const ConsoleCommand& command : commands) {
+    std::vector<display::ConsoleCommand> commands = std::exchange(while_pushed_, {});
+    for (display::ConsoleCommand& more : station_.console.commands())
+      commands.push_back(std::move(more));
+    for (const display::ConsoleCommand& command : commands) {
       obey(command);
       if (!state_.fault.empty()) continue;
       // A key pressed during the push does not confirm that it was felt.
@@ -252,7 +253,7 @@ class PreflightDialogue {
   }
 
   /// Obeys commands that are valid at any step. \throws EndOfSession
-  void obey(const ConsoleCommand& command) {
+  void obey(const display::ConsoleCommand& command) {
     switch (command.kind) {
       case Kind::quit:
         throw end_by_experimenter(command.text);
@@ -279,7 +280,7 @@ class PreflightDialogue {
     }
   }
 
-  void take_note(const ConsoleCommand& note) {
+  void take_note(const display::ConsoleCommand& note) {
     try {
       station_.record.note(note.time_ns, note.text);
       say("note: " + note.text);
@@ -297,20 +298,20 @@ class PreflightDialogue {
 
   /// Called also while waiting for the push or for homing. \throws EndOfSession
   void end_if_due() const {
-    const DeviceTrouble trouble = state_.sample.trouble;
+    const servo::DeviceTrouble trouble = state_.sample.trouble;
     if (station_.end_requested() != 0)
       throw EndOfSession(data::RunEnd::aborted, "a signal asked for the end", true);
     if (!station_.screen.open())
       throw EndOfSession(data::RunEnd::aborted, "the participant's screen was closed", true);
-    if (trouble == DeviceTrouble::guard_lost)
-      throw EndOfSession(data::RunEnd::aborted, advice(trouble), true);
+    if (trouble == servo::DeviceTrouble::guard_lost)
+      throw EndOfSession(data::RunEnd::aborted, servo::advice(trouble), true);
   }
 
   void check_force_direction() {
     station_.servo_thread.clear_fault();  // without readings before homing
     preflight_.pushed(station_.direction_check->push(station_.servo_thread, [this] {
       bool quit = station_.end_requested() != 0;
-      for (ConsoleCommand& more : station_.console.commands()) {
+      for (display::ConsoleCommand& more : station_.console.commands()) {
         quit = quit || more.kind == Kind::quit;
         while_pushed_.push_back(std::move(more));
       }
@@ -319,11 +320,11 @@ class PreflightDialogue {
     pushed_ns_ = station_.clock.now_ns();
   }
 
-  Checklist checklist() const {
-    Checklist list = preflight_.checklist();
-    const DeviceTrouble trouble = state_.sample.trouble;
+  display::Checklist checklist() const {
+    display::Checklist list = preflight_.checklist();
+    const servo::DeviceTrouble trouble = state_.sample.trouble;
     // Trouble that the hand at the grip cannot fix.
-    if (needs_reopening(trouble))
+    if (servo::needs_reopening(trouble))
       list.instruction += "; after that " + station_.console.name_of(Kind::clear_fault);
     if (!state_.fault.empty()) {  // no other command is obeyed first
       list.instruction = "forces are off: " + state_.fault +
@@ -334,13 +335,13 @@ class PreflightDialogue {
   }
 
   void show() {
-    Checklist list = checklist();
+    display::Checklist list = checklist();
     const std::int64_t now = station_.clock.now_ns();
     if (list.instruction != told_ && now - told_ns_ > kReading_ns) {
       told_ = list.instruction;
       told_ns_ = now;
-      Page page;
-      page.kind = Page::Kind::checklist;
+      display::Page page;
+      page.kind = display::Page::Kind::checklist;
       page.checklist = list;
       station_.screen.show(page);
       state_.checklist = std::move(list);
@@ -352,11 +353,12 @@ class PreflightDialogue {
 
   const LiveStation& station_;
   Preflight preflight_;
-  ConsoleState state_;
-  std::string told_;                          ///< the instruction on show
-  std::int64_t told_ns_;                      ///< shown since then; session clock
-  std::int64_t pushed_ns_ = 0;                ///< when the last push ended; session clock
-  std::vector<ConsoleCommand> while_pushed_;  ///< commands that came during a push: not obeyed yet
+  display::ConsoleState state_;
+  std::string told_;            ///< the instruction on show
+  std::int64_t told_ns_;        ///< shown since then; session clock
+  std::int64_t pushed_ns_ = 0;  ///< when the last push ended; session clock
+  std::vector<display::ConsoleCommand>
+      while_pushed_;  ///< commands that came during a push: not obeyed yet
   std::vector<std::string> emergencies_;
 };
 
@@ -366,4 +368,4 @@ PreflightResult run_preflight(const LiveStation& station, const std::vector<std:
   return PreflightDialogue(station, news).run();
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::session

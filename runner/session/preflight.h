@@ -11,7 +11,7 @@
 #include "runner/session/device_check.h"
 #include "runner/session/station.h"
 
-namespace palpate::runner {
+namespace palpate::runner::session {
 
 struct PreflightNeeds {
   double reach = 0;  ///< m, virtual frame: how far the tip must move to either side of the centre
@@ -29,7 +29,7 @@ class Preflight {
   explicit Preflight(const PreflightNeeds& needs) : needs_(needs) {}
 
   Step step() const { return step_; }
-  void add(const Sample& sample);
+  void add(const servo::Sample& sample);
   /// The experimenter continues without the step; homing cannot be skipped. At the step of the
   /// limits: begins the push, or confirms that it was felt.
   void skip();
@@ -41,7 +41,7 @@ class Preflight {
   void pushed(const std::string& fault);
   /// The steps, the finished ones, the current one with its missing items and the experimenter's
   /// options.
-  Checklist checklist() const;
+  display::Checklist checklist() const;
   /// For the record: the checks done and skipped.
   const std::vector<std::string>& findings() const { return findings_; }
 
@@ -56,8 +56,8 @@ class Preflight {
 
   PreflightNeeds needs_;
   Step step_ = Step::homing;
-  int homed_ = 0;                                ///< samples in a row
-  DeviceTrouble trouble_ = DeviceTrouble::none;  ///< while the device is lost
+  int homed_ = 0;                                              ///< samples in a row
+  servo::DeviceTrouble trouble_ = servo::DeviceTrouble::none;  ///< while the device is lost
   enum class Push { not_yet, due, given } push_ = Push::not_yet;
   std::string push_fault_;  ///< of the last push
   Vec3 least_, most_;
@@ -79,4 +79,4 @@ struct PreflightResult {
 /// \throws EndOfSession
 PreflightResult run_preflight(const LiveStation& station, const std::vector<std::string>& news);
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::session

@@ -21,7 +21,7 @@
 #include "runner/session/session_plan.h"
 #include "stimuli/shapes.h"
 
-namespace palpate::runner {
+namespace palpate::runner::session {
 namespace {
 
 /// Whether the protocol matches by name or by the first digits of its SHA-256.
@@ -124,7 +124,7 @@ bool limit_as_recorded(protocols::Protocol& protocol, data::Store& store,
     }
     try {
       // A simulated session that was resumed repeats the same event.
-      if (runner::limit_as_recorded(protocol, note.text)) return true;
+      if (session::limit_as_recorded(protocol, note.text)) return true;
     } catch (const std::invalid_argument& error) {
       throw data::StoreRefused(store.path() + ": " + error.what());
     }
@@ -279,20 +279,20 @@ void replay_shown(const protocols::Protocol& protocol, const data::TrialRecord& 
     throw std::invalid_argument("samples of " + std::to_string(shown.size()) +
                                 " intervals are expected, found " +
                                 std::to_string(intervals.size()));
-  ForceLimits limits;
+  servo::ForceLimits limits;
   limits.max_force = limits.max_change = std::numeric_limits<double>::max();
   // The record begins with the stylus at rest in the home zone.
-  constexpr HomeZone kAnywhere{0, 0};
+  constexpr servo::HomeZone kAnywhere{0, 0};
   // For an extended probe the record has the virtual stylus; the forces at the hand follow from it.
   const std::optional<rendering::Reach> reach = workspace_of(protocol).reach;
   for (std::size_t i = 0; i < intervals.size(); ++i) {
-    ReplayDevice device(intervals[i], protocol.servo_rate);
-    Servo servo(device, device, protocol.servo_rate, limits);
+    devices::ReplayDevice device(intervals[i], protocol.servo_rate);
+    servo::Servo servo(device, device, protocol.servo_rate, limits);
     servo.prepare(shown[i].scene, renderer_for(shown[i].renderer), kAnywhere);
     for (const data::SampleRecord& sample : intervals[i]) {
       servo.hold_steps((sample.faults & rendering::render_fault::kSoftLate) != 0);
       ReplayedSample again;
-      static_cast<Sample&>(again) = servo.tick();
+      static_cast<servo::Sample&>(again) = servo.tick();
       if (again.bodies > 0) again.body = servo.bodies().front();
       if (reach) again.rendering = rendering::felt(*reach, again.rendering);
       visit(i, sample, again);
@@ -324,7 +324,7 @@ bool equals_record(const data::TrialRecord& recorded, const data::SampleRecord& 
   const std::optional<data::BodyRecord> body = data::body_of(recorded, tick);
   if (body && !(again.body && same_body(*body, body_record(*again.body)))) return false;
   return equal(tick.force, r.force) && equal(tick.torque, r.torque) &&
-         tick.depth == r.deepest.depth && tick.contacts == recorded_contacts(r.contacts) &&
+         tick.depth == r.deepest.depth && tick.contacts == servo::recorded_contacts(r.contacts) &&
          tick.contact_type == static_cast<std::uint8_t>(r.deepest.type) &&
          (tick.faults & rendering::kAllRenderFaults) == (r.faults & rendering::kAllRenderFaults);
 }
@@ -365,7 +365,7 @@ std::string other_renderer(const std::string& renderer, bool other) {
   return (renderer == ray) != other ? ray : point;
 }
 
-RenderedForce rendered(const Sample& sample) {
+RenderedForce rendered(const servo::Sample& sample) {
   const rendering::Rendering& r = sample.rendering;
   return {r.force, r.torque, r.deepest.depth};
 }
@@ -421,15 +421,17 @@ ForceSummary render_other(const protocols::Protocol& protocol, const data::Trial
   Summarizer shown(renderers_of(record, true));
   double square_sum = 0;  // N^2
   auto tick = out.ticks.begin();
-  replay(protocol, record, true, [&](std::size_t, const data::SampleRecord& was, const Sample& is) {
-    const rendering::Rendering& r = is.rendering;
-    shown.add(tick->time, glm::length(r.force), r.deepest.depth, static_cast<int>(r.contacts));
-    const double apart = glm::length(r.force - Vec3(was.force[0], was.force[1], was.force[2]));
-    square_sum += apart * apart;
-    out.max_difference = std::max(out.max_difference, apart);
-    tick->other = rendered(is);
-    ++tick;
-  });
+  replay(
+      protocol, record, true,
+      [&](std::size_t, const data::SampleRecord& was, const servo::Sample& is) {
+        const rendering::Rendering& r = is.rendering;
+        shown.add(tick->time, glm::length(r.force), r.deepest.depth, static_cast<int>(r.contacts));
+        const double apart = glm::length(r.force - Vec3(was.force[0], was.force[1], was.force[2]));
+        square_sum += apart * apart;
+        out.max_difference = std::max(out.max_difference, apart);
+        tick->other = rendered(is);
+        ++tick;
+      });
   out.rms_difference = std::sqrt(square_sum / static_cast<double>(out.ticks.size()));
   return shown.over(out.ticks.size());
 }
@@ -444,4 +446,4 @@ ReplayComparison compare_with_record(const protocols::Protocol& protocol,
   return out;
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::session

@@ -17,6 +17,10 @@
 #include "stimuli/vec.h"
 
 namespace palpate::runner {
+class StimulusLibrary;
+}  // namespace palpate::runner
+
+namespace palpate::runner::session {
 
 // A trial of a database with all data for rendering it again: its record, its protocol and the
 // materials as its device showed them.
@@ -44,8 +48,6 @@ protocols::Protocol protocol_as_shown(data::Store& store, const data::StoredTria
 /// "P03/1/12"
 std::string to_string(const data::TrialName& name);
 
-class StimulusLibrary;
-
 /// The samples of each interval of a trial, in order; the record begins with tick 0 in each. A
 /// trial of version 1 has one interval.
 std::vector<std::span<const data::SampleRecord>> samples_of_intervals(
@@ -57,7 +59,7 @@ std::vector<std::optional<stimuli::ObjectSpec>> shown_objects(const protocols::P
                                                               const data::TrialRecord& recorded);
 
 /// The result of a tick.
-struct ReplayedSample : Sample {
+struct ReplayedSample : servo::Sample {
   std::optional<rendering::BodyPose> body;  ///< of a moving stimulus
 };
 
@@ -136,4 +138,4 @@ struct ReplayComparison {
 ReplayComparison compare_with_record(const protocols::Protocol& protocol,
                                      const data::TrialRecord& record, bool compare_other);
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::session

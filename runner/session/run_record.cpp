@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-namespace palpate::runner {
+namespace palpate::runner::session {
 namespace {
 
 void add_file(const std::string& name, const std::shared_ptr<const std::string>& bytes,
@@ -87,4 +87,4 @@ bool RunRecord::has_answers(const std::string& page) {
   return std::find(pages.begin(), pages.end(), page) != pages.end();
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::session

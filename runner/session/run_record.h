@@ -12,7 +12,7 @@
 #include "protocols/protocol.h"
 #include "rendering/probe.h"
 
-namespace palpate::runner {
+namespace palpate::runner::session {
 
 // Pose and velocity of a moving stimulus, as the store keeps them.
 
@@ -101,4 +101,4 @@ class RunRecord final : public TrialLog {
   std::vector<Note> pending_;
 };
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::session

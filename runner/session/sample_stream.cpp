@@ -14,7 +14,7 @@
 #include "runner/servo/ring.h"
 #include "runner/session/lsl_library.h"
 
-namespace palpate::runner {
+namespace palpate::runner::session {
 namespace {
 
 constexpr std::chrono::milliseconds kChunk(20);
@@ -114,7 +114,7 @@ class Outlet {
 
 std::span<const StreamChannel> stream_channels() noexcept { return kChannels; }
 
-StreamRow stream_row(const Sample& sample) noexcept {
+StreamRow stream_row(const servo::Sample& sample) noexcept {
   StreamRow row{sample.time_ns, {}};
   std::size_t at = 0;
   for (const Vec3& vector : {sample.probe.tip, sample.probe.tail, sample.rendering.force,
@@ -122,7 +122,7 @@ StreamRow stream_row(const Sample& sample) noexcept {
     for (int i = 0; i < 3; ++i) row.values[at++] = vector[i];
   }
   row.values[at++] = sample.rendering.deepest.depth;
-  row.values[at] = recorded_contacts(sample.rendering.contacts);
+  row.values[at] = servo::recorded_contacts(sample.rendering.contacts);
   return row;
 }
 
@@ -143,7 +143,7 @@ class SampleStream::Sender {
     quits_.notify_one();
   }
 
-  void push(const Sample& sample) noexcept {
+  void push(const servo::Sample& sample) noexcept {
     if (!ring_.push(stream_row(sample))) ++dropped_;
   }
   std::uint64_t dropped() const noexcept { return dropped_.load(); }
@@ -198,8 +198,8 @@ class SampleStream::Sender {
   }
 
   sample_stream::Outlet outlet_;
-  RealClock clock_;
-  Ring<StreamRow> ring_;
+  servo::RealClock clock_;
+  servo::Ring<StreamRow> ring_;
   std::vector<double> values_, times_;  ///< the thread's own
   std::atomic<std::uint64_t> dropped_{0};
   std::mutex mutex_;
@@ -213,8 +213,8 @@ SampleStream::SampleStream(const std::string& name, double rate)
 
 SampleStream::~SampleStream() = default;
 
-void SampleStream::push(const Sample& sample) noexcept { sender_->push(sample); }
+void SampleStream::push(const servo::Sample& sample) noexcept { sender_->push(sample); }
 
 std::uint64_t SampleStream::dropped() const noexcept { return sender_->dropped(); }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::session

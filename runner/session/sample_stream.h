@@ -13,7 +13,7 @@
 #include "runner/servo/sample.h"
 #include "runner/servo/tick_source.h"
 
-namespace palpate::runner {
+namespace palpate::runner::session {
 
 /// A channel of the stream, as in its description.
 struct StreamChannel {
@@ -26,7 +26,7 @@ struct StreamRow {
   std::int64_t time_ns = 0;  ///< session clock
   std::array<double, 20> values{};
 };
-StreamRow stream_row(const Sample& sample) noexcept;
+StreamRow stream_row(const servo::Sample& sample) noexcept;
 /// The channels of StreamRow::values, in their order.
 std::span<const StreamChannel> stream_channels() noexcept;
 
@@ -41,7 +41,7 @@ class SampleStream {
   SampleStream& operator=(const SampleStream&) = delete;
 
   /// Call from one thread. Returns at once.
-  void push(const Sample& sample) noexcept;
+  void push(const servo::Sample& sample) noexcept;
   /// The number of samples that found no room or that liblsl did not take.
   std::uint64_t dropped() const noexcept;
 
@@ -52,25 +52,25 @@ class SampleStream {
 
 /// A servo whose samples also go into a stream when the session takes them: the servo's thread does
 /// no work for it.
-class StreamedServo final : public TickSource {
+class StreamedServo final : public servo::TickSource {
  public:
-  StreamedServo(TickSource& servo, SampleStream& stream) : servo_(servo), stream_(stream) {}
+  StreamedServo(servo::TickSource& servo, SampleStream& stream) : servo_(servo), stream_(stream) {}
 
   void prepare(const rendering::Scene& scene, const rendering::Renderer& renderer,
-               const HomeZone& home) override {
+               const servo::HomeZone& home) override {
     servo_.prepare(scene, renderer, home);
   }
-  const Sample& next() noexcept override {
-    const Sample& sample = servo_.next();
+  const servo::Sample& next() noexcept override {
+    const servo::Sample& sample = servo_.next();
     stream_.push(sample);
     return sample;
   }
   std::span<const rendering::BodyPose> bodies() const noexcept override { return servo_.bodies(); }
-  ServoQuality stop() noexcept override { return servo_.stop(); }
+  servo::ServoQuality stop() noexcept override { return servo_.stop(); }
 
  private:
-  TickSource& servo_;
+  servo::TickSource& servo_;
   SampleStream& stream_;
 };
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::session

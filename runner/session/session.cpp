@@ -15,7 +15,7 @@
 #include "runner/safety/fault_signals.h"
 #include "runner/session/run_record.h"
 
-namespace palpate::runner {
+namespace palpate::runner::session {
 namespace {
 
 constexpr std::array<std::string_view, 5> kWithdrawals = {"withdrawn", "withdraws", "withdraw",
@@ -45,15 +45,17 @@ EndOfSession end_by_experimenter(const std::string& words) {
 
 namespace {
 
-std::string emergency_reason() { return trip_reason(servo_fault::kEmergency, DeviceTrouble::none); }
+std::string emergency_reason() {
+  return trip_reason(servo::servo_fault::kEmergency, servo::DeviceTrouble::none);
+}
 
 }  // namespace
 
 void SessionHold::pause() { kind_ = std::max(kind_, Kind::pause); }
 
-void SessionHold::hold(const std::string& reason, bool transient, DeviceTrouble trouble) {
+void SessionHold::hold(const std::string& reason, bool transient, servo::DeviceTrouble trouble) {
   kind_ = transient ? Kind::transient_fault : Kind::fault;
-  fault_state_ = trouble == DeviceTrouble::guard_late ? "paused" : "fault";
+  fault_state_ = trouble == servo::DeviceTrouble::guard_late ? "paused" : "fault";
   reason_ = reason + (reason == emergency_reason() ? zero_asked_by_ : "");
   fault_ = reason_;
 }
@@ -62,14 +64,14 @@ void SessionHold::emergency_zero(const std::string& by, bool in_trial) {
   forces_.off();
   zero_asked_by_ = " by " + by;
   fault_ = emergency_reason() + zero_asked_by_;
-  if (!in_trial) hold(emergency_reason(), false, DeviceTrouble::none);
+  if (!in_trial) hold(emergency_reason(), false, servo::DeviceTrouble::none);
 }
 
 std::string SessionHold::how_to_continue() const {
-  const std::string go = station_.console.name_of(ConsoleCommand::Kind::go_on);
+  const std::string go = station_.console.name_of(display::ConsoleCommand::Kind::go_on);
   if (kind_ != Kind::fault) return "to continue: " + go;
-  return "to continue: " + station_.console.name_of(ConsoleCommand::Kind::clear_fault) + ", then " +
-         go;
+  return "to continue: " + station_.console.name_of(display::ConsoleCommand::Kind::clear_fault) +
+         ", then " + go;
 }
 
 std::string SessionHold::held_by() const {
@@ -77,12 +79,12 @@ std::string SessionHold::held_by() const {
 }
 
 bool SessionHold::allow_forces() {
-  const DeviceTrouble before = forces_.newest().trouble;
+  const servo::DeviceTrouble before = forces_.newest().trouble;
   if (station_.guard != nullptr &&
-      (before == DeviceTrouble::unplugged || before == DeviceTrouble::silent))
+      (before == servo::DeviceTrouble::unplugged || before == servo::DeviceTrouble::silent))
     say_("reopening the device");
   const std::string trouble = forces_.allow([this] { return station_.end_requested() != 0; });
-  const DeviceTrouble now = forces_.newest().trouble;
+  const servo::DeviceTrouble now = forces_.newest().trouble;
   forces_.end_without_guard();
   if (trouble.empty()) {
     fault_.clear();
@@ -109,7 +111,7 @@ void SessionHold::go_on() {
     say_("nothing is paused");
   } else if (kind_ == Kind::fault) {
     say_("forces are off: clear the fault first (" +
-         station_.console.name_of(ConsoleCommand::Kind::clear_fault) + ")");
+         station_.console.name_of(display::ConsoleCommand::Kind::clear_fault) + ")");
   } else if (kind_ == Kind::pause || allow_forces()) {
     kind_ = Kind::none;
     say_("going on");
@@ -120,12 +122,12 @@ bool SessionNoise::start() {
   if (station_.noise == nullptr || on_record_) return true;
   try {
     station_.noise->turn_on();
-  } catch (const SoundError& error) {
+  } catch (const sound::SoundError& error) {
     say_(error.what());
     return false;
   }
   on_record_ = true;
-  station_.record.note(station_.clock.now_ns(), to_json_text(*station_.noise));
+  station_.record.note(station_.clock.now_ns(), sound::to_json_text(*station_.noise));
   return true;
 }
 
@@ -133,9 +135,9 @@ void SessionNoise::stop() {
   if (!on_record_) return;
   on_record_ = false;
   station_.noise->turn_off();
-  const NoiseReport heard = station_.noise->report();
+  const sound::NoiseReport heard = station_.noise->report();
   if (station_.noise->has_noise())
-    station_.record.note(station_.clock.now_ns(), to_json_text(heard));
+    station_.record.note(station_.clock.now_ns(), sound::to_json_text(heard));
   if (heard.underruns > 0)
     say_("the masking noise had " + std::to_string(heard.underruns) + " gaps");
 }
@@ -153,12 +155,15 @@ void SessionNoise::go_tone() {
     station_.noise->tone();
 }
 
-void SessionNoise::cue(SoundCue cue) {
+void SessionNoise::cue(participants::SoundCue cue) {
   const auto& sounds = station_.protocol.sounds;
   if (station_.noise == nullptr || !sounds) return;
-  if (cue == SoundCue::ready && sounds->ready) station_.noise->tone(Tone::ready);
-  if (cue == SoundCue::right && sounds->feedback) station_.noise->tone(Tone::right);
-  if (cue == SoundCue::wrong && sounds->feedback) station_.noise->tone(Tone::wrong);
+  if (cue == participants::SoundCue::ready && sounds->ready)
+    station_.noise->tone(sound::Tone::ready);
+  if (cue == participants::SoundCue::right && sounds->feedback)
+    station_.noise->tone(sound::Tone::right);
+  if (cue == participants::SoundCue::wrong && sounds->feedback)
+    station_.noise->tone(sound::Tone::wrong);
 }
 
 // The methods of Session for version 2: trials of several intervals, pages.
@@ -181,14 +186,15 @@ bool comparison_is_right(const protocols::TaskBlock& block, const data::TaskReco
                             : *task.level >= *task.standard_level;
 }
 
-const protocols::TaskAnswer& chosen(const protocols::TaskBlock& block, const Answer& answer) {
+const protocols::TaskAnswer& chosen(const protocols::TaskBlock& block,
+                                    const participants::Answer& answer) {
   return block.answers.at(static_cast<std::size_t>(answer.stimulus));
 }
 
 /// The screens of a text, separated by form feeds, with their pictures.
-std::vector<ReadScreen> screens_of(const std::string& text,
-                                   const std::vector<protocols::PagePicture>& pictures = {}) {
-  std::vector<ReadScreen> screens(1);
+std::vector<participants::ReadScreen> screens_of(
+    const std::string& text, const std::vector<protocols::PagePicture>& pictures = {}) {
+  std::vector<participants::ReadScreen> screens(1);
   for (const char c : text) {
     if (c == '\f') {
       screens.emplace_back();
@@ -220,7 +226,7 @@ void Session::plan_task(const protocols::Trial& trial, data::TrialRecord& record
 }
 
 void Session::prepare_interval(const protocols::Trial& trial, const protocols::Interval& interval,
-                               const HomeZone& home) {
+                               const servo::HomeZone& home) {
   contact_.begin(scenes_->edges(trial, interval), trial.orientation);
   record_.first_contact_time.reset();
   data::IntervalRecord& record = record_.task->intervals.emplace_back();
@@ -232,31 +238,31 @@ void Session::prepare_interval(const protocols::Trial& trial, const protocols::I
   station_.servo.prepare(scenes_->scene(trial, interval), renderer_for(interval.renderer), home);
 }
 
-HomeZone Session::task_home(double rest) const {
+servo::HomeZone Session::task_home(double rest) const {
   return {least_reach_ + station_.protocol.home.margin,
           std::max(rest, station_.protocol.home.rest)};
 }
 
-void Session::tell_interval(const protocols::Trial& trial, const IntervalView& view) {
+void Session::tell_interval(const protocols::Trial& trial, const participants::IntervalView& view) {
   if (events_ != nullptr) events_->interval(trial, view);
   participant_.begin_interval(trial, view);
 }
 
-std::optional<Answer> Session::wait_in_interval(const IntervalView& view,
-                                                std::optional<double> limit, ServoState& servo) {
+std::optional<participants::Answer> Session::wait_in_interval(
+    const participants::IntervalView& view, std::optional<double> limit, ServoState& servo) {
   const std::int64_t limit_ns = limit ? std::llround(*limit * kTaskSecond_ns) : 0;
   while (true) {
-    const Sample& sample = station_.servo.next();
+    const servo::Sample& sample = station_.servo.next();
     servo = {sample.faults, sample.trouble};
     if (servo.tripped()) return std::nullopt;
-    const bool feeling = sample.phase == Phase::feeling;
+    const bool feeling = sample.phase == servo::Phase::feeling;
     if (feeling && view.felt) {
       record_onset_and_contact(sample);
       contact_.add(sample);
       if (station_.protocol.samples) record_sample(sample);
     }
     if (feeling) record_.response_ns = sample.time_ns;
-    const std::optional<Answer> answer = participant_.step(sample);
+    const std::optional<participants::Answer> answer = participant_.step(sample);
     const bool over = feeling && limit && sample.time_ns - record_.onset_ns >= limit_ns;
     const bool meant = answer && answer->goes_on != view.answers;
     if (meant && (!limit || answer->time_ns - record_.onset_ns < limit_ns)) return answer;
@@ -271,16 +277,17 @@ void Session::end_interval() {
   interval.end_ns = record_.response_ns;
 }
 
-std::optional<Answer> Session::show_intervals(const protocols::Trial& trial, ServoState& servo) {
+std::optional<participants::Answer> Session::show_intervals(const protocols::Trial& trial,
+                                                            ServoState& servo) {
   const protocols::TaskBlock& block = task_of(trial);
-  std::optional<Answer> answer;
+  std::optional<participants::Answer> answer;
   if (block.task == TaskKind::adjust) {
     answer = adjust(trial, servo);
   } else {
     const auto count = static_cast<int>(trial.intervals.size());
     for (int i = 0; i < count; ++i) {
       const protocols::Interval& interval = trial.intervals[static_cast<std::size_t>(i)];
-      const IntervalView view{i + 1, count, i + 1 == count, true, &interval};
+      const participants::IntervalView view{i + 1, count, i + 1 == count, true, &interval};
       tell_interval(trial, view);
       prepare_interval(trial, interval, task_home(i > 0 ? block.inter_interval : 0));
       const std::optional<double> limit =
@@ -298,10 +305,10 @@ std::optional<Answer> Session::show_intervals(const protocols::Trial& trial, Ser
 }
 
 /// Asks for the answer after the last interval, with forces off.
-std::optional<Answer> Session::ask_without_forces(const protocols::Trial& trial,
-                                                  ServoState& servo) {
+std::optional<participants::Answer> Session::ask_without_forces(const protocols::Trial& trial,
+                                                                ServoState& servo) {
   const auto count = static_cast<int>(trial.intervals.size());
-  const IntervalView view{count, count, true, false, nullptr};
+  const participants::IntervalView view{count, count, true, false, nullptr};
   tell_interval(trial, view);
   const protocols::Interval nothing{-1, trial.renderer};
   station_.servo.prepare(scenes_->scene(trial, nothing), renderer_for(trial.renderer), {0, 0});
@@ -313,22 +320,23 @@ std::optional<Answer> Session::ask_without_forces(const protocols::Trial& trial,
 /// The participant adjusts the level of one stimulus and feels it and the standard in turn, until
 /// they are equal. After a turn the stylus need not go home: an object that appears around it
 /// exerts no force until the stylus has left it.
-std::optional<Answer> Session::adjust(const protocols::Trial& trial, ServoState& servo) {
+std::optional<participants::Answer> Session::adjust(const protocols::Trial& trial,
+                                                    ServoState& servo) {
   const protocols::TaskBlock& block = task_of(trial);
   protocols::Interval own = trial.intervals[0];
   bool standard = false, turned = false;
-  HomeZone home = task_home(0);
+  servo::HomeZone home = task_home(0);
   std::int64_t first_onset_ns = 0;
   while (true) {
     const protocols::Interval& shown = standard ? trial.intervals[1] : own;
-    const IntervalView view{standard ? 2 : 1, 2, true, true, &shown, turned};
+    const participants::IntervalView view{standard ? 2 : 1, 2, true, true, &shown, turned};
     tell_interval(trial, view);
     prepare_interval(trial, shown, home);
     const double spent =
         first_onset_ns == 0
             ? 0
             : static_cast<double>(station_.clock.now_ns() - first_onset_ns) / kTaskSecond_ns;
-    std::optional<Answer> answer;
+    std::optional<participants::Answer> answer;
     if (spent < block.time_out) answer = wait_in_interval(view, block.time_out - spent, servo);
     if (servo.tripped()) return std::nullopt;
     if (first_onset_ns == 0) first_onset_ns = record_.onset_ns;
@@ -340,7 +348,7 @@ std::optional<Answer> Session::adjust(const protocols::Trial& trial, ServoState&
       return answer;
     }
     turned = act != "switch";
-    home = turned ? HomeZone{0, 0} : task_home(0);
+    home = turned ? servo::HomeZone{0, 0} : task_home(0);
     if (!turned) {
       standard = !standard;
     } else if (!standard) {
@@ -352,14 +360,15 @@ std::optional<Answer> Session::adjust(const protocols::Trial& trial, ServoState&
 
 void Session::ask_confidence(const protocols::ConfidenceSpec& asked) {
   if (events_ != nullptr) events_->asking(true);
-  const std::optional<Answer> step = participant_.confidence(asked);
+  const std::optional<participants::Answer> step = participant_.confidence(asked);
   if (events_ != nullptr) events_->asking(false);
   if (!step) return;
   record_.task->confidence = asked.scale.at(static_cast<std::size_t>(step->stimulus)).number;
   record_.task->confidence_ns = step->time_ns;
 }
 
-void Session::take_task_answer(const protocols::Trial& trial, const std::optional<Answer>& answer) {
+void Session::take_task_answer(const protocols::Trial& trial,
+                               const std::optional<participants::Answer>& answer) {
   if (!answer) return;
   const protocols::TaskBlock& block = task_of(trial);
   data::TaskRecord& task = *record_.task;
@@ -498,36 +507,36 @@ std::array<double, 3> values(const Vec3& v) { return {v.x, v.y, v.z}; }
 }  // namespace
 
 bool SessionFault::is_transient() const {
-  if (faults & (servo_fault::kEmergency | rendering::render_fault::kNonFinite)) return false;
-  if (faults & servo_fault::kDeviceLost)
-    return trouble == DeviceTrouble::guard_late || trouble == DeviceTrouble::guarded;
-  return (faults & (servo_fault::kMissedTicks | servo_fault::kStalled)) != 0;
+  if (faults & (servo::servo_fault::kEmergency | rendering::render_fault::kNonFinite)) return false;
+  if (faults & servo::servo_fault::kDeviceLost)
+    return trouble == servo::DeviceTrouble::guard_late || trouble == servo::DeviceTrouble::guarded;
+  return (faults & (servo::servo_fault::kMissedTicks | servo::servo_fault::kStalled)) != 0;
 }
 
-std::string trip_reason(std::uint32_t faults, DeviceTrouble trouble) {
-  using namespace servo_fault;
+std::string trip_reason(std::uint32_t faults, servo::DeviceTrouble trouble) {
+  using namespace servo::servo_fault;
   for (const std::uint32_t bit :
        {kEmergency, kStalled, kDeviceLost, kMissedTicks, rendering::render_fault::kNonFinite,
         rendering::render_fault::kSoftStalled}) {
     if ((faults & bit) == 0) continue;
-    std::string why = bit == kDeviceLost ? advice(trouble) : "";
-    if (trouble == DeviceTrouble::guard_late || trouble == DeviceTrouble::guarded) {
+    std::string why = bit == kDeviceLost ? servo::advice(trouble) : "";
+    if (trouble == servo::DeviceTrouble::guard_late || trouble == servo::DeviceTrouble::guarded) {
       if (!why.empty()) return why;
     }
-    return fault_row(bit).why + (why.empty() ? why : ": " + why);
+    return safety::fault_row(bit).why + (why.empty() ? why : ": " + why);
   }
-  return fault_row(kTripped).why;
+  return safety::fault_row(kTripped).why;
 }
 
-Session::Session(const Station& station, Respondent& participant, SessionEvents* events,
-                 double least_reach)
+Session::Session(const Station& station, participants::Respondent& participant,
+                 SessionEvents* events, double least_reach)
     : station_(station), participant_(participant), events_(events), least_reach_(least_reach) {
   if (station.protocol.version == 1) return;
   scenes_ = std::make_unique<LevelScenes>(station.protocol);
   least_reach_ = std::max(least_reach, largest_reach(station));  // the same for every level
 }
 
-bool Session::ServoState::tripped() const { return (faults & servo_fault::kTripped) != 0; }
+bool Session::ServoState::tripped() const { return (faults & servo::servo_fault::kTripped) != 0; }
 
 Session::State Session::before_trial() const {
   if (station_.plan.finished()) return State::end;
@@ -631,31 +640,32 @@ void Session::cut_off(const std::string& reason) {
   station_.log.cut_off(reason);
 }
 
-std::optional<Answer> Session::show_stimulus(const protocols::Trial& trial, ServoState& servo) {
+std::optional<participants::Answer> Session::show_stimulus(const protocols::Trial& trial,
+                                                           ServoState& servo) {
   contact_.begin(station_.library.edges(trial.stimulus), trial.orientation);
-  const HomeZone home{std::max(station_.library.reach(trial.stimulus), least_reach_) +
-                          station_.protocol.home.margin,
-                      station_.protocol.home.rest};
+  const servo::HomeZone home{std::max(station_.library.reach(trial.stimulus), least_reach_) +
+                                 station_.protocol.home.margin,
+                             station_.protocol.home.rest};
   station_.servo.prepare(station_.library.scene(trial), renderer_for(trial.renderer), home);
   return wait_for_answer(servo);
 }
 
-std::optional<Answer> Session::wait_for_answer(ServoState& servo) {
+std::optional<participants::Answer> Session::wait_for_answer(ServoState& servo) {
   const std::int64_t limit_ns = std::llround(station_.protocol.response.time_out * kPerSecond_ns);
   while (true) {
-    const Sample& sample = station_.servo.next();
+    const servo::Sample& sample = station_.servo.next();
     servo = {sample.faults, sample.trouble};
     if (servo.tripped()) return std::nullopt;
-    if (sample.phase == Phase::feeling) {
+    if (sample.phase == servo::Phase::feeling) {
       record_onset_and_contact(sample);
       contact_.add(sample);
       if (station_.protocol.samples) record_sample(sample);
       record_.response_ns = sample.time_ns;
     }
-    const std::optional<Answer> answer = participant_.step(sample);
+    const std::optional<participants::Answer> answer = participant_.step(sample);
     if (answer && answer->time_ns - record_.onset_ns < limit_ns) return answer;
     record_.timed_out =
-        sample.phase == Phase::feeling && sample.time_ns - record_.onset_ns >= limit_ns;
+        sample.phase == servo::Phase::feeling && sample.time_ns - record_.onset_ns >= limit_ns;
     if (record_.timed_out) return std::nullopt;
   }
 }
@@ -668,12 +678,12 @@ bool Session::run_trial() {
   record_.attempt = station_.log.begin(record_, station_.clock.now_ns());
   quality_ = {};
   if (events_ != nullptr) events_->began(trial);
-  std::optional<Answer> answer;
+  std::optional<participants::Answer> answer;
   ServoState servo;
   try {
     participant_.begin_trial(trial);
     answer = record_.task ? show_intervals(trial, servo) : show_stimulus(trial, servo);
-  } catch (const TrialCutOff& again) {
+  } catch (const participants::TrialCutOff& again) {
     station_.servo.stop();
     cut_off(again.what());
     return false;
@@ -682,7 +692,7 @@ bool Session::run_trial() {
     cut_off(error.what());
     throw;
   }
-  const ServoQuality last = station_.servo.stop();
+  const servo::ServoQuality last = station_.servo.stop();
   if (!record_.task) quality_ = last;  // intervals have been added one by one
   if (servo.tripped()) {
     const std::string reason = trip_reason(servo.faults, servo.trouble);
@@ -704,7 +714,7 @@ bool Session::run_trial() {
   return true;
 }
 
-void Session::add_quality(const ServoQuality& quality) {
+void Session::add_quality(const servo::ServoQuality& quality) {
   quality_.ticks += quality.ticks;
   quality_.missed_ticks += quality.missed_ticks;
   quality_.longest_period_ns = std::max(quality_.longest_period_ns, quality.longest_period_ns);
@@ -712,7 +722,8 @@ void Session::add_quality(const ServoQuality& quality) {
   quality_.max_force = std::max(quality_.max_force, quality.max_force);
 }
 
-void Session::take_answer(const protocols::Trial& trial, const std::optional<Answer>& answer) {
+void Session::take_answer(const protocols::Trial& trial,
+                          const std::optional<participants::Answer>& answer) {
   record_.response_time =
       record_.task ? task_of(trial).time_out : station_.protocol.response.time_out;
   if (answer) {
@@ -731,7 +742,7 @@ void Session::take_answer(const protocols::Trial& trial, const std::optional<Ans
     record_.first_contact_time.reset();
 }
 
-void Session::record_onset_and_contact(const Sample& sample) {
+void Session::record_onset_and_contact(const servo::Sample& sample) {
   if (sample.tick == 0) {
     record_.onset_ns = sample.time_ns;
     record_.onset_utc = data::format_utc(data::to_unix_ns(station_.utc, sample.time_ns));
@@ -747,7 +758,7 @@ void Session::record_onset_and_contact(const Sample& sample) {
   }
 }
 
-void Session::record_sample(const Sample& sample) {
+void Session::record_sample(const servo::Sample& sample) {
   const rendering::Rendering& rendering = sample.rendering;
   data::SampleRecord kept;
   kept.tick = sample.tick;
@@ -761,7 +772,7 @@ void Session::record_sample(const Sample& sample) {
   kept.device1 = values(sample.device1);
   kept.device2 = values(sample.device2);
   kept.depth = rendering.deepest.depth;
-  kept.contacts = recorded_contacts(rendering.contacts);
+  kept.contacts = servo::recorded_contacts(rendering.contacts);
   kept.contact_type = static_cast<std::uint8_t>(rendering.deepest.type);
   kept.buttons = sample.buttons;
   kept.faults = sample.faults;
@@ -773,4 +784,4 @@ void Session::record_sample(const Sample& sample) {
   if (!bodies.empty()) record_.bodies.back() = body_record(bodies.front());
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::session

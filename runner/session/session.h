@@ -15,7 +15,7 @@
 #include "runner/session/session_plan.h"
 #include "runner/session/station.h"
 
-namespace palpate::runner {
+namespace palpate::runner::session {
 
 // The end of a session before its last trial.
 
@@ -64,7 +64,7 @@ class SessionHold {
   void pause();
   /// Turns forces off and holds the session until the experimenter resumes it.
   /// \param transient  whether the cause ends by itself
-  void hold(const std::string& reason, bool transient, DeviceTrouble trouble);
+  void hold(const std::string& reason, bool transient, servo::DeviceTrouble trouble);
   /// Zero force at once, on request. \param by  source of the request: "the key F12"
   /// \param in_trial  first cuts off the current trial; else holds the session now
   void emergency_zero(const std::string& by, bool in_trial);
@@ -107,7 +107,7 @@ class SessionNoise {
   /// Plays the tone for "go": forces are on.
   void go_tone();
   /// Plays the protocol's sound for the cue, if it has one.
-  void cue(SoundCue cue);
+  void cue(participants::SoundCue cue);
 
  private:
   const LiveStation& station_;
@@ -119,17 +119,18 @@ class SessionNoise {
 /// cut off, forces are zero.
 class SessionFault : public std::runtime_error {
  public:
-  SessionFault(const std::string& what, std::string why, std::uint32_t bits, DeviceTrouble device)
+  SessionFault(const std::string& what, std::string why, std::uint32_t bits,
+               servo::DeviceTrouble device)
       : std::runtime_error(what), reason(std::move(why)), faults(bits), trouble(device) {}
   /// Whether the fault ends by itself: the machine was late, device and stylus are well.
   bool is_transient() const;
   std::string reason;    ///< of the forces going off
   std::uint32_t faults;  ///< of the tick
-  DeviceTrouble trouble;
+  servo::DeviceTrouble trouble;
 };
 
 /// The reason that forces went off, in words. \param faults, trouble  of a sample with kTripped
-std::string trip_reason(std::uint32_t faults, DeviceTrouble trouble);
+std::string trip_reason(std::uint32_t faults, servo::DeviceTrouble trouble);
 
 /// The visible part of a page.
 struct PageView {
@@ -151,7 +152,8 @@ class SessionEvents {
   virtual void cut_off(const std::string& reason) = 0;
   virtual void recorded(const data::TrialRecord& record) = 0;
   /// Version 2: an interval of the trial is about to begin.
-  virtual void interval(const protocols::Trial& /*trial*/, const IntervalView& /*view*/) {}
+  virtual void interval(const protocols::Trial& /*trial*/,
+                        const participants::IntervalView& /*view*/) {}
   /// Version 2: a page is shown, or one of its questions: its number, from 1, and their count; 0:
   /// the text. Empty names: the page is over.
   virtual void page(const PageView& /*view*/) {}
@@ -175,8 +177,8 @@ class Session {
   /// \param events       may be none
   /// \param least_reach  m; least radius of the home zone, for every stimulus. The place where the
   /// screen stops asking to move away must not reveal a shape.
-  Session(const Station& station, Respondent& participant, SessionEvents* events = nullptr,
-          double least_reach = 0);
+  Session(const Station& station, participants::Respondent& participant,
+          SessionEvents* events = nullptr, double least_reach = 0);
 
   State state() const { return state_; }
   const SessionPlan& plan() const { return station_.plan; }
@@ -195,24 +197,29 @@ class Session {
   /// The servo's last values in a trial.
   struct ServoState {
     std::uint32_t faults = 0;
-    DeviceTrouble trouble = DeviceTrouble::none;
+    servo::DeviceTrouble trouble = servo::DeviceTrouble::none;
     bool tripped() const;
   };
-  std::optional<Answer> show_stimulus(const protocols::Trial& trial, ServoState& servo);
-  std::optional<Answer> wait_for_answer(ServoState& servo);
+  std::optional<participants::Answer> show_stimulus(const protocols::Trial& trial,
+                                                    ServoState& servo);
+  std::optional<participants::Answer> wait_for_answer(ServoState& servo);
   // Version 2 (session.cpp)
   void plan_task(const protocols::Trial& trial, data::TrialRecord& record) const;
-  std::optional<Answer> show_intervals(const protocols::Trial& trial, ServoState& servo);
-  std::optional<Answer> adjust(const protocols::Trial& trial, ServoState& servo);
-  std::optional<Answer> ask_without_forces(const protocols::Trial& trial, ServoState& servo);
+  std::optional<participants::Answer> show_intervals(const protocols::Trial& trial,
+                                                     ServoState& servo);
+  std::optional<participants::Answer> adjust(const protocols::Trial& trial, ServoState& servo);
+  std::optional<participants::Answer> ask_without_forces(const protocols::Trial& trial,
+                                                         ServoState& servo);
   void prepare_interval(const protocols::Trial& trial, const protocols::Interval& interval,
-                        const HomeZone& home);
-  HomeZone task_home(double rest) const;
-  std::optional<Answer> wait_in_interval(const IntervalView& view, std::optional<double> limit,
-                                         ServoState& servo);
+                        const servo::HomeZone& home);
+  servo::HomeZone task_home(double rest) const;
+  std::optional<participants::Answer> wait_in_interval(const participants::IntervalView& view,
+                                                       std::optional<double> limit,
+                                                       ServoState& servo);
   void end_interval();
-  void tell_interval(const protocols::Trial& trial, const IntervalView& view);
-  void take_task_answer(const protocols::Trial& trial, const std::optional<Answer>& answer);
+  void tell_interval(const protocols::Trial& trial, const participants::IntervalView& view);
+  void take_task_answer(const protocols::Trial& trial,
+                        const std::optional<participants::Answer>& answer);
   void ask_confidence(const protocols::ConfidenceSpec& asked);
   void begin_task_block();
   void ask_level();
@@ -227,21 +234,22 @@ class Session {
   void rest_between_blocks();
   void rest();
   void tell_feedback();
-  void add_quality(const ServoQuality& quality);
-  void take_answer(const protocols::Trial& trial, const std::optional<Answer>& answer);
-  void record_onset_and_contact(const Sample& sample);
-  void record_sample(const Sample& sample);
+  void add_quality(const servo::ServoQuality& quality);
+  void take_answer(const protocols::Trial& trial,
+                   const std::optional<participants::Answer>& answer);
+  void record_onset_and_contact(const servo::Sample& sample);
+  void record_sample(const servo::Sample& sample);
 
   Station station_;  ///< with the session's own plan
-  Respondent& participant_;
+  participants::Respondent& participant_;
   SessionEvents* events_;
   double least_reach_;
   State state_ = State::instruction;
   data::TrialRecord record_;             ///< of the trial under way
   ContactLog contact_;                   ///< likewise
-  ServoQuality quality_;                 ///< likewise, of its intervals so far
+  servo::ServoQuality quality_;          ///< likewise, of its intervals so far
   std::unique_ptr<LevelScenes> scenes_;  ///< version 2
   int asked_trial_ = 0;                  ///< the last trial for which an advisor was asked
 };
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::session

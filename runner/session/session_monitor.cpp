@@ -9,7 +9,7 @@
 #include "runner/session/session_plan.h"
 #include "stimuli/shapes.h"
 
-namespace palpate::runner {
+namespace palpate::runner::session {
 namespace {
 
 constexpr double kSecond_ns = 1e9;
@@ -50,7 +50,7 @@ SessionMonitor::SessionMonitor(const LiveStation& station, const Sources& source
   state_.session = marker_.session = station.record.session();
   for (const protocols::StimulusSpec& stimulus : station.protocol.stimuli)
     state_.scores.push_back({stimulus.name, 0, 0});
-  state_.takes_answers = station.answer_by == AnswerBy::experimenter;
+  state_.takes_answers = station.answer_by == participants::AnswerBy::experimenter;
 }
 
 double SessionMonitor::elapsed() const {
@@ -89,7 +89,7 @@ void SessionMonitor::show() {
   } else if (state_.held_by.empty() && in_words(session.state()) != nullptr) {
     state_.state = in_words(session.state());
   }
-  const ServoHealth& health = station_.servo_thread.health();
+  const servo::ServoHealth& health = station_.servo_thread.health();
   state_.ticks = health.ticks();
   state_.missed_ticks = health.missed_ticks();
   state_.longest_period_ns = health.longest_period_ns();
@@ -107,14 +107,15 @@ void SessionMonitor::held() {
 
 void SessionMonitor::count(const data::TrialRecord& record) {
   if (record.practice || !data::has_right_answer(record)) return;
-  for (ShapeScore& score : state_.scores) {
+  for (display::ShapeScore& score : state_.scores) {
     if (score.shape != record.shape) continue;
     ++score.shown;
     score.right += record.correct ? 1 : 0;
   }
 }
 
-void SessionMonitor::interval(const protocols::Trial& trial, const IntervalView& view) {
+void SessionMonitor::interval(const protocols::Trial& trial,
+                              const participants::IntervalView& view) {
   const auto& block = station_.protocol.blocks[static_cast<std::size_t>(trial.task_block)];
   turned_ = view.continues;
   feeling_ = feeling_ && view.continues;
@@ -226,7 +227,7 @@ void SessionMonitor::recorded(const data::TrialRecord& record) {
   ++timed_trials_;
   seconds_per_trial_ += (took - seconds_per_trial_) / timed_trials_;
   // A device with motors would have cut the trial off.
-  if ((record.faults & servo_fault::kMissedTicks) != 0)
+  if ((record.faults & servo::servo_fault::kMissedTicks) != 0)
     say("trial " + std::to_string(record.trial) + " missed " + std::to_string(record.missed_ticks) +
         " ticks, up to " + milliseconds(record.longest_period_ns) +
         " apart, which is on record: the computer was busy");
@@ -236,4 +237,4 @@ void SessionMonitor::recorded(const data::TrialRecord& record) {
   }
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::session

@@ -10,7 +10,7 @@
 #include "runner/session/session.h"
 #include "runner/session/station.h"
 
-namespace palpate::runner {
+namespace palpate::runner::session {
 
 /// Shows a session's events on the console and sends them as markers. Belongs to the session's
 /// thread.
@@ -19,7 +19,7 @@ class SessionMonitor final : public SessionEvents {
   /// Its inputs and outputs. All must outlive it.
   struct Sources {
     const Session& session;
-    const KeyboardRespondent& respondent;
+    const participants::KeyboardRespondent& respondent;
     const SessionHold& hold;
     LiveForces& forces;
     SessionNoise& noise;
@@ -51,7 +51,7 @@ class SessionMonitor final : public SessionEvents {
   void answered(const data::TrialRecord& record) override;
   void cut_off(const std::string& reason) override;
   void recorded(const data::TrialRecord& record) override;
-  void interval(const protocols::Trial& trial, const IntervalView& view) override;
+  void interval(const protocols::Trial& trial, const participants::IntervalView& view) override;
   void page(const PageView& view) override;
   void asking(bool now) override { asking_ = now; }
   /// Whether the trial's intervals are over but a question of it is still open.
@@ -62,7 +62,7 @@ class SessionMonitor final : public SessionEvents {
 
   const LiveStation& station_;
   const Sources sources_;
-  ConsoleState state_;
+  display::ConsoleState state_;
   Marker marker_;  ///< of the current trial, to be filled in
   std::int64_t started_ns_, trial_began_ns_ = 0, shown_ns_ = 0;  ///< session clock
   double seconds_per_trial_ = 0;                                 ///< mean, since the session began
@@ -75,4 +75,4 @@ class SessionMonitor final : public SessionEvents {
   std::string page_;  ///< on show, as the state in words; empty: none
 };
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::session

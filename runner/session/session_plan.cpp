@@ -8,7 +8,7 @@
 #include "protocols/tasks/levels.h"
 #include "stimuli/shapes.h"
 
-namespace palpate::runner {
+namespace palpate::runner::session {
 namespace {
 
 constexpr std::size_t kMostKnown = 32;  // a sphere with its trees takes a megabyte
@@ -124,4 +124,4 @@ void SessionPlan::judge_practice() {
   for (std::size_t i = 0; i < trials_.size(); ++i) trials_[i].trial = static_cast<int>(i) + 1;
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::session

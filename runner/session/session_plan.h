@@ -13,7 +13,7 @@
 #include "protocols/tasks/task_plan.h"
 #include "runner/scene_builder.h"
 
-namespace palpate::runner {
+namespace palpate::runner::session {
 
 // The scenes of a session of version 2: stimuli at levels that depend on answers, built on demand.
 
@@ -95,4 +95,4 @@ class SessionPlan {
 /// The outcome of a recorded trial, for SessionPlan::answered.
 protocols::TrialOutcome outcome_of(const data::TrialRecord& record);
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::session

@@ -22,13 +22,13 @@
 #include "runner/session/session.h"
 #include "runner/session/socket_advisor.h"
 
-namespace palpate::runner {
+namespace palpate::runner::session {
 namespace {
 
 /// \throws std::invalid_argument
 const protocols::Protocol& checked(const protocols::Protocol& protocol,
                                    const StimulusLibrary& library,
-                                   const SimulatedSettings& settings) {
+                                   const participants::SimulatedSettings& settings) {
   std::string reasons;
   for (const std::string& fault : simulation_faults(protocol, library, settings)) {
     reasons += (reasons.empty() ? "" : "\n") + fault;
@@ -53,31 +53,33 @@ class VisitingLog final : public TrialLog {
 
 }  // namespace
 
-SimulatedStudy::SimulatedStudy(const protocols::Protocol& p, const SimulatedSettings& s,
-                               std::uint64_t seed_)
+SimulatedStudy::SimulatedStudy(const protocols::Protocol& p,
+                               const participants::SimulatedSettings& s, std::uint64_t seed_)
     : protocol(p),
       settings(s),
       library(p),
       hypotheses(shapes_of(checked(p, library, s))),
-      of_blocks(block_hypotheses(p)),
+      of_blocks(participants::block_hypotheses(p)),
       seed(seed_) {}
 
 void run_simulated_session(const SimulatedStudy& study, const SimulatedSession& session,
                            TrialLog& log, const std::function<bool()>& halting) {
   const protocols::Protocol& protocol = study.protocol;
-  const SimulatedSettings own = individual(study.settings, study.seed, session.participant);
-  SimulatedStylus stylus(own.device, own.hand, protocol.stylus.length, protocol.stylus.grip,
-                         1 / protocol.servo_rate);
-  VirtualClock clock(session.clock_ns);
-  Servo servo(stylus, clock, protocol.servo_rate, ForceLimits{}, workspace_of(protocol));
+  const participants::SimulatedSettings own =
+      participants::individual(study.settings, study.seed, session.participant);
+  devices::SimulatedStylus stylus(own.device, own.hand, protocol.stylus.length,
+                                  protocol.stylus.grip, 1 / protocol.servo_rate);
+  servo::VirtualClock clock(session.clock_ns);
+  servo::Servo servo(stylus, clock, protocol.servo_rate, servo::ForceLimits{},
+                     workspace_of(protocol));
   if (protocol.passivity_controller) servo.control_passivity();
-  std::unique_ptr<Respondent> participant;
+  std::unique_ptr<participants::Respondent> participant;
   if (protocol.version == 2) {
-    participant = std::make_unique<TaskParticipant>(own, study.hypotheses, study.of_blocks, stylus,
-                                                    protocol, study.seed, session.participant);
+    participant = std::make_unique<participants::TaskParticipant>(
+        own, study.hypotheses, study.of_blocks, stylus, protocol, study.seed, session.participant);
   } else {
-    participant = std::make_unique<SimulatedParticipant>(own, study.hypotheses, stylus, protocol,
-                                                         study.seed, session.participant);
+    participant = std::make_unique<participants::SimulatedParticipant>(
+        own, study.hypotheses, stylus, protocol, study.seed, session.participant);
   }
   const Station station{protocol, study.library, session.plan, servo,
                         clock,    session.utc,   log,          session.advisor};
@@ -89,8 +91,9 @@ void run_simulated_session(const SimulatedStudy& study, const SimulatedSession& 
   }
 }
 
-data::RunInfo simulated_run(const protocols::Protocol& protocol, const SimulatedSettings& settings,
-                            int participant, int session) {
+data::RunInfo simulated_run(const protocols::Protocol& protocol,
+                            const participants::SimulatedSettings& settings, int participant,
+                            int session) {
   constexpr std::int64_t kDay_ns = 86'400'000'000'000;
   constexpr std::int64_t kFirstMorning_ns = 946'717'200'000'000'000;  // 2000-01-01T09:00:00Z
   const std::int64_t day =
@@ -108,8 +111,8 @@ data::RunInfo simulated_run(const protocols::Protocol& protocol, const Simulated
 }
 
 bool simulate_in_memory(
-    const protocols::Protocol& protocol, const SimulatedSettings& settings, int participants,
-    std::uint64_t seed, const std::atomic<bool>& stop,
+    const protocols::Protocol& protocol, const participants::SimulatedSettings& settings,
+    int participants, std::uint64_t seed, const std::atomic<bool>& stop,
     const std::function<void(int, const data::TrialRecord&, std::uint64_t)>& visit) {
   const SimulatedStudy study(protocol, settings, seed);
   for (int number = 1; number <= participants; ++number) {
@@ -266,8 +269,8 @@ void refuse_changed(data::Store& store, const data::ProtocolInfo& now) {
 }
 
 std::vector<Work> unfinished_work(const protocols::Protocol& protocol, data::Store& store,
-                                  const SimulatedSettings& settings, const StudyPlan& plan,
-                                  StudyProgress& progress) {
+                                  const participants::SimulatedSettings& settings,
+                                  const StudyPlan& plan, StudyProgress& progress) {
   std::vector<Work> todo;
   const data::ProtocolInfo info = info_of(protocol);
   refuse_changed(store, info);
@@ -379,8 +382,8 @@ class Recorder {
   std::map<std::size_t, data::Run> runs_;
 };
 
-SimulatedStylus simulated_stylus(const protocols::Protocol& protocol,
-                                 const SimulatedSettings& settings) {
+devices::SimulatedStylus simulated_stylus(const protocols::Protocol& protocol,
+                                          const participants::SimulatedSettings& settings) {
   return {settings.device, settings.hand, protocol.stylus.length, protocol.stylus.grip,
           1 / protocol.servo_rate};
 }
@@ -398,8 +401,8 @@ std::vector<stimuli::ObjectSpec> shapes_of(const protocols::Protocol& protocol) 
 }
 
 LimitedForSimulation limit_for_simulation(protocols::Protocol& protocol,
-                                          const SimulatedSettings& settings) {
-  const SimulatedStylus stylus = simulated_stylus(protocol, settings);
+                                          const participants::SimulatedSettings& settings) {
+  const devices::SimulatedStylus stylus = simulated_stylus(protocol, settings);
   const std::vector<LimitedMaterial> limited = limit_materials(protocol, stylus.capabilities());
   LimitedForSimulation out;
   for (const LimitedMaterial& one : limited) out.texts.push_back(one.text);
@@ -410,8 +413,8 @@ LimitedForSimulation limit_for_simulation(protocols::Protocol& protocol,
 
 std::vector<std::string> simulation_faults(const protocols::Protocol& protocol,
                                            const StimulusLibrary& library,
-                                           const SimulatedSettings& settings) {
-  SimulatedStylus device = simulated_stylus(protocol, settings);
+                                           const participants::SimulatedSettings& settings) {
+  devices::SimulatedStylus device = simulated_stylus(protocol, settings);
   std::vector<std::string> faults = incompatibilities(protocol, library, device.capabilities());
   if (protocols::is_external(protocol)) {
     faults.emplace_back(
@@ -419,12 +422,13 @@ std::vector<std::string> simulation_faults(const protocols::Protocol& protocol,
   }
   for (const protocols::StimulusSpec& stimulus : protocol.stimuli) {
     if (protocol.version == 2) break;  // its tasks do not ask for the shape
-    const std::string fault = ShapeHypotheses::fault_of(stimulus.object);
+    const std::string fault = participants::ShapeHypotheses::fault_of(stimulus.object);
     if (!fault.empty()) faults.push_back("stimulus '" + stimulus.name + "': " + fault);
   }
   try {  // patched settings may be invalid
-    const ShapeHypotheses hypotheses({stimuli::ObjectSpec{}});
-    SimulatedParticipant(individual(settings, 0, 1), hypotheses, device, protocol, 0, 1);
+    const participants::ShapeHypotheses hypotheses({stimuli::ObjectSpec{}});
+    participants::SimulatedParticipant(participants::individual(settings, 0, 1), hypotheses, device,
+                                       protocol, 0, 1);
   } catch (const std::invalid_argument& error) {
     faults.emplace_back(error.what());
   }
@@ -437,7 +441,7 @@ std::string simulated_code(int number) {
 }
 
 StudyProgress simulate_study(const protocols::Protocol& protocol, data::Store& store,
-                             const SimulatedSettings& settings, const StudyPlan& plan,
+                             const participants::SimulatedSettings& settings, const StudyPlan& plan,
                              const std::atomic<bool>& stop,
                              const std::function<void(const StudyProgress&)>& report) {
   const SimulatedStudy study(protocol, settings, plan.seed);
@@ -489,4 +493,4 @@ StudyProgress simulate_study(const protocols::Protocol& protocol, data::Store& s
   return progress;
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::session

@@ -20,7 +20,7 @@
 #include "runner/session/session_plan.h"
 #include "runner/session/socket_advisor.h"
 
-namespace palpate::runner {
+namespace palpate::runner::session {
 
 // One session of one simulated participant: the trial loop, servo and renderers of a live session
 // with a virtual clock. simulate_study() stores its records; a sweep keeps only summary figures.
@@ -30,15 +30,15 @@ struct SimulatedStudy {
   /// \throws std::invalid_argument naming the demands that the simulated device or participant
   /// cannot meet.
   /// \param protocol, settings  must outlive it
-  SimulatedStudy(const protocols::Protocol& protocol, const SimulatedSettings& settings,
-                 std::uint64_t seed);
+  SimulatedStudy(const protocols::Protocol& protocol,
+                 const participants::SimulatedSettings& settings, std::uint64_t seed);
 
   const protocols::Protocol& protocol;
-  const SimulatedSettings& settings;
+  const participants::SimulatedSettings& settings;
   StimulusLibrary library;
-  ShapeHypotheses hypotheses;
-  BlockHypotheses of_blocks;  ///< version 2
-  std::uint64_t seed;         ///< of the participants; the schedule has the protocol's own
+  participants::ShapeHypotheses hypotheses;
+  participants::BlockHypotheses of_blocks;  ///< version 2
+  std::uint64_t seed;  ///< of the participants; the schedule has the protocol's own
 };
 
 struct SimulatedSession {
@@ -55,15 +55,16 @@ void run_simulated_session(const SimulatedStudy& study, const SimulatedSession& 
 
 /// The run record of a simulated participant's session before its first trial. Its clock begins at
 /// nine in the morning of a day of its own.
-data::RunInfo simulated_run(const protocols::Protocol& protocol, const SimulatedSettings& settings,
-                            int participant, int session);
+data::RunInfo simulated_run(const protocols::Protocol& protocol,
+                            const participants::SimulatedSettings& settings, int participant,
+                            int session);
 
 /// Simulates a whole study without storing it: participants from 1, their sessions in order, in
 /// this thread. \param visit  gets the participant's number, a trial and its ticks with contact.
 /// \return false: stopped before its end. \throws as SimulatedStudy
 bool simulate_in_memory(
-    const protocols::Protocol& protocol, const SimulatedSettings& settings, int participants,
-    std::uint64_t seed, const std::atomic<bool>& stop,
+    const protocols::Protocol& protocol, const participants::SimulatedSettings& settings,
+    int participants, std::uint64_t seed, const std::atomic<bool>& stop,
     const std::function<void(int, const data::TrialRecord&, std::uint64_t)>& visit);
 
 struct StudyPlan {
@@ -94,7 +95,7 @@ struct LimitedForSimulation {
 /// Scales the protocol's materials down to the limits of the simulated device, where the protocol
 /// asks for that (servo.material_limit).
 LimitedForSimulation limit_for_simulation(protocols::Protocol& protocol,
-                                          const SimulatedSettings& settings);
+                                          const participants::SimulatedSettings& settings);
 
 /// The stimuli as hypotheses of the observer.
 std::vector<stimuli::ObjectSpec> shapes_of(const protocols::Protocol& protocol);
@@ -103,7 +104,7 @@ std::vector<stimuli::ObjectSpec> shapes_of(const protocols::Protocol& protocol);
 /// empty: they can.
 std::vector<std::string> simulation_faults(const protocols::Protocol& protocol,
                                            const StimulusLibrary& library,
-                                           const SimulatedSettings& settings);
+                                           const participants::SimulatedSettings& settings);
 
 /// Runs the trials that have no record yet. The same seed gives the same records for any number of
 /// jobs and interruptions: each trial has a random stream, each session a virtual clock and
@@ -113,11 +114,11 @@ std::vector<std::string> simulation_faults(const protocols::Protocol& protocol,
 /// \throws std::invalid_argument: the simulated device or participant cannot run the protocol;
 /// StoreError
 StudyProgress simulate_study(const protocols::Protocol& protocol, data::Store& store,
-                             const SimulatedSettings& settings, const StudyPlan& plan,
+                             const participants::SimulatedSettings& settings, const StudyPlan& plan,
                              const std::atomic<bool>& stop,
                              const std::function<void(const StudyProgress&)>& report);
 
 /// "S001": the code of simulated participant 1.
 std::string simulated_code(int number);
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::session

@@ -19,7 +19,7 @@
 #include "protocols/tasks/levels.h"
 #include "protocols/tasks/task_plan.h"
 
-namespace palpate::runner {
+namespace palpate::runner::session {
 namespace {
 
 using AdvisorJson = nlohmann::ordered_json;
@@ -233,4 +233,4 @@ void SocketAdvisor::tell(const data::TrialRecord& record) {
   if (socket_ >= 0) send(line_of(message));
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::session

@@ -23,7 +23,7 @@
 #include "protocols/protocol.h"
 #include "protocols/schedule.h"
 
-namespace palpate::runner {
+namespace palpate::runner::session {
 
 // An external program that proposes the levels of adaptive blocks.
 
@@ -82,4 +82,4 @@ class SocketAdvisor final : public LevelAdvisor {
   std::string trouble_;
 };
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::session

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cstddef>
 
-namespace palpate::runner {
+namespace palpate::runner::session {
 
 double largest_reach(const Station& station) {
   double reach = 0;
@@ -12,4 +12,4 @@ double largest_reach(const Station& station) {
   return reach;
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::session

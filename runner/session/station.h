@@ -18,15 +18,15 @@
 #include "runner/session/socket_advisor.h"
 #include "runner/sound/masking_noise.h"
 
-namespace palpate::runner {
+namespace palpate::runner::session {
 
 /// The parts of every session, simulated or live.
 struct Station {
   const protocols::Protocol& protocol;  ///< its materials limited to the device
   const StimulusLibrary& library;  ///< the protocol's stimuli at all levels, as convex meshes, m
   SessionPlan plan;                ///< the schedule, initially at the first unrecorded trial
-  TickSource& servo;               ///< the servo loop: one sample a tick. Live: the servo thread
-  Clock& clock;          ///< session clock, ns: of ticks, keys, markers. Simulated: virtual
+  servo::TickSource& servo;        ///< the servo loop: one sample a tick. Live: the servo thread
+  servo::Clock& clock;   ///< session clock, ns: of ticks, keys, markers. Simulated: virtual
   data::ClockStamp utc;  ///< one moment on the session clock and in UTC
   TrialLog& log;         ///< records every trial before the next one begins. Live: the run record
   LevelAdvisor* advisor = nullptr;  ///< proposes levels of adaptive blocks; may be null
@@ -39,21 +39,21 @@ inline constexpr std::int64_t kSessionNap_ns = 5'000'000;
 /// displays, the markers and the noise have threads or processes of their own; all else belongs to
 /// the session's thread.
 struct LiveStation : Station {
-  RunRecord& record;                 ///< participant, session, notes and trials
-  const DeviceCapabilities& device;  ///< of the open device
-  GuardedDevice* guard;              ///< its watchdog; null without force feedback
-  ServoThread& servo_thread;
+  RunRecord& record;                        ///< participant, session, notes and trials
+  const servo::DeviceCapabilities& device;  ///< of the open device
+  safety::GuardedDevice* guard;             ///< its watchdog; null without force feedback
+  servo::ServoThread& servo_thread;
   /// Felt in the pre-flight; null without force feedback. Outlives the servo thread.
   const ForceDirectionCheck* direction_check;
   std::function<int()> end_requested;  ///< the signal that asked the program to end; 0: none
-  ParticipantScreen& screen;
-  ExperimenterConsole& console;
-  AnswerBy answer_by;
-  Markers& markers;    ///< for other recordings: EEG, motion capture
-  NoisePlayer* noise;  ///< noise and tones in the participant's headphones; null: not wanted
+  display::ParticipantScreen& screen;
+  display::ExperimenterConsole& console;
+  participants::AnswerBy answer_by;
+  Markers& markers;           ///< for other recordings: EEG, motion capture
+  sound::NoisePlayer* noise;  ///< noise and tones in the participant's headphones; null: not wanted
 };
 
 /// m, the radius about the origin that holds every stimulus of the library in any orientation.
 double largest_reach(const Station& station);
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::session

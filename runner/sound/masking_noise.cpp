@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-namespace palpate::runner {
+namespace palpate::runner::sound {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
@@ -238,4 +238,4 @@ std::string to_json_text(const NoiseReport& report) {
   return event.dump();
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::sound

@@ -15,7 +15,7 @@
 #include "protocols/protocol.h"
 #include "runner/sound/sound_output.h"
 
-namespace palpate::runner {
+namespace palpate::runner::sound {
 
 // The signal of the masking noise, independent of the sound output.
 
@@ -130,4 +130,4 @@ class NoisePlayer {
 std::string to_json_text(const NoisePlayer& player);
 std::string to_json_text(const NoiseReport& report);
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::sound

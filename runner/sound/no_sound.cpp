@@ -1,6 +1,6 @@
 #include "runner/sound/sound_output.h"
 
-namespace palpate::runner {
+namespace palpate::runner::sound {
 
 std::unique_ptr<SoundOutput> open_sound(const std::string& device) {
   throw SoundError("no sound from '" + device +
@@ -8,4 +8,4 @@ std::unique_ptr<SoundOutput> open_sound(const std::string& device) {
                    "the session with --without-noise");
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::sound

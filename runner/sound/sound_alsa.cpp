@@ -5,7 +5,7 @@
 
 #include "runner/sound/sound_output.h"
 
-namespace palpate::runner {
+namespace palpate::runner::sound {
 namespace {
 
 constexpr unsigned kRate = 48000;         // Hz
@@ -78,4 +78,4 @@ std::unique_ptr<SoundOutput> open_sound(const std::string& device) {
   return std::make_unique<AlsaOutput>(device);
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::sound

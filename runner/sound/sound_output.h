@@ -7,7 +7,7 @@
 #include <stdexcept>
 #include <string>
 
-namespace palpate::runner {
+namespace palpate::runner::sound {
 
 /// No sound output; what() names the device, the reason and the remedy.
 class SoundError : public std::runtime_error {
@@ -29,4 +29,4 @@ class SoundOutput {
 /// \param device  name of an ALSA PCM: "default", "plughw:1", ... \throws SoundError
 std::unique_ptr<SoundOutput> open_sound(const std::string& device);
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::sound

@@ -15,7 +15,7 @@
 #include "stimuli/inset.h"
 #include "stimuli/primitives.h"
 
-namespace palpate::runner {
+namespace palpate::runner::stability {
 namespace {
 
 constexpr double kDepth = 1e-3;     // m, at rest
@@ -257,9 +257,9 @@ class Loop {
     const rendering::Rendering r = scene_.renderer().tick(
         scene_.scene(), state_, s_.reach ? stretched(*s_.reach, held) : held, 1 / s_.rate);
     const rendering::EndForces shown = on_hand({r.device1, r.device2});
-    DeviceForces forces{shown.tip, shown.tail, false};
+    servo::DeviceForces forces{shown.tip, shown.tail, false};
     if (s_.passivity_controller) {
-      const DeviceForces damping = controller_.damping({held.tip, held.tail}, forces);
+      const servo::DeviceForces damping = controller_.damping({held.tip, held.tail}, forces);
       forces.device1 += damping.device1;
       forces.device2 += damping.device2;
       controller_.commanded(forces);
@@ -283,7 +283,7 @@ class Loop {
   rendering::EndForces balance_;  // of the hand, at rest
   double stiffness_;              // N/m, of the contact
   End tip_, tail_;
-  PassivityController controller_;
+  servo::PassivityController controller_;
   std::array<std::array<double, 2>, kMaxDelay + 1> under_way_{};
   std::uint64_t block_ = 0, ticks_ = 0;  // ticks
   double first_ = 0;                     // m
@@ -446,4 +446,4 @@ double stiffest_stable(const LoopCase& loop, double damping) {
   return low;
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::stability

@@ -12,7 +12,7 @@
 #include "rendering/renderer.h"
 #include "rendering/scene.h"
 
-namespace palpate::runner {
+namespace palpate::runner::stability {
 
 // Simulation of the sampled closed loop of hand, two devices at the ends of a stylus and renderer:
 // does a contact come to rest or oscillate? For studies, not for the servo.
@@ -136,4 +136,4 @@ BoundaryPoint boundary_at(const LoopCase& loop, double stiffness);
 /// Largest stiffness, N/m, at most 10^7, up to which all are stable with this damping of each end.
 double stiffest_stable(const LoopCase& loop, double damping);
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::stability

@@ -7,7 +7,7 @@
 #include "data/base/random.h"
 #include "runner/devices/simulated.h"
 
-namespace palpate::runner {
+namespace palpate::runner::stability {
 namespace {
 
 constexpr double kTick = 1e-3;  // s
@@ -137,8 +137,8 @@ std::vector<IntegratorRow> compare_integrators(const std::function<double()>& no
       }
     }
     rows.push_back(measure(o, "exact", 1, inputs, now_ns, [&] {
-      return [spring = SpringDamper(o.mass, o.damping, o.stiffness, kTick), k = o.stiffness,
-              x = Vec3(), v = Vec3()](double force) mutable {
+      return [spring = devices::SpringDamper(o.mass, o.damping, o.stiffness, kTick),
+              k = o.stiffness, x = Vec3(), v = Vec3()](double force) mutable {
         const Vec3 equilibrium(force / k, 0, 0);
         x -= equilibrium;
         spring.advance(x, v);
@@ -150,4 +150,4 @@ std::vector<IntegratorRow> compare_integrators(const std::function<double()>& no
   return rows;
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::stability

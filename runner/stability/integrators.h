@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-namespace palpate::runner {
+namespace palpate::runner::stability {
 
 /// m x'' = -b x' - k x + F with F held over each tick, the equation of the program's simulated
 /// hand.
@@ -28,4 +28,4 @@ struct IntegratorRow {
 /// hand, a stiff one and an overdamped one. \param now_ns  a clock
 std::vector<IntegratorRow> compare_integrators(const std::function<double()>& now_ns);
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::stability

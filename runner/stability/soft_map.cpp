@@ -11,7 +11,7 @@
 #include "rendering/bodies/soft/soft_scene.h"
 #include "stimuli/solids/solid_mesh.h"
 
-namespace palpate::runner {
+namespace palpate::runner::stability {
 namespace {
 
 constexpr double kModuli[] = {1e3, 1e4, 1e5, 1e6, 1e7};   // Pa
@@ -164,4 +164,4 @@ std::string soft_map_text(const std::vector<SoftSwing>& map) {
   return out + " that scenes allow come to rest" + cell;
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::stability

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-namespace palpate::runner {
+namespace palpate::runner::stability {
 
 struct SoftCase {
   double young = 20000;    ///< Pa
@@ -47,4 +47,4 @@ std::vector<SoftCase> soft_cases_elsewhere(std::uint64_t seed);
 /// Table of the worst swing for each modulus and rate, with a sentence that sums it up.
 std::string soft_map_text(const std::vector<SoftSwing>& map);
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::stability

@@ -7,7 +7,7 @@
 
 #include "data/base/random.h"
 
-namespace palpate::runner {
+namespace palpate::runner::sweep {
 
 std::vector<std::uint64_t> sobol_digits(std::uint64_t index, std::size_t dimensions) {
   if (dimensions < 1 || dimensions > kMostSobolDimensions) {
@@ -173,4 +173,4 @@ std::uint64_t permuted(std::uint64_t value, std::uint64_t count, std::uint64_t k
   return value;
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::sweep

@@ -9,7 +9,7 @@
 
 #include "protocols/sweep_space.h"
 
-namespace palpate::runner {
+namespace palpate::runner::sweep {
 
 constexpr std::size_t kMostSobolDimensions = 3667;
 
@@ -59,4 +59,4 @@ class Design {
 /// entries.
 std::uint64_t permuted(std::uint64_t value, std::uint64_t count, std::uint64_t key);
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::sweep

@@ -14,7 +14,7 @@
 #include "protocols/json_document.h"
 #include "runner/participants/simulated_settings.h"
 
-namespace palpate::runner {
+namespace palpate::runner::sweep {
 
 // JSON pointers into documents: set a value, and say which pointers are near to one that is none.
 
@@ -212,7 +212,7 @@ void SweptStudy::check_participant(const SweepParameter& one, std::size_t number
     const std::vector<json> values = typical_values(one);
     std::vector<std::string> refusals;
     for (const json& value : values) {
-      if (const std::string why = setting_fault(path, value, *now); !why.empty())
+      if (const std::string why = participants::setting_fault(path, value, *now); !why.empty())
         refusals.push_back(why + protocols::found_text(value));
     }
     // All words of a choice must be known; of numbers the space may hold some that fail.
@@ -283,4 +283,4 @@ protocols::Protocol SweptStudy::parse(const json& protocol) const {
   return protocols::parse_protocol_text(protocol.dump(), protocol_path_);
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::sweep

@@ -12,7 +12,7 @@
 #include "protocols/sweep_space.h"
 #include "runner/participants/simulated_settings.h"
 
-namespace palpate::runner {
+namespace palpate::runner::sweep {
 
 struct PointStudy {
   std::uint64_t seed = 0;        ///< of the participants
@@ -57,4 +57,4 @@ class SweptStudy {
   bool varies_order_ = false;  ///< /seed of the protocol
 };
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::sweep

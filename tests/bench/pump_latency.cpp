@@ -28,8 +28,8 @@ constexpr std::int64_t kWarmUp_ns = 200'000'000;
 template <class Act>
 void at_period(std::int64_t period, double seconds, const Act& act) {
   std::thread([&] {
-    request_realtime({});
-    RealClock clock;
+    servo::request_realtime({});
+    servo::RealClock clock;
     const std::int64_t began = clock.now_ns();
     const std::int64_t end = began + kWarmUp_ns + static_cast<std::int64_t>(seconds * 1e9);
     for (std::int64_t due = began; due < end;) {
@@ -52,34 +52,34 @@ void print(const char* load, const char* what, std::vector<std::int64_t> ns) {
 }
 
 void bare_loop(const std::string& service, const char* load, double seconds) {
-  const auto link = haply::connect(service);
+  const auto link = devices::haply::connect(service);
   std::string_view message;
   link->receive(message, std::chrono::seconds(2));
-  RealClock clock;
+  servo::RealClock clock;
   std::vector<std::int64_t> trips;
   at_period(kExchange_ns, seconds, [&](bool counts) {
     const std::int64_t began = clock.now_ns();
-    link->send(haply::command("049D", Vec3(0), haply::Dialect::vector, false));
+    link->send(devices::haply::command("049D", Vec3(0), devices::haply::Dialect::vector, false));
     while (!link->receive(message, std::chrono::seconds(2))) {
     }
-    haply::parse_state(message, "049D", "G1");
+    devices::haply::parse_state(message, "049D", "G1");
     if (counts) trips.push_back(clock.now_ns() - began);
   });
   print(load, "bare loop: round trip", std::move(trips));
 }
 
 void driver(const std::string& service, const char* load, double seconds) {
-  DeviceConfig config;
+  servo::DeviceConfig config;
   config.service = service;
-  haply::Inverse3Device device(config);
-  RealClock clock;
+  devices::haply::Inverse3Device device(config);
+  servo::RealClock clock;
   std::vector<std::int64_t> ages, waits, calls;
   std::int64_t wrote = 0;
   at_period(kTick_ns, seconds, [&](bool counts) {
     const std::int64_t began = clock.now_ns();
     device.read();
     const std::int64_t used = clock.now_ns();
-    const DeviceTimes times = device.times();
+    const servo::DeviceTimes times = device.times();
     if (counts) ages.push_back(used - times.pose_ns);
     if (counts && wrote > 0) waits.push_back(std::max(times.force_ns, wrote) - wrote);
     wrote = clock.now_ns();
@@ -92,7 +92,7 @@ void driver(const std::string& service, const char* load, double seconds) {
 }
 
 int run(double seconds) {
-  testing::EmulatedService service;
+  devices::testing::EmulatedService service;
   std::printf("%-6s %-44s %9s %9s %9s %9s\n", "load", "us", "median", "p99", "p99.9", "max");
   for (const bool busy : {false, true}) {
     std::atomic<bool> quit{false};

@@ -28,7 +28,7 @@ std::string protocol_text(bool samples) {
 }
 
 /// The renderer along a stroke, without a device.
-class Stroke final : public runner::TickSource {
+class Stroke final : public runner::servo::TickSource {
  public:
   Stroke(const rendering::Scene& scene, const rendering::Renderer& renderer, std::uint32_t ticks)
       : poses_(ticks + 1) {
@@ -41,47 +41,47 @@ class Stroke final : public runner::TickSource {
     }
   }
   void prepare(const rendering::Scene& scene, const rendering::Renderer& renderer,
-               const runner::HomeZone&) override {
+               const runner::servo::HomeZone&) override {
     scene_ = scene;
     renderer_ = &renderer;
     state_ = scene_->initial_state();
-    sample_.phase = runner::Phase::feeling;
+    sample_.phase = runner::servo::Phase::feeling;
   }
-  const runner::Sample& next() noexcept override {
+  const runner::servo::Sample& next() noexcept override {
     sample_.tick = next_;
     sample_.time_ns += sample_.period_ns = 1'000'000;
     sample_.probe = poses_[next_++];
     sample_.rendering = renderer_->tick(*scene_, state_, sample_.probe, 1e-3);
     return sample_;
   }
-  runner::ServoQuality stop() noexcept override { return {}; }
+  runner::servo::ServoQuality stop() noexcept override { return {}; }
 
  private:
   std::vector<rendering::LineProbe> poses_;
   std::optional<rendering::Scene> scene_;
   const rendering::Renderer* renderer_ = nullptr;
   rendering::RenderState state_;
-  runner::Sample sample_;
+  runner::servo::Sample sample_;
   std::uint32_t next_ = 0;
 };
 
 /// Answers after so many ticks.
-class Patient final : public runner::Respondent {
+class Patient final : public runner::participants::Respondent {
  public:
   explicit Patient(std::uint32_t ticks) : ticks_(ticks) {}
   void read(const std::string&) override {}
   void feedback(bool) override {}
   void begin_trial(const protocols::Trial&) override {}
-  std::optional<runner::Answer> step(const runner::Sample& sample) override {
+  std::optional<runner::participants::Answer> step(const runner::servo::Sample& sample) override {
     if (sample.tick < ticks_) return std::nullopt;
-    return runner::Answer{0, sample.time_ns};
+    return runner::participants::Answer{0, sample.time_ns};
   }
 
  private:
   std::uint32_t ticks_;
 };
 
-class NoLog final : public runner::TrialLog {
+class NoLog final : public runner::session::TrialLog {
  public:
   int begin(const data::TrialRecord&, std::int64_t) override { return 1; }
   void finish(const data::TrialRecord& record) override { kept = record.samples.size(); }
@@ -91,7 +91,7 @@ class NoLog final : public runner::TrialLog {
 
 }  // namespace
 
-[[gnu::noinline]] void measured_trial(runner::Session& session) { session.step(); }
+[[gnu::noinline]] void measured_trial(runner::session::Session& session) { session.step(); }
 [[gnu::noinline]] void measured_unlogged_trial(UnloggedTrial& trial) { trial.run(); }
 
 namespace {
@@ -101,9 +101,9 @@ std::size_t run(const std::string& which, std::uint32_t ticks) {
       protocols::parse_protocol_text(protocol_text(which == "on"), "one.json");
   const runner::StimulusLibrary library(protocol);
   Patient participant(ticks);
-  runner::VirtualClock clock;
+  runner::servo::VirtualClock clock;
   NoLog log;
-  runner::SessionPlan plan(protocol, 1, 1);
+  runner::session::SessionPlan plan(protocol, 1, 1);
   const rendering::Scene scene = library.scene(plan.next());
   Stroke stroke(scene, rendering::ray_renderer(), ticks);
   if (which == "least") {
@@ -114,8 +114,9 @@ std::size_t run(const std::string& which, std::uint32_t ticks) {
     measured_unlogged_trial(trial);
     return 0;
   }
-  runner::Session session({protocol, library, plan, stroke, clock, {0, 0}, log}, participant);
-  while (session.state() != runner::Session::State::trial) session.step();
+  runner::session::Session session({protocol, library, plan, stroke, clock, {0, 0}, log},
+                                   participant);
+  while (session.state() != runner::session::Session::State::trial) session.step();
   measured_trial(session);
   session.step();
   return log.kept;

@@ -21,13 +21,13 @@ std::vector<stimuli::ObjectSpec> four_shapes() {
 }
 
 /// Touches all over a sphere of the size of the stimuli, the stylus leaning on it.
-std::vector<runner::Percept> percepts(bool ray, bool contact) {
+std::vector<runner::participants::Percept> percepts(bool ray, bool contact) {
   Random random(1);
   const auto direction = [&random] {
     return glm::normalize(Vec3(random.normal(), random.normal(), random.normal()));
   };
-  std::vector<runner::Percept> made(64);
-  for (runner::Percept& percept : made) {
+  std::vector<runner::participants::Percept> made(64);
+  for (runner::participants::Percept& percept : made) {
     percept.ray = ray;
     percept.contact = contact;
     percept.direction = direction();
@@ -41,9 +41,9 @@ std::vector<runner::Percept> percepts(bool ray, bool contact) {
 }
 
 void update(benchmark::State& state, bool ray, bool contact) {
-  const runner::ShapeHypotheses hypotheses(four_shapes());
-  runner::ShapeObserver observer(hypotheses);
-  const std::vector<runner::Percept> made = percepts(ray, contact);
+  const runner::participants::ShapeHypotheses hypotheses(four_shapes());
+  runner::participants::ShapeObserver observer(hypotheses);
+  const std::vector<runner::participants::Percept> made = percepts(ray, contact);
   std::size_t next = 0;
   for (auto _ : state) {
     observer.update(made[next]);
@@ -60,7 +60,7 @@ BENCHMARK_CAPTURE(update, ray_free_space, true, false);
 void build_hypotheses(benchmark::State& state) {
   const std::vector<stimuli::ObjectSpec> stimuli = four_shapes();
   for (auto _ : state) {
-    runner::ShapeHypotheses hypotheses(stimuli);
+    runner::participants::ShapeHypotheses hypotheses(stimuli);
     benchmark::DoNotOptimize(hypotheses.padded_size());
   }
 }

@@ -10,12 +10,12 @@ constexpr double kSecond_ns = 1e9;
 }  // namespace
 
 void UnloggedTrial::run() {
-  std::optional<runner::Answer> answer;
+  std::optional<runner::participants::Answer> answer;
   std::uint32_t faults = 0;
-  while (!answer && !record_.timed_out && !(faults & runner::servo_fault::kTripped)) {
-    const runner::Sample& sample = servo_.next();
+  while (!answer && !record_.timed_out && !(faults & runner::servo::servo_fault::kTripped)) {
+    const runner::servo::Sample& sample = servo_.next();
     faults = sample.faults;
-    if (sample.phase == runner::Phase::feeling) {
+    if (sample.phase == runner::servo::Phase::feeling) {
       note(sample);
       contact_.add(sample);
       record_.timed_out = sample.time_ns - record_.onset_ns >= limit_ns_;
@@ -25,7 +25,7 @@ void UnloggedTrial::run() {
   }
 }
 
-void UnloggedTrial::note(const runner::Sample& sample) {
+void UnloggedTrial::note(const runner::servo::Sample& sample) {
   if (sample.tick == 0) {
     record_.onset_ns = sample.time_ns;
     record_.onset_utc = data::format_utc(sample.time_ns);

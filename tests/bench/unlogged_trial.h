@@ -11,7 +11,7 @@ namespace palpate::bench {
 /// object was touched is counted in either: every trial's record has it.
 class UnloggedTrial {
  public:
-  UnloggedTrial(runner::TickSource& servo, runner::Respondent& participant,
+  UnloggedTrial(runner::servo::TickSource& servo, runner::participants::Respondent& participant,
                 const runner::SharpEdges& edges, const Quat& orientation, std::int64_t limit_ns)
       : servo_(servo), participant_(participant), limit_ns_(limit_ns) {
     contact_.begin(edges, orientation);
@@ -19,13 +19,13 @@ class UnloggedTrial {
   void run();
 
  private:
-  void note(const runner::Sample& sample);
+  void note(const runner::servo::Sample& sample);
 
-  runner::TickSource& servo_;
-  runner::Respondent& participant_;
+  runner::servo::TickSource& servo_;
+  runner::participants::Respondent& participant_;
   std::int64_t limit_ns_;
   data::TrialRecord record_;
-  runner::ContactLog contact_;
+  runner::session::ContactLog contact_;
 };
 
 }  // namespace palpate::bench

@@ -66,7 +66,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   next.trial = 3;
   next.task_block = 0;
   next.level = 500;
-  palpate::runner::SocketAdvisor advisor(
+  palpate::runner::session::SocketAdvisor advisor(
       protocol, {.path = file.path(), .time_out = 0.002, .participant = 1, .session = 1}, {});
   listener.answer(data, size);
   const std::optional<double> level = advisor.ask(next);

@@ -11,7 +11,7 @@
 
 #include "runner/devices/haply/messages.h"
 
-namespace haply = palpate::runner::haply;
+namespace haply = palpate::runner::devices::haply;
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const std::string_view text(reinterpret_cast<const char*>(data), size);

@@ -20,7 +20,7 @@
 namespace {
 
 /// A line on which these bytes come in, some at each tick.
-class Wire final : public palpate::runner::falcon::Transport {
+class Wire final : public palpate::runner::devices::falcon::Transport {
  public:
   Wire(const std::uint8_t* data, std::size_t size) : left_(data, size) {}
   const std::string& serial() const override { return serial_; }
@@ -49,7 +49,7 @@ class Wire final : public palpate::runner::falcon::Transport {
 /// Whatever the device replies, positions stay within its reach and motors within their range, and
 /// in trouble there is no torque.
 void move_an_arm(const std::uint8_t* data, std::size_t size) {
-  using namespace palpate::runner::falcon;
+  using namespace palpate::runner::devices::falcon;
   auto line = std::make_unique<Wire>(data, size);
   Wire& wire = *line;
   FalconDriver driver(std::move(line), {});
@@ -69,7 +69,7 @@ void move_an_arm(const std::uint8_t* data, std::size_t size) {
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  using namespace palpate::runner::falcon;
+  using namespace palpate::runner::devices::falcon;
   PacketStream stream;
   for (std::size_t i = 0; i < size; ++i) {
     const auto packet = stream.take(data[i]);

@@ -12,7 +12,7 @@
 namespace {
 
 void read_calibration_text(const std::string& text) {
-  using namespace palpate::runner::falcon;
+  using namespace palpate::runner::devices::falcon;
   const Calibration calibration = parse_calibration(text, "calibration.json");
   for (const ForceCalibration& force : calibration.forces) {
     if (!std::isfinite(force.counts_per_torque) || force.counts_per_torque >= 0) std::abort();
@@ -34,7 +34,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   } catch (const palpate::protocols::InputError&) {
   }
   try {
-    palpate::runner::load_simulated_settings(file.write(data, size));
+    palpate::runner::participants::load_simulated_settings(file.write(data, size));
   } catch (const palpate::protocols::InputError&) {
   }
   return 0;

@@ -226,9 +226,9 @@ TEST_P(SeveralParts, HundredsOfObjectsAreFeltAtOnceWithoutAllocation) {
   const Scene scene(objects);
   RenderState state = scene.initial_state();
   tick(scene, state, upright(0, -0.01));
-  const std::uint64_t before = runner::allocations();
+  const std::uint64_t before = runner::bench::allocations();
   const Rendering r = tick(scene, state, upright(0, kPressed));
-  EXPECT_EQ(runner::allocations(), before);
+  EXPECT_EQ(runner::bench::allocations(), before);
   EXPECT_EQ(r.contacts, kObjects);
   EXPECT_NEAR(r.force.z, kObjects * kSoft * kPressed, 1e-9);
   EXPECT_EQ(r.faults, 0u);

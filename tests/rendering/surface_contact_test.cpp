@@ -237,9 +237,9 @@ TEST_P(SurfaceContact, TheIdealToolIsNeverInside) {
     int contacts = 0;
     for (int i = 0; i < 8000; ++i) {
       const LineProbe probe = hand.next();
-      const std::uint64_t before = runner::allocations();
+      const std::uint64_t before = runner::bench::allocations();
       const Rendering r = tick(scene, state, probe);
-      ASSERT_EQ(runner::allocations(), before);
+      ASSERT_EQ(runner::bench::allocations(), before);
       ASSERT_EQ(r.faults & ~render_fault::kReleased, 0U) << round << ' ' << i;
       if (r.contacts == 0 || (r.faults & render_fault::kReleased) != 0) continue;
       ++contacts;
@@ -432,9 +432,9 @@ TEST_P(SurfaceContact, AFineMeshIsNotEnteredByAStylusThatTurnsFast) {
   double depth = 0;
   int contacts = 0;
   for (int i = 0; i < 4000; ++i) {
-    const std::uint64_t before = runner::allocations();
+    const std::uint64_t before = runner::bench::allocations();
     const Rendering r = tick(scene, state, hand.next(depth));
-    ASSERT_EQ(runner::allocations(), before);
+    ASSERT_EQ(runner::bench::allocations(), before);
     depth = r.deepest.depth;
     if (r.contacts == 0 || (r.faults & render_fault::kReleased) != 0) continue;
     ++contacts;

@@ -7,15 +7,15 @@
 namespace palpate::runner::testing {
 
 /// Reads the value of a function of the tick, and keeps the last written forces.
-class FakeDevice final : public Device {
+class FakeDevice final : public servo::Device {
  public:
   /// \param drives  degrees of freedom
-  explicit FakeDevice(std::function<DeviceReading(int tick)> script, int drives = 5)
+  explicit FakeDevice(std::function<servo::DeviceReading(int tick)> script, int drives = 5)
       : script_(std::move(script)) {
     capabilities_ = {"fake", 5, drives, 8, 3000, 1000, 0.2, 0, true};
   }
-  const DeviceCapabilities& capabilities() const override { return capabilities_; }
-  DeviceReading read() noexcept override { return script_(tick_++); }
+  const servo::DeviceCapabilities& capabilities() const override { return capabilities_; }
+  servo::DeviceReading read() noexcept override { return script_(tick_++); }
   void write(const Vec3& device1, const Vec3& device2) noexcept override {
     force = device1 + device2;
     last1 = device1;
@@ -29,8 +29,8 @@ class FakeDevice final : public Device {
   Vec3 force, last1, last2;
 
  private:
-  DeviceCapabilities capabilities_;
-  std::function<DeviceReading(int)> script_;
+  servo::DeviceCapabilities capabilities_;
+  std::function<servo::DeviceReading(int)> script_;
   int tick_ = 0;
 };
 

@@ -22,7 +22,7 @@ struct DeviceRecord {
   void add(double force) {
     const std::uint32_t at = count.load();
     if (at >= kRoom) return;
-    writes[at] = {RealClock().now_ns(), force};
+    writes[at] = {servo::RealClock().now_ns(), force};
     count.store(at + 1);
   }
   double last_force() const {
@@ -36,15 +36,15 @@ struct DeviceRecord {
 };
 
 /// Stays at a given pose and records every command.
-class RecordingDevice final : public Device {
+class RecordingDevice final : public servo::Device {
  public:
-  RecordingDevice(DeviceRecord& record, DeviceReading (*where)(int tick))
+  RecordingDevice(DeviceRecord& record, servo::DeviceReading (*where)(int tick))
       : record_(record), where_(where) {
     capabilities_ = {"recording", 5, 5, 8, 3000, 10000, 0.2, 0, true, "R-1", "never"};
   }
   ~RecordingDevice() override { record_.closed = true; }
-  const DeviceCapabilities& capabilities() const override { return capabilities_; }
-  DeviceReading read() noexcept override { return where_(tick_++); }
+  const servo::DeviceCapabilities& capabilities() const override { return capabilities_; }
+  servo::DeviceReading read() noexcept override { return where_(tick_++); }
   void write(const Vec3& device1, const Vec3& device2) noexcept override {
     const Vec3 sum = device1 + device2;
     record_.add(std::sqrt(sum.x * sum.x + sum.y * sum.y + sum.z * sum.z));
@@ -52,8 +52,8 @@ class RecordingDevice final : public Device {
 
  private:
   DeviceRecord& record_;
-  DeviceReading (*where_)(int);
-  DeviceCapabilities capabilities_;
+  servo::DeviceReading (*where_)(int);
+  servo::DeviceCapabilities capabilities_;
   int tick_ = 0;
 };
 

@@ -18,7 +18,7 @@
 #include "runner/commands/shared/progress_line.h"
 #include "stimuli/primitives.h"
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 
 // The measurements of `palpate accuracy`. Shows progress on a terminal.
 
@@ -294,4 +294,4 @@ int accuracy_command(const std::vector<std::string>& args) {
   return extremes_hold && wrong == 0 ? 0 : 1;
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

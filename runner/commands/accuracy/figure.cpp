@@ -10,7 +10,7 @@
 #include "analysis/figures/panel_drawing.h"
 #include "runner/commands/accuracy/report.h"
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 namespace {
 
 // m: an error of 0 has no logarithm, and smaller errors need not be distinguished.
@@ -129,4 +129,4 @@ analysis::Figure accuracy_figure(const AccuracyReport& report) {
   return figure;
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

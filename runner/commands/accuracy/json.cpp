@@ -1,7 +1,7 @@
 #include "rendering/accuracy/peers.h"
 #include "runner/commands/accuracy/report.h"
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 namespace {
 
 using Json = nlohmann::ordered_json;
@@ -226,4 +226,4 @@ Json accuracy_json(const AccuracyReport& report) {
   return json;
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

@@ -10,7 +10,7 @@
 #include "analysis/text.h"
 #include "rendering/accuracy/peers.h"
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 
 std::string significant(double value) {
   char text[32];
@@ -529,4 +529,4 @@ std::string accuracy_page(const AccuracyReport& report) {
   return page.html("palpate " PALPATE_VERSION ".");
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

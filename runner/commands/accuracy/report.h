@@ -19,7 +19,7 @@
 #include "rendering/verification/union_search.h"
 #include "stimuli/shapes.h"
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 
 /// First contacts of one shape at several speeds of the hand.
 struct FirstContactStudy {
@@ -89,4 +89,4 @@ analysis::Figure accuracy_figure(const AccuracyReport& report);
 /// The whole report as one page.
 std::string accuracy_page(const AccuracyReport& report);
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

@@ -36,7 +36,7 @@
 #include "runner/commands/shared/protocol_choice.h"
 #include "runner/commands/shared/sealed_folder.h"
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 
 // The description of a bundle as RO-Crate 1.2 (https://w3id.org/ro/crate/1.2).
 
@@ -576,4 +576,4 @@ int bundle_command(const std::vector<std::string>& args) {
   return make_bundle(options);
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

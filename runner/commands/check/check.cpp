@@ -13,7 +13,7 @@
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/outputs.h"
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 namespace {
 
 namespace po = boost::program_options;
@@ -102,4 +102,4 @@ int check_command(const std::vector<std::string>& args) {
   return check.deviations() > 0 ? 1 : 0;
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

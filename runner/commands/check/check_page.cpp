@@ -10,7 +10,7 @@
 #include "runner/commands/check/deviations.h"
 #include "runner/commands/shared/command.h"
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 namespace {
 
 using analysis::escaped;
@@ -216,4 +216,4 @@ std::string check_html(const StudyCheck& check, const Registration& registered) 
   return page.html("palpate " PALPATE_VERSION ".");
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

@@ -18,7 +18,7 @@
 #include "runner/commands/shared/sealed_folder.h"
 #include "runner/participants/simulated_settings.h"
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 namespace {
 
 using analysis::counted;
@@ -254,8 +254,8 @@ CheckPoint of_trials(const Registration& registered, const StudyData& study) {
 
 /// The version of a simulated participant; "" for changed settings.
 std::string version_of(const std::string& observer_sha256) {
-  for (const int version : participant_versions()) {
-    if (load_simulated_settings("", version).sha256 == observer_sha256)
+  for (const int version : participants::participant_versions()) {
+    if (participants::load_simulated_settings("", version).sha256 == observer_sha256)
       return "version " + std::to_string(version);
   }
   return "changed settings";
@@ -500,4 +500,4 @@ StudyCheck check_study(const Registration& registered, const std::string& folder
   return out;
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

@@ -11,7 +11,7 @@
 #include "data/store/store.h"
 #include "runner/commands/register/registration.h"
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 
 enum class Finding {
   as_registered,
@@ -55,4 +55,4 @@ std::string check_json(const StudyCheck& check, const Registration& registered);
 /// A page like the report of analyze.
 std::string check_html(const StudyCheck& check, const Registration& registered);
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

@@ -20,7 +20,7 @@
 #include "runner/commands/shared/study_options.h"
 #include "runner/commands/sweep/planned.h"
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 namespace {
 
 namespace fs = std::filesystem;
@@ -135,7 +135,7 @@ int begin_sweep(const ClusterSettings& settings, const SweepSettings& sweep) {
 
 int begin_study(const ClusterSettings& settings, const StudyOptions& study) {
   protocols::Protocol protocol = protocols::parse_protocol(study.protocol);
-  fit_to_simulation(protocol, load_simulated_settings(study.patch, study.version));
+  fit_to_simulation(protocol, participants::load_simulated_settings(study.patch, study.version));
   const auto command = [&](const std::vector<std::string>& inputs) {
     const std::string out = "simulate " + shell_quoted(inputs[0]) + " --participants " +
                             std::to_string(study.participants) + " --seed " +
@@ -313,7 +313,7 @@ int cluster_command(const std::vector<std::string>& args) {
     const auto values = line.parse(words);
     if (!values) return 0;
     check_study_options(*values, study);
-    if (study.version == 0) study.version = kDefaultParticipantVersion;
+    if (study.version == 0) study.version = participants::kDefaultParticipantVersion;
     return begin_study(settings, study);
   }
   add_sweep_options(line, sweep);
@@ -321,8 +321,8 @@ int cluster_command(const std::vector<std::string>& args) {
   const auto values = line.parse(words);
   if (!values) return 0;
   check_sweep_options(*values, sweep);
-  if (sweep.version == 0) sweep.version = kDefaultParticipantVersion;
+  if (sweep.version == 0) sweep.version = participants::kDefaultParticipantVersion;
   return begin_sweep(settings, sweep);
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

@@ -24,7 +24,7 @@
 #include "runner/commands/shared/study_options.h"
 #include "runner/session/run_record.h"
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 namespace {
 
 namespace fs = std::filesystem;
@@ -234,7 +234,7 @@ std::int64_t merged_units(const fs::path& folder, const ClusterJob& job) {
 
 std::vector<std::string> copy_inputs(const fs::path& folder, const protocols::Protocol& protocol,
                                      const std::vector<std::string>& others) {
-  const data::ProtocolInfo info = info_of(protocol);
+  const data::ProtocolInfo info = session::info_of(protocol);
   std::ptrdiff_t up = 0;  // steps out of the protocol's folder
   for (const data::ProtocolFile& file : info.files) {
     const fs::path name = fs::path(file.name).lexically_normal();
@@ -354,4 +354,4 @@ void write_scripts(const fs::path& folder, const ClusterJob& job, const std::str
                    " --json analysis.json --report report.html --force > analysis.txt\n");
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

@@ -10,7 +10,7 @@
 #include "protocols/protocol.h"
 #include "runner/commands/plan/plan.h"
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 
 // The scripts of a plan's shards.
 
@@ -90,4 +90,4 @@ void write_scripts(const std::filesystem::path& folder, const ClusterJob& job,
 /// \param text  after the first line, which names the shell
 void write_script(const std::filesystem::path& path, const std::string& text);
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

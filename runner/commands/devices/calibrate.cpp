@@ -24,16 +24,16 @@
 #include "runner/safety/guarded_device.h"
 #include "runner/servo/realtime.h"
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 namespace {
 
 namespace po = boost::program_options;
-using namespace palpate::runner::falcon;
+using namespace palpate::runner::devices::falcon;
 
 /// Questions on stderr, ENTER on stdin; q, the end of stdin or a signal stops.
 class TerminalGuide final : public Guide {
  public:
-  explicit TerminalGuide(const FaultSignals& signals) : signals_(signals) {}
+  explicit TerminalGuide(const safety::FaultSignals& signals) : signals_(signals) {}
 
   void say(const std::string& text) override { std::cerr << printable_lines(text) << "\n"; }
   void ask(const std::string& text) override {
@@ -56,7 +56,7 @@ class TerminalGuide final : public Guide {
   }
 
  private:
-  const FaultSignals& signals_;
+  const safety::FaultSignals& signals_;
   std::string line_;
 };
 
@@ -117,8 +117,8 @@ std::string now_utc() {
 }
 
 /// One device with the nominal scale: a stored calibration must not affect the measurement.
-DeviceConfig uncalibrated(const DeviceConfig& config, const std::string& serial) {
-  DeviceConfig one = config;
+servo::DeviceConfig uncalibrated(const servo::DeviceConfig& config, const std::string& serial) {
+  servo::DeviceConfig one = config;
   one.serials.clear();
   if (!serial.empty()) one.serials = {serial};
   one.calibration.clear();
@@ -127,10 +127,11 @@ DeviceConfig uncalibrated(const DeviceConfig& config, const std::string& serial)
 
 /// In a guard process, because forces are commanded. \param rate  Hz that the guard expects: lower
 /// than the ticks' 1 kHz, so that a late tick does not interrupt the procedure
-std::unique_ptr<GuardedDevice> guarded(OpenEnd open, const DeviceConfig& config, double rate) {
-  GuardSettings settings;
+std::unique_ptr<safety::GuardedDevice> guarded(devices::OpenEnd open,
+                                               const servo::DeviceConfig& config, double rate) {
+  safety::GuardSettings settings;
   settings.rate = rate;
-  return std::make_unique<GuardedDevice>([open, config] { return open(config); }, settings);
+  return std::make_unique<safety::GuardedDevice>([open, config] { return open(config); }, settings);
 }
 constexpr double kWeighingRate = 200, kRegistrationRate = 50;  // Hz; registration uses no force
 
@@ -139,20 +140,20 @@ void store(const std::string& path, const Calibration& calibration) {
   std::cerr << "Stored in " << printable(path) << "\n";
 }
 
-int calibrate_force(const DeviceConfig& config, const po::variables_map& values) {
+int calibrate_force(const servo::DeviceConfig& config, const po::variables_map& values) {
   const WeighingSettings settings = weighing_settings(values);
   Calibration calibration = read_calibration(config.calibration);  // reports its faults first
-  FaultSignals signals;
+  safety::FaultSignals signals;
   const auto device =
       guarded(open_falcon, uncalibrated(config, config.serials.empty() ? "" : config.serials[0]),
               kWeighingRate);
   signals.watch(device.get());
-  request_realtime({});
-  RealClock clock;
+  servo::request_realtime({});
+  servo::RealClock clock;
   TerminalGuide guide(signals);
   wait_until_homed(*device, clock, guide);
   ForceCalibration force = weigh(*device, clock, guide, settings);
-  signals.watch(static_cast<GuardedDevice*>(nullptr));
+  signals.watch(static_cast<safety::GuardedDevice*>(nullptr));
   force.made_utc = now_utc();
   calibration.put(force);
   store(config.calibration, calibration);
@@ -171,20 +172,20 @@ int calibrate_force(const DeviceConfig& config, const po::variables_map& values)
   return 0;
 }
 
-int calibrate_pair(const DeviceKind& kind, const DeviceConfig& config,
+int calibrate_pair(const devices::DeviceKind& kind, const servo::DeviceConfig& config,
                    const po::variables_map& values) {
   const RegistrationSettings settings = registration_settings(values);
   check(
       config.serials.size() == 2 && config.serials[0] != config.serials[1],
       std::string(kind.name) + " needs two --serial: first that of the device at the stylus' tip");
   Calibration calibration = read_calibration(config.calibration);
-  FaultSignals signals;
+  safety::FaultSignals signals;
   const auto tip =
       guarded(kind.open_end, uncalibrated(config, config.serials[0]), kRegistrationRate);
   const auto tail =
       guarded(kind.open_end, uncalibrated(config, config.serials[1]), kRegistrationRate);
-  request_realtime({});
-  RealClock clock;
+  servo::request_realtime({});
+  servo::RealClock clock;
   TerminalGuide guide(signals);
   wait_until_homed(*tip, clock, guide);
   wait_until_homed(*tail, clock, guide);
@@ -221,7 +222,7 @@ void add_calibrate_options(po::options_description& options) {
       "--calibrate, two devices: number of points to take");
 }
 
-int calibrate_devices(const std::string& device, const DeviceConfig& config,
+int calibrate_devices(const std::string& device, const servo::DeviceConfig& config,
                       const po::variables_map& values) {
   check(!config.calibration.empty(), "--calibrate needs --calibration FILE to store into");
   data::ProtectedFiles firmware;
@@ -229,13 +230,13 @@ int calibrate_devices(const std::string& device, const DeviceConfig& config,
   const std::string why = data::write_refusal(config.calibration, true, firmware);
   check(why.empty(), "--calibration " + config.calibration + ": " + why);
   if (device == "falcon") return calibrate_force(config, values);
-  const DeviceKind& kind = device_kind(device);
+  const devices::DeviceKind& kind = devices::device_kind(device);
   if (kind.open_end != nullptr) return calibrate_pair(kind, config, values);
   std::string able = "falcon";
-  for (const DeviceKind& one : device_kinds())
+  for (const devices::DeviceKind& one : devices::device_kinds())
     if (one.open_end != nullptr) able += std::string(", ") + one.name;
   throw UsageError("--calibrate is for the devices " + able + ", not for '" + device +
                    "': other devices have their maker's calibration");
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

@@ -6,7 +6,7 @@
 
 #include "runner/devices/registry.h"
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 
 /// The options that only calibration has.
 void add_calibrate_options(boost::program_options::options_description& options);
@@ -14,7 +14,7 @@ void add_calibrate_options(boost::program_options::options_description& options)
 /// Guides the experimenter through the calibration of `device` (falcon: force by weights; falcon2:
 /// registration of both frames) and stores it in config.calibration. \returns the exit status.
 /// \throws UsageError, std::runtime_error.
-int calibrate_devices(const std::string& device, const DeviceConfig& config,
+int calibrate_devices(const std::string& device, const servo::DeviceConfig& config,
                       const boost::program_options::variables_map& values);
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

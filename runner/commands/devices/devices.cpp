@@ -24,13 +24,13 @@
 #include "runner/servo/realtime.h"
 #include "runner/session/markers.h"
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 namespace {
 
 namespace po = boost::program_options;
 using Json = nlohmann::ordered_json;
 
-Json to_json(const DeviceCapabilities& c) {
+Json to_json(const servo::DeviceCapabilities& c) {
   // Without motors there are no limits of force; the stored ones only keep scenes from being
   // limited.
   const auto limit_of_force = [&c](double limit) {
@@ -51,7 +51,7 @@ Json to_json(const DeviceCapabilities& c) {
           {"calibration", c.calibration}};
 }
 
-void print_limits(const DeviceCapabilities& c) {
+void print_limits(const servo::DeviceCapabilities& c) {
   std::string rate = "at any rate that is asked for";
   if (!c.any_rate) rate = "up to " + std::to_string(std::lround(c.max_rate)) + " Hz";
   std::printf("    senses %d degrees of freedom, ", c.sensed_freedom);
@@ -69,17 +69,18 @@ void print_limits(const DeviceCapabilities& c) {
 }
 
 /// Opens a device, prints its limits and self-test. \return whether the test was passed
-bool open_and_test(const DeviceKind& kind, const DeviceConfig& config, Json& row) {
+bool open_and_test(const devices::DeviceKind& kind, const servo::DeviceConfig& config, Json& row) {
   const auto factory = [&kind, config] { return kind.open(config); };
-  GuardSettings settings;
+  safety::GuardSettings settings;
   settings.rate = config.rate;
-  const std::unique_ptr<Device> device =
-      kind.has_force_feedback ? std::make_unique<GuardedDevice>(factory, settings) : factory();
+  const std::unique_ptr<servo::Device> device =
+      kind.has_force_feedback ? std::make_unique<safety::GuardedDevice>(factory, settings)
+                              : factory();
   row["limits"] = to_json(device->capabilities());
   print_limits(device->capabilities());
   bool passed = true;
   row["self_test"] = Json::array();
-  for (const SelfTestResult& result : self_test(*device, config.rate)) {
+  for (const devices::SelfTestResult& result : devices::self_test(*device, config.rate)) {
     passed = passed && result.passed;
     row["self_test"].push_back(
         {{"what", result.what}, {"passed", result.passed}, {"found", result.found}});
@@ -90,15 +91,16 @@ bool open_and_test(const DeviceKind& kind, const DeviceConfig& config, Json& row
 }
 
 /// Prints the connected devices of a kind. \return false if one that is connected does not work
-bool list_kind(const DeviceKind& kind, const DeviceConfig& config, bool named, Json& rows) {
+bool list_kind(const devices::DeviceKind& kind, const servo::DeviceConfig& config, bool named,
+               Json& rows) {
   Json row = {{"name", kind.name}, {"description", kind.description}};
   std::printf("%s: %s\n", kind.name, kind.description);
   if (kind.has_force_feedback) std::printf("    not tried on hardware, only with an emulator\n");
   bool good = true, usable = false;
   row["connected"] = Json::array();
   try {
-    const std::vector<ConnectedDevice> connected = list_connected(kind, config);
-    for (const ConnectedDevice& found : connected) {
+    const std::vector<servo::ConnectedDevice> connected = devices::list_connected(kind, config);
+    for (const servo::ConnectedDevice& found : connected) {
       row["connected"].push_back({{"serial", found.serial}, {"trouble", found.trouble}});
       usable = usable || found.trouble.empty();
       if (!found.serial.empty())
@@ -123,7 +125,7 @@ bool list_kind(const DeviceKind& kind, const DeviceConfig& config, bool named, J
   return good;
 }
 
-Json to_json(const ServoTiming& t) {
+Json to_json(const bench::ServoTiming& t) {
   static constexpr const char* kVerdicts[] = {"fit", "fit_with_losses", "unfit"};
   return {
       {"rate_hz", t.rate},
@@ -155,7 +157,7 @@ Json to_json(const ServoTiming& t) {
       {"sentence", t.sentence()}};
 }
 
-void print(const ServoTiming& t) {
+void print(const bench::ServoTiming& t) {
   const auto us = [](std::int64_t ns) { return static_cast<double>(ns) / 1000; };
   std::printf("%-44s%10s%10s%10s%10s\n", "us", "median", "p99", "p99.9", "max");
   std::printf("%-44s%10.1f%10.1f%10.1f%10.1f\n", "lateness of ticks", us(t.lateness_median),
@@ -179,8 +181,8 @@ double seconds_of(const po::variables_map& values) {
   return seconds;
 }
 
-int timing(const po::variables_map& values, const DeviceConfig& config, Json& report) {
-  TimingSettings settings;
+int timing(const po::variables_map& values, const servo::DeviceConfig& config, Json& report) {
+  bench::TimingSettings settings;
   settings.rate = config.rate;
   settings.seconds = seconds_of(values);
   settings.guarded = values.count("guarded") > 0;
@@ -193,10 +195,10 @@ int timing(const po::variables_map& values, const DeviceConfig& config, Json& re
     settings.realtime = {0, false, settings.realtime.core, false};
   if (isatty(STDERR_FILENO) != 0)
     std::fprintf(stderr, "Measuring for %g s ...\n", settings.seconds);
-  const ServoTiming result = measure_servo(settings);
+  const bench::ServoTiming result = bench::measure_servo(settings);
   print(result);
   report["timing"] = to_json(result);
-  return result.verdict() == ServoTiming::Verdict::unfit ? 1 : 0;
+  return result.verdict() == bench::ServoTiming::Verdict::unfit ? 1 : 0;
 }
 
 std::string microseconds(std::int64_t ns) {
@@ -205,32 +207,32 @@ std::string microseconds(std::int64_t ns) {
   return text;
 }
 
-void print(const char* what, const Percentiles& of) {
+void print(const char* what, const devices::Percentiles& of) {
   std::printf("%-44s%s%s%s%s\n", what, microseconds(of.median).c_str(),
               microseconds(of.p99).c_str(), microseconds(of.p999).c_str(),
               microseconds(of.max).c_str());
 }
 
 /// For --report: the delay of a device that can be opened, and this machine's servo.
-void add_timing(const DeviceKind* only, const DeviceConfig& config, Json& report) {
+void add_timing(const devices::DeviceKind* only, const servo::DeviceConfig& config, Json& report) {
   constexpr double kSeconds = 3;
   if (only != nullptr && only->has_force_feedback) {
     try {
-      report["chain"] = to_json(measure_chain(*only, config, kSeconds));
+      report["chain"] = devices::to_json(bench::measure_chain(*only, config, kSeconds));
     } catch (const std::runtime_error& error) {
       report["chain"] = {{"trouble", error.what()}};
     }
   }
-  TimingSettings settings;
+  bench::TimingSettings settings;
   settings.rate = config.rate;
   settings.seconds = kSeconds;
   settings.guarded = true;
-  report["timing"] = to_json(measure_servo(settings));
+  report["timing"] = to_json(bench::measure_servo(settings));
   report["machine"] = machine_facts();
 }
 
 /// \throws std::runtime_error if the file exists
-void write_report(const std::string& path, const Json& report, const DeviceConfig& config) {
+void write_report(const std::string& path, const Json& report, const servo::DeviceConfig& config) {
   data::AtomicFile file(path);
   file.write(without_personal_data(report, config.serials).dump(2) + "\n");
   file.sync();
@@ -243,8 +245,8 @@ void write_report(const std::string& path, const Json& report, const DeviceConfi
 
 /// Measures the delay of one device at zero force and stores it beside the calibration.
 /// \return the exit status
-int time_chain(const DeviceKind& kind, const DeviceConfig& config, const po::variables_map& values,
-               Json& report) {
+int time_chain(const devices::DeviceKind& kind, const servo::DeviceConfig& config,
+               const po::variables_map& values, Json& report) {
   const double seconds = seconds_of(values);
   for (const char* other : {"guarded", "no-fifo", "no-realtime"}) {
     if (values.count(other) > 0)
@@ -261,7 +263,7 @@ int time_chain(const DeviceKind& kind, const DeviceConfig& config, const po::var
                      ": it has no motors, so there is no delay from pose to force");
   if (isatty(STDERR_FILENO) != 0)
     std::fprintf(stderr, "Measuring %s for %g s, at zero force ...\n", kind.name, seconds);
-  const ChainTiming timing = measure_chain(kind, config, seconds);
+  const devices::ChainTiming timing = bench::measure_chain(kind, config, seconds);
   std::printf("%-44s%10s%10s%10s%10s\n", "us", "median", "p99", "p99.9", "max");
   print("reading through the guard process", timing.reading);
   print("age of the pose at its use", timing.age);
@@ -273,24 +275,25 @@ int time_chain(const DeviceKind& kind, const DeviceConfig& config, const po::var
       "%llu\n",
       count(timing.ticks), timing.rate, count(timing.lost), count(timing.late),
       count(timing.unsent));
-  const DeviceCapabilities can = kind.nominal(config);
+  const servo::DeviceCapabilities can = kind.nominal(config);
   std::printf(
       "stable stiffness at %g Hz: %.4g N/m, without the delay %.4g N/m; the delay of 99 %% of "
       "ticks is %.3g ms\n",
       timing.rate,
-      with_delay(can, timing.counted(), timing.rate).max_stiffness * timing.rate / can.max_rate,
+      devices::with_delay(can, timing.counted(), timing.rate).max_stiffness * timing.rate /
+          can.max_rate,
       can.max_stiffness * timing.rate / can.max_rate, timing.counted() * 1e3);
-  report["chain"] = to_json(timing);
+  report["chain"] = devices::to_json(timing);
   if (config.calibration.empty()) return 0;
-  const std::string path = chain_file(config.calibration);
-  store_chain(path, timing);
+  const std::string path = devices::chain_file(config.calibration);
+  devices::store_chain(path, timing);
   std::printf("stored in %s: palpate validate --calibration %s uses it\n", printable(path).c_str(),
               printable(config.calibration).c_str());
   return 0;
 }
 
-DeviceConfig config_of(const po::variables_map& values) {
-  DeviceConfig config;
+servo::DeviceConfig config_of(const po::variables_map& values) {
+  servo::DeviceConfig config;
   config.rate = values["rate"].as<double>();
   if (!(config.rate >= 10 && config.rate <= 10'000))
     throw UsageError("--rate: must be 10 to 10000 Hz");
@@ -352,16 +355,16 @@ void add_options(CommandLine& line) {
   add_calibrate_options(line.options);
 }
 
-const DeviceKind& kind_of(const std::string& name) {
+const devices::DeviceKind& kind_of(const std::string& name) {
   try {
-    return device_kind(name);
+    return devices::device_kind(name);
   } catch (const std::invalid_argument& error) {
     throw UsageError(std::string("--device: ") + error.what());
   }
 }
 
 /// \param only  the kind that was named, or nullptr for all. \return the exit status
-int list_devices(const DeviceKind* only, const DeviceConfig& config, Json& report) {
+int list_devices(const devices::DeviceKind* only, const servo::DeviceConfig& config, Json& report) {
   try {
     if (only != nullptr) only->check(config);
   } catch (const std::invalid_argument& error) {
@@ -369,7 +372,7 @@ int list_devices(const DeviceKind* only, const DeviceConfig& config, Json& repor
   }
   int status = 0;
   report["devices"] = Json::array();
-  for (const DeviceKind& kind : device_kinds()) {
+  for (const devices::DeviceKind& kind : devices::device_kinds()) {
     if (only != nullptr && only != &kind) continue;
     if (!list_kind(kind, config, only != nullptr, report["devices"])) status = 1;
   }
@@ -378,25 +381,25 @@ int list_devices(const DeviceKind* only, const DeviceConfig& config, Json& repor
 
 /// One marker of each kind to each receiver. \return the exit status
 int try_markers(const std::vector<std::string>& names) {
-  using Kind = Marker::Kind;
+  using Kind = session::Marker::Kind;
   constexpr std::chrono::milliseconds kApart(500);
-  std::vector<std::unique_ptr<MarkerSink>> sinks;
+  std::vector<std::unique_ptr<session::MarkerSink>> sinks;
   for (const std::string& name : names) {
     try {
-      sinks.push_back(open_marker_sink(name, MarkerCodes::this_computer));
+      sinks.push_back(session::open_marker_sink(name, session::MarkerCodes::this_computer));
     } catch (const std::invalid_argument& error) {
       throw UsageError(std::string("--markers: ") + error.what());
     }
   }
-  RealClock clock;
+  servo::RealClock clock;
   int status = 0;
   for (const Kind kind : {Kind::trial_start, Kind::first_contact, Kind::response, Kind::time_out,
                           Kind::cut_off, Kind::interval, Kind::sync}) {
-    Marker marker;
+    session::Marker marker;
     marker.kind = kind;
     marker.participant = "TEST";
-    marker.code = code_of(marker, protocols::usual_event_codes());
-    std::cout << marker.code << "  " << to_string(kind);
+    marker.code = session::code_of(marker, protocols::usual_event_codes());
+    std::cout << marker.code << "  " << session::to_string(kind);
     for (std::size_t i = 0; i < sinks.size(); ++i) {
       marker.time_ns = clock.now_ns();
       const bool taken = sinks[i]->send(marker);
@@ -425,7 +428,7 @@ int devices_command(const std::vector<std::string>& args) {
     }
     return try_markers((*values)["markers"].as<std::vector<std::string>>());
   }
-  const DeviceConfig config = config_of(*values);
+  const servo::DeviceConfig config = config_of(*values);
   Outputs outputs(*values, {"json"}, {"calibration", "firmware"});
   if (values->count("report") > 0) {
     for (const char* other : {"timing", "calibrate", "json"}) {
@@ -438,7 +441,7 @@ int devices_command(const std::vector<std::string>& args) {
   }
   const bool named = values->count("device") > 0;
   const std::string name = named ? (*values)["device"].as<std::string>() : "";
-  const DeviceKind* const only = named ? &kind_of(name) : nullptr;
+  const devices::DeviceKind* const only = named ? &kind_of(name) : nullptr;
   if (values->count("calibrate") > 0) {
     if (!named) throw UsageError("--calibrate: name the device with --device");
     return calibrate_devices(name, config, *values);
@@ -459,4 +462,4 @@ int devices_command(const std::vector<std::string>& args) {
   return status;
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

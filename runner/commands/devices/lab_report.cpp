@@ -12,7 +12,7 @@
 
 #include "runner/servo/realtime.h"
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 namespace {
 
 using Json = nlohmann::ordered_json;
@@ -115,9 +115,9 @@ std::string processor() {
 Json machine_facts() {
   utsname kernel{};
   uname(&kernel);
-  RealtimeRights rights;
+  servo::RealtimeRights rights;
   // In a thread of its own, which alone gets the priority.
-  std::thread([&rights] { rights = request_realtime({}); }).join();
+  std::thread([&rights] { rights = servo::request_realtime({}); }).join();
   return {{"system", kernel.sysname},
           {"kernel", kernel.release},
           {"architecture", kernel.machine},
@@ -142,4 +142,4 @@ Json without_personal_data(Json findings, std::vector<std::string> serials) {
   return findings;
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 
 /// Kernel, processor and real-time rights, without names of computers or users.
 nlohmann::ordered_json machine_facts();
@@ -17,4 +17,4 @@ nlohmann::ordered_json machine_facts();
 nlohmann::ordered_json without_personal_data(nlohmann::ordered_json findings,
                                              std::vector<std::string> serials);
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

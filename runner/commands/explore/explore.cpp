@@ -16,7 +16,7 @@
 #include "runner/commands/shared/outputs.h"
 #include "runner/display/scene/painter.h"
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 namespace {
 
 constexpr double kShortest = 0.001, kLongest = 3600;  // s, between pictures
@@ -56,14 +56,14 @@ PictureSize parse_size(const std::string& text) {
   const auto parts = split(text, 'x');
   const auto side = [&](std::size_t i) {
     const auto value = number_of<int>(parts[i]);
-    const bool good =
-        value && *value >= ScenePainter::kLeastSide && *value <= ScenePainter::kMostSide;
+    const bool good = value && *value >= display::ScenePainter::kLeastSide &&
+                      *value <= display::ScenePainter::kMostSide;
     return good ? *value : 0;
   };
   if (parts.size() == 2 && side(0) > 0 && side(1) > 0) return {side(0), side(1)};
   refuse_value("size",
-               "width and height of " + std::to_string(ScenePainter::kLeastSide) + " to " +
-                   std::to_string(ScenePainter::kMostSide) + " px, such as 1280x720",
+               "width and height of " + std::to_string(display::ScenePainter::kLeastSide) + " to " +
+                   std::to_string(display::ScenePainter::kMostSide) + " px, such as 1280x720",
                text);
 }
 
@@ -226,4 +226,4 @@ int explore_command(const std::vector<std::string>& args) {
   return open_window(*values, renderer);
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

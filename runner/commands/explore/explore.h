@@ -3,7 +3,7 @@
 
 #include <string>
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 
 struct PictureSize {
   int width = 1280, height = 720;  ///< px
@@ -24,4 +24,4 @@ double parse_every(const std::string& text);
 /// naming --view
 ViewAngles parse_view(const std::string& text);
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

@@ -21,7 +21,7 @@
 #include "runner/safety/fault_signals.h"
 #include "runner/scene_builder.h"
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 namespace {
 
 namespace fs = std::filesystem;
@@ -63,9 +63,9 @@ std::vector<std::size_t> shown_rows(const std::vector<TimedPose>& poses, double 
 
 /// The scene along the path: the moments to draw, and the values that scale arrows and camera.
 struct TouchedScene {
-  std::vector<SceneMoment> moments;  ///< of the pictures
-  double strongest = 0;              ///< N, at one place
-  double most_torque = 0;            ///< N m
+  std::vector<display::SceneMoment> moments;  ///< of the pictures
+  double strongest = 0;                       ///< N, at one place
+  double most_torque = 0;                     ///< N m
 };
 
 TouchedScene touch(const rendering::Scene& scene, const protocols::SceneSpec& spec,
@@ -73,26 +73,27 @@ TouchedScene touch(const rendering::Scene& scene, const protocols::SceneSpec& sp
                    const std::vector<std::size_t>& rows) {
   TouchedScene out;
   std::size_t row = 0, next = 0;
-  render_along(scene, spec, renderer, poses,
-               [&](const TimedPose& pose, const rendering::Rendering& rendering,
-                   const rendering::RenderState& state) {
-                 const bool shown = next < rows.size() && rows[next] == row++;
-                 // Scale arrows by the whole path, not only by the drawn rows.
-                 for (const ContactPlace& contact : contact_places(scene, state, rendering))
-                   out.strongest = std::max(out.strongest, glm::length(contact.force));
-                 if (!shown) return;
-                 const SceneMoment moment = moment_of(pose, spec, scene, rendering, state);
-                 out.most_torque = std::max(out.most_torque, glm::length(torque_on_hand(moment)));
-                 // A path with gaps shows a row more than once.
-                 for (; next < rows.size() && rows[next] == row - 1; ++next)
-                   out.moments.push_back(moment);
-               });
+  render_along(
+      scene, spec, renderer, poses,
+      [&](const TimedPose& pose, const rendering::Rendering& rendering,
+          const rendering::RenderState& state) {
+        const bool shown = next < rows.size() && rows[next] == row++;
+        // Scale arrows by the whole path, not only by the drawn rows.
+        for (const servo::ContactPlace& contact : display::contact_places(scene, state, rendering))
+          out.strongest = std::max(out.strongest, glm::length(contact.force));
+        if (!shown) return;
+        const display::SceneMoment moment = moment_of(pose, spec, scene, rendering, state);
+        out.most_torque = std::max(out.most_torque, glm::length(display::torque_on_hand(moment)));
+        // A path with gaps shows a row more than once.
+        for (; next < rows.size() && rows[next] == row - 1; ++next) out.moments.push_back(moment);
+      });
   return out;
 }
 
-SceneDrawingSettings drawing_settings(const SceneDrawing& drawing, const TouchedScene& touched,
-                                      const rendering::Renderer& renderer, bool labels) {
-  SceneDrawingSettings out{.sides = renderer.side_contact(), .labels = labels};
+display::SceneDrawingSettings drawing_settings(const display::SceneDrawing& drawing,
+                                               const TouchedScene& touched,
+                                               const rendering::Renderer& renderer, bool labels) {
+  display::SceneDrawingSettings out{.sides = renderer.side_contact(), .labels = labels};
   if (touched.strongest > 0)
     out.metres_per_newton = kLongestOfSize * drawing.size() / touched.strongest;
   if (touched.most_torque > 0) out.radians_per_newton_metre = kWidestTurn / touched.most_torque;
@@ -117,16 +118,17 @@ std::pair<double, double> tick_costs(const rendering::Scene& scene,
   return {costs[costs.size() / 2], costs[costs.size() * 99 / 100]};
 }
 
-Camera camera_for(const SceneDrawing& drawing, const TouchedScene& touched,
-                  const SceneDrawingSettings& looks, const FrameSettings& settings) {
-  Camera camera;
+display::Camera camera_for(const display::SceneDrawing& drawing, const TouchedScene& touched,
+                           const display::SceneDrawingSettings& looks,
+                           const FrameSettings& settings) {
+  display::Camera camera;
   camera.resize(static_cast<float>(settings.size.width), static_cast<float>(settings.size.height));
   camera.look_from(settings.view.yaw, settings.view.pitch);
   std::vector<glm::vec3> points = drawing.outline();
   // The tool where it touches; where it does not, it may come from far away.
   const bool touches = std::ranges::any_of(
-      touched.moments, [](const SceneMoment& moment) { return !moment.contacts.empty(); });
-  for (const SceneMoment& moment : touched.moments)
+      touched.moments, [](const display::SceneMoment& moment) { return !moment.contacts.empty(); });
+  for (const display::SceneMoment& moment : touched.moments)
     if (!touches || !moment.contacts.empty()) drawing.add_outline(moment, looks, points);
   camera.fit(points);
   camera.zoom(settings.view.closer);
@@ -157,20 +159,22 @@ DrawnFrames draw_frames(const std::string& scene_path, const protocols::SceneSpe
   const std::vector<std::size_t> rows = shown_rows(poses, settings.every);
   const rendering::Scene scene = build_scene(scene_path, spec, renderer);
   const TouchedScene touched = touch(scene, spec, renderer, poses, rows);
-  SceneDrawing drawing(spec.objects, tool_of(spec.tool));
+  display::SceneDrawing drawing(spec.objects, tool_of(spec.tool));
   drawing.add_compiled(scene);
-  const SceneDrawingSettings looks = drawing_settings(drawing, touched, renderer, settings.labels);
-  const Camera camera = camera_for(drawing, touched, looks, settings);
-  const std::unique_ptr<ScenePainter> painter =
-      make_painter(settings.size.width, settings.size.height);
+  const display::SceneDrawingSettings looks =
+      drawing_settings(drawing, touched, renderer, settings.labels);
+  const display::Camera camera = camera_for(drawing, touched, looks, settings);
+  const std::unique_ptr<display::ScenePainter> painter =
+      display::make_painter(settings.size.width, settings.size.height);
   std::optional<data::AtomicFolder> folder;
   if (!settings.folder.empty()) folder.emplace(settings.folder);
   ProgressLine progress("pictures");
   for (std::size_t i = 0; i < touched.moments.size(); ++i) {
-    ScenePicture picture = drawing.picture(touched.moments[i], light_theme(), looks);
+    display::ScenePicture picture =
+        drawing.picture(touched.moments[i], display::light_theme(), looks);
     const std::uint32_t faults = touched.moments[i].sample.faults;
-    if (faults != 0) picture.caption.insert(picture.caption.begin(), fault_words(faults));
-    painter->draw(picture, camera, light_theme());
+    if (faults != 0) picture.caption.insert(picture.caption.begin(), safety::fault_words(faults));
+    painter->draw(picture, camera, display::light_theme());
     if (folder) {
       data::AtomicFile file(folder->prepare(frame_name(i)));
       file.write(painter->png());
@@ -193,4 +197,4 @@ DrawnFrames draw_frames(const std::string& scene_path, const protocols::SceneSpe
   return out;
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

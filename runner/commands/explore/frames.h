@@ -9,7 +9,7 @@
 #include "runner/commands/explore/explore.h"
 #include "runner/commands/render/forces.h"
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 
 struct FrameSettings {
   PictureSize size;
@@ -40,4 +40,4 @@ DrawnFrames draw_frames(const std::string& scene_path, const protocols::SceneSpe
                         const rendering::Renderer& renderer, const std::vector<TimedPose>& poses,
                         const FrameSettings& settings);
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

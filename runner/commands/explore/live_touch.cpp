@@ -26,7 +26,7 @@
 #include "runner/servo/sample.h"
 #include "runner/session/device_check.h"
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 namespace {
 
 constexpr double kSoftInterval =
@@ -34,10 +34,11 @@ constexpr double kSoftInterval =
 
 }  // namespace
 
-SceneMoment moment_of(const TimedPose& pose, const protocols::SceneSpec& spec,
-                      const rendering::Scene& scene, const rendering::Rendering& rendering,
-                      const rendering::RenderState& state) {
-  SceneMoment out{.sample = {}, .contacts = contact_places(scene, state, rendering)};
+display::SceneMoment moment_of(const TimedPose& pose, const protocols::SceneSpec& spec,
+                               const rendering::Scene& scene, const rendering::Rendering& rendering,
+                               const rendering::RenderState& state) {
+  display::SceneMoment out{.sample = {},
+                           .contacts = display::contact_places(scene, state, rendering)};
   out.sample.time_ns = std::llround(pose.t * 1e9);
   out.sample.probe = virtual_stylus(spec, pose.probe);
   out.sample.rendering = rendering;
@@ -45,8 +46,8 @@ SceneMoment moment_of(const TimedPose& pose, const protocols::SceneSpec& spec,
   out.sample.device1 = rendering.device1;
   out.sample.device2 = rendering.device2;
   if (spec.reach) out.held = pose.probe;
-  out.poses = object_poses(spec.objects, state);
-  out.soft = soft_surfaces(scene, state);
+  out.poses = display::object_poses(spec.objects, state);
+  out.soft = display::soft_surfaces(scene, state);
   return out;
 }
 
@@ -61,11 +62,12 @@ RecordedTouch::RecordedTouch(std::string scene_path, protocols::SceneSpec spec,
 
 void RecordedTouch::touch() {
   const rendering::Scene scene = build_scene(scene_path_, spec_, renderer_);
-  const std::size_t stride = (poses_.size() + Timeline::kMost - 2) / (Timeline::kMost - 1);
+  const std::size_t stride =
+      (poses_.size() + display::Timeline::kMost - 2) / (display::Timeline::kMost - 1);
   std::size_t row = 0;
   std::uint32_t faults = 0;
   double soft_time = -1;  // of the surfaces that were kept last: fewer than there are ticks
-  std::vector<std::shared_ptr<const SoftSurfaceNow>> soft;
+  std::vector<std::shared_ptr<const display::SoftSurfaceNow>> soft;
   moments_.clear();
   render_along(scene, spec_, renderer_, poses_,
                [&](const TimedPose& pose, const rendering::Rendering& rendering,
@@ -83,7 +85,7 @@ void RecordedTouch::touch() {
                });
 }
 
-void RecordedTouch::take(std::vector<SceneMoment>& out) {
+void RecordedTouch::take(std::vector<display::SceneMoment>& out) {
   out.insert(out.end(), std::make_move_iterator(moments_.begin()),
              std::make_move_iterator(moments_.end()));
   moments_.clear();
@@ -120,18 +122,19 @@ std::string keep_in(const std::string& folder, const std::string& bytes, const c
   }
 }
 
-ExploreSettings window_settings(const protocols::SceneSpec& spec,
-                                const rendering::Renderer& renderer,
-                                const HandsOnSettings& settings) {
-  SceneDrawing drawing(spec.objects, tool_of(spec.tool));
+display::ExploreSettings window_settings(const protocols::SceneSpec& spec,
+                                         const rendering::Renderer& renderer,
+                                         const HandsOnSettings& settings) {
+  display::SceneDrawing drawing(spec.objects, tool_of(spec.tool));
   const rendering::Scene scene = build_scene(settings.scene_path, spec, renderer);
   for (const std::string& note : scene_notes(spec, scene))
     std::cerr << printable(settings.scene_path) << ": " << note << '\n';
   drawing.add_compiled(scene);
-  ExploreSettings out{.title = fs::path(settings.scene_path).filename().string(),
-                      .objects = spec.objects,
-                      .drawing = std::move(drawing),
-                      .looks = {.sides = renderer.side_contact(), .labels = settings.labels}};
+  display::ExploreSettings out{
+      .title = fs::path(settings.scene_path).filename().string(),
+      .objects = spec.objects,
+      .drawing = std::move(drawing),
+      .looks = {.sides = renderer.side_contact(), .labels = settings.labels}};
   if (!settings.pictures.empty())
     out.keep_picture = [folder = settings.pictures](const std::string& bytes, const char* kind) {
       return keep_in(folder, bytes, kind);
@@ -142,46 +145,46 @@ ExploreSettings window_settings(const protocols::SceneSpec& spec,
 /// Signals that end the program command zero force while this lives.
 class WatchedForces {
  public:
-  WatchedForces(FaultSignals& signals, ServoThread& servo) : signals_(signals) {
+  WatchedForces(safety::FaultSignals& signals, servo::ServoThread& servo) : signals_(signals) {
     signals_.watch(&servo);
   }
   WatchedForces(const WatchedForces&) = delete;
   WatchedForces& operator=(const WatchedForces&) = delete;
   ~WatchedForces() {
-    signals_.watch(static_cast<ServoThread*>(nullptr));
-    signals_.watch(static_cast<GuardedDevice*>(nullptr));
+    signals_.watch(static_cast<servo::ServoThread*>(nullptr));
+    signals_.watch(static_cast<safety::GuardedDevice*>(nullptr));
   }
 
  private:
-  FaultSignals& signals_;
+  safety::FaultSignals& signals_;
 };
 
 int explore_live(const protocols::SceneSpec& spec, const rendering::Renderer& renderer,
                  const HandsOnSettings& settings) {
-  protocols::Protocol protocol = protocol_of(spec, renderer);
+  protocols::Protocol protocol = serve::protocol_of(spec, renderer);
   protocol.material_limit = protocols::MaterialLimit::limit;
   RunSettings run;
   run.device = settings.device;
   run.calibration = settings.calibration;
   run.without_calibration = settings.without_calibration;
-  const DeviceKind& kind = find_device_kind(settings.device);
-  ExploreSettings window = window_settings(spec, renderer, settings);
-  FaultSignals signals;
+  const devices::DeviceKind& kind = find_device_kind(settings.device);
+  display::ExploreSettings window = window_settings(spec, renderer, settings);
+  safety::FaultSignals signals;
   const OpenDevice open = open_device(kind, run, protocol);
   signals.watch(open.guard);
-  const DeviceCapabilities& device = open.device->capabilities();
+  const servo::DeviceCapabilities& device = open.device->capabilities();
   if (open.guard != nullptr) check_fitness(open, run, protocol, StimulusLibrary(protocol));
-  RealClock clock;
-  ServoSettings servo;
+  servo::RealClock clock;
+  servo::ServoSettings servo;
   servo.rate = protocol.servo_rate;
   servo.workspace = workspace_of(protocol);
-  window.mouse = dynamic_cast<MouseStylus*>(open.device.get());
+  window.mouse = dynamic_cast<devices::MouseStylus*>(open.device.get());
   window.workspace = servo.workspace;
   window.end_requested = [&signals] { return signals.end_requested() != 0; };
   const auto limit = [&](std::vector<stimuli::ObjectSpec>& objects) {
     protocols::Protocol limited = protocol;
     for (std::size_t i = 0; i < objects.size(); ++i) limited.stimuli[i].object = objects[i];
-    for (const LimitedMaterial& what : limit_materials(limited, device))
+    for (const session::LimitedMaterial& what : session::limit_materials(limited, device))
       std::fprintf(stderr, "%s\n", printable(what.text).c_str());
     for (std::size_t i = 0; i < objects.size(); ++i) objects[i] = limited.stimuli[i].object;
   };
@@ -195,8 +198,8 @@ int explore_live(const protocols::SceneSpec& spec, const rendering::Renderer& re
                      if (guard != nullptr) guard->emergency_zero();
                    }});
   const WatchedForces watched(signals, touch.servo());
-  explore_in_window(std::move(window), touch);
-  const ServoHealth& health = touch.servo().health();
+  display::explore_in_window(std::move(window), touch);
+  const servo::ServoHealth& health = touch.servo().health();
   std::cout << health.ticks() << " ticks, " << health.missed_ticks() << " missed, "
             << health.lost_samples() << " not shown\n";
   return 0;
@@ -208,9 +211,9 @@ int explore_hands_on(const protocols::SceneSpec& spec, const rendering::Renderer
                      const HandsOnSettings& settings) {
   if (settings.trajectory.empty()) return explore_live(spec, renderer, settings);
   RecordedTouch touch(settings.scene_path, spec, renderer, read_trajectory(settings.trajectory));
-  ExploreSettings window = window_settings(spec, renderer, settings);
+  display::ExploreSettings window = window_settings(spec, renderer, settings);
   window.end_requested = [&stop = catch_stop_signals()] { return stop.load(); };
-  explore_in_window(std::move(window), touch);
+  display::explore_in_window(std::move(window), touch);
   return 0;
 }
 
@@ -219,19 +222,19 @@ namespace {
 constexpr auto kIdle = std::chrono::milliseconds(5);
 constexpr std::int64_t kSoftEvery = 15'000'000;  // ns, between two surfaces that are kept
 
-ServoSettings with_places(ServoSettings settings) {
+servo::ServoSettings with_places(servo::ServoSettings settings) {
   settings.touched_places = true;
   return settings;
 }
 // Forces begin at any place of the stylus: an object that encloses it exerts none until left.
-constexpr HomeZone kAnywhere{.radius = 0, .rest = 0};
+constexpr servo::HomeZone kAnywhere{.radius = 0, .rest = 0};
 
 }  // namespace
 
-LiveTouch::LiveTouch(Device& device, Clock& clock, Settings settings)
+LiveTouch::LiveTouch(servo::Device& device, servo::Clock& clock, Settings settings)
     : settings_(std::move(settings)),
       shown_(settings_.spec.objects),
-      patience_(has_motors(device.capabilities())),
+      patience_(servo::has_motors(device.capabilities())),
       servo_(device, clock, with_places(settings_.servo)) {
   prepare(shown_);  // reports faults of the scene before there is a window
   recorder_ = std::jthread([this](const std::stop_token& stop) { record(stop); });
@@ -259,15 +262,15 @@ std::int64_t LiveTouch::period_ns() const {
   return static_cast<std::int64_t>(1e9 / settings_.servo.rate);
 }
 
-void LiveTouch::keep(const Sample& sample, std::span<const rendering::BodyPose> bodies) {
+void LiveTouch::keep(const servo::Sample& sample, std::span<const rendering::BodyPose> bodies) {
   if (sample.time_ns == last_ns_) return;  // the servo has stopped and repeats its last sample
   last_ns_ = sample.time_ns;
   patience_.begin();
-  SceneMoment moment{.sample = sample, .contacts = {}};
+  display::SceneMoment moment{.sample = sample, .contacts = {}};
   if (stepping_) {  // the hand got almost no force: show the full one
     moment.sample.device1 = sample.rendering.device1;
     moment.sample.device2 = sample.rendering.device2;
-    moment.sample.faults &= ~servo_fault::kForceLimited;
+    moment.sample.faults &= ~servo::servo_fault::kForceLimited;
   }
   if (sample.rendering.contacts > 0) add_contacts(moment);
   // Pauses are no part of the scene's time.
@@ -281,9 +284,9 @@ void LiveTouch::keep(const Sample& sample, std::span<const rendering::BodyPose> 
   }
   const WorkspaceMap& map = settings_.servo.workspace;
   if (map.reach) moment.held = unstretched(*map.reach, sample.probe);
-  moment.poses = object_poses(shown_, bodies);
+  moment.poses = display::object_poses(shown_, bodies);
   const std::lock_guard lock(mutex_);
-  if (fresh_.size() == Timeline::kMost)  // a stalled display gets only the last minute
+  if (fresh_.size() == display::Timeline::kMost)  // a stalled display gets only the last minute
     fresh_.erase(fresh_.begin(), fresh_.begin() + static_cast<std::ptrdiff_t>(fresh_.size() / 4));
   fresh_.push_back(std::move(moment));
   recorded_.fetch_add(1);
@@ -291,9 +294,10 @@ void LiveTouch::keep(const Sample& sample, std::span<const rendering::BodyPose> 
 
 /// Where forces are off or limited, what was rendered is not what the hand got: one place then,
 /// with that.
-void LiveTouch::add_contacts(SceneMoment& moment) {
-  const Sample& sample = moment.sample;  // with the servo's time still
-  constexpr std::uint32_t kNotAsRendered = servo_fault::kForceLimited | servo_fault::kTripped;
+void LiveTouch::add_contacts(display::SceneMoment& moment) {
+  const servo::Sample& sample = moment.sample;  // with the servo's time still
+  constexpr std::uint32_t kNotAsRendered =
+      servo::servo_fault::kForceLimited | servo::servo_fault::kTripped;
   while (touched_.time_ns < sample.time_ns && servo_.touched(touched_)) {
   }
   if (touched_.time_ns == sample.time_ns && (sample.faults & kNotAsRendered) == 0) {
@@ -305,7 +309,7 @@ void LiveTouch::add_contacts(SceneMoment& moment) {
 }
 
 void LiveTouch::update_soft(std::int64_t now_ns) {
-  SoftThreads* const threads = servo_.soft_threads();
+  servo::SoftThreads* const threads = servo_.soft_threads();
   if (threads == nullptr || threads->empty()) {
     soft_.clear();
     return;
@@ -313,11 +317,11 @@ void LiveTouch::update_soft(std::int64_t now_ns) {
   if (now_ns < soft_ns_ + kSoftEvery && soft_.size() == threads->size()) return;
   soft_ns_ = now_ns;
   soft_.resize(threads->size());
-  SoftSnapshot snapshot;
+  servo::SoftSnapshot snapshot;
   for (std::size_t i = 0; i < threads->size(); ++i) {
     if (!(*threads)[i].latest(snapshot)) continue;
-    soft_[i] = std::make_shared<const SoftSurfaceNow>(
-        SoftSurfaceNow{(*threads)[i].object(), {snapshot.now.begin(), snapshot.now.end()}});
+    soft_[i] = std::make_shared<const display::SoftSurfaceNow>(display::SoftSurfaceNow{
+        (*threads)[i].object(), {snapshot.now.begin(), snapshot.now.end()}});
   }
 }
 
@@ -327,7 +331,7 @@ void LiveTouch::tell_trouble(const std::string& trouble) {
 }
 
 void LiveTouch::keep_what_is_there() {
-  while (const Sample* const sample = servo_.next_now()) keep(*sample, servo_.bodies());
+  while (const servo::Sample* const sample = servo_.next_now()) keep(*sample, servo_.bodies());
 }
 
 void LiveTouch::stop_or_go_on(std::optional<std::vector<stimuli::ObjectSpec>> wanted) {
@@ -393,8 +397,8 @@ void LiveTouch::record(const std::stop_token& stop) {
   }
 }
 
-void LiveTouch::take(std::vector<SceneMoment>& out) {
-  std::vector<SceneMoment> taken;
+void LiveTouch::take(std::vector<display::SceneMoment>& out) {
+  std::vector<display::SceneMoment> taken;
   {
     const std::lock_guard lock(mutex_);
     taken.swap(fresh_);
@@ -419,4 +423,4 @@ std::string LiveTouch::trouble() const {
   return trouble_;
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

@@ -19,23 +19,23 @@
 #include "runner/display/display.h"
 #include "runner/servo/servo_thread.h"
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 
 /// The moment of a scene at a tick along a recorded path. \param state  after the tick
-SceneMoment moment_of(const TimedPose& pose, const protocols::SceneSpec& spec,
-                      const rendering::Scene& scene, const rendering::Rendering& rendering,
-                      const rendering::RenderState& state);
+display::SceneMoment moment_of(const TimedPose& pose, const protocols::SceneSpec& spec,
+                               const rendering::Scene& scene, const rendering::Rendering& rendering,
+                               const rendering::RenderState& state);
 
 /// A recorded path, rendered at once. Of a long path at most Timeline::kMost rows are kept, evenly
 /// spaced.
-class RecordedTouch final : public TouchSource {
+class RecordedTouch final : public display::TouchSource {
  public:
   /// \throws MeshError
   RecordedTouch(std::string scene_path, protocols::SceneSpec spec,
                 const rendering::Renderer& renderer, std::vector<TimedPose> poses);
 
   bool live() const override { return false; }
-  void take(std::vector<SceneMoment>& out) override;
+  void take(std::vector<display::SceneMoment>& out) override;
   void hold(bool) override {}
   void show(const std::vector<stimuli::ObjectSpec>& objects) override;
   void emergency_zero() noexcept override {}
@@ -49,7 +49,7 @@ class RecordedTouch final : public TouchSource {
   protocols::SceneSpec spec_;
   const rendering::Renderer& renderer_;
   std::vector<TimedPose> poses_;
-  std::vector<SceneMoment> moments_;
+  std::vector<display::SceneMoment> moments_;
   std::string trouble_;
 };
 
@@ -70,13 +70,13 @@ int explore_hands_on(const protocols::SceneSpec& spec, const rendering::Renderer
 /// A scene touched through a device. The servo has a thread of its own, which waits only for the
 /// clock and the device. A second thread empties the servo's ring and keeps the samples for the
 /// display, so a stalled display loses nothing of the last minute; it also compiles scenes.
-class LiveTouch final : public TouchSource {
+class LiveTouch final : public display::TouchSource {
  public:
   struct Settings {
     std::string scene_path;  ///< named in faults
     protocols::SceneSpec spec;
     const rendering::Renderer* renderer = nullptr;
-    ServoSettings servo;
+    servo::ServoSettings servo;
     /// Called with the objects before they are shown: limits them to the device.
     std::function<void(std::vector<stimuli::ObjectSpec>&)> limit;
     /// Called by emergency_zero() beside the servo's own, such as a guard's; may be empty.
@@ -84,13 +84,13 @@ class LiveTouch final : public TouchSource {
   };
 
   /// \param device, clock  the servo's alone; must outlive this. \throws MeshError
-  LiveTouch(Device& device, Clock& clock, Settings settings);
+  LiveTouch(servo::Device& device, servo::Clock& clock, Settings settings);
   ~LiveTouch() override;  ///< zero force
   LiveTouch(const LiveTouch&) = delete;
   LiveTouch& operator=(const LiveTouch&) = delete;
 
   bool live() const override { return true; }
-  void take(std::vector<SceneMoment>& out) override;
+  void take(std::vector<display::SceneMoment>& out) override;
   void hold(bool held) override { held_.store(held); }
   void step(int ticks) override { steps_.fetch_add(ticks); }
   double away() const override { return servo_.away(); }
@@ -102,7 +102,7 @@ class LiveTouch final : public TouchSource {
 
   /// Samples kept so far, taken or not. From any thread.
   std::uint64_t recorded() const noexcept { return recorded_.load(); }
-  ServoThread& servo() { return servo_; }  ///< for signal handlers
+  servo::ServoThread& servo() { return servo_; }  ///< for signal handlers
 
  private:
   void record(const std::stop_token& stop);
@@ -112,13 +112,13 @@ class LiveTouch final : public TouchSource {
   protocols::SceneSpec with_objects(const std::vector<stimuli::ObjectSpec>& objects) const;
   void prepare(const std::vector<stimuli::ObjectSpec>& objects);
   std::int64_t period_ns() const;
-  void keep(const Sample& sample, std::span<const rendering::BodyPose> bodies);
-  void add_contacts(SceneMoment& moment);
+  void keep(const servo::Sample& sample, std::span<const rendering::BodyPose> bodies);
+  void add_contacts(display::SceneMoment& moment);
   void update_soft(std::int64_t now_ns);
 
   const Settings settings_;
   mutable std::mutex mutex_;  ///< of the next three; held for a swap or an append
-  std::vector<SceneMoment> fresh_;
+  std::vector<display::SceneMoment> fresh_;
   std::optional<std::vector<stimuli::ObjectSpec>> wanted_;
   std::string trouble_;
   std::atomic<bool> held_{false};
@@ -130,12 +130,13 @@ class LiveTouch final : public TouchSource {
   bool gap_ = false;                         ///< the next sample comes after a pause
   std::int64_t last_ns_ = 0, shown_ns_ = 0;  ///< of the last sample: the servo's, without pauses
   std::int64_t paused_ns_ = 0;               ///< of all pauses
-  Patience patience_;                        ///< with the servo
-  TouchedPlaces touched_;                    ///< touched places without a sample yet
-  std::vector<std::shared_ptr<const SoftSurfaceNow>> soft_;  ///< the newest, by soft object
-  std::int64_t soft_ns_ = 0;                                 ///< when they were requested
-  ServoThread servo_;
+  servo::Patience patience_;                 ///< with the servo
+  servo::TouchedPlaces touched_;             ///< touched places without a sample yet
+  std::vector<std::shared_ptr<const display::SoftSurfaceNow>>
+      soft_;                  ///< the newest, by soft object
+  std::int64_t soft_ns_ = 0;  ///< when they were requested
+  servo::ServoThread servo_;
   std::jthread recorder_;  ///< last: ends first
 };
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

@@ -6,7 +6,7 @@
 #include "data/base/text.h"
 #include "runner/commands/shared/command.h"
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 
 void MovementExport::add_contacts(data::ExportSettings& settings) {
   settings.contacts = [this](const data::StoredTrial& trial) {
@@ -41,4 +41,4 @@ void MovementExport::add_measures(data::ExportSettings& settings, const Movement
   settings.derived = std::move(derived);
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

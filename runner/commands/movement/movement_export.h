@@ -11,7 +11,7 @@
 #include "runner/commands/movement/movement_study.h"
 #include "runner/commands/movement/touched_trial.h"
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 
 /// Adds movement to the settings of an export. Must outlive that export.
 class MovementExport {
@@ -33,4 +33,4 @@ class MovementExport {
   std::map<MovementStudy::TrialKey, data::DerivedMeasures::Values> measured_;
 };
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

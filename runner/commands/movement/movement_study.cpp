@@ -18,7 +18,7 @@
 #include "runner/commands/shared/study_options.h"
 #include "runner/session/replay.h"
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 namespace {
 
 /// The kept values of a trial.
@@ -148,7 +148,7 @@ void add_pictures(const MovementRequest& request, StudyStimuli& stimuli,
     for (const data::StoredTrial& stored : store.attempts(name)) {
       if (!stored.cut_off_reason.empty() || key_of(stored) != rows[at].key) continue;
       const std::shared_ptr<const TouchedStimuli> touched = stimuli.of(store, stored);
-      analysis::TypicalTrial typical{at, to_string(name), {}};
+      analysis::TypicalTrial typical{at, session::to_string(name), {}};
       if (!read_movement(*touched, stored, typical.trial).empty()) continue;
       pictures.typical.push_back(std::move(typical));
       analysis::ShapeOutline& outline = pictures.outlines[study.table.trials.rows[at].shape];
@@ -198,4 +198,4 @@ MovementStudy measure_study(const MovementRequest& request) {
   return study;
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

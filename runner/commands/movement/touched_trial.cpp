@@ -12,7 +12,7 @@
 #include "runner/session/live_forces.h"
 #include "runner/session/replay.h"
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 namespace {
 
 using analysis::SurfaceTriangle;
@@ -208,7 +208,7 @@ std::shared_ptr<const TouchedStimuli> StudyStimuli::of(data::Store& store,
                               trial.run.clock.monotonic_ns);
   if (const auto known = by_run_.find(run); known != by_run_.end()) return known->second;
   bool limited = false;
-  protocols::Protocol protocol = protocol_as_shown(store, trial, folder_, limited);
+  protocols::Protocol protocol = session::protocol_as_shown(store, trial, folder_, limited);
   std::shared_ptr<const TouchedStimuli> made;
   if (const auto known = by_protocol_.find(sha); !limited && known != by_protocol_.end())
     made = known->second;
@@ -239,40 +239,41 @@ std::string read_movement(const TouchedStimuli& stimuli, const data::StoredTrial
     data::SampleSlots slots(stored, trial.rate);
     std::int64_t last_slot = 0;
     TouchedTick last;
-    replay(stimuli.protocol(), stimuli.library(), record,
-           [&](std::size_t, const data::SampleRecord& recorded, const ReplayedSample& again) {
-             equal &= equals_record(record, recorded, again);
-             const rendering::Rendering& shown = again.rendering;
-             Quat turn = to_object;
-             Vec3 moved(0);
-             if (again.body) {
-               turn = to_object * glm::conjugate(again.body->moved.orientation);
-               moved = again.body->moved.position;
-             }
-             TouchedTick tick;
-             tick.contact = shown.contacts > 0;
-             tick.tip = turn * (Vec3(recorded.tip[0], recorded.tip[1], recorded.tip[2]) - moved);
-             tick.point = turn * (shown.deepest.point - moved);
-             tick.normal = turn * shown.deepest.normal;
-             tick.force = turn * shown.force;
-             tick.on_edge =
-                 has_edges && tick.contact && edges.distance(tick.point) <= ContactLog::kReach;
-             tick.touched = {tick.point, tick.point};
-             if (ray && tick.contact) {
-               tick.touched = stimuli.touched(stimulus, turn * (shown.ideal.tip - moved),
-                                              turn * (shown.ideal.tail - moved), tick.point);
-             }
-             const std::int64_t slot = slots.next();
-             const std::int64_t gap = trial.tip.empty() ? 0 : slot - last_slot - 1;
-             if (gap > kLongestGap) trial.breaks.push_back(trial.tip.size());
-             for (std::int64_t k = 1; k <= gap && gap <= kLongestGap; ++k) {
-               const double share = static_cast<double>(k) / static_cast<double>(gap + 1);
-               put(trial, between(last, tick, share), has_edges);
-             }
-             put(trial, tick, has_edges);
-             last_slot = slot;
-             last = tick;
-           });
+    session::replay(
+        stimuli.protocol(), stimuli.library(), record,
+        [&](std::size_t, const data::SampleRecord& recorded, const session::ReplayedSample& again) {
+          equal &= session::equals_record(record, recorded, again);
+          const rendering::Rendering& shown = again.rendering;
+          Quat turn = to_object;
+          Vec3 moved(0);
+          if (again.body) {
+            turn = to_object * glm::conjugate(again.body->moved.orientation);
+            moved = again.body->moved.position;
+          }
+          TouchedTick tick;
+          tick.contact = shown.contacts > 0;
+          tick.tip = turn * (Vec3(recorded.tip[0], recorded.tip[1], recorded.tip[2]) - moved);
+          tick.point = turn * (shown.deepest.point - moved);
+          tick.normal = turn * shown.deepest.normal;
+          tick.force = turn * shown.force;
+          tick.on_edge = has_edges && tick.contact &&
+                         edges.distance(tick.point) <= session::ContactLog::kReach;
+          tick.touched = {tick.point, tick.point};
+          if (ray && tick.contact) {
+            tick.touched = stimuli.touched(stimulus, turn * (shown.ideal.tip - moved),
+                                           turn * (shown.ideal.tail - moved), tick.point);
+          }
+          const std::int64_t slot = slots.next();
+          const std::int64_t gap = trial.tip.empty() ? 0 : slot - last_slot - 1;
+          if (gap > kLongestGap) trial.breaks.push_back(trial.tip.size());
+          for (std::int64_t k = 1; k <= gap && gap <= kLongestGap; ++k) {
+            const double share = static_cast<double>(k) / static_cast<double>(gap + 1);
+            put(trial, between(last, tick, share), has_edges);
+          }
+          put(trial, tick, has_edges);
+          last_slot = slot;
+          last = tick;
+        });
   } catch (const data::StoreRefused&) {
     return "ticks are out of order or times cannot be";
   } catch (const std::invalid_argument& error) {
@@ -301,8 +302,8 @@ std::vector<std::optional<data::TickContact>> contacts_of(const TouchedStimuli& 
   contacts.reserve(record.samples.size());
   bool equal = true;
   const auto visit = [&](std::size_t, const data::SampleRecord& recorded,
-                         const ReplayedSample& again) {
-    equal &= equals_record(record, recorded, again);
+                         const session::ReplayedSample& again) {
+    equal &= session::equals_record(record, recorded, again);
     const rendering::Contact& deepest = again.rendering.deepest;
     auto& contact = contacts.emplace_back();
     if (again.rendering.contacts > 0) {
@@ -312,9 +313,9 @@ std::vector<std::optional<data::TickContact>> contacts_of(const TouchedStimuli& 
   };
   try {
     if (record.task)
-      replay(stimuli.protocol(), record, false, visit);
+      session::replay(stimuli.protocol(), record, false, visit);
     else
-      replay(stimuli.protocol(), stimuli.library(), record, visit);
+      session::replay(stimuli.protocol(), stimuli.library(), record, visit);
   } catch (const std::invalid_argument&) {
     equal = false;
   }
@@ -322,4 +323,4 @@ std::vector<std::optional<data::TickContact>> contacts_of(const TouchedStimuli& 
   return contacts;
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

@@ -19,7 +19,7 @@
 #include "protocols/protocol.h"
 #include "runner/scene_builder.h"
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 
 /// A protocol with its stimuli and their surfaces, built once for many trials. Threads may share
 /// it.
@@ -94,4 +94,4 @@ MeasuredTrial measure_trial(const TouchedStimuli& stimuli, const data::StoredTri
 std::vector<std::optional<data::TickContact>> contacts_of(const TouchedStimuli& stimuli,
                                                           const data::StoredTrial& stored);
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

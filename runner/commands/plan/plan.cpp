@@ -26,7 +26,7 @@
 #include "runner/commands/shared/progress_line.h"
 #include "runner/commands/shared/study_options.h"
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 
 // The part of 'palpate plan' for thresholds.
 
@@ -502,4 +502,4 @@ int plan_command(const std::vector<std::string>& args) {
   return 0;
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

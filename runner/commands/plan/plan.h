@@ -10,7 +10,7 @@
 #include "analysis/statistics/power.h"
 #include "runner/commands/shared/command.h"
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 
 struct PlanOptions {
   std::string database, csv, effect, participants = "2-100", trials = "10,20,40,76", goal = "all",
@@ -38,4 +38,4 @@ analysis::StudyModel model_of(analysis::Pilot& pilot, const PlanOptions& options
 analysis::PlanSettings settings_of(const PlanOptions& options,
                                    const boost::program_options::variables_map& values);
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

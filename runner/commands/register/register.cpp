@@ -32,7 +32,7 @@
 #include "runner/participants/simulated_settings.h"
 #include "runner/session/run_record.h"
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 namespace {
 
 namespace po = boost::program_options;
@@ -304,7 +304,7 @@ int register_command(const std::vector<std::string>& args) {
   const RegisterOptions& options = *given;
   Registration made;
   made.protocol = read_protocol(options.protocol);
-  made.files = info_of(made.protocol).files;
+  made.files = session::info_of(made.protocol).files;
   require_files_below(made.files);
   made.plan_text = protocols::read_text_file(options.plan);
   made.plan = read_fitting_plan(options.plan, made.plan_text, made.protocol);
@@ -323,8 +323,8 @@ int register_command(const std::vector<std::string>& args) {
   made.alpha = made.plan.alpha;
   made.seed = options.seed;
   made.typical_time = PlannedStudies::typical_time(made.protocol, made.too_fast);
-  made.participant_version = kDefaultParticipantVersion;
-  made.participant_sha256 = load_simulated_settings("").sha256;
+  made.participant_version = participants::kDefaultParticipantVersion;
+  made.participant_sha256 = participants::load_simulated_settings("").sha256;
   for (std::size_t p = 1; p <= made.participants; ++p)
     made.order_sha256.push_back(order_checksum(order_of(made.protocol, static_cast<int>(p))));
 
@@ -343,4 +343,4 @@ int register_command(const std::vector<std::string>& args) {
   return 0;
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

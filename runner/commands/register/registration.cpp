@@ -16,7 +16,7 @@
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/sealed_folder.h"
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 namespace {
 
 using Json = nlohmann::ordered_json;
@@ -209,4 +209,4 @@ void require_files_below(const std::vector<data::ProtocolFile>& files) {
   if (!faults.empty()) throw UsageError(faults);
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

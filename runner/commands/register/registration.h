@@ -15,7 +15,7 @@
 #include "protocols/protocol.h"
 #include "protocols/schedule.h"
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 
 /// The trials for analysis of a participant, a line each: "session,renderer,shape,w,x,y,z" with 17
 /// significant digits. Practice is left out, as its rounds depend on answers.
@@ -81,4 +81,4 @@ Registration read_registration(const std::string& folder);
 /// Requires that all names of a protocol's files lead below its folder. \throws UsageError
 void require_files_below(const std::vector<data::ProtocolFile>& files);
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

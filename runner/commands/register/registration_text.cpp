@@ -13,7 +13,7 @@
 #include "data/files/utc.h"
 #include "runner/commands/shared/command.h"
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 namespace {
 
 using Kind = Paragraph::Kind;
@@ -572,4 +572,4 @@ std::string registration_osf(const std::vector<Question>& questions) {
   return out.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

@@ -8,7 +8,7 @@
 
 #include "runner/commands/register/registration.h"
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 
 /// Marks text that only the lab can provide.
 inline constexpr const char* kFillIn = "FILL IN: ";
@@ -42,4 +42,4 @@ std::string as_markdown(std::string_view text);
 /// The same at the beginning of a paragraph, where more characters are markup.
 std::string as_paragraph(std::string_view text);
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

@@ -22,7 +22,7 @@
 #include "runner/session/run_record.h"
 #include "runner/session/simulated_study.h"
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 namespace {
 
 constexpr std::int64_t kSecond_ns = 1'000'000'000, kDay_ns = 86'400 * kSecond_ns;
@@ -76,11 +76,11 @@ void PlannedStudies::write(const std::string& folder, const std::string& csv,
   fs::create_directory(folder);
   data::Store store = data::Store::open((fs::path(folder) / "study.db").string(),
                                         data::Store::Mode::write_or_create);
-  const data::ProtocolInfo info = info_of(protocol_);
+  const data::ProtocolInfo info = session::info_of(protocol_);
   for (std::size_t p = 0; p < schedules_.size(); ++p) {
     const int number = static_cast<int>(p) + 1;
     const data::Participant participant =
-        store.enrol(info, simulated_code(number), number, true, seed_);
+        store.enrol(info, session::simulated_code(number), number, true, seed_);
     const std::vector<Outcome> all = outcomes(p, 0, with_effect, typical_time);
     for (int session = 1; session <= protocol_.sessions.count; ++session) {
       data::RunInfo run_info;
@@ -207,4 +207,4 @@ std::vector<Rehearsal> PlannedStudies::rehearse(
   return out;
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

@@ -14,7 +14,7 @@
 #include "protocols/schedule.h"
 #include "runner/commands/register/registration.h"
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 
 class PlannedStudies {
  public:
@@ -59,4 +59,4 @@ class PlannedStudies {
   std::vector<std::size_t> shape_of_stimulus_;            ///< index into the model's
 };
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

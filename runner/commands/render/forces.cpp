@@ -13,7 +13,7 @@
 #include "runner/commands/shared/command.h"
 #include "runner/scene_builder.h"
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 namespace {
 
 constexpr std::size_t kFaultsShown = 20;
@@ -239,4 +239,4 @@ rendering::LineProbe virtual_stylus(const protocols::SceneSpec& spec,
   return spec.reach ? stretched(reach_for(*spec.reach, real), real) : real;
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

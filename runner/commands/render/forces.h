@@ -12,7 +12,7 @@
 #include "rendering/renderer.h"
 #include "runner/commands/shared/outputs.h"
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 
 // CSV files: the path of a stylus, read, and the forces along it, written.
 
@@ -110,4 +110,4 @@ void render_along(const rendering::Scene& scene, const protocols::SceneSpec& spe
 rendering::LineProbe virtual_stylus(const protocols::SceneSpec& spec,
                                     const rendering::LineProbe& real);
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

@@ -22,7 +22,7 @@
 #include "runner/commands/shared/scene_notes.h"
 #include "stimuli/parts/overlaps.h"
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 
 // `palpate render --explain`: the stages of a tick over a scene, and their costs.
 
@@ -352,4 +352,4 @@ int render_command(const std::vector<std::string>& args) {
   return 0;
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

@@ -12,18 +12,18 @@
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/outputs.h"
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 
 // The findings of `palpate replay`, as text, JSON and CSV.
 
 /// \param name  "P03/1/12", as the trial was named
-std::string to_text(const std::string& name, const RecordedTrial& trial,
-                    const ReplayComparison& found);
-std::string to_json_text(const std::string& name, const RecordedTrial& trial,
-                         const ReplayComparison& found);
+std::string to_text(const std::string& name, const session::RecordedTrial& trial,
+                    const session::ReplayComparison& found);
+std::string to_json_text(const std::string& name, const session::RecordedTrial& trial,
+                         const session::ReplayComparison& found);
 /// A row for each tick: s, m, N, N m; the other renderer's columns if requested. For a trial of
 /// version 2 `interval` comes first, and t counts within it.
-std::string to_csv(const RecordedTrial& trial, const ReplayComparison& found);
+std::string to_csv(const session::RecordedTrial& trial, const session::ReplayComparison& found);
 
 namespace {
 
@@ -36,7 +36,7 @@ std::string formatted(const char* format, Values... values) {
   return text.data();
 }
 
-std::string in_words(const ForceSummary& shown, const char* how) {
+std::string in_words(const session::ForceSummary& shown, const char* how) {
   const std::string first =
       shown.first_contact ? formatted("%.3f s", *shown.first_contact) : "never";
   return formatted(
@@ -46,7 +46,7 @@ std::string in_words(const ForceSummary& shown, const char* how) {
       shown.max_force, 1e3 * shown.max_depth);
 }
 
-std::string verdict(const RecordedTrial& trial, const ReplayComparison& found) {
+std::string verdict(const session::RecordedTrial& trial, const session::ReplayComparison& found) {
   const std::size_t ticks = found.ticks.size();
   if (found.equal_ticks == ticks)
     return "Rendered again: all " + std::to_string(ticks) +
@@ -64,7 +64,7 @@ std::string verdict(const RecordedTrial& trial, const ReplayComparison& found) {
   return text;
 }
 
-Json to_json(const ForceSummary& shown) {
+Json to_json(const session::ForceSummary& shown) {
   return {{"renderer", shown.renderer},
           {"share_in_contact", shown.time_in_contact},
           {"first_contact_s", shown.first_contact ? Json(*shown.first_contact) : Json()},
@@ -82,7 +82,7 @@ void put_vector(std::string& row, const Vector& v) {
   for (int i = 0; i < 3; ++i) put(row, v[i]);
 }
 
-void put(std::string& row, const RenderedForce& shown) {
+void put(std::string& row, const session::RenderedForce& shown) {
   put_vector(row, shown.force);
   put_vector(row, shown.torque);
   put(row, shown.depth);
@@ -101,10 +101,10 @@ void put(std::string& row, const std::optional<data::BodyRecord>& body) {
 }
 
 /// A line for each interval of a trial of version 2.
-std::string intervals_text(const ReplayComparison& found) {
+std::string intervals_text(const session::ReplayComparison& found) {
   std::string text;
   for (std::size_t i = 0; i < found.intervals.size(); ++i) {
-    const ReplayedInterval& one = found.intervals[i];
+    const session::ReplayedInterval& one = found.intervals[i];
     text += "  interval " + std::to_string(i + 1) + ": " +
             (one.stimulus.empty() ? "nothing" : printable(one.stimulus)) + ", " +
             printable(one.renderer) + (one.level ? formatted(", level %.12g", *one.level) : "") +
@@ -114,9 +114,9 @@ std::string intervals_text(const ReplayComparison& found) {
   return text;
 }
 
-Json intervals_json(const ReplayComparison& found) {
+Json intervals_json(const session::ReplayComparison& found) {
   Json all = Json::array();
-  for (const ReplayedInterval& one : found.intervals)
+  for (const session::ReplayedInterval& one : found.intervals)
     all.push_back({{"stimulus", one.stimulus.empty() ? Json() : Json(one.stimulus)},
                    {"renderer", one.renderer},
                    {"level", one.level ? Json(*one.level) : Json()},
@@ -149,8 +149,8 @@ std::string csv_header(bool with_other, bool with_intervals, bool with_body) {
 
 }  // namespace
 
-std::string to_text(const std::string& name, const RecordedTrial& trial,
-                    const ReplayComparison& found) {
+std::string to_text(const std::string& name, const session::RecordedTrial& trial,
+                    const session::ReplayComparison& found) {
   const data::TrialRecord& record = trial.stored.record;
   std::string text = trial.stored.participant.simulated ? "SIMULATED " : "";
   text += "trial " + printable(name) + " of " + printable(trial.stored.protocol_name) + ": " +
@@ -170,8 +170,8 @@ std::string to_text(const std::string& name, const RecordedTrial& trial,
   return text;
 }
 
-std::string to_json_text(const std::string& name, const RecordedTrial& trial,
-                         const ReplayComparison& found) {
+std::string to_json_text(const std::string& name, const session::RecordedTrial& trial,
+                         const session::ReplayComparison& found) {
   Json result = {{"version", 1},
                  {"trial", name},
                  {"protocol", trial.stored.protocol_name},
@@ -195,12 +195,12 @@ std::string to_json_text(const std::string& name, const RecordedTrial& trial,
   return result.dump(1) + "\n";
 }
 
-std::string to_csv(const RecordedTrial& trial, const ReplayComparison& found) {
+std::string to_csv(const session::RecordedTrial& trial, const session::ReplayComparison& found) {
   const data::TrialRecord& record = trial.stored.record;
   const bool with_intervals = record.task.has_value();
   const bool with_body = !record.bodies.empty();
   std::string text = csv_header(found.other.has_value(), with_intervals, with_body);
-  for (const ReplayedTick& tick : found.ticks) {
+  for (const session::ReplayedTick& tick : found.ticks) {
     const data::SampleRecord& was = *tick.recorded;
     if (with_intervals) text += std::to_string(tick.interval) + ",";
     text += std::to_string(was.tick);
@@ -248,11 +248,12 @@ int replay_command(const std::vector<std::string>& args) {
   Outputs outputs(*values, {"out", "json"}, {"db"});
   const data::TrialName name = parse_trial_name(trial);
   data::Store store = data::Store::open(db, data::Store::Mode::read_only);
-  const RecordedTrial recorded = load_recorded_trial(store, name, protocol, folder);
+  const session::RecordedTrial recorded =
+      session::load_recorded_trial(store, name, protocol, folder);
   for (const protocols::StimulusSpec& stimulus : recorded.protocol.stimuli)
     outputs.protect(stimulus.object);
-  const ReplayComparison found =
-      compare_with_record(recorded.protocol, recorded.stored.record, values->count("compare") > 0);
+  const session::ReplayComparison found = session::compare_with_record(
+      recorded.protocol, recorded.stored.record, values->count("compare") > 0);
   if (outputs.wanted("out")) outputs.put("out", to_csv(recorded, found));
   if (outputs.wanted("json")) outputs.put("json", to_json_text(trial, recorded, found));
   outputs.write();
@@ -260,4 +261,4 @@ int replay_command(const std::vector<std::string>& args) {
   return found.equal_ticks == found.ticks.size() ? 0 : 1;
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

@@ -26,7 +26,7 @@
 #include "runner/session/near_codes.h"
 #include "runner/session/run_record.h"
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 namespace {
 
 constexpr std::int64_t kSecond_ns = 1'000'000'000;
@@ -125,7 +125,7 @@ std::string spoken_time(std::int64_t utc_ns, std::int64_t now_utc_ns) {
 }
 
 std::string resumption(data::Store& store, const data::Participant& participant, int session,
-                       const SessionPlan& plan) {
+                       const session::SessionPlan& plan) {
   const std::optional<data::StoredRun> last = newest_run(store, [&](const data::StoredRun& run) {
     return run.participant.id == participant.id && run.info.session == session;
   });
@@ -169,15 +169,15 @@ int choose_session(data::Store& store, const data::Participant& participant,
   return session;
 }
 
-data::ClockStamp stamp_now(Clock& clock) {
+data::ClockStamp stamp_now(servo::Clock& clock) {
   const std::int64_t before = clock.now_ns();
   const std::int64_t utc =
       std::chrono::system_clock::now().time_since_epoch() / std::chrono::nanoseconds(1);
   return {utc, before + (clock.now_ns() - before) / 2};
 }
 
-data::RunInfo run_info(const RunSettings& settings, const DeviceCapabilities& device, int session,
-                       const data::ClockStamp& began, bool joystick) {
+data::RunInfo run_info(const RunSettings& settings, const servo::DeviceCapabilities& device,
+                       int session, const data::ClockStamp& began, bool joystick) {
   data::RunInfo info;
   info.session = session;
   info.clock = began;
@@ -200,7 +200,7 @@ data::RunInfo run_info(const RunSettings& settings, const DeviceCapabilities& de
 }
 
 std::optional<data::ProtocolInfo> other_texts(const Admission& admission) {
-  data::ProtocolInfo shown = info_of(admission.protocol);
+  data::ProtocolInfo shown = session::info_of(admission.protocol);
   if (shown.sha256 == admission.enrolled.sha256) return std::nullopt;
   return shown;
 }
@@ -263,7 +263,7 @@ Known look_into(const RunSettings& settings, const protocols::Protocol& protocol
   if (known.earlier) return known;
   count_on(store, protocol, settings, known);
   // Report an impossible code or number before asking any question.
-  store.look_up(info_of(protocol), code, known.number ? known.number : settings.number);
+  store.look_up(session::info_of(protocol), code, known.number ? known.number : settings.number);
   return known;
 }
 
@@ -279,7 +279,7 @@ std::string latest(const std::vector<std::string>& codes) {
 
 void confirm_new(const RunSettings& settings, const std::string& code,
                  const std::vector<std::string>& codes) {
-  const std::vector<std::string> near = near_codes(code, codes);
+  const std::vector<std::string> near = session::near_codes(code, codes);
   const std::string alike = join_names(near) + (near.size() == 1 ? " is" : " are");
   if (settings.new_participant) return;
   if (!on_a_terminal()) {
@@ -325,12 +325,12 @@ std::optional<std::int64_t> written_ns(const std::string& file) {
 }
 
 void check_clock(const RunSettings& settings, const Known& known, Admission& admission) {
-  ClockEvidence evidence;
+  session::ClockEvidence evidence;
   evidence.now_ns =
       std::chrono::system_clock::now().time_since_epoch() / std::chrono::nanoseconds(1);
   evidence.newest_record_ns = known.newest_ns;
   evidence.newest_file_ns = std::max(written_ns(settings.protocol), written_ns("/proc/self/exe"));
-  const std::string doubt = clock_warning(evidence);
+  const std::string doubt = session::clock_warning(evidence);
   if (doubt.empty()) return;
   say("CLOCK: " + doubt);
   admission.warnings.push_back("CLOCK: " + doubt);
@@ -365,7 +365,7 @@ Admission admit(const RunSettings& settings) {
         files.emplace(file.name, file.bytes);
       protocols::Protocol stored =
           protocols::parse_protocol_text(known.earlier->info.text, settings.protocol, files);
-      admission.enrolled = info_of(stored);
+      admission.enrolled = session::info_of(stored);
       if (choice == ProtocolChoice::stored) admission.protocol = std::move(stored);
       return admission;
     }
@@ -374,8 +374,8 @@ Admission admit(const RunSettings& settings) {
     confirm_participant(settings, admission.participant, known);
   }
   if (known.number) admission.number = known.number;
-  admission.enrolled = info_of(admission.protocol);
+  admission.enrolled = session::info_of(admission.protocol);
   return admission;
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

@@ -14,7 +14,7 @@
 #include "runner/servo/device.h"
 #include "runner/session/session_plan.h"
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 
 // The due session, the trial to resume from, and a withdrawal of the participant.
 
@@ -29,7 +29,7 @@ std::string spoken_time(std::int64_t utc_ns, std::int64_t now_utc_ns);
 /// "12 of 24 trials done, last run yesterday 15:02 (paused), continues with trial 13". Empty if the
 /// session was never begun.
 std::string resumption(data::Store& store, const data::Participant& participant, int session,
-                       const SessionPlan& plan);
+                       const session::SessionPlan& plan);
 
 /// Refuses a code whose newest run, in any protocol, ended with a withdrawal. \throws UsageError
 void refuse_withdrawn(data::Store& store, const std::string& code);
@@ -59,13 +59,13 @@ Admission admit(const RunSettings& settings);
 // The record of a run as a whole.
 
 /// This moment on the session clock and in UTC.
-data::ClockStamp stamp_now(Clock& clock);
+data::ClockStamp stamp_now(servo::Clock& clock);
 
 /// \param joystick  whether the protocol maps one, and a window looks at it
-data::RunInfo run_info(const RunSettings& settings, const DeviceCapabilities& device, int session,
-                       const data::ClockStamp& began, bool joystick);
+data::RunInfo run_info(const RunSettings& settings, const servo::DeviceCapabilities& device,
+                       int session, const data::ClockStamp& began, bool joystick);
 
 /// The protocol as shown, if its texts differ from those of the participant's protocol.
 std::optional<data::ProtocolInfo> other_texts(const Admission& admission);
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

@@ -12,38 +12,38 @@
 #include "runner/display/text_display.h"
 #include "runner/session/device_check.h"
 
-namespace palpate::runner {
-const DeviceKind& find_device_kind(const std::string& name) {
+namespace palpate::runner::commands {
+const devices::DeviceKind& find_device_kind(const std::string& name) {
   try {
-    return device_kind(name);
+    return devices::device_kind(name);
   } catch (const std::invalid_argument& error) {
     throw UsageError(std::string("--device: ") + error.what());
   }
 }
 
-OpenDevice open_device(const DeviceKind& kind, const RunSettings& settings,
+OpenDevice open_device(const devices::DeviceKind& kind, const RunSettings& settings,
                        const protocols::Protocol& protocol) {
-  const DeviceConfig config{protocol.servo_rate, protocol.stylus.length, protocol.stylus.grip,
-                            settings.serials,    settings.firmware,      settings.calibration,
-                            settings.library,    settings.service};
+  const servo::DeviceConfig config{
+      protocol.servo_rate, protocol.stylus.length, protocol.stylus.grip, settings.serials,
+      settings.firmware,   settings.calibration,   settings.library,     settings.service};
   try {
     kind.check(config);
   } catch (const std::invalid_argument& error) {
     throw UsageError(std::string("--serial: ") + error.what());
   }
   if (!kind.has_force_feedback) return {kind.open(config), nullptr};
-  GuardSettings guard;
+  safety::GuardSettings guard;
   guard.rate = protocol.servo_rate;
-  auto guarded = std::make_unique<GuardedDevice>([&] { return kind.open(config); }, guard);
-  GuardedDevice* const itself = guarded.get();
+  auto guarded = std::make_unique<safety::GuardedDevice>([&] { return kind.open(config); }, guard);
+  safety::GuardedDevice* const itself = guarded.get();
   return {std::move(guarded), itself};
 }
 
 void check_fitness(const OpenDevice& open, const RunSettings& settings,
                    const protocols::Protocol& protocol, const StimulusLibrary& library) {
-  const DeviceCapabilities& able = open.device->capabilities();
+  const servo::DeviceCapabilities& able = open.device->capabilities();
   std::string reasons;
-  for (const std::string& reason : incompatibilities(protocol, library, able))
+  for (const std::string& reason : session::incompatibilities(protocol, library, able))
     reasons += "\n" + reason;
   if (!reasons.empty()) throw UsageError("this protocol cannot be run with this device:" + reasons);
   std::size_t answers = protocol.response.keys.size();
@@ -63,21 +63,21 @@ void check_fitness(const OpenDevice& open, const RunSettings& settings,
                    "--without-calibration runs the session without");
 }
 
-ServoSettings servo_settings_of(const protocols::Protocol& protocol) {
-  ServoSettings settings;
+servo::ServoSettings servo_settings_of(const protocols::Protocol& protocol) {
+  servo::ServoSettings settings;
   settings.rate = protocol.servo_rate;
   settings.workspace = workspace_of(protocol);
   settings.passivity_controller = protocol.passivity_controller;
   return settings;
 }
 
-std::vector<std::unique_ptr<MarkerSink>> open_markers(const RunSettings& settings) {
-  const MarkerCodes codes =
-      settings.marker_codes ? MarkerCodes::everywhere : MarkerCodes::this_computer;
-  std::vector<std::unique_ptr<MarkerSink>> sinks;
+std::vector<std::unique_ptr<session::MarkerSink>> open_markers(const RunSettings& settings) {
+  const session::MarkerCodes codes = settings.marker_codes ? session::MarkerCodes::everywhere
+                                                           : session::MarkerCodes::this_computer;
+  std::vector<std::unique_ptr<session::MarkerSink>> sinks;
   for (const std::string& name : settings.markers) {
     try {
-      sinks.push_back(open_marker_sink(name, codes));
+      sinks.push_back(session::open_marker_sink(name, codes));
     } catch (const std::invalid_argument& error) {
       throw UsageError(std::string("--markers: ") + error.what());
     }
@@ -85,26 +85,26 @@ std::vector<std::unique_ptr<MarkerSink>> open_markers(const RunSettings& setting
   return sinks;
 }
 
-std::unique_ptr<NoisePlayer> open_noise(const RunSettings& settings,
-                                        const protocols::Protocol& protocol) {
+std::unique_ptr<sound::NoisePlayer> open_noise(const RunSettings& settings,
+                                               const protocols::Protocol& protocol) {
   if (settings.without_noise) return nullptr;
   if (!protocol.masking_noise) {
     if (!protocol.sounds) return nullptr;
-    return std::make_unique<NoisePlayer>(protocol.sounds->level_db, settings.sound_device);
+    return std::make_unique<sound::NoisePlayer>(protocol.sounds->level_db, settings.sound_device);
   }
   std::optional<double> tones_db;
   if (protocol.sounds) tones_db = protocol.sounds->level_db;
-  return std::make_unique<NoisePlayer>(*protocol.masking_noise, protocol.seed,
-                                       settings.sound_device, open_sound, tones_db);
+  return std::make_unique<sound::NoisePlayer>(*protocol.masking_noise, protocol.seed,
+                                              settings.sound_device, sound::open_sound, tones_db);
 }
 
-std::unique_ptr<ResponseBox> open_response_box(const RunSettings& settings,
-                                               const protocols::Protocol& protocol, Clock& clock,
-                                               const std::function<void()>& emergency) {
+std::unique_ptr<participants::ResponseBox> open_response_box(
+    const RunSettings& settings, const protocols::Protocol& protocol, servo::Clock& clock,
+    const std::function<void()>& emergency) {
   if (settings.response_box.empty()) return nullptr;
   try {
-    return std::make_unique<ResponseBox>(settings.response_box, protocol.responses.box, clock,
-                                         emergency);
+    return std::make_unique<participants::ResponseBox>(settings.response_box,
+                                                       protocol.responses.box, clock, emergency);
   } catch (const std::invalid_argument& error) {
     throw UsageError(std::string("--response-box: ") + error.what());
   }
@@ -113,12 +113,12 @@ std::unique_ptr<ResponseBox> open_response_box(const RunSettings& settings,
 namespace {
 
 /// Of the newest run that has any, whoever took part in it.
-std::optional<WindowPlaces> last_places(data::Store& store) {
-  std::optional<WindowPlaces> newest;
+std::optional<display::WindowPlaces> last_places(data::Store& store) {
+  std::optional<display::WindowPlaces> newest;
   std::int64_t utc_ns = 0;
   for (const data::StoredNote& note : store.notes()) {
     if (newest && note.run_clock.utc_ns < utc_ns) continue;
-    const std::optional<WindowPlaces> places = window_places(note.text);
+    const std::optional<display::WindowPlaces> places = display::window_places(note.text);
     if (!places) continue;
     newest = places;
     utc_ns = note.run_clock.utc_ns;
@@ -128,12 +128,13 @@ std::optional<WindowPlaces> last_places(data::Store& store) {
 
 }  // namespace
 
-std::unique_ptr<DisplayLoop> open_display(const RunSettings& settings,
-                                          const protocols::Protocol& protocol, data::Store& store,
-                                          Clock& clock, Device& device,
-                                          const std::function<void()>& emergency) {
+std::unique_ptr<display::DisplayLoop> open_display(const RunSettings& settings,
+                                                   const protocols::Protocol& protocol,
+                                                   data::Store& store, servo::Clock& clock,
+                                                   servo::Device& device,
+                                                   const std::function<void()>& emergency) {
   if (!settings.no_window) {
-    WindowSettings window;
+    display::WindowSettings window;
     window.title = protocol.name + ", " + settings.participant;
     window.full_screen = settings.full_screen;
     window.ui_scale = settings.ui_scale;
@@ -142,23 +143,23 @@ std::unique_ptr<DisplayLoop> open_display(const RunSettings& settings,
     for (const auto& [key, text] : protocols::texts_of(protocol)) window.texts.push_back(text);
     window.joystick = protocol.responses.joystick;
     window.emergency = emergency;
-    window.mouse = dynamic_cast<MouseStylus*>(&device);
+    window.mouse = dynamic_cast<devices::MouseStylus*>(&device);
     window.workspace = workspace_of(protocol);
     window.clock = &clock;
     window.places = last_places(store);
     try {
-      auto windows = make_windows(window);
+      auto windows = display::make_windows(window);
       const std::string missing = windows->unreadable();
       if (!missing.empty()) std::fprintf(stderr, "%s\n", printable_lines(missing).c_str());
       const std::string warning = windows->warning();
       if (!warning.empty()) std::fprintf(stderr, "%s\n", warning.c_str());
       return windows;
-    } catch (const DisplayError& error) {
+    } catch (const display::DisplayError& error) {
       if (window.mouse != nullptr) throw;
       std::fprintf(stderr, "%s; a text display instead\n", printable(error.what()).c_str());
     }
   }
-  return make_text_display({&clock, emergency});
+  return display::make_text_display({&clock, emergency});
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

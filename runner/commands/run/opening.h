@@ -18,44 +18,45 @@
 #include "runner/session/markers.h"
 #include "runner/sound/masking_noise.h"
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 
 /// \throws UsageError: there is no such device
-const DeviceKind& find_device_kind(const std::string& name);
+const devices::DeviceKind& find_device_kind(const std::string& name);
 
 struct OpenDevice {
-  std::unique_ptr<Device> device;  ///< in this process, or in the watchdog's
-  GuardedDevice* guard = nullptr;  ///< the same; none without force feedback
+  std::unique_ptr<servo::Device> device;   ///< in this process, or in the watchdog's
+  safety::GuardedDevice* guard = nullptr;  ///< the same; none without force feedback
 };
 /// Forks the watchdog where the device has force feedback: before there are other threads.
 /// \throws UsageError; std::runtime_error: the device cannot be opened
-OpenDevice open_device(const DeviceKind& kind, const RunSettings& settings,
+OpenDevice open_device(const devices::DeviceKind& kind, const RunSettings& settings,
                        const protocols::Protocol& protocol);
 /// \throws UsageError: the device cannot or should not show the protocol.
 void check_fitness(const OpenDevice& open, const RunSettings& settings,
                    const protocols::Protocol& protocol, const StimulusLibrary& library);
 
-ServoSettings servo_settings_of(const protocols::Protocol& protocol);
+servo::ServoSettings servo_settings_of(const protocols::Protocol& protocol);
 
 /// \throws UsageError: --markers has an unknown form; std::runtime_error: it cannot be opened
-std::vector<std::unique_ptr<MarkerSink>> open_markers(const RunSettings& settings);
+std::vector<std::unique_ptr<session::MarkerSink>> open_markers(const RunSettings& settings);
 
 /// Null with --without-noise, or if the protocol has neither noise nor sounds. \throws SoundError
-std::unique_ptr<NoisePlayer> open_noise(const RunSettings& settings,
-                                        const protocols::Protocol& protocol);
+std::unique_ptr<sound::NoisePlayer> open_noise(const RunSettings& settings,
+                                               const protocols::Protocol& protocol);
 
 /// Null if no response box is named. \param emergency  commands zero force at once; called in the
 /// box's thread. \throws UsageError; std::runtime_error: its port cannot be opened
-std::unique_ptr<ResponseBox> open_response_box(const RunSettings& settings,
-                                               const protocols::Protocol& protocol, Clock& clock,
-                                               const std::function<void()>& emergency);
+std::unique_ptr<participants::ResponseBox> open_response_box(
+    const RunSettings& settings, const protocols::Protocol& protocol, servo::Clock& clock,
+    const std::function<void()>& emergency);
 /// Opens two windows, or text where there is no display. \throws DisplayError: the mouse needs a
 /// window
 /// \param store  has the last places of the windows
 /// \param emergency  commands zero force at once; called in the display's thread
-std::unique_ptr<DisplayLoop> open_display(const RunSettings& settings,
-                                          const protocols::Protocol& protocol, data::Store& store,
-                                          Clock& clock, Device& device,
-                                          const std::function<void()>& emergency);
+std::unique_ptr<display::DisplayLoop> open_display(const RunSettings& settings,
+                                                   const protocols::Protocol& protocol,
+                                                   data::Store& store, servo::Clock& clock,
+                                                   servo::Device& device,
+                                                   const std::function<void()>& emergency);
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

@@ -32,7 +32,7 @@
 #include "runner/session/socket_advisor.h"
 #include "runner/session/station.h"
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 
 // The output of `palpate run` before and after a session.
 
@@ -40,10 +40,10 @@ namespace palpate::runner {
 void print_participant(const data::Participant& participant, int session, int sessions,
                        bool simulated);
 /// \param elapsed  s, since the servo thread began
-void print_servo_health(const ServoHealth& health, double elapsed);
+void print_servo_health(const servo::ServoHealth& health, double elapsed);
 /// \param who  as stored now
-void print_outcome(const LiveStation& station, const data::Participant& who,
-                   const LiveSession::Outcome& outcome);
+void print_outcome(const session::LiveStation& station, const data::Participant& who,
+                   const session::LiveSession::Outcome& outcome);
 
 void print_participant(const data::Participant& participant, int session, int sessions,
                        bool simulated) {
@@ -60,7 +60,7 @@ void print_participant(const data::Participant& participant, int session, int se
   if (simulated) std::fprintf(stderr, "SIMULATED device: the data are labelled so\n");
 }
 
-void print_servo_health(const ServoHealth& health, double elapsed) {
+void print_servo_health(const servo::ServoHealth& health, double elapsed) {
   std::fprintf(stderr,
                "servo: %llu ticks in %.3f s, %llu missed, longest period %.2f ms, lateness p99.9 "
                "%.0f us\n",
@@ -70,8 +70,8 @@ void print_servo_health(const ServoHealth& health, double elapsed) {
                static_cast<double>(health.lateness().quantile(0.999)) * 1e-3);
 }
 
-void print_outcome(const LiveStation& station, const data::Participant& who,
-                   const LiveSession::Outcome& outcome) {
+void print_outcome(const session::LiveStation& station, const data::Participant& who,
+                   const session::LiveSession::Outcome& outcome) {
   const std::string number = who.id == 0 ? "not enrolled" : "number " + std::to_string(who.number);
   std::printf("%s, participant %s (%s), session %d: %zu of %zu trials on record; %s\n",
               station.protocol.name.c_str(), who.code.c_str(), number.c_str(),
@@ -100,7 +100,7 @@ namespace {
 struct Beforehand {
   const RunSettings& settings;
   const Admission& admission;
-  const std::vector<LimitedMaterial>& limited;
+  const std::vector<session::LimitedMaterial>& limited;
   const data::SessionProgress& progress;  ///< what is on record of this session
   std::int64_t servo_began_ns;            ///< session clock
   std::vector<std::string> news;          ///< shown first on the console
@@ -110,7 +110,7 @@ struct Beforehand {
 template <class Forces>
 class ZeroOnSignal {
  public:
-  ZeroOnSignal(FaultSignals& signals, Forces* forces) : signals_(signals) {
+  ZeroOnSignal(safety::FaultSignals& signals, Forces* forces) : signals_(signals) {
     signals_.watch(forces);
   }
   ZeroOnSignal(const ZeroOnSignal&) = delete;
@@ -118,21 +118,23 @@ class ZeroOnSignal {
   ~ZeroOnSignal() { signals_.watch(static_cast<Forces*>(nullptr)); }
 
  private:
-  FaultSignals& signals_;
+  safety::FaultSignals& signals_;
 };
 
-ForceLimits limits_of(const ServoSettings& settings, const DeviceCapabilities& device) {
-  ForceLimits limits = settings.limits;
+servo::ForceLimits limits_of(const servo::ServoSettings& settings,
+                             const servo::DeviceCapabilities& device) {
+  servo::ForceLimits limits = settings.limits;
   limits.max_force = std::min(limits.max_force, device.max_force);
   return limits;
 }
 
 /// Ends before the first trial. Begins a run only for events that must be kept: a withdrawal, and
 /// notes on a participant who has a number already.
-LiveSession::Outcome end_before_trials(const LiveStation& station, const EndOfSession& end) {
-  RunRecord& record = station.record;
-  LiveSession::Outcome outcome{end.end, end.what(), station.plan.done(), station.plan.size(),
-                               end.failed};
+session::LiveSession::Outcome end_before_trials(const session::LiveStation& station,
+                                                const session::EndOfSession& end) {
+  session::RunRecord& record = station.record;
+  session::LiveSession::Outcome outcome{end.end, end.what(), station.plan.done(),
+                                        station.plan.size(), end.failed};
   if (end.end == data::RunEnd::withdrawn ||
       (record.participant().id != 0 && !record.pending_notes().empty()))
     record.begin();
@@ -144,10 +146,10 @@ LiveSession::Outcome end_before_trials(const LiveStation& station, const EndOfSe
 }
 
 /// Puts the known facts onto the console and into the record, before the first trial.
-void tell(LiveSession& session, const LiveStation& station, const Beforehand& known,
-          const PreflightResult& preflight) {
+void tell(session::LiveSession& session, const session::LiveStation& station,
+          const Beforehand& known, const session::PreflightResult& preflight) {
   const std::int64_t began_ns = station.utc.monotonic_ns;
-  RunRecord& record = station.record;
+  session::RunRecord& record = station.record;
   if (known.settings.after_withdrawal) record.note(began_ns, "begun again after a withdrawal");
   for (const data::TrialRecord& trial : known.progress.completed) session.count(trial);
   for (const std::string& warning : known.admission.warnings) session.say(warning);
@@ -160,12 +162,13 @@ void tell(LiveSession& session, const LiveStation& station, const Beforehand& kn
     record.note(began_ns, text + (calibrated ? "calibration stored" : "WITHOUT calibration"));
   }
   if (!known.limited.empty())
-    record.note(began_ns, to_json_text(known.limited, station.device, station.protocol.servo_rate));
+    record.note(began_ns,
+                session::to_json_text(known.limited, station.device, station.protocol.servo_rate));
   const auto& renderers = station.protocol.renderers;
   const bool side_contact = std::any_of(renderers.begin(), renderers.end(), [](auto kind) {
     return renderer_for(kind).side_contact();
   });
-  if (side_contact && torque_is_left_out(station.device)) {
+  if (side_contact && session::torque_is_left_out(station.device)) {
     session.say("torque is left out: this device drives force alone");
     record.note(began_ns, data::kTorqueLeftOutNote);
   }
@@ -191,25 +194,27 @@ void tell(LiveSession& session, const LiveStation& station, const Beforehand& kn
 
 /// Runs the pre-flight, then the unrecorded trials, in the session's own thread.
 /// \throws as LiveSession::run
-LiveSession::Outcome run_session(const LiveStation& station, const Beforehand& known) {
-  PreflightResult preflight;
+session::LiveSession::Outcome run_session(const session::LiveStation& station,
+                                          const Beforehand& known) {
+  session::PreflightResult preflight;
   try {
-    preflight = run_preflight(station, known.news);
-  } catch (const EndOfSession& end) {
+    preflight = session::run_preflight(station, known.news);
+  } catch (const session::EndOfSession& end) {
     return end_before_trials(station, end);
   }
   if (station.record.participant().id != 0) station.record.begin();  // takes no number
-  LiveSession session(station);
+  session::LiveSession session(station);
   tell(session, station, known, preflight);
   return session.run();
 }
 
 /// Runs the session in its own thread and the display's loop in this one, until both have ended. On
 /// an exception from either: zero force first.
-LiveSession::Outcome run_beside_display(const LiveStation& station, const Beforehand& known,
-                                        DisplayLoop& display,
-                                        const std::function<void()>& emergency) {
-  LiveSession::Outcome outcome;
+session::LiveSession::Outcome run_beside_display(const session::LiveStation& station,
+                                                 const Beforehand& known,
+                                                 display::DisplayLoop& display,
+                                                 const std::function<void()>& emergency) {
+  session::LiveSession::Outcome outcome;
   std::exception_ptr failure, display_failure;
   std::jthread session_thread([&] {
     try {
@@ -235,19 +240,19 @@ LiveSession::Outcome run_beside_display(const LiveStation& station, const Before
 }
 
 /// The most important messages for the experimenter.
-std::vector<std::string> news(const std::string& resumed, const DisplayLoop& display,
-                              const std::vector<LimitedMaterial>& limited) {
+std::vector<std::string> news(const std::string& resumed, const display::DisplayLoop& display,
+                              const std::vector<session::LimitedMaterial>& limited) {
   std::vector<std::string> out;
   if (!resumed.empty()) out.push_back(resumed);
   const std::string unreadable = display.unreadable();
   if (!unreadable.empty()) out.push_back("WARNING: " + unreadable);
-  for (const LimitedMaterial& one : limited) out.push_back(one.text);
+  for (const session::LimitedMaterial& one : limited) out.push_back(one.text);
   return out;
 }
 
-AnswerBy answer_by(const RunSettings& settings) {
-  if (settings.spoken) return AnswerBy::experimenter;
-  return settings.buttons ? AnswerBy::buttons : AnswerBy::keys;
+participants::AnswerBy answer_by(const RunSettings& settings) {
+  if (settings.spoken) return participants::AnswerBy::experimenter;
+  return settings.buttons ? participants::AnswerBy::buttons : participants::AnswerBy::keys;
 }
 
 bool asks_for_consent(const protocols::Protocol& protocol) {
@@ -261,11 +266,11 @@ bool has_joystick(const RunSettings& settings, const protocols::Protocol& protoc
 }
 
 /// Null if not requested.
-std::unique_ptr<SampleStream> open_stream(const RunSettings& settings,
-                                          const protocols::Protocol& protocol) {
+std::unique_ptr<session::SampleStream> open_stream(const RunSettings& settings,
+                                                   const protocols::Protocol& protocol) {
   if (settings.stream.empty()) return nullptr;
   try {
-    return std::make_unique<SampleStream>(settings.stream, protocol.servo_rate);
+    return std::make_unique<session::SampleStream>(settings.stream, protocol.servo_rate);
   } catch (const std::invalid_argument& error) {
     throw UsageError(std::string("--stream: ") + error.what());
   }
@@ -294,7 +299,7 @@ int run_command(const std::vector<std::string>& args) {
   std::signal(SIGPIPE, SIG_IGN);  // a closed reader must not end a session
 
   // Who takes part, in which protocol.
-  const DeviceKind& kind = find_device_kind(settings.device);
+  const devices::DeviceKind& kind = find_device_kind(settings.device);
   Admission admission = admit(settings);
   if (protocols::is_external(admission.protocol))
     throw UsageError(
@@ -306,13 +311,14 @@ int run_command(const std::vector<std::string>& args) {
 
   // The device behind its watchdog, which is forked before markers and noise start their threads.
   auto marker_sinks = open_markers(settings);
-  FaultSignals signals;
+  safety::FaultSignals signals;
   const OpenDevice open = open_device(kind, settings, protocol);
   const ZeroOnSignal guard_on_signal(signals, open.guard);
-  Markers markers(std::move(marker_sinks), protocols::event_codes(protocol), settings.sync);
+  session::Markers markers(std::move(marker_sinks), protocols::event_codes(protocol),
+                           settings.sync);
   const auto stream = open_stream(settings, protocol);
-  const DeviceCapabilities& device = open.device->capabilities();
-  const std::vector<LimitedMaterial> limited = limit_materials(protocol, device);
+  const servo::DeviceCapabilities& device = open.device->capabilities();
+  const std::vector<session::LimitedMaterial> limited = session::limit_materials(protocol, device);
   const StimulusLibrary library(protocol);
   check_fitness(open, settings, protocol, library);
   const auto noise = open_noise(settings, protocol);
@@ -320,7 +326,7 @@ int run_command(const std::vector<std::string>& args) {
   // The record. Data from a simulated device is labelled simulated, whoever answers.
   data::Store store = data::Store::open(settings.database, data::Store::Mode::write_or_create);
   warn_of_exposure(store.path());
-  RealClock clock;
+  servo::RealClock clock;
   const data::Participant participant =
       store.look_up(admission.enrolled, settings.participant, admission.number, device.simulated);
   const int session = choose_session(store, participant, protocol, settings);
@@ -329,11 +335,11 @@ int run_command(const std::vector<std::string>& args) {
     std::fprintf(stderr, "no consent is recorded (--consent VERSION)\n");
 
   // The servo loop, without forces until the first trial; the displays, each of which can end them.
-  const ServoSettings servo_settings = servo_settings_of(protocol);
-  const ForceDirectionCheck direction_check(limits_of(servo_settings, device),
-                                            device.actuated_freedom);
+  const servo::ServoSettings servo_settings = servo_settings_of(protocol);
+  const session::ForceDirectionCheck direction_check(limits_of(servo_settings, device),
+                                                     device.actuated_freedom);
   const std::int64_t servo_began_ns = clock.now_ns();
-  ServoThread servo(*open.device, clock, servo_settings);
+  servo::ServoThread servo(*open.device, clock, servo_settings);
   const ZeroOnSignal servo_on_signal(signals, &servo);
   const auto emergency = [&servo, guard = open.guard] {
     if (guard != nullptr) guard->emergency_zero();
@@ -341,30 +347,32 @@ int run_command(const std::vector<std::string>& args) {
   };
   const auto display = open_display(settings, protocol, store, clock, *open.device, emergency);
   const auto box = open_response_box(settings, protocol, clock, emergency);
-  std::optional<ScreenWithBox> box_screen;
+  std::optional<participants::ScreenWithBox> box_screen;
   if (box) box_screen.emplace(display->participant(), *box);
-  ParticipantScreen& screen =
-      box_screen ? static_cast<ParticipantScreen&>(*box_screen) : display->participant();
+  display::ParticipantScreen& screen =
+      box_screen ? static_cast<display::ParticipantScreen&>(*box_screen) : display->participant();
 
   const data::ClockStamp began = stamp_now(clock);
-  RunRecord record(store, admission.enrolled, participant,
-                   run_info(settings, device, session, began, has_joystick(settings, protocol)),
-                   other_texts(admission));
+  session::RunRecord record(
+      store, admission.enrolled, participant,
+      run_info(settings, device, session, began, has_joystick(settings, protocol)),
+      other_texts(admission));
   const data::SessionProgress progress = store.progress(participant, session);
-  SessionPlan plan(protocol, participant.enrolled_number, session);
-  for (const data::TrialRecord& trial : progress.completed) plan.answered(outcome_of(trial));
+  session::SessionPlan plan(protocol, participant.enrolled_number, session);
+  for (const data::TrialRecord& trial : progress.completed)
+    plan.answered(session::outcome_of(trial));
   const std::string resumed = resumption(store, participant, session, plan);
 
-  std::optional<SocketAdvisor> advisor;
+  std::optional<session::SocketAdvisor> advisor;
   if (!settings.advisor.empty())
     advisor.emplace(protocol,
-                    SocketAdvisor::Settings{settings.advisor, settings.advisor_time_out,
-                                            participant.enrolled_number, session},
+                    session::SocketAdvisor::Settings{settings.advisor, settings.advisor_time_out,
+                                                     participant.enrolled_number, session},
                     progress.completed);
-  std::optional<StreamedServo> streamed;
+  std::optional<session::StreamedServo> streamed;
   if (stream) streamed.emplace(servo, *stream);
-  TickSource& ticks = streamed ? static_cast<TickSource&>(*streamed) : servo;
-  const LiveStation station{
+  servo::TickSource& ticks = streamed ? static_cast<servo::TickSource&>(*streamed) : servo;
+  const session::LiveStation station{
       {protocol, library, plan, ticks, clock, began, record, advisor ? &*advisor : nullptr},
       record,
       device,
@@ -379,7 +387,8 @@ int run_command(const std::vector<std::string>& args) {
       noise.get()};
   const Beforehand known{settings, admission,      limited,
                          progress, servo_began_ns, news(resumed, *display, limited)};
-  const LiveSession::Outcome outcome = run_beside_display(station, known, *display, emergency);
+  const session::LiveSession::Outcome outcome =
+      run_beside_display(station, known, *display, emergency);
   print_outcome(
       station,
       store.look_up(admission.enrolled, participant.code, std::nullopt, participant.simulated),
@@ -390,4 +399,4 @@ int run_command(const std::vector<std::string>& args) {
   return outcome.failed ? 1 : 0;
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

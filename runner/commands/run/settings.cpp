@@ -7,7 +7,7 @@
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/study_options.h"
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 namespace {
 
 namespace po = boost::program_options;
@@ -163,4 +163,4 @@ std::optional<RunSettings> parse_run_settings(const std::vector<std::string>& ar
   return settings;
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

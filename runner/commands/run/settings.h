@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 
 struct RunSettings {
   std::string protocol, database, participant, device;
@@ -30,4 +30,4 @@ struct RunSettings {
 /// None where --help was asked for and printed. \throws UsageError
 std::optional<RunSettings> parse_run_settings(const std::vector<std::string>& args);
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

@@ -4,8 +4,8 @@
 
 #include <string_view>
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 
 std::string_view live_page();
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

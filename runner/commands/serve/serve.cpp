@@ -24,7 +24,7 @@
 #include "runner/servo/realtime.h"
 #include "runner/session/device_check.h"
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 namespace {
 
 namespace po = boost::program_options;
@@ -87,20 +87,20 @@ class TokenFile {
 /// The scene's or session's thread beside the network's: what both kinds of server have.
 class Server {
  public:
-  Server(const po::variables_map& values, FaultSignals& signals)
+  Server(const po::variables_map& values, safety::FaultSignals& signals)
       : values_(values), signals_(signals), network_(settings_of(values)) {}
   ~Server() {
     network_.end();  // it asks what is served
-    signals_.watch(static_cast<ServoThread*>(nullptr));
-    signals_.watch(static_cast<GuardedDevice*>(nullptr));
+    signals_.watch(static_cast<servo::ServoThread*>(nullptr));
+    signals_.watch(static_cast<safety::GuardedDevice*>(nullptr));
   }
   Server(const Server&) = delete;
   Server& operator=(const Server&) = delete;
 
-  Network& network() { return network_; }
+  serve::Network& network() { return network_; }
   /// Says where it is, and answers from now on. \param served  a ServedScene or ServedSession
   template <class Served>
-  void begin(Served& served, ServoThread& servo) {
+  void begin(Served& served, servo::ServoThread& servo) {
     signals_.watch(&servo);
     nlohmann::ordered_json serving = {{"type", "serving"},
                                       {"url", "ws://127.0.0.1:" + std::to_string(network_.port())}};
@@ -125,33 +125,33 @@ class Server {
   }
 
  private:
-  NetworkSettings settings_of(const po::variables_map& values) {
-    token_ = make_token();
-    NetworkSettings net{.port = static_cast<std::uint16_t>(values["port"].as<int>()),
-                        .socket = text_of(values, "socket"),
-                        .token = token_,
-                        .origins = {},
-                        .page = std::string(live_page())};
+  serve::NetworkSettings settings_of(const po::variables_map& values) {
+    token_ = serve::make_token();
+    serve::NetworkSettings net{.port = static_cast<std::uint16_t>(values["port"].as<int>()),
+                               .socket = text_of(values, "socket"),
+                               .token = token_,
+                               .origins = {},
+                               .page = std::string(live_page())};
     if (values.count("allow-origin") > 0)
       net.origins = values["allow-origin"].as<std::vector<std::string>>();
     return net;
   }
 
   const po::variables_map& values_;
-  FaultSignals& signals_;
+  safety::FaultSignals& signals_;
   std::string token_;
-  Network network_;
+  serve::Network network_;
   std::optional<TokenFile> token_file_;
 };
 
-void tell_of_servo(const ServoThread& servo) {
-  const ServoHealth& health = servo.health();
+void tell_of_servo(const servo::ServoThread& servo) {
+  const servo::ServoHealth& health = servo.health();
   std::cerr << "palpate serve ends: " << health.ticks() << " ticks, " << health.missed_ticks()
             << " missed\n";
 }
 
 int serve_scene(const po::variables_map& values, const RunSettings& run) {
-  const DeviceKind& kind = find_device_kind(run.device);
+  const devices::DeviceKind& kind = find_device_kind(run.device);
   const std::string path = text_of(values, "scene");
   protocols::SceneSpec spec;
   std::string text;
@@ -163,28 +163,28 @@ int serve_scene(const po::variables_map& values, const RunSettings& run) {
   if (!(rate >= 100 && rate <= 4000))
     throw UsageError("--rate: expected a number from 100 to 4000");
 
-  FaultSignals signals;
-  protocols::Protocol protocol = protocol_of(spec, renderer_named("point"));
+  safety::FaultSignals signals;
+  protocols::Protocol protocol = serve::protocol_of(spec, renderer_named("point"));
   protocol.servo_rate = rate;
   const OpenDevice open = open_device(kind, run, protocol);  // forks: before there are threads
   signals.watch(open.guard);
   if (open.guard != nullptr) check_fitness(open, run, protocol, StimulusLibrary(protocol));
-  RealClock clock;
-  ServoSettings servo;
+  servo::RealClock clock;
+  servo::ServoSettings servo;
   servo.rate = protocol.servo_rate;
   servo.workspace = workspace_of(protocol);
-  ServedScene scene(*open.device, open.guard, clock,
-                    {.scene_path = path.empty() ? "scene" : path,
-                     .scene = text,
-                     .servo = servo,
-                     .picture = picture_of});
+  serve::ServedScene scene(*open.device, open.guard, clock,
+                           {.scene_path = path.empty() ? "scene" : path,
+                            .scene = text,
+                            .servo = servo,
+                            .picture = picture_of});
   Server server(values, signals);
   scene.answer_through(server.network());
   scene.give_up_when([&signals] { return signals.end_requested() != 0; });
   server.begin(scene, scene.servo());
   try {
     while (signals.end_requested() == 0) {
-      for (const ServeCommand& command : server.network().commands()) {
+      for (const serve::ServeCommand& command : server.network().commands()) {
         if (command.left)
           scene.controller_left();
         else
@@ -193,7 +193,7 @@ int serve_scene(const po::variables_map& values, const RunSettings& run) {
       scene.attend();
       std::this_thread::sleep_for(std::chrono::milliseconds(2));
     }
-  } catch (const EndOfSession& end) {
+  } catch (const session::EndOfSession& end) {
     scene.emergency_zero();
     std::cerr << end.what() << "\n";
     return 1;
@@ -204,23 +204,23 @@ int serve_scene(const po::variables_map& values, const RunSettings& run) {
 }
 
 int serve_session(const RunSettings& settings, const po::variables_map& values) {
-  const DeviceKind& kind = find_device_kind(settings.device);
+  const devices::DeviceKind& kind = find_device_kind(settings.device);
   const Admission admission = admit(settings);
   protocols::Protocol protocol = admission.protocol;
-  if (const std::string why = unserved(protocol); !why.empty())
+  if (const std::string why = serve::unserved(protocol); !why.empty())
     throw UsageError("--protocol: " + why);
 
-  FaultSignals signals;
+  safety::FaultSignals signals;
   const OpenDevice open = open_device(kind, settings, protocol);  // forks: before there are threads
   signals.watch(open.guard);
-  const DeviceCapabilities& device = open.device->capabilities();
-  const std::vector<LimitedMaterial> limited = limit_materials(protocol, device);
+  const servo::DeviceCapabilities& device = open.device->capabilities();
+  const std::vector<session::LimitedMaterial> limited = session::limit_materials(protocol, device);
   const StimulusLibrary library(protocol);
   check_fitness(open, settings, protocol, library);
 
   data::Store store = data::Store::open(settings.database, data::Store::Mode::write_or_create);
   warn_of_exposure(store.path());
-  RealClock clock;
+  servo::RealClock clock;
   const data::Participant participant =
       store.look_up(admission.enrolled, admission.participant, admission.number, device.simulated);
   const int session = choose_session(store, participant, protocol, settings);
@@ -229,29 +229,30 @@ int serve_session(const RunSettings& settings, const po::variables_map& values) 
   const data::ClockStamp began = stamp_now(clock);
   data::RunInfo info = run_info(settings, device, session, began, false);
   info.response_device = "another program";
-  RunRecord record(store, admission.enrolled, participant, info, other_texts(admission));
+  session::RunRecord record(store, admission.enrolled, participant, info, other_texts(admission));
   const data::SessionProgress progress = store.progress(participant, session);
-  SessionPlan plan(protocol, participant.enrolled_number, session);
-  for (const data::TrialRecord& trial : progress.completed) plan.answered(outcome_of(trial));
+  session::SessionPlan plan(protocol, participant.enrolled_number, session);
+  for (const data::TrialRecord& trial : progress.completed)
+    plan.answered(session::outcome_of(trial));
   if (const std::string resumed = resumption(store, participant, session, plan); !resumed.empty())
     std::cerr << resumed << "\n";
 
   record.note(clock.now_ns(), R"({"served":{"preflight":"left out"}})");
   for (const std::string& note : admission.notes) record.note(clock.now_ns(), note);
   if (!limited.empty())
-    record.note(clock.now_ns(), to_json_text(limited, device, protocol.servo_rate));
-  ServoThread servo(*open.device, clock, servo_settings_of(protocol));
-  const Station station{protocol, library, plan, servo, clock, began, record};
-  ServedSession served({.station = station,
-                        .record = record,
-                        .servo = servo,
-                        .guard = open.guard,
-                        .end_requested = [&signals] { return signals.end_requested(); },
-                        .stored = progress.completed,
-                        .picture = picture_of});
+    record.note(clock.now_ns(), session::to_json_text(limited, device, protocol.servo_rate));
+  servo::ServoThread servo(*open.device, clock, servo_settings_of(protocol));
+  const session::Station station{protocol, library, plan, servo, clock, began, record};
+  serve::ServedSession served({.station = station,
+                               .record = record,
+                               .servo = servo,
+                               .guard = open.guard,
+                               .end_requested = [&signals] { return signals.end_requested(); },
+                               .stored = progress.completed,
+                               .picture = picture_of});
   Server server(values, signals);
   server.begin(served, servo);
-  const ServedSession::Outcome outcome =
+  const serve::ServedSession::Outcome outcome =
       served.run(server.network(), [&server] { return server.network().commands(); });
   served.emergency_zero();
   tell_of_servo(servo);
@@ -340,12 +341,12 @@ int serve_command(const std::vector<std::string>& args) {
   if (!values) return 0;
   try {
     return serve(*values);
-  } catch (const MessageRefused& error) {  // of the first scene
+  } catch (const serve::MessageRefused& error) {  // of the first scene
     std::string reasons;
-    for (const Refusal& why : error.why())
+    for (const serve::Refusal& why : error.why())
       reasons += "\n" + why.place + (why.place.empty() ? "" : ": ") + why.message;
     throw UsageError("--scene: it cannot be shown on this device:" + reasons);
   }
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

@@ -8,7 +8,7 @@
 #include "data/base/text.h"
 #include "protocols/json_document.h"
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 namespace {
 
 using nlohmann::json;
@@ -183,4 +183,4 @@ data::StudyAbout read_about_text(const std::string& text, const std::string& fil
   return about;
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

@@ -6,11 +6,11 @@
 
 #include "data/export/study_about.h"
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 
 /// \throws protocols::InputError with every fault.
 data::StudyAbout read_about_file(const std::string& path);
 /// \param file_name  named in faults
 data::StudyAbout read_about_text(const std::string& text, const std::string& file_name);
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

@@ -15,7 +15,7 @@
 #include "data/base/text.h"
 #include "data/files/file_permissions.h"
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 
 bool on_a_terminal() { return isatty(STDIN_FILENO) == 1 && isatty(STDERR_FILENO) == 1; }
 
@@ -162,4 +162,4 @@ void warn_of_exposure(const std::string& database) {
   if (!exposure.empty()) std::cerr << "warning: " << printable(exposure) << "\n";
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

@@ -14,7 +14,7 @@
 
 #include "data/store/store.h"
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 
 // Questions to the user on the terminal.
 
@@ -82,4 +82,4 @@ int sweep_command(const std::vector<std::string>& args);
 int validate_command(const std::vector<std::string>& args);
 int watch_command(const std::vector<std::string>& args);
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

@@ -17,7 +17,7 @@
 #include "data/files/atomic_file.h"
 #include "runner/commands/shared/command.h"
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 namespace {
 
 namespace fs = std::filesystem;
@@ -177,4 +177,4 @@ void Outputs::write() {
   }
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

@@ -14,7 +14,7 @@
 #include "data/files/output_check.h"
 #include "stimuli/shapes.h"
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 
 // CSV with 17 significant digits, so that numbers are read back exactly everywhere.
 
@@ -94,4 +94,4 @@ class Outputs {
   std::string folder_option_, folder_;
 };
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

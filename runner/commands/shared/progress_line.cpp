@@ -8,7 +8,7 @@
 #include <iostream>
 #include <utility>
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 namespace {
 
 std::atomic<bool> stop_asked{false};  // a signal handler needs a global
@@ -61,4 +61,4 @@ void ProgressLine::clear() {
   shown_ = 0;
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

@@ -4,7 +4,7 @@
 #include <atomic>
 #include <string>
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 
 // Ctrl-C during a long command.
 
@@ -38,4 +38,4 @@ class ProgressLine {
   double first_ = -1;             // `done` at the first call; negative: none yet
 };
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

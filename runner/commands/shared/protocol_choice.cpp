@@ -16,7 +16,7 @@
 #include "runner/commands/shared/command.h"
 #include "runner/safety/fault_signals.h"
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 namespace {
 
 std::vector<data::BlockFacts> blocks_of(const nlohmann::ordered_json& protocol) {
@@ -96,8 +96,8 @@ data::ProtocolFacts facts_of(const data::ProtocolInfo& info) {
 
 std::vector<data::FaultMeaning> fault_bits() {
   std::vector<data::FaultMeaning> all;
-  all.reserve(kFaultTable.size());
-  for (const rendering::FaultBit& fault : kFaultTable) {
+  all.reserve(safety::kFaultTable.size());
+  for (const rendering::FaultBit& fault : safety::kFaultTable) {
     all.push_back({fault.bit, std::string(fault.name) + ": " + fault.meaning});
   }
   return all;
@@ -232,4 +232,4 @@ std::string to_json_text(const ChangedProtocol& changed, ProtocolChoice choice) 
   return nlohmann::ordered_json{{"protocol_change", what}}.dump();
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

@@ -10,7 +10,7 @@
 #include "protocols/difference.h"
 #include "protocols/protocol.h"
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 
 // Facts for exports that data/ does not know: protocols, meanings of fault bits, the version.
 
@@ -47,4 +47,4 @@ ProtocolChoice choose_protocol(const ChangedProtocol& changed);
 /// The differences and the choice, for the record.
 std::string to_json_text(const ChangedProtocol& changed, ProtocolChoice choice);
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

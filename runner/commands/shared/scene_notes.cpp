@@ -12,7 +12,7 @@
 #include "stimuli/closed_surface.h"
 #include "stimuli/primitives.h"
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 namespace {
 
 // mm; a hand cannot reach around larger objects, nor feel the shape of smaller ones.
@@ -103,4 +103,4 @@ std::vector<std::string> scene_notes(const protocols::SceneSpec& spec,
   return notes;
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

@@ -8,7 +8,7 @@
 #include "protocols/parse.h"
 #include "rendering/bodies/soft/soft_scene.h"
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 
 /// A sentence with its place for each object that falls through others, because soft objects touch
 /// only the tool. Without line ends.
@@ -25,4 +25,4 @@ std::vector<std::string> mesh_notes(const stimuli::ObjectSpec& object);
 std::vector<std::string> scene_notes(const protocols::SceneSpec& spec,
                                      const rendering::Scene& scene);
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

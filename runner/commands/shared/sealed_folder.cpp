@@ -18,7 +18,7 @@
 #include "data/files/text_sink.h"
 #include "runner/commands/shared/command.h"
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 namespace {
 
 namespace fs = std::filesystem;
@@ -172,4 +172,4 @@ void require_replaceable_folder(const std::string& folder, bool force, const std
   }
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

@@ -8,7 +8,7 @@
 
 #include "data/files/atomic_folder.h"
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 
 inline constexpr const char* kChecksums = "SHA256SUMS";
 
@@ -41,4 +41,4 @@ std::vector<std::string> checksum_faults(const std::string& folder,
 void require_replaceable_folder(const std::string& folder, bool force, const std::string& mark,
                                 const std::vector<std::string>& open = {});
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

@@ -12,7 +12,7 @@
 #include "runner/commands/shared/command.h"
 #include "runner/session/socket_advisor.h"
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 
 analysis::TrialTable read_study_trials(const std::string& database, const std::string& csv) {
   if (!csv.empty()) return analysis::read_trials_csv(csv);
@@ -49,7 +49,7 @@ void check_advisor(const std::string& path, double time_out) {
   if (!(time_out >= 0.01 && time_out <= 60))
     throw UsageError("--ask-time-out-s: must be 0.01 to 60 seconds");
   if (path.empty()) return;
-  if (const std::string fault = socket_fault(path); !fault.empty())
+  if (const std::string fault = session::socket_fault(path); !fault.empty())
     throw UsageError("--ask: expected the Unix domain socket of a program that listens, found " +
                      printable(path) + ": " + fault);
 }
@@ -124,19 +124,19 @@ void add_participant_version(CommandLine& line, int& version) {
       "participant-version", boost::program_options::value(&version)->value_name("1|2|3"),
       ("of the simulated participant; each is frozen. Default: the one that FILE was begun with, "
        "else " +
-       std::to_string(kDefaultParticipantVersion))
+       std::to_string(participants::kDefaultParticipantVersion))
           .c_str());
 }
 
 void check_participant_version(const boost::program_options::variables_map& values, int version) {
   if (values.count("participant-version") == 0) return;
-  const std::vector<int> versions = participant_versions();
+  const std::vector<int> versions = participants::participant_versions();
   if (std::find(versions.begin(), versions.end(), version) == versions.end())
     throw UsageError("--participant-version: must be 1 to " + std::to_string(versions.back()));
 }
 
 int version_to_go_on_with(const std::set<int>& begun, const std::string& file) {
-  if (begun.empty()) return kDefaultParticipantVersion;
+  if (begun.empty()) return participants::kDefaultParticipantVersion;
   if (begun.size() > 1) {
     std::string versions;
     for (const int version : begun)
@@ -144,21 +144,22 @@ int version_to_go_on_with(const std::set<int>& begun, const std::string& file) {
     throw UsageError(printable(file) + ": holds versions " + versions +
                      " of the simulated participant; choose one with --participant-version");
   }
-  if (*begun.begin() != kDefaultParticipantVersion) {
+  if (*begun.begin() != participants::kDefaultParticipantVersion) {
     std::fprintf(stderr, "%s: continues with version %d of the simulated participant\n",
                  printable(file).c_str(), *begun.begin());
   }
   return *begun.begin();
 }
 
-LimitedForSimulation fit_to_simulation(protocols::Protocol& protocol,
-                                       const SimulatedSettings& simulated) {
-  LimitedForSimulation limited = limit_for_simulation(protocol, simulated);
+session::LimitedForSimulation fit_to_simulation(protocols::Protocol& protocol,
+                                                const participants::SimulatedSettings& simulated) {
+  session::LimitedForSimulation limited = session::limit_for_simulation(protocol, simulated);
   std::string reasons;
-  for (const std::string& fault : simulation_faults(protocol, StimulusLibrary(protocol), simulated))
+  for (const std::string& fault :
+       session::simulation_faults(protocol, StimulusLibrary(protocol), simulated))
     reasons += "\n" + fault;
   if (!reasons.empty()) throw UsageError("this protocol cannot be simulated:" + reasons);
   return limited;
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

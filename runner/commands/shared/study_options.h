@@ -12,7 +12,7 @@
 #include "runner/participants/simulated_settings.h"
 #include "runner/session/simulated_study.h"
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 
 /// The trials of a study: from the CSV file if given, else from the database.
 /// \throws UsageError, InputError: the file is not a study's
@@ -66,7 +66,7 @@ int version_to_go_on_with(const std::set<int>& begun, const std::string& file);
 
 /// Limits the materials if the protocol asks for it. \throws UsageError: the simulated device or
 /// participant cannot do the protocol
-LimitedForSimulation fit_to_simulation(protocols::Protocol& protocol,
-                                       const SimulatedSettings& simulated);
+session::LimitedForSimulation fit_to_simulation(protocols::Protocol& protocol,
+                                                const participants::SimulatedSettings& simulated);
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

@@ -16,7 +16,7 @@
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/outputs.h"
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 namespace {
 
 struct ListedTrial {
@@ -356,4 +356,4 @@ std::string recovery_text(const protocols::Protocol& protocol, int participants,
   return document.dump(1) + "\n";
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

@@ -11,7 +11,7 @@
 #include "protocols/tasks/task_plan.h"
 #include "runner/commands/shared/command.h"
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 
 // The columns of a schedule: those of an exported trials.csv that are known before the response.
 
@@ -69,4 +69,4 @@ int comparison_interval(const protocols::TaskBlock& block, const protocols::Tria
 std::string recovery_text(const protocols::Protocol& protocol, int participants, std::uint64_t seed,
                           const std::string& format);
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

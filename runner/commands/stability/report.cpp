@@ -16,7 +16,7 @@
 #include "analysis/text.h"
 #include "runner/commands/accuracy/report.h"
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 namespace {
 
 constexpr double kPanelWidth = 300, kPanelHeight = 250, kRoom = 1240;  // px: three side by side
@@ -42,7 +42,7 @@ void add_name(analysis::Panel& panel, const std::string& name, analysis::Role ro
 
 void add_curve(analysis::Panel& panel, const BoundaryCurve& curve, analysis::Role role) {
   analysis::Mark theory = analysis::line_mark(role, {}, {}, 1.4);
-  for (const BoundaryPoint& point : curve.points) {
+  for (const stability::BoundaryPoint& point : curve.points) {
     const double x = std::log10(point.stiffness);
     if (point.promised) {
       theory.x.push_back(x);
@@ -103,12 +103,12 @@ analysis::Figure stability_figure(const StabilityReport& report) {
   return figure;
 }
 
-analysis::Figure soft_map_figure(const std::vector<SoftSwing>& map) {
+analysis::Figure soft_map_figure(const std::vector<stability::SoftSwing>& map) {
   constexpr double kCellWidth = 64, kCellHeight = 19;  // px
   analysis::Figure figure;
   figure.id = "soft-stability";
   int allowed = 0, settled = 0;
-  for (const SoftSwing& one : map) {
+  for (const stability::SoftSwing& one : map) {
     allowed += one.accepted;
     settled += one.accepted && one.settles();
   }
@@ -123,8 +123,8 @@ analysis::Figure soft_map_figure(const std::vector<SoftSwing>& map) {
       "springs, columns the rate of the body's steps, numbers the swing of the force in percent.";
   figure.max_row_width = kRoom;
   std::vector<std::string> rates, rows;
-  for (const SoftSwing& one : map) {
-    const SoftCase& what = one.what;
+  for (const stability::SoftSwing& one : map) {
+    const stability::SoftCase& what = one.what;
     const std::string title = "tool of " + significant(1000 * what.radius) + " mm, Poisson " +
                               significant(what.poisson) + ", damping " +
                               significant(1000 * what.damping) + " ms";
@@ -181,7 +181,7 @@ analysis::Figure integrator_figure(const StabilityReport& report) {
   for (std::size_t m = 0; m < kMethods.size(); ++m) {
     figure.legend.push_back({kMethods[m], analysis::line_role(m), analysis::MarkerShape::circle});
   }
-  for (const IntegratorRow& row : report.integrators) {
+  for (const stability::IntegratorRow& row : report.integrators) {
     if (!figure.panels.empty() && figure.panels.back().title == row.oscillator) continue;
     analysis::Panel panel;
     panel.title = row.oscillator;
@@ -194,7 +194,7 @@ analysis::Figure integrator_figure(const StabilityReport& report) {
   for (analysis::Panel& panel : figure.panels) {
     for (std::size_t m = 0; m < kMethods.size(); ++m) {
       analysis::Mark line = analysis::line_mark(analysis::line_role(m), {}, {}, 1.4);
-      for (const IntegratorRow& row : report.integrators) {
+      for (const stability::IntegratorRow& row : report.integrators) {
         if (row.oscillator != panel.title || row.method != kMethods[m]) continue;
         if (!std::isfinite(row.error)) continue;
         line.x.push_back(std::clamp(std::log10(row.ns_per_tick), panel.x.low, panel.x.high));
@@ -224,7 +224,7 @@ analysis::Table theory_table(const StabilityReport& report) {
       "The case of the theory: a plain wall, ends so heavy that their mass does not matter";
   table.header = {"curve", "stiffness N/m", "damping N s/m: theory", "measured", "ratio"};
   for (const BoundaryCurve& curve : report.theory) {
-    for (const BoundaryPoint& p : curve.points) {
+    for (const stability::BoundaryPoint& p : curve.points) {
       table.rows.push_back({curve.name, significant(p.stiffness), significant(p.theory),
                             significant(p.measured), significant(p.measured / p.theory)});
     }
@@ -238,7 +238,7 @@ analysis::Table curve_table(const StabilityReport& report, const std::string& pa
   table.header = {"curve", "stiffness N/m", "theory", "measured"};
   for (const BoundaryCurve& curve : report.curves) {
     if (curve.panel != panel) continue;
-    for (const BoundaryPoint& p : curve.points) {
+    for (const stability::BoundaryPoint& p : curve.points) {
       table.rows.push_back({curve.name, significant(p.stiffness),
                             p.promised ? significant(p.theory) : "no promise",
                             p.measured == 0 ? "none" : significant(p.measured)});
@@ -264,12 +264,12 @@ analysis::Table gain_table(const StabilityReport& report) {
                   "delay", "theory", "without", "with",          "factor"};
   table.n_names = 2;
   for (const ControllerGain& g : report.gains) {
-    const LoopSettings& s = g.loop.settings;
-    table.rows.push_back({to_string(g.loop.contact_case), protocols::to_string(g.loop.renderer),
-                          significant(s.rate), significant(g.damping),
-                          significant(1e6 * s.resolution), std::to_string(s.delay),
-                          significant(g.damping * s.rate / (0.5 + s.delay)), significant(g.without),
-                          significant(g.with), significant(g.with / g.without)});
+    const stability::LoopSettings& s = g.loop.settings;
+    table.rows.push_back(
+        {stability::to_string(g.loop.contact_case), protocols::to_string(g.loop.renderer),
+         significant(s.rate), significant(g.damping), significant(1e6 * s.resolution),
+         std::to_string(s.delay), significant(g.damping * s.rate / (0.5 + s.delay)),
+         significant(g.without), significant(g.with), significant(g.with / g.without)});
   }
   return table;
 }
@@ -279,7 +279,7 @@ analysis::Table integrator_table(const StabilityReport& report) {
   table.caption = "Integrators of the hand, 1 kHz: error after 500 ticks over run time";
   table.header = {"case", "method", "steps a tick", "ns a tick", "worst error, m"};
   table.n_names = 2;
-  for (const IntegratorRow& row : report.integrators) {
+  for (const stability::IntegratorRow& row : report.integrators) {
     table.rows.push_back({row.oscillator, row.method, std::to_string(row.steps),
                           significant(row.ns_per_tick),
                           std::isfinite(row.error) ? significant(row.error) : "diverges"});
@@ -291,10 +291,10 @@ analysis::Table integrator_table(const StabilityReport& report) {
 /// exact one's; worst case.
 double integrator_gain(const StabilityReport& report) {
   double worst = HUGE_VAL;
-  for (const IntegratorRow& exact : report.integrators) {
+  for (const stability::IntegratorRow& exact : report.integrators) {
     if (exact.method != "exact") continue;
     double cheapest = HUGE_VAL;
-    for (const IntegratorRow& row : report.integrators) {
+    for (const stability::IntegratorRow& row : report.integrators) {
       if (row.oscillator == exact.oscillator && row.method != "exact" && row.error <= 1e-6) {
         cheapest = std::min(cheapest, row.ns_per_tick);
       }
@@ -340,9 +340,9 @@ Json reach_json(const std::optional<rendering::Reach>& reach) {
   return {{"factor", reach->factor}, {"pivot_share_of_stylus", reach->fraction}};
 }
 
-Json loop_json(const LoopCase& loop) {
-  const LoopSettings& s = loop.settings;
-  return {{"scene", to_string(loop.contact_case)},
+Json loop_json(const stability::LoopCase& loop) {
+  const stability::LoopSettings& s = loop.settings;
+  return {{"scene", stability::to_string(loop.contact_case)},
           {"renderer", protocols::to_string(loop.renderer)},
           {"rate_hz", s.rate},
           {"end_mass_kg", loop.heavy ? Json() : Json(s.mass)},
@@ -360,7 +360,7 @@ Json loop_json(const LoopCase& loop) {
 Json curve_json(const BoundaryCurve& curve) {
   Json json = {{"panel", curve.panel}, {"name", curve.name}, {"loop", loop_json(curve.loop)}};
   json["points"] = Json::array();
-  for (const BoundaryPoint& p : curve.points) {
+  for (const stability::BoundaryPoint& p : curve.points) {
     json["points"].push_back({{"stiffness_n_per_m", p.stiffness},
                               {"measured_ns_per_m", p.measured},
                               {"theory_ns_per_m", p.theory},
@@ -374,7 +374,7 @@ Json curve_json(const BoundaryCurve& curve) {
 double StabilityReport::worst_disagreement() const {
   double worst = 0;
   for (const BoundaryCurve& curve : theory) {
-    for (const BoundaryPoint& p : curve.points) {
+    for (const stability::BoundaryPoint& p : curve.points) {
       worst = std::max(worst, std::abs(p.measured / p.theory - 1));
     }
   }
@@ -384,7 +384,7 @@ double StabilityReport::worst_disagreement() const {
 int StabilityReport::unsafe() const {
   int count = 0;
   for (const BoundaryCurve& curve : curves) {
-    for (const BoundaryPoint& p : curve.points) count += p.unsafe();
+    for (const stability::BoundaryPoint& p : curve.points) count += p.unsafe();
   }
   return count;
 }
@@ -409,7 +409,7 @@ std::vector<std::string> stability_sentences(const StabilityReport& report) {
       std::to_string(report.points()) + " points of the map.");
   double ideal = HUGE_VAL, coarse = HUGE_VAL, late = HUGE_VAL;
   for (const ControllerGain& g : report.gains) {
-    const LoopSettings& settings = g.loop.settings;
+    const stability::LoopSettings& settings = g.loop.settings;
     double& least = settings.delay > 0 ? late : settings.resolution > 0 ? coarse : ideal;
     least = std::min(least, g.with / g.without);
   }
@@ -461,7 +461,7 @@ Json stability_json(const StabilityReport& report) {
                  {"stiffest_with_n_per_m", g.with}};
     json["passivity_controller"].push_back(std::move(gain));
   }
-  for (const IntegratorRow& row : report.integrators) {
+  for (const stability::IntegratorRow& row : report.integrators) {
     json["integrators"].push_back(
         {{"case", row.oscillator},
          {"method", row.method},
@@ -489,4 +489,4 @@ std::string stability_page(const StabilityReport& report) {
   return page.html("palpate " PALPATE_VERSION ".");
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

@@ -11,18 +11,18 @@
 #include "runner/stability/integrators.h"
 #include "runner/stability/soft_map.h"
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 
 /// One curve of the map: the boundary over stiffness.
 struct BoundaryCurve {
   std::string panel, name;  ///< "rates", "0.5 kHz"
-  LoopCase loop;
-  std::vector<BoundaryPoint> points;
+  stability::LoopCase loop;
+  std::vector<stability::BoundaryPoint> points;
 };
 
 /// Largest stable stiffness of a device, without and with the passivity controller.
 struct ControllerGain {
-  LoopCase loop;                 ///< without the controller
+  stability::LoopCase loop;      ///< without the controller
   double damping = 0;            ///< N s/m, of each end
   double without = 0, with = 0;  ///< N/m, largest stable stiffness
 };
@@ -31,7 +31,7 @@ struct StabilityReport {
   std::vector<BoundaryCurve> theory;  ///< heavy ends, as the theory assumes
   std::vector<BoundaryCurve> curves;
   std::vector<ControllerGain> gains;
-  std::vector<IntegratorRow> integrators;
+  std::vector<stability::IntegratorRow> integrators;
 
   /// Largest |measured / theory - 1| of the plain wall with heavy ends.
   double worst_disagreement() const;
@@ -50,7 +50,7 @@ analysis::Figure stability_figure(const StabilityReport& report);
 /// Error over run time of the integrators.
 analysis::Figure integrator_figure(const StabilityReport& report);
 /// Swing of the force on soft bodies, by modulus, spring and rate, a panel for each tool.
-analysis::Figure soft_map_figure(const std::vector<SoftSwing>& map);
+analysis::Figure soft_map_figure(const std::vector<stability::SoftSwing>& map);
 std::string stability_page(const StabilityReport& report);
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

@@ -15,7 +15,7 @@
 #include "runner/commands/stability/report.h"
 #include "runner/stability/soft_map.h"
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 namespace {
 
 constexpr double kRates[] = {500, 1000, 2000, 5000, 10000};  // Hz
@@ -25,7 +25,7 @@ constexpr double kResolution = 3e-5;    // m
 
 std::string in_khz(double rate) { return significant(rate / 1000) + " kHz"; }
 
-BoundaryCurve curve(const char* panel, std::string name, const LoopCase& loop) {
+BoundaryCurve curve(const char* panel, std::string name, const stability::LoopCase& loop) {
   return {panel, std::move(name), loop, {}};
 }
 
@@ -33,7 +33,7 @@ std::vector<BoundaryCurve> theory_curves() {
   std::vector<BoundaryCurve> out;
   for (const int delay : {0, 1}) {
     for (const double rate : kRates) {
-      LoopCase loop;
+      stability::LoopCase loop;
       loop.heavy = true;
       loop.settings.rate = rate;
       loop.settings.delay = delay;
@@ -47,43 +47,43 @@ std::vector<BoundaryCurve> map_curves() {
   std::vector<BoundaryCurve> out;
   for (const protocols::RendererKind renderer :
        {protocols::RendererKind::point, protocols::RendererKind::ray}) {
-    for (const ContactCase contact_case : kContactCases) {
-      LoopCase loop;
+    for (const stability::ContactCase contact_case : stability::kContactCases) {
+      stability::LoopCase loop;
       loop.contact_case = contact_case;
       loop.renderer = renderer;
       out.push_back(
           curve(renderer == protocols::RendererKind::point ? "scenes, point" : "scenes, ray",
-                to_string(contact_case), loop));
+                stability::to_string(contact_case), loop));
     }
   }
   for (const double rate : kRates) {
-    LoopCase loop;
+    stability::LoopCase loop;
     loop.settings.rate = rate;
     out.push_back(curve("rates, wall", in_khz(rate), loop));
   }
   for (const double damping : {0.0, 0.1, 1.0, 10.0}) {
-    LoopCase loop;
+    stability::LoopCase loop;
     loop.virtual_damping = damping;
     out.push_back(curve("damping of the wall", "B " + significant(damping) + " N s/m", loop));
   }
   struct Hand {
     const char* name;
-    EndImpedance impedance;
+    stability::EndImpedance impedance;
   };
   const Hand hands[] = {{"none", {}},
                         {"soft: 50 N/m", {50, 1, 0.02}},
                         {"relaxed: 200 N/m", {200, 5, 0.05}},
                         {"stiff: 1000 N/m", {1000, 10, 0.05}}};
   for (const Hand& hand : hands) {
-    LoopCase loop;
+    stability::LoopCase loop;
     loop.settings.hand = hand.impedance;
     out.push_back(curve("hand, wall", hand.name, loop));
   }
-  LoopCase layered;
+  stability::LoopCase layered;
   layered.layer_share = 1;
   out.push_back(curve("layers and reach, wall", "a layer as stiff as the surface", layered));
   for (const double fraction : {1.0, 0.5}) {
-    LoopCase far;
+    stability::LoopCase far;
     far.settings.reach = rendering::Reach{.factor = 5, .fraction = fraction};
     out.push_back(curve("layers and reach, wall",
                         fraction == 1 ? "reach 5 about the tail" : "reach 5 about the middle",
@@ -99,7 +99,7 @@ std::vector<BoundaryCurve> map_curves() {
                             {"friction 0.5 N, 30 um", 0.5, kResolution, 0},
                             {"one tick late", 0, 0, 1}};
   for (const Device& device : devices) {
-    LoopCase loop;
+    stability::LoopCase loop;
     loop.settings.friction = device.friction;
     loop.settings.resolution = device.resolution;
     loop.settings.delay = device.delay;
@@ -110,26 +110,28 @@ std::vector<BoundaryCurve> map_curves() {
 
 std::vector<ControllerGain> gain_cases() {
   std::vector<ControllerGain> out;
-  const auto add = [&](const LoopCase& loop) { out.push_back({loop, kEndDamping, 0, 0}); };
+  const auto add = [&](const stability::LoopCase& loop) {
+    out.push_back({loop, kEndDamping, 0, 0});
+  };
   for (const protocols::RendererKind renderer :
        {protocols::RendererKind::point, protocols::RendererKind::ray}) {
-    for (const ContactCase contact_case : kContactCases) {
-      LoopCase loop;
+    for (const stability::ContactCase contact_case : stability::kContactCases) {
+      stability::LoopCase loop;
       loop.contact_case = contact_case;
       loop.renderer = renderer;
       add(loop);
     }
   }
   for (const double rate : kRates) {
-    LoopCase loop;
+    stability::LoopCase loop;
     loop.settings.rate = rate;
     if (rate != 1000) add(loop);
   }
-  LoopCase coarse;
+  stability::LoopCase coarse;
   coarse.settings.friction = kEndFriction;
   coarse.settings.resolution = kResolution;
   add(coarse);
-  LoopCase late;
+  stability::LoopCase late;
   late.settings.delay = 1;
   add(late);
   return out;
@@ -172,28 +174,30 @@ StabilityReport study(bool full, int jobs) {
       one.points.resize(stiffnesses.size());
       for (std::size_t i = 0; i < stiffnesses.size(); ++i) {
         tasks.emplace_back(
-            [&one, i, k = stiffnesses[i]] { one.points[i] = boundary_at(one.loop, k); });
+            [&one, i, k = stiffnesses[i]] { one.points[i] = stability::boundary_at(one.loop, k); });
       }
     }
   }
   for (ControllerGain& gain : report.gains) {
-    tasks.emplace_back([&gain] { gain.without = stiffest_stable(gain.loop, gain.damping); });
+    tasks.emplace_back(
+        [&gain] { gain.without = stability::stiffest_stable(gain.loop, gain.damping); });
     tasks.emplace_back([&gain] {
-      LoopCase with = gain.loop;
+      stability::LoopCase with = gain.loop;
       with.settings.passivity_controller = true;
-      gain.with = stiffest_stable(with, gain.damping);
+      gain.with = stability::stiffest_stable(with, gain.damping);
     });
   }
   run_all(tasks, jobs);
-  report.integrators = compare_integrators(now_ns);
+  report.integrators = stability::compare_integrators(now_ns);
   return report;
 }
 
-std::vector<SoftSwing> study_soft(const std::vector<SoftCase>& cases, int jobs) {
-  std::vector<SoftSwing> map(cases.size());
+std::vector<stability::SoftSwing> study_soft(const std::vector<stability::SoftCase>& cases,
+                                             int jobs) {
+  std::vector<stability::SoftSwing> map(cases.size());
   std::vector<std::function<void()>> tasks;
   for (std::size_t i = 0; i < cases.size(); ++i)
-    tasks.emplace_back([&, i] { map[i] = press_and_hold(cases[i]); });
+    tasks.emplace_back([&, i] { map[i] = stability::press_and_hold(cases[i]); });
   run_all(tasks, jobs);
   return map;
 }
@@ -242,13 +246,16 @@ int stability_command(const std::vector<std::string>& args) {
       if (values->count(other) > 0)
         throw UsageError(std::string("--soft: expected without --") + other);
     }
-    const std::vector<SoftSwing> map =
-        study_soft(values->count("seed") > 0 ? soft_cases_elsewhere(seed) : soft_cases(), jobs);
+    const std::vector<stability::SoftSwing> map = study_soft(
+        values->count("seed") > 0 ? stability::soft_cases_elsewhere(seed) : stability::soft_cases(),
+        jobs);
     if (outputs.wanted("figure"))
       outputs.put("figure", analysis::figure_svg(soft_map_figure(map), analysis::light_palette()));
     outputs.write();
-    std::cout << soft_map_text(map);
-    const auto is_good = [](const SoftSwing& one) { return !one.accepted || one.settles(); };
+    std::cout << stability::soft_map_text(map);
+    const auto is_good = [](const stability::SoftSwing& one) {
+      return !one.accepted || one.settles();
+    };
     return std::ranges::all_of(map, is_good) ? 0 : 1;
   }
   if (values->count("seed") > 0) throw UsageError("--seed: expected with --soft");
@@ -263,4 +270,4 @@ int stability_command(const std::vector<std::string>& args) {
   return report.unsafe() == 0 && report.worst_disagreement() <= 0.05 ? 0 : 1;
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

@@ -21,7 +21,7 @@
 #include "runner/session/run_record.h"
 #include "runner/session/simulated_study.h"
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 namespace {
 
 namespace po = boost::program_options;
@@ -44,7 +44,7 @@ json base_protocol(const protocols::Protocol& protocol, const SweepSettings& set
 
 std::string sha256_of_files(const protocols::Protocol& protocol) {
   std::string all;
-  for (const data::ProtocolFile& file : info_of(protocol).files)
+  for (const data::ProtocolFile& file : session::info_of(protocol).files)
     all += file.name + '\n' + checksum_hex(file.bytes) + '\n';
   return all.empty() ? "" : checksum_hex(all);
 }
@@ -58,8 +58,8 @@ void check_names_of_columns(const data::SweepPlan& plan, const std::string& spac
   }
 }
 
-data::SweepPlan plan_of_sweep(const SweepSettings& settings, const SweptStudy& study,
-                              const Design& design, const protocols::Protocol& protocol) {
+data::SweepPlan plan_of_sweep(const SweepSettings& settings, const sweep::SweptStudy& study,
+                              const sweep::Design& design, const protocols::Protocol& protocol) {
   data::SweepPlan plan;
   plan.protocol = study.protocol().dump();
   plan.files_sha256 = sha256_of_files(protocol);
@@ -88,9 +88,10 @@ data::SweepPlan plan_of_sweep(const SweepSettings& settings, const SweptStudy& s
   return plan;
 }
 
-Design design_of(const SweepSettings& settings, const SweptStudy& study) {
+sweep::Design design_of(const SweepSettings& settings, const sweep::SweptStudy& study) {
   try {
-    return {design_kind(settings.design), settings.points, settings.seed, study.space().parameters};
+    return {sweep::design_kind(settings.design), settings.points, settings.seed,
+            study.space().parameters};
   } catch (const std::invalid_argument& error) {
     throw UsageError(std::string("--design, --points: ") + error.what());
   }
@@ -135,7 +136,7 @@ void check_sweep_options(const po::variables_map& values, SweepSettings& setting
 PlannedSweep::PlannedSweep(const SweepSettings& settings)
     : protocol(protocols::parse_protocol(settings.protocol)),
       study(base_protocol(protocol, settings), settings.protocol,
-            read_json(simulated_settings_text(settings.patch, settings.version)),
+            read_json(participants::simulated_settings_text(settings.patch, settings.version)),
             protocols::parse_sweep_space(settings.space), settings.space),
       design(design_of(settings, study)),
       plan(plan_of_sweep(settings, study, design, protocol)) {
@@ -166,7 +167,8 @@ class TrialCollection {
       : cells_(plan.renderers.size() * plan.shapes.size()) {
     table_.renderers = plan.renderers;
     table_.shapes = table_.answers = plan.shapes;
-    for (int i = 1; i <= plan.participants; ++i) table_.participants.push_back(simulated_code(i));
+    for (int i = 1; i <= plan.participants; ++i)
+      table_.participants.push_back(session::simulated_code(i));
   }
 
   void add(int participant, const data::TrialRecord& record, std::uint64_t contact_ticks) {
@@ -347,7 +349,7 @@ std::string reason_of(const std::exception& error) {
 
 }  // namespace
 
-PointStudy study_of_point(const Sweep& sweep, std::int64_t point) {
+sweep::PointStudy study_of_point(const Sweep& sweep, std::int64_t point) {
   return sweep.study.at(sweep.plan.seed, point, values_of_point(sweep, point));
 }
 
@@ -356,21 +358,23 @@ std::optional<data::SweepRow> run_point(const Sweep& sweep, std::int64_t point,
   data::SweepRow row;
   row.point = point;
   for (const json& value : values_of_point(sweep, point)) row.values.push_back(stored(value));
-  const PointStudy study = study_of_point(sweep, point);
+  const sweep::PointStudy study = study_of_point(sweep, point);
   row.seed = study.seed;
   row.order_seed = study.order_seed;
   try {
     protocols::Protocol protocol = sweep.study.parse(study.protocol);
-    const SimulatedSettings settings = read_simulated_settings(study.settings.dump());
-    limit_for_simulation(protocol, settings);
+    const participants::SimulatedSettings settings =
+        participants::read_simulated_settings(study.settings.dump());
+    session::limit_for_simulation(protocol, settings);
     TrialCollection trials(sweep.plan);
     analysis::TaskTable tasks;
-    const bool done = simulate_in_memory(
+    const bool done = session::simulate_in_memory(
         protocol, settings, sweep.plan.participants, study.seed, stop,
         [&](int participant, const data::TrialRecord& record, std::uint64_t contact_ticks) {
           if (!record.task) return trials.add(participant, record, contact_ticks);
           if (!record.practice)
-            tasks.trials.push_back(analysis::task_trial_of(simulated_code(participant), record));
+            tasks.trials.push_back(
+                analysis::task_trial_of(session::simulated_code(participant), record));
         });
     if (!done) return std::nullopt;
     row.figures =
@@ -382,4 +386,4 @@ std::optional<data::SweepRow> run_point(const Sweep& sweep, std::int64_t point,
   return row;
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

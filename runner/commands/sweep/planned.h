@@ -12,7 +12,7 @@
 #include "runner/sweep/design.h"
 #include "runner/sweep/swept_study.h"
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 
 struct SweepSettings {
   std::string protocol, space, design;
@@ -34,8 +34,8 @@ struct PlannedSweep {
   explicit PlannedSweep(const SweepSettings& settings);
 
   protocols::Protocol protocol;  ///< as in its file
-  SweptStudy study;
-  Design design;
+  sweep::SweptStudy study;
+  sweep::Design design;
   data::SweepPlan plan;
 };
 
@@ -43,16 +43,16 @@ struct PlannedSweep {
 
 /// The inputs of a point.
 struct Sweep {
-  const SweptStudy& study;
-  const Design& design;
+  const sweep::SweptStudy& study;
+  const sweep::Design& design;
   const data::SweepPlan& plan;
 };
 
 /// The point's study, not yet run.
-PointStudy study_of_point(const Sweep& sweep, std::int64_t point);
+sweep::PointStudy study_of_point(const Sweep& sweep, std::int64_t point);
 
 /// Runs a point. An exception is the reason why the point failed. \return none: it was stopped
 std::optional<data::SweepRow> run_point(const Sweep& sweep, std::int64_t point,
                                         const std::atomic<bool>& stop);
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

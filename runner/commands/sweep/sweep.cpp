@@ -26,7 +26,7 @@
 #include "runner/commands/shared/study_options.h"
 #include "runner/commands/sweep/planned.h"
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 
 std::string analyze_sweep_file(const std::string& file, const std::string& pattern,
                                Outputs& outputs) {
@@ -210,7 +210,7 @@ int version_begun_with(const std::string& database) {
   std::error_code none;  // an invisible file is refused when opened
   if (std::filesystem::exists(database, none)) {
     const json settings = json_or_discarded(data::SweepFile::open(database).plan().settings);
-    for (const int version : participant_versions()) {
+    for (const int version : participants::participant_versions()) {
       if (settings.is_object() && settings.value("version", json()) == version)
         begun.insert(version);
     }
@@ -258,7 +258,7 @@ void print_point(const Sweep& sweep, std::int64_t point) {
     throw UsageError("--print-point: the sweep has " + std::to_string(sweep.plan.points) +
                      " points");
   }
-  const PointStudy study = study_of_point(sweep, point);
+  const sweep::PointStudy study = study_of_point(sweep, point);
   json out{{"point", point}, {"seed", study.seed}, {"participants", sweep.plan.participants}};
   out["protocol"] = study.protocol;
   out["settings"] = study.settings;
@@ -283,4 +283,4 @@ int sweep_command(const std::vector<std::string>& args) {
   return run_shard(sweep, *settings, shard, planned.protocol.name);
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

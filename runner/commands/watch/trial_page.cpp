@@ -28,7 +28,7 @@
 #include "runner/scene_builder.h"
 #include "runner/session/replay.h"
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 
 // Columns of numbers in the text of a page: integer multiples of a step, as differences of the
 // order that takes the fewest bytes, 7 bits a byte (zigzag, least significant first), in one zlib
@@ -118,7 +118,7 @@ namespace {
 using Cell = std::array<std::int64_t, 3>;
 
 /// Merges the corners in each cell of a grid into their mean, and removes collapsed triangles.
-PictureMesh clustered(const DrawnMesh& drawn, double cell) {
+PictureMesh clustered(const display::DrawnMesh& drawn, double cell) {
   PictureMesh out;
   std::map<Cell, std::uint32_t> known;
   std::vector<double> counts;
@@ -149,9 +149,9 @@ PictureMesh clustered(const DrawnMesh& drawn, double cell) {
   return out;
 }
 
-double size_of(const DrawnMesh& drawn) {
+double size_of(const display::DrawnMesh& drawn) {
   Vec3 low(std::numeric_limits<double>::max()), high(-std::numeric_limits<double>::max());
-  for (const DrawnVertex& corner : drawn) {
+  for (const display::DrawnVertex& corner : drawn) {
     low = glm::min(low, Vec3(corner.position));
     high = glm::max(high, Vec3(corner.position));
   }
@@ -162,7 +162,7 @@ double size_of(const DrawnMesh& drawn) {
 
 PictureMesh picture_mesh(const stimuli::ObjectSpec& object, std::size_t most) {
   constexpr double kSame = 1e-6, kCoarser = 1.25;  // of the size
-  const DrawnMesh drawn = triangles_of(object);
+  const display::DrawnMesh drawn = display::triangles_of(object);
   const double size = size_of(drawn);
   PictureMesh mesh = clustered(drawn, kSame * size);
   const std::size_t all = mesh.triangles.size();
@@ -212,7 +212,7 @@ void put_body(ShownTicks& out, const std::optional<rendering::BodyPose>& body) {
 }
 
 /// \param other  render the path with the other renderer
-ShownTicks ticks_of(const RecordedTrial& trial, bool other) {
+ShownTicks ticks_of(const session::RecordedTrial& trial, bool other) {
   ShownTicks out;
   const data::TrialRecord& record = trial.stored.record;
   const bool moves = std::ranges::any_of(trial.protocol.stimuli, [](const auto& stimulus) {
@@ -220,36 +220,37 @@ ShownTicks ticks_of(const RecordedTrial& trial, bool other) {
   });
   const bool tool = !trial.protocol.tool.segments.empty();
   double time = 0;
-  replay(trial.protocol, record, other,
-         [&](std::size_t interval, const data::SampleRecord& was, const ReplayedSample& is) {
-           if (interval == out.intervals.size()) {
-             out.intervals.push_back(0);
-             time = 0;
-           } else {
-             time += static_cast<double>(is.period_ns) * 1e-9;
-           }
-           ++out.intervals.back();
-           ++out.count;
-           const rendering::Rendering& r = is.rendering;
-           const Vec3 tip = vec(was.tip), tail = vec(was.tail);
-           if (!other) {
-             out.equal += equals_record(record, was, is);
-             out.put("t", time);
-             out.put("tip", tip);
-             out.put("tail", tail);
-           }
-           out.put("force", other ? r.force : vec(was.force));
-           out.put("depth", other ? r.deepest.depth : was.depth);
-           const int contacts = other ? recorded_contacts(r.contacts) : was.contacts;
-           out.put("contacts", contacts);
-           out.put("type", other ? static_cast<double>(r.deepest.type) : was.contact_type);
-           out.put("faults", other ? r.faults : was.faults);
-           out.put("lag_tip", r.ideal.tip - tip);
-           out.put("lag_turn", r.ideal.tail - tail - (r.ideal.tip - tip));
-           out.put("contact", contacts > 0 ? r.deepest.point - r.ideal.tip : Vec3(0));
-           if (moves) put_body(out, is.body);
-           if (tool) out.put("side", r.ideal_side);
-         });
+  session::replay(
+      trial.protocol, record, other,
+      [&](std::size_t interval, const data::SampleRecord& was, const session::ReplayedSample& is) {
+        if (interval == out.intervals.size()) {
+          out.intervals.push_back(0);
+          time = 0;
+        } else {
+          time += static_cast<double>(is.period_ns) * 1e-9;
+        }
+        ++out.intervals.back();
+        ++out.count;
+        const rendering::Rendering& r = is.rendering;
+        const Vec3 tip = vec(was.tip), tail = vec(was.tail);
+        if (!other) {
+          out.equal += session::equals_record(record, was, is);
+          out.put("t", time);
+          out.put("tip", tip);
+          out.put("tail", tail);
+        }
+        out.put("force", other ? r.force : vec(was.force));
+        out.put("depth", other ? r.deepest.depth : was.depth);
+        const int contacts = other ? servo::recorded_contacts(r.contacts) : was.contacts;
+        out.put("contacts", contacts);
+        out.put("type", other ? static_cast<double>(r.deepest.type) : was.contact_type);
+        out.put("faults", other ? r.faults : was.faults);
+        out.put("lag_tip", r.ideal.tip - tip);
+        out.put("lag_turn", r.ideal.tail - tail - (r.ideal.tip - tip));
+        out.put("contact", contacts > 0 ? r.deepest.point - r.ideal.tip : Vec3(0));
+        if (moves) put_body(out, is.body);
+        if (tool) out.put("side", r.ideal_side);
+      });
   return out;
 }
 
@@ -340,9 +341,9 @@ class PageBuilder {
     return meshes_.size() - 1;
   }
 
-  Json parts_json(const RecordedTrial& trial, const ShownTicks& ticks, bool other) {
+  Json parts_json(const session::RecordedTrial& trial, const ShownTicks& ticks, bool other) {
     const data::TrialRecord& record = trial.stored.record;
-    const auto objects = shown_objects(trial.protocol, record);
+    const auto objects = session::shown_objects(trial.protocol, record);
     Json parts = Json::array();
     for (std::size_t i = 0; i < ticks.intervals.size(); ++i) {
       const std::string& renderer =
@@ -377,7 +378,7 @@ class PageBuilder {
   }
 
   std::vector<std::string> facts(const WatchedTrial& one, const ShownTicks& ticks, bool other) {
-    const RecordedTrial& trial = one.trial;
+    const session::RecordedTrial& trial = one.trial;
     std::vector<std::string> out;
     if (other) {
       out.push_back("SIMULATED COMPARISON: the recorded path of " + one.name +
@@ -437,7 +438,8 @@ class PageBuilder {
          {rendering::ContactType::none, rendering::ContactType::point_polygon,
           rendering::ContactType::segment_edge, rendering::ContactType::segment_face})
       types.push_back(rendering::to_string(type));
-    for (const rendering::FaultBit& fault : kFaultTable) faults.push_back({fault.bit, fault.words});
+    for (const rendering::FaultBit& fault : safety::kFaultTable)
+      faults.push_back({fault.bit, fault.words});
     return {{"version", 1},
             {"program", PALPATE_VERSION},
             {"period", 1 / trials_.front().trial.protocol.servo_rate},
@@ -526,4 +528,4 @@ TrialPage trial_page(const std::vector<WatchedTrial>& trials, bool compare) {
   return PageBuilder(trials, compare).build();
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

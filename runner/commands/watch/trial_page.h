@@ -11,7 +11,7 @@
 #include "runner/session/replay.h"
 #include "stimuli/shapes.h"
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 
 // The surface of an object for a page: triangles with shared corners.
 
@@ -27,7 +27,7 @@ PictureMesh picture_mesh(const stimuli::ObjectSpec& object, std::size_t most);
 
 struct WatchedTrial {
   std::string name;  ///< "P03/1/12"
-  RecordedTrial trial;
+  session::RecordedTrial trial;
 };
 
 struct TrialPage {
@@ -44,4 +44,4 @@ TrialPage trial_page(const std::vector<WatchedTrial>& trials, bool compare);
 std::string_view watch_css();  ///< watch.css, embedded by the build
 std::string_view watch_js();
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

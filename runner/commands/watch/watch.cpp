@@ -9,7 +9,7 @@
 #include "runner/commands/shared/outputs.h"
 #include "runner/commands/watch/trial_page.h"
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 namespace {
 
 constexpr std::size_t kMostShown = 4;  // pictures that stay legible side by side
@@ -69,7 +69,8 @@ int watch_command(const std::vector<std::string>& args) {
   data::Store store = data::Store::open(db, data::Store::Mode::read_only);
   std::vector<WatchedTrial> watched;
   for (const data::TrialName& name : names) {
-    watched.push_back({to_string(name), load_recorded_trial(store, name, protocol, folder)});
+    watched.push_back(
+        {session::to_string(name), session::load_recorded_trial(store, name, protocol, folder)});
     for (const protocols::StimulusSpec& stimulus : watched.back().trial.protocol.stimuli)
       outputs.protect(stimulus.object);
   }
@@ -82,4 +83,4 @@ int watch_command(const std::vector<std::string>& args) {
   return 0;
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

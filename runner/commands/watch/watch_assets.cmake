@@ -6,13 +6,13 @@ function(palpate_embed name header)
   set(assets "${CMAKE_CURRENT_BINARY_DIR}/${name}.cpp")
   set(draft "${assets}.draft")
   file(WRITE "${draft}" "// Made by watch_assets.cmake when the build is configured.\n"
-       "#include \"${header}\"\n\nnamespace palpate::runner {\n\n")
+       "#include \"${header}\"\n\nnamespace palpate::runner::commands {\n\n")
   while(ARGN)
     list(POP_FRONT ARGN function text)
     # A literal may have 64 kB: more would need pieces.
     file(APPEND "${draft}" "std::string_view ${function}() {\n  return R\"palpate~(" "${${text}}" ")palpate~\";\n}\n\n")
   endwhile()
-  file(APPEND "${draft}" "}  // namespace palpate::runner\n")
+  file(APPEND "${draft}" "}  // namespace palpate::runner::commands\n")
   configure_file("${draft}" "${assets}" COPYONLY)  # an equal one is left as it is
 endfunction()
 

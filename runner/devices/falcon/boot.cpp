@@ -14,7 +14,7 @@
 #include "protocols/parse.h"
 #include "runner/devices/falcon/packets.h"
 
-namespace palpate::runner::falcon {
+namespace palpate::runner::devices::falcon {
 namespace {
 
 constexpr std::uint32_t kKey = 0x08AA;
@@ -258,4 +258,4 @@ void boot(Transport& transport, const FirmwareImage* image, const BootSettings& 
   if (report) report(progress);
 }
 
-}  // namespace palpate::runner::falcon
+}  // namespace palpate::runner::devices::falcon

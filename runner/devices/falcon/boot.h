@@ -9,7 +9,7 @@
 
 #include "runner/devices/falcon/transport.h"
 
-namespace palpate::runner::falcon {
+namespace palpate::runner::devices::falcon {
 
 /// A firmware file named by the user; none is shipped. A stream for the boot ROM of TI's C28x
 /// processors: 16-bit little-endian words; key 0x08AA, 8 reserved words, entry point; blocks of a
@@ -52,4 +52,4 @@ bool firmware_runs(Transport& transport, const BootSettings& settings = {});
 void boot(Transport& transport, const FirmwareImage* image, const BootSettings& settings = {},
           const BootReport& report = {});
 
-}  // namespace palpate::runner::falcon
+}  // namespace palpate::runner::devices::falcon

@@ -16,23 +16,24 @@
 #include "protocols/json_document.h"
 #include "runner/devices/falcon/parameters.h"
 
-namespace palpate::runner::falcon {
+namespace palpate::runner::devices::falcon {
 
-void wait_until_homed(Device& device, Clock& clock, Guide& guide) {
+void wait_until_homed(servo::Device& device, servo::Clock& clock, Guide& guide) {
   constexpr std::int64_t kTickNs = 1'000'000;
-  DeviceTrouble announced = DeviceTrouble::none;
+  servo::DeviceTrouble announced = servo::DeviceTrouble::none;
   for (;;) {
     clock.wait_until(clock.now_ns() + kTickNs);
-    const DeviceReading reading = device.read();
+    const servo::DeviceReading reading = device.read();
     device.write(Vec3(0), Vec3(0));
-    if (!reading.lost && reading.trouble == DeviceTrouble::none) return;
-    if (reading.trouble == DeviceTrouble::unplugged ||
-        reading.trouble == DeviceTrouble::guard_lost) {
-      throw GuideError(advice(reading.trouble));
+    if (!reading.lost && reading.trouble == servo::DeviceTrouble::none) return;
+    if (reading.trouble == servo::DeviceTrouble::unplugged ||
+        reading.trouble == servo::DeviceTrouble::guard_lost) {
+      throw GuideError(servo::advice(reading.trouble));
     }
-    if (reading.lost && reading.trouble != announced && reading.trouble != DeviceTrouble::guarded) {
+    if (reading.lost && reading.trouble != announced &&
+        reading.trouble != servo::DeviceTrouble::guarded) {
       announced = reading.trouble;
-      guide.say(device.capabilities().serial + ": " + advice(announced));
+      guide.say(device.capabilities().serial + ": " + servo::advice(announced));
     }
     if (guide.answer() == Guide::Answer::stop) throw GuideError("stopped; nothing was stored");
   }
@@ -276,4 +277,4 @@ CalibrationVerdict judge_pair(const Calibration& calibration, const std::string&
                pair != nullptr ? pair->made_utc : "", pair != nullptr, unix_ns);
 }
 
-}  // namespace palpate::runner::falcon
+}  // namespace palpate::runner::devices::falcon

@@ -11,11 +11,11 @@
 #include "runner/servo/device.h"
 #include "stimuli/vec.h"
 
-namespace palpate::runner::falcon {
+namespace palpate::runner::devices::falcon {
 
 /// Asks the experimenter to pull the grip out and push it in until the device is homed. Zero force.
 /// \throws GuideError if stopped or if the device is unplugged.
-void wait_until_homed(Device& device, Clock& clock, Guide& guide);
+void wait_until_homed(servo::Device& device, servo::Clock& clock, Guide& guide);
 
 /// Force scale of one device, measured with known weights.
 struct ForceCalibration {
@@ -78,4 +78,4 @@ CalibrationVerdict judge_pair(const Calibration& calibration, const std::string&
 /// The more severe state, with both texts.
 CalibrationVerdict both(const CalibrationVerdict& a, const CalibrationVerdict& b);
 
-}  // namespace palpate::runner::falcon
+}  // namespace palpate::runner::devices::falcon

@@ -8,7 +8,7 @@
 
 #include "runner/devices/falcon/kinematics.h"
 
-namespace palpate::runner::falcon {
+namespace palpate::runner::devices::falcon {
 namespace {
 
 constexpr int kMaxImplausible = 5;  // in a row; more: the encoders have lost their reference
@@ -35,7 +35,8 @@ void FalconDriver::restart() noexcept {
 }
 
 void FalconDriver::reopen() {
-  if (reading_.trouble != DeviceTrouble::unplugged && reading_.trouble != DeviceTrouble::silent)
+  if (reading_.trouble != servo::DeviceTrouble::unplugged &&
+      reading_.trouble != servo::DeviceTrouble::silent)
     return;
   transport_->reopen();
   if (settings_.boot) settings_.boot(*transport_);
@@ -72,18 +73,18 @@ const DriverReading& FalconDriver::update() noexcept {
   take_replies(0);
   const bool fresh = std::exchange(fresh_, false);
   if (transport_->gone()) {
-    reading_.trouble = DeviceTrouble::unplugged;
+    reading_.trouble = servo::DeviceTrouble::unplugged;
   } else if (transport_->now_ns() - replied_ns_ > settings_.silence_ns || counts_.replies == 0) {
-    reading_.trouble = DeviceTrouble::silent;
+    reading_.trouble = servo::DeviceTrouble::silent;
   } else if (fresh) {
     reading_.buttons = reply_.buttons;
     if (reply_.all_homed()) {
       locate();
     } else {
-      reading_.trouble = DeviceTrouble::not_homed;
+      reading_.trouble = servo::DeviceTrouble::not_homed;
     }
   } else if (reading_.usable() && waiting_) {
-    reading_.trouble = DeviceTrouble::late;
+    reading_.trouble = servo::DeviceTrouble::late;
   }
   if (!reading_.usable()) located_ = false;
   return reading_;
@@ -100,7 +101,7 @@ void FalconDriver::locate() noexcept {
     ++counts_.implausible;
     // Repeat the last valid position, if any, for a few ticks.
     const bool lost = ++implausible_in_a_row_ >= kMaxImplausible || !located_;
-    reading_.trouble = lost ? DeviceTrouble::implausible : DeviceTrouble::late;
+    reading_.trouble = lost ? servo::DeviceTrouble::implausible : servo::DeviceTrouble::late;
     return;
   }
   implausible_in_a_row_ = 0;
@@ -108,7 +109,7 @@ void FalconDriver::locate() noexcept {
   located_ns_ = replied_ns_;
   located_ = true;
   reading_.position = to_world(falcon_position_ - kCentre);
-  reading_.trouble = DeviceTrouble::none;
+  reading_.trouble = servo::DeviceTrouble::none;
 }
 
 std::array<int, 3> FalconDriver::motors_for(const Vec3& force) noexcept {
@@ -132,7 +133,7 @@ std::array<int, 3> FalconDriver::motors_for(const Vec3& force) noexcept {
 }
 
 bool FalconDriver::send(const std::array<int, 3>& motors) noexcept {
-  const bool homed = reply_.all_homed() && reading_.trouble != DeviceTrouble::silent;
+  const bool homed = reply_.all_homed() && reading_.trouble != servo::DeviceTrouble::silent;
   Command command;
   command.motors = motors;
   command.green = homed;
@@ -191,4 +192,4 @@ double guaranteed_force(double counts_per_torque) {
   return least;
 }
 
-}  // namespace palpate::runner::falcon
+}  // namespace palpate::runner::devices::falcon

@@ -14,7 +14,7 @@
 #include "runner/servo/device.h"
 #include "stimuli/vec.h"
 
-namespace palpate::runner::falcon {
+namespace palpate::runner::devices::falcon {
 
 struct DriverSettings {
   double counts_per_torque = kCountsPerTorque;  ///< 1/(N m); from the calibration
@@ -30,10 +30,12 @@ struct DriverReading {
   Vec3 position;  ///< m, world frame, origin at the device's centre; the last valid one while in
                   ///< trouble
   std::uint8_t buttons = 0;
-  DeviceTrouble trouble = DeviceTrouble::silent;
+  servo::DeviceTrouble trouble = servo::DeviceTrouble::silent;
 
   /// Whether the position is usable: it is new, or the last one repeated because a reply is late.
-  bool usable() const { return trouble == DeviceTrouble::none || trouble == DeviceTrouble::late; }
+  bool usable() const {
+    return trouble == servo::DeviceTrouble::none || trouble == servo::DeviceTrouble::late;
+  }
 };
 
 /// Counts of events on the serial line.
@@ -64,7 +66,7 @@ class FalconDriver {
   const DriverReading& reading() const { return reading_; }
   const DriverCounts& counts() const { return counts_; }
   const std::string& serial() const { return transport_->serial(); }
-  DeviceTimes times() const noexcept { return {located_ns_, sent_ns_}; }
+  servo::DeviceTimes times() const noexcept { return {located_ns_, sent_ns_}; }
   /// Counts sent last, -4095 to 4095.
   const std::array<int, 3>& motors() const { return motors_; }
   double counts_per_torque() const { return settings_.counts_per_torque; }
@@ -98,4 +100,4 @@ class FalconDriver {
 /// The largest force (N) that the motors can render in every direction everywhere in the workspace.
 double guaranteed_force(double counts_per_torque);
 
-}  // namespace palpate::runner::falcon
+}  // namespace palpate::runner::devices::falcon

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-namespace palpate::runner::falcon {
+namespace palpate::runner::devices::falcon {
 
 FalconDevice::FalconDevice(std::unique_ptr<FalconDriver> driver, const std::string& calibration)
     : driver_(std::move(driver)) {
@@ -20,7 +20,7 @@ FalconDevice::FalconDevice(std::unique_ptr<FalconDriver> driver, const std::stri
                    calibration};
 }
 
-DeviceReading FalconDevice::read() noexcept {
+servo::DeviceReading FalconDevice::read() noexcept {
   const DriverReading& at = driver_->update();
   return {{at.position, at.position}, at.buttons, !at.usable(), at.trouble};
 }
@@ -46,15 +46,15 @@ Falcon2Device::Falcon2Device(std::unique_ptr<FalconDriver> tip, std::unique_ptr<
                    calibration};
 }
 
-DeviceReading Falcon2Device::read() noexcept {
+servo::DeviceReading Falcon2Device::read() noexcept {
   const DriverReading& tip = tip_->update();
   const DriverReading& tail = tail_->update();
-  DeviceTrouble trouble = tip.trouble;
-  if (tip.usable() && tail.trouble != DeviceTrouble::none) trouble = tail.trouble;
+  servo::DeviceTrouble trouble = tip.trouble;
+  if (tip.usable() && tail.trouble != servo::DeviceTrouble::none) trouble = tail.trouble;
   lost_ = !tip.usable() || !tail.usable();
   if (!lost_ && !stylus_.update(tip.position, tail.position)) {
     lost_ = true;
-    trouble = DeviceTrouble::apart;
+    trouble = servo::DeviceTrouble::apart;
   }
   return {stylus_.stylus(), static_cast<std::uint8_t>(tip.buttons | tail.buttons << 4), lost_,
           trouble};
@@ -74,4 +74,4 @@ void Falcon2Device::write(const Vec3& device1, const Vec3& device2) noexcept {
   tail_->push(lost_ ? Vec3(0) : stylus_.to_tail_frame(device2));
 }
 
-}  // namespace palpate::runner::falcon
+}  // namespace palpate::runner::devices::falcon

@@ -9,47 +9,49 @@
 #include "runner/devices/falcon/stylus_from_ends.h"
 #include "runner/servo/device.h"
 
-namespace palpate::runner::falcon {
+namespace palpate::runner::devices::falcon {
 
-class FalconDevice final : public Device {
+class FalconDevice final : public servo::Device {
  public:
   /// \param calibration  state of its force calibration, for DeviceCapabilities
   explicit FalconDevice(std::unique_ptr<FalconDriver> driver, const std::string& calibration = "");
 
-  const DeviceCapabilities& capabilities() const override { return capabilities_; }
+  const servo::DeviceCapabilities& capabilities() const override { return capabilities_; }
   /// Tip and tail are both the grip: the device senses no axis.
-  DeviceReading read() noexcept override;
+  servo::DeviceReading read() noexcept override;
   /// Both forces act on the one grip.
   void write(const Vec3& device1, const Vec3& device2) noexcept override;
 
   void reopen() override { driver_->reopen(); }
-  DeviceTimes times() const noexcept override { return driver_->times(); }
+  servo::DeviceTimes times() const noexcept override { return driver_->times(); }
 
   FalconDriver& driver() { return *driver_; }
 
  private:
   std::unique_ptr<FalconDriver> driver_;
-  DeviceCapabilities capabilities_;
+  servo::DeviceCapabilities capabilities_;
 };
 
 // Two Falcons that hold the ends of a stylus, like the two Phantoms of Ho, Basdogan & Srinivasan
 // (2000), section 2: five degrees of freedom, sensed and actuated. World frame: the tip's device.
 
-class Falcon2Device final : public Device {
+class Falcon2Device final : public servo::Device {
  public:
   Falcon2Device(std::unique_ptr<FalconDriver> tip, std::unique_ptr<FalconDriver> tail,
                 const StylusFromEnds& stylus, const std::string& calibration = "");
 
-  const DeviceCapabilities& capabilities() const override { return capabilities_; }
+  const servo::DeviceCapabilities& capabilities() const override { return capabilities_; }
   /// Lost if either device is lost or the distance of the ends differs from the stylus' length.
   /// Buttons of the tip's grip are bits 0 to 3, of the tail's 4 to 7.
-  DeviceReading read() noexcept override;
+  servo::DeviceReading read() noexcept override;
   /// \param device1, device2  N, world frame: eq. (1)'s forces at tip and tail.
   void write(const Vec3& device1, const Vec3& device2) noexcept override;
 
   /// Both ends command zero force during that time.
   void reopen() override;
-  DeviceTimes times() const noexcept override { return later_of(tip_->times(), tail_->times()); }
+  servo::DeviceTimes times() const noexcept override {
+    return servo::later_of(tip_->times(), tail_->times());
+  }
 
   FalconDriver& tip() { return *tip_; }
   FalconDriver& tail() { return *tail_; }
@@ -58,8 +60,8 @@ class Falcon2Device final : public Device {
  private:
   std::unique_ptr<FalconDriver> tip_, tail_;
   StylusFromEnds stylus_;
-  DeviceCapabilities capabilities_;
+  servo::DeviceCapabilities capabilities_;
   bool lost_ = true;
 };
 
-}  // namespace palpate::runner::falcon
+}  // namespace palpate::runner::devices::falcon

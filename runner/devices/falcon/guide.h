@@ -6,7 +6,7 @@
 #include <stdexcept>
 #include <string>
 
-namespace palpate::runner::falcon {
+namespace palpate::runner::devices::falcon {
 
 /// Shows texts and questions, and polls for answers.
 class Guide {
@@ -25,4 +25,4 @@ class GuideError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-}  // namespace palpate::runner::falcon
+}  // namespace palpate::runner::devices::falcon

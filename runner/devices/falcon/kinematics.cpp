@@ -6,7 +6,7 @@
 
 #include "runner/devices/falcon/parameters.h"
 
-namespace palpate::runner::falcon {
+namespace palpate::runner::devices::falcon {
 namespace {
 
 constexpr double kMaxStep = 0.02;     // m; beyond it the linear model is too inaccurate
@@ -133,4 +133,4 @@ double force_in_every_direction(const Vec3& position, double max_torque) noexcep
                                 glm::length(j.columns[2])});
 }
 
-}  // namespace palpate::runner::falcon
+}  // namespace palpate::runner::devices::falcon

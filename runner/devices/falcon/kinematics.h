@@ -12,7 +12,7 @@
 
 #include "stimuli/vec.h"
 
-namespace palpate::runner::falcon {
+namespace palpate::runner::devices::falcon {
 
 /// Joint angles of a leg, rad.
 struct LegAngles {
@@ -53,4 +53,4 @@ Vec3 force_of(const Jacobian& j, const Vec3& torque) noexcept;
 /// `max_torque` (N m); 0: out of reach.
 double force_in_every_direction(const Vec3& position, double max_torque) noexcept;
 
-}  // namespace palpate::runner::falcon
+}  // namespace palpate::runner::devices::falcon

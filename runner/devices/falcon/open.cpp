@@ -16,7 +16,7 @@
 #include "runner/devices/falcon/parameters.h"
 #include "runner/devices/falcon/usb.h"
 
-namespace palpate::runner::falcon {
+namespace palpate::runner::devices::falcon {
 namespace {
 
 std::int64_t unix_ns() {
@@ -34,7 +34,7 @@ std::optional<FirmwareImage> image_in(const std::string& path) {
 
 /// \throws InputError if the calibration has no registration of these two.
 const PairRegistration& registration_in(const Calibration& calibration,
-                                        const DeviceConfig& config) {
+                                        const servo::DeviceConfig& config) {
   const std::string &tip = config.serials[0], &tail = config.serials[1];
   if (const PairRegistration* pair = calibration.pair_of(tip, tail)) return *pair;
   throw protocols::InputError(
@@ -67,8 +67,8 @@ std::string summary_of(const CalibrationVerdict& verdict) {
   return "";
 }
 
-DeviceCapabilities nominal(const char* name, int freedom) {
-  DeviceCapabilities can;
+servo::DeviceCapabilities nominal(const char* name, int freedom) {
+  servo::DeviceCapabilities can;
   can.name = name;
   can.sensed_freedom = can.actuated_freedom = freedom;
   can.max_stiffness = kMaxStiffness;
@@ -92,11 +92,15 @@ void show_progress(const std::string& serial, const BootProgress& progress) {
 
 }  // namespace
 
-DeviceCapabilities nominal_falcon(const DeviceConfig& /*config*/) { return nominal("falcon", 3); }
-DeviceCapabilities nominal_falcon2(const DeviceConfig& /*config*/) { return nominal("falcon2", 5); }
+servo::DeviceCapabilities nominal_falcon(const servo::DeviceConfig& /*config*/) {
+  return nominal("falcon", 3);
+}
+servo::DeviceCapabilities nominal_falcon2(const servo::DeviceConfig& /*config*/) {
+  return nominal("falcon2", 5);
+}
 
-std::vector<ConnectedDevice> connected_falcons(const DeviceConfig& /*config*/) {
-  std::vector<ConnectedDevice> connected;
+std::vector<servo::ConnectedDevice> connected_falcons(const servo::DeviceConfig& /*config*/) {
+  std::vector<servo::ConnectedDevice> connected;
   for (UsbListing& listing : list_usb()) {
     connected.push_back({std::move(listing.serial), std::move(listing.trouble)});
   }
@@ -126,7 +130,7 @@ std::unique_ptr<FalconDriver> open_driver(const std::string& serial, const std::
   return std::make_unique<FalconDriver>(std::move(line), settings);
 }
 
-void check_falcon(const DeviceConfig& config) {
+void check_falcon(const servo::DeviceConfig& config) {
   if (config.serials.size() > 1) {
     throw std::invalid_argument("falcon is one device; " + std::to_string(config.serials.size()) +
                                 " serial numbers are given");
@@ -135,7 +139,7 @@ void check_falcon(const DeviceConfig& config) {
   image_in(config.firmware);
 }
 
-void check_falcon2(const DeviceConfig& config) {
+void check_falcon2(const servo::DeviceConfig& config) {
   if (config.serials.size() != 2 || config.serials[0] == config.serials[1]) {
     throw std::invalid_argument(
         "falcon2 needs the serial numbers of two Falcons: first the one at the stylus' tip, then "
@@ -145,7 +149,7 @@ void check_falcon2(const DeviceConfig& config) {
   image_in(config.firmware);
 }
 
-std::unique_ptr<Device> open_falcon(const DeviceConfig& config) {
+std::unique_ptr<servo::Device> open_falcon(const servo::DeviceConfig& config) {
   const Calibration calibration = calibration_in(config.calibration);
   auto driver =
       open_driver(config.serials.empty() ? "" : config.serials[0], config.firmware, calibration);
@@ -153,7 +157,7 @@ std::unique_ptr<Device> open_falcon(const DeviceConfig& config) {
   return std::make_unique<FalconDevice>(std::move(driver), known);
 }
 
-std::unique_ptr<Device> open_falcon2(const DeviceConfig& config) {
+std::unique_ptr<servo::Device> open_falcon2(const servo::DeviceConfig& config) {
   const Calibration calibration = calibration_in(config.calibration);
   const PairRegistration& pair = registration_in(calibration, config);
   auto tip = open_driver(config.serials[0], config.firmware, calibration);
@@ -163,4 +167,4 @@ std::unique_ptr<Device> open_falcon2(const DeviceConfig& config) {
       std::move(tip), std::move(tail), StylusFromEnds(pair.tail_in_tip, pair.stylus_length), known);
 }
 
-}  // namespace palpate::runner::falcon
+}  // namespace palpate::runner::devices::falcon

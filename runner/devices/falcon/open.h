@@ -11,26 +11,26 @@
 #include "runner/devices/falcon/driver.h"
 #include "runner/servo/device.h"
 
-namespace palpate::runner::falcon {
+namespace palpate::runner::devices::falcon {
 
 /// Connected Falcons. \throws TransportError if USB cannot be used.
-std::vector<ConnectedDevice> connected_falcons(const DeviceConfig& config);
+std::vector<servo::ConnectedDevice> connected_falcons(const servo::DeviceConfig& config);
 
 /// See DeviceKind::nominal.
-DeviceCapabilities nominal_falcon(const DeviceConfig& config);
-DeviceCapabilities nominal_falcon2(const DeviceConfig& config);
+servo::DeviceCapabilities nominal_falcon(const servo::DeviceConfig& config);
+servo::DeviceCapabilities nominal_falcon2(const servo::DeviceConfig& config);
 
 /// See DeviceKind::check.
-void check_falcon(const DeviceConfig& config);
-void check_falcon2(const DeviceConfig& config);
+void check_falcon(const servo::DeviceConfig& config);
+void check_falcon2(const servo::DeviceConfig& config);
 
 /// One Falcon. Its capabilities' `calibration` is empty if none is stored. It begins with "stale"
 /// if too old, with "implausible" if its scale is not used. \throws TransportError, InputError.
-std::unique_ptr<Device> open_falcon(const DeviceConfig& config);
+std::unique_ptr<servo::Device> open_falcon(const servo::DeviceConfig& config);
 
 /// The two Falcons of config.serials, the one at the stylus' tip first. config.calibration must
 /// have their registration. \throws TransportError, InputError.
-std::unique_ptr<Device> open_falcon2(const DeviceConfig& config);
+std::unique_ptr<servo::Device> open_falcon2(const servo::DeviceConfig& config);
 
 /// State of all calibrations that these devices need. Two serial numbers are a pair, tip and tail.
 /// \param path  empty: none. \throws InputError.
@@ -42,4 +42,4 @@ CalibrationVerdict judge_calibration(const std::string& path,
 std::unique_ptr<FalconDriver> open_driver(const std::string& serial, const std::string& firmware,
                                           const Calibration& calibration);
 
-}  // namespace palpate::runner::falcon
+}  // namespace palpate::runner::devices::falcon

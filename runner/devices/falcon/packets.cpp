@@ -4,7 +4,7 @@
 
 #include "runner/devices/falcon/parameters.h"
 
-namespace palpate::runner::falcon {
+namespace palpate::runner::devices::falcon {
 namespace {
 
 constexpr std::uint8_t kBegin = '<', kEnd = '>', kZero = 'A';
@@ -96,4 +96,4 @@ std::optional<Packet> PacketStream::take(std::uint8_t byte) noexcept {
   return packet_;
 }
 
-}  // namespace palpate::runner::falcon
+}  // namespace palpate::runner::devices::falcon

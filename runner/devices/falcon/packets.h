@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <optional>
 
-namespace palpate::runner::falcon {
+namespace palpate::runner::devices::falcon {
 
 using Packet = std::array<std::uint8_t, 16>;
 
@@ -52,4 +52,4 @@ class PacketStream {
   std::uint64_t dropped_ = 0;
 };
 
-}  // namespace palpate::runner::falcon
+}  // namespace palpate::runner::devices::falcon

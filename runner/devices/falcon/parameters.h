@@ -7,7 +7,7 @@
 
 #include "stimuli/vec.h"
 
-namespace palpate::runner::falcon {
+namespace palpate::runner::devices::falcon {
 
 // Lengths of the legs, m: a delta of Clavel's type with Stamper's parallelograms.
 inline constexpr double kThigh = 0.0600;             ///< a
@@ -57,4 +57,4 @@ inline constexpr std::uint8_t kInEndpoint = 0x81, kOutEndpoint = 0x02;
 constexpr Vec3 to_world(const Vec3& v) { return {v.x, -v.z, v.y}; }
 constexpr Vec3 from_world(const Vec3& v) { return {v.x, v.z, -v.y}; }
 
-}  // namespace palpate::runner::falcon
+}  // namespace palpate::runner::devices::falcon

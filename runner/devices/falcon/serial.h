@@ -8,7 +8,7 @@
 #include <span>
 #include <string>
 
-namespace palpate::runner::falcon {
+namespace palpate::runner::devices::falcon {
 
 inline constexpr std::size_t kMaxSerial = 32;  ///< characters
 
@@ -27,4 +27,4 @@ inline std::string clean_serial(std::span<const std::uint8_t> text) {
   return any ? clean : "";
 }
 
-}  // namespace palpate::runner::falcon
+}  // namespace palpate::runner::devices::falcon

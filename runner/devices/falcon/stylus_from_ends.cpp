@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-namespace palpate::runner::falcon {
+namespace palpate::runner::devices::falcon {
 namespace {
 
 constexpr std::int64_t kTickNs = 1'000'000;
@@ -21,7 +21,7 @@ constexpr double kMostResidual = 0.003;  // m; above it a point was wrong
 
 class Procedure {
  public:
-  Procedure(Device& tip, Device& tail, Clock& clock, Guide& guide)
+  Procedure(servo::Device& tip, servo::Device& tail, servo::Clock& clock, Guide& guide)
       : tip_(tip), tail_(tail), clock_(clock), guide_(guide), due_ns_(clock.now_ns()) {}
 
   /// Repeats the request until a valid point was taken.
@@ -51,12 +51,12 @@ class Procedure {
     return {free_position(tip_), free_position(tail_)};
   }
 
-  static Vec3 free_position(Device& device) {
-    const DeviceReading reading = device.read();
+  static Vec3 free_position(servo::Device& device) {
+    const servo::DeviceReading reading = device.read();
     device.write(Vec3(0), Vec3(0));
     // The guard has commanded zero force: harmless, as no force is used here.
-    if (reading.lost && reading.trouble != DeviceTrouble::guarded) {
-      throw GuideError(device.capabilities().serial + ": " + advice(reading.trouble));
+    if (reading.lost && reading.trouble != servo::DeviceTrouble::guarded) {
+      throw GuideError(device.capabilities().serial + ": " + servo::advice(reading.trouble));
     }
     return reading.stylus.tip;
   }
@@ -84,16 +84,16 @@ class Procedure {
     return answer == Guide::Answer::go_on;
   }
 
-  Device &tip_, &tail_;
-  Clock& clock_;
+  servo::Device &tip_, &tail_;
+  servo::Clock& clock_;
   Guide& guide_;
   std::int64_t due_ns_;
 };
 
 }  // namespace
 
-PairRegistration register_pair(Device& tip, Device& tail, Clock& clock, Guide& guide,
-                               const RegistrationSettings& settings) {
+PairRegistration register_pair(servo::Device& tip, servo::Device& tail, servo::Clock& clock,
+                               Guide& guide, const RegistrationSettings& settings) {
   Procedure procedure(tip, tail, clock, guide);
   guide.say(glm::length(settings.offset) == 0
                 ? "Pin the two grips together, centre on centre."
@@ -127,9 +127,9 @@ PairRegistration register_pair(Device& tip, Device& tail, Clock& clock, Guide& g
   return pair;
 }
 
-}  // namespace palpate::runner::falcon
+}  // namespace palpate::runner::devices::falcon
 
-namespace palpate::runner {
+namespace palpate::runner::devices {
 namespace {
 
 constexpr std::size_t kLeastPoints = 4;
@@ -203,4 +203,4 @@ Vec3 StylusFromEnds::to_tail_frame(const Vec3& force) const {
   return glm::conjugate(tail_in_tip_.orientation) * force;
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::devices

@@ -11,7 +11,7 @@
 #include "runner/servo/device.h"
 #include "stimuli/vec.h"
 
-namespace palpate::runner {
+namespace palpate::runner::devices {
 
 /// One point in the frames of both devices, m.
 struct PairedPoint {
@@ -66,9 +66,9 @@ class StylusFromEnds {
   int wrong_ = kMaxWrong;  // no valid reading yet
 };
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::devices
 
-namespace palpate::runner::falcon {
+namespace palpate::runner::devices::falcon {
 
 // Registration: the relative pose of two Falcons that hold a stylus, from points that both have
 // visited.
@@ -84,7 +84,7 @@ struct RegistrationSettings {
 
 /// The whole guided procedure; zero force. \throws GuideError, RegistrationError.
 /// \param tip, tail  one Falcon each
-PairRegistration register_pair(Device& tip, Device& tail, Clock& clock, Guide& guide,
-                               const RegistrationSettings& settings);
+PairRegistration register_pair(servo::Device& tip, servo::Device& tail, servo::Clock& clock,
+                               Guide& guide, const RegistrationSettings& settings);
 
-}  // namespace palpate::runner::falcon
+}  // namespace palpate::runner::devices::falcon

@@ -8,7 +8,7 @@
 #include <stdexcept>
 #include <string>
 
-namespace palpate::runner::falcon {
+namespace palpate::runner::devices::falcon {
 
 /// The line cannot be used; what() gives the reason and the remedy.
 class TransportError : public std::runtime_error {
@@ -62,4 +62,4 @@ class Transport {
   virtual std::int64_t now_ns() noexcept = 0;
 };
 
-}  // namespace palpate::runner::falcon
+}  // namespace palpate::runner::devices::falcon

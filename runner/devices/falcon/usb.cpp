@@ -9,7 +9,7 @@
 #include "runner/devices/falcon/parameters.h"
 #include "runner/devices/falcon/usb_context.h"
 
-namespace palpate::runner::falcon {
+namespace palpate::runner::devices::falcon {
 namespace {
 
 constexpr std::size_t kPacket = 64;         // bytes, of both bulk endpoints
@@ -241,4 +241,4 @@ std::unique_ptr<Transport> open_usb(const std::string& serial) {
   return std::make_unique<UsbTransport>(serial);
 }
 
-}  // namespace palpate::runner::falcon
+}  // namespace palpate::runner::devices::falcon

@@ -9,7 +9,7 @@
 
 #include "runner/devices/falcon/transport.h"
 
-namespace palpate::runner::falcon {
+namespace palpate::runner::devices::falcon {
 
 /// A connected Falcon.
 struct UsbListing {
@@ -45,4 +45,4 @@ std::unique_ptr<HotplugListener> listen_for_hotplug();
 /// The message for a libusb error code, with the remedy. \param what  e.g. "cannot open the Falcon"
 std::string usb_error(const std::string& what, int code);
 
-}  // namespace palpate::runner::falcon
+}  // namespace palpate::runner::devices::falcon

@@ -7,7 +7,7 @@
 
 #include "runner/devices/falcon/usb.h"
 
-namespace palpate::runner::falcon {
+namespace palpate::runner::devices::falcon {
 
 using UsbContext = std::unique_ptr<libusb_context, decltype(&libusb_exit)>;
 using UsbHandle = std::unique_ptr<libusb_device_handle, decltype(&libusb_close)>;
@@ -20,4 +20,4 @@ std::vector<UsbDevice> falcons_on(libusb_context* context);
 /// Opens a Falcon; nullptr: it cannot be opened, and `listing.trouble` has the reason.
 UsbHandle open_listed(libusb_device* device, UsbListing& listing);
 
-}  // namespace palpate::runner::falcon
+}  // namespace palpate::runner::devices::falcon

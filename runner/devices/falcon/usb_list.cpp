@@ -6,7 +6,7 @@
 #include "runner/devices/falcon/serial.h"
 #include "runner/devices/falcon/usb_context.h"
 
-namespace palpate::runner::falcon {
+namespace palpate::runner::devices::falcon {
 namespace {
 
 /// The USB port, which identifies a device without a serial number across re-plugging.
@@ -143,4 +143,4 @@ std::unique_ptr<HotplugListener> listen_for_hotplug() {
   return std::make_unique<LibusbHotplugListener>();
 }
 
-}  // namespace palpate::runner::falcon
+}  // namespace palpate::runner::devices::falcon

@@ -2,7 +2,7 @@
 
 #include "runner/devices/falcon/usb.h"
 
-namespace palpate::runner::falcon {
+namespace palpate::runner::devices::falcon {
 namespace {
 [[noreturn]] void refuse() {
   throw TransportError(
@@ -16,4 +16,4 @@ std::unique_ptr<Transport> open_usb(const std::string& /*serial*/) { refuse(); }
 std::unique_ptr<HotplugListener> listen_for_hotplug() { refuse(); }
 std::string usb_error(const std::string& what, int /*code*/) { return what; }
 
-}  // namespace palpate::runner::falcon
+}  // namespace palpate::runner::devices::falcon

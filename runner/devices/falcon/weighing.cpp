@@ -8,7 +8,7 @@
 
 #include "runner/devices/falcon/parameters.h"
 
-namespace palpate::runner::falcon {
+namespace palpate::runner::devices::falcon {
 namespace {
 
 constexpr double kTick = 1e-3;  // s
@@ -55,7 +55,7 @@ class PositionController {
 
 class Procedure {
  public:
-  Procedure(Device& device, Clock& clock, Guide& guide)
+  Procedure(servo::Device& device, servo::Clock& clock, Guide& guide)
       : device_(device), clock_(clock), guide_(guide), due_ns_(clock.now_ns()) {}
   ~Procedure() {
     // Send several: a single zero command could be skipped while a reply is pending.
@@ -120,7 +120,7 @@ class Procedure {
 
   static double centimetres(double metres) { return std::round(metres * 1000) / 10; }
 
-  DeviceReading next_reading() {
+  servo::DeviceReading next_reading() {
     // Do not make up for missed ticks.
     due_ns_ = std::max(due_ns_ + kTickNs, clock_.now_ns());
     clock_.wait_until(due_ns_);
@@ -129,13 +129,13 @@ class Procedure {
 
   /// nullopt: a guard process has just cut off forces; a zero command re-enables them.
   std::optional<Vec3> position() {
-    const DeviceReading reading = next_reading();
-    if (reading.trouble == DeviceTrouble::guarded) {
+    const servo::DeviceReading reading = next_reading();
+    if (reading.trouble == servo::DeviceTrouble::guarded) {
       ++interrupted_;
       device_.write(Vec3(0), Vec3(0));
       return std::nullopt;
     }
-    if (reading.lost) throw GuideError(advice(reading.trouble));
+    if (reading.lost) throw GuideError(servo::advice(reading.trouble));
     return reading.stylus.tip;
   }
 
@@ -167,8 +167,8 @@ class Procedure {
     return answer == Guide::Answer::go_on;
   }
 
-  Device& device_;
-  Clock& clock_;
+  servo::Device& device_;
+  servo::Clock& clock_;
   Guide& guide_;
   std::int64_t due_ns_;
   std::optional<PositionController> controller_;
@@ -222,7 +222,7 @@ ForceCalibration fit_scale(const std::vector<Weighing>& weighings) {
   return force;
 }
 
-ForceCalibration weigh(Device& device, Clock& clock, Guide& guide,
+ForceCalibration weigh(servo::Device& device, servo::Clock& clock, Guide& guide,
                        const WeighingSettings& settings) {
   Procedure procedure(device, clock, guide);
   procedure.start_at_centre();
@@ -240,4 +240,4 @@ ForceCalibration weigh(Device& device, Clock& clock, Guide& guide,
   return force;
 }
 
-}  // namespace palpate::runner::falcon
+}  // namespace palpate::runner::devices::falcon

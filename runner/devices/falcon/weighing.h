@@ -9,7 +9,7 @@
 #include "runner/devices/falcon/guide.h"
 #include "runner/servo/device.h"
 
-namespace palpate::runner::falcon {
+namespace palpate::runner::devices::falcon {
 
 struct WeighingSettings {
   std::vector<double> weights = {0.1, 0.2, 0.4};  ///< kg, each hung at the grip in turn
@@ -33,7 +33,7 @@ ForceCalibration fit_scale(const std::vector<Weighing>& weighings);
 /// The whole guided procedure, at 1 kHz. Zero force before and after.
 /// \param device  one Falcon, opened with its nominal scale; a guard process should own it
 /// \throws GuideError if stopped, if the device is lost, or if the grip drifts away.
-ForceCalibration weigh(Device& device, Clock& clock, Guide& guide,
+ForceCalibration weigh(servo::Device& device, servo::Clock& clock, Guide& guide,
                        const WeighingSettings& settings);
 
-}  // namespace palpate::runner::falcon
+}  // namespace palpate::runner::devices::falcon

@@ -10,7 +10,7 @@
 #include "data/base/text.h"
 #include "runner/servo/realtime.h"
 
-namespace palpate::runner::forcedimension {
+namespace palpate::runner::devices::forcedimension {
 namespace {
 
 constexpr double kWatchdogStep = 125e-6;       // s; at most 255 of them
@@ -38,8 +38,8 @@ const Model& model_of(std::string name) {
   return kUnknown;
 }
 
-DeviceCapabilities capabilities_of(const Model& model, bool wrist, bool active_wrist) {
-  DeviceCapabilities can;
+servo::DeviceCapabilities capabilities_of(const Model& model, bool wrist, bool active_wrist) {
+  servo::DeviceCapabilities can;
   can.name = "forcedimension";
   can.sensed_freedom = wrist ? 5 : 3;
   // Do not drive torque without a known limit.
@@ -100,7 +100,7 @@ int count_of(const Library& library) {
 
 }  // namespace
 
-ForceDimensionDevice::ForceDimensionDevice(const DeviceConfig& config)
+ForceDimensionDevice::ForceDimensionDevice(const servo::DeviceConfig& config)
     : config_(config), library_(config.library) {
   open();
 }
@@ -174,7 +174,7 @@ void ForceDimensionDevice::open() {
   pushed_ = false;
   asked_ns_ = 0;
   until_status_ = 0;
-  status_ = write_trouble_ = DeviceTrouble::none;
+  status_ = write_trouble_ = servo::DeviceTrouble::none;
 }
 
 void ForceDimensionDevice::close() noexcept {
@@ -193,40 +193,40 @@ void ForceDimensionDevice::reopen() {
   open();
 }
 
-DeviceTrouble ForceDimensionDevice::last_error() const noexcept {
+servo::DeviceTrouble ForceDimensionDevice::last_error() const noexcept {
   switch (library_.error_get_last()) {
     case kCommunication:
     case kNoDevice:
-      return DeviceTrouble::unplugged;
+      return servo::DeviceTrouble::unplugged;
     case kDeviceInUse:
-      return DeviceTrouble::in_use;
+      return servo::DeviceTrouble::in_use;
     case kTimeOut:
     default:
-      return DeviceTrouble::silent;
+      return servo::DeviceTrouble::silent;
   }
 }
 
-DeviceTrouble ForceDimensionDevice::trouble_of_status() noexcept {
+servo::DeviceTrouble ForceDimensionDevice::trouble_of_status() noexcept {
   std::array<int, kStatusRoom> status{};
   if (library_.get_status(status.data(), *id_) < 0) return last_error();
-  if (status[kConnected] == 0) return DeviceTrouble::unplugged;
-  if (status[kPower] == 0) return DeviceTrouble::silent;
-  if (status[kReset] != 0) return DeviceTrouble::not_calibrated;
+  if (status[kConnected] == 0) return servo::DeviceTrouble::unplugged;
+  if (status[kPower] == 0) return servo::DeviceTrouble::silent;
+  if (status[kReset] != 0) return servo::DeviceTrouble::not_calibrated;
   const bool stopped = status[kForce] == 0 || status[kError] != 0;
   // It was calibrated just now, or has received no command since it was opened: enable forces, with
   // zero force until the servo commands another.
-  if (status_ == DeviceTrouble::not_calibrated || (stopped && !pushed_)) {
+  if (status_ == servo::DeviceTrouble::not_calibrated || (stopped && !pushed_)) {
     library_.set_force_and_torque(0, 0, 0, 0, 0, 0, *id_);
-    return library_.enable_force(1, *id_) < 0 ? last_error() : DeviceTrouble::none;
+    return library_.enable_force(1, *id_) < 0 ? last_error() : servo::DeviceTrouble::none;
   }
-  return stopped ? DeviceTrouble::stopped_by_device : DeviceTrouble::none;
+  return stopped ? servo::DeviceTrouble::stopped_by_device : servo::DeviceTrouble::none;
 }
 
 bool ForceDimensionDevice::plausible(const Vec3& position, const Vec3& axis,
                                      std::int64_t asked_ns) noexcept {
   // Measure from before the last reading to after this one: a busy machine may stop the thread
   // anywhere.
-  const std::int64_t now = RealClock().now_ns();
+  const std::int64_t now = servo::RealClock().now_ns();
   const double elapsed = asked_ns_ > 0 ? static_cast<double>(now - asked_ns_) * 1e-9 : 1;
   const double moved = glm::length(position - tip_);
   tip_ = position;
@@ -244,29 +244,30 @@ bool ForceDimensionDevice::plausible(const Vec3& position, const Vec3& axis,
   return moved <= kMaxSpeed * elapsed + kJump || elapsed >= 1;
 }
 
-DeviceReading ForceDimensionDevice::read() noexcept {
-  DeviceTrouble trouble = DeviceTrouble::unplugged;
+servo::DeviceReading ForceDimensionDevice::read() noexcept {
+  servo::DeviceTrouble trouble = servo::DeviceTrouble::unplugged;
   std::uint8_t buttons = 0;
   if (id_) {
     double x = 0, y = 0, z = 0, frame[3][3] = {};
-    const std::int64_t asked_ns = RealClock().now_ns();
+    const std::int64_t asked_ns = servo::RealClock().now_ns();
     if (library_.get_position_and_frame(&x, &y, &z, frame, *id_) < 0) {
       trouble = last_error();
     } else {
       pose_ns_ = asked_ns;
       trouble = write_trouble_;
-      if (--until_status_ < 0 || status_ != DeviceTrouble::none) {
+      if (--until_status_ < 0 || status_ != servo::DeviceTrouble::none) {
         until_status_ = static_cast<int>(kStatusPeriod * config_.rate);
         status_ = trouble_of_status();
       }
-      if (trouble == DeviceTrouble::none) trouble = status_;
+      if (trouble == servo::DeviceTrouble::none) trouble = status_;
       const Vec3 along(frame[0][0], frame[1][0], frame[2][0]);
       const bool possible = plausible(to_world({x, y, z}), to_world(along), asked_ns);
-      if (trouble == DeviceTrouble::none && !possible) trouble = DeviceTrouble::implausible;
+      if (trouble == servo::DeviceTrouble::none && !possible)
+        trouble = servo::DeviceTrouble::implausible;
       buttons = static_cast<std::uint8_t>(library_.get_button_mask(*id_));
     }
   }
-  lost_ = trouble != DeviceTrouble::none;
+  lost_ = trouble != servo::DeviceTrouble::none;
   return {{tip_, tail_}, buttons, lost_, trouble};
 }
 
@@ -278,29 +279,29 @@ void ForceDimensionDevice::write(const Vec3& device1, const Vec3& device2) noexc
   pushed_ = pushed_ || force != Vec3(0) || torque != Vec3(0);
   const Vec3 f = from_world(force), t = from_world(torque);
   const bool taken = library_.set_force_and_torque(f.x, f.y, f.z, t.x, t.y, t.z, *id_) >= 0;
-  force_ns_ = RealClock().now_ns();
-  write_trouble_ = taken ? DeviceTrouble::none : last_error();
+  force_ns_ = servo::RealClock().now_ns();
+  write_trouble_ = taken ? servo::DeviceTrouble::none : last_error();
 }
 
-void check(const DeviceConfig& config) {
+void check(const servo::DeviceConfig& config) {
   if (config.serials.size() > 1)
     throw std::invalid_argument("forcedimension is one device; " +
                                 std::to_string(config.serials.size()) +
                                 " serial numbers are given");
 }
 
-DeviceCapabilities nominal(const DeviceConfig& /*config*/) {
-  DeviceCapabilities can = capabilities_of(kModels[0], true, false);
+servo::DeviceCapabilities nominal(const servo::DeviceConfig& /*config*/) {
+  servo::DeviceCapabilities can = capabilities_of(kModels[0], true, false);
   can.max_force = 0;
   return can;
 }
 
-std::vector<ConnectedDevice> connected(const DeviceConfig& config) {
+std::vector<servo::ConnectedDevice> connected(const servo::DeviceConfig& config) {
   const Library library(config.library);
   const int count = count_of(library);
   if (count < 0)
     throw std::runtime_error("Force Dimension devices cannot be counted: " + error_text(library));
-  std::vector<ConnectedDevice> out;
+  std::vector<servo::ConnectedDevice> out;
   for (int index = 0; index < count; ++index) {
     try {
       const Found device = open_one(library, index);
@@ -313,8 +314,8 @@ std::vector<ConnectedDevice> connected(const DeviceConfig& config) {
   return out;
 }
 
-std::unique_ptr<Device> open(const DeviceConfig& config) {
+std::unique_ptr<servo::Device> open(const servo::DeviceConfig& config) {
   return std::make_unique<ForceDimensionDevice>(config);
 }
 
-}  // namespace palpate::runner::forcedimension
+}  // namespace palpate::runner::devices::forcedimension

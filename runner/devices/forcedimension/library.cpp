@@ -8,7 +8,7 @@
 #include <stdexcept>
 #include <vector>
 
-namespace palpate::runner::forcedimension {
+namespace palpate::runner::devices::forcedimension {
 namespace {
 
 namespace fs = std::filesystem;
@@ -104,4 +104,4 @@ std::string Library::version() const {
          std::to_string(revision);
 }
 
-}  // namespace palpate::runner::forcedimension
+}  // namespace palpate::runner::devices::forcedimension

@@ -6,7 +6,7 @@
 #include <memory>
 #include <string>
 
-namespace palpate::runner::forcedimension {
+namespace palpate::runner::devices::forcedimension {
 
 /// `id` is the number returned on opening a device. Negative results are errors unless stated
 /// otherwise. SI units; frame: x to the user, y right, z up.
@@ -59,4 +59,4 @@ inline constexpr int kStatusRoom = 64;  ///< 16 or 17 are written, by version
 /// Places in the status.
 inline constexpr int kPower = 0, kConnected = 1, kReset = 3, kForce = 5, kError = 9;
 
-}  // namespace palpate::runner::forcedimension
+}  // namespace palpate::runner::devices::forcedimension

@@ -8,7 +8,7 @@
 
 #include "runner/devices/haply/link.h"
 
-namespace palpate::runner::haply {
+namespace palpate::runner::devices::haply {
 namespace {
 
 namespace asio = boost::asio;
@@ -142,4 +142,4 @@ std::string get(const std::string& service, const std::string& target) {
   return reply.get().result() == http::status::ok ? reply.get().body() : "";
 }
 
-}  // namespace palpate::runner::haply
+}  // namespace palpate::runner::devices::haply

@@ -9,7 +9,7 @@
 #include "data/base/text.h"
 #include "runner/servo/realtime.h"
 
-namespace palpate::runner::haply {
+namespace palpate::runner::devices::haply {
 namespace {
 
 constexpr std::int64_t kExchange_ns = 250'000;
@@ -27,7 +27,7 @@ constexpr int kMostUnanswered = 20;                   // zeros sent to such a se
 // A reseller's numbers; the reach is the limit in the maker's tutorials.
 constexpr double kMaxForce = 4, kMaxStiffness = 1000, kReach = 0.1, kResolution = 1e-5;
 
-std::string service_of(const DeviceConfig& config) {
+std::string service_of(const servo::DeviceConfig& config) {
   return config.service.empty() ? kService : config.service;
 }
 
@@ -43,8 +43,8 @@ Inventory inventory_of(Link& link) {
   return parse_inventory(message);
 }
 
-DeviceCapabilities capabilities_of(bool grip) {
-  DeviceCapabilities can;
+servo::DeviceCapabilities capabilities_of(bool grip) {
+  servo::DeviceCapabilities can;
   can.name = "inverse3";
   can.sensed_freedom = grip ? 5 : 3;
   can.actuated_freedom = 3;
@@ -67,7 +67,7 @@ Pump::~Pump() {
 }
 
 void Pump::push(const Vec3& force) noexcept {
-  wanted_.write({force.x, force.y, force.z, RealClock().now_ns()});
+  wanted_.write({force.x, force.y, force.z, servo::RealClock().now_ns()});
 }
 
 const Pump::Newest& Pump::newest() noexcept {
@@ -76,8 +76,8 @@ const Pump::Newest& Pump::newest() noexcept {
 }
 
 void Pump::run() noexcept {
-  request_realtime({84, false, -1, false});  // below the guard, which reads it
-  RealClock clock;
+  servo::request_realtime({84, false, -1, false});  // below the guard, which reads it
+  servo::RealClock clock;
   std::int64_t due = clock.now_ns();
   try {
     exchange(true);
@@ -101,8 +101,8 @@ void Pump::run() noexcept {
 }
 
 void Pump::give_up() noexcept {
-  last_.trouble = DeviceTrouble::service_gone;
-  last_.time_ns = RealClock().now_ns();
+  last_.trouble = servo::DeviceTrouble::service_gone;
+  last_.time_ns = servo::RealClock().now_ns();
   newest_.write(last_);
 }
 
@@ -130,7 +130,7 @@ std::optional<Pump::Reply> Pump::receive() {
 }
 
 void Pump::exchange(bool first) {
-  RealClock clock;
+  servo::RealClock clock;
   Wanted wanted;
   while (!wanted_.read(wanted)) {
   }
@@ -144,12 +144,12 @@ void Pump::exchange(bool first) {
   }
   const std::optional<Reply> reply = receive();
   if (!reply) return;
-  const DeviceTrouble before = last_.trouble;
+  const servo::DeviceTrouble before = last_.trouble;
   last_ = {reply->state, asked_ns, clock.now_ns(), before};
   if (!reply->state.has_arm) {
-    last_.trouble = DeviceTrouble::unplugged;
-  } else if (before == DeviceTrouble::unplugged) {
-    last_.trouble = DeviceTrouble::none;
+    last_.trouble = servo::DeviceTrouble::unplugged;
+  } else if (before == servo::DeviceTrouble::unplugged) {
+    last_.trouble = servo::DeviceTrouble::none;
   }
   watch(force, reply->hash);
   newest_.write(last_);
@@ -165,7 +165,7 @@ void Pump::watch(const Vec3& sent, std::size_t hash) noexcept {
   last_message_ = hash;
   // If hand and force do not change, neither need the state.
   if (sent_changed_ && last_.time_ns - changed_ns_ > kStale_ns)
-    last_.trouble = DeviceTrouble::silent;
+    last_.trouble = servo::DeviceTrouble::silent;
   const double size = glm::length(sent);
   const bool heeded = !finite(last_.state.force) || size < kFelt ||
                       glm::length(last_.state.force) >= kHeeded * size;
@@ -175,11 +175,11 @@ void Pump::watch(const Vec3& sent, std::size_t hash) noexcept {
     unanswered_ns_ = last_.time_ns;
   } else if (last_.time_ns - unanswered_ns_ > kUnheeded_ns) {
     misunderstood_.store(true);
-    last_.trouble = DeviceTrouble::stopped_by_device;
+    last_.trouble = servo::DeviceTrouble::stopped_by_device;
   }
 }
 
-Inverse3Device::Inverse3Device(const DeviceConfig& config, bool grip)
+Inverse3Device::Inverse3Device(const servo::DeviceConfig& config, bool grip)
     : config_(config), may_have_grip_(grip), period_ns_(1e9 / config.rate) {
   open();
 }
@@ -232,7 +232,7 @@ void Inverse3Device::open() {
   }
   asked_ns_ = 0;
   // Wait for a first state.
-  RealClock clock;
+  servo::RealClock clock;
   const std::int64_t give_up = clock.now_ns() + 2'000'000'000;
   while (pump_->newest().time_ns == 0 && clock.now_ns() < give_up)
     clock.wait_until(clock.now_ns() + 1'000'000);
@@ -261,25 +261,27 @@ bool Inverse3Device::plausible(const Pump::Newest& newest) noexcept {
   return elapsed >= 1 || moved <= kMaxSpeed * elapsed + kJump;
 }
 
-DeviceReading Inverse3Device::read() noexcept {
+servo::DeviceReading Inverse3Device::read() noexcept {
   if (!pump_) {
     lost_ = true;
-    return {{tip_, tail_}, 0, true, DeviceTrouble::service_gone};
+    return {{tip_, tail_}, 0, true, servo::DeviceTrouble::service_gone};
   }
   const Pump::Newest newest = pump_->newest();
   pose_ns_ = newest.asked_ns;
-  const std::int64_t age = RealClock().now_ns() - newest.time_ns;
-  DeviceTrouble trouble = newest.trouble;
-  if (trouble == DeviceTrouble::none && (newest.time_ns == 0 || age > kSilent_ns))
-    trouble = DeviceTrouble::silent;
-  if (trouble == DeviceTrouble::none && !newest.state.powered) trouble = DeviceTrouble::silent;
-  if (trouble == DeviceTrouble::none && !newest.state.calibrated)
-    trouble = DeviceTrouble::not_calibrated;
-  if (trouble == DeviceTrouble::none && has_grip_ && !newest.state.has_grip)
-    trouble = DeviceTrouble::silent;
-  if (trouble == DeviceTrouble::none && !plausible(newest)) trouble = DeviceTrouble::implausible;
-  lost_ = trouble != DeviceTrouble::none;
-  if (!lost_ && static_cast<double>(age) > 2 * period_ns_) trouble = DeviceTrouble::late;
+  const std::int64_t age = servo::RealClock().now_ns() - newest.time_ns;
+  servo::DeviceTrouble trouble = newest.trouble;
+  if (trouble == servo::DeviceTrouble::none && (newest.time_ns == 0 || age > kSilent_ns))
+    trouble = servo::DeviceTrouble::silent;
+  if (trouble == servo::DeviceTrouble::none && !newest.state.powered)
+    trouble = servo::DeviceTrouble::silent;
+  if (trouble == servo::DeviceTrouble::none && !newest.state.calibrated)
+    trouble = servo::DeviceTrouble::not_calibrated;
+  if (trouble == servo::DeviceTrouble::none && has_grip_ && !newest.state.has_grip)
+    trouble = servo::DeviceTrouble::silent;
+  if (trouble == servo::DeviceTrouble::none && !plausible(newest))
+    trouble = servo::DeviceTrouble::implausible;
+  lost_ = trouble != servo::DeviceTrouble::none;
+  if (!lost_ && static_cast<double>(age) > 2 * period_ns_) trouble = servo::DeviceTrouble::late;
   return {{tip_, tail_}, newest.state.buttons, lost_, trouble};
 }
 
@@ -289,24 +291,24 @@ void Inverse3Device::write(const Vec3& device1, const Vec3& device2) noexcept {
   pump_->push(lost_ || !finite(force) ? Vec3(0) : force);
 }
 
-void check(const DeviceConfig& config) {
+void check(const servo::DeviceConfig& config) {
   if (config.serials.size() > 1)
     throw std::invalid_argument("inverse3 is one device; " + std::to_string(config.serials.size()) +
                                 " serial numbers are given");
 }
 
-DeviceCapabilities nominal(const DeviceConfig& /*config*/) {
-  DeviceCapabilities can = capabilities_of(true);
+servo::DeviceCapabilities nominal(const servo::DeviceConfig& /*config*/) {
+  servo::DeviceCapabilities can = capabilities_of(true);
   can.max_force = 0;
   return can;
 }
 
-std::vector<ConnectedDevice> connected(const DeviceConfig& config) {
+std::vector<servo::ConnectedDevice> connected(const servo::DeviceConfig& config) {
   const std::string service = service_of(config);
   try {
     parse_version(get(service, "/version"));
     const std::unique_ptr<Link> link = connect(service);
-    std::vector<ConnectedDevice> out;
+    std::vector<servo::ConnectedDevice> out;
     for (const Listed& arm : inventory_of(*link).arms)
       out.push_back({arm.id, arm.in_use ? "another program commands it: end that program" : ""});
     return out;
@@ -315,12 +317,12 @@ std::vector<ConnectedDevice> connected(const DeviceConfig& config) {
   }
 }
 
-std::unique_ptr<Device> open(const DeviceConfig& config) {
+std::unique_ptr<servo::Device> open(const servo::DeviceConfig& config) {
   return std::make_unique<Inverse3Device>(config);
 }
 
-std::unique_ptr<Device> open_point(const DeviceConfig& config) {
+std::unique_ptr<servo::Device> open_point(const servo::DeviceConfig& config) {
   return std::make_unique<Inverse3Device>(config, false);
 }
 
-}  // namespace palpate::runner::haply
+}  // namespace palpate::runner::devices::haply

@@ -17,7 +17,7 @@
 #include "runner/servo/shared_value.h"
 #include "runner/servo/triple_buffer.h"
 
-namespace palpate::runner::haply {
+namespace palpate::runner::devices::haply {
 
 inline constexpr const char* kService = "127.0.0.1:10001";
 
@@ -33,7 +33,7 @@ class Pump {
   struct Newest {
     State state;
     std::int64_t asked_ns = 0, time_ns = 0;  ///< CLOCK_MONOTONIC, of its arrival; 0: none yet
-    DeviceTrouble trouble = DeviceTrouble::none;
+    servo::DeviceTrouble trouble = servo::DeviceTrouble::none;
   };
 
   Pump(std::unique_ptr<Link> link, const Settings& settings);
@@ -68,8 +68,8 @@ class Pump {
 
   std::unique_ptr<Link> link_;
   const Settings settings_;
-  SharedValue<Wanted> wanted_;
-  TripleBuffer<Newest> newest_;
+  servo::SharedValue<Wanted> wanted_;
+  servo::TripleBuffer<Newest> newest_;
   Newest seen_;  ///< the reader's
   std::atomic<bool> quit_{false}, misunderstood_{false};
   std::atomic<std::int64_t> force_ns_{0};  ///< DeviceTimes
@@ -84,25 +84,27 @@ class Pump {
   std::thread thread_;
 };
 
-class Inverse3Device final : public Device {
+class Inverse3Device final : public servo::Device {
  public:
   /// \throws std::runtime_error with the obstacle
   /// \param grip  whether to sense the axis of a Verse Grip, if there is one
-  explicit Inverse3Device(const DeviceConfig& config, bool grip = true);
+  explicit Inverse3Device(const servo::DeviceConfig& config, bool grip = true);
 
-  const DeviceCapabilities& capabilities() const override { return capabilities_; }
+  const servo::DeviceCapabilities& capabilities() const override { return capabilities_; }
   /// Never waits. The stylus has its tip at the arm's cursor; without a grip tip and tail are one.
-  DeviceReading read() noexcept override;
+  servo::DeviceReading read() noexcept override;
   void write(const Vec3& device1, const Vec3& device2) noexcept override;
   void reopen() override;
-  DeviceTimes times() const noexcept override { return {pose_ns_, pump_ ? pump_->force_ns() : 0}; }
+  servo::DeviceTimes times() const noexcept override {
+    return {pose_ns_, pump_ ? pump_->force_ns() : 0};
+  }
 
  private:
   void open();
   bool plausible(const Pump::Newest& newest) noexcept;
 
-  DeviceConfig config_;
-  DeviceCapabilities capabilities_;
+  servo::DeviceConfig config_;
+  servo::DeviceCapabilities capabilities_;
   bool other_dialect_ = false;  ///< use the dialect that the version does not suggest
   bool may_have_grip_, has_grip_ = false;
   double period_ns_;
@@ -114,11 +116,11 @@ class Inverse3Device final : public Device {
 };
 
 /// See DeviceKind.
-void check(const DeviceConfig& config);
-DeviceCapabilities nominal(const DeviceConfig& config);
-std::vector<ConnectedDevice> connected(const DeviceConfig& config);
-std::unique_ptr<Device> open(const DeviceConfig& config);
+void check(const servo::DeviceConfig& config);
+servo::DeviceCapabilities nominal(const servo::DeviceConfig& config);
+std::vector<servo::ConnectedDevice> connected(const servo::DeviceConfig& config);
+std::unique_ptr<servo::Device> open(const servo::DeviceConfig& config);
 /// Opens it without the axis of a grip.
-std::unique_ptr<Device> open_point(const DeviceConfig& config);
+std::unique_ptr<servo::Device> open_point(const servo::DeviceConfig& config);
 
-}  // namespace palpate::runner::haply
+}  // namespace palpate::runner::devices::haply

@@ -7,7 +7,7 @@
 #include <string>
 #include <string_view>
 
-namespace palpate::runner::haply {
+namespace palpate::runner::devices::haply {
 
 /// The connection has ended or cannot be made; what() gives the reason.
 struct LinkError : std::runtime_error {
@@ -29,4 +29,4 @@ std::unique_ptr<Link> connect(const std::string& service);
 /// The body of the reply; empty: the status is not 200. \throws LinkError
 std::string get(const std::string& service, const std::string& target);
 
-}  // namespace palpate::runner::haply
+}  // namespace palpate::runner::devices::haply

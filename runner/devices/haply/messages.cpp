@@ -11,7 +11,7 @@
 
 #include "data/base/json_text.h"
 
-namespace palpate::runner::haply {
+namespace palpate::runner::devices::haply {
 namespace {
 
 using Json = nlohmann::json;
@@ -207,4 +207,4 @@ std::string command(const std::string& arm, const Vec3& force, Dialect dialect, 
   return {out.data(), static_cast<std::size_t>(size)};
 }
 
-}  // namespace palpate::runner::haply
+}  // namespace palpate::runner::devices::haply

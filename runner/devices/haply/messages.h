@@ -10,7 +10,7 @@
 
 #include "stimuli/vec.h"
 
-namespace palpate::runner::haply {
+namespace palpate::runner::devices::haply {
 
 /// The key under which a service expects a force. The service ignores unknown keys without an
 /// error.
@@ -59,4 +59,4 @@ State parse_state(std::string_view message, const std::string& arm, const std::s
 /// A command with a force on the hand, N. \param first  with the session's configuration
 std::string command(const std::string& arm, const Vec3& force, Dialect dialect, bool first);
 
-}  // namespace palpate::runner::haply
+}  // namespace palpate::runner::devices::haply

@@ -6,7 +6,7 @@
 #include <type_traits>
 #include <vector>
 
-namespace palpate::runner::touch {
+namespace palpate::runner::devices::touch {
 namespace {
 
 void* load(const std::string& path) {
@@ -64,4 +64,4 @@ Library::Library(const std::string& path) {
         missing);
 }
 
-}  // namespace palpate::runner::touch
+}  // namespace palpate::runner::devices::touch

@@ -4,7 +4,7 @@
 
 #include <string>
 
-namespace palpate::runner::touch {
+namespace palpate::runner::devices::touch {
 
 using Handle = unsigned;
 inline constexpr Handle kNoHandle = 0xFFFFFFFF;
@@ -57,4 +57,4 @@ inline constexpr unsigned kButtons = 0x2000, kPosition = 0x2050, kTransform = 0x
 inline constexpr unsigned kWarm = 0x0200, kTooFast = 0x0203, kFault = 0x0300, kInUse = 0x0301,
                           kCommunication = 0x0302, kLicence = 0x0600;
 
-}  // namespace palpate::runner::touch
+}  // namespace palpate::runner::devices::touch

@@ -11,7 +11,7 @@
 #include "data/base/text.h"
 #include "runner/servo/realtime.h"
 
-namespace palpate::runner::touch {
+namespace palpate::runner::devices::touch {
 namespace {
 
 constexpr unsigned long kSchedulerRate = 1000;      // Hz
@@ -56,8 +56,8 @@ std::string why_not_opened(const Library& library, unsigned code) {
          "and run the maker's setup";
 }
 
-DeviceCapabilities capabilities_of() {
-  DeviceCapabilities can;
+servo::DeviceCapabilities capabilities_of() {
+  servo::DeviceCapabilities can;
   can.name = "touch";
   can.sensed_freedom = 5;
   can.actuated_freedom = 3;
@@ -71,7 +71,7 @@ DeviceCapabilities capabilities_of() {
 
 }  // namespace
 
-TouchDevice::TouchDevice(const DeviceConfig& config)
+TouchDevice::TouchDevice(const servo::DeviceConfig& config)
     : config_(config),
       library_(Library::get(config.library)),
       silence_ns_(1e9 * std::max(0.005, 5 / config.rate)) {
@@ -112,7 +112,7 @@ void TouchDevice::open() {
   wanted_.write({});
   seen_ = {};
   frames_.write(seen_);
-  trouble_ = DeviceTrouble::none;
+  trouble_ = servo::DeviceTrouble::none;
   asked_ns_ = trouble_ns_ = until_calibration_ = 0;
   calibrated_ = true;
   scheduled_ = library_.schedule(called, this, kPriority);
@@ -120,7 +120,7 @@ void TouchDevice::open() {
   library_.start();
   ++running();
   // Wait for a first reading.
-  RealClock clock;
+  servo::RealClock clock;
   const std::int64_t give_up = clock.now_ns() + 500'000'000;
   while (seen_.time_ns == 0 && clock.now_ns() < give_up) {
     clock.wait_until(clock.now_ns() + 1'000'000);
@@ -153,31 +153,31 @@ unsigned TouchDevice::called(void* device) noexcept {
   return 1;  // call again
 }
 
-DeviceTrouble TouchDevice::errors() noexcept {
-  DeviceTrouble out = DeviceTrouble::none;
+servo::DeviceTrouble TouchDevice::errors() noexcept {
+  servo::DeviceTrouble out = servo::DeviceTrouble::none;
   for (int i = 0; i < kMostErrors; ++i) {
     const unsigned code = library_.get_error().code;
     if (code == 0) break;
     if (code == kFault || code == kCommunication) {
-      out = DeviceTrouble::unplugged;
-    } else if (code >= kWarm && code <= kTooFast && out == DeviceTrouble::none) {
-      out = DeviceTrouble::stopped_by_device;
-    } else if (out == DeviceTrouble::none) {
-      out = DeviceTrouble::silent;
+      out = servo::DeviceTrouble::unplugged;
+    } else if (code >= kWarm && code <= kTooFast && out == servo::DeviceTrouble::none) {
+      out = servo::DeviceTrouble::stopped_by_device;
+    } else if (out == servo::DeviceTrouble::none) {
+      out = servo::DeviceTrouble::silent;
     }
   }
   return out;
 }
 
 void TouchDevice::exchange() noexcept {
-  RealClock clock;
+  servo::RealClock clock;
   const std::int64_t now = clock.now_ns();
   Frame frame;
   Wanted wanted;
   const bool whole = wanted_.read(wanted);
   Vec3 force(wanted.x, wanted.y, wanted.z);
   const auto age = static_cast<double>(now - wanted.time_ns);
-  if (!whole || age > silence_ns_ || !finite(force) || trouble_ != DeviceTrouble::none)
+  if (!whole || age > silence_ns_ || !finite(force) || trouble_ != servo::DeviceTrouble::none)
     force = Vec3(0);
   std::array<double, 3> at{}, newtons{};
   std::array<double, 16> transform{};  // column-major
@@ -205,12 +205,12 @@ void TouchDevice::exchange() noexcept {
     }
     calibrated_ = found == kCalibrated;
   }
-  DeviceTrouble trouble = errors();
-  if (trouble != DeviceTrouble::none) {
+  servo::DeviceTrouble trouble = errors();
+  if (trouble != servo::DeviceTrouble::none) {
     trouble_ = trouble;
     trouble_ns_ = now;
   } else if (now - trouble_ns_ > kTroubleLasts) {
-    trouble_ = DeviceTrouble::none;
+    trouble_ = servo::DeviceTrouble::none;
   }
   frame.position = to_world({at[0] * 1e-3, at[1] * 1e-3, at[2] * 1e-3});
   frame.axis = to_world({transform[8], transform[9], transform[10]});
@@ -218,8 +218,8 @@ void TouchDevice::exchange() noexcept {
   frame.asked_ns = now;
   frame.time_ns = clock.now_ns();
   frame.trouble = trouble_;
-  if (frame.trouble == DeviceTrouble::none && !calibrated_)
-    frame.trouble = DeviceTrouble::not_calibrated;
+  if (frame.trouble == servo::DeviceTrouble::none && !calibrated_)
+    frame.trouble = servo::DeviceTrouble::not_calibrated;
   frames_.write(frame);
 }
 
@@ -240,52 +240,53 @@ bool TouchDevice::plausible(const Frame& frame) noexcept {
   return elapsed >= 1 || moved <= kMaxSpeed * elapsed + kJump;
 }
 
-DeviceReading TouchDevice::read() noexcept {
+servo::DeviceReading TouchDevice::read() noexcept {
   const bool fresh = frames_.read(seen_);
-  const std::int64_t age = RealClock().now_ns() - seen_.time_ns;
-  DeviceTrouble trouble = seen_.trouble;
-  if (handle_ == kNoHandle) trouble = DeviceTrouble::unplugged;
-  if (trouble == DeviceTrouble::none && age > kSilent_ns) trouble = DeviceTrouble::silent;
-  if (trouble == DeviceTrouble::none && (fresh || lost_) && !plausible(seen_))
-    trouble = DeviceTrouble::implausible;
-  lost_ = trouble != DeviceTrouble::none;
-  if (!lost_ && static_cast<double>(age) > 2e9 / config_.rate) trouble = DeviceTrouble::late;
+  const std::int64_t age = servo::RealClock().now_ns() - seen_.time_ns;
+  servo::DeviceTrouble trouble = seen_.trouble;
+  if (handle_ == kNoHandle) trouble = servo::DeviceTrouble::unplugged;
+  if (trouble == servo::DeviceTrouble::none && age > kSilent_ns)
+    trouble = servo::DeviceTrouble::silent;
+  if (trouble == servo::DeviceTrouble::none && (fresh || lost_) && !plausible(seen_))
+    trouble = servo::DeviceTrouble::implausible;
+  lost_ = trouble != servo::DeviceTrouble::none;
+  if (!lost_ && static_cast<double>(age) > 2e9 / config_.rate) trouble = servo::DeviceTrouble::late;
   return {{tip_, tail_}, seen_.buttons, lost_, trouble};
 }
 
 void TouchDevice::write(const Vec3& device1, const Vec3& device2) noexcept {
   Vec3 force = device1 + device2;
   if (lost_ || !finite(force)) force = Vec3(0);
-  wanted_.write({force.x, force.y, force.z, RealClock().now_ns()});
+  wanted_.write({force.x, force.y, force.z, servo::RealClock().now_ns()});
 }
 
-void check(const DeviceConfig& config) {
+void check(const servo::DeviceConfig& config) {
   if (config.serials.size() > 1)
     throw std::invalid_argument("touch is one device; " + std::to_string(config.serials.size()) +
                                 " serial numbers are given");
 }
 
-DeviceCapabilities nominal(const DeviceConfig& /*config*/) {
-  DeviceCapabilities can = capabilities_of();
+servo::DeviceCapabilities nominal(const servo::DeviceConfig& /*config*/) {
+  servo::DeviceCapabilities can = capabilities_of();
   can.max_force = 0;
   return can;
 }
 
-std::vector<ConnectedDevice> connected(const DeviceConfig& config) {
+std::vector<servo::ConnectedDevice> connected(const servo::DeviceConfig& config) {
   Library::get(config.library);
-  std::vector<ConnectedDevice> out;
+  std::vector<servo::ConnectedDevice> out;
   const char* const home = std::getenv("GTDD_HOME");
   if (home == nullptr || *home == '\0') return {{"", ""}};  // perhaps the default device
   std::error_code error;                                    // an unreadable folder counts as empty
   for (const auto& file :
        std::filesystem::directory_iterator(std::filesystem::path(home) / "config", error))
     if (file.path().extension() == ".config") out.push_back({file.path().stem().string(), ""});
-  std::ranges::sort(out, {}, &ConnectedDevice::serial);
+  std::ranges::sort(out, {}, &servo::ConnectedDevice::serial);
   return out;
 }
 
-std::unique_ptr<Device> open(const DeviceConfig& config) {
+std::unique_ptr<servo::Device> open(const servo::DeviceConfig& config) {
   return std::make_unique<TouchDevice>(config);
 }
 
-}  // namespace palpate::runner::touch
+}  // namespace palpate::runner::devices::touch

@@ -7,7 +7,7 @@
 #include <glm/geometric.hpp>
 #include <limits>
 
-namespace palpate::runner {
+namespace palpate::runner::display {
 namespace {
 
 constexpr float kFieldOfView = 0.45F;                // rad, vertical
@@ -102,4 +102,4 @@ glm::vec3 Camera::unproject(const glm::vec2& pixel, const glm::vec3& depth_of) c
   return {glm::inverse(view()) * seen};
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::display

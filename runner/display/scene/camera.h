@@ -5,7 +5,7 @@
 #include <glm/vec3.hpp>
 #include <span>
 
-namespace palpate::runner {
+namespace palpate::runner::display {
 
 /// The camera of a picture of a scene: z is up, and initially y points away from the camera (the
 /// frame of rendering/README.md). Points are in the virtual frame, m; pixels from the picture's
@@ -49,4 +49,4 @@ class Camera {
   glm::vec3 centre_{0, 0, 0};        ///< m
 };
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::display

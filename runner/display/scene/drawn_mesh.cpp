@@ -15,7 +15,7 @@
 #include "stimuli/solids/gmsh_file.h"
 #include "stimuli/solids/solid_mesh.h"
 
-namespace palpate::runner {
+namespace palpate::runner::display {
 namespace {
 
 constexpr std::size_t kMostFileBytes = std::size_t{1} << 31;
@@ -195,4 +195,4 @@ DrawnMesh unit_sphere() {
   return out;
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::display

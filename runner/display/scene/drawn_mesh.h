@@ -12,7 +12,7 @@
 #include "stimuli/convex_mesh.h"
 #include "stimuli/shapes.h"
 
-namespace palpate::runner {
+namespace palpate::runner::display {
 
 struct DrawnVertex {
   glm::vec3 position;  ///< m
@@ -45,4 +45,4 @@ DrawnMesh unit_cylinder();  ///< radius 1, from z = 0 to z = 1, without ends
 DrawnMesh unit_cone();      ///< radius 1 at z = 0, apex at z = 1
 DrawnMesh unit_sphere();    ///< radius 1
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::display

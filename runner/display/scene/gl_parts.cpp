@@ -16,7 +16,7 @@
 #include "runner/display/scene/picture.h"
 #include "runner/display/scene/scene_renderer.h"
 
-namespace palpate::runner {
+namespace palpate::runner::display {
 
 // A line of text as an image, set by Pango.
 
@@ -398,4 +398,4 @@ void GlDepthMap::read_as(int unit) const {
   glActiveTexture(GL_TEXTURE0);
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::display

@@ -12,7 +12,7 @@
 #include "runner/display/scene/drawn_mesh.h"
 #include "runner/display/scene/picture.h"
 
-namespace palpate::runner {
+namespace palpate::runner::display {
 
 /// \throws DisplayError if the current context is too old to draw scenes
 void require_opengl();
@@ -139,4 +139,4 @@ class GlText {
   const Theme* theme_ = nullptr;
 };
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::display

@@ -8,7 +8,7 @@
 #include <cstring>
 #include <stdexcept>
 
-namespace palpate::runner {
+namespace palpate::runner::display {
 namespace {
 
 constexpr float kWebpQuality = 82;
@@ -83,4 +83,4 @@ std::string WebpAnimation::finish(double seconds) {
   return out;
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::display

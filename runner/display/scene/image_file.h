@@ -4,7 +4,7 @@
 #include <memory>
 #include <string>
 
-namespace palpate::runner {
+namespace palpate::runner::display {
 
 /// \param pixels  rows from the top, three bytes a pixel: red, green, blue \throws
 /// std::runtime_error
@@ -29,4 +29,4 @@ class WebpAnimation {
   std::unique_ptr<Encoder> encoder_;
 };
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::display

@@ -11,7 +11,7 @@
 #include "runner/display/scene/picture.h"
 #include "runner/display/scene/scene_renderer.h"
 
-namespace palpate::runner {
+namespace palpate::runner::display {
 
 // OpenGL without a display.
 
@@ -119,4 +119,4 @@ std::unique_ptr<ScenePainter> make_painter(int width, int height) {
   return std::make_unique<OffscreenPainter>(width, height);
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::display

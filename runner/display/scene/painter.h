@@ -7,7 +7,7 @@
 #include "runner/display/scene/camera.h"
 #include "runner/display/scene/picture.h"
 
-namespace palpate::runner {
+namespace palpate::runner::display {
 
 /// Draws into memory, in the thread that created it. All functions throw DisplayError or
 /// std::runtime_error if the driver or a library fails.
@@ -31,4 +31,4 @@ class ScenePainter {
 /// no suitable driver; the message names the remedy
 std::unique_ptr<ScenePainter> make_painter(int width, int height);
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::display

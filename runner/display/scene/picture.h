@@ -13,7 +13,7 @@
 
 #include "runner/display/scene/drawn_mesh.h"
 
-namespace palpate::runner {
+namespace palpate::runner::display {
 
 /// No window can be opened or no picture drawn: not built in, no display, or an unsuitable one.
 class DisplayError : public std::runtime_error {
@@ -93,4 +93,4 @@ struct ScenePicture {
   std::optional<glm::vec4> cut;
 };
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::display

@@ -14,7 +14,7 @@
 #include "runner/display/scene/picture.h"
 #include "stimuli/shapes.h"
 
-namespace palpate::runner {
+namespace palpate::runner::display {
 
 const Theme& light_theme() {
   static const Theme theme{.above = {0.87F, 0.90F, 0.93F},
@@ -150,11 +150,11 @@ DrawnTool placed(const rendering::Tool& tool, const rendering::LineProbe& stylus
 
 }  // namespace
 
-DrawnTool tool_in_hand(const rendering::Tool& tool, const Sample& sample) {
+DrawnTool tool_in_hand(const rendering::Tool& tool, const servo::Sample& sample) {
   return placed(tool, sample.probe, sample.rendering.ideal_side);
 }
 
-DrawnTool ideal_tool(const rendering::Tool& tool, const Sample& sample) {
+DrawnTool ideal_tool(const rendering::Tool& tool, const servo::Sample& sample) {
   if (sample.rendering.contacts == 0) return tool_in_hand(tool, sample);
   return placed(tool, sample.rendering.ideal, sample.rendering.ideal_side);
 }
@@ -234,7 +234,7 @@ double turn_scale(const SceneDrawingSettings& settings) {
 
 std::string caption_of(const SceneMoment& moment, double grid) {
   char text[160];
-  const Sample& sample = moment.sample;
+  const servo::Sample& sample = moment.sample;
   const double force = glm::length(sample.device1 + sample.device2);
   const double torque = glm::length(torque_on_hand(moment));
   const bool large = torque >= 1;
@@ -246,12 +246,12 @@ std::string caption_of(const SceneMoment& moment, double grid) {
 
 }  // namespace
 
-std::vector<ContactPlace> contact_places(const rendering::Scene& scene,
-                                         const rendering::RenderState& state,
-                                         const rendering::Rendering& rendering) {
+std::vector<servo::ContactPlace> contact_places(const rendering::Scene& scene,
+                                                const rendering::RenderState& state,
+                                                const rendering::Rendering& rendering) {
   constexpr std::size_t kMostPlaces = 1024;
-  std::vector<ContactPlace> out(kMostPlaces);
-  out.resize(find_contact_places(scene, state, rendering, out));
+  std::vector<servo::ContactPlace> out(kMostPlaces);
+  out.resize(servo::find_contact_places(scene, state, rendering, out));
   return out;
 }
 
@@ -456,7 +456,7 @@ void SceneDrawing::add_objects(const SceneMoment& moment, const SceneDrawingSett
 
 void SceneDrawing::add_tool(const SceneMoment& moment, const Theme& theme,
                             const SceneDrawingSettings& settings, ScenePicture& out) const {
-  const Sample& sample = moment.sample;
+  const servo::Sample& sample = moment.sample;
   if (!finite(sample.probe.tip) || !finite(sample.probe.tail)) return;
   const bool touching = sample.rendering.contacts > 0 && finite(sample.rendering.ideal.tip) &&
                         finite(sample.rendering.ideal.tail);
@@ -493,7 +493,7 @@ void SceneDrawing::add_tool(const SceneMoment& moment, const Theme& theme,
 void SceneDrawing::add_forces(const SceneMoment& moment, const Theme& theme,
                               const SceneDrawingSettings& settings, ScenePicture& out) const {
   const double scale = arrow_scale(settings, size_);
-  for (const ContactPlace& contact : moment.contacts) {
+  for (const servo::ContactPlace& contact : moment.contacts) {
     const double force = glm::length(contact.force);
     if (!finite(contact.place) || !std::isfinite(force)) continue;
     out.balls.push_back(
@@ -544,4 +544,4 @@ ScenePicture SceneDrawing::picture(const SceneMoment& moment, const Theme& theme
   return out;
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::display

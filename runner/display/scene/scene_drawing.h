@@ -21,7 +21,7 @@
 #include "runner/servo/touched_places.h"
 #include "stimuli/shapes.h"
 
-namespace palpate::runner {
+namespace palpate::runner::display {
 
 /// A label in a picture. Pixels from the upper left corner.
 struct LabelBox {
@@ -62,16 +62,16 @@ struct DrawnTool {
 
 /// The tool in the hand: at the stylus, with the roll of the ideal tool (they differ only by its
 /// lag).
-DrawnTool tool_in_hand(const rendering::Tool& tool, const Sample& sample);
+DrawnTool tool_in_hand(const rendering::Tool& tool, const servo::Sample& sample);
 
 /// The ideal tool of the deepest contact; in free space that in the hand.
-DrawnTool ideal_tool(const rendering::Tool& tool, const Sample& sample);
+DrawnTool ideal_tool(const rendering::Tool& tool, const servo::Sample& sample);
 
 /// All contact places of a tick. In a scene with a rigid moving object: the deepest only, with the
 /// total force. \param state  after the tick
-std::vector<ContactPlace> contact_places(const rendering::Scene& scene,
-                                         const rendering::RenderState& state,
-                                         const rendering::Rendering& rendering);
+std::vector<servo::ContactPlace> contact_places(const rendering::Scene& scene,
+                                                const rendering::RenderState& state,
+                                                const rendering::Rendering& rendering);
 
 /// Poses of the objects after a tick. Empty if none moves.
 std::vector<Pose> object_poses(const std::vector<stimuli::ObjectSpec>& objects,
@@ -89,8 +89,8 @@ std::vector<std::shared_ptr<const SoftSurfaceNow>> soft_surfaces(
 
 /// The parts of one tick that a picture shows.
 struct SceneMoment {
-  Sample sample;
-  std::vector<ContactPlace> contacts;
+  servo::Sample sample;
+  std::vector<servo::ContactPlace> contacts;
   /// The stylus in the hand, if the virtual one reaches farther.
   std::optional<rendering::LineProbe> held = std::nullopt;
   std::vector<Pose> poses = {};  ///< of the objects that may have moved; empty: as in the scene
@@ -178,4 +178,4 @@ class SceneDrawing {
 /// component about the stylus.
 Vec3 torque_on_hand(const SceneMoment& moment);
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::display

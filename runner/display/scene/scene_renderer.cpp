@@ -11,7 +11,7 @@
 #include "runner/display/scene/picture.h"
 #include "runner/display/scene/scene_drawing.h"
 
-namespace palpate::runner {
+namespace palpate::runner::display {
 namespace {
 
 // In sizes of the scene.
@@ -357,4 +357,4 @@ unsigned SceneRenderer::draw(const ScenePicture& picture, const Camera& camera, 
   return canvas_.texture();
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::display

@@ -12,7 +12,7 @@
 #include "runner/display/scene/gl_parts.h"
 #include "runner/display/scene/picture.h"
 
-namespace palpate::runner::shaders {
+namespace palpate::runner::display::shaders {
 
 // The shaders of scene_renderer.cpp. Light is summed in linear colours and written as sRGB.
 
@@ -131,9 +131,9 @@ uniform sampler2D text;
 out vec4 result;
 void main() { result = texture(text, at); })";
 
-}  // namespace palpate::runner::shaders
+}  // namespace palpate::runner::display::shaders
 
-namespace palpate::runner {
+namespace palpate::runner::display {
 
 struct DrawingQuality {
   int samples = 4;        ///< a pixel
@@ -197,4 +197,4 @@ class SceneRenderer {
   glm::mat4 lamp_view_{1}, sky_view_{1};
 };
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::display

@@ -27,8 +27,9 @@ std::vector<fs::path> studies(const std::string& folder) {
 
 TEST(AboutFile, IsReadAsItIsWritten) {
   EXPECT_GE(studies("good").size(), 3U);
-  for (const fs::path& file : studies("good")) EXPECT_NO_THROW(read_about_file(file)) << file;
-  const data::StudyAbout about = read_about_file(kStudies + "good/everything.json");
+  for (const fs::path& file : studies("good"))
+    EXPECT_NO_THROW(commands::read_about_file(file)) << file;
+  const data::StudyAbout about = commands::read_about_file(kStudies + "good/everything.json");
   ASSERT_EQ(about.authors.size(), 3U);
   EXPECT_EQ(about.authors[0].name, "Example, Ada");
   EXPECT_EQ(about.authors[0].affiliation, "Universität Beispielstadt");
@@ -37,7 +38,8 @@ TEST(AboutFile, IsReadAsItIsWritten) {
   EXPECT_EQ(about.funding[1].grant, "BCS-0000001");
   EXPECT_EQ(about.doi, "10.5281/zenodo.1234");
   EXPECT_EQ(data::license_url(about), "https://spdx.org/licenses/CC-BY-4.0.html");
-  const data::StudyAbout other = read_about_file(kStudies + "good/license-by-address.json");
+  const data::StudyAbout other =
+      commands::read_about_file(kStudies + "good/license-by-address.json");
   EXPECT_EQ(data::license_url(other), "https://example.org/license");
   EXPECT_EQ(data::doi_url(other), "");
 }
@@ -49,7 +51,7 @@ TEST(AboutFile, NamesEveryFaultOfBadFiles) {
     std::ifstream lines(fs::path(file).replace_extension(".faults"));
     for (std::string line; std::getline(lines, line);) expected.push_back(line);
     try {
-      read_about_file(file);
+      commands::read_about_file(file);
       ADD_FAILURE() << file << " is accepted";
     } catch (const protocols::InputError& error) {
       for (const protocols::Fault& fault : error.faults()) found.push_back(fault.location);
@@ -70,9 +72,10 @@ TEST(AboutFile, EveryWrongDigitOfAnOrcidIsFound) {
       const std::string text =
           R"({"version": 1, "authors": [{"name": "A", "orcid": ")" + changed + R"("}]})";
       if (changed == good) {
-        EXPECT_NO_THROW(read_about_text(text, "study.json"));
+        EXPECT_NO_THROW(commands::read_about_text(text, "study.json"));
       } else {
-        EXPECT_THROW(read_about_text(text, "study.json"), protocols::InputError) << changed;
+        EXPECT_THROW(commands::read_about_text(text, "study.json"), protocols::InputError)
+            << changed;
       }
     }
   }

@@ -21,8 +21,8 @@ class ExportCommand : public ::testing::Test {
   }
   std::string usage_error(const std::vector<std::string>& words) {
     try {
-      runner::export_command(words);
-    } catch (const runner::UsageError& error) {
+      runner::commands::export_command(words);
+    } catch (const runner::commands::UsageError& error) {
       return error.what();
     }
     ADD_FAILURE() << "no UsageError";
@@ -34,7 +34,8 @@ class ExportCommand : public ::testing::Test {
 };
 
 TEST_F(ExportCommand, WritesTheCsv) {
-  EXPECT_EQ(runner::export_command({"--db", database_, "--format", "csv", "--out", out_}), 0);
+  EXPECT_EQ(runner::commands::export_command({"--db", database_, "--format", "csv", "--out", out_}),
+            0);
   const std::string text = contents_of(out_);
   EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 3);
 }
@@ -44,8 +45,9 @@ TEST_F(ExportCommand, OverwritesOnlyWithForce) {
   EXPECT_TRUE(
       contains(usage_error({"--db", database_, "--format", "csv", "--out", out_}), "--force"));
   EXPECT_EQ(contents_of(out_), "mine");
-  EXPECT_EQ(
-      runner::export_command({"--db", database_, "--format", "csv", "--out", out_, "--force"}), 0);
+  EXPECT_EQ(runner::commands::export_command(
+                {"--db", database_, "--format", "csv", "--out", out_, "--force"}),
+            0);
   EXPECT_TRUE(contains(contents_of(out_), "S1,1,1,2,ray"));
 }
 

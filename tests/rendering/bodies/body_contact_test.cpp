@@ -300,9 +300,9 @@ TEST(BodyContact, StepsDoNotAllocate) {
   const Scene scene = s.scene();
   RenderState state = scene.initial_state();
   run(scene, state, 0.1);
-  const std::uint64_t before = runner::allocations();
+  const std::uint64_t before = runner::bench::allocations();
   run(scene, state, 0.7);
-  EXPECT_EQ(runner::allocations() - before, 0U);
+  EXPECT_EQ(runner::bench::allocations() - before, 0U);
 }
 
 }  // namespace

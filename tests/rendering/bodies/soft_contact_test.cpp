@@ -235,7 +235,7 @@ TEST(SoftContact, ATickNeitherAllocatesNorGivesNaN) {
   const PlacedTool tool = one_segment(Vec3(0.06, 0.01, 0.0));
   Random random(19);
   Vec3 tip(-0.03, 0, 0.03);
-  const std::uint64_t before = runner::allocations();
+  const std::uint64_t before = runner::bench::allocations();
   for (int i = 0; i < 3000; ++i) {
     const Vec3 step = 0.001 * Vec3(random.unit() - 0.5, random.unit() - 0.5, random.unit() - 0.55);
     tip += step;
@@ -243,7 +243,7 @@ TEST(SoftContact, ATickNeitherAllocatesNorGivesNaN) {
     const Vec3 force = advance(object, state, tip, tool, glm::length(step), 0.001);
     ASSERT_TRUE(std::isfinite(force.x + force.y + force.z));
   }
-  EXPECT_EQ(runner::allocations(), before);
+  EXPECT_EQ(runner::bench::allocations(), before);
 }
 
 TEST(SoftContact, TheSamePathGivesTheSameForcesToTheBit) {

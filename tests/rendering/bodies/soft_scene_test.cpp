@@ -266,9 +266,9 @@ TEST(SoftScene, TicksWithSeveralDoNotAllocateNorDoThoseOfACopy) {
   RenderState copy = state;
   for (RenderState* const touched : {&state, &copy}) {
     for (const double x : {0.002, 0.062}) {
-      const std::uint64_t before = runner::allocations();
+      const std::uint64_t before = runner::bench::allocations();
       const Rendering r = press(ray_renderer(), scene, *touched, x, 0.004);
-      EXPECT_EQ(runner::allocations(), before) << x;
+      EXPECT_EQ(runner::bench::allocations(), before) << x;
       EXPECT_GT(r.force.z, 0.1) << x;
     }
   }

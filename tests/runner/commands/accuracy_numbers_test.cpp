@@ -11,7 +11,7 @@
 #include "rendering/accuracy/study.h"
 #include "runner/commands/accuracy/report.h"
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 namespace {
 namespace accuracy_numbers {
 
@@ -221,4 +221,4 @@ TEST(AccuracyTables, HaveTheirFormWithNamesBeforeNumbers) {
 
 }  // namespace accuracy_numbers
 }  // namespace
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

@@ -6,7 +6,7 @@
 #include "analysis/figures/figure_svg.h"
 #include "runner/commands/accuracy/report.h"
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 namespace {
 
 rendering::AccuracyRow row_of(const std::string& shape, int triangles, const std::string& probe) {
@@ -53,4 +53,4 @@ TEST(AccuracyReport, ShowsEveryShapeThatWasMeasured) {
 }
 
 }  // namespace
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

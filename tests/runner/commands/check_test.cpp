@@ -22,7 +22,7 @@
 #include "runner/session/run_record.h"
 #include "tests/shared/temporary_folder.h"
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 namespace {
 
 constexpr const char* kProtocol = R"({"version": 1, "name": "brief", "renderers": ["point", "ray"],
@@ -103,7 +103,7 @@ class Check : public ::testing::Test {
     for (int number = 1; number <= change.participants; ++number) {
       const bool simulated = change.simulated || number >= change.simulated_from;
       const data::Participant person =
-          store.enrol(info_of(protocol), "P0" + std::to_string(number), number, simulated,
+          store.enrol(session::info_of(protocol), "P0" + std::to_string(number), number, simulated,
                       simulated ? std::optional<std::uint64_t>(1) : std::nullopt);
       for (int session = 1; session <= 2; ++session) {
         data::RunInfo info;
@@ -367,4 +367,4 @@ TEST_F(Check, ForeignTextsAreShownLiterally) {
 }
 
 }  // namespace
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

@@ -16,14 +16,14 @@
 #include "runner/servo/sample.h"
 #include "tests/runner/fake_device.h"
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 namespace {
 
 using std::chrono::steady_clock;
 
 /// A clock of 1 kHz whose ticks really are some hundred times as fast. It stands still until
 /// started, so that the hand moves only once there is an object to touch.
-class FastClock final : public Clock {
+class FastClock final : public servo::Clock {
  public:
   /// \param ticks  between two sleeps of 0.1 ms
   explicit FastClock(std::uint64_t ticks = 64) : between_naps_(ticks) {}
@@ -43,9 +43,9 @@ class FastClock final : public Clock {
 };
 
 /// A hand that moves down onto the cube's upper face and stays 3 mm deep.
-DeviceReading pressing(int tick) {
+servo::DeviceReading pressing(int tick) {
   const double y = std::max(0.022, 0.05 - 1e-4 * tick);
-  DeviceReading reading;
+  servo::DeviceReading reading;
   reading.stylus = {{0, y, 0}, {0, y + 0.12, 0}};
   return reading;
 }
@@ -77,7 +77,7 @@ bool comes_true(Condition condition) {
 
 class LiveTouchTest : public ::testing::Test {
  protected:
-  testing::FakeDevice device_{pressing};
+  runner::testing::FakeDevice device_{pressing};
   FastClock clock_;
 };
 
@@ -86,13 +86,15 @@ TEST_F(LiveTouchTest, AStalledDisplayNeitherDelaysNorLosesTicks) {
   LiveTouch touch(device_, clock_, settings_of());
   clock_.start();
   ASSERT_TRUE(comes_true([&] { return touch.recorded() >= 5000; }));
-  std::vector<SceneMoment> moments;
+  std::vector<display::SceneMoment> moments;
   touch.take(moments);
   ASSERT_GE(moments.size(), 5000U);
   for (std::size_t i = 0; i < moments.size(); ++i) {
-    const Sample& sample = moments[i].sample;
+    const servo::Sample& sample = moments[i].sample;
     ASSERT_EQ(sample.lateness_ns, 0) << i;
-    ASSERT_EQ(sample.faults & (servo_fault::kSamplesLost | servo_fault::kMissedTicks), 0U) << i;
+    ASSERT_EQ(sample.faults & (servo::servo_fault::kSamplesLost | servo::servo_fault::kMissedTicks),
+              0U)
+        << i;
     const std::int64_t before = i > 0 ? moments[i - 1].sample.time_ns : sample.time_ns - 1'000'000;
     ASSERT_EQ(sample.time_ns - before, 1'000'000) << i;
   }
@@ -119,7 +121,7 @@ TEST_F(LiveTouchTest, MovingObjectsAreShownAndCanBePulled) {
   LiveTouch touch(device_, clock_, with_drifting_cube());
   clock_.start();
   ASSERT_TRUE(comes_true([&] { return touch.recorded() >= 1000; }));
-  std::vector<SceneMoment> moments;
+  std::vector<display::SceneMoment> moments;
   touch.take(moments);
   for (std::size_t i = 0; i < 1000; ++i) {
     ASSERT_EQ(moments[i].poses.size(), 2U) << i;
@@ -129,7 +131,7 @@ TEST_F(LiveTouchTest, MovingObjectsAreShownAndCanBePulled) {
   }
   const Vec3 corner(0.21, 0.01, 0.01), to(0.25, 0.03, 0);
   touch.pull({.object = 1, .on_object = corner, .to = to});
-  SceneMoment last = moments.back();
+  display::SceneMoment last = moments.back();
   const auto newest = [&] {
     moments.clear();
     touch.take(moments);
@@ -148,7 +150,7 @@ TEST_F(LiveTouchTest, TheLastPartOfALongStallIsKept) {
   LiveTouch touch(device_, clock_, settings_of());
   clock_.start();
   ASSERT_TRUE(comes_true([&] { return touch.recorded() >= 70'000; }));
-  std::vector<SceneMoment> moments;
+  std::vector<display::SceneMoment> moments;
   touch.take(moments);
   EXPECT_LE(moments.size(), 60'001U);
   EXPECT_GE(moments.size(), 45'000U);
@@ -160,14 +162,14 @@ TEST_F(LiveTouchTest, AfterAnEmergencyForcesStayOffUntilCleared) {
   LiveTouch touch(device_, clock_, settings_of());
   clock_.start();
   const auto newest = [&] {
-    std::vector<SceneMoment> moments;
+    std::vector<display::SceneMoment> moments;
     touch.take(moments);
-    return moments.empty() ? Sample() : moments.back().sample;
+    return moments.empty() ? servo::Sample() : moments.back().sample;
   };
   ASSERT_TRUE(comes_true([&] { return newest().device1.y > 1; }));
   touch.emergency_zero();
-  ASSERT_TRUE(comes_true([&] { return (newest().faults & servo_fault::kTripped) != 0; }));
-  const Sample off = newest();
+  ASSERT_TRUE(comes_true([&] { return (newest().faults & servo::servo_fault::kTripped) != 0; }));
+  const servo::Sample off = newest();
   EXPECT_EQ(off.device1, Vec3(0));
   EXPECT_EQ(off.device2, Vec3(0));
   touch.clear_fault();
@@ -177,7 +179,7 @@ TEST_F(LiveTouchTest, AfterAnEmergencyForcesStayOffUntilCleared) {
 TEST_F(LiveTouchTest, AHeldSceneGivesNoForceAndDoesNotChange) {
   LiveTouch touch(device_, clock_, settings_of());
   clock_.start();
-  std::vector<SceneMoment> moments;
+  std::vector<display::SceneMoment> moments;
   ASSERT_TRUE(comes_true([&] { return touch.recorded() > 600; }));
   touch.hold(true);
   std::uint64_t before = 0;
@@ -190,7 +192,7 @@ TEST_F(LiveTouchTest, AHeldSceneGivesNoForceAndDoesNotChange) {
 }
 
 /// Each moment is a tick after the previous one, in time and in the objects' motion.
-void expect_no_gap(const std::vector<SceneMoment>& moments) {
+void expect_no_gap(const std::vector<display::SceneMoment>& moments) {
   for (std::size_t i = 1; i < moments.size(); ++i) {
     ASSERT_EQ(moments[i].sample.time_ns - moments[i - 1].sample.time_ns, 1'000'000) << i;
     ASSERT_NEAR(moments[i].poses.at(1).position.z - moments[i - 1].poses.at(1).position.z, 1e-5,
@@ -203,7 +205,7 @@ TEST_F(LiveTouchTest, APauseKeepsMovingObjectsAndStepsContinueFromIt) {
   FastClock clock(1);  // no minute may pass while the test is not scheduled
   LiveTouch touch(device_, clock, with_drifting_cube());
   clock.start();
-  std::vector<SceneMoment> moments;
+  std::vector<display::SceneMoment> moments;
   ASSERT_TRUE(comes_true([&] { return touch.recorded() > 600; }));
   touch.hold(true);
   std::uint64_t before = 0;
@@ -234,8 +236,8 @@ TEST_F(LiveTouchTest, APauseKeepsMovingObjectsAndStepsContinueFromIt) {
 /// The hand has moved away: no force and no motion until it is back.
 TEST_F(LiveTouchTest, AfterAPauseTheSceneResumesOnceTheHandIsBack) {
   std::atomic<double> aside{0};
-  testing::FakeDevice device([&](int tick) {
-    DeviceReading reading = pressing(tick);
+  runner::testing::FakeDevice device([&](int tick) {
+    servo::DeviceReading reading = pressing(tick);
     reading.stylus.tip.x += aside.load();
     reading.stylus.tail.x += aside.load();
     return reading;
@@ -258,16 +260,16 @@ TEST_F(LiveTouchTest, AfterAPauseTheSceneResumesOnceTheHandIsBack) {
   ASSERT_TRUE(comes_true([&] { return touch.recorded() > before + 300; }));
   EXPECT_EQ(touch.away(), 0);
   EXPECT_EQ(touch.trouble(), "");
-  std::vector<SceneMoment> moments;
+  std::vector<display::SceneMoment> moments;
   touch.take(moments);
   expect_no_gap(moments);
 }
 
 TEST_F(LiveTouchTest, AnotherMaterialActsOnceTheHandHasLeft) {
   // Down and up again, so that the hand leaves the object.
-  testing::FakeDevice device([](int tick) {
+  runner::testing::FakeDevice device([](int tick) {
     const double y = 0.03 - 0.008 * std::sin(0.002 * tick);
-    DeviceReading reading;
+    servo::DeviceReading reading;
     reading.stylus = {{0, y, 0}, {0, y + 0.12, 0}};
     return reading;
   });
@@ -275,9 +277,9 @@ TEST_F(LiveTouchTest, AnotherMaterialActsOnceTheHandHasLeft) {
   clock_.start();
   const auto stiffness_becomes = [&](double wanted) {
     return comes_true([&] {
-      std::vector<SceneMoment> moments;
+      std::vector<display::SceneMoment> moments;
       touch.take(moments);
-      for (const SceneMoment& moment : moments) {
+      for (const display::SceneMoment& moment : moments) {
         const rendering::Rendering& r = moment.sample.rendering;
         if (r.contacts == 1 &&
             std::abs(glm::length(r.force) - wanted * r.deepest.depth) < 1e-9 * wanted)
@@ -299,4 +301,4 @@ TEST_F(LiveTouchTest, AnotherMaterialActsOnceTheHandHasLeft) {
 }
 
 }  // namespace
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

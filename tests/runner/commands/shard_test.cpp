@@ -11,7 +11,7 @@
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/study_options.h"
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 namespace {
 namespace shards {
 
@@ -100,4 +100,4 @@ TEST(Shards, OfASlurmArrayAreCountedFromItsFirstTask) {
 
 }  // namespace shards
 }  // namespace
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

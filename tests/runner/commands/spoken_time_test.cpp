@@ -11,7 +11,7 @@
 #include "runner/commands/run/admission.h"
 #include "tests/data/store/store_fixture.h"
 
-namespace palpate::runner {
+namespace palpate::runner::commands {
 namespace {
 namespace spoken_times {
 
@@ -100,4 +100,4 @@ TEST(WithdrawalTime, IsTheWithdrawalsNotTheSessions) {
 }
 
 }  // namespace
-}  // namespace palpate::runner
+}  // namespace palpate::runner::commands

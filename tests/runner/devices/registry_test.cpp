@@ -12,7 +12,7 @@
 
 #include "tests/shared/prose.h"
 
-namespace palpate::runner {
+namespace palpate::runner::devices {
 namespace {
 namespace kinds {
 
@@ -52,7 +52,7 @@ TEST(DeviceKinds, DevicesWithMotorsAreGuarded) {
 
 TEST(DeviceKinds, AFalconSensesAndMovesAPointAndTwoALine) {
   for (const auto& [name, freedom] : {std::pair("falcon", 3), std::pair("falcon2", 5)}) {
-    const DeviceCapabilities can = device_kind(name).nominal({});
+    const servo::DeviceCapabilities can = device_kind(name).nominal({});
     EXPECT_EQ(can.name, name);
     EXPECT_EQ(can.sensed_freedom, freedom);
     EXPECT_EQ(can.actuated_freedom, freedom);
@@ -67,27 +67,27 @@ TEST(DeviceKinds, AFalconSensesAndMovesAPointAndTwoALine) {
 }
 
 TEST(DeviceKinds, DevicesWithoutMotorsAreAlwaysPresentWithTheConfigsStylus) {
-  DeviceConfig config;
+  servo::DeviceConfig config;
   config.stylus_length = 0.2;
   config.stylus_grip = 0.03;
   config.rate = 500;
   for (const char* name : {"mouse", "simulated"}) {
     const DeviceKind& kind = device_kind(name);
     EXPECT_NO_THROW(kind.check(config));
-    const std::vector<ConnectedDevice> there = list_connected(kind, config);
+    const std::vector<servo::ConnectedDevice> there = list_connected(kind, config);
     ASSERT_EQ(there.size(), 1U);
     EXPECT_EQ(there[0].serial, "");
     EXPECT_EQ(there[0].trouble, "");
-    const std::unique_ptr<Device> device = kind.open(config);
-    const DeviceReading reading = device->read();
+    const std::unique_ptr<servo::Device> device = kind.open(config);
+    const servo::DeviceReading reading = device->read();
     EXPECT_NEAR(glm::length(reading.stylus.tail - reading.stylus.tip), 0.2, 1e-4) << name;
-    const DeviceCapabilities can = kind.nominal(config);
+    const servo::DeviceCapabilities can = kind.nominal(config);
     EXPECT_EQ(can.name, device->capabilities().name);
     EXPECT_EQ(can.sensed_freedom, 5) << name;
     EXPECT_EQ(can.actuated_freedom, std::string(name) == "mouse" ? 0 : 5);
   }
   // The simulated hand holds the stylus at the grip: the tip is as much below.
-  const std::unique_ptr<Device> simulated = device_kind("simulated").open(config);
+  const std::unique_ptr<servo::Device> simulated = device_kind("simulated").open(config);
   const rendering::LineProbe stylus = simulated->read().stylus;
   EXPECT_NEAR(stylus.tip.z, 0, 1e-4);
   EXPECT_NEAR(stylus.tip.y, -0.1, 1e-4);
@@ -109,27 +109,27 @@ TEST(DeviceKinds, AreListedInASeparateProcess) {
       return std::string(error.what());
     }
   };
-  kind.connected = [](const DeviceConfig& config) {
-    return std::vector<ConnectedDevice>{
+  kind.connected = [](const servo::DeviceConfig& config) {
+    return std::vector<servo::ConnectedDevice>{
         {config.library + "\xff", "in use by process " + std::to_string(getpid())}};
   };
-  DeviceConfig config;
+  servo::DeviceConfig config;
   config.library = "a";
-  const std::vector<ConnectedDevice> found = list_connected(kind, config);
+  const std::vector<servo::ConnectedDevice> found = list_connected(kind, config);
   ASSERT_EQ(found.size(), 1U);
   EXPECT_EQ(found[0].serial, "a\xef\xbf\xbd") << "bytes that are no text are replaced";
   EXPECT_NE(found[0].trouble, "in use by process " + std::to_string(getpid()));
 
-  kind.connected = [](const DeviceConfig&) -> std::vector<ConnectedDevice> {
+  kind.connected = [](const servo::DeviceConfig&) -> std::vector<servo::ConnectedDevice> {
     throw std::runtime_error("no rights");
   };
   EXPECT_EQ(said(), "no rights");
-  kind.connected = [](const DeviceConfig&) -> std::vector<ConnectedDevice> {
+  kind.connected = [](const servo::DeviceConfig&) -> std::vector<servo::ConnectedDevice> {
     std::raise(SIGKILL);
     return {};
   };
   EXPECT_NE(said().find("crashed"), std::string::npos) << said();
-  kind.connected = [](const DeviceConfig&) -> std::vector<ConnectedDevice> {
+  kind.connected = [](const servo::DeviceConfig&) -> std::vector<servo::ConnectedDevice> {
     pause();
     return {};
   };
@@ -138,4 +138,4 @@ TEST(DeviceKinds, AreListedInASeparateProcess) {
 
 }  // namespace kinds
 }  // namespace
-}  // namespace palpate::runner
+}  // namespace palpate::runner::devices

@@ -8,7 +8,7 @@
 
 #include "runner/devices/replay.h"
 
-namespace palpate::runner {
+namespace palpate::runner::devices {
 namespace {
 namespace replaying {
 
@@ -28,7 +28,7 @@ TEST(ReplayDevice, GivesTipTailAndButtonsInOrderAndThenIsLost) {
   const auto samples = three_samples();
   ReplayDevice device(samples, 1000);
   for (std::size_t i = 0; i < samples.size(); ++i) {
-    const DeviceReading reading = device.read();
+    const servo::DeviceReading reading = device.read();
     EXPECT_FALSE(reading.lost);
     for (int axis = 0; axis < 3; ++axis) {
       const auto k = static_cast<std::size_t>(axis);
@@ -85,4 +85,4 @@ TEST(ReplayDevice, LimitsNothing) {
 
 }  // namespace replaying
 }  // namespace
-}  // namespace palpate::runner
+}  // namespace palpate::runner::devices

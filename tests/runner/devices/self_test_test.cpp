@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-namespace palpate::runner {
+namespace palpate::runner::devices {
 namespace {
 namespace self_testing {
 
@@ -19,15 +19,16 @@ constexpr int kRate = 200;  // Hz: as many readings
 constexpr double kRadius = 0.2, kResolution = 1e-3;
 
 /// A device of 200 Hz, run at a higher requested rate, that keeps the written forces.
-class TestedDevice final : public Device {
+class TestedDevice final : public servo::Device {
  public:
-  explicit TestedDevice(std::function<DeviceReading(int)> script) : script_(std::move(script)) {
+  explicit TestedDevice(std::function<servo::DeviceReading(int)> script)
+      : script_(std::move(script)) {
     capabilities_.max_rate = kRate;
     capabilities_.workspace_radius = kRadius;
     capabilities_.resolution = kResolution;
   }
-  const DeviceCapabilities& capabilities() const override { return capabilities_; }
-  DeviceReading read() noexcept override { return script_(reads++); }
+  const servo::DeviceCapabilities& capabilities() const override { return capabilities_; }
+  servo::DeviceReading read() noexcept override { return script_(reads++); }
   void write(const Vec3& device1, const Vec3& device2) noexcept override {
     ++writes;
     forces = forces || device1 != Vec3(0) || device2 != Vec3(0);
@@ -36,12 +37,12 @@ class TestedDevice final : public Device {
   bool forces = false;
 
  private:
-  DeviceCapabilities capabilities_;
-  std::function<DeviceReading(int)> script_;
+  servo::DeviceCapabilities capabilities_;
+  std::function<servo::DeviceReading(int)> script_;
 };
 
-DeviceReading at(double x) { return {{Vec3(x, 0, 0), Vec3(x, 0, 0.12)}, 0, false}; }
-DeviceReading lost(DeviceTrouble trouble) { return {{}, 0, true, trouble}; }
+servo::DeviceReading at(double x) { return {{Vec3(x, 0, 0), Vec3(x, 0, 0.12)}, 0, false}; }
+servo::DeviceReading lost(servo::DeviceTrouble trouble) { return {{}, 0, true, trouble}; }
 
 struct Line {
   std::string what;
@@ -63,8 +64,9 @@ TEST(SelfTest, ReadsForASecondAtTheDevicesOwnRateWithoutForce) {
   // 2 of 200 late, and each step and reach at its limit: a hand moves at 2 m/s, 10 mm at 200 Hz,
   // plus four times the resolution, here 1 mm.
   TestedDevice device([](int i) {
-    DeviceReading reading = at(i % 2 == 0 ? kRadius + 0.05 - 1e-9 : kRadius + 0.05 - 0.014 + 1e-9);
-    if (i < 2) reading.trouble = DeviceTrouble::late;
+    servo::DeviceReading reading =
+        at(i % 2 == 0 ? kRadius + 0.05 - 1e-9 : kRadius + 0.05 - 0.014 + 1e-9);
+    if (i < 2) reading.trouble = servo::DeviceTrouble::late;
     return reading;
   });
   EXPECT_EQ(
@@ -84,15 +86,15 @@ TEST(SelfTest, ReadsForASecondAtTheDevicesOwnRateWithoutForce) {
 TEST(SelfTest, EachFaultIsFoundAndReported) {
   constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
   TestedDevice device([](int i) {
-    if (i == 20) return lost(DeviceTrouble::unplugged);
+    if (i == 20) return lost(servo::DeviceTrouble::unplugged);
     if (i >= 40 && i < 43) {
-      DeviceReading reading = at(0);
+      servo::DeviceReading reading = at(0);
       Vec3& end = i == 40 ? reading.stylus.tip : reading.stylus.tail;
       end[i - 40] = i == 41 ? HUGE_VAL : kNaN;
       return reading;
     }
-    DeviceReading reading = at(i < 100 ? 0.236 + 2e-6 : 0.25 + 4e-6);
-    if (i >= 50 && i < 53) reading.trouble = DeviceTrouble::late;
+    servo::DeviceReading reading = at(i < 100 ? 0.236 + 2e-6 : 0.25 + 4e-6);
+    if (i >= 50 && i < 53) reading.trouble = servo::DeviceTrouble::late;
     return reading;
   });
   EXPECT_EQ(
@@ -110,7 +112,7 @@ TEST(SelfTest, EachFaultIsFoundAndReported) {
 // Lost readings between two positions do not prove a jump.
 TEST(SelfTest, ALostReadingIsNotCountedAsAJump) {
   TestedDevice device(
-      [](int i) { return i == 100 ? lost(DeviceTrouble::none) : at(i < 100 ? -0.1 : 0.1); });
+      [](int i) { return i == 100 ? lost(servo::DeviceTrouble::none) : at(i < 100 ? -0.1 : 0.1); });
   const std::vector<Line> lines = lines_of(device);
   ASSERT_EQ(lines.size(), 5U);
   EXPECT_EQ(lines[0], (Line{"readings arrive", false, "1 of 200 readings were lost"}))
@@ -121,8 +123,8 @@ TEST(SelfTest, ALostReadingIsNotCountedAsAJump) {
 
 TEST(SelfTest, WithoutReadingsPositionsAreNotJudged) {
   TestedDevice device([](int i) {
-    DeviceReading reading = at(HUGE_VAL);
-    return i < 100 ? lost(DeviceTrouble::silent) : reading;
+    servo::DeviceReading reading = at(HUGE_VAL);
+    return i < 100 ? lost(servo::DeviceTrouble::silent) : reading;
   });
   EXPECT_EQ(lines_of(device),
             (std::vector<Line>{{"readings arrive", false,
@@ -134,4 +136,4 @@ TEST(SelfTest, WithoutReadingsPositionsAreNotJudged) {
 
 }  // namespace self_testing
 }  // namespace
-}  // namespace palpate::runner
+}  // namespace palpate::runner::devices

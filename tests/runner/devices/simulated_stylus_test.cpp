@@ -7,7 +7,7 @@
 
 #include "runner/devices/simulated.h"
 
-namespace palpate::runner {
+namespace palpate::runner::devices {
 namespace {
 
 constexpr double kStep = 1e-3;
@@ -56,7 +56,7 @@ TEST(SimulatedStylus, SettlesInTheEquilibriumOfHandAndForce) {
   SimulatedStylus stylus(ideal_device(), hand, 0.12, 0.06, kStep);
   stylus.reset({{0, 0, 0.1}, {0, 0, 0}, {0, 0, 1}});
   const Vec3 force1(0.4, 0, 1), force2(-0.2, 0.1, 0.2);
-  DeviceReading reading;
+  servo::DeviceReading reading;
   for (int i = 0; i < 5000; ++i) {
     stylus.write(force1, force2);
     reading = stylus.read();
@@ -153,4 +153,4 @@ TEST(SimulatedStylus, EndsAreQuantisedAndStayInTheWorkspace) {
 }
 
 }  // namespace
-}  // namespace palpate::runner
+}  // namespace palpate::runner::devices

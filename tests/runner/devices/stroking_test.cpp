@@ -8,7 +8,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
-namespace palpate::runner {
+namespace palpate::runner::devices {
 namespace {
 namespace stroking {
 
@@ -26,7 +26,7 @@ void expect_strokes(StrokingStylus& device, const StrokeSettings& settings) {
   double furthest = -1;
   const int ticks = static_cast<int>(kRate * 2.2 * (settings.rest + settings.stroke));
   for (int tick = 1; tick <= ticks; ++tick) {
-    const DeviceReading reading = device.read();
+    const servo::DeviceReading reading = device.read();
     device.write(Vec3(0), Vec3(0));
     const double time = tick / kRate;
     EXPECT_FALSE(reading.lost);
@@ -70,4 +70,4 @@ TEST(StrokingStylus, YieldsToAForceLikeAHand) {
 
 }  // namespace stroking
 }  // namespace
-}  // namespace palpate::runner
+}  // namespace palpate::runner::devices

@@ -4,7 +4,7 @@
 
 #include "runner/servo/sample.h"
 
-namespace palpate::runner {
+namespace palpate::runner::display {
 namespace {
 
 ConsoleState in(const char* word) {
@@ -67,7 +67,7 @@ TEST(ConsoleWords, TheBarCountsATrialAfterItsEnd) {
 TEST(ConsoleWords, WhileForcesAreOffTheNextButtonIsNamed) {
   ConsoleState state = in("rest");
   EXPECT_EQ(forces_text(state), "No fault");
-  state.sample.faults = servo_fault::kTripped | servo_fault::kEmergency;
+  state.sample.faults = servo::servo_fault::kTripped | servo::servo_fault::kEmergency;
   state.fault = "zero force was asked for by the key F12";
   EXPECT_EQ(forces_text(state),
             "Forces are off: zero force was asked for by the key F12; next: 'Clear the fault'");
@@ -80,16 +80,16 @@ TEST(ConsoleWords, WhileForcesAreOffTheNextButtonIsNamed) {
 TEST(ConsoleWords, BeforeTheFirstTrialForcesOffIsNoAlarm) {
   ConsoleState state = in("pre-flight");
   state.checklist.steps = {{"Home the device", Checklist::Step::State::now}};
-  state.sample.faults = servo_fault::kTripped | servo_fault::kDeviceLost;
+  state.sample.faults = servo::servo_fault::kTripped | servo::servo_fault::kDeviceLost;
   EXPECT_TRUE(forces_not_yet_on(state));
   EXPECT_EQ(forces_text(state), "Forces are off: none is needed yet");
-  state.sample.trouble = DeviceTrouble::unplugged;
+  state.sample.trouble = servo::DeviceTrouble::unplugged;
   EXPECT_FALSE(forces_not_yet_on(state)) << "to clear it opens the device again";
-  state.sample.trouble = DeviceTrouble::none;
+  state.sample.trouble = servo::DeviceTrouble::none;
   state.fault = "zero force was asked for by the key F12";
   EXPECT_FALSE(forces_not_yet_on(state));
   EXPECT_NE(forces_text(state).find("F12; next: 'Clear the fault'"), std::string::npos);
 }
 
 }  // namespace
-}  // namespace palpate::runner
+}  // namespace palpate::runner::display

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-namespace palpate::runner {
+namespace palpate::runner::display {
 namespace {
 namespace console_fonts {
 
@@ -56,4 +56,4 @@ TEST(Fonts, OfOtherScriptsHaveOnlyTheirLetters) {
 
 }  // namespace console_fonts
 }  // namespace
-}  // namespace palpate::runner
+}  // namespace palpate::runner::display

@@ -6,7 +6,7 @@
 
 #include <deque>
 
-namespace palpate::runner {
+namespace palpate::runner::display {
 namespace {
 
 using Strings = std::vector<std::string>;
@@ -80,4 +80,4 @@ TEST(Joystick, MissingInputsAreNeverPressed) {
 }
 
 }  // namespace
-}  // namespace palpate::runner
+}  // namespace palpate::runner::display

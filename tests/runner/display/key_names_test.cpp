@@ -13,7 +13,7 @@
 
 #include "data/base/text.h"
 
-namespace palpate::runner {
+namespace palpate::runner::display {
 namespace {
 
 // The layout's name of a key needs a window system: without one only the key's place on a US
@@ -98,4 +98,4 @@ TEST(KeyNames, EmergencyKeysAreNamedAsPrinted) {
 }
 
 }  // namespace
-}  // namespace palpate::runner
+}  // namespace palpate::runner::display

@@ -6,7 +6,7 @@
 
 #include "runner/display/scene/scene_drawing.h"
 
-namespace palpate::runner {
+namespace palpate::runner::display {
 namespace {
 
 const glm::vec2 kPicture(640, 360);
@@ -72,4 +72,4 @@ TEST(LabelPlaces, LabelsNeverOverlapNorLeaveThePicture) {
 }
 
 }  // namespace
-}  // namespace palpate::runner
+}  // namespace palpate::runner::display

@@ -8,7 +8,7 @@
 #include <thread>
 #include <utility>
 
-namespace palpate::runner {
+namespace palpate::runner::display {
 namespace {
 
 constexpr double kLength = 0.12;
@@ -18,10 +18,10 @@ double length_of(const rendering::LineProbe& stylus) {
 }
 
 TEST(MouseStylus, RestsOutsideOfTheHomeZoneUntilItIsMoved) {
-  MouseStylus device(kLength, 1000);
+  devices::MouseStylus device(kLength, 1000);
   const rendering::LineProbe start = device.read().stylus;
   for (int i = 0; i < 1000; ++i) {
-    const DeviceReading reading = device.read();
+    const servo::DeviceReading reading = device.read();
     EXPECT_EQ(reading.stylus.tip, start.tip);
     EXPECT_FALSE(reading.lost);
   }
@@ -33,8 +33,8 @@ TEST(MouseStylus, RestsOutsideOfTheHomeZoneUntilItIsMoved) {
 
 TEST(MouseStylus, FollowsWithoutJumpAndKeepsItsLength) {
   for (const double rate : {1000.0, 4000.0}) {
-    MouseStylus device(kLength, rate);
-    StylusTarget hand = device.initial_target();
+    devices::MouseStylus device(kLength, rate);
+    devices::StylusTarget hand = device.initial_target();
     rendering::LineProbe before = device.read().stylus;
     hand.move({-0.12, -0.08, -0.04});
     hand.turn(M_PI - 0.1, -1.4);
@@ -52,10 +52,10 @@ TEST(MouseStylus, FollowsWithoutJumpAndKeepsItsLength) {
 }
 
 TEST(MouseStylus, EveryTargetGivesAFinitePose) {
-  MouseStylus device(kLength, 1000);
+  devices::MouseStylus device(kLength, 1000);
   std::mt19937 random(7);  // NOLINT(cert-msc32-c,cert-msc51-cpp): any sequence will do
   std::uniform_real_distribution<double> far(-10, 10);
-  StylusTarget hand = device.initial_target();
+  devices::StylusTarget hand = device.initial_target();
   for (int i = 0; i < 20000; ++i) {
     hand.move({far(random), far(random), far(random)});
     hand.turn(far(random), far(random));
@@ -71,9 +71,9 @@ TEST(MouseStylus, EveryTargetGivesAFinitePose) {
 }
 
 TEST(MouseStylus, TakesTargetsFromAnotherThread) {
-  MouseStylus device(kLength, 1000);
+  devices::MouseStylus device(kLength, 1000);
   std::thread window([&device] {
-    StylusTarget hand = device.initial_target();
+    devices::StylusTarget hand = device.initial_target();
     for (int i = 0; i < 20000; ++i) {
       hand.move({-1e-5, 0, 0});
       device.set_target(hand.stylus());
@@ -86,7 +86,7 @@ TEST(MouseStylus, TakesTargetsFromAnotherThread) {
 }
 
 TEST(StylusTarget, StaysInReachAndTurnsFiveDegreesOfFreedom) {
-  StylusTarget hand{{}, kLength, 0, 0};
+  devices::StylusTarget hand{{}, kLength, 0, 0};
   EXPECT_NEAR(glm::length(hand.axis() - Vec3(0, -1, 0)), 0, 1e-12) << "towards the viewer";
   hand.turn(M_PI / 2, 0);
   EXPECT_NEAR(glm::length(hand.axis() - Vec3(1, 0, 0)), 0, 1e-12);
@@ -97,9 +97,9 @@ TEST(StylusTarget, StaysInReachAndTurnsFiveDegreesOfFreedom) {
 }
 
 TEST(StylusTarget, TakesThePoseOfAnotherStylus) {
-  StylusTarget hand{{}, kLength, 0, 0};
+  devices::StylusTarget hand{{}, kLength, 0, 0};
   for (const auto& [yaw, pitch] : {std::pair{0.3, 0.8}, {-2.9, -1.2}, {1.6, 0.0}, {3.0, 1.4}}) {
-    const StylusTarget other{{0.05, -0.1, 0.02}, kLength, yaw, pitch};
+    const devices::StylusTarget other{{0.05, -0.1, 0.02}, kLength, yaw, pitch};
     hand.point(other.stylus());
     EXPECT_LT(glm::length(hand.stylus().tip - other.stylus().tip), 1e-12);
     EXPECT_LT(glm::length(hand.stylus().tail - other.stylus().tail), 1e-12);
@@ -109,4 +109,4 @@ TEST(StylusTarget, TakesThePoseOfAnotherStylus) {
 }
 
 }  // namespace
-}  // namespace palpate::runner
+}  // namespace palpate::runner::display

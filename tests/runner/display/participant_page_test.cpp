@@ -11,7 +11,7 @@
 #include "runner/display/window.h"
 #include "tests/runner/display/kept_fonts.h"
 
-namespace palpate::runner {
+namespace palpate::runner::display {
 namespace {
 
 Page trial_page() {
@@ -326,4 +326,4 @@ TEST(MissingLetters, NamesCharactersThatNoFontHas) {
 }
 
 }  // namespace
-}  // namespace palpate::runner
+}  // namespace palpate::runner::display

@@ -14,7 +14,7 @@
 #include "runner/display/scene/camera.h"
 #include "stimuli/primitives.h"
 
-namespace palpate::runner {
+namespace palpate::runner::display {
 namespace {
 
 using rendering::LineProbe;
@@ -103,7 +103,7 @@ TEST(ContactPlacesTest, TheirForcesSumToTheForceOnTheHand) {
       const auto places = contact_places(scene, state, r);
       EXPECT_EQ(static_cast<int>(places.size()), r.contacts);
       Vec3 sum(0), torque(0);
-      for (const ContactPlace& place : places) {
+      for (const servo::ContactPlace& place : places) {
         sum += place.force;
         torque += glm::cross(place.place - probe.tip, place.force);
       }
@@ -219,4 +219,4 @@ TEST(SceneDrawingTest, AMovedObjectIsDrawnAndHitWhereItIs) {
 }
 
 }  // namespace
-}  // namespace palpate::runner
+}  // namespace palpate::runner::display

@@ -13,7 +13,7 @@
 #include "runner/display/scene/scene_drawing.h"
 #include "tests/runner/display/kept_fonts.h"
 
-namespace palpate::runner {
+namespace palpate::runner::display {
 namespace {
 
 constexpr int kWide = 400, kHigh = 300;
@@ -227,4 +227,4 @@ TEST_F(ScenePictureTest, FilesHaveTheirMagicBytes) {
 }
 
 }  // namespace
-}  // namespace palpate::runner
+}  // namespace palpate::runner::display

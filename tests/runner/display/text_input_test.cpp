@@ -4,7 +4,7 @@
 
 #include "runner/display/text_display.h"
 
-namespace palpate::runner {
+namespace palpate::runner::display {
 namespace {
 
 using Kind = ConsoleCommand::Kind;
@@ -113,4 +113,4 @@ TEST(TextInput, ArbitraryInputIsSurvived) {
 }
 
 }  // namespace
-}  // namespace palpate::runner
+}  // namespace palpate::runner::display

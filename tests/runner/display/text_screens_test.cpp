@@ -8,7 +8,7 @@
 
 #include "runner/display/text_display.h"
 
-namespace palpate::runner {
+namespace palpate::runner::display {
 namespace {
 
 using Step = Checklist::Step;
@@ -180,4 +180,4 @@ TEST_F(TextScreens, KeysAndCommandsArriveInOrderAndOnce) {
 }
 
 }  // namespace
-}  // namespace palpate::runner
+}  // namespace palpate::runner::display

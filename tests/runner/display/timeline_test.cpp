@@ -5,7 +5,7 @@
 #include <cmath>
 #include <cstdint>
 
-namespace palpate::runner {
+namespace palpate::runner::display {
 namespace {
 
 SceneMoment moment_at(int milliseconds) {
@@ -132,4 +132,4 @@ TEST(TimelineTest, AnInvalidSpeedIsIgnored) {
 }
 
 }  // namespace
-}  // namespace palpate::runner
+}  // namespace palpate::runner::display

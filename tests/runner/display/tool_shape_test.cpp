@@ -8,7 +8,7 @@
 #include "runner/display/scene/scene_drawing.h"
 #include "stimuli/primitives.h"
 
-namespace palpate::runner {
+namespace palpate::runner::display {
 namespace {
 
 const rendering::Tool kHook{{{{0, 0, 0}, {0, 0, 0.12}}, {{-0.01, 0, 0}, {0.03, 0, 0.01}}}};
@@ -16,7 +16,7 @@ const rendering::Tool kHook{{{{0, 0, 0}, {0, 0, 0.12}}, {{-0.01, 0, 0}, {0.03, 0
 void expect_near(const Vec3& a, const Vec3& b) { EXPECT_LE(glm::distance(a, b), 1e-12); }
 
 TEST(ToolShape, WithoutAToolIsTheStylus) {
-  Sample sample;
+  servo::Sample sample;
   sample.probe = {{0, 0, 0.1}, {0, 0.12, 0.1}};
   const DrawnTool drawn = tool_in_hand({}, sample);
   ASSERT_EQ(drawn.segments.size(), 1u);
@@ -25,7 +25,7 @@ TEST(ToolShape, WithoutAToolIsTheStylus) {
 }
 
 TEST(ToolShape, BeforeATrialHasTheInitialRollOfATrial) {
-  Sample sample;
+  servo::Sample sample;
   sample.probe = {{0.01, 0, 0.1}, {0.01, 0.12, 0.1}};
   const DrawnTool drawn = tool_in_hand(kHook, sample);
   const Mat3 frame = rendering::tool_frame(sample.probe.tail - sample.probe.tip, nullptr, Vec3(0));
@@ -39,7 +39,7 @@ TEST(ToolShape, InContactTheIdealToolRestsOnTheObjectAndTheHandsIsInside) {
   cube.mesh = std::make_shared<const stimuli::ConvexMesh>(stimuli::cube(0.06));
   const rendering::Scene scene({cube}, true, kHook);
   rendering::RenderState state = scene.initial_state();
-  Sample sample;
+  servo::Sample sample;
   for (int i = 0; i < 600; ++i) {  // down onto the cube's upper face, rolled by a quarter turn
     const double height = 0.06 - 6e-5 * i;
     sample.probe = {{0, 0, height}, {0, 0, height + 0.12}};
@@ -60,4 +60,4 @@ TEST(ToolShape, InContactTheIdealToolRestsOnTheObjectAndTheHandsIsInside) {
 }
 
 }  // namespace
-}  // namespace palpate::runner
+}  // namespace palpate::runner::display

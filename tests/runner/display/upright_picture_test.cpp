@@ -16,7 +16,7 @@
 #include "runner/display/scene/scene_drawing.h"
 #include "runner/display/scene_view.h"
 
-namespace palpate::runner {
+namespace palpate::runner::display {
 namespace {
 
 constexpr int kAcross = 320, kTall = 240;
@@ -133,7 +133,7 @@ TEST_F(UprightPictureTest, TheGroundAndItsShadowsLieBelowTheObjects) {
 /// Place at which the stylus is drawn once the device has followed the pointer.
 class PointerOnScreenTest : public UprightPictureTest {
  protected:
-  std::optional<glm::vec2> stylus_after(PointerControl& control, MouseStylus& device,
+  std::optional<glm::vec2> stylus_after(PointerControl& control, devices::MouseStylus& device,
                                         const PointerMotion& pointer) {
     control.step(pointer, camera_,
                  [](const glm::vec3&, const glm::vec3&) { return std::optional<glm::vec3>(); });
@@ -158,7 +158,7 @@ TEST_F(PointerOnScreenTest, ThePointerUpMovesTheStylusUpAndRightMovesItRight) {
   for (const float yaw : {-2.2F, 0.0F, 0.5F, 1.6F}) {
     for (const float pitch : {0.0F, 0.4F, 1.0F}) {
       camera_.look_from(yaw, pitch);
-      MouseStylus device(kStylus, 1000);
+      devices::MouseStylus device(kStylus, 1000);
       PointerControl control(device, WorkspaceMap());
       PointerMotion pointer;
       pointer.over = true;
@@ -178,4 +178,4 @@ TEST_F(PointerOnScreenTest, ThePointerUpMovesTheStylusUpAndRightMovesItRight) {
 }
 
 }  // namespace
-}  // namespace palpate::runner
+}  // namespace palpate::runner::display

@@ -23,10 +23,10 @@
 
 #include "runner/display/window.h"
 
-namespace palpate::runner {
+namespace palpate::runner::display {
 namespace {
 
-class SteadyClock final : public Clock {
+class SteadyClock final : public servo::Clock {
  public:
   std::int64_t now_ns() noexcept override {
     return std::chrono::steady_clock::now().time_since_epoch().count();
@@ -99,7 +99,7 @@ ConsoleState state_of(std::istringstream& words, const rendering::LineProbe& sty
   state.answer = "cylinder, wrong";
   state.scores = {{"sphere", 5, 6}, {"cone", 3, 6}, {"cylinder", 0, 5}, {"cube", 0, 0}};
   if (word == "rest") state.seconds_left = 25;
-  if (word == "homing") state.sample.waiting = Waiting::for_distance;
+  if (word == "homing") state.sample.waiting = servo::Waiting::for_distance;
   if (word == "pre-flight") state.checklist = some_checklist();
   state.messages = {"10:02:11  session 1 began", "10:04:40  " + state.shape};
   stimuli::ObjectSpec object;
@@ -109,7 +109,7 @@ ConsoleState state_of(std::istringstream& words, const rendering::LineProbe& sty
                                              : stimuli::ShapeKind::sphere;
   state.objects = std::make_shared<const std::vector<stimuli::ObjectSpec>>(1, object);
   state.sample.probe = stylus;
-  state.sample.phase = Phase::feeling;
+  state.sample.phase = servo::Phase::feeling;
   if (word == "tool") {
     state.state = "trial";
     state.tool.segments = {
@@ -127,7 +127,7 @@ ConsoleState state_of(std::istringstream& words, const rendering::LineProbe& sty
 /// Acts as a session's thread.
 class Talk {
  public:
-  Talk(DisplayLoop& windows, MouseStylus& mouse) : windows_(windows), mouse_(mouse) {}
+  Talk(DisplayLoop& windows, devices::MouseStylus& mouse) : windows_(windows), mouse_(mouse) {}
 
   void say(const std::string& line) {
     const std::lock_guard lock(mutex_);
@@ -168,7 +168,7 @@ class Talk {
 
  private:
   DisplayLoop& windows_;
-  MouseStylus& mouse_;
+  devices::MouseStylus& mouse_;
   std::mutex mutex_;
   rendering::LineProbe stylus_;
   std::mutex state_mutex_;
@@ -181,7 +181,7 @@ int show(const std::vector<std::string>& args) {
     return std::count(args.begin(), args.end(), what) > 0;
   };
   SteadyClock clock;
-  MouseStylus mouse(0.12, 1000);
+  devices::MouseStylus mouse(0.12, 1000);
   WindowSettings settings;
   settings.title = "harness";
   settings.clock = &clock;
@@ -224,12 +224,12 @@ int show(const std::vector<std::string>& args) {
 }
 
 }  // namespace
-}  // namespace palpate::runner
+}  // namespace palpate::runner::display
 
 int main(int count, char** args) {
   try {
-    return palpate::runner::show({args + 1, args + count});
-  } catch (const palpate::runner::DisplayError& fault) {
+    return palpate::runner::display::show({args + 1, args + count});
+  } catch (const palpate::runner::display::DisplayError& fault) {
     std::cout << fault.what() << std::endl;  // with the earlier output
     return 3;
   }

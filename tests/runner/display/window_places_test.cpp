@@ -5,7 +5,7 @@
 #include <cstdlib>
 #include <string>
 
-namespace palpate::runner {
+namespace palpate::runner::display {
 namespace {
 
 TEST(WindowPlaces, TheRestIsTheLargestFreePart) {
@@ -71,4 +71,4 @@ TEST(WindowPlaces, PlacesAreReadOnlyFromTheirNote) {
 }
 
 }  // namespace
-}  // namespace palpate::runner
+}  // namespace palpate::runner::display

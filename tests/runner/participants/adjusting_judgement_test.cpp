@@ -7,7 +7,7 @@
 #include "runner/participants/task_judgement.h"
 #include "tests/runner/participants/judge.h"
 
-namespace palpate::runner::judged {
+namespace palpate::runner::participants::judged {
 namespace {
 
 class Adjusting : public ::testing::Test {
@@ -98,4 +98,4 @@ TEST(AdjustingJudgement, AdjustsUntilTheyDifferByLessThanAStandardDeviation) {
 }
 
 }  // namespace
-}  // namespace palpate::runner::judged
+}  // namespace palpate::runner::participants::judged

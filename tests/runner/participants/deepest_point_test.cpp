@@ -9,7 +9,7 @@
 #include "tests/runner/participants/ideal_touches.h"
 #include "tests/runner/participants/observer_reference.h"
 
-namespace palpate::runner {
+namespace palpate::runner::participants {
 namespace {
 
 using test::deepest_on_segment;
@@ -179,4 +179,4 @@ TEST(DeepestPointOnAKink, NormalIsPerpendicularToTheStylus) {
 }
 
 }  // namespace
-}  // namespace palpate::runner
+}  // namespace palpate::runner::participants

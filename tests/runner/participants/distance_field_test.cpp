@@ -14,7 +14,7 @@
 #include "stimuli/signed_distance.h"
 #include "tests/runner/participants/solids.h"
 
-namespace palpate::runner {
+namespace palpate::runner::participants {
 namespace {
 
 const stimuli::solids::Outline kEll{{0, 0},       {0.06, 0},    {0.06, 0.02},
@@ -221,4 +221,4 @@ TEST(SolidLine, FindsTheDeepestPlaceOfAConcaveShape) {
 }
 
 }  // namespace
-}  // namespace palpate::runner
+}  // namespace palpate::runner::participants

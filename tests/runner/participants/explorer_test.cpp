@@ -7,23 +7,24 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
-namespace palpate::runner {
+namespace palpate::runner::participants {
 namespace {
 
 constexpr double kFromTip = 0.06, kLength = 0.12;  // m, of the grip and of the stylus
 constexpr double kPeriod = 1e-3;                   // s
 constexpr double kStiffness = 800;                 // N/m
 
-rendering::LineProbe held_at(const HandTarget& target) {
+rendering::LineProbe held_at(const devices::HandTarget& target) {
   return {target.grip - kFromTip * target.axis, target.grip + (kLength - kFromTip) * target.axis};
 }
 
 /// One tick of a hand whose stylus is at its target.
-HandTarget step(Explorer& hand, const TouchState& felt, const rendering::LineProbe& stylus) {
+devices::HandTarget step(Explorer& hand, const TouchState& felt,
+                         const rendering::LineProbe& stylus) {
   return hand.step(felt, stylus.tip, glm::normalize(stylus.tail - stylus.tip));
 }
 
-bool same(const HandTarget& a, const HandTarget& b) {
+bool same(const devices::HandTarget& a, const devices::HandTarget& b) {
   return a.grip == b.grip && a.velocity == b.velocity && a.axis == b.axis;
 }
 
@@ -34,13 +35,13 @@ TEST(Explorer, ActsOnContactAfterTheReactionDelay) {
     settings.motor.reaction_delay = ticks * kPeriod;
     Explorer touching(settings, kFromTip, kStiffness, kPeriod),
         free(settings, kFromTip, kStiffness, kPeriod);
-    HandTarget target = touching.begin(Random(5));
+    devices::HandTarget target = touching.begin(Random(5));
     ASSERT_TRUE(same(target, free.begin(Random(5))));
     constexpr int kTouch = 20;
     for (int tick = 0; tick < kTouch + ticks; ++tick) {
       TouchState felt;
       if (tick >= kTouch) felt = {true, Vec3(0, 0, 1), held_at(target).tip, 0};
-      const HandTarget other = step(free, {}, held_at(target));
+      const devices::HandTarget other = step(free, {}, held_at(target));
       target = step(touching, felt, held_at(target));
       ASSERT_TRUE(same(target, other)) << "delay " << ticks << ", tick " << tick;
     }
@@ -50,7 +51,7 @@ TEST(Explorer, ActsOnContactAfterTheReactionDelay) {
 }
 
 /// Contact with a horizontal surface at height zero, for a hand without reaction delay.
-TouchState felt_below(const HandTarget& target) {
+TouchState felt_below(const devices::HandTarget& target) {
   return {true, Vec3(0, 0, 1), held_at(target).tip, 0};
 }
 
@@ -66,7 +67,7 @@ struct AfterLossOfContact {
     target = step(hand, {}, held_at(target));
   }
   Explorer hand;
-  HandTarget target;
+  devices::HandTarget target;
   Vec3 slid, before;
 };
 
@@ -99,7 +100,7 @@ TEST(Explorer, TurnsToTheChosenHeadingInItsTime) {
     SimulatedSettings settings = quick_hand(2);
     settings.heading.chosen = true;
     Explorer hand(settings, kFromTip, kStiffness, kPeriod);
-    HandTarget target = hand.begin(Random(7));
+    devices::HandTarget target = hand.begin(Random(7));
     int waited = 0;
     while (!hand.wants_heading()) {
       ASSERT_LT(++waited, 10) << "it slides from the second tick on";
@@ -124,7 +125,7 @@ TEST(Explorer, TurnsToTheChosenHeadingInItsTime) {
 
 TEST(Explorer, WantsNoHeadingWhileItWanders) {
   Explorer hand(quick_hand(2), kFromTip, kStiffness, kPeriod);
-  HandTarget target = hand.begin(Random(7));
+  devices::HandTarget target = hand.begin(Random(7));
   for (int tick = 0; tick < 1000; ++tick) {
     target = step(hand, felt_below(target), held_at(target));
     ASSERT_FALSE(hand.wants_heading());
@@ -132,4 +133,4 @@ TEST(Explorer, WantsNoHeadingWhileItWanders) {
 }
 
 }  // namespace
-}  // namespace palpate::runner
+}  // namespace palpate::runner::participants

@@ -16,7 +16,7 @@
 #include "runner/bench/allocation_count.h"
 #include "tests/runner/participants/ideal_touches.h"
 
-namespace palpate::runner {
+namespace palpate::runner::participants {
 namespace {
 
 using test::by_movement;
@@ -162,16 +162,16 @@ TEST(HeadingChoice, GoesStraightOnIfOneShapeIsCertain) {
 }
 
 TEST(HeadingChoice, AllocatesNothing) {
-  if (!counts_allocations()) GTEST_SKIP() << "a sanitizer brings its own operator new";
+  if (!bench::counts_allocations()) GTEST_SKIP() << "a sanitizer brings its own operator new";
   const ShapeHypotheses hypotheses(four_shapes());
   ShapeObserver observer(hypotheses, by_movement());
   HeadingChoice choice(hypotheses, by_movement(), {});
   Random random(4);
   for (const bool ray : {false, true}) {
     const SlidingStylus stylus{ray, {0, 0, 0.03}, {0, 0.05, 0.13}, {0, 0, 1}, {1, 0, 0}};
-    const std::uint64_t before = allocations();
+    const std::uint64_t before = bench::allocations();
     choice.choose(observer, stylus, random);
-    EXPECT_EQ(allocations(), before) << ray;
+    EXPECT_EQ(bench::allocations(), before) << ray;
   }
 }
 
@@ -197,4 +197,4 @@ TEST(HeadingChoice, NamesEverySettingThatIsOutOfRange) {
 }
 
 }  // namespace
-}  // namespace palpate::runner
+}  // namespace palpate::runner::participants

@@ -8,7 +8,7 @@
 #include "runner/participants/shape_observer.h"
 #include "tests/runner/participants/observer_reference.h"
 
-namespace palpate::runner::test {
+namespace palpate::runner::participants::test {
 
 inline Vec3 random_direction(Random& random) {
   return glm::normalize(Vec3(random.normal(), random.normal(), random.normal()));
@@ -69,4 +69,4 @@ inline Percept touch(const stimuli::ObjectSpec& object, const Mat3& r, bool ray,
   return percept;
 }
 
-}  // namespace palpate::runner::test
+}  // namespace palpate::runner::participants::test

@@ -9,7 +9,7 @@
 #include "protocols/parse.h"
 #include "runner/participants/task_judgement.h"
 
-namespace palpate::runner::judged {
+namespace palpate::runner::participants::judged {
 
 using protocols::Interval;
 using protocols::Trial;
@@ -78,4 +78,4 @@ class Judge {
   std::uint64_t draw_ = 0;
 };
 
-}  // namespace palpate::runner::judged
+}  // namespace palpate::runner::participants::judged

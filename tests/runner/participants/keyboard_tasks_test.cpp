@@ -13,7 +13,7 @@
 #include "protocols/parse.h"
 #include "runner/participants/keyboard.h"
 
-namespace palpate::runner {
+namespace palpate::runner::participants {
 namespace {
 
 constexpr const char* kTasks = R"({"version": 2, "name": "t", "renderers": ["point"],
@@ -28,16 +28,16 @@ constexpr const char* kTasks = R"({"version": 2, "name": "t", "renderers": ["poi
   "texts": {"other_key": "OTHER KEY", "other_number": "OTHER NUMBER", "answer_first": "FIRST"}})";
 
 /// One press for each poll, with the time of the poll.
-class Scripted final : public ParticipantScreen {
+class Scripted final : public display::ParticipantScreen {
  public:
-  explicit Scripted(Clock& clock) : clock_(clock) {}
-  void show(const Page& page) override {
+  explicit Scripted(servo::Clock& clock) : clock_(clock) {}
+  void show(const display::Page& page) override {
     pages.push_back(page);
     if (!page.reply.empty()) replies.insert(page.reply);
   }
-  std::vector<KeyPress> keys() override {
+  std::vector<display::KeyPress> keys() override {
     if (script.empty()) return {};
-    std::vector<KeyPress> now;
+    std::vector<display::KeyPress> now;
     for (const std::string& key : script.front()) now.push_back({key, clock_.now_ns()});
     script.pop_front();
     return now;
@@ -48,11 +48,11 @@ class Scripted final : public ParticipantScreen {
       script.push_back({c == ' ' ? "space" : c == '\n' ? "enter" : std::string(1, c)});
   }
   std::deque<std::vector<std::string>> script;
-  std::vector<Page> pages;
+  std::vector<display::Page> pages;
   std::set<std::string> replies;
 
  private:
-  Clock& clock_;
+  servo::Clock& clock_;
 };
 
 class Nobody final : public Attendant {
@@ -78,9 +78,9 @@ class KeyboardTasks : public ::testing::Test {
     if (!view.continues) person_->begin_trial(trial_);
     person_->begin_interval(trial_, view);
   }
-  Sample felt(std::uint8_t buttons = 0) {
-    Sample sample;
-    sample.phase = Phase::feeling;
+  servo::Sample felt(std::uint8_t buttons = 0) {
+    servo::Sample sample;
+    sample.phase = servo::Phase::feeling;
     sample.time_ns = clock_.now_ns();
     sample.buttons = buttons;
     return sample;
@@ -100,7 +100,7 @@ class KeyboardTasks : public ::testing::Test {
   }
 
   protocols::Protocol protocol_ = protocols::parse_protocol_text(kTasks, "t.json");
-  VirtualClock clock_{1'000'000'000};
+  servo::VirtualClock clock_{1'000'000'000};
   Scripted screen_{clock_};
   Nobody nobody_;
   std::optional<KeyboardRespondent> person_;
@@ -178,8 +178,8 @@ TEST_F(KeyboardTasks, AKeyBeforeTheForcesIsNoAnswer) {
   person();
   begin(0, {});
   screen_.script = {{"1"}, {"2"}};
-  Sample before = felt();
-  before.phase = Phase::homing;
+  servo::Sample before = felt();
+  before.phase = servo::Phase::homing;
   EXPECT_FALSE(person_->step(before));
   EXPECT_EQ(answer()->stimulus, 1);
   EXPECT_TRUE(screen_.replies.contains("OTHER KEY"));
@@ -244,7 +244,7 @@ TEST_F(KeyboardTasks, PagesGoBackAndForth) {
                     {"right"}, {},        {"space"}, {},       {"right"}, {"enter"}};
   person_->read_screens({{"one"}, {"two"}, {""}, {"three"}});
   std::string seen;
-  for (const Page& page : screen_.pages) {
+  for (const display::Page& page : screen_.pages) {
     if (!page.reply.empty()) continue;
     if (seen.empty() || seen.substr(seen.size() - page.text.size()) != page.text)
       seen += (seen.empty() ? "" : " ") + page.text;
@@ -261,7 +261,8 @@ TEST_F(KeyboardTasks, ConsentIsGivenBelowItsLastScreenOnly) {
   page.text = "first\fsecond";
   screen_.script = {{}, {"1"}, {"space"}, {}, {"space"}, {"2"}};
   EXPECT_EQ(person_->ask(page, {}), "disagree");
-  for (const Page& shown : screen_.pages) EXPECT_EQ(shown.keys.empty(), shown.text == "first");
+  for (const display::Page& shown : screen_.pages)
+    EXPECT_EQ(shown.keys.empty(), shown.text == "first");
 }
 
 TEST_F(KeyboardTasks, LongScalesHaveAKeyForEachStep) {
@@ -280,9 +281,9 @@ TEST_F(KeyboardTasks, LongScalesHaveAKeyForEachStep) {
 TEST_F(KeyboardTasks, CuesSoundWhenTheyAreShown) {
   person();
   begin(0, {});
-  Sample ready = felt();
-  ready.phase = Phase::homing;
-  ready.waiting = Waiting::for_rest;
+  servo::Sample ready = felt();
+  ready.phase = servo::Phase::homing;
+  ready.waiting = servo::Waiting::for_rest;
   for (int i = 0; i < 5; ++i) {
     person_->step(ready);
     ready.time_ns += 200'000'000;
@@ -294,11 +295,11 @@ TEST_F(KeyboardTasks, CuesSoundWhenTheyAreShown) {
 }
 
 /// Polls a button that is pressed at some polls, numbered from 1.
-void press_at(KeyboardRespondent& person, Nobody& nobody, Clock& clock,
+void press_at(KeyboardRespondent& person, Nobody& nobody, servo::Clock& clock,
               const std::map<int, int>& presses) {
   const int begun = nobody.looks;
   nobody.each_look = [&person, &nobody, &clock, presses, begun] {
-    Sample sample;
+    servo::Sample sample;
     sample.time_ns = clock.now_ns();
     const auto now = presses.find((nobody.looks - begun) / 3);  // each is held for three polls
     if (now != presses.end()) sample.buttons = static_cast<std::uint8_t>(1U << (now->second - 1));
@@ -342,4 +343,4 @@ TEST_F(KeyboardTasks, ButtonsDoNotTypeAndKeysOfPagesStayAllowed) {
 }
 
 }  // namespace
-}  // namespace palpate::runner
+}  // namespace palpate::runner::participants

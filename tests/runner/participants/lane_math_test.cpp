@@ -6,7 +6,7 @@
 #include <cmath>
 #include <limits>
 
-namespace palpate::runner {
+namespace palpate::runner::participants {
 namespace {
 
 TEST(LaneMath, ExpIsWithin3e7OfTheStandardLibrary) {
@@ -50,4 +50,4 @@ TEST(LaneMath, LogNormalCdfIsZeroFromTheStatedBound) {
 }
 
 }  // namespace
-}  // namespace palpate::runner
+}  // namespace palpate::runner::participants

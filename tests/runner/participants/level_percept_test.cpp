@@ -12,7 +12,7 @@
 #include "protocols/parse.h"
 #include "runner/participants/task_judgement.h"
 
-namespace palpate::runner {
+namespace palpate::runner::participants {
 namespace {
 namespace felt_levels {
 
@@ -45,9 +45,9 @@ Percept touch(const Vec3& place) {
   return percept;
 }
 
-Sample pressed(const Vec3& force, double depth, int contacts = 1) {
-  Sample sample;
-  sample.phase = Phase::feeling;
+servo::Sample pressed(const Vec3& force, double depth, int contacts = 1) {
+  servo::Sample sample;
+  sample.phase = servo::Phase::feeling;
   sample.rendering.force = force;
   sample.rendering.deepest.depth = depth;
   sample.rendering.contacts = contacts;
@@ -261,4 +261,4 @@ TEST(LevelPercept, IdentificationByStiffnessMeasuresIt) {
 
 }  // namespace felt_levels
 }  // namespace
-}  // namespace palpate::runner
+}  // namespace palpate::runner::participants

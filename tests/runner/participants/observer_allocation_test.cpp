@@ -4,14 +4,14 @@
 #include "runner/participants/shape_observer.h"
 #include "tests/runner/participants/observer_reference.h"
 
-namespace palpate::runner {
+namespace palpate::runner::participants {
 namespace {
 
 TEST(ShapeObserverAllocation, UpdateAllocatesNothing) {
-  if (!counts_allocations()) GTEST_SKIP() << "a sanitizer brings its own operator new";
+  if (!bench::counts_allocations()) GTEST_SKIP() << "a sanitizer brings its own operator new";
   const ShapeHypotheses hypotheses(test::four_shapes());
   ShapeObserver observer(hypotheses);
-  EXPECT_GT(allocations(), 0u);
+  EXPECT_GT(bench::allocations(), 0u);
   Percept percept;
   percept.tip = {-0.06, 0, 0.03};
   percept.tail = {0.06, 0, 0.03};
@@ -21,12 +21,12 @@ TEST(ShapeObserverAllocation, UpdateAllocatesNothing) {
       percept.ray = ray;
       percept.contact = contact;
       if (ray) percept.along = 0.05;
-      const std::uint64_t before = allocations();
+      const std::uint64_t before = bench::allocations();
       observer.update(percept);
-      EXPECT_EQ(allocations(), before) << ray << contact;
+      EXPECT_EQ(bench::allocations(), before) << ray << contact;
     }
   }
 }
 
 }  // namespace
-}  // namespace palpate::runner
+}  // namespace palpate::runner::participants

@@ -13,7 +13,7 @@
 #include "runner/participants/shape_observer.h"
 #include "tests/runner/participants/ideal_touches.h"
 
-namespace palpate::runner {
+namespace palpate::runner::participants {
 namespace {
 
 using test::by_movement;
@@ -162,4 +162,4 @@ TEST(ObserverEvidence, NamesSettingsOutOfRange) {
 }
 
 }  // namespace
-}  // namespace palpate::runner
+}  // namespace palpate::runner::participants

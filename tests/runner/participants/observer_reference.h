@@ -9,7 +9,7 @@
 #include "runner/participants/shape_observer.h"
 #include "stimuli/signed_distance.h"
 
-namespace palpate::runner::test {
+namespace palpate::runner::participants::test {
 
 inline std::vector<stimuli::ObjectSpec> four_shapes() {
   std::vector<stimuli::ObjectSpec> stimuli(4);
@@ -146,4 +146,4 @@ class ReferenceObserver {
   std::vector<std::vector<double>> log_posterior_;
 };
 
-}  // namespace palpate::runner::test
+}  // namespace palpate::runner::participants::test

@@ -15,7 +15,7 @@
 #include "runner/servo/realtime.h"
 #include "tests/shared/temporary_folder.h"
 
-namespace palpate::runner {
+namespace palpate::runner::participants {
 namespace {
 
 using Mapping = std::map<std::string, std::string>;
@@ -56,13 +56,13 @@ class Box : public ::testing::Test {
     ResponseBox box(terminal_.path, mapping, clock_, [this] { ++emergencies_; });
     const std::int64_t before = clock_.now_ns();
     terminal_.send(bytes);
-    std::vector<KeyPress> all;
+    std::vector<display::KeyPress> all;
     comes([&] {
-      for (const KeyPress& press : box.take()) all.push_back(press);
+      for (const display::KeyPress& press : box.take()) all.push_back(press);
       return all.size() >= count;
     });
     std::string keys;
-    for (const KeyPress& press : all) {
+    for (const display::KeyPress& press : all) {
       keys += press.key + " ";
       EXPECT_GE(press.time_ns, before);
       EXPECT_LE(press.time_ns, clock_.now_ns());
@@ -70,7 +70,7 @@ class Box : public ::testing::Test {
     return keys;
   }
 
-  RealClock clock_;
+  servo::RealClock clock_;
   PseudoTerminal terminal_;
   std::atomic<int> emergencies_{0};
 };
@@ -92,10 +92,10 @@ TEST_F(Box, EscapeIsAnImmediateEmergency) {
 
 TEST_F(Box, AnUnpluggedBoxIsReportedAndTheKeyboardStays) {
   ResponseBox box(terminal_.path, {}, clock_, [] {});
-  class Keyboard final : public ParticipantScreen {
+  class Keyboard final : public display::ParticipantScreen {
    public:
-    void show(const Page&) override {}
-    std::vector<KeyPress> keys() override { return {{"k", 1}}; }
+    void show(const display::Page&) override {}
+    std::vector<display::KeyPress> keys() override { return {{"k", 1}}; }
     bool open() const override { return true; }
   } keyboard;
   ScreenWithBox screen(keyboard, box);
@@ -109,10 +109,10 @@ TEST_F(Box, AnUnpluggedBoxIsReportedAndTheKeyboardStays) {
 // As with a box at another speed, whose bytes arrive changed.
 TEST_F(Box, AnUnknownByteIsReported) {
   ResponseBox box(terminal_.path, {{"A", "1"}}, clock_, [] {});
-  class Keyboard final : public ParticipantScreen {
+  class Keyboard final : public display::ParticipantScreen {
    public:
-    void show(const Page&) override {}
-    std::vector<KeyPress> keys() override { return {}; }
+    void show(const display::Page&) override {}
+    std::vector<display::KeyPress> keys() override { return {}; }
     bool open() const override { return true; }
   } keyboard;
   ScreenWithBox screen(keyboard, box);
@@ -146,4 +146,4 @@ TEST_F(Box, WhatIsNoPortIsRefused) {
 }
 
 }  // namespace
-}  // namespace palpate::runner
+}  // namespace palpate::runner::participants

@@ -12,7 +12,7 @@
 #include "stimuli/primitives.h"
 #include "tests/runner/participants/solids.h"
 
-namespace palpate::runner {
+namespace palpate::runner::participants {
 namespace {
 
 std::vector<Quat> symmetries_of(const std::vector<PlacedPart>& parts) {
@@ -66,4 +66,4 @@ TEST(RotationGrid, EveryOrientationIsNearOneUpToSymmetry) {
 }
 
 }  // namespace
-}  // namespace palpate::runner
+}  // namespace palpate::runner::participants

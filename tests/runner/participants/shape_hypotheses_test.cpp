@@ -15,7 +15,7 @@
 #include "data/base/random.h"
 #include "stimuli/orientation.h"
 
-namespace palpate::runner {
+namespace palpate::runner::participants {
 namespace {
 
 stimuli::ObjectSpec spec(stimuli::ShapeKind kind) {
@@ -183,4 +183,4 @@ TEST(ShapeHypotheses, TheOrderByRotationHasEachOnceNearItsLikes) {
 }
 
 }  // namespace
-}  // namespace palpate::runner
+}  // namespace palpate::runner::participants

@@ -16,7 +16,7 @@
 #include "tests/runner/participants/ideal_touches.h"
 #include "tests/runner/participants/observer_reference.h"
 
-namespace palpate::runner {
+namespace palpate::runner::participants {
 namespace {
 
 using test::four_shapes;
@@ -341,4 +341,4 @@ TEST(ShapeObserver, NamesEverySettingThatIsOutOfRange) {
 }
 
 }  // namespace
-}  // namespace palpate::runner
+}  // namespace palpate::runner::participants

@@ -9,7 +9,7 @@
 #include "stimuli/parts/convex_parts.h"
 #include "tests/stimuli/concave_solids.h"
 
-namespace palpate::runner::test {
+namespace palpate::runner::participants::test {
 
 inline std::vector<PlacedPart> placed(const stimuli::PolygonSoup& soup, const Vec3& shift = {}) {
   std::vector<PlacedPart> parts;
@@ -42,4 +42,4 @@ inline double distance_to_prism(const stimuli::solids::Outline& outline, double 
          std::min(std::max(across, along), 0.0);
 }
 
-}  // namespace palpate::runner::test
+}  // namespace palpate::runner::participants::test

@@ -13,7 +13,7 @@
 #include "protocols/parse.h"
 #include "tests/runner/participants/judge.h"
 
-namespace palpate::runner::judged {
+namespace palpate::runner::participants::judged {
 namespace {
 
 constexpr int kDraws = 4000;
@@ -274,4 +274,4 @@ TEST(TaskJudgement, WithAZeroStandardTheLargestLevelSetsTheNoise) {
 }
 
 }  // namespace
-}  // namespace palpate::runner::judged
+}  // namespace palpate::runner::participants::judged

@@ -8,7 +8,7 @@
 
 #include "runner/safety/fault_signals.h"
 
-namespace palpate::runner {
+namespace palpate::runner::safety {
 namespace {
 
 /// The bits declared in a header's text.
@@ -51,19 +51,20 @@ TEST(FaultTable, TheConsoleNamesEveryDeclaredBit) {
     EXPECT_EQ(fault_words(bit).find("unknown"), std::string::npos) << bit;
   }
   EXPECT_EQ(fault_words(all).find("unknown"), std::string::npos);
-  EXPECT_EQ(fault_words(servo_fault::kDeviceLost | servo_fault::kTripped),
+  EXPECT_EQ(fault_words(servo::servo_fault::kDeviceLost | servo::servo_fault::kTripped),
             "device lost, forces off");
-  EXPECT_EQ(fault_words(servo_fault::kTripped | 1U << 31U), "forces off, unknown (2147483648)");
+  EXPECT_EQ(fault_words(servo::servo_fault::kTripped | 1U << 31U),
+            "forces off, unknown (2147483648)");
 }
 
 TEST(FaultTable, FaultsThatSwitchForcesOffHaveAMessage) {
   // The codebook describes faults that switch forces off as "zero force until cleared".
   for (const rendering::FaultBit& fault : kFaultTable) {
     const bool cuts = std::string(fault.meaning).find("until cleared") != std::string::npos;
-    const bool off = fault.bit == servo_fault::kTripped;
+    const bool off = fault.bit == servo::servo_fault::kTripped;
     EXPECT_EQ(std::string(fault.why).empty(), !cuts && !off) << fault.name;
   }
 }
 
 }  // namespace
-}  // namespace palpate::runner
+}  // namespace palpate::runner::safety

@@ -6,12 +6,12 @@
 
 #include "runner/safety/guard.h"
 
-namespace palpate::runner {
+namespace palpate::runner::safety {
 namespace {
 
 /// Every member differs from its default and from the others.
-DeviceCapabilities some_capabilities() {
-  DeviceCapabilities device;
+servo::DeviceCapabilities some_capabilities() {
+  servo::DeviceCapabilities device;
   device.name = "falcon2";
   device.sensed_freedom = 5;
   device.actuated_freedom = 4;
@@ -30,10 +30,10 @@ DeviceCapabilities some_capabilities() {
 }
 
 TEST(GuardChannel, CapabilitiesPassThroughUnchanged) {
-  const DeviceCapabilities sent = some_capabilities();
+  const servo::DeviceCapabilities sent = some_capabilities();
   FixedCapabilities fixed;
   fixed.set(sent);
-  const DeviceCapabilities got = fixed.numbers();
+  const servo::DeviceCapabilities got = fixed.numbers();
   EXPECT_EQ(got.name, sent.name);
   EXPECT_EQ(got.sensed_freedom, sent.sensed_freedom);
   EXPECT_EQ(got.actuated_freedom, sent.actuated_freedom);
@@ -51,7 +51,7 @@ TEST(GuardChannel, CapabilitiesPassThroughUnchanged) {
 }
 
 TEST(GuardChannel, LongTextsAreTruncatedAndShorterOnesReplaceThem) {
-  DeviceCapabilities device = some_capabilities();
+  servo::DeviceCapabilities device = some_capabilities();
   device.name = std::string(1000, 'n');
   device.calibration = std::string(1000, 'c');
   FixedCapabilities fixed;
@@ -63,21 +63,21 @@ TEST(GuardChannel, LongTextsAreTruncatedAndShorterOnesReplaceThem) {
 }
 
 TEST(GuardChannel, ReadingsPassThroughUnchanged) {
-  DeviceReading sent;
+  servo::DeviceReading sent;
   sent.stylus = {{0.01, 0.02, 0.03}, {0.04, 0.05, 0.06}};
   sent.buttons = 5;
   sent.lost = true;
-  sent.trouble = DeviceTrouble::apart;
+  sent.trouble = servo::DeviceTrouble::apart;
   const GuardedReading guarded(sent, 17, 3);
   EXPECT_EQ(guarded.request, 17U);
   EXPECT_EQ(guarded.trips, 3U);
-  const DeviceReading got = guarded.reading();
+  const servo::DeviceReading got = guarded.reading();
   EXPECT_EQ(got.stylus.tip, sent.stylus.tip);
   EXPECT_EQ(got.stylus.tail, sent.stylus.tail);
   EXPECT_EQ(got.buttons, 5);
   EXPECT_TRUE(got.lost);
-  EXPECT_EQ(got.trouble, DeviceTrouble::apart);
+  EXPECT_EQ(got.trouble, servo::DeviceTrouble::apart);
 }
 
 }  // namespace
-}  // namespace palpate::runner
+}  // namespace palpate::runner::safety

@@ -13,18 +13,20 @@
 #include "runner/safety/guarded_device.h"
 #include "tests/runner/recording_device.h"
 
-namespace palpate::runner::testing {
+namespace palpate::runner::safety::testing {
 
-inline DeviceReading stylus_at(double z) { return {{{0, 0, z}, {0, 0, z + 0.12}}, 0, false}; }
+inline servo::DeviceReading stylus_at(double z) {
+  return {{{0, 0, z}, {0, 0, z + 0.12}}, 0, false};
+}
 /// At rest outside for 0.15 s at 1 kHz, then down into the cube; a second in total.
-inline DeviceReading visiting(int tick) {
+inline servo::DeviceReading visiting(int tick) {
   const int at = tick % 1000;
   return stylus_at(at < 150 ? 0.1 : std::max(0.029, 0.1 - 4e-4 * (at - 150)));
 }
 
 /// Shared with the runner's process.
 struct Shared {
-  DeviceRecord record;
+  runner::testing::DeviceRecord record;
   std::atomic<bool> felt{false};  ///< there has been force for a while, and still is
   std::atomic<bool> go{false};    ///< tells the runner to cause its end
 };
@@ -45,4 +47,4 @@ inline GuardSettings no_rights() {
   return settings;
 }
 
-}  // namespace palpate::runner::testing
+}  // namespace palpate::runner::safety::testing

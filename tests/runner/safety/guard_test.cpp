@@ -13,12 +13,12 @@
 #include "tests/runner/recording_device.h"
 #include "tests/runner/safety/guard_stage.h"
 
-namespace palpate::runner {
+namespace palpate::runner::safety {
 namespace {
 
+using runner::testing::RecordingDevice;
 using testing::nap;
 using testing::no_rights;
-using testing::RecordingDevice;
 using testing::Stage;
 using testing::stylus_at;
 using testing::visiting;
@@ -28,11 +28,11 @@ TEST(Guard, TheDevicesReadingsPassThrough) {
   GuardedDevice device(
       [&] {
         return std::make_unique<RecordingDevice>(stage.shared->record, [](int tick) {
-          DeviceReading reading = stylus_at(0.001 * tick);
+          servo::DeviceReading reading = stylus_at(0.001 * tick);
           reading.buttons = static_cast<std::uint8_t>(tick);
           if (tick == 3) {
             reading.lost = true;
-            reading.trouble = DeviceTrouble::not_homed;
+            reading.trouble = servo::DeviceTrouble::not_homed;
           }
           return reading;
         });
@@ -43,9 +43,9 @@ TEST(Guard, TheDevicesReadingsPassThrough) {
   EXPECT_EQ(device.capabilities().max_rate, 10000);
   bool homing_lost = false;
   for (int i = 0; i < 20; ++i) {
-    const DeviceReading reading = device.read();
-    if (reading.trouble == DeviceTrouble::not_homed) homing_lost = reading.lost;
-    if (reading.trouble != DeviceTrouble::none) continue;
+    const servo::DeviceReading reading = device.read();
+    if (reading.trouble == servo::DeviceTrouble::not_homed) homing_lost = reading.lost;
+    if (reading.trouble != servo::DeviceTrouble::none) continue;
     EXPECT_NEAR(reading.stylus.tip.z, 0.001 * reading.buttons, 1e-12) << "one whole reading";
     device.write(Vec3(0), Vec3(0));
   }
@@ -65,7 +65,7 @@ TEST(Guard, OpeningWaitsForAFirstReading) {
   EXPECT_EQ(device.read().stylus.tip.z, 0.1) << "no reading is late before there was one";
   const auto dying = [&] {
     return std::make_unique<RecordingDevice>(stage.shared->record,
-                                             [](int) -> DeviceReading { _exit(1); });
+                                             [](int) -> servo::DeviceReading { _exit(1); });
   };
   EXPECT_THROW(GuardedDevice(dying, no_rights()), std::runtime_error);
   const auto hanging = [&] {
@@ -99,18 +99,18 @@ TEST(Guard, NoForceBeforeAZeroCommandAndNoneAfterAnEmergency) {
   EXPECT_EQ(command(1), 0);
   EXPECT_EQ(command(0), 0);
   EXPECT_EQ(command(1), 0) << "the runner has not yet heard of it";
-  DeviceReading reading;
+  servo::DeviceReading reading;
   do reading = device.read();
-  while (reading.trouble == DeviceTrouble::late);
+  while (reading.trouble == servo::DeviceTrouble::late);
   EXPECT_TRUE(reading.lost);
-  EXPECT_EQ(reading.trouble, DeviceTrouble::guarded);
+  EXPECT_EQ(reading.trouble, servo::DeviceTrouble::guarded);
   EXPECT_EQ(command(1), 0);
   EXPECT_EQ(command(0), 0);
   EXPECT_EQ(command(1), 1);
 }
 
 TEST(Guard, TheReasonWhyADeviceCannotBeOpenedIsReported) {
-  const auto factory = []() -> std::unique_ptr<Device> {
+  const auto factory = []() -> std::unique_ptr<servo::Device> {
     throw std::runtime_error("the Falcon is asleep");
   };
   try {
@@ -119,9 +119,9 @@ TEST(Guard, TheReasonWhyADeviceCannotBeOpenedIsReported) {
   } catch (const std::runtime_error& error) {
     EXPECT_STREQ(error.what(), "the Falcon is asleep");
   }
-  const auto dying = []() -> std::unique_ptr<Device> { _exit(1); };
+  const auto dying = []() -> std::unique_ptr<servo::Device> { _exit(1); };
   EXPECT_THROW(GuardedDevice(dying, no_rights()), std::runtime_error);
-  const auto hanging = []() -> std::unique_ptr<Device> {
+  const auto hanging = []() -> std::unique_ptr<servo::Device> {
     nap(100'000);
     return nullptr;
   };
@@ -137,19 +137,19 @@ TEST(Guard, AGuardThatHasEndedCountsAsALostDevice) {
       no_rights());
   device.read();
   kill(device.guard_process(), SIGKILL);
-  DeviceReading reading;
+  servo::DeviceReading reading;
   for (int i = 0; i < 1000 && !reading.lost; ++i) {
     reading = device.read();
     device.write(Vec3(0), Vec3(0));
   }
   EXPECT_TRUE(reading.lost);
-  EXPECT_EQ(reading.trouble, DeviceTrouble::guard_lost);
+  EXPECT_EQ(reading.trouble, servo::DeviceTrouble::guard_lost);
 }
 
 /// Reads and commands zero until the reading satisfies the condition. \return the last reading
 template <class Wished>
-DeviceReading read_until(GuardedDevice& device, Wished wished) {
-  DeviceReading reading = device.read();
+servo::DeviceReading read_until(GuardedDevice& device, Wished wished) {
+  servo::DeviceReading reading = device.read();
   for (int i = 0; i < 20'000 && !wished(reading); ++i) {
     device.write(Vec3(0), Vec3(0));
     reading = device.read();
@@ -157,9 +157,9 @@ DeviceReading read_until(GuardedDevice& device, Wished wished) {
   return reading;
 }
 
-bool is_lost(const DeviceReading& reading) { return reading.lost; }
-bool is_well(const DeviceReading& reading) {
-  return !reading.lost && reading.trouble == DeviceTrouble::none;
+bool is_lost(const servo::DeviceReading& reading) { return reading.lost; }
+bool is_well(const servo::DeviceReading& reading) {
+  return !reading.lost && reading.trouble == servo::DeviceTrouble::none;
 }
 
 TEST(Guard, ALateGuardIsALostDeviceOnlyUntilItRecovers) {
@@ -170,7 +170,7 @@ TEST(Guard, ALateGuardIsALostDeviceOnlyUntilItRecovers) {
   for (int i = 0; i < 3; ++i) {
     EXPECT_TRUE(is_well(read_until(device, is_well)));
     kill(device.guard_process(), SIGSTOP);
-    EXPECT_EQ(read_until(device, is_lost).trouble, DeviceTrouble::guard_late);
+    EXPECT_EQ(read_until(device, is_lost).trouble, servo::DeviceTrouble::guard_late);
     kill(device.guard_process(), SIGCONT);
   }
   EXPECT_TRUE(is_well(read_until(device, is_well)));
@@ -183,26 +183,28 @@ TEST(Guard, AGuardThatHangsForGoodCountsAsEnded) {
   GuardedDevice device(
       [&] { return std::make_unique<RecordingDevice>(stage.shared->record, visiting); }, settings);
   kill(device.guard_process(), SIGSTOP);
-  RealClock clock;
+  servo::RealClock clock;
   const std::int64_t began = clock.now_ns();
-  EXPECT_EQ(read_until(device, is_lost).trouble, DeviceTrouble::guard_late);
-  const DeviceReading last = read_until(device, [](const DeviceReading& reading) {
-    return reading.trouble == DeviceTrouble::guard_lost;
+  EXPECT_EQ(read_until(device, is_lost).trouble, servo::DeviceTrouble::guard_late);
+  const servo::DeviceReading last = read_until(device, [](const servo::DeviceReading& reading) {
+    return reading.trouble == servo::DeviceTrouble::guard_lost;
   });
-  EXPECT_EQ(last.trouble, DeviceTrouble::guard_lost);
+  EXPECT_EQ(last.trouble, servo::DeviceTrouble::guard_lost);
   EXPECT_GE(clock.now_ns() - began, 190'000'000);
 }
 
 /// Unplugged and plugged in again by the test.
-class Plug final : public Device {
+class Plug final : public servo::Device {
  public:
   explicit Plug(Stage& stage) : stage_(stage), recording_(stage.shared->record, visiting) {}
-  const DeviceCapabilities& capabilities() const override { return recording_.capabilities(); }
-  DeviceReading read() noexcept override {
+  const servo::DeviceCapabilities& capabilities() const override {
+    return recording_.capabilities();
+  }
+  servo::DeviceReading read() noexcept override {
     open_ = open_ && !stage_.shared->go;
-    DeviceReading reading = recording_.read();
+    servo::DeviceReading reading = recording_.read();
     reading.lost = !open_;
-    reading.trouble = open_ ? DeviceTrouble::none : DeviceTrouble::unplugged;
+    reading.trouble = open_ ? servo::DeviceTrouble::none : servo::DeviceTrouble::unplugged;
     return reading;
   }
   void write(const Vec3& device1, const Vec3& device2) noexcept override {
@@ -223,18 +225,18 @@ class Plug final : public Device {
 TEST(Guard, AnUnpluggedDeviceIsReopenedOnRequest) {
   Stage stage;
   GuardedDevice device([&] { return std::make_unique<Plug>(stage); }, no_rights());
-  const auto reopened = [&device](const DeviceReading&) { return !device.reopening(); };
+  const auto reopened = [&device](const servo::DeviceReading&) { return !device.reopening(); };
   for (int i = 0; i < 3; ++i) {
     stage.shared->go = true;
-    EXPECT_EQ(read_until(device, is_lost).trouble, DeviceTrouble::unplugged);
+    EXPECT_EQ(read_until(device, is_lost).trouble, servo::DeviceTrouble::unplugged);
     device.ask_to_reopen();
     EXPECT_TRUE(device.reopening());
     EXPECT_EQ(read_until(device,
-                         [](const DeviceReading& reading) {
-                           return reading.trouble == DeviceTrouble::reopening;
+                         [](const servo::DeviceReading& reading) {
+                           return reading.trouble == servo::DeviceTrouble::reopening;
                          })
                   .trouble,
-              DeviceTrouble::reopening);
+              servo::DeviceTrouble::reopening);
     EXPECT_TRUE(read_until(device, reopened).lost);
     EXPECT_EQ(device.reopen_trouble(), "nothing is plugged in");
     stage.shared->go = false;
@@ -268,4 +270,4 @@ TEST(Guard, ReopeningSwitchesForcesOffFirst) {
 }
 
 }  // namespace
-}  // namespace palpate::runner
+}  // namespace palpate::runner::safety

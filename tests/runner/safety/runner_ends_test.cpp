@@ -20,13 +20,13 @@
 #include "tests/runner/recording_device.h"
 #include "tests/runner/safety/guard_stage.h"
 
-namespace palpate::runner {
+namespace palpate::runner::safety {
 namespace {
 
-using testing::DeviceRecord;
+using runner::testing::DeviceRecord;
+using runner::testing::RecordingDevice;
 using testing::nap;
 using testing::no_rights;
-using testing::RecordingDevice;
 using testing::Shared;
 using testing::Stage;
 using testing::visiting;
@@ -36,25 +36,25 @@ constexpr std::int64_t kLimit_ns = 20'000'000;
 /// A session's thread and a servo's. Ends once `end` returns or a signal requests the end. Restarts
 /// trials until one has had force for a while, because a busy machine may trip one; afterwards it
 /// clears no fault.
-void feel_a_cube(Shared& shared, Device& device, FaultSignals& signals,
-                 const std::function<void(ServoThread&)>& end) {
+void feel_a_cube(Shared& shared, servo::Device& device, FaultSignals& signals,
+                 const std::function<void(servo::ServoThread&)>& end) {
   const rendering::Scene scene({{std::make_shared<const stimuli::ConvexMesh>(stimuli::cube(0.06)),
                                  Pose{}, stimuli::Material{}, 0, nullptr}},
                                false);
-  RealClock clock;
-  ServoSettings settings;
+  servo::RealClock clock;
+  servo::ServoSettings settings;
   settings.realtime = {0, false, -1};
   settings.ring = 1 << 17;
-  ServoThread servo(device, clock, settings);
+  servo::ServoThread servo(device, clock, settings);
   signals.watch(&servo);
   int felt = 0;
   while (felt < 100) {
     servo.clear_fault();
     servo.prepare(scene, rendering::point_renderer(), {0.062, 0.05, 0.005});
     std::uint32_t faults = 0;
-    for (felt = 0; felt < 100 && !(faults & servo_fault::kTripped);) {
-      const Sample& sample = servo.next();
-      faults = sample.faults & ~servo_fault::kTripped;
+    for (felt = 0; felt < 100 && !(faults & servo::servo_fault::kTripped);) {
+      const servo::Sample& sample = servo.next();
+      faults = sample.faults & ~servo::servo_fault::kTripped;
       if (sample.tick > 0) faults = sample.faults;
       felt = glm::length(sample.device1) > 0.3 ? felt + 1 : 0;
     }
@@ -62,11 +62,11 @@ void feel_a_cube(Shared& shared, Device& device, FaultSignals& signals,
   shared.felt = true;
   end(servo);
   while (signals.end_requested() == 0) nap(1);
-  signals.watch(static_cast<ServoThread*>(nullptr));
+  signals.watch(static_cast<servo::ServoThread*>(nullptr));
 }
 
 /// The runner: a session's thread, a servo's, a guard.
-void run(Shared& shared, const std::function<void(ServoThread&)>& end) {
+void run(Shared& shared, const std::function<void(servo::ServoThread&)>& end) {
   FaultSignals signals;
   GuardedDevice device(
       [&shared] { return std::make_unique<RecordingDevice>(shared.record, visiting); },
@@ -86,7 +86,7 @@ struct Outcome {
 Outcome after(const Shared& shared, const std::function<void()>& event, int for_ms) {
   while (!shared.felt) nap(1);
   const DeviceRecord& record = shared.record;
-  RealClock clock;
+  servo::RealClock clock;
   const std::int64_t began = clock.now_ns();
   event();
   Outcome out;
@@ -110,7 +110,7 @@ Outcome after(const Shared& shared, const std::function<void()>& event, int for_
 struct End {
   const char* name;
   int signal;  ///< sent from outside; 0: none
-  std::function<void(ServoThread&)> by_itself;
+  std::function<void(servo::ServoThread&)> by_itself;
   int dies_of;  ///< signal
 };
 
@@ -125,7 +125,7 @@ TEST_P(RunnerEnds, ZeroForceWithin20ms) {
   if (runner == 0) {
     prctl(PR_SET_PDEATHSIG, SIGKILL);
     try {
-      run(*stage.shared, [&](ServoThread& servo) {
+      run(*stage.shared, [&](servo::ServoThread& servo) {
         if (!GetParam().by_itself) return;
         while (!stage.shared->go) nap(1);
         GetParam().by_itself(servo);
@@ -164,20 +164,21 @@ INSTANTIATE_TEST_SUITE_P(
         End{"sigterm", SIGTERM, nullptr, 0}, End{"sigint", SIGINT, nullptr, 0},
         End{"sigsegv", SIGSEGV, nullptr, SIGSEGV},
         End{"segmentation_fault", 0,
-            [](ServoThread&) {
+            [](servo::ServoThread&) {
               volatile int* volatile nowhere = nullptr;
               *nowhere = 1;
             },
             SIGSEGV},
-        End{"failed_assert", 0, [](ServoThread&) { std::abort(); }, SIGABRT},
+        End{"failed_assert", 0, [](servo::ServoThread&) { std::abort(); }, SIGABRT},
         End{"uncaught_exception", 0,
-            [](ServoThread&) {
+            [](servo::ServoThread&) {
               std::thread([] { throw std::runtime_error("nobody catches this"); }).join();
             },
             SIGABRT},
         End{"caught_exception", 0,
-            [](ServoThread&) { throw std::runtime_error("the database is full"); }, 0},
-        End{"emergency_key", 0, [](ServoThread& servo) { servo.emergency_zero(); }, SIGKILL}),
+            [](servo::ServoThread&) { throw std::runtime_error("the database is full"); }, 0},
+        End{"emergency_key", 0, [](servo::ServoThread& servo) { servo.emergency_zero(); },
+            SIGKILL}),
     [](const auto& end) { return std::string(end.param.name); });
 
 // Without a guard, only the servo's own thread can send zero force: a failing thread must wait for
@@ -189,7 +190,7 @@ TEST(FaultSignals, AFailingThreadWaitsForTheServosZeroForce) {
     prctl(PR_SET_PDEATHSIG, SIGKILL);
     FaultSignals signals;
     RecordingDevice device(stage.shared->record, visiting);
-    feel_a_cube(*stage.shared, device, signals, [](ServoThread&) { std::abort(); });
+    feel_a_cube(*stage.shared, device, signals, [](servo::ServoThread&) { std::abort(); });
     _exit(0);
   }
   int status = 0;
@@ -205,7 +206,7 @@ TEST(Guard, ARunnerThatWasStoppedGivesNoForceUntilCleared) {
   const int runner = fork();
   if (runner == 0) {
     prctl(PR_SET_PDEATHSIG, SIGKILL);
-    run(*stage.shared, [](ServoThread&) {});
+    run(*stage.shared, [](servo::ServoThread&) {});
     _exit(0);
   }
   const Outcome stopped = after(
@@ -223,4 +224,4 @@ TEST(Guard, ARunnerThatWasStoppedGivesNoForceUntilCleared) {
 }
 
 }  // namespace
-}  // namespace palpate::runner
+}  // namespace palpate::runner::safety

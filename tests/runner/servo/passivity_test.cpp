@@ -15,7 +15,7 @@
 #include "stimuli/primitives.h"
 #include "tests/runner/fake_device.h"
 
-namespace palpate::runner {
+namespace palpate::runner::servo {
 namespace {
 
 constexpr double kTick = 1e-3;
@@ -117,7 +117,7 @@ DeviceReading knock(int tick) {
 }
 
 double most_force(bool controlled, double limit, double* most_change = nullptr) {
-  testing::FakeDevice device(knock);
+  runner::testing::FakeDevice device(knock);
   VirtualClock clock;
   Servo servo(device, clock, 1000, {limit, 0.5, 0.2});
   if (controlled) servo.control_passivity();
@@ -149,4 +149,4 @@ TEST(Passivity, TheServoKeepsItsLimitsWithTheController) {
 }
 
 }  // namespace
-}  // namespace palpate::runner
+}  // namespace palpate::runner::servo

@@ -6,7 +6,7 @@
 
 #include "runner/servo/servo_thread.h"
 
-namespace palpate::runner {
+namespace palpate::runner::servo {
 namespace {
 
 constexpr std::int64_t kPeriod_ns = 500'000;  // 2 kHz
@@ -60,4 +60,4 @@ TEST(ServoHealth, TheRecordHasCountsTimesAndFaults) {
 }
 
 }  // namespace
-}  // namespace palpate::runner
+}  // namespace palpate::runner::servo

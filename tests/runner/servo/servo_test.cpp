@@ -11,10 +11,10 @@
 #include "stimuli/primitives.h"
 #include "tests/runner/fake_device.h"
 
-namespace palpate::runner {
+namespace palpate::runner::servo {
 namespace {
 
-using testing::FakeDevice;
+using runner::testing::FakeDevice;
 
 rendering::Scene cube_scene() {
   return rendering::Scene({{std::make_shared<const stimuli::ConvexMesh>(stimuli::cube(0.06)),
@@ -483,4 +483,4 @@ TEST(ForceLimiter, NotFiniteIsZeroUntilCleared) {
 }
 
 }  // namespace
-}  // namespace palpate::runner
+}  // namespace palpate::runner::servo

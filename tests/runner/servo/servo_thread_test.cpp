@@ -14,10 +14,10 @@
 #include "stimuli/primitives.h"
 #include "tests/runner/fake_device.h"
 
-namespace palpate::runner {
+namespace palpate::runner::servo {
 namespace {
 
-using testing::FakeDevice;
+using runner::testing::FakeDevice;
 
 rendering::Scene cube_scene() {
   return rendering::Scene({{std::make_shared<const stimuli::ConvexMesh>(stimuli::cube(0.06)),
@@ -319,4 +319,4 @@ TEST(TimeHistogram, QuantilesAreWithinAnEighth) {
 }
 
 }  // namespace
-}  // namespace palpate::runner
+}  // namespace palpate::runner::servo

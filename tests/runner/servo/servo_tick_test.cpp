@@ -19,7 +19,7 @@
 #include "runner/servo/servo_thread.h"
 #include "stimuli/primitives.h"
 
-namespace palpate::runner {
+namespace palpate::runner::servo {
 namespace {
 
 /// Slides over an object from tick 300 on; calls `hook` from the servo's thread.
@@ -84,10 +84,10 @@ bool two_trials(SlidingDevice& device) {
 std::atomic<std::uint64_t> allocated_at_20{0}, allocated_at_1000{1};
 
 TEST(ServoTick, AllocatesNothing) {
-  if (!counts_allocations()) GTEST_SKIP() << "allocations are not counted under sanitizers";
+  if (!bench::counts_allocations()) GTEST_SKIP() << "allocations are not counted under sanitizers";
   SlidingDevice device([](int tick) {
-    if (tick == 20) allocated_at_20 = allocations();
-    if (tick == 950) allocated_at_1000 = allocations();
+    if (tick == 20) allocated_at_20 = bench::allocations();
+    if (tick == 950) allocated_at_1000 = bench::allocations();
   });
   EXPECT_TRUE(two_trials(device));
   EXPECT_EQ(allocated_at_1000, allocated_at_20);
@@ -147,4 +147,4 @@ TEST(ServoTick, CallsTheSystemOnlyToSleep) {
 }
 
 }  // namespace
-}  // namespace palpate::runner
+}  // namespace palpate::runner::servo

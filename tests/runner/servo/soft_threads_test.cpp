@@ -20,7 +20,7 @@
 #include "runner/servo/servo_thread.h"
 #include "tests/runner/fake_device.h"
 
-namespace palpate::runner {
+namespace palpate::runner::servo {
 namespace {
 
 using rendering::Rendering;
@@ -178,10 +178,10 @@ TEST(SoftThreads, TicksDoNotAllocate) {
     SoftSnapshot snapshot;
     if (threads[made].latest(snapshot) && snapshot.steps > 0) ++made;
   }
-  const std::uint64_t before = allocations();
+  const std::uint64_t before = bench::allocations();
   for (const PathTick& tick : path)
     rendering::ray_renderer().tick(scene, state, tick.probe, tick.dt);
-  EXPECT_EQ(allocations(), before);
+  EXPECT_EQ(bench::allocations(), before);
 }
 
 /// Virtual time with a short real sleep in each tick.
@@ -198,7 +198,7 @@ class SlowClock final : public Clock {
 };
 
 TEST(SoftThreads, TheServoTripsIfTheyStallAndSnapshotsShowTheSurface) {
-  testing::FakeDevice device([](int tick) {
+  runner::testing::FakeDevice device([](int tick) {
     const double z = std::max(0.024, 0.1 - 1e-4 * tick);
     return DeviceReading{{{0, 0, z}, {0, 0, z + 0.12}}, 0, false};
   });
@@ -237,7 +237,7 @@ TEST(SoftThreads, TheServoTripsIfTheyStallAndSnapshotsShowTheSurface) {
 }
 
 TEST(SoftThreads, WithoutMotorsAStallIsOnlyReported) {
-  testing::FakeDevice device([](int tick) {
+  runner::testing::FakeDevice device([](int tick) {
     const double z = std::max(0.024, 0.1 - 1e-4 * tick);
     return DeviceReading{{{0, 0, z}, {0, 0, z + 0.12}}, 0, false};
   });
@@ -262,4 +262,4 @@ TEST(SoftThreads, WithoutMotorsAStallIsOnlyReported) {
 }
 
 }  // namespace
-}  // namespace palpate::runner
+}  // namespace palpate::runner::servo

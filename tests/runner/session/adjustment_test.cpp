@@ -18,7 +18,7 @@
 #include "runner/session/simulated_study.h"
 #include "tests/shared/temporary_folder.h"
 
-namespace palpate::runner {
+namespace palpate::runner::session {
 namespace {
 
 constexpr double kStandard = 300, kLeast = 100, kMost = 600, kTurn = 20;  // N/m
@@ -48,8 +48,8 @@ Settings simulated(std::uint64_t seed) {
     StudyPlan plan;
     plan.participants = kParticipants;
     plan.seed = seed;
-    progress =
-        simulate_study(protocol, store, load_simulated_settings(""), plan, std::atomic<bool>{}, {});
+    progress = simulate_study(protocol, store, participants::load_simulated_settings(""), plan,
+                              std::atomic<bool>{}, {});
   }
   Settings found;
   std::vector<double> numbers;
@@ -109,4 +109,4 @@ TEST(Adjustment, FindsTheStandardWithTheModelsSpread) {
 }
 
 }  // namespace
-}  // namespace palpate::runner
+}  // namespace palpate::runner::session

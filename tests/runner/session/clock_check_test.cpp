@@ -4,7 +4,7 @@
 
 #include "runner/session/device_check.h"
 
-namespace palpate::runner {
+namespace palpate::runner::session {
 namespace {
 
 constexpr std::int64_t kSecond = 1'000'000'000, kDay = 86'400 * kSecond, kYear = 365 * kDay;
@@ -45,4 +45,4 @@ TEST(ClockCheck, DatesOfADamagedFileAreIgnored) {
 }
 
 }  // namespace
-}  // namespace palpate::runner
+}  // namespace palpate::runner::session

@@ -17,7 +17,7 @@
 #include "runner/session/live_forces.h"
 #include "runner/session/simulated_study.h"
 
-namespace palpate::runner {
+namespace palpate::runner::session {
 namespace {
 
 constexpr double kNone = std::numeric_limits<double>::infinity();
@@ -113,9 +113,9 @@ TEST(SharpEdges, TooManyCountAsATexture) {
   EXPECT_EQ(edges_of(row).distance(Vec3(0)), kNone);
 }
 
-Sample touching(const Vec3& point) {
-  Sample sample;
-  sample.phase = Phase::feeling;
+servo::Sample touching(const Vec3& point) {
+  servo::Sample sample;
+  sample.phase = servo::Phase::feeling;
   sample.rendering.contacts = 1;
   sample.rendering.deepest.point = point;
   return sample;
@@ -138,7 +138,7 @@ TEST(ContactLog, CountsEveryTickAsIfAllEdgesWereChecked) {
     const double step = tick % 50 == 0 ? 0.01 : 6e-5;
     p += step * Vec3(random.normal(), random.normal(), random.normal());
     if (glm::length(p) > 0.035) p *= 0.5;
-    Sample sample = touching(turned * p);
+    servo::Sample sample = touching(turned * p);
     if (random.unit() < 0.3) {
       sample.rendering = {};
     } else {
@@ -151,7 +151,7 @@ TEST(ContactLog, CountsEveryTickAsIfAllEdgesWereChecked) {
   EXPECT_DOUBLE_EQ(log.contact_share(), touched / static_cast<double>(kTicks));
   EXPECT_NEAR(*log.edge_dwell(0.001), 0.001 * near, 0.0015) << "but for roundings at the border";
   log.begin(edges, turned);
-  log.add(Sample{});
+  log.add(servo::Sample{});
   EXPECT_EQ(log.contact_share(), 0) << "nothing is left of the trial before";
   EXPECT_EQ(*log.edge_dwell(0.001), 0);
 }
@@ -221,7 +221,7 @@ TEST(ContactLog, OfASimulatedStudyMatchesItsSamples) {
   const std::atomic<bool> stop{false};
   int with_edges = 0, trials = 0;
   simulate_in_memory(
-      protocol, load_simulated_settings("", 3), 1, 77, stop,
+      protocol, participants::load_simulated_settings("", 3), 1, 77, stop,
       [&](int, const data::TrialRecord& record, std::uint64_t contact_ticks) {
         ++trials;
         const stimuli::ObjectSpec* object = nullptr;
@@ -244,4 +244,4 @@ TEST(ContactLog, OfASimulatedStudyMatchesItsSamples) {
 }
 
 }  // namespace
-}  // namespace palpate::runner
+}  // namespace palpate::runner::session

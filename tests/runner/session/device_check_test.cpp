@@ -9,11 +9,11 @@
 #include "protocols/parse.h"
 #include "stimuli/shapes.h"
 
-namespace palpate::runner {
+namespace palpate::runner::session {
 namespace {
 
-DeviceCapabilities some_device() {
-  DeviceCapabilities device;
+servo::DeviceCapabilities some_device() {
+  servo::DeviceCapabilities device;
   device.name = "some";
   device.sensed_freedom = device.actuated_freedom = 5;
   device.max_force = 8;
@@ -45,7 +45,7 @@ stimuli::Material of(double stiffness, double damping = 0) {
   return material;
 }
 
-double share(const stimuli::Material& material, const DeviceCapabilities& device,
+double share(const stimuli::Material& material, const servo::DeviceCapabilities& device,
              double rate = 1000, double scale = 1, bool controlled = false) {
   return showable(material, device, rate, scale, controlled).fraction;
 }
@@ -57,7 +57,7 @@ TEST(DeviceCheck, ARendererWithTorqueNeedsADeviceWithTorqueOrAProtocolThatOmitsI
         protocols::Protocol protocol = some_protocol(of(100));
         if (ray) protocol.renderers = {protocols::RendererKind::ray};
         if (left_out) protocol.torque = protocols::TorqueRule::left_out;
-        DeviceCapabilities device = some_device();
+        servo::DeviceCapabilities device = some_device();
         device.actuated_freedom = driven;
         const StimulusLibrary library(protocol);
         const std::vector<std::string> faults = incompatibilities(protocol, library, device);
@@ -95,7 +95,7 @@ TEST(DeviceCheck, AStimulusMayFillButNotExceedTheWorkspace) {
   const protocols::Protocol protocol = some_protocol(of(100));
   const StimulusLibrary library(protocol);
   const auto faults_where_it_lacks = [&](double metres) {
-    DeviceCapabilities device = some_device();
+    servo::DeviceCapabilities device = some_device();
     device.workspace_radius = library.reach(0) + protocol.home.margin - metres;
     return incompatibilities(protocol, library, device).size();
   };
@@ -105,7 +105,7 @@ TEST(DeviceCheck, AStimulusMayFillButNotExceedTheWorkspace) {
 }
 
 TEST(DeviceCheck, MaterialsAreBoundedByDampingAndFriction) {
-  const DeviceCapabilities device = some_device();
+  const servo::DeviceCapabilities device = some_device();
   EXPECT_EQ(share(of(2000), device), 1);  // at the bound: b = K T / 2
   EXPECT_NEAR(share(of(2500), device), 0.8, 1e-12);
   EXPECT_NEAR(share(of(1000, 0.75), device), 0.8, 1e-12);  // 0.5 + 0.75 N s/m
@@ -118,7 +118,7 @@ TEST(DeviceCheck, MaterialsAreBoundedByDampingAndFriction) {
 }
 
 TEST(DeviceCheck, UnknownPropertiesOfADeviceDoNotLimit) {
-  DeviceCapabilities device = some_device();
+  servo::DeviceCapabilities device = some_device();
   device.damping = device.friction = 0;
   EXPECT_EQ(share(of(2000, 100), device), 1);  // by the maker's figure at half its rate
   EXPECT_NEAR(share(of(2500), device), 0.8, 1e-12);
@@ -170,7 +170,7 @@ TEST(DeviceCheck, AToolBeyondTheStylusIsALeverToo) {
 TEST(DeviceCheck, AStimulusMustLieWithinReachOfTheVirtualTip) {
   protocols::Protocol protocol = some_protocol(of(1));
   protocol.reach = {.factor = 5, .pivot = protocols::ReachSpec::Pivot::tail};
-  DeviceCapabilities device = some_device();
+  servo::DeviceCapabilities device = some_device();
   device.workspace_radius = 0.1;
   const StimulusLibrary library(protocol);
   const double radius = library.reach(0) + protocol.home.margin;  // 0.04 m
@@ -329,7 +329,7 @@ TEST(DeviceCheck, TheRecordLimitsAProtocolAgainToTheBit) {
 }
 
 TEST(DeviceCheck, ADeviceWithoutMotorsRefusesNoMaterial) {
-  DeviceCapabilities mouse = some_device();
+  servo::DeviceCapabilities mouse = some_device();
   mouse.actuated_freedom = 0;
   protocols::Protocol protocol = some_protocol(of(1e5));
   EXPECT_TRUE(incompatibilities(protocol, StimulusLibrary(protocol), mouse).empty());
@@ -338,4 +338,4 @@ TEST(DeviceCheck, ADeviceWithoutMotorsRefusesNoMaterial) {
 }
 
 }  // namespace
-}  // namespace palpate::runner
+}  // namespace palpate::runner::session

@@ -16,7 +16,7 @@
 #include "runner/session/live_session.h"
 #include "tests/shared/temporary_folder.h"
 
-namespace palpate::runner::testing {
+namespace palpate::runner::session::testing {
 
 // 100 Hz, so that even a busy machine does not miss five ticks in a row.
 constexpr const char* kProtocol = R"({"version": 1, "name": "live", "renderers": ["point"],
@@ -26,91 +26,91 @@ constexpr const char* kProtocol = R"({"version": 1, "name": "live", "renderers":
   "response": {"keys": {"1": "ball", "2": "box"}, "time_out_s": 30}})";
 
 /// Answers "1" as soon as a trial may be answered, again and again.
-class Screen final : public ParticipantScreen {
+class Screen final : public display::ParticipantScreen {
  public:
-  explicit Screen(Clock& clock) : clock_(clock) {}
-  void show(const Page& page) override {
+  explicit Screen(servo::Clock& clock) : clock_(clock) {}
+  void show(const display::Page& page) override {
     kind = page.kind;
     shown_ns_ = clock_.now_ns();
     texts.push_back(page.text);
-    if (kind == Page::Kind::feedback && on_feedback) on_feedback();
+    if (kind == display::Page::Kind::feedback && on_feedback) on_feedback();
     pages.push_back(page);
     if (shown) shown(page);
   }
-  std::vector<KeyPress> keys() override {
+  std::vector<display::KeyPress> keys() override {
     if (pressed) return pressed();
     if (!wrong_key.empty()) return {{std::exchange(wrong_key, {}), clock_.now_ns()}};
     if (clock_.now_ns() < shown_ns_ + takes_ns) return {};
-    if (kind == Page::Kind::text) return {{"space", clock_.now_ns()}};
-    if (kind == Page::Kind::neutral && answers) return {{"1", clock_.now_ns()}};
+    if (kind == display::Page::Kind::text) return {{"space", clock_.now_ns()}};
+    if (kind == display::Page::Kind::neutral && answers) return {{"1", clock_.now_ns()}};
     return {};
   }
   bool open() const override { return is_open; }
-  Page::Kind kind = Page::Kind::message;
+  display::Page::Kind kind = display::Page::Kind::message;
   std::vector<std::string> texts;
-  std::vector<Page> pages;
-  std::function<void(const Page&)> shown;
-  std::function<std::vector<KeyPress>()> pressed;  ///< instead of everything else
-  std::string wrong_key;                           ///< pressed once
+  std::vector<display::Page> pages;
+  std::function<void(const display::Page&)> shown;
+  std::function<std::vector<display::KeyPress>()> pressed;  ///< instead of everything else
+  std::string wrong_key;                                    ///< pressed once
   std::atomic<bool> answers{true};
   std::int64_t takes_ns = 0;  ///< to read or to answer
   std::function<void()> on_feedback;
   bool is_open = true;
 
  private:
-  Clock& clock_;
+  servo::Clock& clock_;
   std::int64_t shown_ns_ = 0;
 };
 
 /// Clears every fault and continues, unless set otherwise.
-class Console final : public ExperimenterConsole {
+class Console final : public display::ExperimenterConsole {
  public:
-  explicit Console(Clock& clock) : clock_(clock) {}
-  void show(const ConsoleState& state) override {
+  explicit Console(servo::Clock& clock) : clock_(clock) {}
+  void show(const display::ConsoleState& state) override {
     last = state;
     if (shown) shown(state);
   }
-  std::vector<ConsoleCommand> commands() override {
-    std::vector<ConsoleCommand> out = std::exchange(next, {});
+  std::vector<display::ConsoleCommand> commands() override {
+    std::vector<display::ConsoleCommand> out = std::exchange(next, {});
     if (in_state && in_state->first == last.state)
       out.push_back(std::exchange(in_state, std::nullopt)->second);
     if (last.state == "paused" && goes_on) {
       ++pauses;
       if (repair) repair();
-      out.push_back({ConsoleCommand::Kind::go_on, "", clock_.now_ns()});
+      out.push_back({display::ConsoleCommand::Kind::go_on, "", clock_.now_ns()});
     }
     if (last.state == "fault" && in_fault) {
       if (in_fault_sees != nullptr) *in_fault_sees = last.held_by;
       out.push_back(*std::exchange(in_fault, std::nullopt));
     } else if (last.state == "fault" && !clears && ++ignored > 1000) {
-      out.push_back({ConsoleCommand::Kind::quit, "not obeyed", clock_.now_ns()});
+      out.push_back({display::ConsoleCommand::Kind::quit, "not obeyed", clock_.now_ns()});
     } else if (last.state == "fault" && clears) {
       ++faults;
       if (repair) repair();
-      out.push_back({ConsoleCommand::Kind::clear_fault, "", clock_.now_ns()});
-      out.push_back({ConsoleCommand::Kind::go_on, "", clock_.now_ns()});
+      out.push_back({display::ConsoleCommand::Kind::clear_fault, "", clock_.now_ns()});
+      out.push_back({display::ConsoleCommand::Kind::go_on, "", clock_.now_ns()});
     }
     return out;
   }
-  std::string name_of(ConsoleCommand::Kind kind) const override {
-    return kind == ConsoleCommand::Kind::go_on ? "'on'" : "'other'";
+  std::string name_of(display::ConsoleCommand::Kind kind) const override {
+    return kind == display::ConsoleCommand::Kind::go_on ? "'on'" : "'other'";
   }
-  ConsoleState last;
-  std::function<void(const ConsoleState&)> shown;
-  std::vector<ConsoleCommand> next;
+  display::ConsoleState last;
+  std::function<void(const display::ConsoleState&)> shown;
+  std::vector<display::ConsoleCommand> next;
   std::function<void()> repair;
-  bool goes_on = false;                    ///< after a pause
-  bool clears = true;                      ///< faults
-  std::optional<ConsoleCommand> in_fault;  ///< sent once
-  std::string* in_fault_sees = nullptr;    ///< the reason shown at that time
+  bool goes_on = false;                             ///< after a pause
+  bool clears = true;                               ///< faults
+  std::optional<display::ConsoleCommand> in_fault;  ///< sent once
+  std::string* in_fault_sees = nullptr;             ///< the reason shown at that time
   /// Sent once, in this state.
-  std::optional<std::pair<std::string, ConsoleCommand>> in_state;
+  std::optional<std::pair<std::string, display::ConsoleCommand>> in_state;
   int pauses = 0;
   int faults = 0;
   int ignored = 0;  ///< polls of the console after `in_fault`
 
  private:
-  Clock& clock_;
+  servo::Clock& clock_;
 };
 
 class Collected final : public MarkerSink {
@@ -132,11 +132,12 @@ class LiveSessions : public ::testing::Test {
     participant_ = store_->enrol(info_of(protocol_), "P01");
   }
 
-  LiveSession::Outcome run(Device& device, AnswerBy by = AnswerBy::keys) {
-    ServoSettings settings;
+  LiveSession::Outcome run(servo::Device& device,
+                           participants::AnswerBy by = participants::AnswerBy::keys) {
+    servo::ServoSettings settings;
     settings.rate = protocol_.servo_rate;
     settings.realtime.lock_memory = false;
-    ServoThread servo(device, clock_, settings);
+    servo::ServoThread servo(device, clock_, settings);
     data::RunInfo info;
     info.program_version = "0.0.0";
     info.device = "fake";
@@ -178,20 +179,20 @@ class LiveSessions : public ::testing::Test {
   protocols::Protocol protocol_ = protocols::parse_protocol_text(kProtocol, "live.json");
   StimulusLibrary library_{protocol_};
   const palpate::testing::TemporaryFolder folder_;
-  RealClock clock_;
+  servo::RealClock clock_;
   Screen screen_{clock_};
   Console console_{clock_};
   std::vector<Marker> markers_;
   int signal_ = 0;
-  std::unique_ptr<NoisePlayer> noise_;
+  std::unique_ptr<sound::NoisePlayer> noise_;
   std::optional<data::Store> store_;
   data::Participant participant_;
 };
 
-inline DeviceReading at(double x, bool lost = false, std::uint8_t buttons = 0) {
-  DeviceReading reading{{{x, 0, 0}, {x, 0, 0.12}}, buttons, lost};
-  if (lost) reading.trouble = DeviceTrouble::unplugged;
+inline servo::DeviceReading at(double x, bool lost = false, std::uint8_t buttons = 0) {
+  servo::DeviceReading reading{{{x, 0, 0}, {x, 0, 0.12}}, buttons, lost};
+  if (lost) reading.trouble = servo::DeviceTrouble::unplugged;
   return reading;
 }
 
-}  // namespace palpate::runner::testing
+}  // namespace palpate::runner::session::testing

@@ -7,11 +7,11 @@
 #include "tests/runner/fake_device.h"
 #include "tests/runner/session/live_session_case.h"
 
-namespace palpate::runner {
+namespace palpate::runner::session {
 namespace {
 
+using runner::testing::FakeDevice;
 using testing::at;
-using testing::FakeDevice;
 using testing::LiveSessions;
 
 TEST_F(LiveSessions, AClosedScreenASignalOrAQuitEndsItResumably) {
@@ -26,7 +26,7 @@ TEST_F(LiveSessions, AClosedScreenASignalOrAQuitEndsItResumably) {
   EXPECT_EQ(outcome.end, data::RunEnd::aborted);
   EXPECT_TRUE(outcome.failed);
   signal_ = 0;
-  console_.next = {{ConsoleCommand::Kind::quit, "tired", 0}};
+  console_.next = {{display::ConsoleCommand::Kind::quit, "tired", 0}};
   outcome = run(device);
   EXPECT_EQ(outcome.end, data::RunEnd::aborted);
   EXPECT_FALSE(outcome.failed);
@@ -60,10 +60,10 @@ TEST_F(LiveSessions, AWithdrawalCountsInEveryStateAndSpelling) {
     console_.clears = console_.goes_on = std::string(state) != "fault";
     if (state == std::string("paused")) {
       console_.goes_on = false;
-      console_.next = {{ConsoleCommand::Kind::pause, "", 0}};
+      console_.next = {{display::ConsoleCommand::Kind::pause, "", 0}};
     }
     const std::string& text = texts[static_cast<std::size_t>(number) % texts.size()];
-    console_.in_state = {state, {ConsoleCommand::Kind::quit, text, 0}};
+    console_.in_state = {state, {display::ConsoleCommand::Kind::quit, text, 0}};
     FakeDevice device(
         [state](int tick) { return at(0.1, tick > 60 && std::string(state) == "fault"); });
     const LiveSession::Outcome outcome = run(device);
@@ -77,7 +77,7 @@ TEST_F(LiveSessions, AWithdrawalCountsInEveryStateAndSpelling) {
 TEST_F(LiveSessions, AnEndDuringTheFeedbackKeepsTheAnswer) {
   protocol_.response.feedback = true;
   FakeDevice device([](int) { return at(0.1); });
-  screen_.on_feedback = [&] { console_.next = {{ConsoleCommand::Kind::quit, "", 0}}; };
+  screen_.on_feedback = [&] { console_.next = {{display::ConsoleCommand::Kind::quit, "", 0}}; };
   const LiveSession::Outcome outcome = run(device);
   EXPECT_EQ(outcome.recorded, 1u);
   EXPECT_EQ(records().size(), 1u);
@@ -87,14 +87,14 @@ TEST_F(LiveSessions, AWithdrawalOnTheLastPageOrRightAfterAnotherEndCounts) {
   protocol_.texts.end = "that was all";
   FakeDevice device([](int) { return at(0.1); });
   screen_.takes_ns = 80'000'000;
-  console_.in_state = {"end", {ConsoleCommand::Kind::quit, "withdrawn", 0}};
+  console_.in_state = {"end", {display::ConsoleCommand::Kind::quit, "withdrawn", 0}};
   LiveSession::Outcome outcome = run(device);
   EXPECT_EQ(outcome.recorded, 2u);
   EXPECT_EQ(outcome.end, data::RunEnd::withdrawn);
   participant_ = store_->enrol({protocol_.name, protocol_.source_text, protocol_.sha256}, "P02");
-  console_.next = {{ConsoleCommand::Kind::quit, "a mistake", 0},
-                   {ConsoleCommand::Kind::note, "she said why", 0},
-                   {ConsoleCommand::Kind::quit, "Withdrawn", 0}};
+  console_.next = {{display::ConsoleCommand::Kind::quit, "a mistake", 0},
+                   {display::ConsoleCommand::Kind::note, "she said why", 0},
+                   {display::ConsoleCommand::Kind::quit, "Withdrawn", 0}};
   outcome = run(device);
   EXPECT_EQ(outcome.end, data::RunEnd::withdrawn);
   EXPECT_EQ(store_->progress(participant_, 1).last_end, data::RunEnd::withdrawn);
@@ -104,7 +104,7 @@ TEST_F(LiveSessions, AWithdrawalOnTheLastPageOrRightAfterAnotherEndCounts) {
 TEST_F(LiveSessions, AStopCanBeCancelledAndTheEndReportsIt) {
   protocol_.texts.end = "that was all";
   FakeDevice device([](int) { return at(0.1); });
-  const ConsoleCommand stop{ConsoleCommand::Kind::stop_after_trial, "", 0};
+  const display::ConsoleCommand stop{display::ConsoleCommand::Kind::stop_after_trial, "", 0};
   console_.next = {stop, stop};
   EXPECT_EQ(run(device).end, data::RunEnd::done);
   EXPECT_EQ(screen_.texts.back(), "that was all");
@@ -112,7 +112,7 @@ TEST_F(LiveSessions, AStopCanBeCancelledAndTheEndReportsIt) {
   EXPECT_EQ(console_.last.stop_plan, "");
 
   participant_ = store_->enrol({protocol_.name, protocol_.source_text, protocol_.sha256}, "P02");
-  console_.next = {{ConsoleCommand::Kind::quit, "", 0}};
+  console_.next = {{display::ConsoleCommand::Kind::quit, "", 0}};
   run(device);
   EXPECT_EQ(screen_.texts.back(), "") << "it was not the last object";
 }
@@ -121,7 +121,7 @@ TEST_F(LiveSessions, AStopIsObeyedWhileTheSessionWaits) {
   FakeDevice device([](int tick) { return at(0.1, tick > 30); });  // lost for good
   screen_.answers = false;
   console_.clears = false;
-  console_.in_fault = {ConsoleCommand::Kind::stop_after_trial, "", 0};
+  console_.in_fault = {display::ConsoleCommand::Kind::stop_after_trial, "", 0};
   const LiveSession::Outcome outcome = run(device);
   EXPECT_EQ(outcome.end, data::RunEnd::paused);
   EXPECT_FALSE(outcome.failed);
@@ -137,4 +137,4 @@ TEST_F(LiveSessions, ASessionThatReachesItsLimitIsPaused) {
 }
 
 }  // namespace
-}  // namespace palpate::runner
+}  // namespace palpate::runner::session

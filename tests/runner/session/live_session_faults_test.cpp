@@ -7,11 +7,11 @@
 #include "tests/runner/fake_device.h"
 #include "tests/runner/session/live_session_case.h"
 
-namespace palpate::runner {
+namespace palpate::runner::session {
 namespace {
 
+using runner::testing::FakeDevice;
 using testing::at;
-using testing::FakeDevice;
 using testing::LiveSessions;
 
 TEST_F(LiveSessions, ALostDeviceCutsTheTrialOffAndItIsShownAgainOnceCleared) {
@@ -62,16 +62,16 @@ TEST_F(LiveSessions, ADeviceUnpluggedInABreakIsReportedInTheBreak) {
   FakeDevice device([&](int) { return at(0.1, !plugged); });
   screen_.takes_ns = 150'000'000;
   std::string state, fault;
-  screen_.shown = [&](const Page& page) {
+  screen_.shown = [&](const display::Page& page) {
     if (page.text == "Rest." && fault.empty()) plugged = false;
   };
-  console_.shown = [&](const ConsoleState& now) {
+  console_.shown = [&](const display::ConsoleState& now) {
     if (!fault.empty() || now.fault.empty()) return;
     state = now.state;
     fault = now.fault;
     plugged = true;
-    console_.next = {{ConsoleCommand::Kind::clear_fault, "", 0},
-                     {ConsoleCommand::Kind::go_on, "", 0}};
+    console_.next = {{display::ConsoleCommand::Kind::clear_fault, "", 0},
+                     {display::ConsoleCommand::Kind::go_on, "", 0}};
   };
   const LiveSession::Outcome outcome = run(device);
   EXPECT_EQ(outcome.end, data::RunEnd::done);
@@ -84,7 +84,7 @@ TEST_F(LiveSessions, ADeviceUnpluggedInABreakIsReportedInTheBreak) {
 TEST_F(LiveSessions, AFaultNamesItsReasonAndTheNextStep) {
   FakeDevice device([&](int tick) { return at(0.1, tick > 30); });
   screen_.answers = console_.clears = false;
-  console_.in_fault = {ConsoleCommand::Kind::stop_after_trial, "", 0};
+  console_.in_fault = {display::ConsoleCommand::Kind::stop_after_trial, "", 0};
   std::string held;
   console_.in_fault_sees = &held;
   run(device);
@@ -94,10 +94,10 @@ TEST_F(LiveSessions, AFaultNamesItsReasonAndTheNextStep) {
 }
 
 TEST_F(LiveSessions, ALateGuardPausesTheSessionAndAnEndedOneEndsIt) {
-  std::atomic<DeviceTrouble> trouble{DeviceTrouble::none};
+  std::atomic<servo::DeviceTrouble> trouble{servo::DeviceTrouble::none};
   FakeDevice device([&](int tick) {
-    if (tick == 30) trouble = DeviceTrouble::guard_late;
-    DeviceReading reading = at(0.1, trouble != DeviceTrouble::none);
+    if (tick == 30) trouble = servo::DeviceTrouble::guard_late;
+    servo::DeviceReading reading = at(0.1, trouble != servo::DeviceTrouble::none);
     reading.trouble = trouble;
     return reading;
   });
@@ -108,7 +108,7 @@ TEST_F(LiveSessions, ALateGuardPausesTheSessionAndAnEndedOneEndsIt) {
     EXPECT_EQ(console_.last.held_by,
               "the guard process was late: the machine may be busy; to continue: 'on'");
     EXPECT_EQ(device.force, Vec3(0));
-    trouble = DeviceTrouble::none;
+    trouble = servo::DeviceTrouble::none;
     screen_.answers = true;
   };
   EXPECT_EQ(run(device).end, data::RunEnd::done);
@@ -117,8 +117,8 @@ TEST_F(LiveSessions, ALateGuardPausesTheSessionAndAnEndedOneEndsIt) {
   participant_ = store_->enrol({protocol_.name, protocol_.source_text, protocol_.sha256}, "P02");
   screen_.answers = false;
   FakeDevice dying([&](int tick) {
-    DeviceReading reading = at(0.1, tick >= 30);
-    if (tick >= 30) reading.trouble = DeviceTrouble::guard_lost;
+    servo::DeviceReading reading = at(0.1, tick >= 30);
+    if (tick >= 30) reading.trouble = servo::DeviceTrouble::guard_lost;
     return reading;
   });
   const LiveSession::Outcome outcome = run(dying);
@@ -132,12 +132,12 @@ TEST_F(LiveSessions, ALateGuardPausesTheSessionAndAnEndedOneEndsIt) {
 using Plugged = std::shared_ptr<std::atomic<bool>>;
 
 /// Accepts everything until unplugged.
-class Headphones final : public SoundOutput {
+class Headphones final : public sound::SoundOutput {
  public:
   explicit Headphones(Plugged plugged) : plugged_(std::move(plugged)) {}
   double rate() const override { return 8000; }
   int write(std::span<const std::int16_t>) override {
-    if (!*plugged_) throw SoundError("pulled out");
+    if (!*plugged_) throw sound::SoundError("pulled out");
     return 0;
   }
   double latency() override { return 0; }
@@ -147,12 +147,12 @@ class Headphones final : public SoundOutput {
 };
 TEST_F(LiveSessions, HeadphonesPulledOutInATrialCutItOffAndPauseUntilTheyAreBack) {
   const Plugged plugged = std::make_shared<std::atomic<bool>>(true);
-  noise_ =
-      std::make_unique<NoisePlayer>(protocols::MaskingNoise{}, 1, "headphones",
-                                    [plugged](const std::string&) -> std::unique_ptr<SoundOutput> {
-                                      if (!*plugged) throw SoundError("no headphones");
-                                      return std::make_unique<Headphones>(plugged);
-                                    });
+  noise_ = std::make_unique<sound::NoisePlayer>(
+      protocols::MaskingNoise{}, 1, "headphones",
+      [plugged](const std::string&) -> std::unique_ptr<sound::SoundOutput> {
+        if (!*plugged) throw sound::SoundError("no headphones");
+        return std::make_unique<Headphones>(plugged);
+      });
   FakeDevice device([&](int tick) {
     if (tick == 30) *plugged = false;  // in the first trial
     return at(0.1);
@@ -178,4 +178,4 @@ TEST_F(LiveSessions, HeadphonesPulledOutInATrialCutItOffAndPauseUntilTheyAreBack
 }
 
 }  // namespace
-}  // namespace palpate::runner
+}  // namespace palpate::runner::session

@@ -9,11 +9,11 @@
 #include "tests/runner/fake_device.h"
 #include "tests/runner/session/live_session_case.h"
 
-namespace palpate::runner {
+namespace palpate::runner::session {
 namespace {
 
+using runner::testing::FakeDevice;
 using testing::at;
-using testing::FakeDevice;
 using testing::LiveSessions;
 
 TEST_F(LiveSessions, FirstContactIsMarkedAndAnAnswerBeforeItHasNone) {
@@ -41,8 +41,8 @@ TEST_F(LiveSessions, EveryTrialAsksForTheSameDistanceWhateverItsShape) {
   std::atomic<bool> far{false};
   std::vector<std::set<std::string>> seen;  // texts of the page, in each trial
   screen_.answers = false;
-  screen_.shown = [&](const Page& page) {
-    if (page.kind == Page::Kind::neutral && page.text.empty()) {
+  screen_.shown = [&](const display::Page& page) {
+    if (page.kind == display::Page::Kind::neutral && page.text.empty()) {
       far = screen_.answers = false;
       seen.emplace_back();
     }
@@ -63,7 +63,7 @@ TEST_F(LiveSessions, AKeyThatDoesNothingGetsAReplyAndAFaultAsksToWait) {
   std::atomic<bool> plugged{true};
   FakeDevice device([&](int) { return at(0.1, !plugged); });
   screen_.answers = false;
-  screen_.shown = [&](const Page& page) {
+  screen_.shown = [&](const display::Page& page) {
     if (page.go && page.reply.empty() && plugged && !screen_.answers) screen_.wrong_key = "x";
     if (page.go && !page.reply.empty() && !screen_.answers) plugged = false;
   };
@@ -72,9 +72,10 @@ TEST_F(LiveSessions, AKeyThatDoesNothingGetsAReplyAndAFaultAsksToWait) {
   const auto has = [&](const auto& what) {
     return std::any_of(screen_.pages.begin(), screen_.pages.end(), what);
   };
-  EXPECT_TRUE(has([&](const Page& p) { return p.go && p.reply == protocol_.texts.other_key; }));
-  EXPECT_TRUE(has([&](const Page& p) {
-    return p.kind == Page::Kind::message && p.text == protocol_.texts.wait;
+  EXPECT_TRUE(
+      has([&](const display::Page& p) { return p.go && p.reply == protocol_.texts.other_key; }));
+  EXPECT_TRUE(has([&](const display::Page& p) {
+    return p.kind == display::Page::Kind::message && p.text == protocol_.texts.wait;
   }));
 }
 
@@ -85,7 +86,7 @@ TEST_F(LiveSessions, ABreakCountsDownAndTheConsoleShowsTheAnswer) {
   FakeDevice device([](int) { return at(0.1); });
   EXPECT_EQ(run(device).end, data::RunEnd::done);
   std::vector<int> counted;
-  for (const Page& page : screen_.pages) {
+  for (const display::Page& page : screen_.pages) {
     if (page.seconds_left == 0) continue;
     counted.push_back(page.seconds_left);
     EXPECT_EQ(page.done, 1);
@@ -93,7 +94,7 @@ TEST_F(LiveSessions, ABreakCountsDownAndTheConsoleShowsTheAnswer) {
   }
   EXPECT_EQ(counted, (std::vector<int>{2, 1}));
   const auto trial = std::find_if(screen_.pages.begin(), screen_.pages.end(),
-                                  [](const Page& page) { return !page.keys.empty(); });
+                                  [](const display::Page& page) { return !page.keys.empty(); });
   ASSERT_NE(trial, screen_.pages.end());
   EXPECT_EQ(trial->keys[0], std::pair(std::string("1"), std::string("Kugel")));
   for (const data::TrialRecord& record : records()) EXPECT_EQ(record.response, "ball");
@@ -108,7 +109,7 @@ TEST_F(LiveSessions, ButtonsAnswerAtTheirTickUnlessHeldFromBefore) {
     return at(0.1, false, static_cast<std::uint8_t>(1 + (tick % 40 > 35 ? 2 : 0)));
   });
   screen_.answers = false;
-  EXPECT_EQ(run(device, AnswerBy::buttons).end, data::RunEnd::done);
+  EXPECT_EQ(run(device, participants::AnswerBy::buttons).end, data::RunEnd::done);
   ASSERT_EQ(records().size(), 2u);
   for (const data::TrialRecord& record : records()) EXPECT_EQ(record.response, "box");
 }
@@ -126,4 +127,4 @@ TEST_F(LiveSessions, UndeliveredMarkersAreCountedWithoutDelay) {
 }
 
 }  // namespace
-}  // namespace palpate::runner
+}  // namespace palpate::runner::session

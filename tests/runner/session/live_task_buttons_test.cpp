@@ -11,11 +11,11 @@
 #include "tests/runner/fake_device.h"
 #include "tests/runner/session/live_session_case.h"
 
-namespace palpate::runner {
+namespace palpate::runner::session {
 namespace {
 
+using runner::testing::FakeDevice;
 using testing::at;
-using testing::FakeDevice;
 using testing::LiveSessions;
 
 constexpr const char* kPagesAndTasks = R"({"version": 2, "name": "pages", "renderers": ["point"],
@@ -56,7 +56,7 @@ class LiveTaskButtons : public LiveSessions {
     participant_ = store_->enrol(info_of(protocol_), "P02");
     screen_.answers = false;
     screen_.takes_ns = 3'600'000'000'000;  // the keyboard is unattended
-    screen_.shown = [this](const Page& page) {
+    screen_.shown = [this](const display::Page& page) {
       int button = 1;
       for (const auto& [word, number] : kPressed) {
         if (page.text.find(word) != std::string::npos) button = number;
@@ -103,7 +103,7 @@ TEST_F(LiveTaskButtons, OfTheDeviceAnswerPagesTrialsAndConfidence) {
     const int button = held();
     return at(0.1, false, static_cast<std::uint8_t>(button == 0 ? 0 : 1U << (button - 1)));
   });
-  EXPECT_EQ(run(device, AnswerBy::buttons).end, data::RunEnd::done);
+  EXPECT_EQ(run(device, participants::AnswerBy::buttons).end, data::RunEnd::done);
   expect_all_answered();
 }
 
@@ -113,27 +113,29 @@ TEST_F(LiveTaskButtons, TheConsoleNamesTheCurrentQuestion) {
         "question 1 of 1: after, again"}) {
     console_.next.clear();
     console_.last = {};
-    console_.in_state = {state, {ConsoleCommand::Kind::quit, "seen", 0}};
+    console_.in_state = {state, {display::ConsoleCommand::Kind::quit, "seen", 0}};
     FakeDevice device([this](int) {
       const int button = held();
       return at(0.1, false, static_cast<std::uint8_t>(button == 0 ? 0 : 1U << (button - 1)));
     });
-    EXPECT_EQ(run(device, AnswerBy::buttons).reason, "ended by the experimenter: seen") << state;
+    EXPECT_EQ(run(device, participants::AnswerBy::buttons).reason,
+              "ended by the experimenter: seen")
+        << state;
   }
 }
 
 TEST_F(LiveTaskButtons, OfAGamepadAnswerPagesTrialsAndConfidence) {
-  JoystickKeys keys(
+  display::JoystickKeys keys(
       {{"button 1", "1"}, {"button 2", "2"}, {"button 3", "3"}, {"axis 1 +", "space"}});
   std::int64_t next = 0;
   screen_.pressed = [&] {
-    if (clock_.now_ns() < next) return std::vector<KeyPress>{};
+    if (clock_.now_ns() < next) return std::vector<display::KeyPress>{};
     next = clock_.now_ns() + 10'000'000;
     const int button = held();
-    JoystickState state{{button == 1, button == 2, button == 3}, {-1}, {}};
+    display::JoystickState state{{button == 1, button == 2, button == 3}, {-1}, {}};
     // Where no answer is expected, the pedal continues.
     if (button == 1 && screen_.pages.back().keys.empty()) state = {{false, false, false}, {1}, {}};
-    std::vector<KeyPress> all;
+    std::vector<display::KeyPress> all;
     for (const std::string& key : keys.pressed(state)) all.push_back({key, clock_.now_ns()});
     return all;
   };
@@ -143,4 +145,4 @@ TEST_F(LiveTaskButtons, OfAGamepadAnswerPagesTrialsAndConfidence) {
 }
 
 }  // namespace
-}  // namespace palpate::runner
+}  // namespace palpate::runner::session

@@ -61,7 +61,7 @@ extern "C" int ioctl(int file, unsigned long request, ...) noexcept {
   return 0;
 }
 
-namespace palpate::runner {
+namespace palpate::runner::session {
 namespace {
 
 using Kind = Marker::Kind;
@@ -231,4 +231,4 @@ TEST(MarkerPorts, ASerialPortGetsBytesOrPulses) {
 }
 
 }  // namespace
-}  // namespace palpate::runner
+}  // namespace palpate::runner::session

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace palpate::runner {
+namespace palpate::runner::session {
 namespace {
 
 using Codes = std::vector<std::string>;
@@ -49,4 +49,4 @@ TEST(NearCodes, ShortCodesThatDifferByALetterAreNotNear) {
 }
 
 }  // namespace
-}  // namespace palpate::runner
+}  // namespace palpate::runner::session

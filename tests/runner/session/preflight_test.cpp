@@ -6,16 +6,16 @@
 
 #include "runner/servo/servo.h"
 
-namespace palpate::runner {
+namespace palpate::runner::session {
 namespace {
 
 using Step = Preflight::Step;
 
-Sample sample(const Vec3& tip, unsigned buttons = 0, bool lost = false) {
-  Sample out;
+servo::Sample sample(const Vec3& tip, unsigned buttons = 0, bool lost = false) {
+  servo::Sample out;
   out.probe.tip = tip;
   out.buttons = static_cast<std::uint8_t>(buttons);
-  out.faults = lost ? servo_fault::kDeviceLost : 0;
+  out.faults = lost ? servo::servo_fault::kDeviceLost : 0;
   return out;
 }
 
@@ -55,11 +55,11 @@ TEST(Preflight, EverySideMustBeReached) {
 TEST(Preflight, AnEmergencyKeepsCompletedSteps) {
   Preflight preflight({0.03, 0});
   home(preflight);
-  Sample off = sample({0, 0, 0}, 0, true);
-  off.trouble = DeviceTrouble::guarded;
+  servo::Sample off = sample({0, 0, 0}, 0, true);
+  off.trouble = servo::DeviceTrouble::guarded;
   preflight.add(off);
   EXPECT_EQ(preflight.step(), Step::range);
-  off.trouble = DeviceTrouble::unplugged;
+  off.trouble = servo::DeviceTrouble::unplugged;
   preflight.add(off);
   EXPECT_EQ(preflight.step(), Step::homing);
 }
@@ -82,7 +82,7 @@ TEST(Preflight, SkippedStepsAreRecorded) {
   preflight.skip();
   EXPECT_EQ(preflight.step(), Step::done);
   std::string states;
-  for (const Checklist::Step& step : preflight.checklist().steps)
+  for (const display::Checklist::Step& step : preflight.checklist().steps)
     states += step.words + std::to_string(static_cast<int>(step.state)) + " ";
   EXPECT_EQ(states, "Home the device2 Move to every side3 Press the buttons3 ");
   ASSERT_EQ(preflight.findings().size(), 3u);
@@ -145,31 +145,31 @@ TEST(Preflight, ADeviceThatIsLostWhileItPushesIsHomedAndPushesAgain) {
 }
 
 /// Keeps every command.
-class Grip final : public Device {
+class Grip final : public servo::Device {
  public:
   Grip(double limit, int driven) {
     able_.sensed_freedom = 5;
     able_.actuated_freedom = driven;
     able_.max_force = limit;
   }
-  const DeviceCapabilities& capabilities() const override { return able_; }
-  DeviceReading read() noexcept override { return {{{0, 0, 0}, {0, 0, 0.12}}}; }
+  const servo::DeviceCapabilities& capabilities() const override { return able_; }
+  servo::DeviceReading read() noexcept override { return {{{0, 0, 0}, {0, 0, 0.12}}}; }
   void write(const Vec3& device1, const Vec3& device2) noexcept override {
     commands.emplace_back(device1, device2);
   }
   std::vector<std::pair<Vec3, Vec3>> commands;
 
  private:
-  DeviceCapabilities able_;
+  servo::DeviceCapabilities able_;
 };
 
 TEST(ForceDirectionCheck, PushesToTheRightWithinTheLimitsAndReleases) {
   for (const int driven : {3, 5}) {
     for (const double limit : {6.0, 0.8}) {
       Grip grip(limit, driven);
-      VirtualClock clock;
-      const ForceLimits limits{limit, 0.5, 0.2};
-      Servo servo(grip, clock, 1000, limits);
+      servo::VirtualClock clock;
+      const servo::ForceLimits limits{limit, 0.5, 0.2};
+      servo::Servo servo(grip, clock, 1000, limits);
       const ForceDirectionCheck push(limits, driven);
       EXPECT_EQ(push.force(), std::min(1.0, limit / 2));
       EXPECT_EQ(push.push(servo, [] { return false; }), "");
@@ -190,41 +190,42 @@ TEST(ForceDirectionCheck, PushesToTheRightWithinTheLimitsAndReleases) {
 }
 
 /// A servo that exceeds its limits.
-class WrongServo final : public TickSource {
+class WrongServo final : public servo::TickSource {
  public:
-  explicit WrongServo(const std::function<void(Sample&)>& spoil) : spoil_(spoil) {}
-  void prepare(const rendering::Scene&, const rendering::Renderer&, const HomeZone&) override {
+  explicit WrongServo(const std::function<void(servo::Sample&)>& spoil) : spoil_(spoil) {}
+  void prepare(const rendering::Scene&, const rendering::Renderer&,
+               const servo::HomeZone&) override {
     sample_.tick = ~0u;
   }
-  const Sample& next() noexcept override {
-    sample_.phase = Phase::feeling;
+  const servo::Sample& next() noexcept override {
+    sample_.phase = servo::Phase::feeling;
     sample_.time_ns += 1'000'000;
     ++sample_.tick;
     sample_.device1 = Vec3(std::min(1.0, 0.005 * sample_.tick), 0, 0);
     spoil_(sample_);
     return sample_;
   }
-  ServoQuality stop() noexcept override {
+  servo::ServoQuality stop() noexcept override {
     stopped = true;
     return {};
   }
   bool stopped = false;
 
  private:
-  const std::function<void(Sample&)> spoil_;
-  Sample sample_;
+  const std::function<void(servo::Sample&)> spoil_;
+  servo::Sample sample_;
 };
 
 TEST(ForceDirectionCheck, ReportsWrongCommands) {
   const ForceDirectionCheck push({2, 0.5, 0.2}, 5);
-  const std::pair<std::string, std::function<void(Sample&)>> cases[] = {
-      {"", [](Sample&) {}},
-      {"above the limit of 2.00 N", [](Sample& s) { s.device2.z = s.tick < 400 ? 0 : 2.1; }},
-      {"for a push of 1.00 N", [](Sample& s) { s.device1.x = 0.01 * s.tick; }},
-      {"changed by 0.60 N in a tick", [](Sample& s) { s.device1.x = s.tick < 9 ? 0 : 0.6; }},
-      {"no more than 0.40 N", [](Sample& s) { s.device1 *= 0.4; }},
+  const std::pair<std::string, std::function<void(servo::Sample&)>> cases[] = {
+      {"", [](servo::Sample&) {}},
+      {"above the limit of 2.00 N", [](servo::Sample& s) { s.device2.z = s.tick < 400 ? 0 : 2.1; }},
+      {"for a push of 1.00 N", [](servo::Sample& s) { s.device1.x = 0.01 * s.tick; }},
+      {"changed by 0.60 N in a tick", [](servo::Sample& s) { s.device1.x = s.tick < 9 ? 0 : 0.6; }},
+      {"no more than 0.40 N", [](servo::Sample& s) { s.device1 *= 0.4; }},
       {"the forces went off",
-       [](Sample& s) { s.faults = s.tick > 9 ? servo_fault::kTripped : 0; }}};
+       [](servo::Sample& s) { s.faults = s.tick > 9 ? servo::servo_fault::kTripped : 0; }}};
   for (const auto& [what, spoil] : cases) {
     WrongServo servo(spoil);
     const std::string said = push.push(servo, [] { return false; });
@@ -232,7 +233,7 @@ TEST(ForceDirectionCheck, ReportsWrongCommands) {
     EXPECT_EQ(said.empty(), what.empty()) << said;
     EXPECT_TRUE(servo.stopped);
   }
-  WrongServo servo([](Sample&) {});
+  WrongServo servo([](servo::Sample&) {});
   EXPECT_NE(push.push(servo, [] { return true; }), "");
   EXPECT_TRUE(servo.stopped);
 }
@@ -245,4 +246,4 @@ TEST(Preflight, ALostDeviceIsHomedAgain) {
 }
 
 }  // namespace
-}  // namespace palpate::runner
+}  // namespace palpate::runner::session

@@ -10,7 +10,7 @@
 #include "runner/session/session.h"
 #include "tests/runner/fake_device.h"
 
-namespace palpate::runner {
+namespace palpate::runner::session {
 
 inline constexpr const char* kTwoShapes = R"({"version": 1, "name": "two", "renderers": ["point"],
   "stimuli": [{"name": "ball", "shape": "sphere", "radius_m": 0.02, "subdivisions": 1},
@@ -22,7 +22,7 @@ inline constexpr const char* kTwoShapes = R"({"version": 1, "name": "two", "rend
   "response": {"keys": {"1": "ball", "2": "box"}, "time_out_s": 2}})";
 
 /// Answers after 0.3 s, right or wrong as set; -1: never.
-class ScriptedRespondent final : public Respondent {
+class ScriptedRespondent final : public participants::Respondent {
  public:
   explicit ScriptedRespondent(std::deque<int> right) : right_(std::move(right)) {}
   void read(const std::string& text) override { pages += text + ";"; }
@@ -32,9 +32,10 @@ class ScriptedRespondent final : public Respondent {
     if (!right_.empty()) right_.pop_front();
     answer_ = right_now_ == 1 ? trial.stimulus : 1 - trial.stimulus;
   }
-  std::optional<Answer> step(const Sample& sample) override {
-    if (right_now_ < 0 || sample.phase != Phase::feeling || sample.tick < 300) return std::nullopt;
-    return Answer{answer_, sample.time_ns};
+  std::optional<participants::Answer> step(const servo::Sample& sample) override {
+    if (right_now_ < 0 || sample.phase != servo::Phase::feeling || sample.tick < 300)
+      return std::nullopt;
+    return participants::Answer{answer_, sample.time_ns};
   }
   std::string pages;
 
@@ -59,17 +60,18 @@ class MemoryLog final : public TrialLog {
 struct SessionBench {
   protocols::Protocol protocol = protocols::parse_protocol_text(kTwoShapes, "two.json");
   StimulusLibrary library{protocol};
-  testing::FakeDevice device{[](int) {
-    return DeviceReading{{{0, 0, 0.1}, {0, 0, 0.22}}, 0, false};
+  runner::testing::FakeDevice device{[](int) {
+    return servo::DeviceReading{{{0, 0, 0.1}, {0, 0, 0.22}}, 0, false};
   }};
-  VirtualClock clock;
-  Servo servo{device, clock, protocol.servo_rate, ForceLimits{}};
+  servo::VirtualClock clock;
+  servo::Servo servo{device, clock, protocol.servo_rate, servo::ForceLimits{}};
   MemoryLog log;
 
-  Session session(Respondent& respondent, SessionPlan plan) {
+  Session session(participants::Respondent& respondent, SessionPlan plan) {
     return session(respondent, std::move(plan), servo);
   }
-  Session session(Respondent& respondent, SessionPlan plan, TickSource& another_servo) {
+  Session session(participants::Respondent& respondent, SessionPlan plan,
+                  servo::TickSource& another_servo) {
     return {{protocol, library, std::move(plan), another_servo, clock, {0, 0}, log}, respondent};
   }
 };
@@ -78,4 +80,4 @@ inline void run(Session& session) {
   while (session.state() != Session::State::end) session.step();
 }
 
-}  // namespace palpate::runner
+}  // namespace palpate::runner::session

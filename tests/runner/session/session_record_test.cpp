@@ -8,26 +8,26 @@
 
 #include "tests/runner/session/session_case.h"
 
-namespace palpate::runner {
+namespace palpate::runner::session {
 namespace {
 
 /// A servo whose trials end with given figures.
-class Judging final : public TickSource {
+class Judging final : public servo::TickSource {
  public:
-  explicit Judging(Servo& servo) : servo_(servo) {}
+  explicit Judging(servo::Servo& servo) : servo_(servo) {}
   void prepare(const rendering::Scene& scene, const rendering::Renderer& renderer,
-               const HomeZone& home) override {
+               const servo::HomeZone& home) override {
     servo_.prepare(scene, renderer, home);
   }
-  const Sample& next() noexcept override { return servo_.next(); }
-  ServoQuality stop() noexcept override {
+  const servo::Sample& next() noexcept override { return servo_.next(); }
+  servo::ServoQuality stop() noexcept override {
     servo_.stop();
     return verdict;
   }
-  ServoQuality verdict;
+  servo::ServoQuality verdict;
 
  private:
-  Servo& servo_;
+  servo::Servo& servo_;
 };
 
 TEST(Session, TheServosVerdictIsInTheTrialsRecord) {
@@ -55,12 +55,13 @@ TEST(Session, TheServosVerdictIsInTheTrialsRecord) {
 }
 
 /// Ticks with all numbers distinct; contact from the fifth on.
-class Numbered final : public TickSource {
+class Numbered final : public servo::TickSource {
  public:
-  void prepare(const rendering::Scene&, const rendering::Renderer&, const HomeZone&) override {
+  void prepare(const rendering::Scene&, const rendering::Renderer&,
+               const servo::HomeZone&) override {
     tick_ = -3;
   }
-  const Sample& next() noexcept override {
+  const servo::Sample& next() noexcept override {
     double number = 0.001 * ++tick_;
     const auto vector = [&number] {
       const Vec3 v(number + 0.1, number + 0.2, number + 0.3);
@@ -68,7 +69,7 @@ class Numbered final : public TickSource {
       return v;
     };
     sample_ = {};
-    sample_.phase = tick_ < 0 ? Phase::homing : Phase::feeling;
+    sample_.phase = tick_ < 0 ? servo::Phase::homing : servo::Phase::feeling;
     sample_.tick = static_cast<std::uint32_t>(std::max(tick_, 0));
     sample_.time_ns = time_ns_ += 1'000'000;
     sample_.period_ns = 1'000'000 + tick_;
@@ -83,17 +84,17 @@ class Numbered final : public TickSource {
     sample_.device1 = vector();
     sample_.device2 = vector();
     sample_.buttons = static_cast<std::uint8_t>(tick_ % 4);
-    sample_.faults = tick_ == 7 ? servo_fault::kForceLimited : 0;
+    sample_.faults = tick_ == 7 ? servo::servo_fault::kForceLimited : 0;
     if (tick_ >= 0) shown.push_back(sample_);
     return sample_;
   }
-  ServoQuality stop() noexcept override { return {}; }
-  std::vector<Sample> shown;
+  servo::ServoQuality stop() noexcept override { return {}; }
+  std::vector<servo::Sample> shown;
 
  private:
   int tick_ = 0;
   std::int64_t time_ns_ = 5'000'000'000;
-  Sample sample_;
+  servo::Sample sample_;
 };
 
 TEST(Session, ATrialKeepsEverySampleAndItsInitialFacts) {
@@ -111,7 +112,7 @@ TEST(Session, ATrialKeepsEverySampleAndItsInitialFacts) {
   };
   for (std::size_t i = 0; i < record.samples.size(); ++i) {
     const data::SampleRecord& kept = record.samples[i];
-    const Sample& shown = servo.shown[i];
+    const servo::Sample& shown = servo.shown[i];
     EXPECT_EQ(kept.tick, shown.tick);
     EXPECT_EQ(kept.period_ns, shown.period_ns);
     EXPECT_EQ(kept.lateness_ns, shown.lateness_ns);
@@ -128,7 +129,7 @@ TEST(Session, ATrialKeepsEverySampleAndItsInitialFacts) {
     EXPECT_EQ(kept.buttons, shown.buttons);
     EXPECT_EQ(kept.faults, shown.faults);
   }
-  const Sample& first = servo.shown[0];
+  const servo::Sample& first = servo.shown[0];
   EXPECT_TRUE(same(record.start_tip, first.probe.tip));
   EXPECT_TRUE(same(record.start_tail, first.probe.tail));
   EXPECT_EQ(record.onset_ns, first.time_ns);
@@ -144,8 +145,9 @@ TEST(Session, ATrialKeepsEverySampleAndItsInitialFacts) {
 // Only the machine's lateness passes by itself; faults of stylus or device and requests for zero
 // force need the experimenter.
 TEST(SessionFault, IsTransientIfOnlyTheMachineWasLate) {
-  using namespace servo_fault;
-  const auto transient = [](std::uint32_t faults, DeviceTrouble trouble = DeviceTrouble::none) {
+  using namespace servo::servo_fault;
+  const auto transient = [](std::uint32_t faults,
+                            servo::DeviceTrouble trouble = servo::DeviceTrouble::none) {
     return SessionFault("", "", faults | kTripped, trouble).is_transient();
   };
   EXPECT_TRUE(transient(kMissedTicks));
@@ -155,40 +157,45 @@ TEST(SessionFault, IsTransientIfOnlyTheMachineWasLate) {
   EXPECT_FALSE(transient(kEmergency | kMissedTicks));
   EXPECT_FALSE(transient(rendering::render_fault::kNonFinite));
   EXPECT_FALSE(transient(rendering::render_fault::kNonFinite | kStalled));
-  for (const DeviceTrouble trouble :
-       {DeviceTrouble::unplugged, DeviceTrouble::silent, DeviceTrouble::not_homed,
-        DeviceTrouble::implausible, DeviceTrouble::apart, DeviceTrouble::guard_lost}) {
+  for (const servo::DeviceTrouble trouble :
+       {servo::DeviceTrouble::unplugged, servo::DeviceTrouble::silent,
+        servo::DeviceTrouble::not_homed, servo::DeviceTrouble::implausible,
+        servo::DeviceTrouble::apart, servo::DeviceTrouble::guard_lost}) {
     EXPECT_FALSE(transient(kDeviceLost, trouble));
     EXPECT_FALSE(transient(kDeviceLost | kMissedTicks, trouble));
   }
-  EXPECT_TRUE(transient(kDeviceLost, DeviceTrouble::guard_late));
-  EXPECT_TRUE(transient(kDeviceLost, DeviceTrouble::guarded));
+  EXPECT_TRUE(transient(kDeviceLost, servo::DeviceTrouble::guard_late));
+  EXPECT_TRUE(transient(kDeviceLost, servo::DeviceTrouble::guarded));
 }
 
 TEST(SessionFault, TheReasonIsTheWorstFaultWithItsRemedy) {
-  using namespace servo_fault;
-  const auto reason = [](std::uint32_t faults, DeviceTrouble trouble = DeviceTrouble::none) {
+  using namespace servo::servo_fault;
+  const auto reason = [](std::uint32_t faults,
+                         servo::DeviceTrouble trouble = servo::DeviceTrouble::none) {
     return trip_reason(faults | kTripped, trouble);
   };
   const std::uint32_t non_finite = rendering::render_fault::kNonFinite;
-  EXPECT_EQ(reason(kEmergency | kDeviceLost | kMissedTicks, DeviceTrouble::silent),
+  EXPECT_EQ(reason(kEmergency | kDeviceLost | kMissedTicks, servo::DeviceTrouble::silent),
             reason(kEmergency));
   EXPECT_EQ(reason(kStalled | kMissedTicks), reason(kStalled));
-  EXPECT_EQ(reason(kDeviceLost | kMissedTicks | non_finite, DeviceTrouble::silent),
-            reason(kDeviceLost, DeviceTrouble::silent));
+  EXPECT_EQ(reason(kDeviceLost | kMissedTicks | non_finite, servo::DeviceTrouble::silent),
+            reason(kDeviceLost, servo::DeviceTrouble::silent));
   std::set<std::string> all;
   for (const std::uint32_t bit : {kEmergency, kStalled, kDeviceLost, kMissedTicks, non_finite,
                                   rendering::render_fault::kSoftStalled, 0u})
     all.insert(reason(bit));
   EXPECT_EQ(all.size(), 7u) << "each has its own words";
-  for (const DeviceTrouble trouble : {DeviceTrouble::unplugged, DeviceTrouble::guard_late,
-                                      DeviceTrouble::guarded, DeviceTrouble::apart}) {
-    EXPECT_NE(reason(kDeviceLost, trouble).find(advice(trouble)), std::string::npos);
+  for (const servo::DeviceTrouble trouble :
+       {servo::DeviceTrouble::unplugged, servo::DeviceTrouble::guard_late,
+        servo::DeviceTrouble::guarded, servo::DeviceTrouble::apart}) {
+    EXPECT_NE(reason(kDeviceLost, trouble).find(servo::advice(trouble)), std::string::npos);
   }
   // If the guard was late the device is not lost: its own advice suffices.
-  EXPECT_EQ(reason(kDeviceLost, DeviceTrouble::guard_late), advice(DeviceTrouble::guard_late));
-  EXPECT_NE(reason(kDeviceLost, DeviceTrouble::unplugged), advice(DeviceTrouble::unplugged));
+  EXPECT_EQ(reason(kDeviceLost, servo::DeviceTrouble::guard_late),
+            servo::advice(servo::DeviceTrouble::guard_late));
+  EXPECT_NE(reason(kDeviceLost, servo::DeviceTrouble::unplugged),
+            servo::advice(servo::DeviceTrouble::unplugged));
 }
 
 }  // namespace
-}  // namespace palpate::runner
+}  // namespace palpate::runner::session

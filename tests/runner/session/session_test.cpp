@@ -10,10 +10,10 @@
 #include "tests/runner/session/session_case.h"
 #include "tests/shared/temporary_folder.h"
 
-namespace palpate::runner {
+namespace palpate::runner::session {
 namespace {
 
-using testing::FakeDevice;
+using runner::testing::FakeDevice;
 
 TEST(Session, RunsPracticeBlocksBreaksAndEnd) {
   SessionBench bench;
@@ -115,9 +115,9 @@ TEST(Session, AFaultCutsTheTrialOffWithZeroForce) {
   SessionBench bench;
   FakeDevice failing([](int tick) {
     const double z = tick == 700 ? std::numeric_limits<double>::quiet_NaN() : 0.1;
-    return DeviceReading{{{0, 0, z}, {0, 0, 0.22}}, 0, false};
+    return servo::DeviceReading{{{0, 0, z}, {0, 0, 0.22}}, 0, false};
   });
-  Servo servo(failing, bench.clock, 1000, ForceLimits{});
+  servo::Servo servo(failing, bench.clock, 1000, servo::ForceLimits{});
   ScriptedRespondent respondent({-1});
   Session session = bench.session(respondent, SessionPlan(bench.protocol, 1, 1), servo);
   EXPECT_THROW(run(session), SessionFault);
@@ -140,9 +140,10 @@ TEST(Session, ACutOffTrialIsShownAgainAndBothAttemptsAreOnRecord) {
     info.program_version = "0.0.0";
     info.device = "fake";
     FakeDevice failing([](int tick) {
-      return DeviceReading{{{0, 0, 0.1}, {0, 0, 0.22}}, 0, tick == 2000};  // in the third trial
+      return servo::DeviceReading{
+          {{0, 0, 0.1}, {0, 0, 0.22}}, 0, tick == 2000};  // in the third trial
     });
-    Servo servo(failing, bench.clock, 1000, ForceLimits{});
+    servo::Servo servo(failing, bench.clock, 1000, servo::ForceLimits{});
     RunRecord log(store, info_of(protocol), participant, info);
     ScriptedRespondent respondent({});
     Session session({protocol,
@@ -176,4 +177,4 @@ TEST(Session, ACutOffTrialIsShownAgainAndBothAttemptsAreOnRecord) {
 }
 
 }  // namespace
-}  // namespace palpate::runner
+}  // namespace palpate::runner::session

@@ -12,15 +12,15 @@
 #include "runner/session/simulated_study.h"
 #include "tests/shared/temporary_folder.h"
 
-namespace palpate::runner {
+namespace palpate::runner::session {
 namespace {
 
 namespace fs = std::filesystem;
 
 class SimulatedSolids : public ::testing::Test {
  protected:
-  StudyProgress simulate(const protocols::Protocol& protocol, const SimulatedSettings& settings,
-                         int participants) const {
+  StudyProgress simulate(const protocols::Protocol& protocol,
+                         const participants::SimulatedSettings& settings, int participants) const {
     data::Store store = data::Store::open(db(), data::Store::Mode::write_or_create);
     const std::atomic<bool> never{false};
     return simulate_study(protocol, store, settings,
@@ -51,7 +51,7 @@ TEST_F(SimulatedSolids, ConcaveObjectsAreExploredAndIdentified) {
   protocols::Protocol protocol =
       protocols::parse_protocol(PALPATE_SOURCE_DIR "/protocols/concave.json");
   protocol.repetitions = 1;
-  const StudyProgress progress = simulate(protocol, load_simulated_settings(""), 1);
+  const StudyProgress progress = simulate(protocol, participants::load_simulated_settings(""), 1);
   EXPECT_EQ(progress.recorded, 8);
   const Count found = count();
   EXPECT_EQ(found.trials, 8);
@@ -64,7 +64,7 @@ TEST_F(SimulatedSolids, LayersAreFeltAtTheirDepths) {
   protocols::Protocol protocol =
       protocols::parse_protocol(PALPATE_SOURCE_DIR "/protocols/layered.json");
   protocol.repetitions = 1;
-  EXPECT_EQ(simulate(protocol, load_simulated_settings(""), 2).recorded, 12);
+  EXPECT_EQ(simulate(protocol, participants::load_simulated_settings(""), 2).recorded, 12);
   const Count found = count();
   EXPECT_GE(found.touched, 10);
   EXPECT_GE(found.right, 8) << "4 would be chance";
@@ -76,7 +76,8 @@ TEST_F(SimulatedSolids, ATrialThatCannotBeginEndsTheStudyAndKeepsItsData) {
   const protocols::Protocol protocol =
       protocols::parse_protocol(PALPATE_SOURCE_DIR "/protocols/quick.json");
   std::ofstream(folder_ / "near.json") << R"({"motor": {"approach_distance_m": 0.06}})";
-  const SimulatedSettings near = load_simulated_settings(folder_ / "near.json");
+  const participants::SimulatedSettings near =
+      participants::load_simulated_settings(folder_ / "near.json");
   for (int attempt = 0; attempt < 2; ++attempt) {  // it stops at the same place again
     try {
       simulate(protocol, near, 1);
@@ -99,4 +100,4 @@ TEST_F(SimulatedSolids, ATrialThatCannotBeginEndsTheStudyAndKeepsItsData) {
 }
 
 }  // namespace
-}  // namespace palpate::runner
+}  // namespace palpate::runner::session

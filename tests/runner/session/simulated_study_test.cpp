@@ -22,7 +22,7 @@
 #include "runner/session/replay.h"
 #include "tests/shared/temporary_folder.h"
 
-namespace palpate::runner {
+namespace palpate::runner::session {
 namespace {
 
 namespace fs = std::filesystem;
@@ -56,7 +56,8 @@ class SimulatedStudy : public ::testing::Test {
 
   StudyProgress simulate(const protocols::Protocol& protocol, const fs::path& db, int jobs,
                          std::uint64_t seed = 1,
-                         const SimulatedSettings& settings = load_simulated_settings("")) const {
+                         const participants::SimulatedSettings& settings =
+                             participants::load_simulated_settings("")) const {
     data::Store store = data::Store::open(db, data::Store::Mode::write_or_create);
     const std::atomic<bool> never{false};
     return simulate_study(protocol, store, settings,
@@ -64,9 +65,9 @@ class SimulatedStudy : public ::testing::Test {
   }
 
   /// Settings with the patch in the text.
-  SimulatedSettings patched(const std::string& text, int version) const {
+  participants::SimulatedSettings patched(const std::string& text, int version) const {
     std::ofstream(folder_ / "patch.json") << text;
-    return load_simulated_settings(folder_ / "patch.json", version);
+    return participants::load_simulated_settings(folder_ / "patch.json", version);
   }
 
   /// Compares the trials of the frozen participant with the recorded ones; writes them beside the
@@ -105,8 +106,9 @@ TEST_F(SimulatedStudy, IsTheSameHoweverOftenItIsStopped) {
       std::this_thread::sleep_for(std::chrono::milliseconds(after));
       stop = true;
     });
-    const StudyProgress progress = simulate_study(
-        p, store, load_simulated_settings(""), {.participants = 3, .seed = 1, .jobs = 2}, stop, {});
+    const StudyProgress progress =
+        simulate_study(p, store, participants::load_simulated_settings(""),
+                       {.participants = 3, .seed = 1, .jobs = 2}, stop, {});
     done = progress.recorded == progress.expected;
     ++stops;
   }
@@ -119,7 +121,7 @@ void SimulatedStudy::expect_frozen(int version) const {
   const protocols::Protocol p =
       protocols::parse_protocol(PALPATE_SOURCE_DIR "/protocols/quick.json");
   const fs::path db = folder_ / ("frozen " + std::to_string(version) + ".db");
-  simulate(p, db, 2, 1, load_simulated_settings("", version));
+  simulate(p, db, 2, 1, participants::load_simulated_settings("", version));
   data::Store store = data::Store::open(db, data::Store::Mode::read_only);
   std::ifstream kept(PALPATE_SOURCE_DIR "/tests/runner/session/" + name);
   std::ostringstream found;
@@ -161,7 +163,7 @@ TEST_F(SimulatedStudy, TheFrozenParticipantsTrialsDoNotChange) {
 #ifdef __clang__
   GTEST_SKIP() << "other roundings grow to other trials: the files are the release compiler's, g++";
 #endif
-  for (const int version : participant_versions()) {
+  for (const int version : participants::participant_versions()) {
     SCOPED_TRACE("version " + std::to_string(version));
     expect_frozen(version);
   }
@@ -170,15 +172,16 @@ TEST_F(SimulatedStudy, TheFrozenParticipantsTrialsDoNotChange) {
 // Version 3 is version 2 with its switches on, and version 2 is version 1 with another search.
 TEST_F(SimulatedStudy, VersionsDifferOnlyByTheirSwitches) {
   const protocols::Protocol p = protocol();
-  const auto trials = [&](const std::string& name, const SimulatedSettings& settings) {
+  const auto trials = [&](const std::string& name,
+                          const participants::SimulatedSettings& settings) {
     simulate(p, folder_ / name, 2, 1, settings);
     std::string csv = csv_of(folder_ / name);
     for (std::size_t at; (at = csv.find(settings.sha256)) != std::string::npos;)
       csv.erase(at, settings.sha256.size());
     return csv;
   };
-  const std::string version2 = trials("2.db", load_simulated_settings("", 2));
-  const std::string version3 = trials("3.db", load_simulated_settings("", 3));
+  const std::string version2 = trials("2.db", participants::load_simulated_settings("", 2));
+  const std::string version3 = trials("3.db", participants::load_simulated_settings("", 3));
   EXPECT_NE(version2, version3);
   EXPECT_EQ(trials("3 from 2.db", patched(R"({"percept": {"place": "surface"},
       "observer": {"forgetting": false, "evidence": "movement"}, "heading": {"chosen": true}})",
@@ -186,7 +189,7 @@ TEST_F(SimulatedStudy, VersionsDifferOnlyByTheirSwitches) {
             version3);
   EXPECT_EQ(trials("2 from 1.db", patched(R"({"search": {"after_loss": "turn-to-centre"}})", 1)),
             version2);
-  EXPECT_NE(trials("1.db", load_simulated_settings("", 1)), version2);
+  EXPECT_NE(trials("1.db", participants::load_simulated_settings("", 1)), version2);
 }
 
 // Each switch has its own effect.
@@ -201,7 +204,7 @@ TEST_F(SimulatedStudy, EverySwitchChangesTheTrials) {
         R"({"heading": {"interval_s": 0.1}})", R"({"heading": {"turning_time_s": 0.3}})",
         R"({"heading": {"hypotheses": 8}})", R"({"heading": {"headings": 3}})",
         R"({"heading": {"places": 1}})", R"({"heading": {"look_ahead_m": 0.04}})"}) {
-    const SimulatedSettings settings = patched(patch, 3);
+    const participants::SimulatedSettings settings = patched(patch, 3);
     const fs::path db = folder_ / (std::to_string(seen.size()) + ".db");
     simulate(p, db, 2, 1, settings);
     std::string csv = csv_of(db);
@@ -233,7 +236,7 @@ TEST_F(SimulatedStudy, ExploresAnObjectHalfAMetreAwayAndReplaysItToTheBit) {
       R"(, "samples": true, "reach": {"factor": 5, "pivot": "tail"},
       "stylus": {"length_m": 0.1, "grip_m": 0.05}, "workspace": {"centre_m": [0, 0.45, 0]},
       "servo": {"material_limit": "limit"})");
-  limit_for_simulation(p, load_simulated_settings(""));
+  limit_for_simulation(p, participants::load_simulated_settings(""));
   EXPECT_LT(p.stimuli[0].object.material.stiffness, 800 / 25.0) << "a lever of 5 is felt 25 times";
   simulate(p, folder_ / "far.db", 2);
   data::Store store = data::Store::open(folder_ / "far.db", data::Store::Mode::read_only);
@@ -295,8 +298,9 @@ TEST_F(SimulatedStudy, RefusesWhatTheDeviceOrTheParticipantCannotDo) {
 }
 
 TEST_F(SimulatedStudy, PatchesAreCheckedAndChangeTheChecksum) {
-  const SimulatedSettings defaults = load_simulated_settings("", 2);
-  const SimulatedSettings quick = patched(R"({"motor": {"reaction_delay_s": 0.02}})", 2);
+  const participants::SimulatedSettings defaults = participants::load_simulated_settings("", 2);
+  const participants::SimulatedSettings quick =
+      patched(R"({"motor": {"reaction_delay_s": 0.02}})", 2);
   EXPECT_EQ(quick.motor.reaction_delay, 0.02);
   EXPECT_NE(quick.sha256, defaults.sha256);
   EXPECT_EQ(patched("{}", 2).sha256, defaults.sha256);
@@ -309,15 +313,15 @@ TEST_F(SimulatedStudy, PatchesAreCheckedAndChangeTheChecksum) {
         R"({"note": 5})"}) {
     EXPECT_THROW(patched(bad, 2), protocols::InputError) << bad;
   }
-  EXPECT_THROW(load_simulated_settings("", 4), std::invalid_argument);
+  EXPECT_THROW(participants::load_simulated_settings("", 4), std::invalid_argument);
 }
 
 // A checksum reported with results is that of the file published with them.
 TEST_F(SimulatedStudy, ChecksumsAreThoseOfTheFrozenFiles) {
-  for (const int version : participant_versions()) {
+  for (const int version : participants::participant_versions()) {
     std::ifstream file(PALPATE_SOURCE_DIR "/runner/participants/simulated_v" +
                        std::to_string(version) + ".json");
-    EXPECT_EQ(load_simulated_settings("", version).sha256,
+    EXPECT_EQ(participants::load_simulated_settings("", version).sha256,
               checksum_hex(nlohmann::json::parse(file).dump()))
         << "version " << version;
   }
@@ -325,20 +329,21 @@ TEST_F(SimulatedStudy, ChecksumsAreThoseOfTheFrozenFiles) {
 
 TEST_F(SimulatedStudy, VersionsAreFoundByTheirChecksums) {
   std::ofstream(folder_ / "patch.json") << R"({"motor": {"reaction_delay_s": 0.02}})";
-  for (const int version : participant_versions()) {
-    const std::string plain = load_simulated_settings("", version).sha256;
-    const std::string patched = load_simulated_settings(folder_ / "patch.json", version).sha256;
-    EXPECT_EQ(participant_version_of(plain, ""), version);
-    EXPECT_EQ(participant_version_of(patched, folder_ / "patch.json"), version);
-    EXPECT_EQ(participant_version_of(patched, ""), std::nullopt);
-    EXPECT_EQ(participant_version_of(plain, folder_ / "patch.json"), std::nullopt);
+  for (const int version : participants::participant_versions()) {
+    const std::string plain = participants::load_simulated_settings("", version).sha256;
+    const std::string patched =
+        participants::load_simulated_settings(folder_ / "patch.json", version).sha256;
+    EXPECT_EQ(participants::participant_version_of(plain, ""), version);
+    EXPECT_EQ(participants::participant_version_of(patched, folder_ / "patch.json"), version);
+    EXPECT_EQ(participants::participant_version_of(patched, ""), std::nullopt);
+    EXPECT_EQ(participants::participant_version_of(plain, folder_ / "patch.json"), std::nullopt);
   }
-  EXPECT_EQ(load_simulated_settings("").version, 3);
+  EXPECT_EQ(participants::load_simulated_settings("").version, 3);
 }
 
 // A later version's switch counts in an earlier version's checksum if it is changed.
 TEST_F(SimulatedStudy, ChecksumsKnowEverySwitch) {
-  const SimulatedSettings defaults = load_simulated_settings("", 2);
+  const participants::SimulatedSettings defaults = participants::load_simulated_settings("", 2);
   EXPECT_EQ(patched(R"({"percept": {"place": "tip"}, "heading": {"chosen": false}})", 2).sha256,
             defaults.sha256);
   std::vector<std::string> seen{defaults.sha256};
@@ -356,24 +361,26 @@ TEST_F(SimulatedStudy, SettingsAsTextHaveEveryKeyAndReadBackUnchanged) {
   const auto keys = [](int version) {
     std::vector<std::string> found;
     const nlohmann::json settings =
-        nlohmann::json::parse(simulated_settings_text("", version)).flatten();
+        nlohmann::json::parse(participants::simulated_settings_text("", version)).flatten();
     for (const auto& [pointer, value] : settings.items()) found.push_back(pointer);
     return found;
   };
   EXPECT_EQ(keys(1), keys(3));
   EXPECT_EQ(keys(2), keys(3));
-  for (const int version : participant_versions()) {
-    EXPECT_EQ(read_simulated_settings(simulated_settings_text("", version)).sha256,
-              load_simulated_settings("", version).sha256);
+  for (const int version : participants::participant_versions()) {
+    EXPECT_EQ(
+        participants::read_simulated_settings(participants::simulated_settings_text("", version))
+            .sha256,
+        participants::load_simulated_settings("", version).sha256);
   }
-  nlohmann::json settings = nlohmann::json::parse(simulated_settings_text("", 3));
+  nlohmann::json settings = nlohmann::json::parse(participants::simulated_settings_text("", 3));
   settings["heading"].erase("places");
-  EXPECT_THROW(read_simulated_settings(settings.dump()), protocols::InputError);
+  EXPECT_THROW(participants::read_simulated_settings(settings.dump()), protocols::InputError);
   settings["heading"]["places"] = "two";
-  EXPECT_THROW(read_simulated_settings(settings.dump()), protocols::InputError);
+  EXPECT_THROW(participants::read_simulated_settings(settings.dump()), protocols::InputError);
   settings["heading"]["places"] = 3;
-  EXPECT_EQ(read_simulated_settings(settings.dump()).heading.places, 3);
+  EXPECT_EQ(participants::read_simulated_settings(settings.dump()).heading.places, 3);
 }
 
 }  // namespace
-}  // namespace palpate::runner
+}  // namespace palpate::runner::session

@@ -21,7 +21,7 @@
 #include "runner/session/simulated_study.h"
 #include "tests/shared/temporary_folder.h"
 
-namespace palpate::runner {
+namespace palpate::runner::session {
 namespace {
 
 using nlohmann::json;
@@ -66,7 +66,7 @@ class TaskSession : public ::testing::Test {
     plan.participants = 1;
     plan.seed = 3;
     const std::atomic<bool> stop{false};
-    simulate_study(protocol, store, load_simulated_settings(""), plan, stop, {});
+    simulate_study(protocol, store, participants::load_simulated_settings(""), plan, stop, {});
   }
   static std::vector<data::TrialRecord> trials_of(const std::string& database) {
     data::Store store = data::Store::open(database, data::Store::Mode::read_only);
@@ -141,7 +141,7 @@ class KeptTrials final : public TrialLog {
 
 TEST_F(TaskSession, GivesTheSameDatabaseWhereverItIsInterrupted) {
   const protocols::Protocol protocol = parsed_study(with_blocks(kCompare));
-  const SimulatedSettings settings = load_simulated_settings("");
+  const participants::SimulatedSettings settings = participants::load_simulated_settings("");
   simulate(protocol, path("whole.db"));
   const std::string expected = csv_of(path("whole.db"));
   const std::size_t count = trials_of(path("whole.db")).size();
@@ -350,4 +350,4 @@ TEST_F(TaskSession, ExportsTheColumnsOfTasksForVersion2Only) {
 }
 
 }  // namespace
-}  // namespace palpate::runner
+}  // namespace palpate::runner::session

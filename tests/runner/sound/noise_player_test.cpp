@@ -12,7 +12,7 @@
 
 #include "runner/sound/masking_noise.h"
 
-namespace palpate::runner {
+namespace palpate::runner::sound {
 namespace {
 
 /// The output, and faults to inject; outlives the outputs.
@@ -203,4 +203,4 @@ TEST(NoisePlayer, WithoutAnOutputItThrows) {
 }
 
 }  // namespace
-}  // namespace palpate::runner
+}  // namespace palpate::runner::sound

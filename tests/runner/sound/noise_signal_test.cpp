@@ -7,7 +7,7 @@
 
 #include "runner/sound/masking_noise.h"
 
-namespace palpate::runner {
+namespace palpate::runner::sound {
 namespace {
 
 constexpr double kRate = 48000;  // Hz
@@ -139,4 +139,4 @@ TEST(NoiseSignal, IsDeterministicFromItsSeed) {
 }
 
 }  // namespace
-}  // namespace palpate::runner
+}  // namespace palpate::runner::sound

@@ -12,7 +12,7 @@
 #include "runner/stability/integrators.h"
 #include "runner/stability/soft_map.h"
 
-namespace palpate::runner {
+namespace palpate::runner::stability {
 namespace {
 
 TEST(Stability, APlainWallBecomesUnstableWhereTheoryPredicts) {
@@ -242,4 +242,4 @@ TEST(SoftMap, AllowedCasesComeToRestElsewhereToo) {
 }
 
 }  // namespace
-}  // namespace palpate::runner
+}  // namespace palpate::runner::stability

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <set>
 
-namespace palpate::runner {
+namespace palpate::runner::sweep {
 namespace {
 
 std::vector<protocols::SweepParameter> parameters(std::size_t n) {
@@ -124,4 +124,4 @@ TEST(Design, SaltellisSamplesDifferInOneParameterFromTheFirst) {
 }
 
 }  // namespace
-}  // namespace palpate::runner
+}  // namespace palpate::runner::sweep

@@ -8,7 +8,7 @@
 #include "runner/sweep/design.h"
 #include "tests/analysis/sweep_table_fixture.h"
 
-namespace palpate::runner {
+namespace palpate::runner::sweep {
 namespace {
 
 // Owen (1997, Ann. Stat. 25, 1541-1562): of n points of a Latin hypercube a mean's variance is at
@@ -44,4 +44,4 @@ TEST(PatternShare, IntervalCoversTheTruthAtLeastAtItsNominalRate) {
 }
 
 }  // namespace
-}  // namespace palpate::runner
+}  // namespace palpate::runner::sweep

@@ -9,7 +9,7 @@
 #include "analysis/statistics/sensitivity.h"
 #include "runner/sweep/design.h"
 
-namespace palpate::runner {
+namespace palpate::runner::sweep {
 namespace {
 
 std::vector<double> outputs_of(const Design& design,
@@ -72,4 +72,4 @@ TEST(SobolIndices, MatchTheSquaredCoefficientsOfALinearModel) {
 }
 
 }  // namespace
-}  // namespace palpate::runner
+}  // namespace palpate::runner::sweep

@@ -8,7 +8,7 @@
 
 #include "tests/runner/devices/falcon/emulated_node.h"
 
-namespace palpate::runner::falcon::testing {
+namespace palpate::runner::devices::falcon::testing {
 namespace {
 
 constexpr const char* kHubDescriptors =
@@ -75,4 +75,4 @@ std::int64_t EmulatedBus::now_ns() {
   return std::chrono::steady_clock::now().time_since_epoch() / std::chrono::nanoseconds(1);
 }
 
-}  // namespace palpate::runner::falcon::testing
+}  // namespace palpate::runner::devices::falcon::testing

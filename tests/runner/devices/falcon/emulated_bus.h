@@ -13,7 +13,7 @@
 
 #include "tests/runner/devices/falcon/emulator.h"
 
-namespace palpate::runner::falcon::testing {
+namespace palpate::runner::devices::falcon::testing {
 
 class EmulatedBus {
  public:
@@ -47,4 +47,4 @@ class EmulatedBus {
   std::unique_ptr<Impl> impl_;
 };
 
-}  // namespace palpate::runner::falcon::testing
+}  // namespace palpate::runner::devices::falcon::testing

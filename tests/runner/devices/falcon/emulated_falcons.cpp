@@ -45,7 +45,8 @@ namespace {
 
 using namespace palpate;
 using namespace palpate::runner;
-using namespace palpate::runner::falcon;
+using namespace palpate::runner::devices;
+using namespace palpate::runner::devices::falcon;
 using falcon::testing::EmulatedBus;
 using falcon::testing::Emulator;
 

@@ -5,7 +5,7 @@
 #include <sstream>
 #include <stdexcept>
 
-namespace palpate::runner::falcon::testing {
+namespace palpate::runner::devices::falcon::testing {
 namespace {
 
 /// As lsusb would show it: device, configuration, interface, two bulk endpoints.
@@ -90,4 +90,4 @@ void EmulatedNode::vanished(UMockdevIoctlBase* /*base*/, UMockdevIoctlClient* cl
   node->usbfs_.forget(client);
 }
 
-}  // namespace palpate::runner::falcon::testing
+}  // namespace palpate::runner::devices::falcon::testing

@@ -12,7 +12,7 @@
 
 #include "tests/runner/devices/falcon/emulated_usbfs.h"
 
-namespace palpate::runner::falcon::testing {
+namespace palpate::runner::devices::falcon::testing {
 
 class EmulatedNode {
  public:
@@ -56,4 +56,4 @@ class EmulatedNode {
   std::vector<Retired> retired_;
 };
 
-}  // namespace palpate::runner::falcon::testing
+}  // namespace palpate::runner::devices::falcon::testing

@@ -10,7 +10,7 @@
 
 #include "tests/runner/devices/falcon/emulated_bus.h"
 
-namespace palpate::runner::falcon::testing {
+namespace palpate::runner::devices::falcon::testing {
 namespace {
 
 constexpr int kPolls = 3;  // a servo polls once a tick; a client that polls more often is waiting
@@ -203,4 +203,4 @@ bool EmulatedUsbfs::reap(UMockdevIoctlClient* client, UMockdevIoctlData* argumen
   return true;
 }
 
-}  // namespace palpate::runner::falcon::testing
+}  // namespace palpate::runner::devices::falcon::testing

@@ -14,7 +14,7 @@
 
 #include "tests/runner/devices/falcon/emulator.h"
 
-namespace palpate::runner::falcon::testing {
+namespace palpate::runner::devices::falcon::testing {
 
 /// One call at a time: callers hold the node's lock.
 class EmulatedUsbfs {
@@ -58,4 +58,4 @@ class EmulatedUsbfs {
   int empty_reaps_ = 0;  // in a row
 };
 
-}  // namespace palpate::runner::falcon::testing
+}  // namespace palpate::runner::devices::falcon::testing

@@ -10,7 +10,7 @@
 #include "runner/devices/falcon/packets.h"
 #include "runner/devices/falcon/parameters.h"
 
-namespace palpate::runner::falcon::testing {
+namespace palpate::runner::devices::falcon::testing {
 namespace {
 
 constexpr std::int64_t kMonitorNs = 4'200'000;  // four bytes at 9600 baud
@@ -303,4 +303,4 @@ std::vector<std::uint8_t> synthetic_image(std::size_t words) {
   return bytes;
 }
 
-}  // namespace palpate::runner::falcon::testing
+}  // namespace palpate::runner::devices::falcon::testing

@@ -13,7 +13,7 @@
 
 #include "stimuli/vec.h"
 
-namespace palpate::runner::falcon::testing {
+namespace palpate::runner::devices::falcon::testing {
 
 /// Faults to inject. Counts start when they are set; 0: never.
 struct EmulatorFaults {
@@ -130,4 +130,4 @@ class Emulator {
 /// A well-formed boot stream with meaningless content: tests need no vendor's firmware.
 std::vector<std::uint8_t> synthetic_image(std::size_t words);
 
-}  // namespace palpate::runner::falcon::testing
+}  // namespace palpate::runner::devices::falcon::testing

@@ -12,7 +12,7 @@
 #include "runner/devices/falcon/transport.h"
 #include "tests/runner/devices/falcon/emulator.h"
 
-namespace palpate::runner::falcon::testing {
+namespace palpate::runner::devices::falcon::testing {
 
 class FakeTransport final : public Transport {
  public:
@@ -75,4 +75,4 @@ class FakeTransport final : public Transport {
   bool gone_ = false;
 };
 
-}  // namespace palpate::runner::falcon::testing
+}  // namespace palpate::runner::devices::falcon::testing

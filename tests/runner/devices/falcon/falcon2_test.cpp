@@ -12,7 +12,7 @@
 #include "tests/runner/devices/falcon/fake_transport.h"
 #include "tests/runner/devices/falcon/scripted_guide.h"
 
-namespace palpate::runner::falcon {
+namespace palpate::runner::devices::falcon {
 namespace {
 
 using testing::Emulator;
@@ -65,9 +65,9 @@ struct Bench {
   }
 };
 
-DeviceReading run(Bench& bench, Falcon2Device& device, int ticks, const Vec3& force1 = Vec3(0),
-                  const Vec3& force2 = Vec3(0)) {
-  DeviceReading reading;
+servo::DeviceReading run(Bench& bench, Falcon2Device& device, int ticks,
+                         const Vec3& force1 = Vec3(0), const Vec3& force2 = Vec3(0)) {
+  servo::DeviceReading reading;
   for (int i = 0; i < ticks; ++i) {
     bench.wait();
     reading = device.read();
@@ -83,7 +83,7 @@ TEST(Falcon2, SensesTheStylus) {
   EXPECT_EQ(device.capabilities().sensed_freedom, 5);
   for (const Vec3& axis : {Vec3(0, 0, 1), Vec3(0.2, 0, 1), Vec3(-0.1, 0.15, 1)}) {
     bench.hold_stylus({0.005, -0.01, 0.002}, axis);
-    const DeviceReading reading = run(bench, device, 600);
+    const servo::DeviceReading reading = run(bench, device, 600);
     EXPECT_FALSE(reading.lost);
     EXPECT_LT(glm::length(reading.stylus.tip - Vec3(0.005, -0.01, 0.002)), 2e-4);
     const Vec3 seen = glm::normalize(reading.stylus.tail - reading.stylus.tip);
@@ -146,7 +146,7 @@ TEST(Falcon2, ReadsTheButtonsOfBothGrips) {
 }
 
 /// Advances the time of both lines.
-class BenchClock final : public Clock {
+class BenchClock final : public servo::Clock {
  public:
   explicit BenchClock(Bench& bench) : bench_(bench) {}
   std::int64_t now_ns() noexcept override { return bench_.tip_line->now_ns(); }
@@ -225,4 +225,4 @@ TEST(FalconRegistration, APointTakenTwiceIsAskedForAgain) {
 }
 
 }  // namespace
-}  // namespace palpate::runner::falcon
+}  // namespace palpate::runner::devices::falcon

@@ -13,7 +13,7 @@
 #include "tests/runner/devices/falcon/fake_transport.h"
 #include "tests/shared/temporary_folder.h"
 
-namespace palpate::runner::falcon {
+namespace palpate::runner::devices::falcon {
 namespace {
 
 using testing::Emulator;
@@ -223,4 +223,4 @@ TEST(FalconImage, ReadsAFile) {
 }
 
 }  // namespace
-}  // namespace palpate::runner::falcon
+}  // namespace palpate::runner::devices::falcon

@@ -12,7 +12,7 @@
 #include "runner/devices/falcon/serial.h"
 #include "tests/shared/temporary_folder.h"
 
-namespace palpate::runner::falcon {
+namespace palpate::runner::devices::falcon {
 namespace {
 
 constexpr std::int64_t kNow = 1'793'530'800'000'000'000;  // 2026-11-01T11:00:00Z
@@ -171,7 +171,7 @@ TEST(FalconCalibration, VerdictsNameTheDevicesAndWhatToDo) {
 }
 
 TEST(FalconCalibration, TwoFalconsWithoutARegistrationAreNotOpened) {
-  DeviceConfig config;
+  servo::DeviceConfig config;
   config.serials = {"A1", "B2"};
   const auto fault_of = [&] {
     try {
@@ -198,4 +198,4 @@ TEST(FalconCalibration, ACalibrationFromTheFutureIsStale) {
 }
 
 }  // namespace
-}  // namespace palpate::runner::falcon
+}  // namespace palpate::runner::devices::falcon

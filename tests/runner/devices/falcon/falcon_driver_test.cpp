@@ -11,7 +11,7 @@
 #include "tests/runner/devices/falcon/emulator.h"
 #include "tests/runner/devices/falcon/fake_transport.h"
 
-namespace palpate::runner::falcon {
+namespace palpate::runner::devices::falcon {
 namespace {
 
 using testing::Emulator;
@@ -51,7 +51,7 @@ TEST(FalconDriver, ReadsThePositionOfTheGrip) {
     Bench bench(true, at);
     bench.emulator.plant.hand = [at](double) { return at; };
     const DriverReading& reading = bench.tick();
-    EXPECT_EQ(reading.trouble, DeviceTrouble::none);
+    EXPECT_EQ(reading.trouble, servo::DeviceTrouble::none);
     EXPECT_LT(glm::length(reading.position - to_world(at - kCentre)), 5e-5);  // a count
   }
 }
@@ -66,7 +66,7 @@ TEST(FalconDriver, FollowsAHand) {
   for (int i = 0; i < 3000; ++i) {
     const Vec3 before = bench.true_position();
     const DriverReading& reading = bench.tick();
-    ASSERT_EQ(reading.trouble, DeviceTrouble::none);
+    ASSERT_EQ(reading.trouble, servo::DeviceTrouble::none);
     worst = std::max(worst, glm::length(reading.position - before));
     farthest = std::max(farthest, glm::length(reading.position));
   }
@@ -133,7 +133,7 @@ TEST(FalconDriver, NoForceBeforeAllAxesAreHomed) {
   Bench bench(false);
   bench.emulator.plant.hand_stiffness = 400;
   bench.emulator.plant.hand_damping = 20;
-  EXPECT_EQ(bench.driver->reading().trouble, DeviceTrouble::not_homed);
+  EXPECT_EQ(bench.driver->reading().trouble, servo::DeviceTrouble::not_homed);
   // Fully out, then in: each axis passes its index at its own time.
   bench.emulator.plant.hand = [](double t) {
     return kCentre + Vec3(0.01, 0.012, 0.035 * std::sin(4 * t));
@@ -141,7 +141,8 @@ TEST(FalconDriver, NoForceBeforeAllAxesAreHomed) {
   bool some = false;
   int ticks = 0;
   for (; bench.emulator.homed() != 7 && ticks < 3000; ++ticks) {
-    EXPECT_NE(bench.tick([](const Vec3&) { return Vec3(1, 1, 1); }).trouble, DeviceTrouble::none);
+    EXPECT_NE(bench.tick([](const Vec3&) { return Vec3(1, 1, 1); }).trouble,
+              servo::DeviceTrouble::none);
     EXPECT_EQ(bench.emulator.leds(), 8U);  // red
     some = some || (bench.emulator.homed() != 0 && bench.emulator.homed() != 7);
   }
@@ -149,7 +150,7 @@ TEST(FalconDriver, NoForceBeforeAllAxesAreHomed) {
   EXPECT_LT(ticks, 3000);
   EXPECT_FALSE(bench.emulator.torque_before_homing());
   for (int i = 0; i < 5; ++i) bench.tick([](const Vec3&) { return Vec3(1, 1, 1); });
-  EXPECT_EQ(bench.driver->reading().trouble, DeviceTrouble::none);
+  EXPECT_EQ(bench.driver->reading().trouble, servo::DeviceTrouble::none);
   EXPECT_EQ(bench.emulator.leds(), 2U);  // green
   EXPECT_FALSE(bench.emulator.torque_is_zero());
 }
@@ -162,22 +163,22 @@ TEST(FalconDriver, LostHomingGivesZeroForce) {
   bench.emulator.lose_homing();
   // One tick notices it, the next sends zero.
   for (int i = 0; i < 3; ++i) bench.tick(push);
-  EXPECT_EQ(bench.driver->reading().trouble, DeviceTrouble::not_homed);
+  EXPECT_EQ(bench.driver->reading().trouble, servo::DeviceTrouble::not_homed);
   EXPECT_TRUE(bench.emulator.torque_is_zero());
 }
 
 TEST(FalconDriver, SilenceIsDetected) {
   Bench bench;
   bench.emulator.faults.silent = true;
-  EXPECT_EQ(bench.tick().trouble, DeviceTrouble::none);
-  for (int i = 0; i < 20; ++i) EXPECT_EQ(bench.tick().trouble, DeviceTrouble::late) << i;
+  EXPECT_EQ(bench.tick().trouble, servo::DeviceTrouble::none);
+  for (int i = 0; i < 20; ++i) EXPECT_EQ(bench.tick().trouble, servo::DeviceTrouble::late) << i;
   for (int i = 0; i < 10; ++i) bench.tick();
-  EXPECT_EQ(bench.driver->reading().trouble, DeviceTrouble::silent);
+  EXPECT_EQ(bench.driver->reading().trouble, servo::DeviceTrouble::silent);
   EXPECT_GT(bench.driver->counts().late, 10U);
   EXPECT_GT(bench.driver->counts().resent, 3U);
   bench.emulator.faults.silent = false;
   for (int i = 0; i < 10; ++i) bench.tick();
-  EXPECT_EQ(bench.driver->reading().trouble, DeviceTrouble::none);
+  EXPECT_EQ(bench.driver->reading().trouble, servo::DeviceTrouble::none);
 }
 
 TEST(FalconDriver, ToleratesSplitShortAndLateReplies) {
@@ -204,11 +205,12 @@ TEST(FalconDriver, APositionThatJumpsIsImplausible) {
   bench.tick();
   for (int i = 0; i < 3; ++i) {
     const DriverReading& reading = bench.tick();
-    EXPECT_EQ(reading.trouble, DeviceTrouble::late);
+    EXPECT_EQ(reading.trouble, servo::DeviceTrouble::late);
     EXPECT_EQ(reading.position, before);
   }
   bool lost = false;
-  for (int i = 0; i < 10; ++i) lost = lost || bench.tick().trouble == DeviceTrouble::implausible;
+  for (int i = 0; i < 10; ++i)
+    lost = lost || bench.tick().trouble == servo::DeviceTrouble::implausible;
   EXPECT_TRUE(lost);
   EXPECT_GE(bench.driver->counts().implausible, 4U);
 }
@@ -218,7 +220,7 @@ TEST(FalconDriver, UnpluggedAndReopened) {
   const auto push = [](const Vec3&) { return Vec3(0, 0, 2); };
   for (int i = 0; i < 5; ++i) bench.tick(push);
   bench.line->unplugged = true;
-  EXPECT_EQ(bench.tick(push).trouble, DeviceTrouble::unplugged);
+  EXPECT_EQ(bench.tick(push).trouble, servo::DeviceTrouble::unplugged);
   EXPECT_FALSE(bench.driver->halt());
   EXPECT_THROW(bench.driver->reopen(), TransportError);
   bench.line->unplugged = false;
@@ -226,7 +228,7 @@ TEST(FalconDriver, UnpluggedAndReopened) {
   EXPECT_EQ(bench.line->reopened, 1);
   bench.driver->reopen();
   EXPECT_EQ(bench.line->reopened, 1) << "one that is well is left alone";
-  EXPECT_EQ(bench.driver->reading().trouble, DeviceTrouble::none);
+  EXPECT_EQ(bench.driver->reading().trouble, servo::DeviceTrouble::none);
   EXPECT_TRUE(bench.emulator.torque_is_zero());  // restart leaves no torque
 }
 
@@ -263,7 +265,7 @@ TEST(FalconDevice, SensesThreeDegreesOfFreedom) {
   EXPECT_LT(device.capabilities().max_force, 6.2);
   for (int i = 0; i < 4; ++i) {
     line.wait(kTick);
-    const DeviceReading reading = device.read();
+    const servo::DeviceReading reading = device.read();
     EXPECT_FALSE(reading.lost);
     EXPECT_EQ(reading.stylus.tip, reading.stylus.tail);
     device.write({1, 0, 0}, {0, 0, 1});
@@ -272,4 +274,4 @@ TEST(FalconDevice, SensesThreeDegreesOfFreedom) {
 }
 
 }  // namespace
-}  // namespace palpate::runner::falcon
+}  // namespace palpate::runner::devices::falcon

@@ -19,7 +19,7 @@
 #include "tests/runner/devices/falcon/emulated_bus.h"
 #include "tests/runner/devices/falcon/preload.h"
 
-namespace palpate::runner::falcon {
+namespace palpate::runner::devices::falcon {
 namespace {
 
 using testing::EmulatedBus;
@@ -31,26 +31,26 @@ constexpr int kAttempts = 4;
 
 /// Pushes with 1.5 N until it is ended.
 int be_runner() {
-  GuardSettings settings;
+  safety::GuardSettings settings;
   settings.linger = 0.2;
-  std::unique_ptr<GuardedDevice> owned;
+  std::unique_ptr<safety::GuardedDevice> owned;
   while (owned == nullptr) {
     try {
-      owned = std::make_unique<GuardedDevice>([] { return open_falcon({}); }, settings);
+      owned = std::make_unique<safety::GuardedDevice>([] { return open_falcon({}); }, settings);
     } catch (const std::runtime_error&) {  // the guard of the previous attempt still runs
       std::this_thread::sleep_for(std::chrono::milliseconds(100));
     }
   }
-  GuardedDevice& device = *owned;
-  request_realtime({});
-  RealClock clock;
+  safety::GuardedDevice& device = *owned;
+  servo::request_realtime({});
+  servo::RealClock clock;
   std::int64_t due = clock.now_ns();
   for (;;) {
     due = std::max(due + 1'000'000, clock.now_ns());
     clock.wait_until(due);
-    const DeviceReading reading = device.read();
+    const servo::DeviceReading reading = device.read();
     // A zero command rearms the guard after a busy machine made it cut off forces.
-    const bool cut = reading.trouble == DeviceTrouble::guarded;
+    const bool cut = reading.trouble == servo::DeviceTrouble::guarded;
     device.write(reading.lost || cut ? Vec3(0) : Vec3(0, 0, 1.5), Vec3(0));
   }
 }
@@ -126,12 +126,12 @@ INSTANTIATE_TEST_SUITE_P(Ends, FalconGuard,
                          });
 
 }  // namespace
-}  // namespace palpate::runner::falcon
+}  // namespace palpate::runner::devices::falcon
 
 int main(int argc, char** argv) {
   if (argc > 1 && std::strcmp(argv[1], "--runner") == 0)
-    return palpate::runner::falcon::be_runner();
-  if (!palpate::runner::falcon::testing::rerun_preloaded(argv)) return 1;
+    return palpate::runner::devices::falcon::be_runner();
+  if (!palpate::runner::devices::falcon::testing::rerun_preloaded(argv)) return 1;
   ::testing::InitGoogleTest(&argc, argv);
   return RUN_ALL_TESTS();
 }

@@ -10,7 +10,7 @@
 #include "tests/runner/devices/falcon/line_clock.h"
 #include "tests/runner/devices/falcon/scripted_guide.h"
 
-namespace palpate::runner::falcon {
+namespace palpate::runner::devices::falcon {
 namespace {
 
 using testing::Emulator;
@@ -61,4 +61,4 @@ TEST(FalconHoming, StopsWhenAskedOrUnplugged) {
 }
 
 }  // namespace
-}  // namespace palpate::runner::falcon
+}  // namespace palpate::runner::devices::falcon

@@ -9,7 +9,7 @@
 #include "runner/devices/falcon/kinematics.h"
 #include "runner/devices/falcon/parameters.h"
 
-namespace palpate::runner::falcon {
+namespace palpate::runner::devices::falcon {
 namespace {
 
 Vec3 thighs_at(const Vec3& position) {
@@ -193,4 +193,4 @@ TEST(FalconKinematics, FramesAreRightHandedAndInverse) {
 }
 
 }  // namespace
-}  // namespace palpate::runner::falcon
+}  // namespace palpate::runner::devices::falcon

@@ -7,7 +7,7 @@
 #include "data/base/random.h"
 #include "runner/devices/falcon/packets.h"
 
-namespace palpate::runner::falcon {
+namespace palpate::runner::devices::falcon {
 namespace {
 
 std::string text(const Packet& packet) { return {packet.begin(), packet.end()}; }
@@ -149,4 +149,4 @@ TEST(FalconPackets, RandomBytesNeverBreakTheStream) {
 }
 
 }  // namespace
-}  // namespace palpate::runner::falcon
+}  // namespace palpate::runner::devices::falcon

@@ -16,7 +16,7 @@
 #include "tests/runner/devices/falcon/emulated_bus.h"
 #include "tests/runner/devices/falcon/preload.h"
 
-namespace palpate::runner::falcon {
+namespace palpate::runner::devices::falcon {
 namespace {
 
 using testing::EmulatedBus;
@@ -131,16 +131,16 @@ TEST(FalconUsb, UploadsFirmwareInSpiteOfLostAndWrongEchoes) {
 TEST(FalconUsb, HomesAndHoldsAWall) {
   ReadyArm bench(false);
   FalconDriver& driver = *bench.driver;
-  EXPECT_EQ(driver.reading().trouble, DeviceTrouble::not_homed);
+  EXPECT_EQ(driver.reading().trouble, servo::DeviceTrouble::not_homed);
   bench.bus.with(0, [](Emulator& emulator) {
     emulator.plant.hand_stiffness = 400;
     emulator.plant.hand_damping = 20;
     emulator.plant.hand = [](double t) { return kCentre + Vec3(0, 0, 0.035 * std::sin(6 * t)); };
   });
   const auto push = [](const Vec3&) { return Vec3(1, 1, 1); };
-  EXPECT_LT(
-      run(driver, 5000, push, [&] { return driver.reading().trouble == DeviceTrouble::none; }),
-      5000);
+  EXPECT_LT(run(driver, 5000, push,
+                [&] { return driver.reading().trouble == servo::DeviceTrouble::none; }),
+            5000);
   bench.bus.with(0, [](Emulator& emulator) {
     EXPECT_FALSE(emulator.torque_before_homing());
     emulator.plant.hand_stiffness = 80;
@@ -190,9 +190,9 @@ TEST(FalconUsb, UnpluggedInContactAndPluggedInAgain) {
   EXPECT_TRUE(driver.reading().usable());
   EXPECT_FALSE(bench.bus.read(0, &Emulator::torque_is_zero));
   bench.bus.unplug(0);
-  EXPECT_LT(
-      run(driver, 200, push, [&] { return driver.reading().trouble == DeviceTrouble::unplugged; }),
-      200);
+  EXPECT_LT(run(driver, 200, push,
+                [&] { return driver.reading().trouble == servo::DeviceTrouble::unplugged; }),
+            200);
   EXPECT_FALSE(driver.halt());
   EXPECT_THROW(driver.reopen(), TransportError);
   bench.bus.plug(0);
@@ -206,7 +206,7 @@ TEST(FalconUsb, UnpluggedInContactAndPluggedInAgain) {
     }
   }
   ASSERT_TRUE(open);
-  EXPECT_EQ(driver.reading().trouble, DeviceTrouble::none);
+  EXPECT_EQ(driver.reading().trouble, servo::DeviceTrouble::none);
   EXPECT_TRUE(bench.bus.read(0, &Emulator::torque_is_zero));
 }
 
@@ -253,10 +253,10 @@ TEST(FalconUsb, TwoDevicesWorkAtOnce) {
 }
 
 }  // namespace
-}  // namespace palpate::runner::falcon
+}  // namespace palpate::runner::devices::falcon
 
 int main(int argc, char** argv) {
-  if (!palpate::runner::falcon::testing::rerun_preloaded(argv)) return 1;
+  if (!palpate::runner::devices::falcon::testing::rerun_preloaded(argv)) return 1;
   ::testing::InitGoogleTest(&argc, argv);
   return RUN_ALL_TESTS();
 }

@@ -11,7 +11,7 @@
 #include "tests/runner/devices/falcon/line_clock.h"
 #include "tests/runner/devices/falcon/scripted_guide.h"
 
-namespace palpate::runner::falcon {
+namespace palpate::runner::devices::falcon {
 namespace {
 
 using testing::Emulator;
@@ -149,4 +149,4 @@ TEST(FalconWeighing, ASingleWeightIsRefused) {
 }
 
 }  // namespace
-}  // namespace palpate::runner::falcon
+}  // namespace palpate::runner::devices::falcon

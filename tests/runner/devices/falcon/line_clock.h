@@ -3,10 +3,10 @@
 #include "runner/servo/device.h"
 #include "tests/runner/devices/falcon/fake_transport.h"
 
-namespace palpate::runner::falcon::testing {
+namespace palpate::runner::devices::falcon::testing {
 
 /// The line's own time.
-class LineClock final : public Clock {
+class LineClock final : public servo::Clock {
  public:
   explicit LineClock(FakeTransport& line) : line_(line) {}
   std::int64_t now_ns() noexcept override { return line_.now_ns(); }
@@ -18,4 +18,4 @@ class LineClock final : public Clock {
   FakeTransport& line_;
 };
 
-}  // namespace palpate::runner::falcon::testing
+}  // namespace palpate::runner::devices::falcon::testing

@@ -7,7 +7,7 @@
 #include <fstream>
 #include <string>
 
-namespace palpate::runner::falcon::testing {
+namespace palpate::runner::devices::falcon::testing {
 namespace {
 
 constexpr const char* kPreload = "libumockdev-preload.so.0";
@@ -41,4 +41,4 @@ bool rerun_preloaded(char** argv) {
   return false;
 }
 
-}  // namespace palpate::runner::falcon::testing
+}  // namespace palpate::runner::devices::falcon::testing

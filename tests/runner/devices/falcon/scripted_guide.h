@@ -8,7 +8,7 @@
 
 #include "runner/devices/falcon/guide.h"
 
-namespace palpate::runner::falcon::testing {
+namespace palpate::runner::devices::falcon::testing {
 
 class ScriptedGuide final : public Guide {
  public:
@@ -35,4 +35,4 @@ class ScriptedGuide final : public Guide {
   int patience_ = 0;
 };
 
-}  // namespace palpate::runner::falcon::testing
+}  // namespace palpate::runner::devices::falcon::testing

@@ -11,7 +11,7 @@
 #include "data/base/random.h"
 #include "stimuli/orientation.h"
 
-namespace palpate::runner {
+namespace palpate::runner::devices {
 namespace {
 
 Vec3 apply(const Pose& pose, const Vec3& p) { return pose.orientation * p + pose.position; }
@@ -114,4 +114,4 @@ TEST(StylusFromEnds, AStylusThatChangesItsLengthIsAFault) {
 }
 
 }  // namespace
-}  // namespace palpate::runner
+}  // namespace palpate::runner::devices

@@ -16,7 +16,7 @@
 #include "tests/runner/devices/forcedimension/stub_state.h"
 #include "tests/shared/temporary_folder.h"
 
-namespace palpate::runner::forcedimension {
+namespace palpate::runner::devices::forcedimension {
 namespace {
 
 using testing::StubDevice;
@@ -40,10 +40,10 @@ class ForceDimension : public ::testing::Test {
 
   StubDevice& one() { return state_->device[0]; }
   StubDevice& other() { return state_->device[1]; }
-  static DeviceTrouble read(Device& device) { return device.read().trouble; }
+  static servo::DeviceTrouble read(servo::Device& device) { return device.read().trouble; }
   /// Reads until the status has been queried again.
-  static DeviceTrouble settle(Device& device) {
-    DeviceTrouble trouble = DeviceTrouble::none;
+  static servo::DeviceTrouble settle(servo::Device& device) {
+    servo::DeviceTrouble trouble = servo::DeviceTrouble::none;
     for (int tick = 0; tick < 10; ++tick) {
       trouble = device.read().trouble;
       device.write(Vec3(0), Vec3(0));
@@ -60,7 +60,7 @@ class ForceDimension : public ::testing::Test {
   }
 
   StubState* state_;
-  DeviceConfig config_;
+  servo::DeviceConfig config_;
 };
 
 void expect_near(const Vec3& a, const Vec3& b) {
@@ -74,11 +74,11 @@ TEST_F(ForceDimension, AStylusIsReadInTheWorldFrameAndItsForcesAddUpAtTheGrip) {
   one().hand[2] = 0.03;  // up
   one().hand_stiffness = 0;
   const auto device = open(config_);
-  const DeviceReading reading = device->read();
+  const servo::DeviceReading reading = device->read();
   EXPECT_FALSE(reading.lost);
   expect_near(reading.stylus.tip, {0.02, -0.01, 0.03});
   expect_near(reading.stylus.tail, {0.02, -0.01 - config_.stylus_length, 0.03});
-  const DeviceCapabilities& can = device->capabilities();
+  const servo::DeviceCapabilities& can = device->capabilities();
   EXPECT_EQ(can.sensed_freedom, 5);
   EXPECT_EQ(can.actuated_freedom, 3);
   EXPECT_EQ(can.max_force, 12);
@@ -97,7 +97,7 @@ TEST_F(ForceDimension, WithoutAWristTheStylusIsAPoint) {
   one().model = 1;
   const auto device = open(config_);
   EXPECT_EQ(device->capabilities().sensed_freedom, 3);
-  const DeviceReading reading = device->read();
+  const servo::DeviceReading reading = device->read();
   EXPECT_EQ(reading.stylus.tip, reading.stylus.tail);
 }
 
@@ -117,7 +117,7 @@ TEST_F(ForceDimension, ADrivenWristGetsTheTorqueOfTheTailsForceAboutTheTip) {
 
 TEST_F(ForceDimension, AnUnknownModelGetsCautiousLimits) {
   one().model = 3;
-  const DeviceCapabilities can = open(config_)->capabilities();
+  const servo::DeviceCapabilities can = open(config_)->capabilities();
   EXPECT_EQ(can.max_force, 8);
   EXPECT_EQ(can.max_stiffness, 1000);
   EXPECT_EQ(can.workspace_radius, 0.05);
@@ -128,28 +128,28 @@ TEST_F(ForceDimension, EveryFaultIsTroubleAndZeroForceUntilItIsOver) {
     const char* name;
     double StubDevice::*what;
     double value, well;
-    DeviceTrouble trouble;
-  } cases[] = {{"unplugged", &StubDevice::connected, 0, 1, DeviceTrouble::unplugged},
-               {"no power", &StubDevice::power, 0, 1, DeviceTrouble::silent},
-               {"calibration lost", &StubDevice::reset, 1, 0, DeviceTrouble::not_calibrated},
-               {"too fast", &StubDevice::too_fast, 1, 0, DeviceTrouble::stopped_by_device},
-               {"NaN", &StubDevice::wrong, 1, 0, DeviceTrouble::implausible},
-               {"infinite", &StubDevice::wrong, 2, 0, DeviceTrouble::implausible},
-               {"1e9 m", &StubDevice::wrong, 3, 0, DeviceTrouble::implausible},
-               {"communication", &StubDevice::error, 2, 0, DeviceTrouble::unplugged},
-               {"no answer", &StubDevice::error, 7, 0, DeviceTrouble::silent},
-               {"in use", &StubDevice::error, 20, 0, DeviceTrouble::in_use}};
+    servo::DeviceTrouble trouble;
+  } cases[] = {{"unplugged", &StubDevice::connected, 0, 1, servo::DeviceTrouble::unplugged},
+               {"no power", &StubDevice::power, 0, 1, servo::DeviceTrouble::silent},
+               {"calibration lost", &StubDevice::reset, 1, 0, servo::DeviceTrouble::not_calibrated},
+               {"too fast", &StubDevice::too_fast, 1, 0, servo::DeviceTrouble::stopped_by_device},
+               {"NaN", &StubDevice::wrong, 1, 0, servo::DeviceTrouble::implausible},
+               {"infinite", &StubDevice::wrong, 2, 0, servo::DeviceTrouble::implausible},
+               {"1e9 m", &StubDevice::wrong, 3, 0, servo::DeviceTrouble::implausible},
+               {"communication", &StubDevice::error, 2, 0, servo::DeviceTrouble::unplugged},
+               {"no answer", &StubDevice::error, 7, 0, servo::DeviceTrouble::silent},
+               {"in use", &StubDevice::error, 20, 0, servo::DeviceTrouble::in_use}};
   for (const auto& [name, what, value, well, trouble] : cases) {
     SCOPED_TRACE(name);
     *state_ = StubState{};
     one().serial = 4711;
     const auto device = open(config_);
-    ASSERT_EQ(settle(*device), DeviceTrouble::none);
+    ASSERT_EQ(settle(*device), servo::DeviceTrouble::none);
     device->write({0, 0, 1}, Vec3(0));
     ASSERT_EQ(one().force[2], 1);
     one().*what = value;
     EXPECT_EQ(settle(*device), trouble);
-    const DeviceReading reading = device->read();
+    const servo::DeviceReading reading = device->read();
     EXPECT_TRUE(reading.lost);
     EXPECT_TRUE(std::isfinite(reading.stylus.tip.x + reading.stylus.tip.y + reading.stylus.tip.z));
     device->write({0, 0, 1}, Vec3(0));
@@ -158,31 +158,32 @@ TEST_F(ForceDimension, EveryFaultIsTroubleAndZeroForceUntilItIsOver) {
     if (reached) {
       EXPECT_EQ(one().force[2], 0) << "a force that is asked for anyway";
     }
-    if (needs_reopening(trouble)) device->reopen();
-    EXPECT_EQ(settle(*device), DeviceTrouble::none);
+    if (servo::needs_reopening(trouble)) device->reopen();
+    EXPECT_EQ(settle(*device), servo::DeviceTrouble::none);
     device->write({0, 0, 1}, Vec3(0));
     EXPECT_EQ(one().force[2], 1) << "it works again";
   }
 }
 
 TEST_F(ForceDimension, ReadsAndWritesDoNotAllocate) {
-  if (!counts_allocations()) GTEST_SKIP() << "allocations are not counted under sanitizers";
+  if (!bench::counts_allocations()) GTEST_SKIP() << "allocations are not counted under sanitizers";
   const auto device = open(config_);
-  ASSERT_EQ(settle(*device), DeviceTrouble::none);
-  const std::uint64_t before = allocations();
+  ASSERT_EQ(settle(*device), servo::DeviceTrouble::none);
+  const std::uint64_t before = bench::allocations();
   for (int tick = 0; tick < kMinuteOfTicks; ++tick) {
     device->read();
     device->write({0, 0, 1}, Vec3(0));
   }
-  EXPECT_EQ(allocations(), before);
+  EXPECT_EQ(bench::allocations(), before);
 }
 
 TEST_F(ForceDimension, AJumpIsImplausible) {
   const auto device = open(config_);
-  ASSERT_EQ(settle(*device), DeviceTrouble::none);
+  ASSERT_EQ(settle(*device), servo::DeviceTrouble::none);
   one().wrong = 4;
-  EXPECT_EQ(read(*device), DeviceTrouble::implausible);
-  EXPECT_EQ(read(*device), DeviceTrouble::none) << "the servo keeps the forces off by itself";
+  EXPECT_EQ(read(*device), servo::DeviceTrouble::implausible);
+  EXPECT_EQ(read(*device), servo::DeviceTrouble::none)
+      << "the servo keeps the forces off by itself";
 }
 
 TEST_F(ForceDimension, AfterADeadGuardTheFirmwareSwitchesForcesOff) {
@@ -190,11 +191,11 @@ TEST_F(ForceDimension, AfterADeadGuardTheFirmwareSwitchesForcesOff) {
   device->read();
   device->write({0, 0, 1}, Vec3(0));
   std::this_thread::sleep_for(std::chrono::milliseconds(50));
-  EXPECT_EQ(settle(*device), DeviceTrouble::stopped_by_device);
+  EXPECT_EQ(settle(*device), servo::DeviceTrouble::stopped_by_device);
   EXPECT_EQ(one().force[2], 0);
   EXPECT_EQ(one().forces_on, 0) << "not by itself on again";
   device->reopen();
-  EXPECT_EQ(settle(*device), DeviceTrouble::none);
+  EXPECT_EQ(settle(*device), servo::DeviceTrouble::none);
 }
 
 TEST_F(ForceDimension, TheFirmwareWaitsForAServoThatIsSlow) {
@@ -243,7 +244,7 @@ TEST_F(ForceDimension, WhatCannotBeOpenedSaysWhy) {
 TEST_F(ForceDimension, AnOldLibraryWorksAndItsMissingFunctionsAreRecorded) {
   config_.library = OLD_LIBRARY;
   const auto device = open(config_);
-  EXPECT_EQ(settle(*device), DeviceTrouble::none);
+  EXPECT_EQ(settle(*device), servo::DeviceTrouble::none);
   EXPECT_EQ(device->capabilities().calibration,
             "maker's: omega.6, SDK 3.3.0.1, WITHOUT the firmware's watchdog");
   EXPECT_EQ(one().watchdog, 0);
@@ -252,7 +253,7 @@ TEST_F(ForceDimension, AnOldLibraryWorksAndItsMissingFunctionsAreRecorded) {
 TEST_F(ForceDimension, DevicesAreListedWithSerialNumbersAndTroubles) {
   state_->count = 2;
   other().in_use = 1;
-  const std::vector<ConnectedDevice> found = connected(config_);
+  const std::vector<servo::ConnectedDevice> found = connected(config_);
   ASSERT_EQ(found.size(), 2U);
   EXPECT_EQ(found[0].serial, "4711");
   EXPECT_EQ(found[0].trouble, "");
@@ -261,4 +262,4 @@ TEST_F(ForceDimension, DevicesAreListedWithSerialNumbersAndTroubles) {
 }
 
 }  // namespace
-}  // namespace palpate::runner::forcedimension
+}  // namespace palpate::runner::devices::forcedimension

@@ -12,8 +12,8 @@
 
 namespace {
 
-using palpate::runner::testing::StubDevice;
-using palpate::runner::testing::StubState;
+using palpate::runner::devices::testing::StubDevice;
+using palpate::runner::devices::testing::StubState;
 
 thread_local int last_error = 0;
 constexpr int kNoDevice = 5, kTimeOut = 7, kInUse = 20;
@@ -22,7 +22,8 @@ constexpr char kFirstId = 3;  // ids are no indices
 StubState& state() {
   static StubState* const mapped = [] {
     const char* const path = std::getenv("PALPATE_STUB_STATE");
-    return palpate::runner::testing::map_stub_state(path != nullptr ? path : "/nonexistent/stub");
+    return palpate::runner::devices::testing::map_stub_state(path != nullptr ? path
+                                                                             : "/nonexistent/stub");
   }();
   return *mapped;
 }

@@ -9,7 +9,7 @@
 #include <stdexcept>
 #include <string>
 
-namespace palpate::runner::testing {
+namespace palpate::runner::devices::testing {
 
 /// One device. Frame of the library: x to the user, y right, z up.
 struct StubDevice {
@@ -46,4 +46,4 @@ inline StubState* map_stub_state(const std::string& path) {
   return static_cast<StubState*>(memory);
 }
 
-}  // namespace palpate::runner::testing
+}  // namespace palpate::runner::devices::testing

@@ -18,8 +18,8 @@
 
 #include "tests/runner/devices/haply/emulated_service.h"
 
-using palpate::runner::testing::EmulatedArm;
-using palpate::runner::testing::EmulatedService;
+using palpate::runner::devices::testing::EmulatedArm;
+using palpate::runner::devices::testing::EmulatedService;
 
 namespace {
 

@@ -11,7 +11,7 @@
 #include <list>
 #include <nlohmann/json.hpp>
 
-namespace palpate::runner::testing {
+namespace palpate::runner::devices::testing {
 
 namespace asio = boost::asio;
 namespace beast = boost::beast;
@@ -190,4 +190,4 @@ std::string EmulatedService::answer(const std::string& message, bool& mute,
   return out.dump();
 }
 
-}  // namespace palpate::runner::testing
+}  // namespace palpate::runner::devices::testing

@@ -11,7 +11,7 @@
 #include <thread>
 #include <vector>
 
-namespace palpate::runner::testing {
+namespace palpate::runner::devices::testing {
 
 /// State set and read by a test.
 struct EmulatedArm {
@@ -65,4 +65,4 @@ class EmulatedService {
   std::thread acceptor_;
 };
 
-}  // namespace palpate::runner::testing
+}  // namespace palpate::runner::devices::testing

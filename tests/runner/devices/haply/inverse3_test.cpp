@@ -15,7 +15,7 @@
 #include "runner/bench/allocation_count.h"
 #include "tests/runner/devices/haply/emulated_service.h"
 
-namespace palpate::runner::haply {
+namespace palpate::runner::devices::haply {
 namespace {
 
 using testing::EmulatedArm;
@@ -93,18 +93,18 @@ class Inverse3 : public ::testing::Test {
   Inverse3() { config_.service = service_.address(); }
 
   /// Reads like a servo, with a force to the right, until `holds` or a long time-out.
-  bool until(Device& device, const std::function<bool(const DeviceReading&)>& holds,
+  bool until(servo::Device& device, const std::function<bool(const servo::DeviceReading&)>& holds,
              const Vec3& force = Vec3(0)) {
     for (int tick = 0; tick < 10'000; ++tick) {
-      const DeviceReading reading = device.read();
+      const servo::DeviceReading reading = device.read();
       device.write(force, Vec3(0));
       if (holds(reading)) return true;
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
     }
     return false;
   }
-  bool works(Device& device) {
-    return until(device, [](const DeviceReading& reading) { return !reading.lost; });
+  bool works(servo::Device& device) {
+    return until(device, [](const servo::DeviceReading& reading) { return !reading.lost; });
   }
   std::string refusal() {
     try {
@@ -116,7 +116,7 @@ class Inverse3 : public ::testing::Test {
   }
 
   EmulatedService service_;
-  DeviceConfig config_;
+  servo::DeviceConfig config_;
 };
 
 TEST_F(Inverse3, AStylusIsReadAndItsForcesAddUpAtTheCursor) {
@@ -128,7 +128,7 @@ TEST_F(Inverse3, AStylusIsReadAndItsForcesAddUpAtTheCursor) {
   });
   const auto device = open(config_);
   ASSERT_TRUE(works(*device));
-  const DeviceReading reading = device->read();
+  const servo::DeviceReading reading = device->read();
   EXPECT_EQ(reading.stylus.tip, Vec3(0.01, 0.02, 0.03));
   EXPECT_LT(glm::length(reading.stylus.tail - Vec3(0.01 + config_.stylus_length, 0.02, 0.03)),
             1e-9);
@@ -136,7 +136,8 @@ TEST_F(Inverse3, AStylusIsReadAndItsForcesAddUpAtTheCursor) {
   EXPECT_EQ(device->capabilities().sensed_freedom, 5);
   EXPECT_EQ(device->capabilities().actuated_freedom, 3);
   EXPECT_NE(device->capabilities().calibration.find("Inverse Service 3.5.0.0"), std::string::npos);
-  EXPECT_TRUE(until(*device, [this](const DeviceReading&) { return service_.arm().force[0] == 1; },
+  EXPECT_TRUE(until(*device,
+                    [this](const servo::DeviceReading&) { return service_.arm().force[0] == 1; },
                     {1, 0, 0}));
   EXPECT_NE(service_.arm().first.find("arm_front_centered"), std::string::npos);
 }
@@ -146,13 +147,14 @@ TEST_F(Inverse3, WithoutAGripItIsAPoint) {
   const auto device = open(config_);
   ASSERT_TRUE(works(*device));
   EXPECT_EQ(device->capabilities().sensed_freedom, 3);
-  const DeviceReading reading = device->read();
+  const servo::DeviceReading reading = device->read();
   EXPECT_EQ(reading.stylus.tip, reading.stylus.tail);
 }
 
 TEST_F(Inverse3, AForceThatIsNotRenewedBecomesZero) {
   const auto device = open(config_);
-  ASSERT_TRUE(until(*device, [this](const DeviceReading&) { return service_.arm().force[2] == 1; },
+  ASSERT_TRUE(until(*device,
+                    [this](const servo::DeviceReading&) { return service_.arm().force[2] == 1; },
                     {0, 0, 1}));
   const auto give_up = std::chrono::steady_clock::now() + std::chrono::seconds(10);
   while (service_.arm().force[2] != 0 && std::chrono::steady_clock::now() < give_up)
@@ -164,15 +166,15 @@ TEST_F(Inverse3, EveryFaultGivesTroubleAndZeroForceAndAllowsReopening) {
   const struct {
     const char* name;
     std::function<void(EmulatedArm&)> fault, mend;
-    DeviceTrouble trouble;
+    servo::DeviceTrouble trouble;
   } cases[] = {{"unplugged", [](auto& a) { a.present = false; }, [](auto& a) { a.present = true; },
-                DeviceTrouble::unplugged},
+                servo::DeviceTrouble::unplugged},
                {"no power", [](auto& a) { a.powered = false; }, [](auto& a) { a.powered = true; },
-                DeviceTrouble::silent},
+                servo::DeviceTrouble::silent},
                {"calibration lost", [](auto& a) { a.calibrated = false; },
-                [](auto& a) { a.calibrated = true; }, DeviceTrouble::not_calibrated},
+                [](auto& a) { a.calibrated = true; }, servo::DeviceTrouble::not_calibrated},
                {"grip asleep", [](auto& a) { a.awake = false; }, [](auto& a) { a.awake = true; },
-                DeviceTrouble::silent},
+                servo::DeviceTrouble::silent},
                {"far",
                 [](auto& a) {
                   a.hand = {1e9, 0, 0};
@@ -180,56 +182,60 @@ TEST_F(Inverse3, EveryFaultGivesTroubleAndZeroForceAndAllowsReopening) {
                 [](auto& a) {
                   a.hand = {0, 0, 0};
                 },
-                DeviceTrouble::implausible},
+                servo::DeviceTrouble::implausible},
                {"no replies", [](auto& a) { a.mute = true; }, [](auto& a) { a.mute = false; },
-                DeviceTrouble::silent},
+                servo::DeviceTrouble::silent},
                {"no JSON", [](auto& a) { a.instead = "{{{"; }, [](auto& a) { a.instead = ""; },
-                DeviceTrouble::service_gone},
+                servo::DeviceTrouble::service_gone},
                {"too long", [](auto& a) { a.instead = std::string(10 << 20, ' '); },
-                [](auto& a) { a.instead = ""; }, DeviceTrouble::service_gone}};
+                [](auto& a) { a.instead = ""; }, servo::DeviceTrouble::service_gone}};
   for (const auto& [name, fault, mend, trouble] : cases) {
     SCOPED_TRACE(name);
     const auto device = open(config_);
     ASSERT_TRUE(works(*device));
-    ASSERT_TRUE(until(
-        *device, [this](const DeviceReading&) { return service_.arm().force[2] == 1; }, {0, 0, 1}));
+    ASSERT_TRUE(until(*device,
+                      [this](const servo::DeviceReading&) { return service_.arm().force[2] == 1; },
+                      {0, 0, 1}));
     service_.with(fault);
     const auto began = std::chrono::steady_clock::now();
-    EXPECT_TRUE(until(
-        *device, [this](const DeviceReading&) { return service_.arm().force[2] == 0; }, {0, 0, 1}));
+    EXPECT_TRUE(until(*device,
+                      [this](const servo::DeviceReading&) { return service_.arm().force[2] == 0; },
+                      {0, 0, 1}));
     const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - began;
     std::clog << name << ": zero force after " << took.count() << " ms\n";
-    const DeviceTrouble expected = trouble;
-    EXPECT_TRUE(until(
-        *device, [expected](const DeviceReading& r) { return r.lost && r.trouble == expected; },
-        {0, 0, 1}))
+    const servo::DeviceTrouble expected = trouble;
+    EXPECT_TRUE(
+        until(*device,
+              [expected](const servo::DeviceReading& r) { return r.lost && r.trouble == expected; },
+              {0, 0, 1}))
         << static_cast<int>(device->read().trouble);
     service_.with(mend);
     device->reopen();
     EXPECT_TRUE(works(*device));
-    EXPECT_TRUE(until(
-        *device, [this](const DeviceReading&) { return service_.arm().force[2] == 1; }, {0, 0, 1}));
+    EXPECT_TRUE(until(*device,
+                      [this](const servo::DeviceReading&) { return service_.arm().force[2] == 1; },
+                      {0, 0, 1}));
   }
 }
 
 TEST_F(Inverse3, ReadsAndWritesDoNotAllocate) {
-  if (!counts_allocations()) GTEST_SKIP() << "allocations are not counted under sanitizers";
+  if (!bench::counts_allocations()) GTEST_SKIP() << "allocations are not counted under sanitizers";
   const auto device = open(config_);
   ASSERT_TRUE(works(*device));
-  const std::uint64_t before = allocations();
+  const std::uint64_t before = bench::allocations();
   for (int tick = 0; tick < kMinuteOfTicks; ++tick) {
     device->read();
     device->write({0, 0, 1}, Vec3(0));
   }
-  EXPECT_EQ(allocations(), before);
+  EXPECT_EQ(bench::allocations(), before);
 }
 
 TEST_F(Inverse3, AServiceThatEndsAndComesBackIsOpenedAgain) {
   const auto device = open(config_);
   ASSERT_TRUE(works(*device));
   service_.turn(false);
-  EXPECT_TRUE(until(*device, [](const DeviceReading& r) {
-    return r.trouble == DeviceTrouble::service_gone && r.lost;
+  EXPECT_TRUE(until(*device, [](const servo::DeviceReading& r) {
+    return r.trouble == servo::DeviceTrouble::service_gone && r.lost;
   }));
   EXPECT_THROW(device->reopen(), std::runtime_error);
   EXPECT_TRUE(device->read().lost);
@@ -237,7 +243,8 @@ TEST_F(Inverse3, AServiceThatEndsAndComesBackIsOpenedAgain) {
   service_.turn(true);
   device->reopen();
   EXPECT_TRUE(works(*device));
-  EXPECT_TRUE(until(*device, [this](const DeviceReading&) { return service_.arm().force[0] == 1; },
+  EXPECT_TRUE(until(*device,
+                    [this](const servo::DeviceReading&) { return service_.arm().force[0] == 1; },
                     {1, 0, 0}));
 }
 
@@ -245,12 +252,15 @@ TEST_F(Inverse3, AForceThatTheServiceIgnoresIsRetriedInTheOtherDialect) {
   service_.with([](EmulatedArm& arm) { arm.vector = false; });  // although it is 3.5
   const auto device = open(config_);
   ASSERT_TRUE(works(*device));
-  EXPECT_TRUE(until(
-      *device, [](const DeviceReading& r) { return r.trouble == DeviceTrouble::stopped_by_device; },
-      {1, 0, 0}));
+  EXPECT_TRUE(until(*device,
+                    [](const servo::DeviceReading& r) {
+                      return r.trouble == servo::DeviceTrouble::stopped_by_device;
+                    },
+                    {1, 0, 0}));
   EXPECT_EQ(service_.arm().force[0], 0);
   device->reopen();
-  EXPECT_TRUE(until(*device, [this](const DeviceReading&) { return service_.arm().force[0] == 1; },
+  EXPECT_TRUE(until(*device,
+                    [this](const servo::DeviceReading&) { return service_.arm().force[0] == 1; },
                     {1, 0, 0}));
 }
 
@@ -259,9 +269,9 @@ TEST_F(Inverse3, AStateThatNeverChangesIsStale) {
   ASSERT_TRUE(works(*device));
   service_.with([](EmulatedArm& arm) { arm.frozen = true; });
   double force = 0;
-  EXPECT_TRUE(until(*device, [&](const DeviceReading& r) {
+  EXPECT_TRUE(until(*device, [&](const servo::DeviceReading& r) {
     device->write({force += 1e-5, 0, 0}, Vec3(0));
-    return r.trouble == DeviceTrouble::silent;
+    return r.trouble == servo::DeviceTrouble::silent;
   }));
 }
 
@@ -288,11 +298,11 @@ TEST_F(Inverse3, WhatCannotBeOpenedSaysWhy) {
 }
 
 TEST_F(Inverse3, IsListedWithoutBeingCommanded) {
-  const std::vector<ConnectedDevice> found = connected(config_);
+  const std::vector<servo::ConnectedDevice> found = connected(config_);
   ASSERT_EQ(found.size(), 1U);
   EXPECT_EQ(found[0].serial, "049D");
   EXPECT_EQ(service_.arm().commands, 0U);
 }
 
 }  // namespace
-}  // namespace palpate::runner::haply
+}  // namespace palpate::runner::devices::haply

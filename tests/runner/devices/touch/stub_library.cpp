@@ -19,8 +19,8 @@
 
 namespace {
 
-using palpate::runner::testing::StubDevice;
-using palpate::runner::testing::StubState;
+using palpate::runner::devices::testing::StubDevice;
+using palpate::runner::devices::testing::StubState;
 
 struct Task {
   unsigned long id;
@@ -31,7 +31,8 @@ struct Task {
 struct Library {
   StubState* state = [] {
     const char* const path = std::getenv("PALPATE_STUB_STATE");
-    return palpate::runner::testing::map_stub_state(path != nullptr ? path : "/nonexistent/stub");
+    return palpate::runner::devices::testing::map_stub_state(path != nullptr ? path
+                                                                             : "/nonexistent/stub");
   }();
   std::mutex mutex;
   std::vector<Task> tasks;

@@ -21,7 +21,7 @@
 #include "tests/runner/devices/forcedimension/stub_state.h"
 #include "tests/shared/temporary_folder.h"
 
-namespace palpate::runner::touch {
+namespace palpate::runner::devices::touch {
 namespace {
 
 using testing::StubDevice;
@@ -45,22 +45,22 @@ class Touch : public ::testing::Test {
 
   StubDevice& one() { return state_->device[0]; }
   /// Reads like a servo, with a force upwards, until `holds` or a long time-out.
-  static bool until(Device& device, const std::function<bool(const DeviceReading&)>& holds,
-                    double up = 0) {
+  static bool until(servo::Device& device,
+                    const std::function<bool(const servo::DeviceReading&)>& holds, double up = 0) {
     for (int tick = 0; tick < 10'000; ++tick) {
-      const DeviceReading reading = device.read();
+      const servo::DeviceReading reading = device.read();
       device.write({0, 0, up}, Vec3(0));
       if (holds(reading)) return true;
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
     }
     return false;
   }
-  static bool works(Device& device) {
-    return until(device, [](const DeviceReading& reading) { return !reading.lost; });
+  static bool works(servo::Device& device) {
+    return until(device, [](const servo::DeviceReading& reading) { return !reading.lost; });
   }
-  bool pushes(Device& device) {
+  bool pushes(servo::Device& device) {
     return until(
-        device, [this](const DeviceReading&) { return one().force[1] == 1; }, 1);
+        device, [this](const servo::DeviceReading&) { return one().force[1] == 1; }, 1);
   }
   std::string refusal() {
     try {
@@ -72,7 +72,7 @@ class Touch : public ::testing::Test {
   }
 
   StubState* state_;
-  DeviceConfig config_;
+  servo::DeviceConfig config_;
 };
 
 TEST_F(Touch, AStylusIsReadInTheWorldFrameAndItsForcesAddUpAtTheTip) {
@@ -82,11 +82,11 @@ TEST_F(Touch, AStylusIsReadInTheWorldFrameAndItsForcesAddUpAtTheTip) {
   one().hand_stiffness = 0;
   const auto device = open(config_);
   ASSERT_TRUE(works(*device));
-  const DeviceReading reading = device->read();
+  const servo::DeviceReading reading = device->read();
   EXPECT_LT(glm::length(reading.stylus.tip - Vec3(0.01, -0.02, 0.03)), 1e-12);
   EXPECT_LT(glm::length(reading.stylus.tail - Vec3(0.01, -0.02 - config_.stylus_length, 0.03)),
             1e-12);
-  const DeviceCapabilities& can = device->capabilities();
+  const servo::DeviceCapabilities& can = device->capabilities();
   EXPECT_EQ(can.sensed_freedom, 5);
   EXPECT_EQ(can.actuated_freedom, 3);
   EXPECT_EQ(can.max_force, 3.3);
@@ -120,17 +120,18 @@ TEST_F(Touch, EveryFaultIsTroubleAndZeroForceUntilItIsOver) {
     const char* name;
     double StubDevice::*what;
     double value, well;
-    DeviceTrouble trouble;
-  } cases[] = {{"unplugged", &StubDevice::connected, 0, 1, DeviceTrouble::unplugged},
-               {"too fast", &StubDevice::too_fast, 1, 0, DeviceTrouble::stopped_by_device},
-               {"warm", &StubDevice::error, 0x0200, 0, DeviceTrouble::stopped_by_device},
-               {"errors without end", &StubDevice::error, 1, 0, DeviceTrouble::stopped_by_device},
-               {"an unknown error", &StubDevice::error, 0x0999, 0, DeviceTrouble::silent},
-               {"calibration lost", &StubDevice::reset, 1, 0, DeviceTrouble::not_calibrated},
-               {"stalled", &StubDevice::delay, 1, 0, DeviceTrouble::silent},
-               {"NaN", &StubDevice::wrong, 1, 0, DeviceTrouble::implausible},
-               {"infinite", &StubDevice::wrong, 2, 0, DeviceTrouble::implausible},
-               {"1e9 m", &StubDevice::wrong, 3, 0, DeviceTrouble::implausible}};
+    servo::DeviceTrouble trouble;
+  } cases[] = {
+      {"unplugged", &StubDevice::connected, 0, 1, servo::DeviceTrouble::unplugged},
+      {"too fast", &StubDevice::too_fast, 1, 0, servo::DeviceTrouble::stopped_by_device},
+      {"warm", &StubDevice::error, 0x0200, 0, servo::DeviceTrouble::stopped_by_device},
+      {"errors without end", &StubDevice::error, 1, 0, servo::DeviceTrouble::stopped_by_device},
+      {"an unknown error", &StubDevice::error, 0x0999, 0, servo::DeviceTrouble::silent},
+      {"calibration lost", &StubDevice::reset, 1, 0, servo::DeviceTrouble::not_calibrated},
+      {"stalled", &StubDevice::delay, 1, 0, servo::DeviceTrouble::silent},
+      {"NaN", &StubDevice::wrong, 1, 0, servo::DeviceTrouble::implausible},
+      {"infinite", &StubDevice::wrong, 2, 0, servo::DeviceTrouble::implausible},
+      {"1e9 m", &StubDevice::wrong, 3, 0, servo::DeviceTrouble::implausible}};
   for (const auto& [name, what, value, well, trouble] : cases) {
     SCOPED_TRACE(name);
     *state_ = StubState{};
@@ -142,33 +143,34 @@ TEST_F(Touch, EveryFaultIsTroubleAndZeroForceUntilItIsOver) {
     const auto began = std::chrono::steady_clock::now();
     if (what != &StubDevice::delay) {  // a stalled scheduler sets no force
       EXPECT_TRUE(until(
-          *device, [this](const DeviceReading&) { return one().force[1] == 0; }, 1));
+          *device, [this](const servo::DeviceReading&) { return one().force[1] == 0; }, 1));
       const std::chrono::duration<double, std::milli> took =
           std::chrono::steady_clock::now() - began;
       std::clog << name << ": zero force after " << took.count() << " ms\n";
     }
     EXPECT_TRUE(until(
-        *device, [trouble](const DeviceReading& read) { return read.trouble == trouble; }, 1));
-    const DeviceReading reading = device->read();
+        *device, [trouble](const servo::DeviceReading& read) { return read.trouble == trouble; },
+        1));
+    const servo::DeviceReading reading = device->read();
     EXPECT_TRUE(reading.lost);
     EXPECT_TRUE(std::isfinite(reading.stylus.tip.x + reading.stylus.tip.y + reading.stylus.tip.z));
     one().*what = well;
-    if (needs_reopening(trouble)) device->reopen();
+    if (servo::needs_reopening(trouble)) device->reopen();
     EXPECT_TRUE(works(*device));
     EXPECT_TRUE(pushes(*device)) << "it works again";
   }
 }
 
 TEST_F(Touch, ReadsAndWritesDoNotAllocate) {
-  if (!counts_allocations()) GTEST_SKIP() << "allocations are not counted under sanitizers";
+  if (!bench::counts_allocations()) GTEST_SKIP() << "allocations are not counted under sanitizers";
   const auto device = open(config_);
   ASSERT_TRUE(works(*device));
-  const std::uint64_t before = allocations();
+  const std::uint64_t before = bench::allocations();
   for (int tick = 0; tick < kMinuteOfTicks; ++tick) {
     device->read();
     device->write({0, 0, 1}, Vec3(0));
   }
-  EXPECT_EQ(allocations(), before);
+  EXPECT_EQ(bench::allocations(), before);
 }
 
 TEST_F(Touch, ACalibrationThatIsDueIsUpdated) {
@@ -207,7 +209,7 @@ TEST_F(Touch, NamesAreThoseOfTheMakersSetup) {
   for (const char* name : {"Left.config", "Default Device.config", "notes.txt"})
     std::ofstream(home / "config/" + name) << "\n";
   setenv("GTDD_HOME", home.path().c_str(), 1);
-  const std::vector<ConnectedDevice> found = connected(config_);
+  const std::vector<servo::ConnectedDevice> found = connected(config_);
   unsetenv("GTDD_HOME");
   ASSERT_EQ(found.size(), 2U);
   EXPECT_EQ(found[0].serial, "Default Device");
@@ -229,4 +231,4 @@ TEST_F(Touch, ALibraryThatCannotBeUsedSaysWhy) {
 }
 
 }  // namespace
-}  // namespace palpate::runner::touch
+}  // namespace palpate::runner::devices::touch
