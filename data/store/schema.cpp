@@ -10,11 +10,11 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <array>
 #include <cerrno>
 #include <map>
 #include <string>
 #include <system_error>
+#include <vector>
 
 #include "data/errors.h"
 #include "data/files/atomic_file.h"
@@ -131,11 +131,13 @@ std::string back_up(SQLite::Database& db, const std::string& path, int version) 
 }  // namespace
 
 std::span<const Migration> migrations() {
-  static const std::array<Migration, 4> steps = {
-      {{1, withdrawal_sql()},
-       {2, provenance_sql(), [](SQLite::Database& db) { SealWriter(db).seal_existing_rows(); }},
-       {3, contact_sql()},
-       {4, tasks_sql()}}};
+  static const std::vector<Migration> steps = [] {
+    std::vector<Migration> made;
+    for (const char* sql : migrations_sql())
+      made.push_back({static_cast<int>(made.size()) + 1, sql});
+    made.at(1).fill = [](SQLite::Database& db) { SealWriter(db).seal_existing_rows(); };
+    return made;
+  }();
   return steps;
 }
 

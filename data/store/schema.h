@@ -14,13 +14,10 @@ inline constexpr int kApplicationId = 0x504C5054;  ///< "PLPT", PRAGMA applicati
 
 inline constexpr int kPageSize = 4096;  ///< bytes
 
-/// schema.sql (version 1), withdrawal.sql, provenance.sql, contact.sql and tasks.sql (the changes
-/// of versions 2, 3, 4 and 5), embedded when the program was built.
+/// schema.sql (version 1) and the changes of versions 2, 3, ... (data/CMakeLists.txt lists their
+/// files), embedded when the program was built.
 const char* schema_sql();
-const char* withdrawal_sql();
-const char* provenance_sql();
-const char* contact_sql();
-const char* tasks_sql();
+std::span<const char* const> migrations_sql();
 
 /// Turns version `from` into `from + 1`.
 struct Migration {
