@@ -37,14 +37,15 @@ struct TickCost {
 struct TickCostSettings {
   std::size_t ticks = 200'000;    ///< ticks of a row, in all its rounds
   std::size_t approaches = 1000;  ///< first contacts in a round, each in a new trial
+  bool with_million = true;       ///< a mesh of 1,310,720 triangles, which takes seconds to make
 };
 
 /// A path at 0.1 m/s over icospheres of 30 mm radius (20 to 327,680 triangles), the paper's other
-/// three shapes, one of 1,000 spheres, and objects of ten near spheres with a tool of three
-/// segments. Penetration depth 1 to 2 mm; the ray's contact moves between the tip and the side.
-/// Warm caches: 1,000 ticks precede each row, except for first contacts, which start a new trial 10
-/// mm away, from a random direction. \param done  called after each row with the number of rows so
-/// far and in total
+/// three shapes, one of 1,000 spheres, concave balls (1,280 to 1,310,720 triangles), and
+/// objects of ten near spheres with a tool of three segments. Penetration depth 1 to 2 mm; the
+/// ray's contact moves between the tip and the side. Warm caches: 1,000 ticks precede each row,
+/// except for first contacts, which start a new trial 10 mm away, from a random direction. \param
+/// done  called after each row with the number of rows so far and in total
 std::vector<TickCost> measure_tick_costs(
     const TickCostSettings& settings,
     const std::function<void(std::size_t, std::size_t)>& done = {});

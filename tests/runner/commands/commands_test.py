@@ -317,6 +317,10 @@ class Bench(CommandCase):
             for renderer in ("point", "ray"):
                 for state in ("contact", "free", "first_contact"):
                     self.assertIn(("icosphere", triangles, renderer, state), seen)
+        for renderer in ("point", "ray"):
+            concave = {(r["triangles"], r["state"]) for r in rows if r["mesh"] == "bumpy ball, concave" and r["renderer"] == renderer}
+            # The mesh of a million triangles is for 20,000 ticks and more.
+            self.assertEqual(concave, {(n, state) for n in (1280, 81920) for state in ("contact", "free", "first_contact")})
         for r in rows:
             self.assertGreaterEqual(r["ticks"], 50, r)
             self.assertEqual(r["allocations"], 0, r)
