@@ -123,7 +123,9 @@ TEST(FalconUsb, UploadsFirmwareInSpiteOfLostAndWrongEchoes) {
   bus.with(0, [&image](Emulator& emulator) {
     EXPECT_EQ(emulator.mode(), Emulator::Mode::run);
     EXPECT_EQ(emulator.image(), image.bytes);
-    EXPECT_EQ(emulator.uploads(), 3);
+    // On a busy machine an echo may be late as well, and counts as lost.
+    EXPECT_GE(emulator.uploads(), 3);
+    EXPECT_LE(emulator.uploads(), settings.uploads);
     EXPECT_EQ(emulator.latency_ms(), 1);
   });
 }
