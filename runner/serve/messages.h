@@ -83,6 +83,7 @@ struct Message {
   std::vector<StreamField> fields;    ///< subscribe
   nlohmann::json t_client;            ///< clock: returned unchanged
   std::optional<std::int64_t> seen;   ///< clock: ns, of the newest answer to `clock` received
+  std::uint32_t times_off = 0;        ///< clear: LiveForces::times_off() on arrival
 };
 
 /// Time of an answer: its own if the client's clock is known, else its arrival.

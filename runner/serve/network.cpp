@@ -47,6 +47,7 @@ constexpr std::size_t kMostWatchers = 8;
 constexpr std::size_t kMostUnknown = 16;   // connections before their hello
 constexpr int kMostMessages = 200;         // a second; above twice as many the client is closed
 constexpr std::size_t kMostWaiting = 256;  // queued replies and events of a client
+constexpr std::size_t kMostWaitingBytes = 8 << 20;
 constexpr std::size_t kMostCommands = 64;  // commands not yet taken by the session
 constexpr std::size_t kMostRows = 1024;    // rows in a stream's message
 constexpr const char* kSubprotocol = "palpate.1";
@@ -136,7 +137,8 @@ class Client : public std::enable_shared_from_this<Client> {
   /// A client that does not read is disconnected, so that its queue stays bounded.
   void send(std::string text) {
     if (closing_ || closed) return;
-    if (waiting_.size() >= kMostWaiting) return close();
+    if (waiting_.size() >= kMostWaiting || waiting_bytes_ > kMostWaitingBytes) return close();
+    waiting_bytes_ += text.size();
     waiting_.push_back(std::move(text));
     write_next();
   }
@@ -152,7 +154,6 @@ class Client : public std::enable_shared_from_this<Client> {
   bool closed = false;
   asio::steady_timer hello_timer;
   ClientClock clock;
-  std::int64_t heard_ns = 0;
   std::int64_t second_ns = 0;  ///< start of the second in which messages are counted
   int in_second = 0;           ///< messages
   // Stream:
@@ -167,6 +168,7 @@ class Client : public std::enable_shared_from_this<Client> {
   virtual void write(const std::string& text) = 0;
   void written(const Code& error) {
     writing_ = false;
+    waiting_bytes_ -= waiting_.front().size();
     waiting_.pop_front();
     if (error) return close();
     if (closing_ && waiting_.empty()) return close();
@@ -180,6 +182,7 @@ class Client : public std::enable_shared_from_this<Client> {
     write(waiting_.front());
   }
   std::deque<std::string> waiting_;
+  std::size_t waiting_bytes_ = 0;
   bool writing_ = false, closing_ = false;
 };
 
@@ -307,7 +310,12 @@ class Network::Impl final : public Hub {
   }
   ~Impl() override {
     end();
-    if (!settings_.socket.empty()) ::unlink(settings_.socket.c_str());
+    if (settings_.socket.empty()) return;
+    // Another server may have taken the path after somebody removed this socket.
+    struct stat state {};
+    if (::lstat(settings_.socket.c_str(), &state) == 0 && state.st_dev == socket_file_.st_dev &&
+        state.st_ino == socket_file_.st_ino)
+      ::unlink(settings_.socket.c_str());
   }
   Impl(const Impl&) = delete;
   Impl& operator=(const Impl&) = delete;
@@ -352,7 +360,7 @@ class Network::Impl final : public Hub {
       client.second_ns = now;
       client.in_second = 0;
     }
-    client.heard_ns = now;
+    if (client.role == Client::Role::control) controller_heard_ns_ = now;
     // Close a flooding client: it would take all of this thread's time.
     if (++client.in_second > 2 * kMostMessages) return client.close();
     Message message;
@@ -382,7 +390,7 @@ class Network::Impl final : public Hub {
 
   void gone(Client& client) override {
     if (client.role == Client::Role::control) {
-      if (hooks_.forces_are_on()) {
+      if (hooks_.forces_may_come()) {
         hooks_.emergency();
         tell_all(event("controller_gone", now_ns()));  // from now on no force is commanded
       }
@@ -420,6 +428,7 @@ class Network::Impl final : public Hub {
       local_acceptor_.open(place.protocol());
       local_acceptor_.bind(place);
       ::chmod(settings_.socket.c_str(), 0600);
+      ::lstat(settings_.socket.c_str(), &socket_file_);
       local_acceptor_.listen();
     } catch (const boost::system::system_error& error) {
       const std::string path = std::exchange(settings_.socket, {});
@@ -439,7 +448,7 @@ class Network::Impl final : public Hub {
     return std::ranges::count_if(
                clients_,
                [](const auto& entry) { return entry.second->role == Client::Role::unknown; }) +
-               unread_ >=
+               greetings_ >=
            static_cast<std::ptrdiff_t>(kMostUnknown);
   }
 
@@ -461,10 +470,16 @@ class Network::Impl final : public Hub {
 
   /// The request of a connection before it is a WebSocket.
   struct Greeting {
-    explicit Greeting(tcp::socket socket) : stream(std::move(socket)) {
+    Greeting(tcp::socket socket, std::ptrdiff_t& greetings)
+        : count(greetings), stream(std::move(socket)) {
+      ++count;
       parser.header_limit(8 << 10);
       parser.body_limit(0);
     }
+    ~Greeting() { --count; }
+    Greeting(const Greeting&) = delete;
+    Greeting& operator=(const Greeting&) = delete;
+    std::ptrdiff_t& count;
     beast::tcp_stream stream;
     beast::flat_buffer buffer;
     http::request_parser<http::empty_body> parser;
@@ -473,12 +488,10 @@ class Network::Impl final : public Hub {
   void read_request(tcp::socket socket) {
     Code ignored;
     socket.set_option(tcp::no_delay(true), ignored);
-    auto greeting = std::make_shared<Greeting>(std::move(socket));
+    auto greeting = std::make_shared<Greeting>(std::move(socket), greetings_);
     greeting->stream.expires_after(kHelloPatience);
-    ++unread_;
     http::async_read(greeting->stream, greeting->buffer, greeting->parser,
                      [this, greeting](const Code& error, std::size_t) {
-                       --unread_;
                        if (!error) greet(greeting);
                      });
   }
@@ -558,6 +571,7 @@ class Network::Impl final : public Hub {
     if (!message.control && watchers >= kMostWatchers)
       return turn_away("full", "8 programs watch already");
     client.role = message.control ? Client::Role::control : Client::Role::watch;
+    if (message.control) controller_heard_ns_ = now_ns();
     client.hello_timer.cancel();
     nlohmann::ordered_json more = {{"version", kServeVersion},
                                    {"program", "palpate " PALPATE_VERSION},
@@ -613,6 +627,7 @@ class Network::Impl final : public Hub {
     if (client.role != Client::Role::control)
       return refuse("not-controller", "only the controller may send this");
     message.clock_is_known = client.clock.is_known(received_ns);
+    message.times_off = hooks_.times_off();
     const std::int64_t id = message.id;
     if (!command({client.id, false, std::move(message)}))
       client.send(refused(id, {{"busy", "64 messages wait for the session already", ""}}));
@@ -630,7 +645,8 @@ class Network::Impl final : public Hub {
       if (client->role != Client::Role::unknown) client->send(text);
   }
 
-  /// Detects a silent controller while forces are on.
+  /// Detects a silent controller while forces are on, also one that has said goodbye while the
+  /// session's thread is too busy to end them.
   void watch() {
     watch_timer_.expires_after(kWatchEvery);
     watch_timer_.async_wait([this](const Code& error) {
@@ -638,12 +654,10 @@ class Network::Impl final : public Hub {
       const bool on = hooks_.forces_are_on();
       const std::int64_t now = now_ns();
       if (!on) silent_ = false;
-      for (const auto& [id, client] : std::map(clients_)) {
-        if (client->role != Client::Role::control || !on || silent_) continue;
-        if (now - client->heard_ns <= kSilence) continue;
+      if (on && !silent_ && now - controller_heard_ns_ > kSilence) {
         silent_ = true;
         hooks_.silence();
-        tell_all(event("client_silent", now, {{"since_ns", client->heard_ns}}));
+        tell_all(event("client_silent", now, {{"since_ns", controller_heard_ns_}}));
       }
       watch();
     });
@@ -691,13 +705,15 @@ class Network::Impl final : public Hub {
 
   NetworkSettings settings_;
   NetworkHooks hooks_;
+  struct stat socket_file_ {};
+  std::ptrdiff_t greetings_ = 0;  ///< outlives those that io_ still holds
   asio::io_context io_{1};
   tcp::acceptor acceptor_;
   Local::acceptor local_acceptor_;
   asio::steady_timer watch_timer_, stream_timer_;
   std::map<std::uint64_t, std::shared_ptr<Client>> clients_;
   std::uint64_t newest_ = 0;
-  std::ptrdiff_t unread_ = 0;  ///< connections whose request has not arrived
+  std::int64_t controller_heard_ns_ = 0;
   bool silent_ = false;
   std::mutex mutex_;  ///< guards the next member
   std::vector<ServeCommand> commands_;

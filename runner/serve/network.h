@@ -27,8 +27,10 @@ struct NetworkSettings {
 struct NetworkHooks {
   std::function<void()> emergency, silence;  ///< zero force: at once; by the ramp
   std::function<bool()> forces_are_on;
-  std::function<nlohmann::json()> state;  ///< an object: part of the answer to hello
-  std::function<std::string()> picture;   ///< of the scene: members of an answer, as JSON
+  std::function<bool()> forces_may_come;     ///< on, or a scene is about to begin
+  std::function<std::uint32_t()> times_off;  ///< LiveForces::times_off()
+  std::function<nlohmann::json()> state;     ///< an object: part of the answer to hello
+  std::function<std::string()> picture;      ///< of the scene: members of an answer, as JSON
   TickStream* ticks = nullptr;
 };
 

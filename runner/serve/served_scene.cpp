@@ -154,7 +154,14 @@ void ServedScene::start(std::uint64_t client, const Message& message) {
     throw MessageRefused("bad-message", "stimulus, level and orientation are for --protocol only");
   const rendering::Renderer& renderer =
       named_renderer(message.renderer.empty() ? "ray" : message.renderer);
-  show(read(scene_.dump(), renderer), renderer);
+  const protocols::SceneSpec spec = read(scene_.dump(), renderer);
+  shown_.store(true);
+  try {
+    show(spec, renderer);
+  } catch (...) {
+    shown_.store(false);
+    throw;
+  }
   renderer_ = &renderer;
   trial_ = Trial{
       .asked_ns = clock_.now_ns(), .client = client, .id = message.id, .number = message.trial};
@@ -186,6 +193,7 @@ void ServedScene::set(std::uint64_t client, const Message& message) {
 
 ordered_json ServedScene::end_trial() {
   const servo::ServoQuality quality = servo_.stop();
+  shown_.store(false);
   attend();
   const Trial trial = *std::exchange(trial_, {});
   ordered_json out;
@@ -206,15 +214,17 @@ ordered_json ServedScene::end_trial() {
 
 void ServedScene::drop_pending(const std::string& code, const std::string& why) {
   servo_.stop();
+  shown_.store(false);
   const Trial trial = *std::exchange(trial_, {});
   output_->reply(trial.client, refused(trial.id, {{code, why, ""}}));
 }
 
 void ServedScene::clear(std::uint64_t client, const Message& message) {
   if (trial_) end_trial();
-  const std::string trouble = forces_.allow(stop_);
+  const std::string trouble = forces_.allow(stop_, message.times_off);
   if (!trouble.empty()) throw MessageRefused("forces-off", trouble);
   held_by_.clear();
+  silent_.store(false);
   tell("cleared", clock_.now_ns());
   output_->reply(client, accepted(message.id));
 }
@@ -312,6 +322,7 @@ void ServedScene::take(const servo::Sample& sample) {
   if (!trial_ || sample.phase != servo::Phase::feeling) return;
   if ((sample.faults & servo::servo_fault::kTripped) != 0 && !trial_->told_off) {
     trial_->told_off = true;
+    shown_.store(false);
     held_by_ = why_off(sample);
     tell("forces_off", sample.time_ns, {{"reason", held_by_}});
   }

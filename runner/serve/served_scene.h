@@ -62,6 +62,10 @@ class ServedScene {
   }
   /// From any thread.
   bool forces_are_on() const noexcept { return !servo_.forces_are_off(); }
+  /// Whether they are on, or a scene is shown in which they may come. From any thread.
+  bool forces_may_come() const noexcept { return shown_.load() || forces_are_on(); }
+  /// From any thread.
+  std::uint32_t times_off() const noexcept { return forces_.times_off(); }
   /// Ticks, for the network's thread.
   TickStream& ticks() noexcept { return ticks_; }
   /// Members of the answer to hello: the current scene, or null. From any thread.
@@ -111,6 +115,7 @@ class ServedScene {
   std::string held_by_;       ///< reason why forces are off, until `clear`
   TickStream ticks_;
   std::atomic<bool> silent_{false};
+  std::atomic<bool> shown_{false};  ///< from `start` until its end, or until forces are off
   servo::Patience patience_;
   servo::ServoThread servo_;
   session::LiveForces forces_;

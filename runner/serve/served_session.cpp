@@ -6,6 +6,7 @@
 #include <cstring>
 #include <utility>
 
+#include "data/base/text.h"
 #include "runner/safety/fault_signals.h"
 #include "runner/session/session_plan.h"
 #include "stimuli/shapes.h"
@@ -185,6 +186,7 @@ ServedSession::Outcome ServedSession::run_trials() {
       return {end.end, end.what(), end.failed};
     }
     in_trial_ = in_trial_ && session_.state() == session::Session::State::response;
+    keep_under_way();
     if (!stored_) continue;
     keep_state();
     ordered_json said = short_json(*stored_);
@@ -223,6 +225,7 @@ void ServedSession::held(const std::string& reason) {
   held_by_ = reason;
   const std::string why = "forces are off (" + reason + "): clear first";
   refuse(std::exchange(start_, {}), "forces-off", why);
+  keep_under_way();
   refuse(std::exchange(answer_, {}), "forces-off", why);
   tell("forces_off", clock_.now_ns(), {{"reason", reason}});
 }
@@ -255,6 +258,7 @@ void ServedSession::attend() {
 void ServedSession::left() {
   start_.reset();
   answer_.reset();
+  keep_under_way();
   if (in_trial_) throw participants::TrialCutOff("the controller has left");
 }
 
@@ -268,11 +272,13 @@ void ServedSession::obey(const Asked& asked) {
     case MessageType::stop:
       if (!in_trial_) {
         refuse(std::exchange(start_, {}), "stopped", "stopped before forces were on");
+        keep_under_way();
         return output_->reply(asked.client, accepted(message.id));
       }
       stop_ = asked;
+      // Any reason must do: the record refuses a NUL, but forces end here.
       throw participants::TrialCutOff(message.text.empty() ? "stopped by the program"
-                                                           : message.text);
+                                                           : printable(message.text));
     case MessageType::mark:
     case MessageType::note: {
       const std::int64_t now = clock_.now_ns();
@@ -303,6 +309,7 @@ void ServedSession::start(const Asked& asked) {
     throw MessageRefused("forces-off", "forces are off (" + held_by_ + "): clear first");
   choice_of(asked.message, session_.plan().next());  // refuse a bad choice at once, even in a break
   start_ = asked;
+  keep_under_way();
 }
 
 /// \throws MessageRefused: it is not the trial that is due, or cannot be presented
@@ -405,7 +412,8 @@ void ServedSession::answer(const Asked& asked) {
 
 void ServedSession::clear(const Asked& asked) {
   if (in_trial_) throw MessageRefused("running", "a trial is under way");
-  const std::string trouble = forces_.allow([this] { return parts_.end_requested() != 0; });
+  const std::string trouble =
+      forces_.allow([this] { return parts_.end_requested() != 0; }, asked.message.times_off);
   if (!trouble.empty()) throw MessageRefused("forces-off", trouble);
   held_by_.clear();
   silent_.store(false);
@@ -434,6 +442,7 @@ std::optional<protocols::TrialChoice> ServedSession::choose(const protocols::Tri
     } catch (const MessageRefused& error) {  // practice may have continued with another trial
       output_->reply(start_->client, refused(start_->message.id, error.why()));
       start_.reset();
+      keep_under_way();
     }
     clock_.wait_until(clock_.now_ns() + session::kSessionNap_ns / 5);
   }
@@ -485,6 +494,7 @@ void ServedSession::cut_off(const std::string& reason) {
   if (stop_) output_->reply(stop_->client, accepted(stop_->message.id, {{"t_ns", now}}));
   stop_.reset();
   refuse(std::exchange(start_, {}), "stopped", "the trial was cut off: " + reason);
+  keep_under_way();
   if (answer_ && held_by_.empty())
     refuse(std::exchange(answer_, {}), "stopped", "the trial was cut off: " + reason);
 }

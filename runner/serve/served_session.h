@@ -55,6 +55,12 @@ class ServedSession final : public participants::Respondent, public session::Ses
     silent_.store(true);
     forces_.fade();
   }
+  /// Whether they are on, or a trial has been asked for in which they may come. From any thread.
+  bool forces_may_come() const noexcept {
+    return under_way_.load() || !parts_.servo.forces_are_off();
+  }
+  /// From any thread.
+  std::uint32_t times_off() const noexcept { return forces_.times_off(); }
   /// Ticks, for the network's thread.
   TickStream& ticks() noexcept { return ticks_; }
   /// Members of the answer to hello. From any thread.
@@ -97,6 +103,7 @@ class ServedSession final : public participants::Respondent, public session::Ses
   const protocols::TaskBlock* block_of(const protocols::Trial& trial) const;
   nlohmann::ordered_json next_trial() const;
   void keep_state();
+  void keep_under_way() noexcept { under_way_.store(start_.has_value() || in_trial_); }
   void draw(const protocols::Trial& trial);
   void held(const std::string& reason);
   void refuse(const std::optional<Asked>& asked, const std::string& code, const std::string& why);
@@ -126,7 +133,8 @@ class ServedSession final : public participants::Respondent, public session::Ses
   std::uint64_t controller_ = 0;  ///< the client that sent a command last; 0: none, or it has left
   std::string held_by_;           ///< reason why forces are off, until `clear`
   std::atomic<bool> silent_{false};
-  mutable std::mutex mutex_;  ///< guards the next two: this thread writes, others read
+  std::atomic<bool> under_way_{false};  ///< start_, or in_trial_
+  mutable std::mutex mutex_;            ///< guards the next two: this thread writes, others read
   nlohmann::ordered_json state_;
   std::string picture_ = R"("objects":[])";
   nlohmann::ordered_json trials_ = nlohmann::ordered_json::array();  ///< on record

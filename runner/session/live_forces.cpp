@@ -63,6 +63,7 @@ bool is_settled(const servo::Sample& sample) {
 }  // namespace
 
 void LiveForces::off() noexcept {
+  times_off_.fetch_add(1);  // first: allow() must not overlook it
   if (guard_ != nullptr) guard_->emergency_zero();
   servo_.emergency_zero();
 }
@@ -110,7 +111,18 @@ std::string LiveForces::open_again(const std::function<bool()>& stop) {
   }
 }
 
-std::string LiveForces::allow(const std::function<bool()>& stop) {
+std::string LiveForces::allow(const std::function<bool()>& stop,
+                              std::optional<std::uint32_t> known) {
+  constexpr const char* kLater = "zero force was asked for after that";
+  const std::uint32_t times = known.value_or(times_off());
+  if (times_off() != times) return kLater;
+  std::string trouble = allow_now(stop);
+  if (times_off() == times) return trouble;
+  off();  // in case the request came just before it was cleared
+  return kLater;
+}
+
+std::string LiveForces::allow_now(const std::function<bool()>& stop) {
   const std::int64_t asked_ns = clock_.now_ns();
   // A request for zero force from now on is kept, however long this takes.
   servo_.clear_fault();

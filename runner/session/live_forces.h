@@ -2,6 +2,7 @@
 // Switches the forces of a live session: off at once, on again only while device and watchdog work.
 // Also measures how a trial's object was touched.
 
+#include <atomic>
 #include <cstdint>
 #include <functional>
 #include <optional>
@@ -56,15 +57,18 @@ class LiveForces {
   LiveForces(servo::ServoThread& servo, safety::GuardedDevice* guard, servo::Clock& clock)
       : servo_(servo), guard_(guard), clock_(clock) {}
 
-  /// Zero force at once, until allow().
+  /// Zero force at once, until allow(). From any thread.
   void off() noexcept;
+  /// Number of calls of off(). From any thread.
+  std::uint32_t times_off() const noexcept { return times_off_.load(); }
   /// The same by the servo's ramp. From any thread.
   void fade() noexcept { servo_.fade_out(); }
   /// Allows forces again, once the device gives a good reading. Reopens an unplugged or silent
   /// device first, which may take seconds.
   /// \param stop  asked every few milliseconds; true gives up
+  /// \param known  times_off() when the request was made: a later off() is kept. Empty: now
   /// \return the reason that forces stay off, in words; empty: they are allowed
-  std::string allow(const std::function<bool()>& stop);
+  std::string allow(const std::function<bool()>& stop, std::optional<std::uint32_t> known = {});
 
   /// The servo's newest sample.
   const servo::Sample& newest() noexcept;
@@ -78,11 +82,13 @@ class LiveForces {
   template <class Wished>
   bool await(Wished wished, double seconds, const std::function<bool()>& stop);
   std::string open_again(const std::function<bool()>& stop);
+  std::string allow_now(const std::function<bool()>& stop);
 
   servo::ServoThread& servo_;
   safety::GuardedDevice* guard_;
   servo::Clock& clock_;
   servo::Sample sample_;
+  std::atomic<std::uint32_t> times_off_{0};
 };
 
 }  // namespace palpate::runner::session

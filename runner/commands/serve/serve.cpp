@@ -1,3 +1,6 @@
+#include <netinet/in.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <chrono>
@@ -50,37 +53,68 @@ std::string picture_of(const std::vector<stimuli::ObjectSpec>& objects) {
   return "\"objects\":" + out.dump();
 }
 
+/// Whether a program listens at this port of 127.0.0.1.
+bool is_listening(std::uint16_t port) {
+  const int link = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  if (link < 0) return false;
+  sockaddr_in place{};
+  place.sin_family = AF_INET;
+  place.sin_port = htons(port);
+  place.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  const bool listening =
+      ::connect(link, reinterpret_cast<const sockaddr*>(&place), sizeof place) == 0;
+  ::close(link);
+  return listening;
+}
+
 /// The file with the token while the server runs; only its owner can read it. Replaces no file but
 /// one that a server left behind.
 class TokenFile {
  public:
-  TokenFile(std::string path, const std::string& text) : path_(std::move(path)) {
+  /// \param port  of this server
+  TokenFile(std::string path, std::uint16_t port, const std::string& text)
+      : path_(std::move(path)) {
     if (path_.empty()) return;
     data::AtomicFile file(path_);
     file.write(text + "\n");
     file.sync();
-    const bool left_behind = is_token_file(path_);
+    const bool left_behind = is_left_behind(path_, port);
     if (!left_behind && std::filesystem::exists(path_))
       throw UsageError("--token-file: " + printable(path_) +
                        " exists and holds no token; name another file");
     file.commit(left_behind);
+    ::fstat(file.descriptor(), &file_);
+    path_ = std::filesystem::canonical(path_).string();
     written_ = true;
   }
   ~TokenFile() {
-    if (written_) ::unlink(path_.c_str());
+    struct stat found {};  // another server's, if somebody removed this one
+    if (written_ && ::lstat(path_.c_str(), &found) == 0 && found.st_dev == file_.st_dev &&
+        found.st_ino == file_.st_ino)
+      ::unlink(path_.c_str());
   }
   TokenFile(const TokenFile&) = delete;
   TokenFile& operator=(const TokenFile&) = delete;
 
  private:
-  static bool is_token_file(const std::string& path) {
+  /// \throws UsageError: its server still runs
+  static bool is_left_behind(const std::string& path, std::uint16_t own) {
+    std::error_code none;  // reading from a pipe would wait for its writer
+    if (!std::filesystem::is_regular_file(path, none)) return false;
+    constexpr std::string_view kStart = R"({"type":"serving","url":"ws://127.0.0.1:)";
     std::ifstream file(path, std::ios::binary);
     std::string start(kStart.size(), '\0');
-    return file.read(start.data(), static_cast<std::streamsize>(start.size())) && start == kStart;
+    if (!file.read(start.data(), static_cast<std::streamsize>(start.size())) || start != kStart)
+      return false;
+    std::uint16_t port = 0;
+    if (file >> port && port != own && is_listening(port))
+      throw UsageError("--token-file: " + printable(path) +
+                       " belongs to a server that runs; end it, or name another file");
+    return true;
   }
 
-  static constexpr std::string_view kStart = R"({"type":"serving")";
-  const std::string path_;
+  std::string path_;
+  struct stat file_ {};
   bool written_ = false;
 };
 
@@ -108,10 +142,12 @@ class Server {
       serving["socket"] = socket;
     serving["token"] = token_;
     serving["page"] = "http://127.0.0.1:" + std::to_string(network_.port()) + "/#" + token_;
-    token_file_.emplace(text_of(values_, "token-file"), serving.dump());
+    token_file_.emplace(text_of(values_, "token-file"), network_.port(), serving.dump());
     network_.begin({.emergency = [&served] { served.emergency_zero(); },
                     .silence = [&served] { served.controller_is_silent(); },
                     .forces_are_on = [&servo] { return !servo.forces_are_off(); },
+                    .forces_may_come = [&served] { return served.forces_may_come(); },
+                    .times_off = [&served] { return served.times_off(); },
                     .state = [&served] { return served.state(); },
                     .picture = [&served] { return served.picture(); },
                     .ticks = &served.ticks()});

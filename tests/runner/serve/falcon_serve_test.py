@@ -97,11 +97,14 @@ class Falcon(ServeCase):
             self.assertLess(time.monotonic(), end, f"nothing was felt: {record[-5:]}")
 
     def start_program(self):
-        program = subprocess.Popen([sys.executable, "-c", PROGRAM.format(
-            folder=str(pathlib.Path(CLIENT).parent), **{k: self.said[k] for k in ("url", "token")})],
-            stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+        complaints = self.dir / "complaints.txt"
+        with complaints.open("w") as file:
+            program = subprocess.Popen([sys.executable, "-c", PROGRAM.format(
+                folder=str(pathlib.Path(CLIENT).parent), **{k: self.said[k] for k in ("url", "token")})],
+                stdout=subprocess.PIPE, stderr=file, text=True)
         self.addCleanup(lambda: (program.kill(), program.communicate()))
-        self.assertEqual(program.stdout.readline(), "on\n")
+        if program.stdout.readline() != "on\n":
+            self.fail(f"the program ends: {complaints.read_text()}; the server's end: {self.emulator.poll()}")
         return program
 
     def in_contact(self, act, event):

@@ -48,7 +48,9 @@ class ServeCase(unittest.TestCase):
             process.communicate()
         self.addCleanup(end)
         line = process.stdout.readline()
-        self.assertTrue(line, "it does not serve")
+        if not line:
+            process.wait(PATIENCE)
+            self.fail(f"it does not serve, and ends with {process.returncode}: {process.stderr.read()}")
         self.said = json.loads(line)
         return process
 

@@ -7,6 +7,7 @@ import asyncio
 import contextlib
 import csv
 import json
+import os
 import pathlib
 import signal
 import socket
@@ -148,7 +149,7 @@ class Serve(ServeCase):
 
     def test_only_clients_with_the_token_are_accepted(self):
         token = self.dir / "token.json"
-        token.write_text('{"type":"serving","url":"of a server that was killed"}\n')
+        token.write_text('{"type":"serving","url":"ws://127.0.0.1:1","of":"a server that was killed"}\n')
         token.chmod(0o644)
         process = self.serve("--token-file", token)
         self.assertNotIn("token", self.said)
@@ -174,6 +175,78 @@ class Serve(ServeCase):
         process.send_signal(signal.SIGINT)
         self.assertEqual(process.wait(PATIENCE), 0)
         self.assertFalse(token.exists() or self.path.exists())
+
+    def test_a_second_server_leaves_the_first_ones_files(self):
+        token = self.dir / "token.json"
+        first = self.serve("--token-file", token)
+        said = token.read_text()
+        command = [PALPATE, "serve", "--device", "simulated", "--scene", self.scene, "--token-file"]
+        done = subprocess.run([*command, token], capture_output=True, text=True, timeout=PATIENCE)
+        self.assertEqual((done.returncode, token.read_text()), (2, said))
+        self.assertIn("belongs to a server that runs", done.stderr)
+        pipe = self.dir / "pipe"
+        os.mkfifo(pipe)
+        done = subprocess.run([*command, pipe], capture_output=True, text=True, timeout=PATIENCE)
+        self.assertEqual(done.returncode, 2)
+        self.assertIn("holds no token", done.stderr)
+        # Somebody removes the files, and a second server takes the names: the first leaves them alone at its end.
+        token.unlink()
+        self.path.unlink()
+        second = self.serve("--token-file", token)
+        first.send_signal(signal.SIGINT)
+        self.assertEqual(first.wait(PATIENCE), 0)
+        self.said = json.loads(token.read_text())
+        self.assertTrue(self.hello(self.lines(), role="watch")["ok"])
+        # A killed server's file at the port that the next one gets.
+        second.kill()
+        second.wait(PATIENCE)
+        third = self.serve("--token-file", token, "--port", self.said["url"].rsplit(":", 1)[1])
+        third.send_signal(signal.SIGINT)
+        self.assertEqual(third.wait(PATIENCE), 0)
+        self.assertFalse(token.exists() or self.path.exists())
+
+    def test_an_emergency_is_not_undone_by_a_clear_that_was_said_before(self):
+        self.serve(scene=False)
+        hand, eye = self.lines(), self.client(role="watch")
+        self.assertTrue(self.hello(hand)["ok"])
+        ball = BALL["objects"][0]
+        slow = {"objects": [{**ball, "subdivisions": 6, "position_m": [0, 0, 0.001 * i]} for i in range(12)]}
+        hand.send(json.dumps({"id": 1, "type": "load", "scene": slow}))  # takes the session's thread a while
+        hand.send('{"id": 2, "type": "load", "scene": ' + json.dumps(BALL) + "}")
+        hand.send('{"id": 3, "type": "clear"}')
+        hand.send('{"id": 4, "type": "start"}')
+        hand.send('{"id": 5, "type": "alive"}')
+        self.assertEqual(self.hears(hand)["re"], 5)  # the others wait for the session
+        eye.emergency()
+        replies = {reply["re"]: reply for reply in (self.hears(hand) for _ in range(4))}
+        self.assertTrue(replies[1]["ok"] and replies[2]["ok"], replies)
+        for number in (3, 4):
+            self.assertEqual(replies[number]["error"]["code"], "forces-off")
+        hand.send('{"id": 6, "type": "clear"}')
+        self.assertTrue(self.hears(hand)["ok"])
+
+    def test_a_client_that_reads_nothing_is_closed_before_it_takes_much_memory(self):
+        process = self.serve(scene=False)
+        hand = self.client()
+        hand.load({"objects": [{**BALL["objects"][0], "subdivisions": 6}]})
+        eye = self.lines()
+        self.assertTrue(self.hello(eye, role="watch")["ok"])
+
+        def resident():
+            return int(pathlib.Path(f"/proc/{process.pid}/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+
+        hand.ask("picture")
+        before = resident()
+        with contextlib.suppress(OSError):
+            for number in range(190):
+                eye.send(json.dumps({"id": number, "type": "picture"}))
+        hand.ask("alive")
+        time.sleep(0.2)
+        self.assertLess(resident() - before, 24 << 20)
+        eye.socket.settimeout(PATIENCE)
+        with self.assertRaises((TypeError, OSError)):  # closed
+            for _ in range(190):
+                json.loads(eye.receive())
 
     def test_foreign_pages_are_refused(self):
         self.serve("--allow-origin", "http://lab.example")

@@ -279,6 +279,45 @@ class Served(ServeCase):
         self.assertEqual(process.wait(PATIENCE), 0)
         return acknowledged
 
+    def test_a_controller_that_goes_while_its_start_waits_leaves_forces_off(self):
+        self.begin(self.protocol({**EXTERNAL, "trials": 2}, home={"rest_s": 60}))  # the hand does not rest as long
+        eye = self.client(role="watch")
+        hand = self.client()
+        hand._send("start", False, {"stimulus": "ball", "renderer": "ray"})
+        self.one_of(eye, "waiting")
+        hand._link.socket.shutdown(2)
+        self.one_of(eye, "controller_gone")
+        self.one_of(eye, "cut_off")
+        with self.client() as hand:
+            self.refused("forces-off", hand.start, stimulus="ball", renderer="ray")
+            hand.clear()
+            hand._send("start", False, {"stimulus": "ball", "renderer": "ray"})
+            self.one_of(eye, "waiting")
+
+    def test_any_words_of_a_program_are_kept(self):
+        process = self.begin(self.protocol({**EXTERNAL, "trials": 2}))
+        words = ["", "\x00", "a\nb\r\t\x1b[31mred", "\u202e\ufeff\U0001f600", "x" * 1000, "'; DROP TABLE trials; --", "=1+1"]
+        with self.client() as hand:
+            for word in words:
+                for say in (hand.note, lambda text: hand.mark(9, text), hand.stop):
+                    with contextlib.suppress(ServeError):
+                        say(word)
+                self.begun(hand, hand.next, stimulus="ball", renderer="ray")
+                with contextlib.suppress(ServeError):
+                    hand.answer(word)
+                with contextlib.suppress(ServeError):
+                    hand.stop(word)
+                with contextlib.suppress(ServeError):
+                    hand.start(stimulus=word, renderer="ray")
+            said = self.trial(hand, "ball", stimulus="ball", renderer="ray")
+            self.assertEqual(said["trial"], 1)
+        process.send_signal(signal.SIGTERM)
+        self.assertEqual(process.wait(PATIENCE), 0)
+        reasons = {reason for (reason,) in self.sql("SELECT cut_off_reason FROM attempts WHERE state = 'cut_off'")}
+        self.assertGreaterEqual(reasons, {words[4], words[5], words[6]})
+        self.assertEqual(len(self.rows()), 1)
+        self.assertTrue(all(letter == "\n" or letter >= " " for letter in process.stderr.read()))
+
     def test_kills_at_twelve_points_lose_no_acknowledged_trial(self):
         ran = self.rows(self.run_live(self.protocol({**IDENTIFY, "repetitions": 2})))
         self.assertEqual(len(ran), 8)
