@@ -144,19 +144,25 @@ PYBIND11_MODULE(_palpate, module) {
   });
   py::class_<Document>(module, "Document")
       .def(py::init<std::string, std::string>(), py::arg("text"), py::arg("file"));
-  module.def("simulate", &simulate);
-  module.def("render", [](const Document& scene, const std::vector<Coordinates>& trajectory,
-                          const std::string& renderer) {
-    return render(scene, poses_of(trajectory), renderer);
-  });
-  module.def("render_file",
-             [](const Document& scene, const std::string& trajectory, const std::string& renderer) {
-               return render(scene, commands::read_trajectory(trajectory), renderer);
-             });
-  module.def("schedule", &schedule);
-  module.def("settings",
-             [](int version) { return participants::simulated_settings_text("", version); });
-  module.def("read", &protocols::read_text_file);
+  // Names and order are those of _palpate.pyi.
+  module.def("simulate", &simulate, py::arg("protocol"), py::arg("settings"),
+             py::arg("participants"), py::arg("seed"));
+  module.def(
+      "render",
+      [](const Document& scene, const std::vector<Coordinates>& trajectory,
+         const std::string& renderer) { return render(scene, poses_of(trajectory), renderer); },
+      py::arg("scene"), py::arg("trajectory"), py::arg("renderer"));
+  module.def(
+      "render_file",
+      [](const Document& scene, const std::string& trajectory, const std::string& renderer) {
+        return render(scene, commands::read_trajectory(trajectory), renderer);
+      },
+      py::arg("scene"), py::arg("trajectory"), py::arg("renderer"));
+  module.def("schedule", &schedule, py::arg("protocol"), py::arg("participant"));
+  module.def(
+      "settings", [](int version) { return participants::simulated_settings_text("", version); },
+      py::arg("version"));
+  module.def("read", &protocols::read_text_file, py::arg("path"));
 }
 
 }  // namespace palpate::runner

@@ -34,9 +34,9 @@ except ModuleNotFoundError as error:
         "  cmake --preset release -DPALPATE_PYTHON=ON && cmake --build --preset release --target palpate_python\n"
         "and import it with PYTHONPATH=.build/release/runner/python") from error
 
-from .client import AsyncClient, Client, ServeError
+from .client import AsyncClient, Client, Clock, ServeError
 
-__all__ = ["AsyncClient", "Client", "InputError", "ServeError", "render", "schedule", "settings", "simulate", "__version__"]
+__all__ = ["AsyncClient", "Client", "Clock", "InputError", "ServeError", "render", "schedule", "settings", "simulate", "__version__"]
 
 Path = Union[str, "os.PathLike[str]"]
 Columns = Dict[str, NDArray[Any]]
@@ -123,4 +123,5 @@ def settings(version: int = DEFAULT_VERSION) -> Dict[str, Any]:
 
     version: 1, 2 or 3. Names of settings end in their unit; runner/participants/README.md says what they are.
     """
-    return json.loads(_palpate.settings(version))
+    values: Dict[str, Any] = json.loads(_palpate.settings(version))
+    return values

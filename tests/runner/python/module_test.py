@@ -8,6 +8,7 @@ import io
 import json
 import os
 import pathlib
+import re
 import shutil
 import signal
 import subprocess
@@ -258,6 +259,69 @@ def test_stubs_and_docstrings_match_the_module():
         for parameter in signature.parameters.values():
             assert parameter.annotation is not inspect.Parameter.empty
             assert parameter.name in function.__doc__ or function is palpate.schedule
+
+
+def test_the_stub_has_the_parameters_of_the_compiled_functions():
+    stub = ast.parse((pathlib.Path(palpate.__file__).parent / "_palpate.pyi").read_text())
+
+    def compiled(function):
+        """Names in the first line that pybind11 writes: name(a: T, b: T) -> T"""
+        return re.findall(r"[(,] ?(\w+)(?=[:,)])", function.__doc__.splitlines()[0].rpartition(" -> ")[0])
+
+    functions = {node.name: node for node in stub.body if isinstance(node, ast.FunctionDef)}
+    assert len(functions) > 5
+    for name, node in functions.items():
+        assert [arg.arg for arg in node.args.args] == compiled(getattr(palpate._palpate, name)), name
+    made, = [node for kind in stub.body if isinstance(kind, ast.ClassDef) and kind.name == "Document" for node in kind.body]
+    assert [arg.arg for arg in made.args.args] == compiled(palpate._palpate.Document.__init__)
+    assert issubclass(palpate._palpate.InputError, ValueError)
+
+
+TYPED = """
+import asyncio
+import palpate
+from typing import Any, Dict
+
+def loop(hand: palpate.Client) -> float:
+    zero: int = hand.start(stimulus="ball", renderer="ray", trial=1)
+    said: Dict[str, Any] = hand.answer("ball", t_ns=zero, correct=True)
+    clock: palpate.Clock = hand.clock()
+    hand.start("ball", trial="one")  # wrong
+    hand.set("/objects/0")  # wrong
+    hand.begin()  # wrong
+    late: str = hand.mark(3)  # wrong
+    hand.wait_for(("left", "fault"), 3)
+    return clock.offset_ns + float(hand.samples()["force"][:, 2].sum()) + float(said["response_time_s"])
+
+async def watch() -> None:
+    async with await palpate.AsyncClient.from_token_file("token.json", role="watch") as eye:
+        await eye.subscribe(250, ("tip", "force"))
+        later: int = eye.start()  # wrong
+        first: Dict[str, Any] = await eye.wait_for("first_contact")
+
+asyncio.run(watch())
+trials = palpate.simulate("p.json", {"motor": {}}, participants=2, seed=5)
+palpate.simulate("p.json", seed="5")  # wrong
+palpate.render({"objects": []}, trials, "ray")["force_x"].mean()
+palpate.settings(3)["motor"]
+palpate.schedule("p.json")  # wrong
+"""
+
+
+def test_a_type_checker_accepts_the_module_and_finds_wrong_use(tmp_path):
+    mypy = shutil.which("mypy")
+    if mypy is None:
+        pytest.skip("mypy is not installed")
+    program = tmp_path / "program.py"
+    program.write_text(TYPED)
+    folder = pathlib.Path(palpate.__file__).parent
+    done = subprocess.run([mypy, "--strict", "--no-error-summary", "--cache-dir", tmp_path / "cache", "--python-executable",
+                           sys.executable, program, folder / "__init__.py", folder / "client.py", folder / "_palpate.pyi"],
+                          env={**os.environ, "MYPYPATH": str(folder.parent)}, cwd=tmp_path, capture_output=True, text=True, timeout=300)
+    wrong = {number for number, line in enumerate(TYPED.splitlines(), 1) if line.endswith("# wrong")}
+    found = {line.split(":")[1] for line in done.stdout.splitlines() if line.startswith("program.py:") and ": error:" in line}
+    assert found == {str(number) for number in wrong}, done.stdout + done.stderr
+    assert all(line.startswith("program.py:") for line in done.stdout.splitlines()), done.stdout
 
 
 def test_both_clients_are_annotated_and_alike():
