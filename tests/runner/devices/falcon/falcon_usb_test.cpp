@@ -120,7 +120,7 @@ TEST(FalconUsb, UploadsFirmwareInSpiteOfLostAndWrongEchoes) {
   settings.packet_probes = 2;
   EXPECT_FALSE(firmware_runs(*line, settings));
   boot(*line, &image, settings);
-  bus.with(0, [&image](Emulator& emulator) {
+  bus.with(0, [&image, &settings](Emulator& emulator) {
     EXPECT_EQ(emulator.mode(), Emulator::Mode::run);
     EXPECT_EQ(emulator.image(), image.bytes);
     // On a busy machine an echo may be late as well, and counts as lost.
