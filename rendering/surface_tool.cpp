@@ -1,6 +1,7 @@
 #include "rendering/surface_tool.h"
 
 #include <algorithm>
+#include <cmath>
 #include <glm/geometric.hpp>
 
 #include "rendering/surface_patch.h"
@@ -17,11 +18,20 @@ constexpr double kRounding = 0.125;  // of the skin; tolerance of its width
 constexpr double kLessSkin = 0.25;   // of the skin, repeatedly, in a gap narrower than two
 constexpr double kInTheWay = 0.25;   // of the tolerance; a patch that is deeper holds the tool
 constexpr double kSamePlace = 8;     // skins; within them a returning contact never left
-// The skin hides the bottom of a valley of 1e-7 rad: its sides would alternate endlessly.
+// The skin hides the bottom of a flat valley: its sides would alternate endlessly. A tool that is
+// held `depth` off its goal goes from the nearest place of one side to that of the other, depth
+// times the angle between them, and does not meet the side that it leaves where that way times the
+// angle is less than the skin: on ways of up to the root of skin times depth.
 constexpr int kTimes = 2;             // releases by one patch in a tick
 constexpr double kSameValley = 1e-6;  // of the size
+constexpr double kHiddenWay = 4;      // of that root
 constexpr int kMostInTheWay = 4;
 constexpr int kPieces = 64;  // of a long cast, examined one by one
+
+/// m, between places of rest on the two sides of a flat valley. \param depth  of the tool
+double hidden_way(double size, double skin, double depth) {
+  return std::max(kSameValley * size, kHiddenWay * std::sqrt(skin * depth));
+}
 
 }  // namespace
 
@@ -107,7 +117,8 @@ bool SurfaceTool::parted_here(const SurfacePatch& patch) const {
   for (std::size_t i = 0; i < parted_count_; ++i) {
     const Parted& parted = parted_[i];
     if (!(parted.patch == patch)) continue;
-    const double far = parted.times < kTimes ? same : kSameValley * surface_.size();
+    const double far =
+        parted.times < kTimes ? same : hidden_way(surface_.size(), skin_, glm::length(at_));
     const Vec3 apart = at_ - parted.at;
     return glm::dot(apart, apart) <= far * far;
   }
@@ -231,6 +242,11 @@ bool SurfaceTool::find_goal(Vec3& goal) {
 /// stay even if they hold nothing one skin away.
 bool SurfaceTool::rests() {
   SurfacePlane in_the_way;
+  const auto all = planes_.all();
+  const bool in_valley =
+      std::any_of(all.begin(), all.end(), [](const SurfacePlane& plane) { return plane.stays; });
+  const double far =
+      in_valley ? hidden_way(surface_.size(), skin_, glm::length(at_)) : kSamePlace * skin_;
   for (int i = 0; i < kMostInTheWay; ++i) {
     if (!in_the_way_at_rest(in_the_way)) return true;
     take_plane(in_the_way);
@@ -238,7 +254,7 @@ bool SurfaceTool::rests() {
     const Vec3 last = exact_;
     if (!find_exact_place()) return false;
     const Vec3 moved = exact_ - last;
-    if (glm::dot(moved, moved) > kSamePlace * kSamePlace * skin_ * skin_) return false;
+    if (glm::dot(moved, moved) > far * far) return false;
   }
   return false;
 }

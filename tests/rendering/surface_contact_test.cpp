@@ -322,6 +322,25 @@ TEST_P(SurfaceContact, SidesThatRoundingBentBackDoNotTakeTurnsForEver) {
   }
 }
 
+TEST_P(SurfaceContact, AToolRestsAtTheBottomOfAFlatValley) {
+  // Faces of files with rounded coordinates bend by 1e-6 to 1e-3 rad. A tip that is pressed
+  // between their normals may not see the bottom within its skin.
+  for (double bend = 1e-6; bend < 1e-3; bend *= 1.3) {
+    const Scene scene = scene_of({bent_block(bend)});
+    for (const double deep : {0.0005, 0.003}) {
+      RenderState state = scene.initial_state();
+      press(scene, state, {-1e-5, 0, -deep});
+      for (int i = 1; i < 20; ++i) {
+        const double x = deep * bend * i / 20;
+        const Rendering r = tick(scene, state, standing({x, 0.0003 * i, -deep}));
+        ASSERT_EQ(r.faults, 0U) << bend << ' ' << deep << ' ' << i;
+        ASSERT_NEAR(glm::length(r.force / kStiffness - Vec3(-x, 0, deep)), 0, 1e-5 * deep)
+            << bend << ' ' << deep << ' ' << i;
+      }
+    }
+  }
+}
+
 TEST_P(SurfaceContact, AFlatFaceInManyTrianglesHoldsNothingAlongIt) {
   Random random(3);
   for (int round = 0; round < 4; ++round) {
