@@ -168,6 +168,13 @@ class PlyReader {
     };
     const auto vertex = named("vertex"), face = named("face");
     bool good = has_format_ && vertex != elements_.end() && face != elements_.end();
+    for (const char* name : {"vertex", "face"}) {
+      const auto again = std::count_if(elements_.begin(), elements_.end(),
+                                       [&](const auto& element) { return element.name == name; });
+      if (again < 2) continue;
+      faults_.add("", std::string("one element ") + name + " in the header", std::to_string(again));
+      good = false;
+    }
     if (vertex == elements_.end()) faults_.add("", "an element vertex in the header", "none");
     if (face == elements_.end()) {
       faults_.add("", "an element face in the header: a cloud of points is no surface", "none");

@@ -188,6 +188,14 @@ TEST(OffFile, EveryKindOfTextGivesTheSameMesh) {
     expect_same(read_mesh("a.off", text), soup, 1e-9);
 }
 
+TEST_F(PlyFile, AnElementMustNotBeGivenTwice) {
+  const std::string text =
+      "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n"
+      "property float z\nelement face 0\nproperty list uchar int vertex_indices\n"
+      "element face 1\nproperty int a\nend_header\n0 0 0\n3 0 0 0\n";
+  EXPECT_EQ(fault_in("a.ply", text), "a.ply: expected one element face in the header, found 2");
+}
+
 TEST(OffFile, FaultsNameTheLine) {
   const PolygonSoup soup = cube(0.06);
   const std::string text = off(soup, "OFF\n", "", "");
