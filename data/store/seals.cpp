@@ -3,6 +3,7 @@
 #include <nettle/sha2.h>
 #include <sqlite3.h>
 
+#include <algorithm>
 #include <array>
 #include <vector>
 
@@ -20,11 +21,16 @@ constexpr int kVersion = 3;  // first version of the schema with seals
 
 /// Version of the schema: rows of an older database are sealed before migration adds columns.
 int version_of(SQLite::Database& db) {
-  SQLite::Statement tasks(db, "SELECT 1 FROM pragma_table_info('attempts') WHERE name = 'task'");
-  if (tasks.executeStep()) return 5;
-  SQLite::Statement find(
-      db, "SELECT 1 FROM pragma_table_info('attempts') WHERE name = 'contact_share'");
-  return find.executeStep() ? 4 : kVersion;
+  int version = kVersion;
+  SQLite::Statement columns(db, "SELECT name FROM pragma_table_info('attempts')");
+  while (columns.executeStep()) {
+    const std::string name = columns.getColumn(0).getString();
+    if (name == "task") version = std::max(version, 5);
+    for (const MeasuredColumn& measured : kMeasured) {
+      if (name == measured.name) version = std::max(version, measured.since);
+    }
+  }
+  return version;
 }
 
 std::vector<std::int64_t> ids(SQLite::Database& db, const char* sql, std::int64_t of = 0) {
