@@ -201,7 +201,7 @@ ServedSession::Outcome ServedSession::run_trials() {
     said["next"] = next_trial();
     tell("stored", clock_.now_ns(), said);
     if (answer_) said["stamped"] = stamped_by(answer_->message);
-    if (answer_) output_->reply(answer_->client, accepted(answer_->message.id, std::move(said)));
+    if (answer_) output_->reply(answer_->client, accepted(answer_->message.id, said));
     answer_.reset();
     stored_.reset();
   }
