@@ -149,7 +149,8 @@ TEST_F(Touch, EveryFaultIsTroubleAndZeroForceUntilItIsOver) {
       std::clog << name << ": zero force after " << took.count() << " ms\n";
     }
     EXPECT_TRUE(until(
-        *device, [trouble](const servo::DeviceReading& read) { return read.trouble == trouble; },
+        *device,
+        [expected = trouble](const servo::DeviceReading& read) { return read.trouble == expected; },
         1));
     const servo::DeviceReading reading = device->read();
     EXPECT_TRUE(reading.lost);
