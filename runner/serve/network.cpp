@@ -733,6 +733,14 @@ std::string make_token() {
   return out;
 }
 
+bool is_listening(std::uint16_t port) {
+  asio::io_context io;
+  tcp::socket other(io);
+  Code error;
+  other.connect({asio::ip::address_v4::loopback(), port}, error);
+  return !error;
+}
+
 Network::Network(NetworkSettings settings) : impl_(std::make_unique<Impl>(std::move(settings))) {}
 Network::~Network() = default;
 void Network::begin(NetworkHooks hooks) { impl_->begin(std::move(hooks)); }

@@ -37,6 +37,9 @@ struct NetworkHooks {
 /// 128 bits as 32 hexadecimal digits, from the kernel. \throws std::runtime_error
 std::string make_token();
 
+/// Whether a program listens at this port of 127.0.0.1.
+bool is_listening(std::uint16_t port);
+
 class Network final : public ServeOutput {
  public:
   /// Listens, but accepts no client before begin(). \throws std::runtime_error naming the port or

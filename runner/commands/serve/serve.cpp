@@ -1,5 +1,3 @@
-#include <netinet/in.h>
-#include <sys/socket.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -53,20 +51,6 @@ std::string picture_of(const std::vector<stimuli::ObjectSpec>& objects) {
   return "\"objects\":" + out.dump();
 }
 
-/// Whether a program listens at this port of 127.0.0.1.
-bool is_listening(std::uint16_t port) {
-  const int link = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
-  if (link < 0) return false;
-  sockaddr_in place{};
-  place.sin_family = AF_INET;
-  place.sin_port = htons(port);
-  place.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-  const bool listening =
-      ::connect(link, reinterpret_cast<const sockaddr*>(&place), sizeof place) == 0;
-  ::close(link);
-  return listening;
-}
-
 /// The file with the token while the server runs; only its owner can read it. Replaces no file but
 /// one that a server left behind.
 class TokenFile {
@@ -107,7 +91,7 @@ class TokenFile {
     if (!file.read(start.data(), static_cast<std::streamsize>(start.size())) || start != kStart)
       return false;
     std::uint16_t port = 0;
-    if (file >> port && port != own && is_listening(port))
+    if (file >> port && port != own && serve::is_listening(port))
       throw UsageError("--token-file: " + printable(path) +
                        " belongs to a server that runs; end it, or name another file");
     return true;
