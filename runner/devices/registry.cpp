@@ -10,6 +10,7 @@
 #include <chrono>
 #include <csignal>
 #include <cstring>
+#include <functional>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <stdexcept>
@@ -26,7 +27,7 @@ namespace palpate::runner::devices {
 namespace {
 
 using Json = nlohmann::json;
-constexpr auto kListingPatience = std::chrono::seconds(3);
+constexpr std::chrono::seconds kListingPatience(3), kCalibrationPatience(60);
 
 std::vector<servo::ConnectedDevice> always_there(const servo::DeviceConfig& /*config*/) {
   return {{}};
@@ -75,7 +76,7 @@ constexpr DeviceKind kKinds[] = {
     {"forcedimension",
      "a Force Dimension omega, delta, sigma or lambda, through the maker's library", true,
      forcedimension::check, forcedimension::nominal, forcedimension::connected,
-     forcedimension::open},
+     forcedimension::open, nullptr, forcedimension::move_to_calibrate},
     {"forcedimension2", "two Force Dimension devices that hold the ends of a stylus", true,
      check_named<kForceDimension2>, nominal_pair<kForceDimension2, forcedimension::nominal>,
      forcedimension::connected, open_named<kForceDimension2, forcedimension::open>,
@@ -102,17 +103,15 @@ constexpr DeviceKind kKinds[] = {
      nothing_to_check, as_opened<open_simulated>, always_there, open_simulated},
 };
 
-/// The message of a listing process: {"found": [...]} or {"error": "..."}.
-std::string listing_of(const DeviceKind& kind, const servo::DeviceConfig& config) noexcept {
+/// The message of a separate process: {"done": ...} or {"error": "..."}.
+std::string message_of(const std::function<Json()>& work) noexcept {
   Json out;
   try {
-    out["found"] = Json::array();
-    for (const servo::ConnectedDevice& one : kind.connected(config))
-      out["found"].push_back({{"serial", one.serial}, {"trouble", one.trouble}});
+    out["done"] = work();
   } catch (const std::exception& error) {
     out = {{"error", error.what()}};
   } catch (...) {
-    out = {{"error", "the devices could not be listed"}};
+    out = {{"error", "it failed without a reason"}};
   }
   return out.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
@@ -127,8 +126,8 @@ void write_all(int to, const std::string& text) {
 }
 
 /// Reads until the other end closes; none: it took too long.
-std::optional<std::string> read_all(int from) {
-  const auto give_up = std::chrono::steady_clock::now() + kListingPatience;
+std::optional<std::string> read_all(int from, std::chrono::seconds patience) {
+  const auto give_up = std::chrono::steady_clock::now() + patience;
   std::string text;
   while (true) {
     const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(
@@ -145,41 +144,57 @@ std::optional<std::string> read_all(int from) {
   }
 }
 
+/// What `work` returns in a separate process, which a maker's library can crash or hold up.
+/// \param what  "listing these devices". \throws std::runtime_error
+Json in_child(const std::function<Json()>& work, std::chrono::seconds patience, std::string what) {
+  int ends[2];
+  if (pipe2(ends, O_CLOEXEC) != 0) throw std::runtime_error(what + ": " + std::strerror(errno));
+  const int runner = getpid();
+  const pid_t child = fork();
+  if (child == 0) {
+    prctl(PR_SET_PDEATHSIG, SIGKILL);
+    if (getppid() != runner) _exit(1);
+    const int nothing = open("/dev/null", O_WRONLY | O_CLOEXEC);
+    if (nothing >= 0) dup2(nothing, STDOUT_FILENO);  // keep a library's output out of our results
+    write_all(ends[1], message_of(work));
+    _exit(0);
+  }
+  close(ends[1]);
+  const std::string why = child < 0 ? std::strerror(errno) : "";
+  const std::optional<std::string> said = child < 0 ? std::nullopt : read_all(ends[0], patience);
+  close(ends[0]);
+  if (child < 0) throw std::runtime_error(what + ": " + why);
+  if (!said) kill(child, SIGKILL);
+  waitpid(child, nullptr, 0);
+  if (!said)
+    throw std::runtime_error(what + " took longer than " + std::to_string(patience.count()) +
+                             " s: is a device stuck?");
+  const Json message = json_or_discarded(*said);
+  if (!message.is_object()) throw std::runtime_error(what + " crashed");
+  if (message.contains("error")) throw std::runtime_error(message["error"].get<std::string>());
+  return message["done"];
+}
+
 }  // namespace
 
 std::vector<servo::ConnectedDevice> list_connected(const DeviceKind& kind,
                                                    const servo::DeviceConfig& config) {
   if (!kind.has_force_feedback) return kind.connected(config);
-  int ends[2];
-  if (pipe2(ends, O_CLOEXEC) != 0)
-    throw std::runtime_error(std::string("the devices cannot be listed: ") + std::strerror(errno));
-  const int runner = getpid();
-  const pid_t lister = fork();
-  if (lister == 0) {
-    prctl(PR_SET_PDEATHSIG, SIGKILL);
-    if (getppid() != runner) _exit(1);
-    const int nothing = open("/dev/null", O_WRONLY | O_CLOEXEC);
-    if (nothing >= 0) dup2(nothing, STDOUT_FILENO);  // keep a library's output out of our results
-    write_all(ends[1], listing_of(kind, config));
-    _exit(0);
-  }
-  close(ends[1]);
-  const std::string why = lister < 0 ? std::strerror(errno) : "";
-  const std::optional<std::string> said = lister < 0 ? std::nullopt : read_all(ends[0]);
-  close(ends[0]);
-  if (lister < 0) throw std::runtime_error("the devices cannot be listed: " + why);
-  if (!said) kill(lister, SIGKILL);
-  waitpid(lister, nullptr, 0);
-  if (!said)
-    throw std::runtime_error("listing these devices took longer than 3 s: is one of them stuck?");
-  const Json listing = json_or_discarded(*said);
-  if (!listing.is_object())
-    throw std::runtime_error("the program that lists these devices crashed");
-  if (listing.contains("error")) throw std::runtime_error(listing["error"].get<std::string>());
+  const auto list = [&] {
+    Json listing = Json::array();
+    for (const servo::ConnectedDevice& one : kind.connected(config))
+      listing.push_back({{"serial", one.serial}, {"trouble", one.trouble}});
+    return listing;
+  };
   std::vector<servo::ConnectedDevice> found;
-  for (const Json& one : listing["found"])
+  for (const Json& one : in_child(list, kListingPatience, "listing these devices"))
     found.push_back({one["serial"].get<std::string>(), one["trouble"].get<std::string>()});
   return found;
+}
+
+std::string calibrate_by_itself(const DeviceKind& kind, const servo::DeviceConfig& config) {
+  const auto calibrate = [&] { return Json(kind.move_to_calibrate(config)); };
+  return in_child(calibrate, kCalibrationPatience, "the calibration").get<std::string>();
 }
 
 std::span<const DeviceKind> device_kinds() { return kKinds; }

@@ -30,6 +30,9 @@ struct DeviceKind {
   std::unique_ptr<servo::Device> (*open)(const servo::DeviceConfig& config);
   /// For a pair: opens one of the two as a point; else nullptr.
   OpenEnd open_end = nullptr;
+  /// Where the device can move its own arm to find its zero, else nullptr. Loads a maker's library:
+  /// call calibrate_by_itself. \return what was done, in words. \throws std::runtime_error
+  std::string (*move_to_calibrate)(const servo::DeviceConfig& config) = nullptr;
 };
 
 std::span<const DeviceKind> device_kinds();
@@ -39,6 +42,10 @@ std::span<const DeviceKind> device_kinds();
 /// because the listing hung or crashed
 std::vector<servo::ConnectedDevice> list_connected(const DeviceKind& kind,
                                                    const servo::DeviceConfig& config);
+/// Lets a device with move_to_calibrate do so, in a separate process whose end is the end of its
+/// forces, for at most a minute. \throws std::runtime_error as move_to_calibrate, or because it
+/// hung or crashed
+std::string calibrate_by_itself(const DeviceKind& kind, const servo::DeviceConfig& config);
 /// \throws std::invalid_argument listing the known names
 const DeviceKind& device_kind(const std::string& name);
 

@@ -202,6 +202,23 @@ int calibrate_pair(const devices::DeviceKind& kind, const servo::DeviceConfig& c
   return 0;
 }
 
+/// Asks before an arm moves by itself.
+int let_it_calibrate(const devices::DeviceKind& kind, const servo::DeviceConfig& config) {
+  std::cerr << "The device will move its arm to its stops by itself, for some seconds.\nTake your "
+               "hand off the grip and everything out of its reach. Ctrl-C switches its forces "
+               "off.\nType yes and ENTER to begin: "
+            << std::flush;
+  std::string said;
+  std::getline(std::cin, said);
+  if (said != "yes") {
+    std::cerr << "Nothing was moved.\n";
+    return 1;
+  }
+  std::cout << printable(devices::calibrate_by_itself(kind, config))
+            << "\nThe device keeps its calibration until its power is switched off.\n";
+  return 0;
+}
+
 }  // namespace
 
 void add_calibrate_options(po::options_description& options) {
@@ -222,20 +239,24 @@ void add_calibrate_options(po::options_description& options) {
       "--calibrate, two devices: number of points to take");
 }
 
-int calibrate_devices(const std::string& device, const servo::DeviceConfig& config,
+int calibrate_devices(const devices::DeviceKind& kind, const servo::DeviceConfig& config,
                       const po::variables_map& values) {
+  if (kind.move_to_calibrate != nullptr) {
+    kind.check(config);
+    return let_it_calibrate(kind, config);
+  }
   check(!config.calibration.empty(), "--calibrate needs --calibration FILE to store into");
   data::ProtectedFiles firmware;
   firmware.add(config.firmware, "--firmware reads it, it would be overwritten");
   const std::string why = data::write_refusal(config.calibration, true, firmware);
   check(why.empty(), "--calibration " + config.calibration + ": " + why);
-  if (device == "falcon") return calibrate_force(config, values);
-  const devices::DeviceKind& kind = devices::device_kind(device);
+  if (kind.name == std::string("falcon")) return calibrate_force(config, values);
   if (kind.open_end != nullptr) return calibrate_pair(kind, config, values);
   std::string able = "falcon";
   for (const devices::DeviceKind& one : devices::device_kinds())
-    if (one.open_end != nullptr) able += std::string(", ") + one.name;
-  throw UsageError("--calibrate is for the devices " + able + ", not for '" + device +
+    if (one.open_end != nullptr || one.move_to_calibrate != nullptr)
+      able += std::string(", ") + one.name;
+  throw UsageError("--calibrate is for the devices " + able + ", not for '" + kind.name +
                    "': other devices have their maker's calibration");
 }
 

@@ -319,6 +319,7 @@ void add_options(CommandLine& line) {
   palpate devices --timing --device inverse3 --calibration lab.json    delay from pose to force
   palpate devices --device forcedimension --report found.json          for palpate's developers
   palpate devices --calibrate --device falcon --calibration lab.json --weights 0.1,0.2,0.4
+  palpate devices --calibrate --device forcedimension                  moves its arm to its stops
   palpate devices --markers parport:/dev/parport0       does the EEG amplifier see each code?
 )";
   line.options.add_options()                                                                //
@@ -444,7 +445,7 @@ int devices_command(const std::vector<std::string>& args) {
   const devices::DeviceKind* const only = named ? &kind_of(name) : nullptr;
   if (values->count("calibrate") > 0) {
     if (!named) throw UsageError("--calibrate: name the device with --device");
-    return calibrate_devices(name, config, *values);
+    return calibrate_devices(*only, config, *values);
   }
   Json report = {{"program_version", PALPATE_VERSION}};
   int status = 0;

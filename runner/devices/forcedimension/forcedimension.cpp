@@ -13,7 +13,9 @@
 namespace palpate::runner::devices::forcedimension {
 namespace {
 
-constexpr double kWatchdogStep = 125e-6;       // s; at most 255 of them
+constexpr double kWatchdogStep = 125e-6;  // s; at most 255 of them
+constexpr unsigned char kWatchdogWhileMoving =
+    200;                                       // steps: 25 ms, the library's thread may be late
 constexpr double kStatusPeriod = 0.008;        // s; the status costs a separate transfer
 constexpr double kFarthest = 0.5;              // m; no model reaches so far
 constexpr double kMaxSpeed = 5, kJump = 1e-3;  // m/s and m; hands move the grip more slowly
@@ -64,8 +66,8 @@ struct Found {
   std::string serial, name;
 };
 
-Found open_one(const Library& library, int index) {
-  const int id = library.open_id(static_cast<char>(index));
+Found open_one(const Library& library, int (*open_id)(char index), int index) {
+  const int id = open_id(static_cast<char>(index));
   if (id < 0) {
     throw std::runtime_error(library.error_get_last() == kDeviceInUse
                                  ? "another program uses it: end that program"
@@ -92,10 +94,40 @@ unsigned char watchdog_of(double rate) {
       std::min(255.0, std::ceil(std::max(0.005, 5 / rate) / kWatchdogStep)));
 }
 
-/// Number of devices; negative: the library cannot count them.
+/// Number of devices. \throws std::runtime_error
 int count_of(const Library& library) {
   constexpr int kMost = 16;
-  return std::min(library.get_device_count(), kMost);
+  const int count = library.get_device_count();
+  if (count < 0)
+    throw std::runtime_error("Force Dimension devices cannot be counted: " + error_text(library));
+  return std::min(count, kMost);
+}
+
+/// Opens the device with the config's serial number, or the first that is free, by `open_id`.
+/// Identifies it by its serial number: indices change as devices come and go.
+/// \throws std::runtime_error with the obstacle
+Found open_wanted(const Library& library, int (*open_id)(char index),
+                  const servo::DeviceConfig& config) {
+  const int count = count_of(library);
+  const std::string wanted = config.serials.empty() ? "" : config.serials[0];
+  std::string others, trouble;
+  for (int index = 0; index < count; ++index) {
+    try {
+      const Found device = open_one(library, open_id, index);
+      const bool ours = is_held(device.id);
+      if (!ours && (wanted.empty() || device.serial == wanted)) return device;
+      others += (others.empty() ? "" : ", ") + device.serial;
+      if (!ours) library.close(device.id);
+    } catch (const std::runtime_error& error) {
+      trouble = error.what();
+    }
+  }
+  std::string text = wanted.empty() ? "no Force Dimension device is ready"
+                                    : "no Force Dimension device has the serial number " + wanted;
+  if (!others.empty()) text += "; connected: " + others;
+  if (!trouble.empty()) text += "; one reports: " + trouble;
+  if (count == 0) text += ": check its cable, its power supply and the rights to use USB";
+  throw std::runtime_error(text);
 }
 
 }  // namespace
@@ -108,37 +140,9 @@ ForceDimensionDevice::ForceDimensionDevice(const servo::DeviceConfig& config)
 ForceDimensionDevice::~ForceDimensionDevice() { close(); }
 
 void ForceDimensionDevice::open() {
-  const int count = count_of(library_);
-  if (count < 0)
-    throw std::runtime_error("Force Dimension devices cannot be counted: " + error_text(library_));
-  const std::string wanted = config_.serials.empty() ? "" : config_.serials[0];
-  // Identify the device by its serial number: indices change as devices come and go.
-  std::string others, trouble;
-  Found device{};
-  for (int index = 0; index < count && !id_; ++index) {
-    try {
-      device = open_one(library_, index);
-    } catch (const std::runtime_error& error) {
-      trouble = error.what();
-      continue;
-    }
-    const bool ours = is_held(device.id);
-    if (!ours && (wanted.empty() || device.serial == wanted)) {
-      id_ = device.id;
-      held().push_back(device.id);
-    } else {
-      others += (others.empty() ? "" : ", ") + device.serial;
-      if (!ours) library_.close(device.id);
-    }
-  }
-  if (!id_) {
-    std::string text = wanted.empty() ? "no Force Dimension device is ready"
-                                      : "no Force Dimension device has the serial number " + wanted;
-    if (!others.empty()) text += "; connected: " + others;
-    if (!trouble.empty()) text += "; one reports: " + trouble;
-    if (count == 0) text += ": check its cable, its power supply and the rights to use USB";
-    throw std::runtime_error(text);
-  }
+  const Found device = open_wanted(library_, library_.open_id, config_);
+  id_ = device.id;
+  held().push_back(device.id);
   const char id = *id_;
   const auto need = [&](int result, const char* what) {
     if (result >= 0) return;
@@ -299,12 +303,10 @@ servo::DeviceCapabilities nominal(const servo::DeviceConfig& /*config*/) {
 std::vector<servo::ConnectedDevice> connected(const servo::DeviceConfig& config) {
   const Library library(config.library);
   const int count = count_of(library);
-  if (count < 0)
-    throw std::runtime_error("Force Dimension devices cannot be counted: " + error_text(library));
   std::vector<servo::ConnectedDevice> out;
   for (int index = 0; index < count; ++index) {
     try {
-      const Found device = open_one(library, index);
+      const Found device = open_one(library, library.open_id, index);
       out.push_back({device.serial, ""});
       library.close(device.id);
     } catch (const std::runtime_error& error) {
@@ -316,6 +318,45 @@ std::vector<servo::ConnectedDevice> connected(const servo::DeviceConfig& config)
 
 std::unique_ptr<servo::Device> open(const servo::DeviceConfig& config) {
   return std::make_unique<ForceDimensionDevice>(config);
+}
+
+std::string move_to_calibrate(const servo::DeviceConfig& config) {
+  const Library library(config.library);
+  if (library.open_to_regulate == nullptr || library.is_initialized == nullptr ||
+      library.auto_init == nullptr || library.stop_regulation == nullptr ||
+      library.set_watchdog == nullptr)
+    throw std::runtime_error(
+        "this library cannot move a device safely to calibrate it: name the maker's libdrd.so with "
+        "--library, or use the maker's program");
+  if (config.serials.empty() && count_of(library) > 1)
+    throw std::runtime_error("several devices are connected: name the one to move with --serial");
+  const Found device = open_wanted(library, library.open_to_regulate, config);
+  const std::string name = device.name + ", serial number " + device.serial;
+  const auto is_calibrated = [&] {
+    std::array<int, kStatusRoom> status{};
+    return library.get_status(status.data(), device.id) >= 0 && status[kReset] == 0 &&
+           library.is_initialized(device.id);
+  };
+  const bool was_calibrated = is_calibrated();
+  bool moved = was_calibrated;
+  std::string why;
+  if (!was_calibrated) {
+    // If this process ends, the firmware switches forces off.
+    moved = library.enable_expert_mode() >= 0 &&
+            library.set_watchdog(kWatchdogWhileMoving, device.id) >= 0 &&
+            library.auto_init(device.id) >= 0;
+    if (!moved) why = error_text(library);
+    library.stop_regulation(true, device.id);
+  }
+  const bool calibrated = moved && is_calibrated();
+  library.set_force_and_torque(0, 0, 0, 0, 0, 0, device.id);
+  library.enable_force(0, device.id);
+  library.close(device.id);
+  if (!moved) throw std::runtime_error(name + " was not calibrated: " + why);
+  if (!calibrated)
+    throw std::runtime_error(name +
+                             " moved but reports no calibration: calibrate it as its manual says");
+  return name + (was_calibrated ? ": is calibrated already, it was not moved" : ": is calibrated");
 }
 
 }  // namespace palpate::runner::devices::forcedimension

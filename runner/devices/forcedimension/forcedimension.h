@@ -61,5 +61,6 @@ void check(const servo::DeviceConfig& config);
 servo::DeviceCapabilities nominal(const servo::DeviceConfig& config);
 std::vector<servo::ConnectedDevice> connected(const servo::DeviceConfig& config);
 std::unique_ptr<servo::Device> open(const servo::DeviceConfig& config);
+std::string move_to_calibrate(const servo::DeviceConfig& config);
 
 }  // namespace palpate::runner::devices::forcedimension

@@ -90,6 +90,10 @@ Library::Library(const std::string& path) {
   require("dhdErrorGetLastStr", error_get_last_str);
   find(from, "dhdSetWatchdog", set_watchdog);
   find(from, "dhdEmulateButton", emulate_button);
+  find(from, "drdOpenID", open_to_regulate);
+  find(from, "drdIsInitialized", is_initialized);
+  find(from, "drdAutoInit", auto_init);
+  find(from, "drdStop", stop_regulation);
   if (!missing.empty())
     throw std::runtime_error(
         "this is not a Force Dimension library that palpate can use (SDK 3.7 or newer): it has "

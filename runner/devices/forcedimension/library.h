@@ -44,9 +44,13 @@ struct Library {
   int (*error_get_last)() = nullptr;
   const char* (*error_get_last_str)() = nullptr;
 
-  // Null in older versions without the function.
+  // Null in older versions without the function; the last four also in libdhd.
   int (*set_watchdog)(unsigned char periods_of_125us, char id) = nullptr;
   int (*emulate_button)(unsigned char on, char id) = nullptr;
+  int (*open_to_regulate)(char index) = nullptr;  ///< returns the id
+  bool (*is_initialized)(char id) = nullptr;      ///< its arm has been moved to calibrate it
+  int (*auto_init)(char id) = nullptr;            ///< moves the arm; returns when it is done
+  int (*stop_regulation)(bool keep_forces, char id) = nullptr;
 
  private:
   struct Unload {

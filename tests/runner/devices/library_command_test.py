@@ -26,7 +26,7 @@ PATIENCE = 120  # s; only a hang reaches it
 # As in stub_state.h: the number of devices, then the numbers of each.
 FIELDS = ("serial model hand_x hand_y hand_z hand_stiffness connected power reset in_use wrong buttons too_fast error "
           "delay force_x force_y force_z torque_x torque_y torque_z forces_on brakes watchdog open commands "
-          "last_command").split()
+          "last_command moved").split()
 PROTOCOL = {
     "version": 1, "name": "touch", "renderers": ["ray"], "torque": "left_out", "seed": 3, "samples": True,
     "servo": {"rate_hz": 100}, "material": {"stiffness_n_per_m": 50},
@@ -123,6 +123,39 @@ class DeviceBehindALibrary(unittest.TestCase):
         missing = self.palpate("devices", "--device", KIND, "--library", self.folder / "none.so")
         self.assertEqual(missing.returncode, 1)
         self.assertIn("--library", missing.stdout + missing.stderr)
+
+    def calibrate(self, said):
+        return subprocess.run([PALPATE, "devices", "--calibrate", "--device", KIND, "--library", STUB], input=said,
+                              capture_output=True, text=True, timeout=PATIENCE, env=self.environment)
+
+    @unittest.skipUnless(KIND == "forcedimension", "it cannot move its arm by itself")
+    def test_it_moves_its_arm_to_calibrate_only_after_yes(self):
+        self.stub.set(reset=1)
+        for said in ("", "no\n", "y\n"):
+            refused = self.calibrate(said)
+            self.assertEqual((refused.returncode, self.stub.get("moved")), (1, 0), refused.stderr)
+            self.assertIn("Nothing was moved", refused.stderr)
+        done = self.calibrate("yes\n")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn("omega.6, serial number 4711: is calibrated", done.stdout)
+        self.assertEqual((self.stub.get("moved"), self.stub.get("reset"), self.stub.force()), (1, 0, 0))
+        self.assertIn("already", self.calibrate("yes\n").stdout)
+        self.assertEqual((self.stub.get("moved"), self.stub.get("open")), (1, 0))
+
+    @unittest.skipUnless(KIND == "forcedimension", "it cannot move its arm by itself")
+    def test_ending_the_program_ends_the_movement(self):
+        self.stub.set(reset=1, delay=PATIENCE)
+        program = subprocess.Popen([PALPATE, "devices", "--calibrate", "--device", KIND, "--library", STUB],
+                                   stdin=subprocess.PIPE, text=True, env=self.environment)
+        self.addCleanup(lambda: (program.kill(), program.communicate()))
+        program.stdin.write("yes\n")
+        program.stdin.flush()
+        self.wait(lambda: self.stub.get("moved") > 0)
+        self.assertEqual(self.stub.get("watchdog"), 200, "25 ms after the last command the firmware ends forces")
+        mover, = subprocess.run(["pgrep", "-P", str(program.pid)], capture_output=True, text=True).stdout.split()
+        program.kill()
+        program.wait()
+        self.wait(lambda: not pathlib.Path(f"/proc/{mover}").exists())
 
     def test_a_protocol_that_needs_torque_is_refused(self):
         required = {key: value for key, value in PROTOCOL.items() if key != "torque"}

@@ -241,6 +241,39 @@ TEST_F(ForceDimension, WhatCannotBeOpenedSaysWhy) {
   EXPECT_THROW(check(config_), std::invalid_argument);
 }
 
+TEST_F(ForceDimension, TheArmMovesByItselfOnlyIfItMustBeCalibratedAndEndsWithoutForce) {
+  one().reset = 1;
+  EXPECT_EQ(move_to_calibrate(config_), "omega.6, serial number 4711: is calibrated");
+  EXPECT_EQ(one().moved, 1);
+  EXPECT_EQ(one().watchdog, 200);
+  EXPECT_EQ(one().force[2], 0);
+  EXPECT_EQ(one().forces_on, 0);
+  EXPECT_EQ(one().open, 0);
+  EXPECT_NE(move_to_calibrate(config_).find("already"), std::string::npos);
+  EXPECT_EQ(one().moved, 1);
+}
+
+TEST_F(ForceDimension, AnArmThatCannotBeCalibratedSaysWhyAndEndsWithoutForce) {
+  const auto refused = [this] {
+    try {
+      return "it is said: " + move_to_calibrate(config_);
+    } catch (const std::runtime_error& error) {
+      return std::string(error.what());
+    }
+  };
+  one().reset = one().too_fast = 1;
+  EXPECT_EQ(refused(), "omega.6, serial number 4711 was not calibrated: timeout");
+  EXPECT_EQ(one().force[2], 0);
+  EXPECT_EQ(one().forces_on, 0);
+  EXPECT_EQ(one().open, 0);
+  state_->count = 2;
+  other().serial = 99;
+  EXPECT_NE(refused().find("--serial"), std::string::npos) << refused();
+  EXPECT_EQ(one().moved, 1) << "which of two must be said";
+  config_.library = OLD_LIBRARY;
+  EXPECT_NE(refused().find("maker's program"), std::string::npos) << refused();
+}
+
 TEST_F(ForceDimension, AnOldLibraryWorksAndItsMissingFunctionsAreRecorded) {
   config_.library = OLD_LIBRARY;
   const auto device = open(config_);

@@ -53,6 +53,13 @@ StubDevice* device_of(char id) {
   return &device;
 }
 
+void wait(double seconds) {
+  if (seconds <= 0) return;
+  const timespec time{static_cast<time_t>(seconds),
+                      static_cast<long>(std::fmod(seconds, 1.0) * 1e9)};
+  nanosleep(&time, nullptr);
+}
+
 void go_limp(StubDevice& device) {
   for (int i = 0; i < 3; ++i) device.force[i] = device.torque[i] = 0;
 }
@@ -149,11 +156,7 @@ int dhdGetPositionAndOrientationFrame(double* x, double* y, double* z, double fr
   StubDevice* const device = device_of(id);
   if (device == nullptr) return -1;
   watch(*device);
-  if (device->delay > 0) {
-    const timespec time{static_cast<time_t>(device->delay),
-                        static_cast<long>(std::fmod(device->delay, 1.0) * 1e9)};
-    nanosleep(&time, nullptr);
-  }
+  wait(device->delay);
   std::array<double, 3> at{};
   for (int i = 0; i < 3; ++i) {
     at[static_cast<std::size_t>(i)] =
@@ -231,6 +234,30 @@ int dhdSetWatchdog(unsigned char periods, char id) {
   return 0;
 }
 int dhdEmulateButton(unsigned char /*on*/, char id) { return device_of(id) == nullptr ? -1 : 0; }
+
+int drdOpenID(char index) { return dhdOpenID(index); }
+bool drdIsInitialized(char id) {
+  const StubDevice* const device = device_of(id);
+  return device != nullptr && device->reset == 0;
+}
+int drdAutoInit(char id) {
+  StubDevice* const device = device_of(id);
+  if (device == nullptr) return -1;
+  if (device->power == 0) return fail(kTimeOut);
+  ++device->moved;
+  device->forces_on = 1;
+  device->force[2] = 1;
+  wait(device->delay);
+  if (device->too_fast != 0) return fail(kTimeOut);  // a hand holds the arm
+  device->reset = 0;
+  return 0;
+}
+int drdStop(bool keep_forces, char id) {
+  StubDevice* const device = device_of(id);
+  if (device == nullptr) return -1;
+  if (!keep_forces) device->forces_on = 0;
+  return 0;
+}
 #endif
 
 }  // extern "C"

@@ -27,6 +27,7 @@ struct StubDevice {
   // Set by the stub.
   double force[3] = {0, 0, 0}, torque[3] = {0, 0, 0};  ///< N, N m, of a real device
   double forces_on = 0, brakes = 0, watchdog = 0, open = 0, commands = 0, last_command = 0;
+  double moved = 0;  ///< times that the arm moved by itself
 };
 
 struct StubState {
