@@ -18,9 +18,14 @@ std::optional<RunEnd> parse_run_end(std::string_view text) {
   return std::nullopt;
 }
 
+std::vector<IntervalRecord> intervals_of(const TrialRecord& record) {
+  if (record.task) return record.task->intervals;
+  return {
+      {record.shape, record.renderer, std::nullopt, false, record.onset_ns, record.response_ns}};
+}
+
 std::int64_t first_onset_ns(const TrialRecord& record) {
-  if (!record.task) return record.onset_ns;
-  for (const IntervalRecord& interval : record.task->intervals) {
+  for (const IntervalRecord& interval : intervals_of(record)) {
     if (interval.onset_ns != 0) return interval.onset_ns;
   }
   return record.onset_ns;

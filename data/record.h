@@ -103,6 +103,9 @@ struct TrialRecord {
   std::vector<BodyRecord> bodies = {};
 };
 
+/// What was presented, in order; a trial of version 1 has one interval, without a level.
+std::vector<IntervalRecord> intervals_of(const TrialRecord& record);
+
 /// State of the stimulus after the tick; none: it did not move, or there was none.
 /// \param sample  an element of record.samples
 std::optional<BodyRecord> body_of(const TrialRecord& record, const SampleRecord& sample);

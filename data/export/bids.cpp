@@ -315,7 +315,7 @@ std::vector<Column> columns_of(const StudyLabel& study, bool contacts) {
 }
 
 /// The stimulus of each interval.
-nlohmann::ordered_json intervals_of(const TaskRecord& task) {
+nlohmann::ordered_json intervals_json(const TaskRecord& task) {
   nlohmann::ordered_json all = nlohmann::ordered_json::array();
   for (const IntervalRecord& interval : task.intervals) {
     auto& one =
@@ -428,7 +428,7 @@ void BidsRecording::add(const StoredTrial& trial, const std::string& path) {
                              {"renderer", guarded_text(record.renderer)},
                              {"shape", guarded_text(record.shape)},
                              {"orientation_wxyz", record.orientation_wxyz}});
-  if (record.task) about["intervals"] = intervals_of(*record.task);
+  if (record.task) about["intervals"] = intervals_json(*record.task);
   if (settings_.motion) events_.add(trial, onset);
 }
 

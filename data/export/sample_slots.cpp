@@ -18,14 +18,12 @@ double seconds_between(std::int64_t from_ns, std::int64_t to_ns) {
 }  // namespace
 
 double duration_of(const TrialRecord& record) {
-  if (!record.task) return record.response_time;
   return record.response_time + seconds_between(first_onset_ns(record), record.onset_ns);
 }
 
 /// -1: no interval is left
 std::int64_t SampleSlots::begin_of_next_interval() {
-  if (!trial_.record.task) return -1;
-  const std::vector<IntervalRecord>& all = trial_.record.task->intervals;
+  const std::vector<IntervalRecord> all = intervals_of(trial_.record);
   for (std::size_t i = static_cast<std::size_t>(interval_) + 1; i < all.size(); ++i) {
     if (all[i].onset_ns == 0) continue;  // never shown
     interval_ = static_cast<int>(i);

@@ -215,15 +215,10 @@ protocols::Interval interval_of(const protocols::Protocol& protocol,
 
 std::vector<ShownInterval> scenes_of(const protocols::Protocol& protocol,
                                      const data::TrialRecord& recorded, bool other) {
-  protocols::Trial trial = trial_of(protocol, recorded);
+  const protocols::Trial trial = trial_of(protocol, recorded);
   std::vector<ShownInterval> shown;
-  if (!recorded.task) {
-    trial.renderer = kind_of(recorded.renderer, other);
-    shown.push_back({trial.renderer, StimulusLibrary(protocol).scene(trial)});
-    return shown;
-  }
   LevelScenes scenes(protocol);
-  for (const data::IntervalRecord& interval : recorded.task->intervals) {
+  for (const data::IntervalRecord& interval : data::intervals_of(recorded)) {
     const protocols::Interval one = interval_of(protocol, interval, other);
     shown.push_back({one.renderer, scenes.scene(trial, one)});
   }
@@ -252,13 +247,8 @@ std::vector<std::span<const data::SampleRecord>> samples_of_intervals(
 std::vector<std::optional<stimuli::ObjectSpec>> shown_objects(const protocols::Protocol& protocol,
                                                               const data::TrialRecord& recorded) {
   const protocols::Trial trial = trial_of(protocol, recorded);
-  if (!recorded.task) {
-    stimuli::ObjectSpec object = protocol.stimuli[static_cast<std::size_t>(trial.stimulus)].object;
-    object.pose = stimuli::compose({Vec3(0), trial.orientation}, object.pose);
-    return {object};
-  }
   std::vector<std::optional<stimuli::ObjectSpec>> shown;
-  for (const data::IntervalRecord& recorded_one : recorded.task->intervals) {
+  for (const data::IntervalRecord& recorded_one : data::intervals_of(recorded)) {
     const protocols::Interval one = interval_of(protocol, recorded_one, false);
     shown.push_back(one.stimulus < 0 ? std::nullopt
                                      : std::optional(shown_object(protocol, trial, one)));
@@ -371,16 +361,14 @@ RenderedForce rendered(const servo::Sample& sample) {
 }
 
 ReplayedInterval interval_of(const data::TrialRecord& record, std::size_t number) {
-  if (!record.task) return {record.shape, record.renderer};
-  const data::IntervalRecord& interval = record.task->intervals[number];
+  const data::IntervalRecord interval = data::intervals_of(record)[number];
   return {interval.stimulus, interval.renderer, interval.level, interval.standard};
 }
 
 /// The renderers of the intervals: "point", "ray" or, in order of appearance, "point, ray".
 std::string renderers_of(const data::TrialRecord& record, bool other) {
-  if (!record.task) return other_renderer(record.renderer, other);
   std::string all;
-  for (const data::IntervalRecord& interval : record.task->intervals) {
+  for (const data::IntervalRecord& interval : data::intervals_of(record)) {
     const std::string one = other_renderer(interval.renderer, other);
     if (all.find(one) == std::string::npos) all += (all.empty() ? "" : ", ") + one;
   }

@@ -174,7 +174,7 @@ using protocols::PageItem;
 using protocols::PageSpec;
 using protocols::TaskKind;
 
-constexpr double kTaskSecond_ns = 1e9;
+constexpr double kPerSecond_ns = 1e9;
 
 /// Whether the comparison answers the question of `compare`. At the standard's own level, where
 /// either answer would do, it follows the rule of the other levels.
@@ -250,7 +250,7 @@ void Session::tell_interval(const protocols::Trial& trial, const participants::I
 
 std::optional<participants::Answer> Session::wait_in_interval(
     const participants::IntervalView& view, std::optional<double> limit, ServoState& servo) {
-  const std::int64_t limit_ns = limit ? std::llround(*limit * kTaskSecond_ns) : 0;
+  const std::int64_t limit_ns = limit ? std::llround(*limit * kPerSecond_ns) : 0;
   while (true) {
     const servo::Sample& sample = station_.servo.next();
     servo = {sample.faults, sample.trouble};
@@ -335,7 +335,7 @@ std::optional<participants::Answer> Session::adjust(const protocols::Trial& tria
     const double spent =
         first_onset_ns == 0
             ? 0
-            : static_cast<double>(station_.clock.now_ns() - first_onset_ns) / kTaskSecond_ns;
+            : static_cast<double>(station_.clock.now_ns() - first_onset_ns) / kPerSecond_ns;
     std::optional<participants::Answer> answer;
     if (spent < block.time_out) answer = wait_in_interval(view, block.time_out - spent, servo);
     if (servo.tripped()) return std::nullopt;
@@ -500,8 +500,6 @@ void Session::tell_page(const PageView& view) {
 
 namespace {
 
-constexpr double kPerSecond_ns = 1e9;
-
 std::array<double, 3> values(const Vec3& v) { return {v.x, v.y, v.z}; }
 
 }  // namespace
@@ -647,27 +645,10 @@ std::optional<participants::Answer> Session::show_stimulus(const protocols::Tria
                                  station_.protocol.home.margin,
                              station_.protocol.home.rest};
   station_.servo.prepare(station_.library.scene(trial), renderer_for(trial.renderer), home);
-  return wait_for_answer(servo);
-}
-
-std::optional<participants::Answer> Session::wait_for_answer(ServoState& servo) {
-  const std::int64_t limit_ns = std::llround(station_.protocol.response.time_out * kPerSecond_ns);
-  while (true) {
-    const servo::Sample& sample = station_.servo.next();
-    servo = {sample.faults, sample.trouble};
-    if (servo.tripped()) return std::nullopt;
-    if (sample.phase == servo::Phase::feeling) {
-      record_onset_and_contact(sample);
-      contact_.add(sample);
-      if (station_.protocol.samples) record_sample(sample);
-      record_.response_ns = sample.time_ns;
-    }
-    const std::optional<participants::Answer> answer = participant_.step(sample);
-    if (answer && answer->time_ns - record_.onset_ns < limit_ns) return answer;
-    record_.timed_out =
-        sample.phase == servo::Phase::feeling && sample.time_ns - record_.onset_ns >= limit_ns;
-    if (record_.timed_out) return std::nullopt;
-  }
+  const auto answer = wait_in_interval({}, station_.protocol.response.time_out, servo);
+  record_.timed_out = !answer && !servo.tripped();
+  add_quality(station_.servo.stop());
+  return answer;
 }
 
 bool Session::run_trial() {
@@ -692,8 +673,7 @@ bool Session::run_trial() {
     cut_off(error.what());
     throw;
   }
-  const servo::ServoQuality last = station_.servo.stop();
-  if (!record_.task) quality_ = last;  // intervals have been added one by one
+  station_.servo.stop();
   if (servo.tripped()) {
     const std::string reason = trip_reason(servo.faults, servo.trouble);
     cut_off(reason);

@@ -202,7 +202,6 @@ class Session {
   };
   std::optional<participants::Answer> show_stimulus(const protocols::Trial& trial,
                                                     ServoState& servo);
-  std::optional<participants::Answer> wait_for_answer(ServoState& servo);
   // Version 2 (session.cpp)
   void plan_task(const protocols::Trial& trial, data::TrialRecord& record) const;
   std::optional<participants::Answer> show_intervals(const protocols::Trial& trial,

@@ -16,9 +16,10 @@ constexpr std::size_t kMostKnown = 32;  // a sphere with its trees takes a megab
 protocols::StimulusSpec shown_stimulus(const protocols::Protocol& protocol,
                                        const protocols::Trial& trial,
                                        const protocols::Interval& interval) {
-  const auto& block = protocol.blocks[static_cast<std::size_t>(trial.task_block)];
-  if (interval.level)
+  if (interval.level) {
+    const auto& block = protocol.blocks[static_cast<std::size_t>(trial.task_block)];
     return protocols::at_level(protocol, block, interval.stimulus, *interval.level);
+  }
   return protocol.stimuli[static_cast<std::size_t>(interval.stimulus)];
 }
 

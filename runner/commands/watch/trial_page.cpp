@@ -262,9 +262,7 @@ double steps_of(const std::string& name) {
   return kPerMetre;
 }
 
-std::string stimulus_words(const data::TrialRecord& record, std::size_t interval) {
-  if (!record.task) return record.shape;
-  const data::IntervalRecord& shown = record.task->intervals[interval];
+std::string stimulus_words(const data::IntervalRecord& shown) {
   if (shown.stimulus.empty()) return "nothing";
   return shown.stimulus + (shown.level ? ", level " + analysis::short_number(*shown.level) : "") +
          (shown.standard ? ", standard" : "");
@@ -282,7 +280,8 @@ class PageBuilder {
 
   TrialPage build() {
     std::size_t objects = 0;
-    for (const WatchedTrial& one : trials_) objects += one.trial.stored.record.task ? 2 : 1;
+    for (const WatchedTrial& one : trials_)
+      objects += data::intervals_of(one.trial.stored.record).size();
     // An object's share of the page; each requested trial has at least one object.
     most_triangles_ =
         std::max<std::size_t>(kMostTriangles / std::max<std::size_t>(objects, 1), 300);
@@ -344,14 +343,13 @@ class PageBuilder {
   Json parts_json(const session::RecordedTrial& trial, const ShownTicks& ticks, bool other) {
     const data::TrialRecord& record = trial.stored.record;
     const auto objects = session::shown_objects(trial.protocol, record);
+    const std::vector<data::IntervalRecord> intervals = data::intervals_of(record);
     Json parts = Json::array();
     for (std::size_t i = 0; i < ticks.intervals.size(); ++i) {
-      const std::string& renderer =
-          record.task ? record.task->intervals[i].renderer : record.renderer;
-      const std::string label = printable(stimulus_words(record, i));
+      const std::string label = printable(stimulus_words(intervals[i]));
       Json part = {{"ticks", ticks.intervals[i]},
                    {"label", "interval " + std::to_string(i + 1) + ": " + label + ", " +
-                                 renderer_words(renderer, other)},
+                                 renderer_words(intervals[i].renderer, other)},
                    {"mesh", nullptr}};
       if (objects[i]) {
         part["mesh"] = add_mesh(*objects[i], label);
