@@ -287,7 +287,6 @@ namespace {
 
 using protocols::LevelScale;
 
-constexpr double kHalfChiSquared95 = 0.5 * 3.841458820694124;
 constexpr double kOpenEnd = std::numeric_limits<double>::infinity();
 
 /// The point towards `limit` where a profile, above 0 at `inside`, falls to 0; nullopt: it does

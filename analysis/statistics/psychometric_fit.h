@@ -15,6 +15,10 @@
 
 namespace palpate::analysis {
 
+/// Half the 95 % quantile of chi-squared with one degree of freedom: differences of log-likelihood
+/// beyond it are significant.
+inline constexpr double kHalfChiSquared95 = 0.5 * 3.841458820694124;
+
 struct SimplexMinimum {
   std::vector<double> place;
   double value = 0;

@@ -376,7 +376,6 @@ std::vector<LevelCount> counts_to_fit(const ParticipantFunction& one,
 /// Sets the model's direction to the expected one, or to the other if that fits clearly better.
 void set_direction(ParticipantFunction& one, const DetectionCounts& detections, bool catches,
                    protocols::Easier expected) {
-  constexpr double kHalfChiSquared95 = 0.5 * 3.841458820694124;
   using protocols::Easier;
   one.model.function.easier = expected;
   if (easier_of(one.counts) == expected) return;

@@ -1,11 +1,12 @@
 """A session of two intervals in windows, for as long as is wanted: nothing may crash.
 
-Usage: windows_soak.py PALPATE [--minutes M] [--seed S] [--size 1024x768] [--manager openbox|xfwm4]
+Usage: windows_soak.py PALPATE [--minutes M] [--seed S] [--size 1024x768] [--manager openbox|xfwm4] [--slow FACTOR]
 
 It begins with pages, then takes turns: trials that are answered, with the pointer on the object; windows that are
 moved and resized; pauses; the emergency button; a session that is closed by its window and begun again. Meant for
 builds with AddressSanitizer (preset asan) or, with
-`--with "valgrind --suppressions=tests/shared/valgrind.supp --error-exitcode=9"`, for portable ones. Drawn
+`--slow 20 --size 640x480 --with "valgrind --suppressions=tests/shared/valgrind.supp --error-exitcode=9"`, for
+portable ones: there a frame takes seconds, and keys must wait for it. Drawn
 in software with one thread, which is where a driver's errors of timing have been seen.
 """
 
@@ -90,7 +91,7 @@ class Soak:
             self.screen.point(self.console, self.draw.randint(60, 500), self.draw.randint(100, 300))
             for key in ("space", self.draw.choice("12"), "space", self.draw.choice("12")):
                 self.screen.key(key)
-                time.sleep(0.4)
+                time.sleep(0.4 * self.options.slow)
         elif what < 0.9:
             self.counts["resized"] += 1
             window = self.draw.choice([self.participant, self.console])
@@ -146,6 +147,7 @@ def main():
     options.add_argument("palpate")
     options.add_argument("--minutes", type=float, default=10)
     options.add_argument("--seed", type=int, default=1)
+    options.add_argument("--slow", type=float, default=1, help="times the usual pauses between keys")
     options.add_argument("--size", default="1024x768")
     options.add_argument("--manager", choices=["openbox", "xfwm4"])
     options.add_argument("--with", dest="using", default="", help="a command to run it with")
