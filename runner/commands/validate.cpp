@@ -142,7 +142,7 @@ void print_summary(const protocols::Protocol& protocol, std::ostream& out) {
 
 void print_verdict(const std::string& what, const std::vector<std::string>& reasons,
                    const std::vector<session::LimitedMaterial>& limited, std::ostream& out) {
-  out << "    " << std::left << std::setw(15) << what
+  out << "    " << std::left << std::setw(17) << what
       << (reasons.empty() ? limited.empty() ? "yes" : "yes, with limits:" : "no:") << "\n";
   for (const std::string& reason : reasons) out << "      " << printable(reason) << "\n";
   if (!reasons.empty()) return;
