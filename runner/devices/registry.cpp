@@ -146,7 +146,8 @@ std::optional<std::string> read_all(int from, std::chrono::seconds patience) {
 
 /// What `work` returns in a separate process, which a maker's library can crash or hold up.
 /// \param what  "listing these devices". \throws std::runtime_error
-Json in_child(const std::function<Json()>& work, std::chrono::seconds patience, std::string what) {
+Json in_child(const std::function<Json()>& work, std::chrono::seconds patience,
+              const std::string& what) {
   int ends[2];
   if (pipe2(ends, O_CLOEXEC) != 0) throw std::runtime_error(what + ": " + std::strerror(errno));
   const int runner = getpid();
