@@ -18,13 +18,15 @@
 #include "stimuli/orientation.h"
 
 namespace palpate::rendering {
-namespace {
 
 bool all_finite(const Rendering& r) {
   return finite(r.force) && finite(r.torque) && finite(r.device1) && finite(r.device2) &&
          finite(r.deepest.point) && finite(r.deepest.normal) && std::isfinite(r.deepest.depth) &&
-         std::isfinite(r.deepest.along) && finite(r.ideal.tip) && finite(r.ideal.tail);
+         std::isfinite(r.deepest.along) && finite(r.ideal.tip) && finite(r.ideal.tail) &&
+         finite(r.ideal_side);
 }
+
+namespace {
 
 /// Relative to the contact's force; levers relative to the lengths from which they were computed.
 double force_error(const Renderer& renderer, const LineProbe& probe, const Rendering& r,

@@ -14,6 +14,9 @@ namespace palpate::rendering {
 // Errors of one tick of a renderer over a scene of one convex part, against the brute-force
 // reference. For checks, not for the servo.
 
+/// Whether all numbers of a rendering are finite.
+bool all_finite(const Rendering& r);
+
 /// The part of the probe that can touch, in the frame of the part's mesh: for the point renderer
 /// the tip alone.
 LineProbe felt_probe(const Scene& scene, const Renderer& renderer, const LineProbe& probe);

@@ -10,6 +10,7 @@
 #include <sstream>
 #include <utility>
 
+#include "rendering/verification/search.h"
 #include "stimuli/primitives.h"
 
 namespace palpate::rendering {
@@ -172,12 +173,6 @@ const double kSinBlend = std::sin(kFlat / 2);         // of equation (2)
 constexpr double kTurned = 1e-9;                      // rad; less is rounding
 constexpr std::uint32_t kCounted = render_fault::kContactCapped | render_fault::kReleased;
 
-bool all_finite(const Rendering& r) {
-  Vec3 sum = r.force + r.torque + r.device1 + r.device2 + r.ideal.tip + r.ideal.tail + r.ideal_side;
-  if (r.contacts > 0) sum += r.deepest.point + r.deepest.normal * r.deepest.depth;
-  return std::isfinite(sum.x) && std::isfinite(sum.y) && std::isfinite(sum.z);
-}
-
 /// The axes of a tool from its stylus and +x.
 Mat3 axes_of(const LineProbe& stylus, const Vec3& side) {
   const Vec3 z = glm::normalize(stylus.tail - stylus.tip);
@@ -196,9 +191,9 @@ double distance_to_segment(const Vec3& p, const Vec3& a, const Vec3& b) {
 }
 
 /// One walk in progress.
-class Walk {
+class UnionWalker {
  public:
-  Walk(const Renderer& renderer, UnionWalk drawn, std::uint64_t seed, std::uint64_t walk)
+  UnionWalker(const Renderer& renderer, UnionWalk drawn, std::uint64_t seed, std::uint64_t walk)
       : renderer_(renderer),
         walk_(std::move(drawn)),
         oracle_(walk_.parts, walk_.tool),
@@ -382,7 +377,7 @@ UnionCounts& UnionCounts::operator+=(const UnionCounts& other) {
 
 UnionCounts search_union(const Renderer& renderer, UnionWalk drawn, std::uint64_t seed,
                          std::uint64_t walk) {
-  return Walk(renderer, std::move(drawn), seed, walk).run();
+  return UnionWalker(renderer, std::move(drawn), seed, walk).run();
 }
 
 UnionCounts search_union(const Renderer& renderer, std::uint64_t seed, std::uint64_t walk) {
