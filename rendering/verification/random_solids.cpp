@@ -243,7 +243,7 @@ namespace {
 
 using Index = std::uint32_t;
 
-struct Plane {
+struct FacePlane {
   Vec3 normal;
   double offset;
 };
@@ -251,11 +251,11 @@ struct Plane {
 /// A convex solid that can be cut. planes[i] is that of soup.faces[i].
 struct Block {
   stimuli::PolygonSoup soup;
-  std::vector<Plane> planes;
+  std::vector<FacePlane> planes;
 
   /// Removes what is above the plane. Corners on it count as below, so it must not pass through
   /// one; random planes do not.
-  void cut(const Plane& plane) {
+  void cut(const FacePlane& plane) {
     const auto height = [&](Index v) {
       return glm::dot(plane.normal, soup.vertices[v]) - plane.offset;
     };
@@ -272,7 +272,7 @@ struct Block {
     };
     std::map<Index, Index> rim;  // around the cut, clockwise seen from outside
     stimuli::PolygonSoup left;
-    std::vector<Plane> planes_left;
+    std::vector<FacePlane> planes_left;
     for (std::size_t f = 0; f < soup.faces.size(); ++f) {
       std::vector<Index> face;
       Index out = 0, back = 0;
@@ -379,7 +379,7 @@ stimuli::PolygonSoup polar_of_cut_cube(Random& random, int cuts) {
 
 stimuli::PolygonSoup part_below(const stimuli::PolygonSoup& solid, const Vec3& normal,
                                 double offset) {
-  Block block{solid, std::vector<Plane>(solid.faces.size(), Plane{Vec3(0), 0})};
+  Block block{solid, std::vector<FacePlane>(solid.faces.size(), FacePlane{Vec3(0), 0})};
   block.cut({normal, offset});
   return block.tidy();
 }
