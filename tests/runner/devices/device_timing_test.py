@@ -6,22 +6,19 @@ Usage: device_timing_test.py PALPATE EMULATED_INVERSE_SERVICE STUB_LIBDRD STUB_L
 
 import datetime
 import json
-import mmap
 import os
 import pathlib
 import re
-import struct
 import subprocess
 import sys
 import tempfile
 import unittest
 
+from stub_state import StubState
+
 PALPATE, SERVICE, DRD, HD, *FALCONS = sys.argv[1:6]
 PATIENCE = 120  # s; only a hang reaches it
 RATE = 100  # Hz, that a busy machine keeps
-# As in stub_state.h: the number of devices, then the numbers of each.
-FIELDS = ("serial model hand_x hand_y hand_z hand_stiffness connected power reset in_use wrong buttons too_fast error delay").split()
-NUMBERS = 27  # of each device
 
 
 class Timing(unittest.TestCase):
@@ -31,19 +28,10 @@ class Timing(unittest.TestCase):
         self.folder = pathlib.Path(scratch.name)
         self.calibration = self.folder / "lab.json"
         state = self.folder / "stub"
-        state.write_bytes(bytes(8 * (1 + 2 * NUMBERS)))
-        self.file = open(state, "r+b")
-        self.addCleanup(self.file.close)
-        self.stub = mmap.mmap(self.file.fileno(), 0)
+        self.stub = StubState(state)
         self.addCleanup(self.stub.close)
-        struct.pack_into("d", self.stub, 0, 1)
-        self.set(serial=4711, model=1, hand_stiffness=400, connected=1, power=1)
+        self.stub.set(serial=4711, model=1, hand_stiffness=400, connected=1, power=1)
         self.environment = {**os.environ, "PALPATE_STUB_STATE": str(state)}
-
-    def set(self, **numbers):
-        for name, number in numbers.items():  # at once: pack_into would write a zero first
-            at = 8 * (1 + FIELDS.index(name))
-            self.stub[at:at + 8] = struct.pack("d", number)
 
     def service(self):
         process = subprocess.Popen([SERVICE], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
@@ -80,7 +68,7 @@ class Timing(unittest.TestCase):
 
     def test_what_a_library_takes_is_measured(self):
         quick = self.time("forcedimension", "--library", DRD)
-        self.set(delay=0.003)  # s, of each pose
+        self.stub.set(delay=0.003)  # s, of each pose
         slow = self.time("forcedimension", "--library", DRD)
         # A pose is as old as the library takes to give it.
         self.assertGreaterEqual(slow["pose_age_ns"]["median"], 3_000_000)
@@ -124,7 +112,7 @@ class Timing(unittest.TestCase):
         self.palpate("devices", "--timing", "--device", "forcedimension", "--seconds", 0, status=2)
         for option in (["--guarded"], ["--no-fifo"], ["--core", 0]):
             self.palpate("devices", "--timing", "--device", "forcedimension", "--library", DRD, *option, status=2)
-        self.set(connected=0)
+        self.stub.set(connected=0)
         self.palpate("devices", "--timing", "--device", "forcedimension", "--library", DRD, status=1)
         self.palpate("devices", "--report", self.folder / "r.json", "--json", self.folder / "j.json", status=2)
         self.assertEqual([one.name for one in self.folder.iterdir()], ["stub"])
@@ -133,7 +121,7 @@ class Timing(unittest.TestCase):
         library = self.folder / "anna" / "libdrd.so"
         library.parent.mkdir()
         library.symlink_to(DRD)
-        self.set(serial=47112)  # the library has 16 bits
+        self.stub.set(serial=47112)  # the library has 16 bits
         out = self.folder / "found.json"
         options = ("devices", "--device", "forcedimension", "--library", library, "--rate", RATE, "--report", out)
         self.palpate(*options)

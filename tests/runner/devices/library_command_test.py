@@ -5,12 +5,10 @@ Usage: library_command_test.py PALPATE forcedimension|touch STUB_LIBRARY
 
 import contextlib
 import json
-import mmap
 import os
 import pathlib
 import re
 import sqlite3
-import struct
 import subprocess
 import sys
 import tempfile
@@ -19,14 +17,11 @@ import unittest
 import unittest.mock
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "session"))
+from stub_state import StubState  # noqa: E402
 from terminal import Terminal  # noqa: E402
 
 PALPATE, KIND, STUB = sys.argv[1:4]
 PATIENCE = 120  # s; only a hang reaches it
-# As in stub_state.h: the number of devices, then the numbers of each.
-FIELDS = ("serial model hand_x hand_y hand_z hand_stiffness connected power reset in_use wrong buttons too_fast error "
-          "delay force_x force_y force_z torque_x torque_y torque_z forces_on brakes watchdog open commands "
-          "last_command moved").split()
 PROTOCOL = {
     "version": 1, "name": "touch", "renderers": ["ray"], "torque": "left_out", "seed": 3, "samples": True,
     "servo": {"rate_hz": 100}, "material": {"stiffness_n_per_m": 50},
@@ -43,36 +38,16 @@ EXPECTED = {
 }[KIND]
 
 
-class Stub:
-    """The first device's numbers by name."""
-
+class Stub(StubState):
     def __init__(self, path):
-        path.write_bytes(bytes(8 * (1 + 2 * len(FIELDS))))
-        self._file = open(path, "r+b")
-        self._map = mmap.mmap(self._file.fileno(), 0)
-        struct.pack_into("d", self._map, 0, 1)
+        super().__init__(path)
         self.set(serial=4711, model=0, hand_stiffness=400, connected=1, power=1)
-
-    def set(self, **numbers):
-        for name, number in numbers.items():  # at once: pack_into would write a zero first
-            at = 8 * (1 + FIELDS.index(name))
-            self._map[at:at + 8] = struct.pack("d", number)
-
-    def get(self, name):
-        return struct.unpack_from("d", self._map, 8 * (1 + FIELDS.index(name)))[0]
 
     def hand_to_the_right(self, metres):
         self.set(**{"hand_" + EXPECTED["right"]: metres})
 
     def force_to_the_right(self):
         return self.get("force_" + EXPECTED["right"])
-
-    def force(self):
-        return max(abs(self.get(f"force_{axis}")) for axis in "xyz")
-
-    def close(self):
-        self._map.close()
-        self._file.close()
 
 
 class DeviceBehindALibrary(unittest.TestCase):

@@ -7,11 +7,9 @@ Usage: pair_command_test.py PALPATE forcedimension2 STUB_LIBRARY
 
 import contextlib
 import json
-import mmap
 import os
 import pathlib
 import sqlite3
-import struct
 import subprocess
 import sys
 import tempfile
@@ -20,6 +18,7 @@ import unittest
 import unittest.mock
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "session"))
+from stub_state import StubState  # noqa: E402
 from terminal import Terminal  # noqa: E402
 
 PALPATE, KIND, MAKERS = sys.argv[1:4]
@@ -41,48 +40,30 @@ def in_tail_frame(at):
 
 
 class StubEnds:
-    """As in stub_state.h: the number of devices, then the numbers of each."""
-
-    FIELDS = ("serial model hand_x hand_y hand_z hand_stiffness connected power reset in_use wrong buttons too_fast "
-              "error delay force_x force_y force_z").split()
-    NUMBERS = 27  # of each device
     serials = ("4711", "4712")
     options = ("--library", MAKERS)
 
     def __init__(self, folder):
         path = folder / "stub"
-        path.write_bytes(bytes(8 * (1 + 2 * self.NUMBERS)))
         self.environment = {"PALPATE_STUB_STATE": str(path)}
-        self._file = open(path, "r+b")
-        self._map = mmap.mmap(self._file.fileno(), 0)
-        struct.pack_into("d", self._map, 0, 2)
+        self._state = StubState(path, 2)
         for end in (0, 1):
-            self._set(end, serial=4711 + end, model=1, hand_stiffness=400, connected=1, power=1)
-
-    def _place(self, end, name):
-        return 8 * (1 + end * self.NUMBERS + self.FIELDS.index(name))
-
-    def _set(self, end, **numbers):
-        for name, number in numbers.items():  # at once: pack_into would write a zero first
-            at = self._place(end, name)
-            self._map[at:at + 8] = struct.pack("d", number)
+            self._state.set(end, serial=4711 + end, model=1, hand_stiffness=400, connected=1, power=1)
 
     def hand(self, end, x, y, z):
         if KIND == "touch2":  # x right, y up, z to the user
-            self._set(end, hand_x=x, hand_y=z, hand_z=-y)
+            self._state.set(end, hand_x=x, hand_y=z, hand_z=-y)
         else:  # x to the user, y right
-            self._set(end, hand_x=-y, hand_y=x, hand_z=z)
+            self._state.set(end, hand_x=-y, hand_y=x, hand_z=z)
 
     def plug(self, end, there):
-        self._set(end, connected=int(there))
+        self._state.set(end, connected=int(there))
 
     def pushes(self, end):
-        return any(abs(struct.unpack_from("d", self._map, self._place(end, f"force_{axis}"))[0]) > 0.005
-                   for axis in "xyz")
+        return self._state.force(end) > 0.005
 
     def close(self):
-        self._map.close()
-        self._file.close()
+        self._state.close()
 
 
 class Inverse3Ends:
