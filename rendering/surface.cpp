@@ -7,12 +7,10 @@
 #include <limits>
 #include <numeric>
 
-#include "rendering/surface_patch.h"
+#include "rendering/surface_search.h"
 
 namespace palpate::rendering {
 namespace {
-
-constexpr std::uint32_t kLeaf = 4;
 
 /// Six times the signed volume below d's plane, in doubles, and a bound of its rounding error
 /// (Shewchuk 1997, orient3d's filter).
@@ -35,6 +33,24 @@ float rounded_up(double value) {
   return static_cast<double>(near) < value
              ? std::nextafter(near, std::numeric_limits<float>::infinity())
              : near;
+}
+
+/// Moves the `first` triangles along the longest extent of the middles to the front.
+void split(std::span<const Vec3> middles, std::span<std::uint32_t> triangles, std::size_t first) {
+  Vec3 low(HUGE_VAL), high(-HUGE_VAL);
+  for (const std::uint32_t triangle : triangles) {
+    low = glm::min(low, middles[triangle]);
+    high = glm::max(high, middles[triangle]);
+  }
+  const Vec3 extent = high - low;
+  int axis = 0;
+  if (extent[1] > extent[axis]) axis = 1;
+  if (extent[2] > extent[axis]) axis = 2;
+  std::nth_element(
+      triangles.begin(), triangles.begin() + static_cast<std::ptrdiff_t>(first), triangles.end(),
+      [&](std::uint32_t p, std::uint32_t q) {
+        return middles[p][axis] != middles[q][axis] ? middles[p][axis] < middles[q][axis] : p < q;
+      });
 }
 
 }  // namespace
@@ -128,75 +144,84 @@ void Surface::build_tree() {
     const auto& c = triangles_[i].corners;
     middles[i] = (vertices_[c[0]] + vertices_[c[1]] + vertices_[c[2]]) / 3.0;
   }
-  order_.resize(triangles_.size());
-  std::iota(order_.begin(), order_.end(), 0U);
-  nodes_.reserve(triangles_.size());
-  normals_.reserve(triangles_.size());
-  build_node(middles, 0, static_cast<std::uint32_t>(order_.size()));
+  std::vector<std::uint32_t> order(triangles_.size());
+  std::iota(order.begin(), order.end(), 0U);
+  nodes_.reserve(triangles_.size() / (kWidth - 1) + 16);
+  build_node(middles, order);
   nodes_.shrink_to_fit();
   normals_.shrink_to_fit();
 }
 
-std::uint32_t Surface::build_node(std::span<const Vec3> middles, std::uint32_t begin,
-                                  std::uint32_t end) {
+/// Divides the triangles among the children of a new node. All nodes are full, except for the last
+/// of each level.
+std::uint32_t Surface::build_node(std::span<const Vec3> middles,
+                                  std::span<std::uint32_t> triangles) {
   const auto index = static_cast<std::uint32_t>(nodes_.size());
-  Vec3 low(HUGE_VAL), high(-HUGE_VAL), first_middle(HUGE_VAL), last_middle(-HUGE_VAL);
-  for (std::uint32_t i = begin; i < end; ++i) {
-    for (const std::uint32_t corner : triangles_[order_[i]].corners) {
-      low = glm::min(low, vertices_[corner]);
-      high = glm::max(high, vertices_[corner]);
-    }
-    first_middle = glm::min(first_middle, middles[order_[i]]);
-    last_middle = glm::max(last_middle, middles[order_[i]]);
-  }
   Node node;
-  for (int k = 0; k < 3; ++k) {
-    const auto at = static_cast<std::size_t>(k);
-    node.middle[at] = static_cast<float>(0.5 * (low[k] + high[k]));
-    const double middle = node.middle[at];
-    node.half[at] = rounded_up(std::max(high[k] - middle, middle - low[k]));
+  for (std::size_t k = 0; k < 3; ++k) {
+    node.low[k] = Lanes{} + std::numeric_limits<float>::infinity();
+    node.high[k] = -node.low[k];
   }
-  node.first = begin;
-  node.count = end - begin;
+  Normals normals;
+  node.leaf = triangles.size() <= kWidth;
+  std::size_t share = 1;  // triangles of a child
+  while (share * kWidth < triangles.size()) share *= kWidth;
   nodes_.push_back(node);
-  normals_.push_back(normals_of(begin, end));
-  if (end - begin <= kLeaf) return index;
-  const Vec3 extent = last_middle - first_middle;
-  int axis = 0;
-  if (extent[1] > extent[axis]) axis = 1;
-  if (extent[2] > extent[axis]) axis = 2;
-  const std::uint32_t half = (begin + end) / 2;
-  std::nth_element(
-      order_.begin() + begin, order_.begin() + half, order_.begin() + end,
-      [&](std::uint32_t p, std::uint32_t q) {
-        return middles[p][axis] != middles[q][axis] ? middles[p][axis] < middles[q][axis] : p < q;
-      });
-  build_node(middles, begin, half);
-  const std::uint32_t right = build_node(middles, half, end);
-  nodes_[index].first = right;
-  nodes_[index].count = 0;
+  normals_.push_back(normals);
+  std::size_t child = 0;
+  const auto divide = [&](const auto& self, std::span<std::uint32_t> some) -> void {
+    if (some.size() > share) {
+      const std::size_t half = (some.size() + share) / (2 * share) * share;
+      split(middles, some, half);
+      self(self, some.first(half));
+      self(self, some.subspan(half));
+      return;
+    }
+    set_box(some, child, node);
+    set_normals(some, child, normals);
+    node.children[child] = node.leaf ? some.front() : build_node(middles, some);
+    ++child;
+  };
+  divide(divide, triangles);
+  nodes_[index] = node;
+  normals_[index] = normals;
   return index;
 }
 
-Surface::Normals Surface::normals_of(std::uint32_t begin, std::uint32_t end) const {
+void Surface::set_box(std::span<const std::uint32_t> triangles, std::size_t child,
+                      Node& node) const {
+  Vec3 low(HUGE_VAL), high(-HUGE_VAL);
+  for (const std::uint32_t triangle : triangles) {
+    for (const std::uint32_t corner : triangles_[triangle].corners) {
+      low = glm::min(low, vertices_[corner] - centre_);
+      high = glm::max(high, vertices_[corner] - centre_);
+    }
+  }
+  for (int k = 0; k < 3; ++k) {
+    node.low[static_cast<std::size_t>(k)][child] = -rounded_up(-low[k]);
+    node.high[static_cast<std::size_t>(k)][child] = rounded_up(high[k]);
+  }
+}
+
+void Surface::set_normals(std::span<const std::uint32_t> triangles, std::size_t child,
+                          Normals& normals) const {
   Vec3 low(HUGE_VAL), high(-HUGE_VAL);
   const auto add = [&](const Vec3& normal) {
     low = glm::min(low, normal);
     high = glm::max(high, normal);
   };
-  for (std::uint32_t i = begin; i < end; ++i) {
-    const SurfaceTriangle& t = triangles_[order_[i]];
+  for (const std::uint32_t index : triangles) {
+    const SurfaceTriangle& t = triangles_[index];
     add(t.normal);
     for (std::uint32_t k = 0; k < 3; ++k) {
-      if (owns(t, order_[i], k) && t.touches(k))
+      if (owns(t, index, k) && t.touches(k))
         add(triangles_[SurfaceTriangle::triangle_of(t.across[k])].normal);
     }
   }
-  Normals out;
   for (int k = 0; k < 3; ++k)
-    out.middle[static_cast<std::size_t>(k)] = static_cast<float>(0.5 * (low[k] + high[k]));
-  out.radius = rounded_up(0.5 * glm::length(high - low) + 1e-6);
-  return out;
+    normals.middle[static_cast<std::size_t>(k)][child] =
+        static_cast<float>(0.5 * (low[k] + high[k]));
+  normals.radius[child] = rounded_up(0.5 * glm::length(high - low) + 1e-6);
 }
 
 int Surface::winding(const Vec3& point) const {
@@ -210,7 +235,7 @@ int Surface::winding(const Vec3& point) const {
                      Vec3(flat * std::cos(turn), flat * std::sin(turn), rise);
     count = 0;
     bool clear = true;
-    near_segment(point, way, 0, [&](std::uint32_t index) {
+    near_segment(point, way, [&](std::uint32_t index) {
       const SurfaceTriangle& t = triangles_[index];
       const Vec3 a = vertices_[t.corners[0]] - point, b = vertices_[t.corners[1]] - point,
                  c = vertices_[t.corners[2]] - point;

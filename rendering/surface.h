@@ -42,6 +42,22 @@ struct SurfaceShell {
   stimuli::Material material;
 };
 
+/// Bits for the parts of a triangle and a segment that can touch.
+namespace surface_pair {
+inline constexpr std::uint8_t kSides = 7;  ///< bit k: side k, which is the triangle's own
+inline constexpr std::uint8_t kTip = 8, kTail = 16;
+inline constexpr std::uint8_t kAll = 31;
+}  // namespace surface_pair
+
+/// A segment whose ends move linearly, with room about them.
+struct SegmentMotion {
+  Vec3 start, end;          ///< m, the ends at first
+  Vec3 start_way, end_way;  ///< m, their motion
+  double start_room = 0;    ///< m; the start may be so far off
+  double end_room = 0;      ///< m; the same of the end, and of points between interpolated
+  double turn = 0;          ///< m; one end may be so far off relative to the other
+};
+
 /// Immutable. Several shells, which may overlap, are one surface: the solid is their union.
 class Surface {
  public:
@@ -54,36 +70,33 @@ class Surface {
   double radius() const { return radius_; }  ///< m, of that sphere
   double size() const { return 2 * radius_; }
 
-  /// Of the tree: a box in single precision, rounded outwards.
-  struct Node {
-    std::array<float, 3> middle, half;
-    std::uint32_t first = 0;  ///< leaf: of order(); else the right child, the left one is the next
-    std::uint32_t count = 0;  ///< leaf: triangles; else 0
+  /// Of the tree: the boxes of up to eight children side by side, relative to the centre, in single
+  /// precision and rounded outwards. An unused box is empty.
+  static constexpr std::size_t kWidth = 8;
+  using Lanes = float __attribute__((vector_size(sizeof(float) * kWidth)));
+  struct alignas(64) Node {
+    std::array<Lanes, 3> low{}, high{};
+    std::array<std::uint32_t, kWidth> children{};  ///< of a leaf: triangles; else nodes
+    bool leaf = false;
   };
-  /// A ball around the normals of a node's triangles and their neighbours across touched edges.
-  struct Normals {
-    std::array<float, 3> middle;
-    float radius = 0;
+  /// For each child a ball around the normals of its triangles and of their neighbours across
+  /// touched edges.
+  struct alignas(64) Normals {
+    std::array<Lanes, 3> middle{};
+    Lanes radius{};
   };
-  const stimuli::LargeArray<Node>& nodes() const { return nodes_; }
-  const stimuli::LargeArray<std::uint32_t>& order() const { return order_; }
 
-  /// Calls visit(triangle) for all triangles within `room` of the segment, and for some farther
-  /// ones. Defined in surface_patch.h. \param visit  returns whether to continue
-  template <class Visit>
-  void near_segment(const Vec3& start, const Vec3& along, double room, const Visit& visit) const;
+  // Searches; defined in surface_search.h.
 
-  /// How far a segment may move. Points between its ends move by the interpolated distance.
-  struct Motion {
-    double start = 0, end = 0;  ///< m
-    double turn = 0;            ///< m; one end relative to the other
-  };
-  /// Calls visit(triangle) for all triangles that the segment can touch within the motion: with an
-  /// end, or on a silhouette edge that the triangle owns. Also visits some that it cannot touch.
+  /// Calls visit(triangle) for all triangles that meet the segment, and for some others near it.
   /// \param visit  returns whether to continue
   template <class Visit>
-  void touchable(const Vec3& start, const Vec3& along, const Motion& motion,
-                 const Visit& visit) const;
+  void near_segment(const Vec3& start, const Vec3& along, const Visit& visit) const;
+  /// Calls visit(triangle, what) for all triangles that the segment can touch within the motion:
+  /// with an end, or on a silhouette edge that the triangle owns. Also visits some that it cannot
+  /// touch. \param visit  `what`: bits of surface_pair; returns whether to continue
+  template <class Visit>
+  void touchable(const SegmentMotion& motion, const Visit& visit) const;
 
   /// How often the surface winds round a point that does not lie on it.
   int winding(const Vec3& point) const;
@@ -92,15 +105,16 @@ class Surface {
   void add(const SurfaceShell& shell);
   void find_edges();
   void build_tree();
-  std::uint32_t build_node(std::span<const Vec3> middles, std::uint32_t begin, std::uint32_t end);
-  Normals normals_of(std::uint32_t begin, std::uint32_t end) const;
+  std::uint32_t build_node(std::span<const Vec3> middles, std::span<std::uint32_t> triangles);
+  void set_box(std::span<const std::uint32_t> triangles, std::size_t child, Node& node) const;
+  void set_normals(std::span<const std::uint32_t> triangles, std::size_t child,
+                   Normals& normals) const;
 
   stimuli::LargeArray<Vec3> vertices_;
   stimuli::LargeArray<SurfaceTriangle> triangles_;
   std::vector<stimuli::Material> materials_;
   stimuli::LargeArray<Node> nodes_;
   stimuli::LargeArray<Normals> normals_;  // by node
-  stimuli::LargeArray<std::uint32_t> order_;
   Vec3 centre_;
   double radius_ = 0;
 };

@@ -8,15 +8,13 @@
 #include "rendering/probes.h"
 #include "rendering/render_fault.h"
 #include "rendering/surface_patch.h"
+#include "rendering/surface_search.h"
 #include "rendering/surface_tool.h"
 
 namespace palpate::rendering {
 namespace {
 
-constexpr std::size_t kFewNear = 12, kManyNear = 48;    // wanted length of a list
 constexpr double kSmallRoom = 1e-6, kLargeRoom = 0.25;  // of the size
-constexpr double kSomeTicks = 3;                        // a short list lasts for about so many
-constexpr double kMostOfRoom = 0.75;                    // for the motion; the rest is for pushes
 constexpr double kStep = 0.02;                          // rad; larger turns are divided
 constexpr int kMostSteps = 64, kContactSteps = 8;       // steps of a tick; at a first contact
 
@@ -39,164 +37,67 @@ SurfacePlane SurfaceTool::plane_at(const SurfacePatch& patch) const {
   return {patch, plane.normal, plane.depth};
 }
 
-/// m, the greatest distances of segment ends from their places in the list.
-EndRooms SurfaceTool::moved_from_list(const PosedTool& at, const Vec3& by) const {
-  double start2 = 0, end2 = 0;
-  for (std::size_t j = 0; j < at.count; ++j) {
-    const Vec3 start = at.segments[j].start + by - own_.listed.segments[j].start;
-    const Vec3 end = start + at.segments[j].along - own_.listed.segments[j].along;
-    start2 = std::max(start2, glm::dot(start, start));
-    end2 = std::max(end2, glm::dot(end, end));
-  }
-  return {std::sqrt(start2), std::sqrt(end2)};
+/// m, the farthest that it reaches from its tip.
+double SurfaceTool::tool_size() const {
+  return carried_ != nullptr ? tick_.scene.tool_reach() : glm::length(tick_.tool.d);
 }
 
-/// m, how far the tool may still move in any direction before the list is incomplete.
-double SurfaceTool::room_left(const PosedTool& at, const Vec3& by) const {
-  if (!own_.has_list) return 0;
-  const EndRooms moved = moved_from_list(at, by);
-  return std::min(own_.room.start - moved.start, own_.room.end - moved.end);
-}
-
-/// Lists everything within `room` of the tool that it can touch. Clears has_list if that is more
-/// than `most`.
-void SurfaceTool::list(const PosedTool& at, const EndRooms& room, std::size_t most) {
-  own_.near.clear();
-  own_.listed = at;
-  own_.room = room;
-  own_.has_list = true;
-  const double start = room.start + 4 * skin_, end = room.end + 4 * skin_;
-  const Surface::Motion far{start, end, start + end};  // the ends may move opposite ways
-  for (std::size_t j = 0; j < at.count && own_.has_list; ++j) {
-    const PosedTool::Segment& segment = at.segments[j];
-    surface_.touchable(segment.start, segment.along, far, [&](std::uint32_t triangle) {
-      const std::uint8_t what = within(triangle, segment, far);
-      if (what == 0) return true;
-      own_.has_list = own_.near.size() < most;
-      if (own_.has_list) own_.near.push_back({triangle, static_cast<std::uint8_t>(j), what});
-      return own_.has_list;
-    });
-  }
-}
-
-/// The parts of a triangle that the segment can touch while it moves by at most `far`: bits of
-/// surface_pair.
-std::uint8_t SurfaceTool::within(std::uint32_t index, const PosedTool::Segment& segment,
-                                 const Surface::Motion& far) const {
-  const SurfaceTriangle& t = surface_.triangles()[index];
-  const Vec3 &a = surface_.vertices()[t.corners[0]], &b = surface_.vertices()[t.corners[1]],
-             &c = surface_.vertices()[t.corners[2]];
-  const Vec3 low = glm::min(a, glm::min(b, c)), high = glm::max(a, glm::max(b, c));
-  const auto end_is_near = [&](const Vec3& p, double room) {
-    return std::abs(glm::dot(t.normal, p - a)) <= room && p.x >= low.x - room &&
-           p.y >= low.y - room && p.z >= low.z - room && p.x <= high.x + room &&
-           p.y <= high.y + room && p.z <= high.z + room;
-  };
-  std::uint8_t what = end_is_near(segment.start, far.start) ? surface_pair::kTip : std::uint8_t{0};
-  if (segment.along == Vec3(0)) return what;
-  if (end_is_near(segment.end(true), far.end)) what |= surface_pair::kTail;
-  const double own = glm::dot(t.normal, segment.along);
-  for (std::uint32_t k = 0; k < 3; ++k) {
-    if (!owns(t, index, k) || !t.touches(k)) continue;
-    const double other = glm::dot(
-        surface_.triangles()[SurfaceTriangle::triangle_of(t.across[k])].normal, segment.along);
-    if (std::min(own, other) > far.turn || std::max(own, other) < -far.turn) continue;
-    if (!side_is_near(k == 0 ? a : k == 1 ? b : c, k == 0 ? b : k == 1 ? c : a, segment, far))
-      continue;
-    what |= static_cast<std::uint8_t>(1U << k);
-  }
-  return what;
-}
-
-/// Whether the segment may reach the ball around the edge from v0 to v1.
-bool SurfaceTool::side_is_near(const Vec3& v0, const Vec3& v1, const PosedTool::Segment& segment,
-                               const Surface::Motion& far) const {
-  const Vec3 middle = 0.5 * (v0 + v1) - segment.start, half = 0.5 * (v1 - v0);
-  const double length2 = glm::dot(segment.along, segment.along);
-  const double at = std::clamp(glm::dot(middle, segment.along) / length2, 0.0, 1.0);
-  const double radius = glm::length(half) * (1 + 1e-9);
-  // Farther along, the segment may move farther or less far.
-  const double reach = (radius + std::max(far.start, far.end)) / std::sqrt(length2);
-  const double farthest = std::clamp(far.end > far.start ? at + reach : at - reach, 0.0, 1.0);
-  const double room = radius + far.start + farthest * (far.end - far.start);
-  const Vec3 apart = middle - at * segment.along;
-  return glm::dot(apart, apart) <= room * room;
-}
-
-/// Renews the list if the motion of the tool may leave it.
-void SurfaceTool::keep_list(const PosedTool& from, const PosedTool& to) {
-  const auto is_listed = [&](const PosedTool& at) {
-    const EndRooms moved = moved_from_list(at, Vec3(0));
-    return moved.start <= own_.made_for.start && moved.end <= own_.made_for.end;
-  };
-  if (own_.has_list && is_listed(from) && is_listed(to)) return;
-  if (!own_.crowded) {
-    list_for_some_ticks(from, to);
-    if (own_.has_list) return;
-  }
-  list_for_this_tick(from, to);
-  own_.crowded = !own_.has_list || own_.near.size() > kFewNear / 3 * to.count;
-}
-
-/// Lists as much room as a short list allows.
-void SurfaceTool::list_for_some_ticks(const PosedTool& from, const PosedTool& to) {
-  const std::size_t few = kFewNear * to.count, many = kManyNear * to.count;
-  const double size = surface_.size();
-  if (!(own_.wanted_room > 0)) own_.wanted_room = 0.01 * size;
-  own_.listed = to;
-  const EndRooms moved = moved_from_list(from, Vec3(0));
-  const EndRooms needed{kSomeTicks * moved.start + 8 * skin_, kSomeTicks * moved.end + 8 * skin_};
-  EndRooms room{std::max(needed.start, own_.wanted_room), std::max(needed.end, own_.wanted_room)};
-  list(to, room, many);
-  while (!own_.has_list && (room.start > needed.start || room.end > needed.end)) {
-    room = {std::max(needed.start, 0.5 * room.start), std::max(needed.end, 0.5 * room.end)};
-    list(to, room, many);
-  }
-  own_.made_for = {kMostOfRoom * room.start, kMostOfRoom * room.end};
-  const double least = std::min(room.start, room.end);
-  if (own_.has_list && own_.near.size() < few)
-    own_.wanted_room = 1.5 * least;
-  else
-    own_.wanted_room = std::min(least, own_.wanted_room);
-  own_.wanted_room = std::clamp(own_.wanted_room, kSmallRoom * size, kLargeRoom * size);
-}
-
-/// Lists the room of this motion and a small margin.
-void SurfaceTool::list_for_this_tick(const PosedTool& from, const PosedTool& to) {
-  PosedTool middle = to;
-  for (std::size_t j = 0; j < to.count; ++j) {
-    PosedTool::Segment& segment = middle.segments[j];
-    segment.start = 0.5 * (from.segments[j].start + to.segments[j].start);
-    segment.along = 0.5 * (from.segments[j].along + to.segments[j].along);
-  }
-  own_.listed = middle;
-  const EndRooms first = moved_from_list(from, Vec3(0)), last = moved_from_list(to, Vec3(0));
-  own_.made_for = {std::max(first.start, last.start), std::max(first.end, last.end)};
-  // A push moves both ends alike.
-  const double pushed = own_.made_for.start + 8 * skin_;
-  list(middle, {own_.made_for.start + pushed, own_.made_for.end + pushed}, own_.near.capacity());
+/// Whether the segment can touch nothing within the motion.
+bool SurfaceTool::is_clear(const SegmentMotion& motion) const {
+  bool clear = true;
+  surface_.touchable(motion, [&](std::uint32_t, std::uint8_t) { return clear = false; });
+  return clear;
 }
 
 /// Whether a free virtual tool cannot touch anything in this tick.
 bool SurfaceTool::far_away() {
-  const PosedTool before = pose(tick_.state.has_last ? all_.last : tick_.tool),
-                  now = pose(tick_.tool);
-  double step2 = 0, distance2 = HUGE_VAL;
-  for (std::size_t j = 0; j < now.count; ++j) {
-    const PosedTool::Segment &a = before.segments[j], &b = now.segments[j];
+  const ToolPose& last = tick_.state.has_last ? all_.last : tick_.tool;
+  const PosedTool before = pose(last), now = pose(tick_.tool);
+  double step2 = 0, distance2 = HUGE_VAL, from_clear2 = 0;
+  const auto far = [](const PosedTool::Segment& a, const PosedTool::Segment& b) {
     const Vec3 start = b.start - a.start, end = start + b.along - a.along;
-    step2 = std::max({step2, glm::dot(start, start), glm::dot(end, end)});
+    return std::max(glm::dot(start, start), glm::dot(end, end));
+  };
+  for (std::size_t j = 0; j < now.count; ++j) {
+    const PosedTool::Segment& b = now.segments[j];
+    step2 = std::max(step2, far(before.segments[j], b));
+    if (own_.clear_room > 0) {
+      const PosedTool::Segment& clear = own_.clear.segments[j];
+      from_clear2 = std::max({from_clear2, far(clear, before.segments[j]), far(clear, b)});
+    }
     const Vec3 to = surface_.centre() - b.start;
     const double length2 = glm::dot(b.along, b.along);
     const double t = length2 > 0 ? std::clamp(glm::dot(to, b.along) / length2, 0.0, 1.0) : 0.0;
     const Vec3 apart = to - t * b.along;
     distance2 = std::min(distance2, glm::dot(apart, apart));
   }
-  const double near = surface_.radius() + std::sqrt(step2) + 2 * skin_;
+  const double step = std::sqrt(step2), near = surface_.radius() + step + 2 * skin_;
   if (distance2 > near * near) return true;
-  keep_list(before, now);
-  return own_.has_list && own_.near.empty() && room_left(before, Vec3(0)) > 0 &&
-         room_left(now, Vec3(0)) > 0;
+  if (own_.clear_room > 0 && from_clear2 < own_.clear_room * own_.clear_room) return true;
+  // Look for room for some ticks.
+  const double size = surface_.size(), needed = 2 * step + 8 * skin_;
+  const double room = std::max(needed, own_.wanted_clear_room);
+  bool clear = true;
+  for (std::size_t j = 0; j < now.count && clear; ++j) {
+    const PosedTool::Segment& b = now.segments[j];
+    clear = is_clear({b.start, b.end(true), Vec3(0), Vec3(0), room, room, 2 * room});
+  }
+  own_.clear = now;
+  own_.clear_room = clear ? room - 4 * skin_ : 0;
+  own_.wanted_clear_room =
+      std::clamp((clear ? 2 : 0.5) * room, kSmallRoom * size, kLargeRoom * size);
+  if (clear) return true;
+  // Else for this one: it turns about its tip, by less than kStep at once, and translates.
+  const double angle = angle_between(carried_, last, tick_.tool);
+  if (angle > kStep) return false;
+  const double aside = glm::length(placed_.local_vector(tick_.tool.tip - last.tip)) + angle * step;
+  for (std::size_t j = 0; j < now.count; ++j) {
+    const PosedTool::Segment &a = before.segments[j], &b = now.segments[j];
+    if (!is_clear({a.start, a.end(true), b.start - a.start, b.end(true) - a.end(true),
+                   aside + 4 * skin_, aside + 4 * skin_, 2 * aside}))
+      return false;
+  }
+  return true;
 }
 
 /// Moves the ideal tool from a pose outside the surface as near to another pose as it can get.
@@ -208,7 +109,6 @@ void SurfaceTool::step(const ToolPose& target, const ToolPose& from) {
     most = 0.5 * turn(from, most);
     stuck_ = false;
     resume_planes();
-    collect_patches();
     translate();
   } while (most > 0 && (stuck_ || in_crack_ || !planes_.leave_room()));
   own_.carrying_count = 0;
@@ -224,23 +124,24 @@ void SurfaceTool::follow() {
     from = tick_.state.has_last ? all_.last : tick_.tool;
     memory_.grasp = Vec3(0);
     own_.carrying_count = 0;
-    int steps =
-        std::clamp(static_cast<int>(std::ceil(angle_between(carried_, from, tick_.tool) / kStep)),
-                   1, kMostSteps);
-    const auto go = [&] {
-      ToolPose at = from;
-      for (int i = 1; i <= steps; ++i) {
+    const double angle = angle_between(carried_, from, tick_.tool);
+    int steps = std::clamp(static_cast<int>(std::ceil(angle / kStep)), 1, kMostSteps);
+    const auto go = [&](int done) {
+      ToolPose at = done == 0 ? from : between(from, tick_.tool, double(done) / steps);
+      for (int i = done + 1; i <= steps; ++i) {
         step(i == steps ? tick_.tool : between(from, tick_.tool, double(i) / steps), at);
         at = pose_;
         at.tip = target_.tip + placed_.world_vector(at_);
       }
     };
-    go();
+    go(0);
     if (!planes_.empty() && steps < kContactSteps) {
-      // Finer steps find the patch that is met first.
+      // Finer steps find the patch that is met first. A tool that does not turn is free until then.
+      const bool turns = tick_.sides && angle * tool_size() > kExact * skin_;
+      const double free = turns || steps > 1 ? 0 : first_hit_ * kContactSteps - kExact;
       steps = kContactSteps;
       own_.carrying_count = 0;
-      go();
+      go(std::clamp(static_cast<int>(free), 0, steps - 1));
     }
   } else {
     step(tick_.tool, from);
@@ -256,7 +157,7 @@ bool SurfaceTool::virtual_inside() {
     const PosedTool::Segment& segment = now.segments[j];
     inside = surface_.winding(segment.start) > 0;
     if (inside || segment.along == Vec3(0)) continue;
-    surface_.near_segment(segment.start, segment.along, 0, [&](std::uint32_t index) {
+    surface_.near_segment(segment.start, segment.along, [&](std::uint32_t index) {
       const SurfaceTriangle& t = surface_.triangles()[index];
       const double a = glm::dot(t.normal, segment.start) - t.offset,
                    b = a + glm::dot(t.normal, segment.along);
@@ -471,8 +372,7 @@ void SurfaceTool::remember(std::size_t first_contact) {
     all_.most_behind = group_;
   }
   all_.exceptions |= angle > kMostLag;
-  const double size = carried_ != nullptr ? tick_.scene.tool_reach() : glm::length(pose_.d);
-  all_.reach = std::max(all_.reach, glm::length(at_) + angle * size);
+  all_.reach = std::max(all_.reach, glm::length(at_) + angle * tool_size());
   // The mean contact place: the tool turns about it at the next tick.
   Vec3 grasp(0);
   double weight = 0;

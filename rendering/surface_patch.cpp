@@ -115,6 +115,15 @@ void sweep_edge(const Surface& surface, std::uint32_t side, std::uint8_t segment
 
 }  // namespace
 
+bool exists(const Surface& surface, const SurfacePatch& patch, const PosedTool& tool) {
+  const Vec3& along = tool.segments[patch.segment].along;
+  const SurfaceTriangle& t = surface.triangles()[patch.triangle()];
+  if (patch.kind == PatchKind::face) return by_tip(t, along) != patch.tail;
+  const std::uint32_t across = t.across[SurfaceTriangle::side_of(patch.side)];
+  return by_tip(t, along) !=
+         by_tip(surface.triangles()[SurfaceTriangle::triangle_of(across)], along);
+}
+
 PatchPlane plane_of(const Surface& surface, const SurfacePatch& patch, const PosedTool& tool) {
   const PosedTool::Segment& segment = tool.segments[patch.segment];
   if (patch.kind == PatchKind::face) {

@@ -5,6 +5,7 @@
 #include <glm/geometric.hpp>
 
 #include "rendering/surface_patch.h"
+#include "rendering/surface_search.h"
 
 namespace palpate::rendering {
 namespace {
@@ -13,7 +14,6 @@ constexpr int kRounds = 96;          // casts a tick at most; then the ideal too
 constexpr double kSlidOff = 4;       // skins; farther off its patch, a contact has ended
 constexpr double kAtRest = 2e-12;    // of the size; the same without the skin
 constexpr double kOnPatch = 1e-11;   // of the size
-constexpr double kExact = 1e-5;      // of the skin; shorter distances are rounding
 constexpr double kRounding = 0.125;  // of the skin; tolerance of its width
 constexpr double kLessSkin = 0.25;   // of the skin, repeatedly, in a gap narrower than two
 constexpr double kInTheWay = 0.25;   // of the tolerance; a patch that is deeper holds the tool
@@ -26,7 +26,21 @@ constexpr int kTimes = 2;             // releases by one patch in a tick
 constexpr double kSameValley = 1e-6;  // of the size
 constexpr double kHiddenWay = 4;      // of that root
 constexpr int kMostInTheWay = 4;
-constexpr int kPieces = 64;  // of a long cast, examined one by one
+constexpr int kPieces = 64;  // the first piece of a long cast, at least
+// A list of patches. Where it is used up it is made anew, with this room:
+constexpr double kFirstRoom = 0.01, kMostRoom = 0.25;  // of the size
+constexpr double kLeastRoom = 8;                       // skins
+constexpr double kMore = 1.5, kLess = 0.5;  // of the last one, where it had few patches; many
+constexpr std::size_t kFew = 6, kMany = 24;
+constexpr double kTwice = 2;            // of the stride, after a turn
+constexpr double kGrown = 4;            // of the last one at most, in one orientation
+constexpr double kSlower = 0.75;        // of the stride; it shrinks to that in a tick
+constexpr double kUsedUp = 0.5;         // of the room is left, and a way is longer
+constexpr double kSameTurn = 0.125;     // of the tolerance; a turn that moves ends by less
+constexpr double kListed = 16;          // tolerances; error of a listed plane
+constexpr double kAlmostAlong = 1e-2;   // rad; closer to its edge its error is larger
+constexpr double kLevel = 1e-12;        // of the length; a triangle along the segment
+constexpr std::size_t kOfTriangle = 5;  // patches of a triangle at most
 
 /// m, between places of rest on the two sides of a flat valley. \param depth  of the tool
 double hidden_way(double size, double skin, double depth) {
@@ -35,45 +49,139 @@ double hidden_way(double size, double skin, double depth) {
 
 }  // namespace
 
-/// Collects the listed patches for the turned tool.
-void SurfaceTool::collect_patches() {
-  own_.patches.clear();
-  if (!own_.has_list) return;
-  for (const NearTriangle& near : own_.near) {
-    for_each_patch(surface_, near.triangle, near.segment, near.what,
-                   turned_.segments[near.segment].along, [&](const SurfacePatch& patch) {
-                     if (own_.patches.size() < own_.patches.capacity())
-                       own_.patches.push_back({plane_of(surface_, patch, turned_), patch});
-                   });
+/// Lists the patches of a triangle that the listed tool can touch, or could if it were turned by
+/// rounding. \param what  bits of surface_pair
+void SurfaceTool::list_triangle(std::uint32_t index, std::uint8_t what, std::uint8_t segment) {
+  const Vec3& along = own_.listed.segments[segment].along;
+  const double length2 = glm::dot(along, along), level = kLevel * std::sqrt(length2);
+  const SurfaceTriangle& t = surface_.triangles()[index];
+  const double own = glm::dot(t.normal, along);
+  const auto add_face = [&](bool tail) {
+    const Vec3 end = own_.listed.segments[segment].end(tail);
+    own_.patches.push_back({{t.normal, t.offset - glm::dot(t.normal, end)},
+                            {index << 2, segment, tail, SurfacePatch::Kind::face}});
+  };
+  if ((what & surface_pair::kTip) != 0 && own >= -level) add_face(false);
+  if (!(length2 > 0)) return;
+  if ((what & surface_pair::kTail) != 0 && own <= level) add_face(true);
+  if ((what & surface_pair::kSides) == 0) return;
+  for (std::uint32_t k = 0; k < 3; ++k) {
+    if (!owns(t, index, k) || !t.touches(k)) continue;
+    const SurfaceTriangle& beyond = surface_.triangles()[SurfaceTriangle::triangle_of(t.across[k])];
+    const double other = glm::dot(beyond.normal, along);
+    if (std::min(own, other) > level || std::max(own, other) < -level) continue;
+    const SurfacePatch patch{index << 2 | k, segment, false, SurfacePatch::Kind::edge};
+    own_.patches.push_back({plane_of(surface_, patch, own_.listed), patch});
+    // The normal of an edge that lies almost along the segment is sensitive to rounding.
+    const Vec3 e = surface_.vertices()[t.corners[(k + 1) % 3]] - surface_.vertices()[t.corners[k]];
+    const Vec3 across = glm::cross(e, along);
+    if (glm::dot(across, across) < kAlmostAlong * kAlmostAlong * glm::dot(e, e) * length2)
+      own_.patches.back().plane = {};
   }
 }
 
+/// Lists what is within own_.room of the listed tool; false if that is more than `most`.
+bool SurfaceTool::fill_list(std::size_t most) {
+  own_.patches.clear();
+  bool fits = true;
+  const double room = own_.room + 4 * skin_;
+  for (std::size_t j = 0; j < own_.listed.count && fits; ++j) {
+    const PosedTool::Segment& segment = own_.listed.segments[j];
+    surface_.touchable({segment.start, segment.end(true), Vec3(0), Vec3(0), room, room, 0},
+                       [&](std::uint32_t triangle, std::uint8_t what) {
+                         list_triangle(triangle, what, static_cast<std::uint8_t>(j));
+                         return fits = own_.patches.size() + kOfTriangle <= most;
+                       });
+  }
+  return fits;
+}
+
+/// Lists the patches near the turned tool at a translation, with as much room as a short list
+/// allows.
+void SurfaceTool::list_about(const Vec3& at) {
+  // A list that ends with a turn needs room for one tick.
+  const bool turned = !own_.has_list || !same_turn();
+  const double enough = !(own_.stride > 0) ? HUGE_VAL
+                        : turned           ? kTwice * own_.stride
+                                           : kGrown * own_.room;
+  own_.listed = turned_;
+  for (std::size_t j = 0; j < turned_.count; ++j) own_.listed.segments[j].start += at;
+  const double least = kLeastRoom * skin_;
+  if (!(own_.wanted_room > 0)) own_.wanted_room = kFirstRoom * surface_.size();
+  own_.room = std::clamp(std::min(own_.wanted_room, enough), least, kMostRoom * surface_.size());
+  own_.has_list = false;
+  while (!own_.has_list) {
+    const bool smallest = own_.room <= least;
+    own_.has_list = fill_list(smallest ? kMostPatches : kMany * turned_.count);
+    if (own_.has_list || smallest) break;
+    own_.room = std::max(least, kLess * own_.room);
+  }
+  const bool is_short = own_.has_list && own_.patches.size() < kFew * turned_.count;
+  if (own_.room < own_.wanted_room && is_short) return;
+  own_.wanted_room = is_short ? kMore * own_.room : own_.room;
+}
+
+/// Whether the tool has its orientation in the list.
+bool SurfaceTool::same_turn() const {
+  const Vec3 moved = from_list();
+  const double same = kSameTurn * tolerance_, same2 = same * same;
+  for (std::size_t j = 0; j < turned_.count; ++j) {
+    const PosedTool::Segment &now = turned_.segments[j], &then = own_.listed.segments[j];
+    const Vec3 turn = now.along - then.along, apart = now.start - then.start - moved;
+    if (glm::dot(turn, turn) > same2 || glm::dot(apart, apart) > same2) return false;
+  }
+  return true;
+}
+
+/// m, how far the tool may still be translated before the list is incomplete; 0 after a turn.
+double SurfaceTool::room_left(const Vec3& at) const {
+  if (!own_.has_list || !same_turn()) return 0;
+  return own_.room - glm::length(from_list() + at);
+}
+
+/// Renews the list if it is used up, or too short for a way from here.
+void SurfaceTool::keep_list(const Vec3& at, double way) {
+  const double room = room_left(at);
+  if (!(room > std::min(way, kUsedUp * own_.room))) list_about(at);
+}
+
 /// Finds the first patch on a straight line.
-PatchHit SurfaceTool::cast(const Vec3& from, const Vec3& to) const {
+PatchHit SurfaceTool::cast(const Vec3& from, const Vec3& to) {
   PatchHit first;
   const Vec3 way = to - from;
   const double length = glm::length(way);
   if (!(length > 0)) return first;
+  keep_list(from, length);
   double done = 0;
-  const double room = room_left(turned_, from);
+  const double room = room_left(from);
   if (room > 0) {
-    for (const NearPatch& near : own_.patches)
-      cast_on_patch(surface_, near.patch, near.plane, turned_, from, to, tolerance_, first);
+    const Vec3 moved = from_list(), start = from + moved, end = to + moved;
+    const double error = kListed * tolerance_;
+    for (const NearPatch& near : own_.patches) {
+      const double above = glm::dot(near.plane.normal, start) - near.plane.depth,
+                   under = near.plane.depth - glm::dot(near.plane.normal, end);
+      if (under < -error || above < -error) continue;
+      // Later than the first so far.
+      if (above - error > first.time * (above + under + 2 * error)) continue;
+      if (!exists(surface_, near.patch, turned_)) continue;
+      cast_on_patch(surface_, near.patch, rendering::plane_of(surface_, near.patch, turned_),
+                    turned_, from, to, tolerance_, first);
+    }
     done = std::min(1.0, room / length);
     if (first.time <= done || done == 1) return first;
     first = {};
   }
-  const double piece = std::max({own_.wanted_room, skin_, length / kPieces}) / length;
+  double piece = std::max({own_.room, skin_, length / kPieces}) / length;
   while (done < 1) {
-    const double end = std::min(1.0, done + 2 * piece);
-    const Vec3 middle = from + 0.5 * (done + end) * way;
-    const double reach = 0.5 * (end - done) * length + 2 * skin_;
+    const double end = std::min(1.0, done + piece);
+    const Vec3 middle = from + done * way, step = (end - done) * way;
     for (std::size_t j = 0; j < turned_.count; ++j) {
       const PosedTool::Segment& segment = turned_.segments[j];
       surface_.touchable(
-          segment.start + middle, segment.along, {reach, reach}, [&](std::uint32_t triangle) {
-            for_each_patch(surface_, triangle, static_cast<std::uint8_t>(j), surface_pair::kAll,
-                           segment.along, [&](const SurfacePatch& patch) {
+          {segment.start + middle, segment.end(true) + middle, step, step, 2 * skin_, 2 * skin_, 0},
+          [&](std::uint32_t triangle, std::uint8_t what) {
+            for_each_patch(surface_, triangle, static_cast<std::uint8_t>(j), what, segment.along,
+                           [&](const SurfacePatch& patch) {
                              cast_on_patch(surface_, patch,
                                            rendering::plane_of(surface_, patch, turned_), turned_,
                                            from, to, tolerance_, first);
@@ -84,6 +192,7 @@ PatchHit SurfaceTool::cast(const Vec3& from, const Vec3& to) const {
     if (first.time <= end) return first;
     first = {};
     done = end;
+    piece *= 2;
   }
   return first;
 }
@@ -170,7 +279,7 @@ bool SurfaceTool::past_a_patch_at_rest() const {
 }
 
 /// Looks for a patch that the tool enters when the skin is removed; sets its plane.
-bool SurfaceTool::in_the_way_at_rest(SurfacePlane& out) const {
+bool SurfaceTool::in_the_way_at_rest(SurfacePlane& out) {
   double deepest = kInTheWay * tolerance_;
   bool found = false;
   const auto look = [&](const SurfacePatch& patch, const PatchPlane& plane) {
@@ -184,19 +293,31 @@ bool SurfaceTool::in_the_way_at_rest(SurfacePlane& out) const {
     found = true;
     out = {patch, plane.normal, plane.depth};
   };
-  if (room_left(turned_, exact_) > 0) {
-    for (const NearPatch& near : own_.patches) look(near.patch, near.plane);
+  keep_list(exact_, 0);
+  if (room_left(exact_) > 0) {
+    const Vec3 moved = from_list(), rest = exact_ + moved, now = at_ + moved;
+    for (const NearPatch& near : own_.patches) {
+      const Vec3& normal = near.plane.normal;
+      if (glm::dot(normal, rest) - near.plane.depth > kListed * tolerance_ ||
+          glm::dot(normal, now) - near.plane.depth < -kListed * tolerance_ ||
+          !exists(surface_, near.patch, turned_))
+        continue;
+      look(near.patch, rendering::plane_of(surface_, near.patch, turned_));
+    }
     return found;
   }
   for (std::size_t j = 0; j < turned_.count; ++j) {
     const PosedTool::Segment& segment = turned_.segments[j];
-    surface_.touchable(
-        segment.start + exact_, segment.along, {4 * skin_, 4 * skin_}, [&](std::uint32_t triangle) {
-          for_each_patch(
-              surface_, triangle, static_cast<std::uint8_t>(j), surface_pair::kAll, segment.along,
-              [&](const SurfacePatch& patch) { look(patch, plane_of(surface_, patch, turned_)); });
-          return true;
-        });
+    surface_.touchable({segment.start + exact_, segment.end(true) + exact_, Vec3(0), Vec3(0),
+                        4 * skin_, 4 * skin_, 0},
+                       [&](std::uint32_t triangle, std::uint8_t what) {
+                         for_each_patch(surface_, triangle, static_cast<std::uint8_t>(j), what,
+                                        segment.along, [&](const SurfacePatch& patch) {
+                                          look(patch,
+                                               rendering::plane_of(surface_, patch, turned_));
+                                        });
+                         return true;
+                       });
   }
   return found;
 }
@@ -261,12 +382,19 @@ bool SurfaceTool::rests() {
 
 /// Moves the ideal tool as near to the virtual one as the surface allows.
 void SurfaceTool::translate() {
+  const Vec3 from = at_;
+  find_rest();
+  own_.stride = std::max(glm::length(at_ - from), kSlower * own_.stride);
+}
+
+void SurfaceTool::find_rest() {
   parted_count_ = 0;
   const double slack = kAtRest * surface_.size();
   for (int round = 0; round < kRounds && !stuck_; ++round) {
     Vec3 goal;
     if (!find_goal(goal)) break;
     const PatchHit hit = cast(at_, goal);
+    if (round == 0) first_hit_ = hit.time;
     if (hit.hit()) {
       move_to_hit(goal, hit);
       continue;
@@ -316,27 +444,16 @@ double most_turned(const PosedTool& from, const PosedTool& to) {
 PatchHit SurfaceTool::sweep(const PosedTool& from, const PosedTool& to, const Vec3& shift) const {
   PatchHit first;
   const double slack = kLonger * surface_.size();
-  const auto look = [&](std::uint32_t triangle, std::size_t j, std::uint8_t what) {
-    const PosedTool::Segment end{to.segments[j].start + shift, to.segments[j].along};
-    sweep_triangle(surface_, triangle, static_cast<std::uint8_t>(j), what, from.segments[j], end,
-                   tolerance_, slack, first);
-  };
-  if (room_left(from, Vec3(0)) > 0 && room_left(to, shift) > 0) {
-    for (const NearTriangle& near : own_.near) look(near.triangle, near.segment, near.what);
-    return first;
-  }
   for (std::size_t j = 0; j < to.count; ++j) {
     const PosedTool::Segment& a = from.segments[j];
     const PosedTool::Segment b{to.segments[j].start + shift, to.segments[j].along};
-    const Vec3 start = 0.5 * (a.start + b.start), along = 0.5 * (a.along + b.along);
-    const Vec3 turned = 0.5 * (b.along - a.along);
-    const Surface::Motion reach{0.5 * glm::length(b.start - a.start) + 2 * skin_,
-                                0.5 * glm::length(b.end(true) - a.end(true)) + 2 * skin_,
-                                glm::length(turned)};
-    surface_.touchable(start, along, reach, [&](std::uint32_t triangle) {
-      look(triangle, j, surface_pair::kAll);
-      return true;
-    });
+    surface_.touchable({a.start, a.end(true), b.start - a.start, b.end(true) - a.end(true),
+                        2 * skin_, 2 * skin_, 0},
+                       [&](std::uint32_t triangle, std::uint8_t what) {
+                         sweep_triangle(surface_, triangle, static_cast<std::uint8_t>(j), what, a,
+                                        b, tolerance_, slack, first);
+                         return true;
+                       });
   }
   return first;
 }
@@ -353,10 +470,7 @@ double SurfaceTool::turn(const ToolPose& from, double most) {
   planes_.clear();
   // Turn about the grasp, from the last place.
   const double motion = most_moved(before, whole, apart + shift);
-  PosedTool near_whole = whole;
-  for (std::size_t j = 0; j < whole.count; ++j) near_whole.segments[j].start += apart + shift;
-  keep_list(before, near_whole);
-  if (motion == 0) {
+  if (motion <= kExact * skin_) {
     pose_ = target_;
     turned_ = whole;
     at_ = apart;

@@ -39,23 +39,17 @@ class SurfaceTool {
   bool virtual_inside();
 
  private:
+  static constexpr double kExact = 1e-5;  // of the skin; shorter distances are rounding
+
   // surface_contact.cpp
   PosedTool pose(const ToolPose& at) const;
   Vec3 turned(const Vec3& grasp, const ToolPose& at) const {
     return carried_ != nullptr ? at.frame * grasp : grasp.z * at.d;
   }
+  double tool_size() const;
   bool far_away();
+  bool is_clear(const SegmentMotion& motion) const;
   void step(const ToolPose& target, const ToolPose& from);
-  void keep_list(const PosedTool& from, const PosedTool& to);
-  void list_for_some_ticks(const PosedTool& from, const PosedTool& to);
-  void list_for_this_tick(const PosedTool& from, const PosedTool& to);
-  void list(const PosedTool& at, const EndRooms& room, std::size_t most);
-  std::uint8_t within(std::uint32_t index, const PosedTool::Segment& segment,
-                      const Surface::Motion& far) const;
-  bool side_is_near(const Vec3& v0, const Vec3& v1, const PosedTool::Segment& segment,
-                    const Surface::Motion& far) const;
-  EndRooms moved_from_list(const PosedTool& at, const Vec3& by) const;
-  double room_left(const PosedTool& at, const Vec3& by) const;
   SurfacePlane plane_at(const SurfacePatch& patch) const;
 
   // Turning.
@@ -65,15 +59,22 @@ class SurfaceTool {
   PatchHit sweep(const PosedTool& from, const PosedTool& to, const Vec3& shift) const;
 
   // Translating.
-  void collect_patches();
-  PatchHit cast(const Vec3& from, const Vec3& to) const;
+  void keep_list(const Vec3& at, double way);
+  void list_about(const Vec3& at);
+  bool fill_list(std::size_t most);
+  void list_triangle(std::uint32_t index, std::uint8_t what, std::uint8_t segment);
+  bool same_turn() const;
+  double room_left(const Vec3& at) const;
+  Vec3 from_list() const { return turned_.segments[0].start - own_.listed.segments[0].start; }
+  PatchHit cast(const Vec3& from, const Vec3& to);
   void resume_planes();
   void translate();
+  void find_rest();
   bool find_goal(Vec3& goal);
   void move_to_hit(const Vec3& goal, const PatchHit& hit);
   bool find_exact_place();
   bool rests();
-  bool in_the_way_at_rest(SurfacePlane& plane) const;
+  bool in_the_way_at_rest(SurfacePlane& plane);
   void take_plane(const SurfacePlane& plane);
   void let_go_of_idle_planes();
   bool let_go_of_slid_planes(const Vec3& at, double slack);
@@ -110,6 +111,7 @@ class SurfaceTool {
   };
   std::array<Parted, 8> parted_;  ///< the last patches that released the tool in this tick
   std::size_t parted_count_ = 0;
+  double first_hit_ = 0;  ///< PatchHit::time of the first cast of a step
   bool stuck_ = false;
   bool in_crack_ = false;  ///< opposite planes are less than a skin apart
 };

@@ -72,38 +72,27 @@ struct PlacedSurface {
   }
 };
 
-/// A triangle near a segment of the tool, and the features of the two that can meet.
-struct NearTriangle {
-  std::uint32_t triangle = 0;
-  std::uint8_t segment = 0;
-  std::uint8_t what = 0;  ///< bits of surface_pair
-};
-
-/// A patch near the tool in this tick's orientation.
+/// A patch near the tool.
 struct NearPatch {
-  PatchPlane plane;
+  PatchPlane plane;  ///< for the tool where it was listed; without a normal: not known
   SurfacePatch patch;
-};
-
-/// m, of the first ends of a tool's segments, and of the second ends.
-struct EndRooms {
-  double start = 0, end = 0;
 };
 
 /// A surface's state between ticks. Local frame, m.
 struct SurfaceState {
   std::array<SurfacePatch, kMostPlanes> carrying;  ///< held the ideal tool at the last tick
   std::size_t carrying_count = 0;
-  /// All that the tool can touch while no end of it is farther than `room` from its place at
-  /// `listed`.
-  std::vector<NearTriangle> near;
+  /// All that the tool can touch while it is translated by less than `room`, m, from `listed`.
+  std::vector<NearPatch> patches;
   PosedTool listed;
-  EndRooms room;
-  EndRooms made_for;       ///< the part of the room that a motion may use
+  double room = 0;
   double wanted_room = 0;  ///< for the next list
+  double stride = 0;       ///< m, how far the ideal tool is translated in a tick, about
   bool has_list = false;
-  bool crowded = false;            ///< a list for some ticks would be long: each is for one tick
-  std::vector<NearPatch> patches;  ///< of this tick
+  /// The tool touches nothing while no end of it is farther than `clear_room`, m, from `clear`.
+  PosedTool clear;
+  double clear_room = 0;
+  double wanted_clear_room = 0;  ///< for the next one
   /// The contacts of the last tick; their friction is in UnionMemory::pairs.
   struct Rubbed {
     Vec3 normal;
@@ -113,8 +102,8 @@ struct SurfaceState {
   std::array<Rubbed, kMostPlanes> rubbed;
 };
 
-/// The longest list of triangles; where there are more, each tick queries the tree.
-inline constexpr std::size_t kMostNear = 1024, kMostPatches = 2 * kMostNear;
+/// The longest list of patches; where there are more, each motion queries the tree.
+inline constexpr std::size_t kMostPatches = 512;
 
 // The planes that hold an ideal tool. Internal to the contact law of unions (union_contact.h).
 

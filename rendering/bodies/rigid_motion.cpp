@@ -11,7 +11,7 @@
 #include <optional>
 #include <stdexcept>
 
-#include "rendering/surface_patch.h"
+#include "rendering/surface_search.h"
 
 namespace palpate::rendering {
 namespace {
@@ -334,7 +334,7 @@ class LineMoments {
     crossings_.clear();
     const Vec3 way(0, 0, length);
     const Vec3 start = from + out_.about;
-    surface_.near_segment(start, way, 0, [&](std::uint32_t index) {
+    surface_.near_segment(start, way, [&](std::uint32_t index) {
       const SurfaceTriangle& t = surface_.triangles()[index];
       if (t.normal.z == 0) return true;
       bool in = true, out = true;

@@ -11,6 +11,7 @@
 
 #include "data/base/random.h"
 #include "rendering/surface_patch.h"
+#include "rendering/surface_search.h"
 #include "rendering/verification/surface_stroke.h"
 #include "runner/bench/allocation_count.h"
 #include "stimuli/closed_surface.h"
@@ -486,6 +487,7 @@ TEST(SurfaceTree, FindsAllThatAMovingSegmentCanTouch) {
     const auto corner = [&](std::uint32_t k) { return surface.vertices()[t.corners[k % 3]]; };
     const double length = 0.2 * random.unit();
     Vec3 start, end;
+    std::uint8_t expected = i % 4 == 0 ? surface_pair::kTail : surface_pair::kTip;
     if (i % 2 == 0) {  // an end on the triangle
       const double a = random.unit(), b = (1 - a) * random.unit();
       start = corner(0) + a * (corner(1) - corner(0)) + b * (corner(2) - corner(0));
@@ -501,18 +503,27 @@ TEST(SurfaceTree, FindsAllThatAMovingSegmentCanTouch) {
       if (glm::dot(t.normal, along) * glm::dot(other, along) >= 0) continue;
       start = corner(k) + random.unit() * e - random.unit() * along;
       end = start + along;
+      expected = surface_pair::kSides;
       ++sides;
     }
-    const Surface::Motion motion{1e-3 * random.unit(), 5e-3 * random.unit()};
-    const Vec3 from_start = random.unit() * motion.start * direction(random),
-               from_end = random.unit() * motion.end * direction(random);
+    // The pose is some way along a motion, and off it by less than the room.
+    SegmentMotion motion;
+    motion.start_room = 1e-3 * random.unit();
+    motion.end_room = 5e-3 * random.unit();
+    const double time = random.unit();
+    if (i % 3 > 0) {
+      motion.start_way = 2e-3 * random.unit() * direction(random);
+      motion.end_way = 1e-2 * random.unit() * direction(random);
+    }
+    motion.turn = motion.start_room + motion.end_room;
+    motion.start =
+        start - time * motion.start_way - random.unit() * motion.start_room * direction(random);
+    motion.end = end - time * motion.end_way - random.unit() * motion.end_room * direction(random);
     bool found = false;
-    surface.touchable(start - from_start, (end - from_end) - (start - from_start),
-                      {motion.start, motion.end, motion.start + motion.end},
-                      [&](std::uint32_t triangle) {
-                        found = triangle == index;
-                        return !found;
-                      });
+    surface.touchable(motion, [&](std::uint32_t triangle, std::uint8_t what) {
+      found = triangle == index && (what & expected) != 0;
+      return !found;
+    });
     ASSERT_TRUE(found) << i;
   }
   EXPECT_GT(sides, 1000);
