@@ -13,70 +13,86 @@ from task_study import PALPATE, PEOPLE, TaskStudy, logistic, rows_of_a_study
 FIXTURES = pathlib.Path(__file__).with_name("fixtures")
 
 
-def best_with_lapses_at_both_ends(case, function, scale):
-    """By the definition: maximum and profile likelihood with one lapse rate up to 0.06 at both ends."""
-    place = math.log10 if scale == "log" else float
-    points = [(place(level), n, k) for level, n, k in zip(case["levels"], case["n"], case["k"])]
-    core = {"logistic": logistic, "normal": statistics.NormalDist().cdf,
-            "weibull": lambda z: 1 - math.exp(-10 ** min(z, 30))}[function]
+def golden_section(f, low, high, steps=44):
+    """The least value of f, and where it is."""
+    share = (math.sqrt(5) - 1) / 2
+    a, b = high - share * (high - low), low + share * (high - low)
+    at_a, at_b = f(a), f(b)
+    for _ in range(steps):
+        if at_a < at_b:
+            high, b, at_b = b, a, at_a
+            a = high - share * (high - low)
+            at_a = f(a)
+        else:
+            low, a, at_a = a, b, at_b
+            b = low + share * (high - low)
+            at_b = f(b)
+    return min(((f(x), x) for x in (low, high, (low + high) / 2)))
 
-    def loss(threshold, log_slope, lapse):
+
+class LapsesAtBothEnds:
+    """By the definition: maximum and profile likelihood with one lapse rate up to 0.06 at both ends."""
+
+    def __init__(self, case, function, scale):
+        place = math.log10 if scale == "log" else float
+        self.points = [(place(level), n, k) for level, n, k in zip(case["levels"], case["n"], case["k"])]
+        self.core = {"logistic": logistic, "normal": statistics.NormalDist().cdf,
+                     "weibull": lambda z: 1 - math.exp(-10 ** min(z, 30))}[function]
+        self.back = (lambda x: 10 ** x) if scale == "log" else float
+        xs = [x for x, _, _ in self.points]
+        self.low, self.high = min(xs), max(xs)
+        self.steep = math.log(40 / (self.high - self.low))  # wide enough: the maximum lies within
+        self.flat = self.steep - 4
+
+    def loss(self, threshold, log_slope, lapse):
         total = 0
-        for x, n, k in points:
+        for x, n, k in self.points:
             z = max(-700, min(700, math.exp(log_slope) * (x - threshold)))
-            p = min(1 - 1e-15, max(1e-15, lapse + (1 - 2 * lapse) * core(z)))
+            p = min(1 - 1e-15, max(1e-15, lapse + (1 - 2 * lapse) * self.core(z)))
             total -= k * math.log(p) + (n - k) * math.log(1 - p)
         return total
 
-    def golden(f, low, high, steps=44):
-        share = (math.sqrt(5) - 1) / 2
-        a, b = high - share * (high - low), low + share * (high - low)
-        at_a, at_b = f(a), f(b)
-        for _ in range(steps):
-            if at_a < at_b:
-                high, b, at_b = b, a, at_a
-                a = high - share * (high - low)
-                at_a = f(a)
-            else:
-                low, a, at_a = a, b, at_b
-                b = low + share * (high - low)
-                at_b = f(b)
-        return min(((f(x), x) for x in (low, high, (low + high) / 2)))
+    def over_slope(self, threshold, lapse):
+        return golden_section(lambda s: self.loss(threshold, s, lapse), self.flat, self.steep)
 
-    xs = [x for x, _, _ in points]
-    low, high = min(xs), max(xs)
-    steep = math.log(40 / (high - low))  # wide enough: the maximum lies within
-    flat = steep - 4
+    def over_lapse(self, threshold):
+        inner = golden_section(lambda r: self.over_slope(threshold, r)[0], 0, 0.06, 30)
+        return min(inner, *((self.over_slope(threshold, r)[0], r) for r in (0, 0.06)))
 
-    def best(threshold=None, lapse=None):
+    def best(self, threshold=None, lapse=None):
         """Loss, threshold, log slope and lapse, with what is given held."""
-        def over_slope(t, rate):
-            return golden(lambda s: loss(t, s, rate), flat, steep)
-        def over_rate(t):
-            if lapse is not None:
-                return over_slope(t, lapse)[0], lapse
-            return min(golden(lambda r: over_slope(t, r)[0], 0, 0.06, 30), (over_slope(t, 0)[0], 0), (over_slope(t, 0.06)[0], 0.06))
-        t = threshold if threshold is not None else golden(lambda x: over_rate(x)[0], low, high, 34)[1]
-        value, rate = over_rate(t)
-        return value, t, over_slope(t, rate)[1], rate
+        def at(t):
+            return self.over_lapse(t) if lapse is None else (self.over_slope(t, lapse)[0], lapse)
 
-    least, threshold, log_slope, lapse = best()
-    allowed = least + 0.5 * 3.841458820694124
+        t = threshold if threshold is not None else golden_section(lambda x: at(x)[0], self.low, self.high, 34)[1]
+        value, rate = at(t)
+        return value, t, self.over_slope(t, rate)[1], rate
 
-    def end(inside, outside, held):
-        if held(outside) <= allowed:
-            return outside
-        for _ in range(16):
-            middle = (inside + outside) / 2
-            inside, outside = (middle, outside) if held(middle) <= allowed else (inside, middle)
-        return (inside + outside) / 2
+    def found(self):
+        least, threshold, log_slope, lapse = self.best()
+        allowed = least + 0.5 * 3.841458820694124
 
-    back = (lambda x: 10 ** x) if scale == "log" else float
-    reach = (high - low) / 4
-    return {"log_likelihood": -least, "threshold": back(threshold), "slope": math.exp(log_slope), "fitted_lapse": lapse,
-            "threshold_low": back(end(threshold, threshold - reach, lambda t: best(threshold=t)[0])),
-            "threshold_high": back(end(threshold, threshold + reach, lambda t: best(threshold=t)[0])),
-            "lapse_low": end(lapse, 0, lambda r: best(lapse=r)[0]), "lapse_high": end(lapse, 0.06, lambda r: best(lapse=r)[0])}
+        def end(inside, outside, held):
+            if held(outside) <= allowed:
+                return outside
+            for _ in range(16):
+                middle = (inside + outside) / 2
+                inside, outside = (middle, outside) if held(middle) <= allowed else (inside, middle)
+            return (inside + outside) / 2
+
+        reach = (self.high - self.low) / 4
+        low, high = (end(threshold, threshold + way, lambda t: self.best(threshold=t)[0]) for way in (-reach, reach))
+        return {"log_likelihood": -least, "threshold": self.back(threshold), "slope": math.exp(log_slope),
+                "fitted_lapse": lapse, "threshold_low": self.back(low), "threshold_high": self.back(high),
+                "lapse_low": end(lapse, 0, lambda r: self.best(lapse=r)[0]),
+                "lapse_high": end(lapse, 0.06, lambda r: self.best(lapse=r)[0])}
+
+
+def trials_of(case, standard):
+    return [{"participant_id": "T1", "session": 1, "block": 1, "trial": 1000 * place + i + 1, "renderer": "ray",
+             "shape": "ball", "response": "2", "correct": 1, "task": "compare", "block_name": "b", "track": 1,
+             "level": level, "standard_level": standard, "success": int(i < k)}
+            for place, (level, n, k) in enumerate(zip(case["levels"], case["n"], case["k"])) for i in range(n)]
 
 
 class PsychometricFunctions(TaskStudy):
@@ -98,19 +114,14 @@ class PsychometricFunctions(TaskStudy):
 
     def test_functions_by_command_are_those_of_r(self):
         """Maximum likelihood by R's optim on the definition (fixtures/make_psychophysics.R): of a comparison about a standard,
-        and of a forced choice. The JND of a forced choice is measured half-way from guessing to certainty, of a Weibull
-        function by its inverse."""
+        and of a forced choice."""
         for case in json.loads((FIXTURES / "psychophysics.json").read_text())["by_command"]:
             function, scale = case["name"].split()
             both_sides = case["guess"] == 0
             standard = 500 if both_sides else 100
             if both_sides:  # R's lower end is 0 there, without lapses
-                case |= best_with_lapses_at_both_ends(case, function, scale)
-            rows = [{"participant_id": "T1", "session": 1, "block": 1, "trial": 1000 * place + i + 1, "renderer": "ray", "shape": "ball",
-                     "response": "2", "correct": 1, "task": "compare", "block_name": "b", "track": 1, "level": level,
-                     "standard_level": standard, "success": int(i < k)}
-                    for place, (level, n, k) in enumerate(zip(case["levels"], case["n"], case["k"])) for i in range(n)]
-            self.write(rows)
+                case |= LapsesAtBothEnds(case, function, scale).found()
+            self.write(trials_of(case, standard))
             for chosen in ([["--scale", scale]] if function != "weibull" else [[], ["--scale", "log"]]):
                 with self.subTest(case["name"], guess=case["guess"], chosen=chosen):
                     done = self.analyze("--function", function, *chosen, "--json", self.path / "one.json", "--force")
@@ -120,24 +131,33 @@ class PsychometricFunctions(TaskStudy):
                     fit = cell["psychometric_functions"][0]["fit"]
                     self.assertEqual((fit["function"], fit["scale"], fit["guess"]),
                                      (function, scale, fit["lapse"] if both_sides else case["guess"]))
-                    self.assertEqual(fit["guess_is_lapse"], both_sides)
-                    self.assertAlmostEqual(fit["log_likelihood"], case["log_likelihood"], delta=1e-6)
-                    self.assertAlmostEqual(fit["threshold"] / case["threshold"], 1, delta=1e-4)
-                    self.assertAlmostEqual(fit["slope"] / case["slope"], 1, delta=2e-3)
-                    self.assertAlmostEqual(fit["lapse"], case["fitted_lapse"], delta=1e-4)
-                    for end, value in zip(("lapse_low", "lapse_high"), fit["lapse_ci95"]):
-                        self.assertAlmostEqual(value, case[end], delta=1e-4)
-                    self.assertEqual(fit["guess_ci95"], fit["lapse_ci95"] if both_sides else [case["guess"]] * 2)
-                    for end, value in zip(("threshold_low", "threshold_high"), fit["threshold_ci95"]):
-                        self.assertAlmostEqual(value / case[end], 1, delta=1e-3)
-                    if case["guess"] == 0.5:
-                        half_way = fit["threshold"] * (math.log(2) ** (1 / fit["slope"]) if function == "weibull" else 1)
-                        self.assertAlmostEqual(fit["jnd"], half_way - standard, delta=1e-6 * standard)
-                    elif scale == "log":
-                        quartile = {"logistic": lambda p: math.log(p / (1 - p)), "normal": statistics.NormalDist().inv_cdf,
-                                    "weibull": lambda p: math.log10(-math.log(1 - p))}[function]
-                        ratio = 10 ** ((quartile(0.75) - quartile(0.25)) / 2 / fit["slope"])
-                        self.assertAlmostEqual(fit["weber_fraction"], ratio - 1, delta=1e-6)
+                    self.check_fit(fit, case, both_sides)
+                    self.check_discrimination(fit, case["guess"], standard)
+
+    def check_fit(self, fit, case, both_sides):
+        self.assertEqual(fit["guess_is_lapse"], both_sides)
+        self.assertAlmostEqual(fit["log_likelihood"], case["log_likelihood"], delta=1e-6)
+        self.assertAlmostEqual(fit["threshold"] / case["threshold"], 1, delta=1e-4)
+        self.assertAlmostEqual(fit["slope"] / case["slope"], 1, delta=2e-3)
+        self.assertAlmostEqual(fit["lapse"], case["fitted_lapse"], delta=1e-4)
+        for end, value in zip(("lapse_low", "lapse_high"), fit["lapse_ci95"]):
+            self.assertAlmostEqual(value, case[end], delta=1e-4)
+        self.assertEqual(fit["guess_ci95"], fit["lapse_ci95"] if both_sides else [case["guess"]] * 2)
+        for end, value in zip(("threshold_low", "threshold_high"), fit["threshold_ci95"]):
+            self.assertAlmostEqual(value / case[end], 1, delta=1e-3)
+
+    def check_discrimination(self, fit, guess, standard):
+        """The JND of a forced choice is measured half-way from guessing to certainty, of a Weibull function by its
+        inverse."""
+        function = fit["function"]
+        if guess == 0.5:
+            half_way = fit["threshold"] * (math.log(2) ** (1 / fit["slope"]) if function == "weibull" else 1)
+            self.assertAlmostEqual(fit["jnd"], half_way - standard, delta=1e-6 * standard)
+        elif fit["scale"] == "log":
+            quartile = {"logistic": lambda p: math.log(p / (1 - p)), "normal": statistics.NormalDist().inv_cdf,
+                        "weibull": lambda p: math.log10(-math.log(1 - p))}[function]
+            ratio = 10 ** ((quartile(0.75) - quartile(0.25)) / 2 / fit["slope"])
+            self.assertAlmostEqual(fit["weber_fraction"], ratio - 1, delta=1e-6)
 
     def scales(self, *more):
         done = subprocess.run([PALPATE, "analyze", *more, "--json", self.path / "scales.json", "--force"], capture_output=True,

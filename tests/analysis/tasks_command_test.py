@@ -10,6 +10,23 @@ import unittest
 from task_study import PEOPLE, TaskStudy, logistic, rows_of_a_study
 
 
+def t_interval(values):
+    """Mean and 95 % interval by Student's t for 3 to 5 degrees of freedom."""
+    quantile = {3: 3.182446, 4: 2.776445, 5: 2.570582}[len(values) - 1]
+    half = quantile * statistics.stdev(values) / math.sqrt(len(values))
+    return statistics.mean(values), statistics.mean(values) - half, statistics.mean(values) + half
+
+
+def figures_of(cell, measure):
+    """Of each participant of a cell whose figure is determined."""
+    if cell["task"] == "adjust":
+        return {each["participant_id"]: each[measure] for each in cell["adjustments"]}
+    if cell["task"] == "rate":
+        return {each["participant_id"]: each["exponent"] for each in cell["magnitude_estimation"]["participants"]}
+    return {each["participant_id"]: each["fit"][measure] for each in cell["psychometric_functions"]
+            if each["fit"]["determined"]}
+
+
 class Tasks(TaskStudy):
     def test_known_functions_are_found(self):
         for seed in (1, 2):
@@ -139,11 +156,6 @@ class Tasks(TaskStudy):
         self.assertIn("of 30 trials", drawn)
 
     def test_means_over_participants_are_those_of_their_figures(self):
-        def t_interval(values):  # 95 %, Student's t for 3 to 5 degrees of freedom
-            quantile = {3: 3.182446, 4: 2.776445, 5: 2.570582}[len(values) - 1]
-            half = quantile * statistics.stdev(values) / math.sqrt(len(values))
-            return statistics.mean(values), statistics.mean(values) - half, statistics.mean(values) + half
-
         for seed in (1, 6):
             found = self.found(rows_of_a_study(seed))
             groups = {(one["task"], one["measure"]): one for one in found["group_results"]}
@@ -156,34 +168,34 @@ class Tasks(TaskStudy):
                 self.assertEqual(group["mean_is"], "geometric" if geometric else "arithmetic")
                 self.assertEqual([one["renderer"] for one in group["renderers"]], ["point", "ray"] if task == "compare" else ["ray"])
                 for one in group["renderers"]:
-                    cell = cells[task, one["renderer"]]
-                    if task == "adjust":
-                        values = {each["participant_id"]: each[measure] for each in cell["adjustments"]}
-                    elif task == "rate":
-                        values = {each["participant_id"]: each["exponent"] for each in cell["magnitude_estimation"]["participants"]}
-                    else:
-                        values = {each["participant_id"]: each["fit"][measure] for each in cell["psychometric_functions"]
-                                  if each["fit"]["determined"]}
+                    values = figures_of(cells[task, one["renderer"]], measure)
                     self.assertEqual({each["participant_id"]: each["value"] for each in one["participants"]}, values)
                     self.assertEqual(one["n_participants"] + one["n_undetermined"], 6)
-                    numbers = [math.log(value) if geometric else value for value in values.values()]
-                    if statistics.stdev(numbers) < 1e-6:  # the exponents are all 0.6
-                        continue
-                    expected = [math.exp(x) if geometric else x for x in t_interval(numbers)]
-                    for got, wanted in zip((one["mean"], *one["ci95"]), expected):
-                        self.assertAlmostEqual(got / wanted, 1, delta=1e-5)
-                    self.assertAlmostEqual(one["sd_of_natural_logs" if geometric else "sd"], statistics.stdev(numbers), places=9)
-                    self.assertRegex(text, rf"\n  {one['renderer']} +{one['mean']:.4g} \[{one['ci95'][0]:.4g}, {one['ci95'][1]:.4g}\] "
-                                           rf"\({one['n_participants']} participants")
-            # Point against ray: the paired comparison is of the same figures.
+                    self.check_mean(one, values.values(), geometric, text)
             for one in found["renderer_comparisons"]:
-                point, ray = groups[one["task"], one["measure"]]["renderers"]
-                ratios = [math.log(b["value"] / a["value"]) for a in point["participants"] for b in ray["participants"]
-                          if a["participant_id"] == b["participant_id"]]
-                difference, = one["differences"]
-                self.assertEqual((one["reference"], difference["renderer"]), ("point", "ray"))
-                for got, wanted in zip((difference["mean"], *difference["ci95"]), t_interval(ratios)):
-                    self.assertAlmostEqual(got, wanted, places=5)
+                self.check_comparison(one, groups)
+
+    def check_mean(self, one, values, geometric, text):
+        numbers = [math.log(value) if geometric else value for value in values]
+        if statistics.stdev(numbers) < 1e-6:  # the exponents are all 0.6
+            return
+        expected = [math.exp(x) if geometric else x for x in t_interval(numbers)]
+        for got, wanted in zip((one["mean"], *one["ci95"]), expected):
+            self.assertAlmostEqual(got / wanted, 1, delta=1e-5)
+        self.assertAlmostEqual(one["sd_of_natural_logs" if geometric else "sd"], statistics.stdev(numbers), places=9)
+        low, high = one["ci95"]
+        self.assertRegex(text, rf"\n  {one['renderer']} +{one['mean']:.4g} \[{low:.4g}, {high:.4g}\] "
+                               rf"\({one['n_participants']} participants")
+
+    def check_comparison(self, one, groups):
+        """Of point against ray, in pairs of the same figures."""
+        point, ray = groups[one["task"], one["measure"]]["renderers"]
+        ratios = [math.log(b["value"] / a["value"]) for a in point["participants"] for b in ray["participants"]
+                  if a["participant_id"] == b["participant_id"]]
+        difference, = one["differences"]
+        self.assertEqual((one["reference"], difference["renderer"]), ("point", "ray"))
+        for got, wanted in zip((difference["mean"], *difference["ci95"]), t_interval(ratios)):
+            self.assertAlmostEqual(got, wanted, places=5)
 
     def test_the_reference_is_point_whichever_came_first(self):
         rows = [row for row in rows_of_a_study(2) if row["task"] == "compare"]

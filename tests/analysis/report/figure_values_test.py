@@ -229,7 +229,7 @@ class FigureValues(unittest.TestCase):
                                          if abs(float(t.get("x")) - (left + right) / 2) < 0.6 and float(t.get("y")) < top])
         self.assertGreaterEqual(max(panel.ticks), percent)
 
-    def test_accuracy_order_and_learning_draw_the_numbers_of_the_analysis(self):
+    def test_changes_of_accuracy_and_time_are_those_of_the_analysis(self):
         drawing = Drawing(self.figures["speed-accuracy"])
         self.check_layout("speed-accuracy", drawing)
         (panel,) = drawing.panels
@@ -245,6 +245,7 @@ class FigureValues(unittest.TestCase):
                                                  if e.tag == SVG + "circle"])
         self.assertEqual(by_x, by_time)
 
+    def test_reductions_by_the_order_of_renderers_are_those_of_the_analysis(self):
         drawing = Drawing(self.figures["order"])
         self.check_layout("order", drawing)
         (panel,) = drawing.panels
@@ -257,6 +258,7 @@ class FigureValues(unittest.TestCase):
             (diamond,) = [e for _, e in drawing.marks(rf"{shape}, orders balanced: .*") if e.tag == SVG + "polygon"]
             self.check_y(panel, centre(diamond)[1], one["balanced_percent_reduction"])
 
+    def test_times_of_learning_and_their_intervals_are_those_of_the_analysis(self):
         drawing = Drawing(self.figures["learning"], log=True)
         (panel,) = drawing.panels
         for renderer in self.two:
