@@ -81,6 +81,56 @@ def table_faults(path):
     return faults
 
 
+def places_of(name, samples, tick):
+    """Of each trial, the rows of its ticks; and their faults."""
+    places, faults = {}, []
+    for i, row in enumerate(samples):
+        if row[0] == "n/a":
+            continue
+        place = places.setdefault(row[0], [])
+        # Each interval of a trial counts its ticks from 0.
+        if place and [int(x) for x in row[1 : tick + 1]] <= [int(x) for x in samples[place[-1]][1 : tick + 1]]:
+            faults.append(f"{name}: row {i}: the ticks are out of order")
+        place.append(i)
+    return places, faults
+
+
+def recorded_trial_faults(name, trial, place, onset, told, about, sidecar):
+    """Of one trial's rows against the table's row and the sidecar's entry of it; onset in s, by its first row."""
+    faults = []
+    if abs(onset - float(told["onset"])) * sidecar.get("SamplingFrequency", 0) > 1:
+        faults.append(f"{name}: trial {trial} does not stand at its onset")
+    if about.get("first_row") != place[0] or about.get("rows") != place[-1] + 1 - place[0]:
+        faults.append(f"{name}: trial {trial} does not stand where Trials says")
+    if len(place) > int(told["ticks"]):
+        faults.append(f"{name}: more samples of trial {trial} than the trial has ticks")
+    for key in ("renderer", "shape"):
+        if about.get(key) != told[key]:
+            faults.append(f"{name}: trial {trial}: another {key} than in the table")
+    pose = [float(told[f"orientation_{axis}"]) for axis in "wxyz"]
+    if about.get("orientation_wxyz") != pose:
+        faults.append(f"{name}: trial {trial}: another pose than in the table")
+    if about.get("shape") not in sidecar.get("Objects", {}):
+        faults.append(f"{name}: trial {trial}: its object is not in Objects")
+    return faults
+
+
+def place_faults(name, places, samples, tick, told, sidecar):
+    """Of the trials' rows (places) against the table's rows (told) and the sidecar."""
+    faults = []
+    rate, start = sidecar.get("SamplingFrequency", 0), sidecar.get("StartTime", 0)
+    listed = {str(trial["trial"]): trial for trial in sidecar.get("Trials", [])}
+    if set(listed) != set(places):
+        faults.append(f"{name}: Trials lists others than there are")
+    for trial, place in places.items():
+        if trial not in told:
+            faults.append(f"{name}: trial {trial} is not in the table")
+            continue
+        onset = start + (place[0] - int(samples[place[0]][tick])) / rate if rate > 0 else 0
+        faults += recorded_trial_faults(name, trial, place, onset, told[trial], listed.get(trial, {}), sidecar)
+    return faults
+
+
 def recording_faults(path):
     faults = []
     sidecar = json.loads(path.with_name(path.name[: -len(".tsv.gz")] + ".json").read_text())
@@ -103,41 +153,9 @@ def recording_faults(path):
         return faults + [f"{path.name}: a value is no number"]
     if any(0 < row.count("n/a") < len(row) for row in samples):
         faults.append(f"{path.name}: a row is n/a in part")
-    rate, start = sidecar.get("SamplingFrequency", 0), sidecar.get("StartTime", 0)
     tick = columns.index("tick")
-    places = {}  # trial -> the rows of its ticks
-    for i, row in enumerate(samples):
-        if row[0] == "n/a":
-            continue
-        place = places.setdefault(row[0], [])
-        # Each interval of a trial counts its ticks from 0.
-        if place and [int(x) for x in row[1 : tick + 1]] <= [int(x) for x in samples[place[-1]][1 : tick + 1]]:
-            faults.append(f"{path.name}: row {i}: the ticks are out of order")
-        place.append(i)
-    listed = {str(trial["trial"]): trial for trial in sidecar.get("Trials", [])}
-    if set(listed) != set(places):
-        faults.append(f"{path.name}: Trials lists others than there are")
-    for trial, place in places.items():
-        if trial not in told:
-            faults.append(f"{path.name}: trial {trial} is not in the table")
-            continue
-        onset = start + (place[0] - int(samples[place[0]][tick])) / rate if rate > 0 else 0
-        if abs(onset - float(told[trial]["onset"])) * rate > 1:
-            faults.append(f"{path.name}: trial {trial} does not stand at its onset")
-        about = listed.get(trial, {})
-        if about.get("first_row") != place[0] or about.get("rows") != place[-1] + 1 - place[0]:
-            faults.append(f"{path.name}: trial {trial} does not stand where Trials says")
-        if len(place) > int(told[trial]["ticks"]):
-            faults.append(f"{path.name}: more samples of trial {trial} than the trial has ticks")
-        for name in ("renderer", "shape"):
-            if about.get(name) != told[trial][name]:
-                faults.append(f"{path.name}: trial {trial}: another {name} than in the table")
-        pose = [float(told[trial][f"orientation_{axis}"]) for axis in "wxyz"]
-        if about.get("orientation_wxyz") != pose:
-            faults.append(f"{path.name}: trial {trial}: another pose than in the table")
-        if about.get("shape") not in sidecar.get("Objects", {}):
-            faults.append(f"{path.name}: trial {trial}: its object is not in Objects")
-    return faults
+    places, more = places_of(path.name, samples, tick)
+    return faults + more + place_faults(path.name, places, samples, tick, told, sidecar)
 
 
 def bids_faults(folder):

@@ -8,6 +8,8 @@ import bids_checks
 import psychds_checks
 from study import Study
 
+BEH = "sub-S001/ses-1/beh/sub-S001_ses-1_task-quick_beh"
+
 
 class Rules(Study):
     def test_a_codebook_goes_with_the_csv(self):
@@ -110,19 +112,25 @@ class Rules(Study):
         for name in ("plain", "sampled"):
             self.assertEqual(bids_checks.bids_faults(self.dir / f"{name}-bids"), [])
 
-    def test_every_bids_check_can_fail(self):
-        beh = "sub-S001/ses-1/beh/sub-S001_ses-1_task-quick_beh"
-        for old, new, fault in (
-            ("\nsub-S001", "\nsub-S009", "participants.tsv lists"),
-        ):
-            folder = self.copy("plain-bids")
-            self.change(folder / "participants.tsv", old, new)
-            self.assertIn(fault, " ".join(bids_checks.bids_faults(folder)))
+    def faults_of(self, folder):
+        return " ".join(bids_checks.bids_faults(folder))
+
+    def test_every_bids_check_of_participants_and_descriptions_can_fail(self):
         folder = self.copy("plain-bids")
-        header, rows = bids_checks.read_tsv(folder / f"{beh}.tsv")
+        self.change(folder / "participants.tsv", "\nsub-S001", "\nsub-S009")
+        self.assertIn("participants.tsv lists", self.faults_of(folder))
+        folder = self.copy("plain-bids")
+        self.change(folder / f"{BEH}.json", '"max_force"', '"mux_force"')
+        self.assertIn("max_force is not described", self.faults_of(folder))
+        (folder / f"{BEH}.json").unlink()
+        self.assertIn("no sidecar", self.faults_of(folder))
+
+    def test_every_bids_check_of_a_table_can_fail(self):
+        folder = self.copy("plain-bids")
+        header, rows = bids_checks.read_tsv(folder / f"{BEH}.tsv")
         def write(changed):
-            (folder / f"{beh}.tsv").write_text("".join("\t".join(row) + "\n" for row in [header] + changed))
-            return " ".join(bids_checks.bids_faults(folder))
+            (folder / f"{BEH}.tsv").write_text("".join("\t".join(row) + "\n" for row in [header] + changed))
+            return self.faults_of(folder)
         self.assertIn("not sorted", write([rows[0], *rows[:0:-1]]))
         self.assertIn("onset is not 0", write(rows[1:]))
         self.assertIn("no number: soon", write([["0", "soon", *rows[0][2:]]]))
@@ -131,11 +139,8 @@ class Rules(Study):
         self.assertIn("fields for", write([rows[0][:-1]]))
         self.assertIn("is empty", write([["0", "", *rows[0][2:]]]))
         self.assertIn("no level", write([[x.replace("point", "pin").replace("ray", "pin") for x in rows[0]]]))
-        folder = self.copy("plain-bids")
-        self.change(folder / f"{beh}.json", '"max_force"', '"mux_force"')
-        self.assertIn("max_force is not described", " ".join(bids_checks.bids_faults(folder)))
-        (folder / f"{beh}.json").unlink()
-        self.assertIn("no sidecar", " ".join(bids_checks.bids_faults(folder)))
+
+    def test_every_bids_check_of_a_recording_can_fail(self):
         folder = self.copy("sampled-bids")
         physio = folder / "sub-S001/ses-1/beh/sub-S001_ses-1_task-withsamples_run-1_recording-haptic_physio.tsv.gz"
         lines = gzip.open(physio, "rt").read().splitlines(keepends=True)
@@ -148,9 +153,9 @@ class Rules(Study):
                                ([lines[0].replace("\t0", "\tnull")] + lines[1:], "no number")):
             with gzip.open(physio, "wt") as file:
                 file.writelines(changed)
-            self.assertIn(fault, " ".join(bids_checks.bids_faults(folder)))
+            self.assertIn(fault, self.faults_of(folder))
         self.change(physio.with_name(physio.name[: -len(".tsv.gz")] + ".json"), '"SamplingFrequency"', '"Rate"')
-        self.assertIn("no SamplingFrequency", " ".join(bids_checks.bids_faults(folder)))
+        self.assertIn("no SamplingFrequency", self.faults_of(folder))
 
     def test_psychds_keeps_its_rules(self):
         for name in ("plain", "sampled"):
