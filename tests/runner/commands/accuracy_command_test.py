@@ -14,78 +14,96 @@ PALPATE = sys.argv[1]
 SMALL = ["--quick", "--paths", "1", "--ticks", "40", "--most-triangles", "80"]
 
 
-class Accuracy(unittest.TestCase):
-    def setUp(self):
+def accuracy(*args, status=0):
+    done = subprocess.run([PALPATE, "accuracy", *map(str, args)], capture_output=True, text=True, timeout=300)
+    assert done.returncode == status, done.stdout + done.stderr
+    return done
+
+
+class Results(unittest.TestCase):
+    """Of one small study: its text, numbers, figure and page."""
+
+    @classmethod
+    def setUpClass(cls):
         scratch = tempfile.TemporaryDirectory()
-        self.addCleanup(scratch.cleanup)
-        self.dir = pathlib.Path(scratch.name)
+        cls.addClassCleanup(scratch.cleanup)
+        numbers, cls.figure, page = (pathlib.Path(scratch.name) / f"a.{end}" for end in ("json", "svg", "html"))
+        cls.done = accuracy(*SMALL, "--json", numbers, "--figure", cls.figure, "--report", page)
+        cls.result = json.loads(numbers.read_text())
+        cls.page = page.read_text()
+        cls.seen = {(r["shape"], r["triangles"], r["probe"], r["method"]) for r in cls.result["rows"]}
+        cls.methods = {m["name"] for m in cls.result["methods"]}
 
-    def accuracy(self, *args, status=0):
-        done = subprocess.run([PALPATE, "accuracy", *map(str, args)], capture_output=True, text=True, timeout=300)
-        self.assertEqual(done.returncode, status, done.stdout + done.stderr)
-        return done
-
-    def test_measures_every_shape_and_recommends_a_tessellation(self):
-        numbers, figure, page = self.dir / "a.json", self.dir / "a.svg", self.dir / "a.html"
-        done = self.accuracy(*SMALL, "--json", numbers, "--figure", figure, "--report", page)
-        self.assertEqual(done.stderr, "")
+    def test_every_shape_has_a_recommendation(self):
+        self.assertEqual(self.done.stderr, "")
         for shape in ["sphere", "cone", "cylinder", "cube", "box"]:
-            self.assertRegex(done.stdout, rf"(?m)^  {shape}: .*\.$")
-        result = json.loads(numbers.read_text())
-        self.assertEqual([r["shape"] for r in result["recommended"]], ["sphere", "cone", "cylinder", "cube", "box"])
+            self.assertRegex(self.done.stdout, rf"(?m)^  {shape}: .*\.$")
+        recommended = self.result["recommended"]
+        self.assertEqual([r["shape"] for r in recommended], ["sphere", "cone", "cylinder", "cube", "box"])
         # 80 triangles are too few for a sphere and enough for a cube.
-        self.assertIsNone(result["recommended"][0]["triangles_for_device"])
-        self.assertEqual(result["recommended"][3]["triangles_for_device"], 12)
-        # The recommended tessellation meets the demands in the same file's rows; the next coarser one does not.
+        self.assertIsNone(recommended[0]["triangles_for_device"])
+        self.assertEqual(recommended[3]["triangles_for_device"], 12)
+
+    def test_the_recommended_tessellation_meets_the_demands_and_the_next_coarser_one_does_not(self):
         def keeps(row):
             errors = row["against_shape"]
             return (errors["lost"] == 0 and errors["phantom"] == 0 and errors["depth"]["p999_m"] < 1e-3 and
                     math.degrees(errors["direction"]["p999_rad"]) < 10)
 
-        for one in result["recommended"]:
-            rows = [r for r in result["rows"] if r["shape"] == one["shape"] and r["method"] == "tick"]
+        for one in self.result["recommended"]:
+            rows = [r for r in self.result["rows"] if r["shape"] == one["shape"] and r["method"] == "tick"]
             chosen = one["triangles_for_hand"] or math.inf
             self.assertTrue(all(keeps(r) for r in rows if r["triangles"] >= chosen), one)
             coarser = {r["triangles"] for r in rows if r["triangles"] < chosen}
             if coarser:
                 self.assertFalse(all(keeps(r) for r in rows if r["triangles"] == max(coarser)), one)
-        methods = {m["name"] for m in result["methods"]}
-        self.assertLessEqual({"tick", "walk", "walk-float", "walk-cold", "scan", "brute-force"}, methods)
-        self.assertEqual(methods - {"bullet", "fcl"}, {"tick", "walk", "walk-float", "walk-cold", "scan", "brute-force"})
-        self.assertEqual({p["name"] for p in result["peers"] if p["present"]}, methods & {"bullet", "fcl"})
-        for peer in result["peers"]:
+
+    def test_all_own_methods_and_the_peers_that_are_present_are_measured(self):
+        self.assertLessEqual({"tick", "walk", "walk-float", "walk-cold", "scan", "brute-force"}, self.methods)
+        self.assertEqual(self.methods - {"bullet", "fcl"},
+                         {"tick", "walk", "walk-float", "walk-cold", "scan", "brute-force"})
+        self.assertEqual({p["name"] for p in self.result["peers"] if p["present"]}, self.methods & {"bullet", "fcl"})
+        for peer in self.result["peers"]:
             if not peer["present"]:
-                self.assertIn(f"{peer['name']:<12}absent", done.stdout)
-        seen = {(r["shape"], r["triangles"], r["probe"], r["method"]) for r in result["rows"]}
-        self.assertEqual(len(seen), len(result["rows"]))
-        self.assertEqual(len(seen), 9 * 2 * len(methods))
-        for row in result["rows"]:
+                self.assertIn(f"{peer['name']:<12}absent", self.done.stdout)
+        self.assertEqual(len(self.seen), len(self.result["rows"]))
+        self.assertEqual(len(self.seen), 9 * 2 * len(self.methods))
+
+    def test_the_tick_is_exact_on_the_polyhedron(self):
+        for row in self.result["rows"]:
             self.assertGreater(row["ns_per_tick"], 0)
             if row["method"] == "tick":
                 exact = row["against_polyhedron"]
                 self.assertEqual((exact["lost"], exact["phantom"]), (0, 0), row)
                 self.assertLess(exact["depth"]["worst_m"], 1e-15)
                 self.assertLess(exact["force"]["worst_n"], 1e-12)
-        self.assertTrue(all(r["exact_missed"] == 0 for r in result["first_contact"]["rows"]))
-        # A dot for each tessellation and method in both panels of its shape, and one in the legend.
-        drawn = xml.etree.ElementTree.parse(figure).getroot()
+        self.assertTrue(all(r["exact_missed"] == 0 for r in self.result["first_contact"]["rows"]))
+
+    def test_the_figure_has_a_dot_for_each_tessellation_and_method(self):
+        drawn = xml.etree.ElementTree.parse(self.figure).getroot()
         dots = list(drawn.iter("{http://www.w3.org/2000/svg}circle"))
-        self.assertEqual(len(dots), len(seen) + len(methods))
-        # The page is well-formed, has the figure and every table, and loads nothing.
-        root = xml.etree.ElementTree.fromstring(re.sub(r"<!DOCTYPE html>|<script>.*?</script>", "", page.read_text(), flags=re.S))
+        self.assertEqual(len(dots), len(self.seen) + len(self.methods))  # both panels of a shape, and the legend
+
+    def test_the_page_has_the_figure_and_every_table_and_loads_nothing(self):
+        as_xml = re.sub(r"<!DOCTYPE html>|<script>.*?</script>", "", self.page, flags=re.S)
+        root = xml.etree.ElementTree.fromstring(as_xml)
         self.assertEqual(len(root.findall(".//{http://www.w3.org/2000/svg}svg")), 2)  # for wide and narrow screens
-        self.assertEqual(len(root.findall(".//table")), len(re.findall(r"(?m)^\S.*\n  (?:triangles|method|shape|case|wrong) ", done.stdout)))
-        self.assertNotRegex(page.read_text(), r"src=|href=\"(?!#|data:)")
-        self.assertIn("default-src 'none'; script-src 'sha256-", page.read_text())
-        # Both probes pass every extreme case; the search finds no fault.
-        self.assertTrue(all(e["holds"] for e in result["extremes"]))
-        self.assertEqual(len(result["extremes"]) % 2, 0)
-        self.assertGreaterEqual(len(result["extremes"]), 30)
-        self.assertEqual(result["search"]["wrong"], 0)
-        self.assertEqual(result["search"]["ticks"], 100000)
-        self.assertEqual((result["union_search"]["wrong"], result["union_search"]["ticks"]), (0, 100000))
-        # Unions: the renderers match closed forms; every case has one row for each method.
-        unions = result["unions"]
+        tables = re.findall(r"(?m)^\S.*\n  (?:triangles|method|shape|case|wrong) ", self.done.stdout)
+        self.assertEqual(len(root.findall(".//table")), len(tables))
+        self.assertNotRegex(self.page, r"src=|href=\"(?!#|data:)")
+        self.assertIn("default-src 'none'; script-src 'sha256-", self.page)
+
+    def test_both_probes_pass_every_extreme_case_and_the_searches_find_no_fault(self):
+        self.assertTrue(all(e["holds"] for e in self.result["extremes"]))
+        self.assertEqual(len(self.result["extremes"]) % 2, 0)
+        self.assertGreaterEqual(len(self.result["extremes"]), 30)
+        self.assertEqual(self.result["search"]["wrong"], 0)
+        self.assertEqual(self.result["search"]["ticks"], 100000)
+        unions = self.result["union_search"]
+        self.assertEqual((unions["wrong"], unions["ticks"]), (0, 100000))
+
+    def test_unions_match_closed_forms_and_have_a_row_for_each_method(self):
+        unions = self.result["unions"]
         names = [m["name"] for m in unions["methods"]]
         self.assertEqual(names, ["law", "one per part", "penalties"])
         cases = list(dict.fromkeys(r["case"] for r in unions["rows"]))
@@ -98,6 +116,13 @@ class Accuracy(unittest.TestCase):
             else:
                 self.assertIsNone(row["inside"], row)
 
+
+class Accuracy(unittest.TestCase):
+    def setUp(self):
+        scratch = tempfile.TemporaryDirectory()
+        self.addCleanup(scratch.cleanup)
+        self.dir = pathlib.Path(scratch.name)
+
     def test_the_search_gives_the_same_counts_with_any_number_of_threads(self):
         one, three = self.dir / "1.json", self.dir / "3.json"
         # Status 1 if it finds a fault; this test compares the counts only.
@@ -108,7 +133,7 @@ class Accuracy(unittest.TestCase):
             self.assertEqual(done.returncode, 1 if wrong else 0, done.stderr)
             self.assertIn("31,000 ticks in 62 walks", done.stdout)
             unions = self.dir / f"u{jobs}.json"
-            self.accuracy("--search", "15000", "--unions", "--jobs", jobs, "--json", unions)
+            accuracy("--search", "15000", "--unions", "--jobs", jobs, "--json", unions)
             self.assertNotIn("search", json.loads(unions.read_text()))
             self.assertEqual(json.loads(unions.read_text())["union_search"]["walks"], 30)
         self.assertEqual(one.read_text(), three.read_text())
@@ -122,17 +147,17 @@ class Accuracy(unittest.TestCase):
     def test_does_not_replace_files_unasked(self):
         there = self.dir / "there.json"
         there.write_text("mine")
-        done = self.accuracy("--search", "500", "--json", there, status=2)
+        done = accuracy("--search", "500", "--json", there, status=2)
         self.assertIn("--force", done.stderr)
         self.assertEqual(there.read_text(), "mine")
-        self.accuracy("--search", "500", "--json", there, "--force")
+        accuracy("--search", "500", "--json", there, "--force")
         self.assertIn("search", json.loads(there.read_text()))
 
     def test_wrong_usage_is_status_2(self):
         for args in (["--search", "0"], ["--search", "-5"], ["--search", "x"], ["--paths", "0"], ["--ticks", "0"],
                      ["--most-triangles", "19"], ["--unions"], ["--jobs", "0", "--search", "500"], ["extra"],
                      ["--search", "500", "--figure", self.dir / "f.json"], ["--json", self.dir]):
-            done = self.accuracy(*args, status=2)
+            done = accuracy(*args, status=2)
             self.assertEqual(done.stdout, "")
             self.assertTrue(done.stderr)
         self.assertEqual(list(self.dir.iterdir()), [])

@@ -33,67 +33,76 @@ def files(folder):
     return {p.relative_to(folder).as_posix() for p in folder.rglob("*") if p.is_file()}
 
 
-def crate_faults(folder):
+class CrateFaults:
     """What RO-Crate 1.2 says that a crate must be, and is not (https://w3id.org/ro/crate/1.2, root-data-entity,
     data-entities, appendix on JSON-LD)."""
-    document = json.loads((folder / "ro-crate-metadata.json").read_text(encoding="utf-8"))
-    faults = []
 
-    def expect(holds, what):
+    def __init__(self, folder):
+        self.folder, self.found = folder, []
+        document = json.loads((folder / "ro-crate-metadata.json").read_text(encoding="utf-8"))
+        self.expect(set(document) == {"@context", "@graph"}, "only @context and @graph")
+        self.expect(document["@context"] == "https://w3id.org/ro/crate/1.2/context", "the context by reference")
+        self.entities = {}
+        for entity in document["@graph"]:
+            self.expect(isinstance(entity.get("@id"), str) and entity.get("@type"), f"@id and @type: {entity}")
+            self.expect(entity["@id"] not in self.entities, f"each @id once: {entity['@id']}")
+            self.entities[entity["@id"]] = entity
+        self.of_the_root()
+        linked = self.linked_from(self.entities["./"])
+        for identity, entity in self.entities.items():
+            self.of_an_entity(identity, entity, linked)
+        described = {urllib.parse.unquote(i) for i, e in self.entities.items() if e["@type"] == "File"}
+        self.expect(described | {"ro-crate-metadata.json"} == files(folder), "every file is described")
+
+    def expect(self, holds, what):
         if not holds:
-            faults.append(what)
+            self.found.append(what)
 
-    expect(set(document) == {"@context", "@graph"}, "only @context and @graph")
-    expect(document["@context"] == "https://w3id.org/ro/crate/1.2/context", "the context by reference")
-    entities = {}
-    for entity in document["@graph"]:
-        expect(isinstance(entity.get("@id"), str) and entity.get("@type"), f"@id and @type: {entity}")
-        expect(entity["@id"] not in entities, f"each @id once: {entity['@id']}")
-        entities[entity["@id"]] = entity
-    descriptor = entities["ro-crate-metadata.json"]
-    expect(descriptor["@type"] == "CreativeWork", "type of the descriptor")
-    expect(descriptor["about"] == {"@id": "./"}, "about the root")
-    expect(descriptor["conformsTo"] == {"@id": "https://w3id.org/ro/crate/1.2"}, "conformsTo")
-    root = entities["./"]
-    expect(root["@type"] == "Dataset", "type of the root")
-    for key in ("name", "description", "datePublished", "license"):
-        expect(root.get(key), f"root has {key}")
-    expect(re.fullmatch(r"\d{4}-\d\d-\d\d", root["datePublished"]), "date to the day")
-    license = entities.get(root["license"]["@id"], {})
-    expect(license.get("name") and license.get("description"), "license with name and description")
+    def of_the_root(self):
+        descriptor = self.entities["ro-crate-metadata.json"]
+        self.expect(descriptor["@type"] == "CreativeWork", "type of the descriptor")
+        self.expect(descriptor["about"] == {"@id": "./"}, "about the root")
+        self.expect(descriptor["conformsTo"] == {"@id": "https://w3id.org/ro/crate/1.2"}, "conformsTo")
+        root = self.entities["./"]
+        self.expect(root["@type"] == "Dataset", "type of the root")
+        for key in ("name", "description", "datePublished", "license"):
+            self.expect(root.get(key), f"root has {key}")
+        self.expect(re.fullmatch(r"\d{4}-\d\d-\d\d", root["datePublished"]), "date to the day")
+        license = self.entities.get(root["license"]["@id"], {})
+        self.expect(license.get("name") and license.get("description"), "license with name and description")
 
-    linked = set()
+    def linked_from(self, root):
+        linked, open_ends = set(), [root]
+        while open_ends:
+            parts = {part["@id"] for part in open_ends.pop().get("hasPart", [])} - linked
+            linked |= parts
+            open_ends += [self.entities.get(part, {}) for part in parts]
+        return linked
 
-    def follow(entity):
-        for part in entity.get("hasPart", []):
-            if part["@id"] not in linked:
-                linked.add(part["@id"])
-                follow(entities.get(part["@id"], {}))
-
-    follow(root)
-    for identity, entity in entities.items():
+    def of_an_entity(self, identity, entity, linked):
         flat = {key: value if isinstance(value, list) else [value] for key, value in entity.items()}
         for key, values in flat.items():
             for value in values:
                 if isinstance(value, dict):
-                    expect(set(value) == {"@id"}, f"{identity}: {key} is nested")
+                    self.expect(set(value) == {"@id"}, f"{identity}: {key} is nested")
                     absolute = re.match(r"[a-z]+:", value["@id"])
-                    expect(value["@id"] in entities or absolute, f"{identity}: {key} leads nowhere")
+                    self.expect(value["@id"] in self.entities or absolute, f"{identity}: {key} leads nowhere")
+        path = self.folder / urllib.parse.unquote(identity)
         if "File" in flat["@type"]:
-            expect(identity in linked, f"{identity} is linked from the root")
-            path = folder / urllib.parse.unquote(identity)
-            expect(path.is_file(), f"{identity} is there")
-            expect(entity.get("encodingFormat"), f"{identity}: encodingFormat")
+            self.expect(identity in linked, f"{identity} is linked from the root")
+            self.expect(path.is_file(), f"{identity} is there")
+            self.expect(entity.get("encodingFormat"), f"{identity}: encodingFormat")
             if "contentSize" in entity:
-                expect(entity["contentSize"] == str(path.stat().st_size), f"{identity}: contentSize")
+                self.expect(entity["contentSize"] == str(path.stat().st_size), f"{identity}: contentSize")
         if "Dataset" in flat["@type"] and identity != "./":
-            expect(identity in linked and identity.endswith("/"), f"{identity}: a folder, linked")
-            expect((folder / urllib.parse.unquote(identity)).is_dir(), f"{identity} is there")
+            self.expect(identity in linked and identity.endswith("/"), f"{identity}: a folder, linked")
+            self.expect(path.is_dir(), f"{identity} is there")
         if "Person" in flat["@type"]:
-            expect(entity.get("name"), f"{identity}: name")
-    described = {urllib.parse.unquote(i) for i, e in entities.items() if e["@type"] == "File"}
-    expect(described | {"ro-crate-metadata.json"} == files(folder), "every file is described")
-    return faults
+            self.expect(entity.get("name"), f"{identity}: name")
+
+
+def crate_faults(folder):
+    return CrateFaults(folder).found
 
 
 class Bundle(unittest.TestCase):

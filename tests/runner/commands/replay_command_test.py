@@ -16,6 +16,10 @@ sys.dont_write_bytecode = True
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "data" / "store"))
 import seals  # noqa: E402
 
+# kg, 1/s, m/s^2, s. Heavy and slow enough to stay within the hand's reach; lighter ones float away before some trials
+# touch them.
+MASS, DAMPING, GRAVITY, TICK = 2, 10, -0.02, 0.001
+
 
 def protocol(samples=True, **material):
     return {"version": 1, "name": "short", "renderers": ["point", "ray"], "samples": samples,
@@ -47,44 +51,53 @@ class Replay(CommandCase):
         base.close()
         return db, [(f"{code}/{session}/{trial}", renderer) for code, session, trial, renderer in trials]
 
-    def test_poses_of_moving_stimuli_are_recorded_and_replayed(self):
-        # Heavy and slow enough to stay within the hand's reach; lighter ones float away before some trials touch them.
-        mass, damping, gravity, tick = 2, 10, -0.02, 0.001
+    def moving_study(self):
         design = protocol()
-        design["gravity_m_per_s2"] = [0, 0, gravity]
+        design["gravity_m_per_s2"] = [0, 0, GRAVITY]
         for stimulus in design["stimuli"]:
-            stimulus["body"] = {"mass_kg": mass, "damping_per_s": damping}
-        path, db, out = (self.dir / f"moves.{end}" for end in ("json", "db", "csv"))
-        path.write_text(json.dumps(design))
+            stimulus["body"] = {"mass_kg": MASS, "damping_per_s": DAMPING}
+        path, db = self.file("moves.json", design), self.dir / "moves.db"
         self.palpate("simulate", path, "--db", db, "--participants", 1, "--seed", 3)
+        return db
+
+    def test_poses_of_moving_stimuli_are_recorded_and_replayed(self):
+        db, out = self.moving_study(), self.dir / "moves.csv"
         touched_by = set()
         for trial in range(1, 5):
             done = self.palpate("replay", "--db", db, "--trial", f"S001/1/{trial}", "--out", out, "--force")
             self.assertIn("equal the record, bit by bit", done.stdout)
+            touched_by.add(next(name for name in ("point", "ray") if f", {name}, " in done.stdout))
             with out.open() as file:
                 rows = [{name: float(value) for name, value in row.items()} for row in csv.DictReader(file)]
-            self.assertGreater(len(rows), 100)
-            touched = next(i for i, row in enumerate(rows) if row["recorded_depth"] > 0)
-            touched_by.add(next(name for name in ("point", "ray") if f", {name}, " in done.stdout))
-            self.assertGreater(touched, 100)
-            # Before contact it falls as in a fluid.
-            for i in range(0, touched, 50):
-                t = (i + 1) * tick  # its pose is the one after the tick
-                fallen = gravity / damping * (t - (1 - math.exp(-damping * t)) / damping)
-                self.assertAlmostEqual(rows[i]["recorded_body_z"], fallen, delta=1e-12)
-            # From then on its momentum is the impulse of hand and weight less the fluid's, to first order in the step.
-            for axis, weight in (("x", 0), ("y", 0), ("z", gravity)):
-                given, bound = 0, 1e-12
-                for i, row in enumerate(rows):
-                    given += weight * tick - row[f"recorded_force_{axis}"] / mass * tick
-                    bound += abs(row[f"recorded_force_{axis}"]) / mass * tick * damping * tick
-                    held = row[f"recorded_body_v{axis}"] + damping * row[f"recorded_body_{axis}"]
-                    self.assertAlmostEqual(held, given, delta=bound)
+            self.check_fall(rows)
+            self.check_momentum(rows)
             self.assertGreater(max(abs(row["recorded_body_x"]) for row in rows), 1e-4)
             for row in rows[:: len(rows) // 20]:
                 self.assertAlmostEqual(sum(row[f"recorded_body_q{k}"] ** 2 for k in "wxyz"), 1, delta=1e-12)
         self.assertEqual(touched_by, {"point", "ray"})
-        # One wrong bit of one place is reported.
+
+    def check_fall(self, rows):
+        """Before contact it falls as in a fluid."""
+        self.assertGreater(len(rows), 100)
+        touched = next(i for i, row in enumerate(rows) if row["recorded_depth"] > 0)
+        self.assertGreater(touched, 100)
+        for i in range(0, touched, 50):
+            t = (i + 1) * TICK  # its pose is the one after the tick
+            fallen = GRAVITY / DAMPING * (t - (1 - math.exp(-DAMPING * t)) / DAMPING)
+            self.assertAlmostEqual(rows[i]["recorded_body_z"], fallen, delta=1e-12)
+
+    def check_momentum(self, rows):
+        """It is the impulse of hand and weight less the fluid's, to first order in the step."""
+        for axis, weight in (("x", 0), ("y", 0), ("z", GRAVITY)):
+            given, bound = 0, 1e-12
+            for row in rows:
+                given += weight * TICK - row[f"recorded_force_{axis}"] / MASS * TICK
+                bound += abs(row[f"recorded_force_{axis}"]) / MASS * TICK * DAMPING * TICK
+                held = row[f"recorded_body_v{axis}"] + DAMPING * row[f"recorded_body_{axis}"]
+                self.assertAlmostEqual(held, given, delta=bound)
+
+    def test_one_wrong_bit_of_a_recorded_pose_is_reported(self):
+        db = self.moving_study()
         with sqlite3.connect(db) as base:
             packing, count, data = base.execute("SELECT packing, count, data FROM samples LIMIT 1").fetchone()
         base.close()
