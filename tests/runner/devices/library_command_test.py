@@ -140,7 +140,8 @@ class DeviceBehindALibrary(unittest.TestCase):
         self.assertIn("/torque", terminal.text)
         self.assertFalse(self.database.exists())
 
-    def test_a_session_with_faults_is_complete_in_the_end(self):
+    def begin(self):
+        """A session after its pre-flight, which begins with the device in its calibration pit."""
         self.stub.set(reset=1)
         terminal = self.run_session("--new-participant")
         terminal.wait_for("calibration pit")
@@ -158,6 +159,9 @@ class DeviceBehindALibrary(unittest.TestCase):
         terminal.type(":go\n")
         terminal.wait_for("move the stylus")
         terminal.type(":go\n")
+        return terminal
+
+    def unplug_once_in_contact_and_answer_all(self, terminal):
         cut_off = False
         while True:
             # The home zone is to the right; the stylus points away from the user.
@@ -180,6 +184,9 @@ class DeviceBehindALibrary(unittest.TestCase):
                 continue
             terminal.type("1")
         self.assertEqual(terminal.finish(), 0, terminal.text)
+
+    def test_a_session_with_faults_is_complete_in_the_end(self):
+        self.unplug_once_in_contact_and_answer_all(self.begin())
         self.assertEqual(self.rows("SELECT count(*) FROM attempts WHERE state = 'completed'"), [(2,)])
         self.assertGreaterEqual(self.rows("SELECT count(*) FROM attempts WHERE state <> 'completed'")[0][0], 1)
         notes = [text for (text,) in self.rows("SELECT text FROM notes")]

@@ -161,6 +161,33 @@ class Pair(unittest.TestCase):
             self.assertAlmostEqual(found, true, places=4)
         self.assertAlmostEqual(abs(pair["tail_orientation_wxyz"][3]), 1, places=4)
 
+    def lose(self, end, terminal):
+        self.ends.plug(end, False)
+        terminal.wait_for("the device is unplugged")
+        self.wait(lambda: not self.ends.pushes(1 - end))  # the other one receives none
+        self.ends.plug(end, True)
+        terminal.type(":clear\n:go\n")
+
+    def lose_each_end_once_in_contact_and_answer_all(self, terminal):
+        lost = 0
+        while True:
+            self.hold(0.04)
+            came = terminal.wait_for("[trial, ", "[fault, ", "[paused, ", "on record; ")
+            if came == "on record; ":
+                break
+            if came != "[trial, ":
+                terminal.type(":clear\n:go\n")
+                continue
+            self.hold(0.012)
+            before = terminal.hear().count("[fault, ")
+            self.wait(lambda: all(self.pushed()) or terminal.hear().count("[fault, ") > before)
+            if lost < 2 and all(self.pushed()):
+                self.lose(lost, terminal)
+                lost += 1
+            else:
+                terminal.type("1")
+        self.assertEqual(terminal.finish(), 0, terminal.text)
+
     def test_a_session_in_which_one_end_is_lost(self):
         run = ["run", self.folder / "protocol.json", "--db", self.database, "--participant", "P01", "--new-participant",
                "--no-window", *self.options]
@@ -175,29 +202,7 @@ class Pair(unittest.TestCase):
             terminal.type(":go\n")
             if came == "move the stylus":
                 break
-        lost = set()
-        while True:
-            self.hold(0.04)
-            came = terminal.wait_for("[trial, ", "[fault, ", "[paused, ", "on record; ")
-            if came == "on record; ":
-                break
-            if came != "[trial, ":
-                terminal.type(":clear\n:go\n")
-                continue
-            self.hold(0.012)
-            before = terminal.hear().count("[fault, ")
-            self.wait(lambda: all(self.pushed()) or terminal.hear().count("[fault, ") > before)
-            if len(lost) < 2 and all(self.pushed()):
-                end = len(lost)
-                self.ends.plug(end, False)
-                terminal.wait_for("the device is unplugged")
-                self.wait(lambda: not self.ends.pushes(1 - end))  # the other one receives none
-                self.ends.plug(end, True)
-                lost.add(end)
-                terminal.type(":clear\n:go\n")
-                continue
-            terminal.type("1")
-        self.assertEqual(terminal.finish(), 0, terminal.text)
+        self.lose_each_end_once_in_contact_and_answer_all(terminal)
         with contextlib.closing(sqlite3.connect(self.database)) as db:
             rows = db.execute("SELECT state, count(*) FROM attempts GROUP BY state").fetchall()
             self.assertEqual(dict(rows)["completed"], 2)

@@ -16,8 +16,8 @@ from falcon_session import AWAY, FalconSession
 
 
 class Preflight(FalconSession):
-    def test_from_homing_to_the_first_answer(self):
-        terminal = self.run_session("--calibration", self.calibration(1), "--buttons", emulator=["--unhomed"])
+    def home(self, terminal):
+        """Up to the offer of a push; forces are limited to the lesser of 6 N and the device's own limit."""
         terminal.wait_for("home the device: pull the grip fully out")
         self.assertFalse(self.state()["torque_before_homing"])
         self.control.tell("shake 1 0.035")
@@ -27,25 +27,15 @@ class Preflight(FalconSession):
         limits = limits or re.search(r"up to ([\d.]+) N at the grip \(the device's own limit: ([\d.]+) N\)",
                                      terminal.text)
         self.assertEqual(float(limits[1]), min(6.0, float(limits[2])))
-        farthest = self.pushed_and_felt(terminal)
-        # 1 N against 400 N/m; the scale of force is the emulator's own.
-        self.assertAlmostEqual(farthest, 0.0025, delta=0.0015)
-        terminal.type(":go\n")
-        terminal.wait_for("move the stylus 26 mm from the centre")
-        terminal.type("\x1b")
-        terminal.wait_for("EMERGENCY by the key Escape: forces are off until the fault is cleared")
-        terminal.wait_for("orces are off: zero force was asked for by the key Escape; next: ':clear'")
-        terminal.type(":go\n")  # it has no effect before the fault is cleared
+
+    def reach_every_side(self):
         for place in ((-0.03, 0, 0), (0.03, 0, 0), (0, -0.03, 0), (0, 0.03, 0), (0, 0, -0.03), (0, 0, 0.03)):
             self.hand(*place)
             self.control.wait_until(lambda: all(abs(is_at - wanted) < 0.002 for is_at, wanted in zip(
                 self.state()["position_m"], (place[0], place[1], 0.125 + place[2]))))
             time.sleep(0.1)  # some ticks
-        terminal.type(":clear\n")
-        terminal.wait_for("press button 1 of the device")
-        self.hand(*AWAY)
-        self.press(1)
-        self.press(2)
+
+    def answer_by_button_2(self, terminal):
         while True:
             came = terminal.wait_for("[space bar: go on]", "[trial, ", "[fault, ", "[paused, ", "on record; ",
                                       "press button")
@@ -56,6 +46,26 @@ class Preflight(FalconSession):
             else:
                 terminal.type(":clear\n:go\n" if came in ("[fault, ", "[paused, ") else " ")
         self.assertEqual(terminal.finish(), 0, terminal.text)
+
+    def test_from_homing_to_the_first_answer(self):
+        terminal = self.run_session("--calibration", self.calibration(1), "--buttons", emulator=["--unhomed"])
+        self.home(terminal)
+        farthest = self.pushed_and_felt(terminal)
+        # 1 N against 400 N/m; the scale of force is the emulator's own.
+        self.assertAlmostEqual(farthest, 0.0025, delta=0.0015)
+        terminal.type(":go\n")
+        terminal.wait_for("move the stylus 26 mm from the centre")
+        terminal.type("\x1b")
+        terminal.wait_for("EMERGENCY by the key Escape: forces are off until the fault is cleared")
+        terminal.wait_for("orces are off: zero force was asked for by the key Escape; next: ':clear'")
+        terminal.type(":go\n")  # it has no effect before the fault is cleared
+        self.reach_every_side()
+        terminal.type(":clear\n")
+        terminal.wait_for("press button 1 of the device")
+        self.hand(*AWAY)
+        self.press(1)
+        self.press(2)
+        self.answer_by_button_2(terminal)
         found = next(note for note in self.notes() if note.startswith("pre-flight: "))
         for part in ("device homed", "a push of 1.0 N to the right was felt; limits: forces of up to",
                      "range of 26 mm to each side", "buttons 1 to 2 work", "EMERGENCY by the key Escape",

@@ -121,8 +121,8 @@ class Inverse3(unittest.TestCase):
             if self.service.pushes():
                 return
 
-    def test_a_session_with_faults_is_resumed_and_complete_in_the_end(self):
-        terminal = self.begin("--new-participant")
+    def meet_faults(self, terminal):
+        """Each ends forces until it is mended and cleared."""
         for fault, words, mend in (
                 ("set present 0", "the device is unplugged: plug it in again", "set present 1"),
                 ("set calibrated 0", "the device asks for its maker's calibration", "set calibrated 1"),
@@ -143,6 +143,8 @@ class Inverse3(unittest.TestCase):
         self.wait(lambda: not self.service.pushes())
         self.service.tell(AWAY)
         terminal.type(":clear\n:go\n")
+
+    def lose_the_guard(self, terminal):
         self.touch(terminal)
         guards = pathlib.Path(f"/proc/{terminal.process.pid}/task/{terminal.process.pid}/children").read_text().split()
         self.assertEqual(len(guards), 1)
@@ -151,9 +153,8 @@ class Inverse3(unittest.TestCase):
         self.wait(lambda: not self.service.pushes())
         terminal.type(":quit\n")
         terminal.finish()
-        self.assertEqual(self.rows("SELECT count(*) FROM attempts WHERE state = 'completed'"), [(0,)])
 
-        terminal = self.begin()
+    def answer_all(self, terminal):
         while True:
             self.service.tell(AWAY)
             came = terminal.wait_for("[trial, ", "[fault, ", "[paused, ", "on record; ")
@@ -161,6 +162,14 @@ class Inverse3(unittest.TestCase):
                 break
             terminal.type("1" if came == "[trial, " else ":clear\n:go\n")
         self.assertEqual(terminal.finish(), 0, terminal.text)
+
+    def test_a_session_with_faults_is_resumed_and_complete_in_the_end(self):
+        terminal = self.begin("--new-participant")
+        self.meet_faults(terminal)
+        self.lose_the_guard(terminal)
+        self.assertEqual(self.rows("SELECT count(*) FROM attempts WHERE state = 'completed'"), [(0,)])
+
+        self.answer_all(self.begin())
         self.assertEqual(self.rows("SELECT count(*) FROM attempts WHERE state = 'completed'"), [(4,)])
         self.assertGreaterEqual(self.rows("SELECT count(*) FROM attempts WHERE state = 'cut_off'")[0][0], 5)
         self.assertEqual(self.rows("SELECT count(*) FROM runs"), [(2,)])
@@ -169,6 +178,9 @@ class Inverse3(unittest.TestCase):
         self.assertIn("maker's: Inverse3 049D, Inverse Service 3.5.0.0",
                       self.rows("SELECT device_calibration FROM runs")[0][0])
         self.assertFalse(self.service.pushes())
+        self.check_that_torque_is_said_to_be_left_out()
+
+    def check_that_torque_is_said_to_be_left_out(self):
         exported = subprocess.run([PALPATE, "export", "--db", self.database, "--format", "csv", "--out",
                                    self.folder / "trials.csv"], capture_output=True, text=True, timeout=PATIENCE)
         self.assertEqual(exported.returncode, 0, exported.stderr)
