@@ -95,16 +95,15 @@ class OnSlurm(unittest.TestCase):
             except OSError as error:
                 self.assertEqual(error.errno, errno.ENOSPC)
 
-    def test_results_survive_kills_requeues_restarts_and_a_full_disk(self):
-        self.small_disk()
-        self.hit = set()
-        plan = [PROTOCOLS / "quick.json", "--space", "s.json", "--points", POINTS, "--participants", 1,
-                "--repetitions", REPETITIONS]
-        said = self.palpate("cluster", "sweep", *plan, "--shards", SHARDS, "--dir", "disk/d")
-        self.job = said.split()[1].rstrip(":")
-        last = f"{self.job}_{SHARDS}"
-        subprocess.run(["scontrol", "hold", last], env=self.slurm.environment, check=True)
+    def others_ended(self, requeued):
+        """Whether only the last shard is left. A requeued task would wait for two minutes, so let it begin."""
+        states = self.states(self.job)
+        if states.get(str(requeued)) == "PENDING":
+            self.slurm.ask("scontrol", "update", f"jobid={self.job}_{requeued}", "StartTime=now")
+        return set(states) <= {str(SHARDS)}
 
+    def kill_requeue_and_restart(self):
+        """Numbers of the shards that were killed and requeued, once all but the last have ended."""
         killed = self.half_way()
         os.kill(self.process_of(killed), signal.SIGKILL)
 
@@ -119,14 +118,19 @@ class OnSlurm(unittest.TestCase):
         self.slurm.end("slurmctld")
         self.slurm.start_controller()
         self.slurm.wait("the controller is back", lambda: self.slurm.ask("scontrol", "ping"))
+        self.slurm.wait("all but the last have ended", lambda: self.others_ended(requeued))
+        return killed, requeued
 
-        def others_ended():  # a requeued task would wait for two minutes
-            states = self.states(self.job)
-            if states.get(str(requeued)) == "PENDING":
-                self.slurm.ask("scontrol", "update", f"jobid={self.job}_{requeued}", "StartTime=now")
-            return set(states) <= {str(SHARDS)}
-
-        self.slurm.wait("all but the last have ended", others_ended)
+    def test_results_survive_kills_requeues_restarts_and_a_full_disk(self):
+        self.small_disk()
+        self.hit = set()
+        plan = [PROTOCOLS / "quick.json", "--space", "s.json", "--points", POINTS, "--participants", 1,
+                "--repetitions", REPETITIONS]
+        said = self.palpate("cluster", "sweep", *plan, "--shards", SHARDS, "--dir", "disk/d")
+        self.job = said.split()[1].rstrip(":")
+        last = f"{self.job}_{SHARDS}"
+        subprocess.run(["scontrol", "hold", last], env=self.slurm.environment, check=True)
+        killed, requeued = self.kill_requeue_and_restart()
         self.assertLess(self.points(killed), POINTS // SHARDS)
         self.assertEqual(self.points(requeued), POINTS // SHARDS)
 

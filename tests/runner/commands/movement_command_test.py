@@ -120,25 +120,14 @@ def of_motion(tip, contact):
     return found, velocity, joined
 
 
-def of_touch(trial, tip, velocity, force, depth, contact, episodes):
-    """Of a point on a frictionless cube: the force is along the normal, the contact by the depth along it."""
+def to_object(trial, vectors):
     q = [float(trial["orientation_" + k]) for k in "wxyz"]
     w, u = q[0], np.array(q[1:])
+    return vectors - 2 * w * np.cross(u, vectors) + 2 * np.cross(u, np.cross(u, vectors))
 
-    def to_object(vectors):
-        return vectors - 2 * w * np.cross(u, vectors) + 2 * np.cross(u, np.cross(u, vectors))
 
-    size = norm(force)
-    normal = force / np.where(size > 0, size, 1)[:, None]
-    along = norm(velocity - (velocity * normal).sum(axis=1)[:, None] * normal)
-    points = to_object(tip + depth[:, None] * normal)
-    # On a face; the distance to the nearest edge follows from the larger of the other two coordinates.
-    away = np.sort(np.abs(np.abs(points) - EDGE / 2), axis=1)
-    on_edge = contact & (norm(away[:, :2]) <= 0.003)
-    inner = np.zeros(len(size), bool)
-    for a, b in runs(contact):
-        inner[a + 1:b - 1] = True
-    change = np.gradient(size) * RATE
+def shares(size, along, on_edge, contact):
+    """Of the kinds of exploration, by tenths of a second in contact."""
     kinds = []
     for a, b in runs(contact):
         for i in range(a, b - 99, 100):
@@ -147,22 +136,45 @@ def of_touch(trial, tip, velocity, force, depth, contact, episodes):
                 kinds.append("contour" if on_edge[part].mean() >= 0.5 else "lateral")
             else:
                 kinds.append("pressure" if np.ptp(size[part]) > 0.3 * size[part].mean() else "static")
-    found = {"force_mean": size[contact].mean(), "force_max": size[contact].max(),
-             "force_sd": size[contact].std(ddof=1), "force_mean_n": size[contact].mean(),
-             "speed_contact": along[contact].mean(), "edge_dwell": on_edge.sum() / RATE,
-             "press_peak": np.mean([size[a:b].max() for a, b in episodes if b - a >= 20]),
-             "force_rate": math.sqrt((change[inner] ** 2).mean())}
-    for kind in ("static", "pressure", "lateral", "contour"):
-        if kinds:
-            found["share_" + kind] = kinds.count(kind) / len(kinds)
+    return {"share_" + kind: kinds.count(kind) / len(kinds)
+            for kind in ("static", "pressure", "lateral", "contour") if kinds}
+
+
+def coverage(points):
+    """The share of the cube's surface within 5 mm of a point."""
     draws = np.random.default_rng(5)
     places = draws.uniform(-EDGE / 2, EDGE / 2, (10000, 3))
     places[np.arange(10000), draws.integers(0, 3, 10000)] = draws.choice([-EDGE / 2, EDGE / 2], 10000)
     covered = np.zeros(10000, bool)
-    for point in points[contact]:
+    for point in points:
         covered |= ((places - point) ** 2).sum(axis=1) <= 0.005 ** 2
-    found["coverage"] = covered.mean()
-    return found
+    return covered.mean()
+
+
+def of_touch(trial, tip, velocity, force, depth, contact, episodes):
+    """Of a point on a frictionless cube: the force is along the normal, the contact by the depth along it."""
+    size = norm(force)
+    normal = force / np.where(size > 0, size, 1)[:, None]
+    along = norm(velocity - (velocity * normal).sum(axis=1)[:, None] * normal)
+    points = to_object(trial, tip + depth[:, None] * normal)
+    # On a face; the distance to the nearest edge follows from the larger of the other two coordinates.
+    away = np.sort(np.abs(np.abs(points) - EDGE / 2), axis=1)
+    on_edge = contact & (norm(away[:, :2]) <= 0.003)
+    inner = np.zeros(len(size), bool)
+    for a, b in runs(contact):
+        inner[a + 1:b - 1] = True
+    change = np.gradient(size) * RATE
+    return {"force_mean": size[contact].mean(), "force_max": size[contact].max(),
+            "force_sd": size[contact].std(ddof=1), "force_mean_n": size[contact].mean(),
+            "speed_contact": along[contact].mean(), "edge_dwell": on_edge.sum() / RATE,
+            "press_peak": np.mean([size[a:b].max() for a, b in episodes if b - a >= 20]),
+            "force_rate": math.sqrt((change[inner] ** 2).mean()), "coverage": coverage(points[contact]),
+            **shares(size, along, on_edge, contact)}
+
+
+def tab_separated(path):
+    with path.open() as file:
+        return list(csv.DictReader(file, delimiter="\t"))
 
 
 class Movement(CommandCase):
@@ -289,49 +301,55 @@ class Movement(CommandCase):
             file = next((self.dir / "physio").glob(f"sub-*/{stem}/beh/*physio.tsv.gz"))
             columns = json.loads(file.with_name(file.name.replace(".tsv.gz", ".json")).read_text())["Columns"]
             recorded = gzip.decompress(file.read_bytes()).decode()
+            rows = [dict(zip(columns, line.split("\t"), strict=True)) for line in recorded.splitlines()]
             moved = next((self.dir / "motion").glob(f"sub-*/{stem}/motion/*_motion.tsv"))
             self.assertEqual(moved.read_text(), recorded)
-            with moved.with_name(moved.name.replace("_motion", "_channels")).open() as opened:
-                channels = list(csv.DictReader(opened, delimiter="\t"))
-            self.assertEqual([one["name"] for one in channels], columns)
-            self.assertEqual([one["name"] for one in channels if one["type"] == "POS"],
-                             [f"{end}_{axis}" for end in ("tip", "tail") for axis in "xyz"])
-            about = json.loads(moved.with_suffix(".json").read_text())
-            rows = [dict(zip(columns, line.split("\t"), strict=True)) for line in recorded.splitlines()]
-            self.assertEqual((about["RecordingDuration"], about["POSChannelCount"], about["MotionChannelCount"]),
-                             (len(rows) / RATE, 6, len(columns)))
-            with next(moved.parent.glob("*_events.tsv")).open() as opened:
-                events = list(csv.DictReader(opened, delimiter="\t"))
-            for event in events:
-                row = rows[round(float(event["onset"]) * RATE)]
-                self.assertEqual((row["trial"], row["tick"]), (event["trial"], "0"))
-                (trial,) = [one for one in trials if (one["session"], one["trial"]) == (str(session), event["trial"])]
-                self.assertEqual((event["shape"], event["renderer"]), (trial["shape"], trial["renderer"]))
-                self.assertAlmostEqual(float(event["duration"]), float(trial["response_time"]), delta=1e-9)
-            with (moved.parents[1] / f"{moved.name.split('_task')[0]}_scans.tsv").open() as opened:
-                self.assertEqual([one["filename"] for one in csv.DictReader(opened, delimiter="\t")],
-                                 [f"motion/{moved.name}"])
+            self.check_description(moved, columns, len(rows))
+            events = tab_separated(next(moved.parent.glob("*_events.tsv")))
+            self.check_events(events, rows, [one for one in trials if one["session"] == str(session)])
             by_point += self.check_contacts(rows, {one["trial"] for one in events if one["renderer"] == "point"})
-            table = next((self.dir / "motion" / "derivatives" / "palpate").glob(f"sub-*/{stem}/beh/*_desc-movement_beh.tsv"))
-            told = json.loads(table.with_suffix(".json").read_text())
-            with table.open() as opened:
-                for row in csv.DictReader(opened, delimiter="\t"):
-                    self.assertEqual(set(row), set(told))
-                    (own,) = [one for one in measures if (one["session"], one["trial"]) == (str(session), row["trial"])]
-                    for name in ("path_length", "coverage", "share_lateral"):
-                        self.assertEqual(None if row[name] == "n/a" else float(row[name]), float(own[name]) if own[name] else None)
+            derived = self.dir / "motion" / "derivatives" / "palpate"
+            self.check_measures(next(derived.glob(f"sub-*/{stem}/beh/*_desc-movement_beh.tsv")),
+                                [one for one in measures if one["session"] == str(session)])
         self.assertGreater(by_point, 100)
-        table = next((self.dir / "psych" / "data").glob("*/*_description-movement_data.csv"))
-        with table.open() as opened:
+        self.check_psych_ds(measures)
+        self.palpate("export", "--db", db, "--format", "bids", "--out", self.dir / "motion", "--force")
+
+    def check_description(self, moved, columns, count):
+        channels = tab_separated(moved.with_name(moved.name.replace("_motion", "_channels")))
+        self.assertEqual([one["name"] for one in channels], columns)
+        self.assertEqual([one["name"] for one in channels if one["type"] == "POS"],
+                         [f"{end}_{axis}" for end in ("tip", "tail") for axis in "xyz"])
+        about = json.loads(moved.with_suffix(".json").read_text())
+        self.assertEqual((about["RecordingDuration"], about["POSChannelCount"], about["MotionChannelCount"]),
+                         (count / RATE, 6, len(columns)))
+        scans = tab_separated(moved.parents[1] / f"{moved.name.split('_task')[0]}_scans.tsv")
+        self.assertEqual([one["filename"] for one in scans], [f"motion/{moved.name}"])
+
+    def check_events(self, events, rows, trials):
+        for event in events:
+            row = rows[round(float(event["onset"]) * RATE)]
+            self.assertEqual((row["trial"], row["tick"]), (event["trial"], "0"))
+            (trial,) = [one for one in trials if one["trial"] == event["trial"]]
+            self.assertEqual((event["shape"], event["renderer"]), (trial["shape"], trial["renderer"]))
+            self.assertAlmostEqual(float(event["duration"]), float(trial["response_time"]), delta=1e-9)
+
+    def check_measures(self, table, measures):
+        told = json.loads(table.with_suffix(".json").read_text())
+        for row in tab_separated(table):
+            self.assertEqual(set(row), set(told))
+            (own,) = [one for one in measures if one["trial"] == row["trial"]]
+            for name in ("path_length", "coverage", "share_lateral"):
+                self.assertEqual(None if row[name] == "n/a" else float(row[name]),
+                                 float(own[name]) if own[name] else None)
+
+    def check_psych_ds(self, measures):
+        with next((self.dir / "psych" / "data").glob("*/*_description-movement_data.csv")).open() as opened:
             rows = list(csv.DictReader(opened))
         self.assertEqual([float(row["sparc"]) for row in rows], [float(one["sparc"]) for one in measures])
-        described = {one["name"] for one in json.loads((self.dir / "psych" / "dataset_description.json").read_text())["variableMeasured"]}
+        description = json.loads((self.dir / "psych" / "dataset_description.json").read_text())
+        described = {one["name"] for one in description["variableMeasured"]}
         self.assertLessEqual(set(rows[0]) | {"contact_x", "normal_z"}, described)
-        self.palpate("export", "--db", db, "--format", "bids", "--out", self.dir / "motion", "--force")
-        for args, why in [(["psych-ds", "--motion"], "--motion"), (["csv", "--contacts"], "--contacts"),
-                          (["csv", "--movement"], "--movement"), (["bids", "--meshes", "."], "--meshes")]:
-            said = self.palpate("export", "--db", db, "--format", *args, "--out", self.dir / "no", status=2).stderr
-            self.assertIn(why, said)
 
     def check_contacts(self, rows, points):
         """On the ideal stylus, which the depth along the normal separates from the recorded one; without friction the
@@ -369,6 +387,10 @@ class Movement(CommandCase):
                           (["--movement-csv", "m.csv"], "give --movement"),
                           (["--cutoff-hz", "10"], "--movement")]:
             self.assertIn(why, self.palpate("analyze", "--db", db, *args, status=2).stderr)
+        for args, why in [(["psych-ds", "--motion"], "--motion"), (["csv", "--contacts"], "--contacts"),
+                          (["csv", "--movement"], "--movement"), (["bids", "--meshes", "."], "--meshes")]:
+            said = self.palpate("export", "--db", db, "--format", *args, "--out", self.dir / "no", status=2).stderr
+            self.assertIn(why, said)
         self.assertIn("--db FILE", self.palpate("analyze", "--csv", "x.csv", "--movement", status=2).stderr)
         taken = self.file("taken.csv", "mine")
         self.palpate("analyze", "--db", db, "--movement", "--movement-csv", taken, status=2)

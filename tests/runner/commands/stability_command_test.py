@@ -48,43 +48,53 @@ class Stability(unittest.TestCase):
         self.assertEqual(result["unsafe_points"], 0)
         rates = {curve["loop"]["rate_hz"] for curve in result["curves"]}
         self.assertEqual(rates, {500, 1000, 2000, 5000, 10000})
-        self.assertEqual({(c["loop"]["scene"], c["loop"]["renderer"]) for c in result["curves"] if c["panel"].startswith("scenes")},
-                         {(s, r) for s in ("wall", "edge", "sphere", "two objects", "body on a wall") for r in ("point", "ray")})
-        # A movable object held against a wall has the wall's boundary, with and without passivity controller; one that
-        # slipped or bounced would not.
+        scenes = {(c["loop"]["scene"], c["loop"]["renderer"]) for c in result["curves"]
+                  if c["panel"].startswith("scenes")}
+        self.assertEqual(scenes, {(s, r) for s in ("wall", "edge", "sphere", "two objects", "body on a wall")
+                                  for r in ("point", "ray")})
         for renderer in ("point", "ray"):
-            wall, body = ([point["measured_ns_per_m"] for point in curve["points"]]
-                          for name in ("wall", "body on a wall") for curve in result["curves"]
-                          if (curve["panel"], curve["loop"]["scene"]) == (f"scenes, {renderer}", name))
-            wall_gain, body_gain = ([gain[f"stiffest_{which}_n_per_m"] for which in ("without", "with")]
-                                    for name in ("wall", "body on a wall")
-                                    for gain in result["passivity_controller"][:10]  # of the scenes
-                                    if (gain["loop"]["renderer"], gain["loop"]["scene"]) == (renderer, name))
-            for found, expected in zip(body + body_gain, wall + wall_gain, strict=True):
-                self.assertAlmostEqual(found / expected, 1, delta=0.01)
-        # Theory, computed again, for the effective stiffness: of surface and layer together. With a reach of 5, one end
-        # moves the virtual tip by its lever, the other by one less in the opposite direction.
+            self.check_a_held_body(result, renderer)
+        self.check_theory(result["theory"] + result["curves"])
+        # A dot or a triangle for every point, a dot for every name.
+        root = xml.etree.ElementTree.parse(figure).getroot()
+        svg = "{http://www.w3.org/2000/svg}"
+        points = sum(len(curve["points"]) for curve in result["curves"])
+        drawn = len(list(root.iter(svg + "circle"))) + len(list(root.iter(svg + "polygon")))
+        self.assertEqual(drawn, points + len(result["curves"]))
+        as_xml = re.sub(r"<!DOCTYPE html>|<script>.*?</script>", "", page.read_text(), flags=re.S)
+        xml.etree.ElementTree.fromstring(as_xml)
+
+    def check_a_held_body(self, result, renderer):
+        """A movable object held against a wall has the wall's boundary, with and without passivity controller; one that
+        slipped or bounced would not."""
+        wall, body = ([point["measured_ns_per_m"] for point in curve["points"]]
+                      for name in ("wall", "body on a wall") for curve in result["curves"]
+                      if (curve["panel"], curve["loop"]["scene"]) == (f"scenes, {renderer}", name))
+        wall_gain, body_gain = ([gain[f"stiffest_{which}_n_per_m"] for which in ("without", "with")]
+                                for name in ("wall", "body on a wall")
+                                for gain in result["passivity_controller"][:10]  # of the scenes
+                                if (gain["loop"]["renderer"], gain["loop"]["scene"]) == (renderer, name))
+        for found, expected in zip(body + body_gain, wall + wall_gain, strict=True):
+            self.assertAlmostEqual(found / expected, 1, delta=0.01)
+
+    def check_theory(self, curves):
+        """Computed again, for the effective stiffness: of surface and layer together. With a reach of 5, one end moves
+        the virtual tip by its lever, the other by one less in the opposite direction."""
         felt = {"a layer as stiff as the surface": 2, "reach 5 about the tail": 5**2 + 4**2,
                 "reach 5 about the middle": 3**2 + 2**2}
-        self.assertLessEqual(set(felt), {curve["name"] for curve in result["theory"] + result["curves"]})
-        for curve in result["theory"] + result["curves"]:
+        self.assertLessEqual(set(felt), {curve["name"] for curve in curves})
+        for curve in curves:
             loop = curve["loop"]
             for point in curve["points"]:
                 stiffness = felt.get(curve["name"], 1) * point["stiffness_n_per_m"]
                 theory = stiffness / loop["rate_hz"] * (0.5 + loop["delay_ticks"]) + loop["virtual_damping_ns_per_m"]
                 self.assertAlmostEqual(point["theory_ns_per_m"] / theory, 1, 12)
         extras = {curve["name"]: (curve["loop"]["layer_stiffness_of_surface"], curve["loop"]["reach"])
-                  for curve in result["theory"] + result["curves"]}
+                  for curve in curves}
         self.assertEqual({name: extra for name, extra in extras.items() if extra != (0, None)},
                          {"a layer as stiff as the surface": (1, None),
                           "reach 5 about the tail": (0, {"factor": 5, "pivot_share_of_stylus": 1}),
                           "reach 5 about the middle": (0, {"factor": 5, "pivot_share_of_stylus": 0.5})})
-        # A dot or a triangle for every point, a dot for every name.
-        root = xml.etree.ElementTree.parse(figure).getroot()
-        svg = "{http://www.w3.org/2000/svg}"
-        points = sum(len(curve["points"]) for curve in result["curves"])
-        self.assertEqual(len(list(root.iter(svg + "circle"))) + len(list(root.iter(svg + "polygon"))), points + len(result["curves"]))
-        xml.etree.ElementTree.fromstring(re.sub(r"<!DOCTYPE html>|<script>.*?</script>", "", page.read_text(), flags=re.S))
 
     def test_a_tool_comes_to_rest_on_all_soft_bodies_that_scenes_allow(self):
         figure = self.dir / "soft.svg"

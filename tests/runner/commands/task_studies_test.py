@@ -33,8 +33,7 @@ class TaskStudies(CommandCase):
     def test_shipped_protocols_go_from_simulation_to_report_and_exports(self):
         for name in SHIPPED:
             with self.subTest(name):
-                protocol = PROTOCOLS / f"{name}.json"
-                db = self.simulated(protocol, name)
+                db = self.simulated(PROTOCOLS / f"{name}.json", name)
                 page = self.dir / f"{name}.html"
                 out = self.dir / f"{name}.numbers.json"
                 said = self.palpate("analyze", "--db", db, "--report", page, "--json", out,
@@ -44,41 +43,47 @@ class TaskStudies(CommandCase):
                 found = json.loads(out.read_text())
                 text, rows = self.exported(db)
                 self.assertEqual(found["n_trials"] + found["n_practice"], len(rows))
-                # The analysis of the export gives the same cells as that of the database; only the database has the
-                # procedures and their scale.
-                scales = set()
-                for cell in found["cells"]:
-                    for one in cell.get("psychometric_functions", []):
-                        scales.add(one["fit"]["scale"])
-                        for track in one.get("tracks", []):
-                            kind = track.pop("procedure", {"kind": "constant"})["kind"]
-                            if kind != "staircase":  # unknown to the export, where each could be one
-                                self.assertEqual(track.pop("reversal_trials"), [], kind)
-                self.assertLessEqual(len(scales), 1)
-                known = ["--scale", *scales] if scales else []
-                exported = self.numbers("--csv", self.dir / f"{name}.csv", *known)["cells"]
-                for cell in (*exported, *found["cells"]):  # known from the protocol only
-                    for name_of_protocol in ("level_unit", "expected_easier"):
-                        cell.pop(name_of_protocol)
-                for cell, own in zip(exported, found["cells"]):
-                    for one, same in zip(cell.get("psychometric_functions", []), own.get("psychometric_functions", [])):
-                        for track, as_stored in zip(one.get("tracks", []), same.get("tracks", [])):
-                            if "reversal_trials" not in as_stored:
-                                track.pop("reversal_trials")
-                self.assertEqual(exported, found["cells"])
-                self.assertEqual(scales, {"log"} if name == "size-questplus" else scales - {"log"})
+                self.check_analysis_of_the_export(name, found["cells"])
                 for kind in ("bids", "psych-ds"):
                     folder = self.dir / f"{name}-{kind}"
                     self.palpate("export", "--db", db, "--format", kind, "--out", folder)
                     self.assertTrue(any(folder.rglob("*.tsv")) or any(folder.rglob("*.csv")))
                     self.palpate("export", "--db", db, "--format", kind, "--out", folder, "--force")
-                # Repeating changes nothing, resuming in parts gives the same, another seed does not.
-                self.palpate("simulate", protocol, "--db", db, "--participants", 2)
-                self.assertEqual(self.exported(db)[0], text)
-                parts = self.simulated(protocol, f"{name}-parts", participants=1)
-                self.palpate("simulate", protocol, "--db", parts, "--participants", 2)
-                self.assertEqual(self.exported(parts)[0], text)
-                self.assertNotEqual(self.exported(self.simulated(protocol, f"{name}-7", seed=7))[0], text)
+                self.check_repeated(name, db, text)
+
+    def check_analysis_of_the_export(self, name, cells):
+        """It gives the same cells as that of the database; only the database has the procedures and their scale."""
+        scales = set()
+        for cell in cells:
+            for one in cell.get("psychometric_functions", []):
+                scales.add(one["fit"]["scale"])
+                for track in one.get("tracks", []):
+                    kind = track.pop("procedure", {"kind": "constant"})["kind"]
+                    if kind != "staircase":  # unknown to the export, where each could be one
+                        self.assertEqual(track.pop("reversal_trials"), [], kind)
+        self.assertLessEqual(len(scales), 1)
+        known = ["--scale", *scales] if scales else []
+        exported = self.numbers("--csv", self.dir / f"{name}.csv", *known)["cells"]
+        for cell in (*exported, *cells):  # known from the protocol only
+            for name_of_protocol in ("level_unit", "expected_easier"):
+                cell.pop(name_of_protocol)
+        for cell, own in zip(exported, cells):
+            for one, same in zip(cell.get("psychometric_functions", []), own.get("psychometric_functions", [])):
+                for track, as_stored in zip(one.get("tracks", []), same.get("tracks", [])):
+                    if "reversal_trials" not in as_stored:
+                        track.pop("reversal_trials")
+        self.assertEqual(exported, cells)
+        self.assertEqual(scales, {"log"} if name == "size-questplus" else scales - {"log"})
+
+    def check_repeated(self, name, db, text):
+        """Repeating changes nothing, resuming in parts gives the same, another seed does not."""
+        protocol = PROTOCOLS / f"{name}.json"
+        self.palpate("simulate", protocol, "--db", db, "--participants", 2)
+        self.assertEqual(self.exported(db)[0], text)
+        parts = self.simulated(protocol, f"{name}-parts", participants=1)
+        self.palpate("simulate", protocol, "--db", parts, "--participants", 2)
+        self.assertEqual(self.exported(parts)[0], text)
+        self.assertNotEqual(self.exported(self.simulated(protocol, f"{name}-7", seed=7))[0], text)
 
     def test_answers_to_pages_are_exported_on_request(self):
         db = self.simulated(PROTOCOLS / "roughness-magnitude.json", "pages", participants=3)
