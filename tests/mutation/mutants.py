@@ -66,67 +66,82 @@ def excluded_spans(text, all_tokens):
     return spans
 
 
-def sites(text):
-    """[(line index, [(column, old, new, is_text)])]: what may be changed, a line a row."""
-    every = tokens(text)
-    code = [t for t in every if t[0] not in ("comment", "preprocessor")]
-    spans = excluded_spans(text, every)
-    starts = [0] + [m.end() for m in re.finditer("\n", text)]
-    lines = text.split("\n")
-    rows = {}
+class Sites:
+    """What may be changed in a text: rows[line index] = [(column, old, new, is_text)]."""
 
-    def place(at):
-        low, high = 0, len(starts)
+    def __init__(self, text):
+        every = tokens(text)
+        self.text, self.lines, self.rows = text, text.split("\n"), {}
+        self.code = [t for t in every if t[0] not in ("comment", "preprocessor")]
+        self.spans = excluded_spans(text, every)
+        self.starts = [0] + [m.end() for m in re.finditer("\n", text)]
+        in_line = {}
+        for index, (_, at, _) in enumerate(self.code):
+            in_line.setdefault(self.place(at)[0], []).append(index)
+            self.of_token(index)
+        for row, members in in_line.items():
+            self.of_line(row, members)
+
+    def place(self, at):
+        low, high = 0, len(self.starts)
         while high - low > 1:
             middle = (low + high) // 2
-            low, high = (middle, high) if starts[middle] <= at else (low, middle)
-        return low, at - starts[low]
+            low, high = (middle, high) if self.starts[middle] <= at else (low, middle)
+        return low, at - self.starts[low]
 
-    def add(at, old, new, is_text=False):
-        if old == new or any(a <= at < b for a, b in spans):
+    def add(self, at, old, new, is_text=False):
+        if old == new or any(a <= at < b for a, b in self.spans):
             return
-        row, column = place(at)
-        rows.setdefault(row, []).append((column, old, new, is_text))
+        row, column = self.place(at)
+        self.rows.setdefault(row, []).append((column, old, new, is_text))
 
-    in_line = {}
-    for index, (kind, at, token) in enumerate(code):
-        row, column = place(at)
-        in_line.setdefault(row, []).append(index)
-        before, after = text[at - 1:at], text[at + len(token):at + len(token) + 1]
-        neighbours = [code[i][0] for i in (index - 1, index + 1) if 0 <= i < len(code)]
-        last = code[index - 1][2] if index else ""
+    def of_token(self, index):
+        kind, at, token = self.code[index]
+        last = self.code[index - 1][2] if index else ""
         declared = token not in ("true", "false", "break", "continue") and last != "return" and \
             re.match(r"[\w>&*]", last[-1:])
         if kind == "operator":
-            spaced = before in " \n" and after in " \n"
-            if token in SPACED and spaced and "string" not in neighbours:
-                for new in SPACED[token]:
-                    add(at, token, new)
-            elif token == "!" or (token == "-" and after.strip() and before in " ([{" and
-                                  (last in "([{,?:=<>&|+*/" or last in ("return", "&&", "||", "==", "<="))):
-                add(at, token, "")
-            elif token in ("++", "--") and "for (" not in lines[row]:
-                add(at, token, "--" if token == "++" else "++")
-        elif kind == "number" and after != ">":
+            self.of_operator(index, last)
+        elif kind == "number" and self.text[at + len(token):at + len(token) + 1] != ">":
             for new in number_mutants(token):
-                add(at, token, new)
+                self.add(at, token, new)
         elif kind == "word" and token in OTHER and not declared:
-            add(at, token, OTHER[token])
+            self.add(at, token, OTHER[token])
         elif kind == "string" and last != "extern":
-            add(at, token, '""' if len(token) > 2 else '"?"', True)
-    for row, members in in_line.items():
-        line, first = lines[row], members[0]
-        end_before = code[first - 1][2] if first else ";"
-        plain = all(code[i][0] != "raw" for i in members)
-        if plain and end_before in (";", "{", "}", ")", ":", "else") and DELETABLE.match(line) and \
+            self.add(at, token, '""' if len(token) > 2 else '"?"', True)
+
+    def of_operator(self, index, last):
+        _, at, token = self.code[index]
+        before, after = self.text[at - 1:at], self.text[at + len(token):at + len(token) + 1]
+        neighbours = [self.code[i][0] for i in (index - 1, index + 1) if 0 <= i < len(self.code)]
+        spaced = before in " \n" and after in " \n"
+        if token in SPACED and spaced and "string" not in neighbours:
+            for new in SPACED[token]:
+                self.add(at, token, new)
+        elif token == "!" or (token == "-" and after.strip() and before in " ([{" and
+                              (last in "([{,?:=<>&|+*/" or last in ("return", "&&", "||", "==", "<="))):
+            self.add(at, token, "")
+        elif token in ("++", "--") and "for (" not in self.lines[self.place(at)[0]]:
+            self.add(at, token, "--" if token == "++" else "++")
+
+    def of_line(self, row, members):
+        """Statements without effect, and arguments exchanged."""
+        if any(self.code[i][0] == "raw" for i in members):
+            return
+        line, first = self.lines[row], members[0]
+        end_before = self.code[first - 1][2] if first else ";"
+        if end_before in (";", "{", "}", ")", ":", "else") and DELETABLE.match(line) and \
                 line.count("(") == line.count(")"):
             column = len(line) - len(line.lstrip())
-            add(starts[row] + column, line.strip(), ";")
-        for match in ARGUMENTS.finditer(line) if plain else ():
+            self.add(self.starts[row] + column, line.strip(), ";")
+        for match in ARGUMENTS.finditer(line):
             name, one, two = match.groups()
             if name not in SYMMETRIC and one != two:
-                add(starts[row] + match.start(), match.group(), f"{name}({two}, {one})")
-    return sorted(rows.items())
+                self.add(self.starts[row] + match.start(), match.group(), f"{name}({two}, {one})")
+
+
+def sites(text):
+    return sorted(Sites(text).rows.items())
 
 
 def sources(tree, folder):

@@ -230,7 +230,7 @@ def report(path, survivors):
             show(mutant)
 
 
-def main():
+def arguments():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folders", nargs="*", metavar="ROOM", help="room, or a folder inside one: " + ", ".join(ROOMS))
     parser.add_argument("--seed", type=int, default=1, help="which places are drawn (1)")
@@ -256,14 +256,22 @@ def main():
     for folder in options.folders:
         if folder.split("/")[0] not in ROOMS or not (REPOSITORY / folder).is_dir():
             parser.error(f"{folder} is no room or folder inside one: {', '.join(ROOMS)}")
-    results = options.tree / "results"
-    if options.report:
-        for path in sorted(results.glob("*.jsonl")) if results.is_dir() else ():
-            if not options.folders or any(path.stem.startswith(f.replace("/", "-") + "-") for f in options.folders):
-                report(path, True)
-        return
-    if not options.folders:
+    if not options.folders and not options.report:
         parser.error("name a room: " + ", ".join(ROOMS))
+    return options
+
+
+def report_all(options):
+    results = options.tree / "results"
+    for path in sorted(results.glob("*.jsonl")) if results.is_dir() else ():
+        if not options.folders or any(path.stem.startswith(f.replace("/", "-") + "-") for f in options.folders):
+            report(path, True)
+
+
+def main():
+    options = arguments()
+    if options.report:
+        return report_all(options)
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # as Ctrl-C: `finally` undoes the mutant
     for folder in options.folders:
         if options.list:
