@@ -345,29 +345,28 @@ class SessionTest(WindowCase):
         width, _ = self.screen.size(self.console)
         self.screen.click(self.console, width - (250 if column == 0 else 60), 420 + 40 * row)
 
-    def test_the_emergency_button_works_in_every_state_and_over_every_dialog(self):
-        self.write_protocol(material={"stiffness_n_per_m": 100}, practice={"repetitions": 1},
-                            breaks={"min_seconds": 3},
-                            texts={"instructions": "Feel.", "practice": "Try.", "break": "Rest.",
-                                   "end": "Thanks."}, home={"rest_s": 1, "margin_m": 0.01})
-        self.start(device="simulated", to_the_first_trial=False)
+    def write_a_reason(self):
+        self.click_button(2, 1)
+        self.screen.click(self.console, self.screen.size(self.console)[0] - 200, 475)
+        self.screen.do("type", "--delay", 100, "why 1")
+
+    def emergencies_on_pages(self):
         for page in ["instructions", "practice"]:
             self.click_emergency()
             self.screen.keep(self.console, f"emergency_{page}")
             self.clear_and_go_on()
             self.press_until("space", lambda: page == "instructions" or self.attempts())
+
+    def emergencies_while_homing(self):
         homing = self.attempts()[-1]
         self.click_emergency()  # while waiting for the stylus, or just after
         wait_for("the cut-off", lambda: self.attempts()[homing[0] - 1][3] != "running")
         self.click_emergency()  # and again during the fault
         self.clear_and_go_on()
-        def write_a_reason():
-            self.click_button(2, 1)
-            self.screen.click(self.console, self.screen.size(self.console)[0] - 200, 475)
-            self.screen.do("type", "--delay", 100, "why 1")
 
+    def emergencies_over_dialogs(self):
         dialogs = {"none": lambda: None, "end": lambda: self.click_button(2, 1),
-                   "reason": write_a_reason, "note": self.write_a_note}
+                   "reason": self.write_a_reason, "note": self.write_a_note}
         for name, open_dialog in dialogs.items():
             wait_for("a trial", lambda: self.forces_are_on())
             open_dialog()
@@ -381,6 +380,8 @@ class SessionTest(WindowCase):
             if name in ("end", "reason"):
                 self.screen.click(self.console, self.screen.size(self.console)[0] - 60, 513)  # back
             self.clear_and_go_on()
+
+    def emergencies_after_answers(self):
         wait_for("a practice trial", lambda: self.forces_are_on())
         self.answer()
         self.click_emergency()  # during the feedback, or right after it
@@ -395,6 +396,17 @@ class SessionTest(WindowCase):
         self.clear_and_go_on()
         # The next trial begins at once or, where a page is shown, with a key.
         self.press_until("space", lambda: len(self.attempts()) > before)
+
+    def test_the_emergency_button_works_in_every_state_and_over_every_dialog(self):
+        self.write_protocol(material={"stiffness_n_per_m": 100}, practice={"repetitions": 1},
+                            breaks={"min_seconds": 3},
+                            texts={"instructions": "Feel.", "practice": "Try.", "break": "Rest.",
+                                   "end": "Thanks."}, home={"rest_s": 1, "margin_m": 0.01})
+        self.start(device="simulated", to_the_first_trial=False)
+        self.emergencies_on_pages()
+        self.emergencies_while_homing()
+        self.emergencies_over_dialogs()
+        self.emergencies_after_answers()
 
 
 class NoDisplay(unittest.TestCase):

@@ -100,30 +100,22 @@ class TaskWindows(WindowCase):
                  time.sleep(0.3) or self.program.poll() is not None)
         self.assertEqual(self.program.returncode, 0, self.messages())
 
-    def test_pages_with_a_picture_and_letters_as_they_are_typed(self):
-        (self.folder / "red.png").write_bytes(png(80, 50, (255, 0, 0)))
-        long_text = " ".join(f"Word{i}" for i in range(900))
-        pages = [
-            {"name": "how", "kind": "instructions", "text": "A stylus.\fA ball.", "pictures": ["red.png"]},
-            {"name": "consent", "kind": "consent", "consent_version": "1", "text": long_text},
-            {"name": "you", "kind": "questionnaire", "items": [
-                {"name": "work", "kind": "text", "question": "What is your work?"},
-                {"name": "age", "kind": "number", "question": "How old are you?", "min": 18, "max": 120},
-                {"name": "hand", "kind": "choice", "question": "Which hand?", "choices": ["left", "right"]}]}]
-        self.start(NUMBER, pages=pages)
+    def look_at_pictures(self):
         def red():
             width, height = self.screen.size(self.participant)
             shown = self.screen.pixels(self.participant, 0, 0, width, height)
             return sum(pixel == (255, 0, 0) for pixel in shown)
-        first = self.page("page_picture")
+
+        self.page("page_picture")
         self.assertGreater(red(), 80 * 50, "the picture is shown, enlarged")
         self.press("space", then=True, name="page_without_picture")
         self.assertEqual(red(), 0)
         self.press("Left", then=True, name="page_picture_again")
         self.assertGreater(red(), 0)
         self.press("space", then=True, name="page_second")
-        self.press("space", then=True, name="consent_1")
-        # Longer than the window: agreement is possible only after all of it was shown.
+
+    def agree(self):
+        """Longer than the window: agreement is possible only after all of it was shown."""
         self.screen.key("1")
         time.sleep(0.5)
         self.assertEqual(self.rows("SELECT count(*) FROM page_answers"), [(0,)])
@@ -136,6 +128,8 @@ class TaskWindows(WindowCase):
             self.screen.key("1")
             time.sleep(0.5)
         self.assertGreater(screens, 1)
+
+    def fill_in(self):
         typing = self.page("typing_empty")
         self.type("Lab, Jena?")
         self.page("typing", typing)
@@ -146,15 +140,43 @@ class TaskWindows(WindowCase):
         self.press("BackSpace", "KP_4", "KP_2", "Return", then=True, name="choice")
         self.screen.key("2")
         wait_for("the answers", lambda: len(self.rows("SELECT 1 FROM page_answers")) == 4)
+
+    def rate(self):
+        self.type("-7,25")
+        self.screen.key("Return")
+        wait_for("the answer", self.tasks)
+        self.assertEqual(self.tasks()[0]["number"], -7.25)
+
+    def test_pages_with_a_picture_and_letters_as_they_are_typed(self):
+        (self.folder / "red.png").write_bytes(png(80, 50, (255, 0, 0)))
+        long_text = " ".join(f"Word{i}" for i in range(900))
+        pages = [
+            {"name": "how", "kind": "instructions", "text": "A stylus.\fA ball.", "pictures": ["red.png"]},
+            {"name": "consent", "kind": "consent", "consent_version": "1", "text": long_text},
+            {"name": "you", "kind": "questionnaire", "items": [
+                {"name": "work", "kind": "text", "question": "What is your work?"},
+                {"name": "age", "kind": "number", "question": "How old are you?", "min": 18, "max": 120},
+                {"name": "hand", "kind": "choice", "question": "Which hand?", "choices": ["left", "right"]}]}]
+        self.start(NUMBER, pages=pages)
+        self.look_at_pictures()
+        self.press("space", then=True, name="consent_1")
+        self.agree()
+        self.fill_in()
         self.assertEqual([answer for (answer,) in self.rows("SELECT answer FROM page_answers ORDER BY id")],
                          ["agree", "Lab, Jena?", "42", "right"])
         wait_for("a trial", lambda: self.rows("SELECT 1 FROM attempts"))
         time.sleep(1)
         self.page("rate")
+        self.rate()
+        self.end()
+
+    def test_the_emergency_works_while_a_number_is_typed(self):
+        self.start(NUMBER)
+        wait_for("a trial", lambda: self.screen.key("space") or self.rows("SELECT 1 FROM attempts"))
+        time.sleep(1)
         before = self.screen.settled_picture(self.participant)
         self.type("-7,25")
         self.page("rate_typed", before)
-        # Typed into the console's note it is not an answer; the emergency works while typing.
         self.screen.key("F12")
         wait_for("the cut-off", lambda: self.rows("SELECT 1 FROM attempts WHERE state = 'cut_off'"))
         self.screen.keep(self.console, "rate_emergency")
@@ -164,10 +186,7 @@ class TaskWindows(WindowCase):
         wait_for("the trial again", lambda: len(self.rows("SELECT 1 FROM attempts")) == 2)
         self.screen.focus(self.participant)
         time.sleep(1)
-        self.type("-7,25")
-        self.screen.key("Return")
-        wait_for("the answer", self.tasks)
-        self.assertEqual(self.tasks()[0]["number"], -7.25)
+        self.rate()
         self.end()
 
     def test_pages_after_the_last_trial(self):
