@@ -109,16 +109,22 @@ class Pages(ServeCase):
             self.assertLess(time.monotonic(), end, script)
             time.sleep(0.05)
 
-    def test_a_block_of_jspsych(self):
-        script = jspsych()
-        origin = self.pages({"index.html": PAGE.encode(), "jspsych.js": script})
-        (self.dir / "p.json").write_text(json.dumps(PROTOCOL))
+    def open_block(self, page=PAGE, protocol=PROTOCOL):
+        """The server of a page with jsPsych that is ready to run."""
+        origin = self.pages({"index.html": page.encode(), "jspsych.js": jspsych()})
+        (self.dir / "p.json").write_text(json.dumps(protocol))
         process = self.run_server([PALPATE, "serve", "--device", "simulated", "--protocol", self.dir / "p.json", "--db",
                                    self.dir / "page.db", "--participant", "P01", "--allow-origin", origin])
         self.browser.open_url(origin + "/index.html")
         self.until("window.ready === true")
+        return process
+
+    def run_block(self):
         self.browser.run(f"void (window.done = run({json.dumps(self.said['url'])}, {json.dumps(self.said['token'])})"
                          ".then(data => window.data = data, error => window.failed = String(error)))")
+
+    def answer_block(self):
+        """Answers by turns with the mouse and with keys; what jsPsych kept."""
         answered = 0
         while not self.browser.run("window.data !== undefined"):
             self.assertIsNone(self.browser.run("window.failed ?? null"))
@@ -133,7 +139,12 @@ class Pages(ServeCase):
             elif self.browser.run(f"(b => b ? (b.click(), true) : false)(document.querySelector('[data-choice={wanted}]'))"):
                 answered += 1
             time.sleep(0.05)
-        data = self.browser.run("window.data")
+        return self.browser.run("window.data")
+
+    def test_a_block_of_jspsych(self):
+        process = self.open_block()
+        self.run_block()
+        data = self.answer_block()
         self.assertEqual(process.wait(PATIENCE), 0)
         self.assertEqual(self.complaints(), [])
         out = self.dir / "rows.csv"
@@ -159,12 +170,7 @@ class Pages(ServeCase):
         self.assertEqual({one["response"] for one in data}, {"ball", "box"})
 
     def test_a_block_ends_with_the_server(self):
-        origin = self.pages({"index.html": PAGE.encode(), "jspsych.js": jspsych()})
-        (self.dir / "p.json").write_text(json.dumps(PROTOCOL))
-        process = self.run_server([PALPATE, "serve", "--device", "simulated", "--protocol", self.dir / "p.json", "--db",
-                                   self.dir / "page.db", "--participant", "P01", "--allow-origin", origin])
-        self.browser.open_url(origin + "/index.html")
-        self.until("window.ready === true")
+        process = self.open_block()
         self.browser.run(f"""void (async () => {{
           const {{connect}} = await import('./palpate.js');
           const eye = await connect({json.dumps(self.said["url"])}, {json.dumps(self.said["token"])}, {{role: 'watch'}});
@@ -189,15 +195,9 @@ window.run = async (url, token) => {
 };
 window.ready = true;
 </script>"""
-        origin = self.pages({"index.html": page.encode(), "jspsych.js": jspsych()})
         free = {"name": "free", "task": "external", "stimuli": ["ball", "box"], "trials": 1, "answers": ["yes", "no"]}
-        (self.dir / "p.json").write_text(json.dumps({**PROTOCOL, "blocks": [free]}))
-        process = self.run_server([PALPATE, "serve", "--device", "simulated", "--protocol", self.dir / "p.json", "--db",
-                                   self.dir / "page.db", "--participant", "P01", "--allow-origin", origin])
-        self.browser.open_url(origin + "/index.html")
-        self.until("window.ready === true")
-        self.browser.run(f"void (window.done = run({json.dumps(self.said['url'])}, {json.dumps(self.said['token'])})"
-                         ".then(data => window.data = data, error => window.failed = String(error)))")
+        process = self.open_block(page, {**PROTOCOL, "blocks": [free]})
+        self.run_block()
         self.until("""window.failed || window.data ||
             (document.querySelector('[data-choice="go on"]') ?? document.querySelector('[data-choice=yes]'))?.click(), window.data""")
         self.assertIsNone(self.browser.run("window.failed ?? null"))
@@ -214,21 +214,36 @@ window.ready = true;
                                    ".then(async hand => (await hand.close(), 'connected'), error => error.code)")
             self.assertEqual(got, said)
 
-    def test_the_module_streams_and_measures_clocks(self):
+    def in_module(self, script):
+        """What a script of a page returns that has a connection of the module, hand."""
         origin = self.pages({"index.html": b"<!DOCTYPE html><title>module</title>"})
         self.serve("--allow-origin", origin)
         self.browser.open_url(origin + "/index.html")
-        got = self.browser.run(f"""(async () => {{
+        return self.browser.run(f"""(async () => {{
           const {{connect}} = await import('./palpate.js');
           const hand = await connect({json.dumps(self.said["url"])}, {json.dumps(self.said["token"])});
+          {script}
+        }})()""")
+
+    def test_the_module_streams_samples(self):
+        got = self.in_module("""
           const rows = [];
           hand.addEventListener('samples', event => rows.push(...event.detail));
           await hand.subscribe(50, ['tip', 'depth']);
-          const refused = await hand.start({{renderer: 'line'}}).catch(error => [error.code, error.place]);
+          const refused = await hand.start({renderer: 'line'}).catch(error => [error.code, error.place]);
           await hand.start();
           await new Promise(r => setTimeout(r, 700));  // longer than silence may last
           const stopped = await hand.stop();
-          const unknown = (() => {{ try {{ return hand.server_ns(); }} catch (error) {{ return error.message; }} }})();
+          return {rows, refused, stopped};""")
+        self.assertEqual(got["refused"], ["bad-message", "/renderer"])
+        self.assertGreater(len(got["rows"]), 10)
+        self.assertEqual(sorted(got["rows"][0]), ["depth", "t_ns", "tick", "tip"])
+        self.assertEqual(len(got["rows"][0]["tip"]), 3)
+        self.assertGreater(got["stopped"]["ticks"], 0)
+
+    def test_the_module_measures_clocks(self):
+        got = self.in_module("""
+          const unknown = (() => { try { return hand.server_ns(); } catch (error) { return error.message; } })();
           const clock = await hand.clock();
           const again = await hand.clock(1);
           window.hand = hand;
@@ -236,19 +251,13 @@ window.ready = true;
           await hand.start();
           const at_ms = performance.now();
           await new Promise(r => setTimeout(r, 30));
-          const said = await hand.answer('ball', {{at_ms}});
+          const said = await hand.answer('ball', {at_ms});
           const apart_ms = Math.abs(said.t_ns / 1e6 - at_ms - hand.best_clock.offset_ms);
-          const early = await hand.start().then(() => hand.answer('ball', {{at_ms: 1}})).catch(error => error.place);
+          const early = await hand.start().then(() => hand.answer('ball', {at_ms: 1})).catch(error => error.place);
           await hand.stop();
-          return {{rows, refused, stopped, clock, again, unknown, there_and_back: hand.page_ms(hand.server_ns(1234.5)),
-                   stamped: said.stamped, apart_ms, early}};
-        }})()""")
-        self.assertEqual(got["refused"], ["bad-message", "/renderer"])
-        self.assertGreater(len(got["rows"]), 10)
-        self.assertEqual(sorted(got["rows"][0]), ["depth", "t_ns", "tick", "tip"])
-        self.assertEqual(len(got["rows"][0]["tip"]), 3)
+          return {clock, again, unknown, there_and_back: hand.page_ms(hand.server_ns(1234.5)), stamped: said.stamped,
+                  apart_ms, early};""")
         self.assertLess(got["clock"]["round_trip_ms"], 1000)
-        self.assertGreater(got["stopped"]["ticks"], 0)
         self.assertIn("ask clock() first", got["unknown"])
         self.assertEqual((got["stamped"], got["early"]), ("client", "/t_ns"))
         self.assertLess(got["apart_ms"], 1e-3)

@@ -19,6 +19,30 @@ import unittest
 import jsonschema
 from serve_case import BALL, PALPATE, PATIENCE, PROTOCOLS, Client, ServeCase, ServeError, client
 
+GOOD = ['{"id":1,"type":"alive"}', '{"id":2,"type":"clock","t_client":1.5}', '{"id":3,"type":"mark","code":255}',
+        '{"id":4,"type":"subscribe","rate_hz":0.5,"fields":["depth"]}', '{"id":5,"type":"clear"}',
+        '{"id":6,"type":"load","scene":' + json.dumps(BALL) + '}', '{"id":7,"type":"note","text":"h\u00e4nd"}',
+        '{"id":8,"type":"start","renderer":"point","trial":3}', '{"id":9,"type":"stop","reason":"x"}',
+        '{"id":10,"type":"set","path":"/objects/0/damping_ns_per_m","value":0}',
+        '{"id":9007199254740992,"type":"emergency"}', '{"id":1.2e1,"type":"alive"}',
+        '{"id":13,"type":"note","text":"' + "\u00e9" * 1000 + '"}',
+        '{"id":14,"type":"clock","t_client":1.5,"t_seen_ns":9223372036854775807}',
+        '{"id":15,"type":"subscribe","rate_hz":1e-300,"fields":[]}']
+BAD = ['{"id":1,"type":"jump"}', '{"type":"alive"}', '{"id":-1,"type":"alive"}', '{"id":1.5,"type":"alive"}',
+       '{"id":1,"type":"alive","more":0}', '{"id":1,"type":"mark","code":256}', '{"id":1,"type":"mark"}',
+       '{"id":1,"type":"subscribe","rate_hz":1001}', '{"id":1,"type":"subscribe","rate_hz":1,"fields":["tip","tip"]}',
+       '{"id":1,"type":"subscribe","rate_hz":1,"fields":["smell"]}', '{"id":1,"type":"start","renderer":"line"}',
+       '{"id":1,"type":"start","trial":0}', '{"id":1,"type":"set","path":"/gravity","value":1}',
+       '{"id":1,"type":"note"}', '{"id":1,"type":"answer","response":3}', '{"id":1,"type":"load","scene":[]}',
+       '{"id":"1","type":"alive"}',
+       '{"id":1,"type":"clock","t_client":"now"}', '[]', '3', 'null',
+       '{"id":1e300,"type":"alive"}', '{"id":9007199254740993,"type":"alive"}', '{"id":1,"type":"mark","code":1.5}',
+       '{"id":1,"type":"note","text":"' + "\u00e9" * 1001 + '"}', '{"id":1,"type":"clock","t_seen_ns":-1}',
+       '{"id":1,"type":"clock","t_seen_ns":123456789012345678901234567890}']
+NO_JSON = ['', '{', '{"id":1,"type":"alive"', "{'id':1}", '{"id":1,"id":2,"type":"alive"}', '\xff', '[' * 5000,
+           '{"id":NaN,"type":"alive"}', '{"id":1,"type":"note","text":"\\ud800"}', '{"id":1e400,"type":"alive"}',
+           '{"id":1,"type":"load","scene":' + '{"objects":' * 300 + '1' + '}' * 301]
+
 
 def schemas():
     """Schemas of a client's messages and of the server's."""
@@ -305,43 +329,21 @@ class Serve(ServeCase):
     def test_messages_and_their_schema_agree(self):
         self.serve()
         says, answers = schemas()
-        ball = json.dumps(BALL)
-        good = ['{"id":1,"type":"alive"}', '{"id":2,"type":"clock","t_client":1.5}', '{"id":3,"type":"mark","code":255}',
-                '{"id":4,"type":"subscribe","rate_hz":0.5,"fields":["depth"]}', '{"id":5,"type":"clear"}',
-                '{"id":6,"type":"load","scene":' + ball + '}', '{"id":7,"type":"note","text":"h\u00e4nd"}',
-                '{"id":8,"type":"start","renderer":"point","trial":3}', '{"id":9,"type":"stop","reason":"x"}',
-                '{"id":10,"type":"set","path":"/objects/0/damping_ns_per_m","value":0}', '{"id":9007199254740992,"type":"emergency"}',
-                '{"id":1.2e1,"type":"alive"}', '{"id":13,"type":"note","text":"' + "\u00e9" * 1000 + '"}',
-                '{"id":14,"type":"clock","t_client":1.5,"t_seen_ns":9223372036854775807}',
-                '{"id":15,"type":"subscribe","rate_hz":1e-300,"fields":[]}']
-        bad = ['{"id":1,"type":"jump"}', '{"type":"alive"}', '{"id":-1,"type":"alive"}', '{"id":1.5,"type":"alive"}',
-               '{"id":1,"type":"alive","more":0}', '{"id":1,"type":"mark","code":256}', '{"id":1,"type":"mark"}',
-               '{"id":1,"type":"subscribe","rate_hz":1001}', '{"id":1,"type":"subscribe","rate_hz":1,"fields":["tip","tip"]}',
-               '{"id":1,"type":"subscribe","rate_hz":1,"fields":["smell"]}', '{"id":1,"type":"start","renderer":"line"}',
-               '{"id":1,"type":"start","trial":0}', '{"id":1,"type":"set","path":"/gravity","value":1}', '{"id":1,"type":"note"}',
-               '{"id":1,"type":"answer","response":3}', '{"id":1,"type":"load","scene":[]}', '{"id":"1","type":"alive"}',
-               '{"id":1,"type":"clock","t_client":"now"}', '[]', '3', 'null',
-               '{"id":1e300,"type":"alive"}', '{"id":9007199254740993,"type":"alive"}', '{"id":1,"type":"mark","code":1.5}',
-               '{"id":1,"type":"note","text":"' + "\u00e9" * 1001 + '"}', '{"id":1,"type":"clock","t_seen_ns":-1}',
-               '{"id":1,"type":"clock","t_seen_ns":123456789012345678901234567890}']
-        no_json = ['', '{', '{"id":1,"type":"alive"', "{'id':1}", '{"id":1,"id":2,"type":"alive"}', '\xff', '[' * 5000,
-                   '{"id":NaN,"type":"alive"}', '{"id":1,"type":"note","text":"\\ud800"}', '{"id":1e400,"type":"alive"}',
-                   '{"id":1,"type":"load","scene":' + '{"objects":' * 300 + '1' + '}' * 301]
         link = self.lines()
         self.assertTrue(self.hello(link)["ok"])
-        for text in good:
+        for text in GOOD:
             self.assertTrue(says.is_valid(json.loads(text)), text)
             link.send(text)
             reply = self.hears(link)
             self.assertTrue(reply["ok"] and answers.is_valid(reply), (text, reply))
-        for text in bad:
+        for text in BAD:
             self.assertFalse(says.is_valid(json.loads(text)), text)
             link.send(text)
             reply = self.hears(link)
             self.assertFalse(reply["ok"], text)
             self.assertEqual(reply["error"]["code"], "bad-message", text)
             self.assertTrue(answers.is_valid(reply), reply)
-        for text in no_json[1:]:
+        for text in NO_JSON[1:]:
             link.socket.sendall(text.encode("latin-1") + b"\n")
             reply = self.hears(link)
             self.assertEqual((reply["re"], reply["error"]["code"]), (None, "bad-json"), text[:50])

@@ -116,6 +116,49 @@ class Served(ServeCase):
             said = self.run_palpate("replay", "--db", self.db, "--trial", f"P01/1/{trial}", "--compare")
             self.assertRegex(said, r"(?m)(\d+) of \1 ticks|all \d+ ticks", said)
 
+    def be_refused(self, hand):
+        """Asks for what an external block does not take before its first trial."""
+        for wrong in ({}, {"stimulus": "cone", "level": 30}, {"stimulus": "ball"}, {"stimulus": "ball", "level": 61},
+                      {"stimulus": "ball", "level": 30, "renderer": "line"}, {"stimulus": "ball", "level": 30},
+                      {"stimulus": "ball", "level": 30, "renderer": "ray", "trial": 2}):
+            with self.assertRaises(ServeError) as caught:
+                hand.start(**wrong)
+            self.assertIn(caught.exception.code, ("bad-trial", "bad-message"), wrong)
+        self.refused("recorded", hand.load, {"objects": []})
+        self.refused("nothing-felt", hand.answer, "soft")
+
+    def answer_one_and_stop_the_next(self, hand, orientation):
+        first = self.trial(hand, "soft", stimulus="box", level=25, renderer="ray", orientation_wxyz=orientation,
+                           trial=1)
+        self.assertEqual((first["response"], first["level"], first["correct"]), ("soft", 25, False))
+        self.assertEqual(hand.next["trial"], 2)
+        hand.start(stimulus="ball", level=60, renderer="point")
+        self.refused("bad-answer", hand.answer, "box")
+        self.refused("running", hand.start, stimulus="ball", level=60, renderer="point")
+        hand.stop("the participant sneezed")
+        hand.mark(7, "flash")
+        hand.note("a bell rang")
+        self.assertEqual(hand.next["trial"], 2)
+
+    def answer_by_words_and_by_clock(self, hand):
+        while True:
+            try:
+                hand.start(stimulus="ball", level=60, renderer="point")
+                said = hand.answer("hard", correct=True)
+                break
+            except ServeError:
+                hand.clear()
+        self.assertTrue(said["correct"])
+        self.know_the_clock(hand)
+        zero = hand.start(stimulus="ball", level=40, renderer="point")
+        time.sleep(0.05)
+        now = time.monotonic_ns()
+        with self.assertRaises(ServeError):
+            hand.answer("hard", t_ns=zero - 1)
+        said = hand.answer("hard", t_ns=now)
+        self.assertEqual(said["stamped"], "client")
+        self.assertAlmostEqual(said["response_time_s"], (now - zero) * 1e-9, places=9)
+
     def test_an_external_block(self):
         answers = {"answers": ["soft", "hard"], **LEVEL}
         process = self.begin(self.protocol({**EXTERNAL, **answers}))
@@ -123,62 +166,36 @@ class Served(ServeCase):
         with self.client() as hand:
             self.assertEqual(hand.next["stimuli"], ["ball", "box"])
             self.assertEqual(hand.next["level_range"], [20, 60])
-            for wrong in ({}, {"stimulus": "cone", "level": 30}, {"stimulus": "ball"}, {"stimulus": "ball", "level": 61},
-                          {"stimulus": "ball", "level": 30, "renderer": "line"}, {"stimulus": "ball", "level": 30},
-                          {"stimulus": "ball", "level": 30, "renderer": "ray", "trial": 2}):
-                with self.assertRaises(ServeError) as caught:
-                    hand.start(**wrong)
-                self.assertIn(caught.exception.code, ("bad-trial", "bad-message"), wrong)
-            self.refused("recorded", hand.load, {"objects": []})
-            self.refused("nothing-felt", hand.answer, "soft")
-            first = self.trial(hand, "soft", stimulus="box", level=25, renderer="ray", orientation_wxyz=turned, trial=1)
-            self.assertEqual((first["response"], first["level"], first["correct"]), ("soft", 25, False))
-            self.assertEqual(hand.next["trial"], 2)
-            hand.start(stimulus="ball", level=60, renderer="point")
-            self.refused("bad-answer", hand.answer, "box")
-            self.refused("running", hand.start, stimulus="ball", level=60, renderer="point")
-            hand.stop("the participant sneezed")
-            hand.mark(7, "flash")
-            hand.note("a bell rang")
-            self.assertEqual(hand.next["trial"], 2)
+            self.be_refused(hand)
+            self.answer_one_and_stop_the_next(hand, turned)
         self.assertIsNone(process.poll())  # it waits for another controller
         with self.client() as hand:  # resumes
             self.assertEqual([(t["trial"], t["stimulus"], t["response"]) for t in hand.server["record"]["stored"]],
                              [(1, "box", "soft")])
-            while True:
-                try:
-                    hand.start(stimulus="ball", level=60, renderer="point")
-                    said = hand.answer("hard", correct=True)
-                    break
-                except ServeError:
-                    hand.clear()
-            self.assertTrue(said["correct"])
-            self.know_the_clock(hand)
-            zero = hand.start(stimulus="ball", level=40, renderer="point")
-            time.sleep(0.05)
-            now = time.monotonic_ns()
-            with self.assertRaises(ServeError):
-                hand.answer("hard", t_ns=zero - 1)
-            said = hand.answer("hard", t_ns=now)
-            self.assertEqual(said["stamped"], "client")
-            self.assertAlmostEqual(said["response_time_s"], (now - zero) * 1e-9, places=9)
+            self.answer_by_words_and_by_clock(hand)
         process.send_signal(signal.SIGTERM)
         self.assertEqual(process.wait(PATIENCE), 0)
-        rows = self.rows()
-        self.assertEqual([(row["shape"], row["level"], row["renderer"], row["response"], row["correct"], row["task"]) for row in rows],
-                         [("box", "25", "ray", "soft", "0", "external"), ("ball", "60", "point", "hard", "1", "external"),
-                          ("ball", "40", "point", "hard", "0", "external")])
-        self.assertEqual([float(rows[0][f"orientation_{axis}"]) for axis in "wxyz"], turned)
-        notes = [text for (text,) in self.sql("SELECT text FROM notes ORDER BY id")]
-        self.assertIn('{"mark":{"code":7,"text":"flash"}}', notes)
-        self.assertIn("a bell rang", notes)
-        self.assertIn(("the participant sneezed",), self.sql("SELECT cut_off_reason FROM attempts WHERE state = 'cut_off'"))
-        self.assertEqual(self.sql("SELECT end_reason FROM runs"), [("paused",)])
+        self.check_record_of_the_external_block(turned)
         self.run_palpate("analyze", "--db", self.db)
         again = self.begin(self.dir / "protocol.json")
         with self.client() as hand:
             self.assertEqual((hand.server["record"]["done"], hand.next["trial"]), (3, 4))
         again.kill()
+
+    def check_record_of_the_external_block(self, orientation):
+        rows = self.rows()
+        self.assertEqual([(row["shape"], row["level"], row["renderer"], row["response"], row["correct"], row["task"])
+                          for row in rows],
+                         [("box", "25", "ray", "soft", "0", "external"),
+                          ("ball", "60", "point", "hard", "1", "external"),
+                          ("ball", "40", "point", "hard", "0", "external")])
+        self.assertEqual([float(rows[0][f"orientation_{axis}"]) for axis in "wxyz"], orientation)
+        notes = [text for (text,) in self.sql("SELECT text FROM notes ORDER BY id")]
+        self.assertIn('{"mark":{"code":7,"text":"flash"}}', notes)
+        self.assertIn("a bell rang", notes)
+        self.assertIn(("the participant sneezed",),
+                      self.sql("SELECT cut_off_reason FROM attempts WHERE state = 'cut_off'"))
+        self.assertEqual(self.sql("SELECT end_reason FROM runs"), [("paused",)])
 
     def test_wrong_use(self):
         external = self.protocol(EXTERNAL)

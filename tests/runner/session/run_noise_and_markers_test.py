@@ -98,7 +98,8 @@ class Noise(Live):
 
 
 class Marks(Live):
-    def test_markers_reach_udp_and_serial_ports_despite_a_blocked_receiver(self):
+    def ports(self):
+        """A UDP socket and the master's side of a serial port, and their names for --markers."""
         receiver = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self.addCleanup(receiver.close)
         receiver.bind(("127.0.0.1", 0))
@@ -106,12 +107,15 @@ class Marks(Live):
         master, slave = pty.openpty()
         self.addCleanup(os.close, master)
         self.addCleanup(os.close, slave)
+        return receiver, master, [f"udp:127.0.0.1:{receiver.getsockname()[1]}", f"serial:{os.ttyname(slave)}:115200"]
+
+    def test_markers_reach_udp_and_serial_ports_despite_a_blocked_receiver(self):
+        receiver, master, (udp, serial) = self.ports()
         nobody = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         nobody.bind(("127.0.0.1", 0))
         closed = nobody.getsockname()[1]
         nobody.close()
-        terminal = self.begin("--markers", f"udp:127.0.0.1:{receiver.getsockname()[1]}", "--markers",
-                              f"serial:{os.ttyname(slave)}:115200", "--markers", f"udp:127.0.0.1:{closed}",
+        terminal = self.begin("--markers", udp, "--markers", serial, "--markers", f"udp:127.0.0.1:{closed}",
                               repetitions=1, blocks_per_renderer=1)
         lines = []
 
@@ -137,30 +141,25 @@ class Marks(Live):
                                  "response"])
         sent = os.read(master, 100)
         self.assertEqual(sent[:2] + sent[2:].replace(b"\2", b""), bytes([1, 2, 3, 1, 5, 1, 3]))
-        rows = self.export()
-        start, contact, response = lines[:3]
-        self.assertEqual({key: response[key] for key in ("participant_id", "session", "block", "trial", "attempt",
-                                                         "renderer", "shape", "response")},
-                         {"participant_id": "P01", "session": 1, "block": 1, "trial": 1, "attempt": 1,
-                          "renderer": "ray", "shape": rows[0]["shape"], "response": "ball"})
-        self.assertAlmostEqual((response["time_ns"] - start["time_ns"]) / 1e9, float(rows[0]["response_time"]), 9)
-        self.assertAlmostEqual((contact["time_ns"] - start["time_ns"]) / 1e9, float(rows[0]["first_contact_time"]), 9)
-        self.assertEqual(rows[0]["before_contact"], "0")
-        self.assertGreater(float(rows[0]["max_force"]), 0)
+        self.check_against_the_first_row(*lines[:3])
         self.assertEqual(lines[-1]["attempt"], 2)
         for line in lines:
             self.assertGreaterEqual(line["sent_ns"], line["time_ns"])
         self.assertIn("markers were not taken", terminal.text)
 
+    def check_against_the_first_row(self, start, contact, response):
+        row = self.export()[0]
+        self.assertEqual({key: response[key] for key in ("participant_id", "session", "block", "trial", "attempt",
+                                                         "renderer", "shape", "response")},
+                         {"participant_id": "P01", "session": 1, "block": 1, "trial": 1, "attempt": 1,
+                          "renderer": "ray", "shape": row["shape"], "response": "ball"})
+        self.assertAlmostEqual((response["time_ns"] - start["time_ns"]) / 1e9, float(row["response_time"]), 9)
+        self.assertAlmostEqual((contact["time_ns"] - start["time_ns"]) / 1e9, float(row["first_contact_time"]), 9)
+        self.assertEqual(row["before_contact"], "0")
+        self.assertGreater(float(row["max_force"]), 0)
+
     def test_a_protocols_own_codes_and_every_second(self):
-        receiver = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self.addCleanup(receiver.close)
-        receiver.bind(("127.0.0.1", 0))
-        receiver.settimeout(30)
-        master, slave = pty.openpty()
-        self.addCleanup(os.close, master)
-        self.addCleanup(os.close, slave)
-        where = [f"udp:127.0.0.1:{receiver.getsockname()[1]}", f"serial:{os.ttyname(slave)}:115200"]
+        receiver, master, where = self.ports()
         codes = {"trial_start": 10, "response:ball": 14, "sync": 99}
         terminal = self.begin("--sync", "--markers", where[0], "--markers", where[1], repetitions=1,
                               blocks_per_renderer=1, codes=codes)
