@@ -109,14 +109,20 @@ def failures_of(schema, files, program_only, more_good=()):
     return failures
 
 
-def main(source):
-    tests = source / "tests" / "protocols"
-    scene, protocol = load_schemas(source / "protocols")
-    version_2 = load_version_2(source / "protocols", protocol.schema)
-    failures = []
+class Protocols:
+    """Protocols and scenes by their schemas, against the good and bad files of the parser's tests."""
 
-    def faults(path):
-        validator = scene if path.name.startswith("scene") else protocol
+    def __init__(self, source):
+        self.source, self.files = source, source / "tests" / "protocols"
+        self.scene, self.protocol = load_schemas(source / "protocols")
+        self.version_2 = load_version_2(source / "protocols", self.protocol.schema)
+        published = sorted((source / "protocols").glob("*.json"))
+        self.good = sorted((self.files / "good").glob("*.json")) + [
+            path for path in published if ".schema" not in path.name and ".texts." not in path.name]
+        self.bad = sorted((self.files / "bad").glob("*.json"))
+
+    def faults(self, path):
+        validator = self.scene if path.name.startswith("scene") else self.protocol
         try:
             document = read(path)
         except (ValueError, RecursionError) as error:
@@ -124,45 +130,67 @@ def main(source):
         if "1e999" in path.read_text(encoding="utf-8"):
             return ["Python reads a number that is too large as infinity"]
         if isinstance(document, dict) and document.get("version") == 2:
-            validator = version_2
+            validator = self.version_2
         return [f"{error.json_path}: {error.message}" for error in validator.iter_errors(document)]
 
-    good = sorted((tests / "good").glob("*.json")) + [
-        p for p in sorted((source / "protocols").glob("*.json")) if ".schema" not in p.name and ".texts." not in p.name]
-    for path in good:
-        failures += [f"{path.name}, which is good: {fault}" for fault in faults(path)]
-    bad = sorted((tests / "bad").glob("*.json"))
-    for path in bad:
-        accepted = not faults(path)
-        if accepted and path.stem not in PROGRAM_ONLY:
-            failures.append(f"{path.name}: the schema accepts it")
-        if not accepted and path.stem in PROGRAM_ONLY:
-            failures.append(f"{path.name}: the schema refuses it, so it is not for the program only")
+    def of_files(self):
+        failures = [f"{path.name}, which is good: {fault}" for path in self.good for fault in self.faults(path)]
+        for path in self.bad:
+            accepted = not self.faults(path)
+            if accepted and path.stem not in PROGRAM_ONLY:
+                failures.append(f"{path.name}: the schema accepts it")
+            if not accepted and path.stem in PROGRAM_ONLY:
+                failures.append(f"{path.name}: the schema refuses it, so it is not for the program only")
+        if len(self.good) < 7 or len(self.bad) < 40:
+            failures.append(f"only {len(self.good)} good and {len(self.bad)} bad files were found")
+        return failures
+
+    def of_unused_keys(self):
+        """The parser accepts everything.json, so it knows every key that the schema names."""
+        def keys_in(*names):
+            return set().union(*(keys(read(self.files / "good" / name)) for name in names))
+
+        failures = []
+        unused = properties(self.protocol.schema) - keys_in("everything.json")
+        unused -= {"objects"}  # of scenes
+        if unused:
+            failures.append(f"everything.json lacks {sorted(unused)}")
+        own = {k: v for k, v in self.version_2.schema.items() if k != "$defs"}
+        own["$defs"] = {k: v for k, v in self.version_2.schema["$defs"].items() if k != "one"}
+        unused = properties(own) - keys_in("everything-v2.json", "external-v2.json")
+        if unused:
+            failures.append(f"everything-v2.json and external-v2.json lack {sorted(unused)}")
+        return failures
+
+    def of_mesh_files(self):
+        """The schema takes the names that the program takes."""
+        header = (self.source / "stimuli" / "mesh_file.h").read_text()
+        endings = re.findall(r"\.\w+", re.search(r'kMeshExtensions = "(.*)"', header)[1])
+        return [f"the schema refuses the mesh file {name}"
+                for name in [f"mesh{ending}" for ending in endings] + ["MESH.3MF", "mesh.msh"]
+                if next(self.scene.iter_errors({"objects": [{"shape": "mesh", "file": name}]}), None)]
+
+
+def spaces(source):
     published = sorted((source / "protocols" / "spaces").glob("*.json"))
-    failures += failures_of(source / "protocols" / "sweep_space.schema.json", tests / "spaces", SPACES_PROGRAM_ONLY, published)
-    study = source / "protocols" / "study.schema.json"
-    failures += failures_of(study, tests / "studies", STUDIES_PROGRAM_ONLY)
-    unused = properties(read(study)) - keys(read(tests / "studies" / "good" / "everything.json"))
+    return failures_of(source / "protocols" / "sweep_space.schema.json", source / "tests" / "protocols" / "spaces",
+                       SPACES_PROGRAM_ONLY, published)
+
+
+def studies(source):
+    schema, files = source / "protocols" / "study.schema.json", source / "tests" / "protocols" / "studies"
+    failures = failures_of(schema, files, STUDIES_PROGRAM_ONLY)
+    unused = properties(read(schema)) - keys(read(files / "good" / "everything.json"))
     if unused:
         failures.append(f"everything.json of the studies lacks {sorted(unused)}")
-    # The parser accepts everything.json, so it knows every key that the schema names.
-    unused = properties(protocol.schema) - keys(read(tests / "good" / "everything.json"))
-    unused -= {"objects"}  # of scenes
-    if unused:
-        failures.append(f"everything.json lacks {sorted(unused)}")
-    own = {k: v for k, v in version_2.schema.items() if k != "$defs"}
-    own["$defs"] = {k: v for k, v in version_2.schema["$defs"].items() if k != "one"}
-    unused = properties(own) - keys(read(tests / "good" / "everything-v2.json")) - keys(read(tests / "good" / "external-v2.json"))
-    if unused:
-        failures.append(f"everything-v2.json and external-v2.json lack {sorted(unused)}")
-    endings = re.findall(r"\.\w+", re.search(r'kMeshExtensions = "(.*)"', (source / "stimuli" / "mesh_file.h").read_text())[1])
-    for name in [f"mesh{ending}" for ending in endings] + ["MESH.3MF", "mesh.msh"]:
-        if next(scene.iter_errors({"objects": [{"shape": "mesh", "file": name}]}), None):
-            failures.append(f"the schema refuses the mesh file {name}")
-    if len(good) < 7 or len(bad) < 40:
-        failures.append(f"only {len(good)} good and {len(bad)} bad files were found")
+    return failures
 
-    print("\n".join(failures) or f"{len(good)} good and {len(bad)} bad files: as they should be")
+
+def main(source):
+    protocols = Protocols(source)
+    failures = [*protocols.of_files(), *protocols.of_unused_keys(), *protocols.of_mesh_files(), *spaces(source),
+                *studies(source)]
+    print("\n".join(failures) or f"{len(protocols.good)} good and {len(protocols.bad)} bad files: as they should be")
     return 1 if failures else 0
 
 

@@ -147,44 +147,53 @@ class Judge:
 
     def generators(self, segments, reference):
         """(normal, place) of all patches that segments touch."""
-        s, tolerance, out = self.s, self.tolerance, []
+        out = []
         for p, q in segments:
             is_point = (p == q).all()
             d = q - p
-            length = np.linalg.norm(d)
-            slope = np.zeros(len(s.f)) if is_point else s.n @ d / length
-            for end, sign in ((p, 1), (q, -1)):
-                near = s.distances(end) < tolerance
-                # The end that points into the facet; both where the segment lies along it.
-                out += [(s.n[t], end) for t in np.flatnonzero(near & (sign * slope > -NEARLY_PARALLEL))]
-                if is_point:
-                    break
+            slope = np.zeros(len(self.s.f)) if is_point else self.s.n @ d / np.linalg.norm(d)
+            out += self.at_ends(p, q, slope, is_point)
             if is_point:
                 continue
-            e = s.e1 - s.e0
-            cross = np.cross(e, d)
-            norm = np.linalg.norm(cross, axis=1)
-            n = cross / np.where(norm > 0, norm, 1)[:, None]
-            silhouette = (s.left @ d) * (s.right @ d) <= 1e-12 * length ** 2
-            # Nearest places of line and segment.
-            w = p - s.e0
-            ee, ed, dd, ew, dw = dot(e, e), e @ d, d @ d, dot(e, w), w @ d
-            det = ee * dd - ed ** 2
-            u = np.where(det > 0, (dd * ew - ed * dw) / np.where(det > 0, det, 1), 0)
-            u = np.clip(u, 0, 1)
-            t = np.clip((u * ed - dw) / dd, 0, 1)
-            u = np.clip((t * ed + ew) / ee, 0, 1)
-            gap = np.linalg.norm(s.e0 + u[:, None] * e - p - t[:, None] * d, axis=1)
-            for i in np.flatnonzero(silhouette & (norm > 1e-9 * np.sqrt(ee) * length) & (gap < tolerance)):
-                outward = n[i] if n[i] @ (s.left[i] + s.right[i]) > 0 else -n[i]
-                out.append((outward, p + t[i] * d))
+            out += self.at_edges(p, d)
             # Equation (2): somewhere on the portion that lies along a facet, with the touched patch's own normal.
             flat = np.abs(slope) <= NEARLY_PARALLEL
             for n_touched, place in list(out):
-                along = np.flatnonzero(flat & (s.n @ n_touched > 0))
+                along = np.flatnonzero(flat & (self.s.n @ n_touched > 0))
                 if len(along):
-                    near = along[s.distances(place)[along] < tolerance]
+                    near = along[self.s.distances(place)[along] < self.tolerance]
                     out += [(n_touched, p + k * d) for t in near for k in self.portion(t, p, q)]
+        return out
+
+    def at_ends(self, p, q, slope, is_point):
+        """Facets that an end touches: the end that points into the facet; both where the segment lies along it."""
+        out = []
+        for end, sign in ((p, 1),) if is_point else ((p, 1), (q, -1)):
+            near = self.s.distances(end) < self.tolerance
+            out += [(self.s.n[t], end) for t in np.flatnonzero(near & (sign * slope > -NEARLY_PARALLEL))]
+        return out
+
+    def at_edges(self, p, d):
+        """Convex edges, seen on their silhouette, that the segment from p to p + d crosses."""
+        s, length = self.s, np.linalg.norm(d)
+        e = s.e1 - s.e0
+        cross = np.cross(e, d)
+        norm = np.linalg.norm(cross, axis=1)
+        n = cross / np.where(norm > 0, norm, 1)[:, None]
+        silhouette = (s.left @ d) * (s.right @ d) <= 1e-12 * length ** 2
+        # Nearest places of line and segment.
+        w = p - s.e0
+        ee, ed, dd, ew, dw = dot(e, e), e @ d, d @ d, dot(e, w), w @ d
+        det = ee * dd - ed ** 2
+        u = np.where(det > 0, (dd * ew - ed * dw) / np.where(det > 0, det, 1), 0)
+        u = np.clip(u, 0, 1)
+        t = np.clip((u * ed - dw) / dd, 0, 1)
+        u = np.clip((t * ed + ew) / ee, 0, 1)
+        gap = np.linalg.norm(s.e0 + u[:, None] * e - p - t[:, None] * d, axis=1)
+        out = []
+        for i in np.flatnonzero(silhouette & (norm > 1e-9 * np.sqrt(ee) * length) & (gap < self.tolerance)):
+            outward = n[i] if n[i] @ (s.left[i] + s.right[i]) > 0 else -n[i]
+            out.append((outward, p + t[i] * d))
         return out
 
     def portion(self, t, p, q):
