@@ -113,7 +113,7 @@ Found open_wanted(const Library& library, int (*open_id)(char index),
   std::string others, trouble;
   for (int index = 0; index < count; ++index) {
     try {
-      const Found device = open_one(library, open_id, index);
+      Found device = open_one(library, open_id, index);
       const bool ours = is_held(device.id);
       if (!ours && (wanted.empty() || device.serial == wanted)) return device;
       others += (others.empty() ? "" : ", ") + device.serial;
