@@ -9,6 +9,8 @@ namespace {
 
 using PatchKind = SurfacePatch::Kind;
 
+constexpr double kSilhouette = 1e-12;  // of the length; tolerance of a segment along a triangle
+
 /// A side from v0 to v1, with its own triangle on the left.
 struct EdgeOf {
   const SurfaceTriangle &left, &right;
@@ -86,7 +88,7 @@ void sweep_edge(const Surface& surface, std::uint32_t side, std::uint8_t segment
     if (!(time <= 1) || !(time < first.time)) return;
     const Vec3 along = from.along + time * turn;
     const double left = glm::dot(edge.left.normal, along),
-                 right = glm::dot(edge.right.normal, along), level = 1e-12 * length;
+                 right = glm::dot(edge.right.normal, along), level = kSilhouette * length;
     const double rate = c1 + 2 * c2 * time;
     const bool up = left >= -level && right <= level, down = left <= level && right >= -level;
     if (!((up && rate < 0) || (down && rate > 0))) return;
@@ -218,8 +220,18 @@ void sweep_triangle(const Surface& surface, std::uint32_t index, std::uint8_t se
     sweep_end(surface, index, segment, true, from.end(true), to.end(true), tolerance, first);
   if ((what & surface_pair::kSides) == 0) return;
   const SurfaceTriangle& t = surface.triangles()[index];
+  const double first_slope = glm::dot(t.normal, from.along),
+               last_slope = glm::dot(t.normal, to.along),
+               level = 2 * kSilhouette * glm::length(from.along);
   for (std::uint32_t k = 0; k < 3; ++k) {
     if ((what >> k & 1) == 0 || !owns(t, index, k) || !t.touches(k)) continue;
+    // Both triangles face the same way all the time.
+    const Vec3& beyond = surface.triangles()[SurfaceTriangle::triangle_of(t.across[k])].normal;
+    const double first_beyond = glm::dot(beyond, from.along),
+                 last_beyond = glm::dot(beyond, to.along);
+    if (std::max(std::max(first_slope, last_slope), std::max(first_beyond, last_beyond)) < -level ||
+        std::min(std::min(first_slope, last_slope), std::min(first_beyond, last_beyond)) > level)
+      continue;
     sweep_edge(surface, index << 2 | k, segment, from, to, tolerance, slack, first);
   }
 }
