@@ -12,7 +12,7 @@ namespace palpate::runner::devices::falcon {
 namespace {
 
 constexpr double kTick = 1e-3;  // s
-constexpr std::int64_t kTickNs = 1'000'000;
+constexpr std::int64_t kWeighingTickNs = 1'000'000;
 constexpr double kNearCentre = 0.01;  // m, at the start
 constexpr int kLastTicks = 20;
 constexpr int kMaxAttempts = 5;
@@ -22,7 +22,7 @@ constexpr double kRamp = 0.5;         // s, from zero to full force
 // In the nominal scale. The loop must stay stable with motors 4 times as strong.
 constexpr double kStiffness = 250, kDamping = 5, kIntegral = 250;  // N/m, N s/m, N/(m s)
 constexpr double kVelocityTime = 2.5e-3;                           // s, of the filter
-constexpr double kMostResidual = 0.1;                              // share of the heaviest weight
+constexpr double kMostResidualShare = 0.1;                         // share of the heaviest weight
 
 /// PID control of the grip's position.
 class PositionController {
@@ -53,19 +53,19 @@ class PositionController {
   long saturated_ = 0;
 };
 
-class Procedure {
+class WeighingProcedure {
  public:
-  Procedure(servo::Device& device, servo::Clock& clock, Guide& guide)
+  WeighingProcedure(servo::Device& device, servo::Clock& clock, Guide& guide)
       : device_(device), clock_(clock), guide_(guide), due_ns_(clock.now_ns()) {}
-  ~Procedure() {
+  ~WeighingProcedure() {
     // Send several: a single zero command could be skipped while a reply is pending.
     for (int i = 0; i < kLastTicks; ++i) {
       next_reading();
       device_.write(Vec3(0), Vec3(0));
     }
   }
-  Procedure(const Procedure&) = delete;
-  Procedure& operator=(const Procedure&) = delete;
+  WeighingProcedure(const WeighingProcedure&) = delete;
+  WeighingProcedure& operator=(const WeighingProcedure&) = delete;
 
   void start_at_centre() {
     guide_.ask("Move the grip to the centre of its workspace, hold it there, and press ENTER.");
@@ -122,7 +122,7 @@ class Procedure {
 
   servo::DeviceReading next_reading() {
     // Do not make up for missed ticks.
-    due_ns_ = std::max(due_ns_ + kTickNs, clock_.now_ns());
+    due_ns_ = std::max(due_ns_ + kWeighingTickNs, clock_.now_ns());
     clock_.wait_until(due_ns_);
     return device_.read();
   }
@@ -213,10 +213,10 @@ ForceCalibration fit_scale(const std::vector<Weighing>& weighings) {
   force.residual = std::sqrt(square) / slope.z;
   force.sideways = std::hypot(slope.x, slope.y) / slope.z;
   force.arm_weight = (mean_force.z - slope.z * mean_weight) / slope.z;
-  if (force.residual > kMostResidual * heaviest) {
+  if (force.residual > kMostResidualShare * heaviest) {
     std::ostringstream text;
     text << "the weights lie " << force.residual << " N off a straight line ("
-         << kMostResidual * heaviest << " N are allowed): was a weight wrong or touched?";
+         << kMostResidualShare * heaviest << " N are allowed): was a weight wrong or touched?";
     throw GuideError(text.str());
   }
   return force;
@@ -224,7 +224,7 @@ ForceCalibration fit_scale(const std::vector<Weighing>& weighings) {
 
 ForceCalibration weigh(servo::Device& device, servo::Clock& clock, Guide& guide,
                        const WeighingSettings& settings) {
-  Procedure procedure(device, clock, guide);
+  WeighingProcedure procedure(device, clock, guide);
   procedure.start_at_centre();
   std::vector<Weighing> weighings = {
       procedure.measure(0, "Let go of the grip: the motors hold it. Press ENTER.", settings)};
