@@ -338,24 +338,21 @@ std::string move_to_calibrate(const servo::DeviceConfig& config) {
            library.is_initialized(device.id);
   };
   const bool was_calibrated = is_calibrated();
-  bool moved = was_calibrated;
-  std::string why;
+  std::string trouble;
   if (!was_calibrated) {
     // If this process ends, the firmware switches forces off.
-    moved = library.enable_expert_mode() >= 0 &&
-            library.set_watchdog(kWatchdogWhileMoving, device.id) >= 0 &&
-            library.auto_init(device.id) >= 0;
-    if (!moved) why = error_text(library);
+    const bool moved = library.enable_expert_mode() >= 0 &&
+                       library.set_watchdog(kWatchdogWhileMoving, device.id) >= 0 &&
+                       library.auto_init(device.id) >= 0;
+    if (!moved) trouble = " was not calibrated: " + error_text(library);
     library.stop_regulation(true, device.id);
+    if (moved && !is_calibrated())
+      trouble = " moved but reports no calibration: calibrate it as its manual says";
   }
-  const bool calibrated = moved && is_calibrated();
   library.set_force_and_torque(0, 0, 0, 0, 0, 0, device.id);
   library.enable_force(0, device.id);
   library.close(device.id);
-  if (!moved) throw std::runtime_error(name + " was not calibrated: " + why);
-  if (!calibrated)
-    throw std::runtime_error(name +
-                             " moved but reports no calibration: calibrate it as its manual says");
+  if (!trouble.empty()) throw std::runtime_error(name + trouble);
   return name + (was_calibrated ? ": is calibrated already, it was not moved" : ": is calibrated");
 }
 

@@ -163,15 +163,8 @@ class DeviceBehindALibrary(unittest.TestCase):
 
     def unplug_once_in_contact_and_answer_all(self, terminal):
         cut_off = False
-        while True:
-            # The home zone is to the right; the stylus points away from the user.
-            self.stub.hand_to_the_right(0.04)
-            came = terminal.wait_for("[trial, ", "[fault, ", "[paused, ", "on record; ")
-            if came == "on record; ":
-                break
-            if came != "[trial, ":
-                terminal.type(":clear\n:go\n")
-                continue
+        # The home zone is to the right; the stylus points away from the user.
+        for _ in terminal.trials(lambda: self.stub.hand_to_the_right(0.04)):
             self.stub.hand_to_the_right(0.012)
             self.wait(lambda: self.stub.force() > 0.01 or terminal.text.count("[fault, "))
             if not cut_off and self.stub.force() > 0.01:

@@ -170,14 +170,7 @@ class Pair(unittest.TestCase):
 
     def lose_each_end_once_in_contact_and_answer_all(self, terminal):
         lost = 0
-        while True:
-            self.hold(0.04)
-            came = terminal.wait_for("[trial, ", "[fault, ", "[paused, ", "on record; ")
-            if came == "on record; ":
-                break
-            if came != "[trial, ":
-                terminal.type(":clear\n:go\n")
-                continue
+        for _ in terminal.trials(lambda: self.hold(0.04)):
             self.hold(0.012)
             before = terminal.hear().count("[fault, ")
             self.wait(lambda: all(self.pushed()) or terminal.hear().count("[fault, ") > before)

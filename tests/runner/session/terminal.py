@@ -71,6 +71,19 @@ class Terminal:
             if time.monotonic() > end or not self._gather(0.2):
                 raise AssertionError(f"none of {words} came after:\n{self.text}")
 
+    def trials(self, leave):
+        """Yields at each trial until the session is on record. Before it, leave() takes the hand off the object; faults
+        are cleared."""
+        while True:
+            leave()
+            came = self.wait_for("[trial, ", "[fault, ", "[paused, ", "on record; ")
+            if came == "on record; ":
+                return
+            if came == "[trial, ":
+                yield
+            else:
+                self.type(":clear\n:go\n")
+
     def hear(self):
         """All output so far."""
         self._gather(0)
