@@ -105,13 +105,11 @@ PUBLIC = {
     "analysis": "text",
     "analysis/input": "csv_reader trials study_record sweep_table task_trials",
     "analysis/statistics": "analysis comparison conclusions describe interval_coverage mixed_model "
-                           "model_study paired pattern power plan quantiles sensitivity "
+                           "paired pattern power plan quantiles sensitivity "
                            "sweep_analysis task_analysis threshold_plan",
     "analysis/movement": "comparison measures pictures",
-    "analysis/figures": "panel_drawing figure_svg figures movement_figures svg sweep_figures "
-                        "task_figures",
-    "analysis/report": "html_page hypotheses movement_report plan_report report sweep_report tables "
-                       "task_report",
+    "analysis/figures": "panel_drawing figures svg",
+    "analysis/report": "html_page hypotheses plan_report report tables",
     "runner": "",
     "runner/servo": "device force_limiter passivity realtime ring sample servo servo_thread "
                     "shared_value tick_clock tick_source touched_places triple_buffer",

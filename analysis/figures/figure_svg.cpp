@@ -1,5 +1,3 @@
-#include "analysis/figures/figure_svg.h"
-
 #include <algorithm>
 #include <cstddef>
 #include <optional>

@@ -3,6 +3,7 @@
 // figure_svg() draws it.
 
 #include <cstddef>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -10,6 +11,11 @@
 #include "analysis/statistics/analysis.h"
 
 namespace palpate::analysis {
+
+struct MovementPictures;
+struct MovementTable;
+struct SweepAnalysis;
+struct TaskAnalysis;
 
 /// What a colour encodes; each palette gives it a value. point, ray, third to eighth: a renderer or
 /// a separate line; paper: results of Ho, Basdogan & Srinivasan (2000); heat: cells of a matrix;
@@ -124,5 +130,40 @@ constexpr std::size_t kShownShapes = 24;
 constexpr std::size_t kShownRenderers = 6;
 /// Largest number of participants drawn one by one.
 constexpr std::size_t kShownParticipants = 200;
+
+// Figures of tasks.
+
+/// For each stimulus in a block with means over participants: "group1", ...: a panel for each
+/// measure with every participant, the mean and its 95 % interval, by renderer. For each cell with
+/// psychometric functions: "function1", ...: a panel for each participant with the share of
+/// successes at each level (area of the symbol: trials), the fitted function and the threshold's
+/// interval; and "track1", ...: levels over the trials of up to four tracks with the answers, and
+/// reversals of a staircase. Participants beyond the first 12 are left out, with a note.
+std::vector<Figure> task_figures(const TaskAnalysis& analysis);
+
+// Figures of movement.
+
+/// The figures for which there are data: movement-paths (a typical trial on three views of its
+/// object), movement-contact (where surfaces were touched), movement-speed (speed over time with
+/// movements and contact), movement-coverage (share of the surface over time), movement-procedures
+/// (share of exploratory procedures). Shapes beyond the first eight and renderers beyond the first
+/// four are left out, with a note.
+std::vector<Figure> movement_figures(const MovementTable& table, const MovementPictures& pictures);
+
+/// Mean over participants' means of an untransformed share; none: no trial has it.
+std::optional<double> mean_share(const MovementTable& table, std::size_t measure,
+                                 std::size_t renderer, std::size_t shape);
+
+// Figures of a sweep.
+
+/// gains: each shape's gain over the space, with the paper's; drivers: their strongest drivers;
+/// scatter: each shape's gain over its strongest driver. Only figures with data.
+std::vector<Figure> sweep_figures(const SweepAnalysis& analysis);
+
+/// "Sobol index" or "rank correlation".
+std::string driver_measure(const SweepAnalysis& analysis);
+
+/// Number of parameters shown for each shape in figures and tables.
+constexpr std::size_t kShownDrivers = 8;
 
 }  // namespace palpate::analysis

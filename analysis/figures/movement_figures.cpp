@@ -1,5 +1,3 @@
-#include "analysis/figures/movement_figures.h"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -7,7 +5,10 @@
 #include <optional>
 #include <utility>
 
+#include "analysis/figures/figures.h"
 #include "analysis/figures/panel_drawing.h"
+#include "analysis/movement/comparison.h"
+#include "analysis/movement/pictures.h"
 #include "analysis/statistics/analysis.h"
 #include "analysis/text.h"
 

@@ -89,4 +89,16 @@ std::string fitting(std::string_view text, double width, double size);
 std::vector<std::string> lines_of(std::string_view text, double width, double size,
                                   bool bold = false);
 
+// A whole figure.
+
+/// standalone: a separate file, with title and notes; in_page: the HTML page shows title and notes;
+/// in_narrow_page: the same for narrow screens, with narrower panels stacked vertically.
+enum class FigurePlacement { standalone, in_page, in_narrow_page };
+
+/// In a page, title and notes are outside the visible part (viewBox) and used when the drawing is
+/// saved. Marks have a <title> (tooltip) with their numbers; marks of one participant are a <g>
+/// with the attribute data-person.
+std::string figure_svg(const Figure& figure, const Palette& palette,
+                       FigurePlacement placement = FigurePlacement::standalone);
+
 }  // namespace palpate::analysis

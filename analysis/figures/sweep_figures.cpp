@@ -1,13 +1,13 @@
-#include "analysis/figures/sweep_figures.h"
-
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <string>
 #include <utility>
 
+#include "analysis/figures/figures.h"
 #include "analysis/figures/panel_drawing.h"
 #include "analysis/statistics/comparison.h"
+#include "analysis/statistics/sweep_analysis.h"
 #include "analysis/text.h"
 #include "data/base/random.h"
 

@@ -1,5 +1,3 @@
-#include "analysis/figures/task_figures.h"
-
 #include <algorithm>
 #include <cmath>
 #include <iterator>
@@ -8,7 +6,9 @@
 #include <string>
 #include <utility>
 
+#include "analysis/figures/figures.h"
 #include "analysis/figures/panel_drawing.h"
+#include "analysis/statistics/task_analysis.h"
 #include "analysis/text.h"
 
 namespace palpate::analysis {

@@ -62,4 +62,12 @@ struct AdjustedGain {
 /// The measures of the table: coverage rate, strokes, share of contact.
 std::vector<AdjustedGain> adjusted_gains(const MovementTable& table);
 
+/// Everything that is reported of movement.
+struct MovementAnalysis {
+  MovementTable table;
+  std::vector<MeasureComparison> measures;
+  std::vector<AdjustedGain> gains;
+  std::string program_version;
+};
+
 }  // namespace palpate::analysis

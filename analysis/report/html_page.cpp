@@ -6,7 +6,6 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "analysis/figures/figure_svg.h"
 #include "analysis/figures/svg.h"
 #include "analysis/text.h"
 #include "data/base/checksum.h"

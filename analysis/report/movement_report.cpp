@@ -1,12 +1,12 @@
-#include "analysis/report/movement_report.h"
-
 #include <algorithm>
 #include <cctype>
 #include <cmath>
 #include <string_view>
 #include <utility>
 
-#include "analysis/figures/movement_figures.h"
+#include "analysis/figures/figures.h"
+#include "analysis/movement/comparison.h"
+#include "analysis/movement/pictures.h"
 #include "analysis/report/html_page.h"
 #include "analysis/report/inference_json.h"
 #include "analysis/report/report.h"

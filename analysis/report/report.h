@@ -9,6 +9,13 @@
 
 namespace palpate::analysis {
 
+struct Drivers;
+struct MovementAnalysis;
+struct MovementPictures;
+struct MovementTable;
+struct SweepAnalysis;
+struct TaskAnalysis;
+
 /// The analysis for a terminal: the conclusion, then warnings and tables. UTF-8, at most 100
 /// columns; long names are shortened, wide tables are split.
 std::string report_text(const Analysis& analysis);
@@ -27,5 +34,42 @@ void put_reduction_cards(std::string& out, const Analysis& analysis);
 
 /// The analysis as one HTML page (HtmlPage): conclusion, warnings, figures, tables and provenance.
 std::string report_html(const Analysis& analysis, const StudyRecord& record);
+
+// Of the tasks of a study of version 2.
+
+/// The analysis of the tasks of a study of version 2, for a terminal.
+std::string task_report_text(const TaskAnalysis& analysis);
+/// The same as an HTML page with the figures.
+std::string task_report_html(const TaskAnalysis& analysis, const std::string& program_version);
+/// Every number, 17 significant digits. An infinite end of an interval is null.
+std::string task_report_json(const TaskAnalysis& analysis, const std::string& program_version);
+
+// Of movement.
+
+/// Runs every analysis on the table.
+MovementAnalysis analyze_movement(MovementTable table, const std::string& program_version);
+
+/// At most 100 columns; labelled if participants are simulated.
+std::string movement_text(const MovementAnalysis& analysis);
+/// Every number, setting and definition.
+std::string movement_json(const MovementAnalysis& analysis);
+/// A self-contained page with the figures and their description in words.
+std::string movement_html(const MovementAnalysis& analysis, const MovementPictures& pictures);
+
+// Of a sweep.
+
+/// Gains over the space, what each depends on, why points failed.
+std::vector<Table> sweep_tables(const SweepAnalysis& analysis);
+/// In how many settings the pattern holds, in a sentence; what was run where none was asked for.
+std::string sweep_answer(const SweepAnalysis& analysis);
+
+/// In how many settings the pattern holds, and what its interval is about; "" without a pattern.
+std::string pattern_note(const SweepAnalysis& analysis);
+/// Whether chance is a part of a total index. \return "" where it is not
+std::string chance_note(const Drivers& drivers);
+
+std::string sweep_text(const SweepAnalysis& analysis);
+std::string sweep_json(const SweepAnalysis& analysis);
+std::string sweep_html(const SweepAnalysis& analysis);
 
 }  // namespace palpate::analysis

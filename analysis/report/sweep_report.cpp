@@ -1,16 +1,15 @@
-#include "analysis/report/sweep_report.h"
-
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "analysis/figures/sweep_figures.h"
+#include "analysis/figures/figures.h"
 #include "analysis/report/html_page.h"
 #include "analysis/report/report.h"
 #include "analysis/report/tables.h"
 #include "analysis/statistics/comparison.h"
+#include "analysis/statistics/sweep_analysis.h"
 #include "analysis/text.h"
 
 namespace palpate::analysis {

@@ -1,14 +1,12 @@
-#include "analysis/report/task_report.h"
-
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <variant>
 
 #include "analysis/figures/figures.h"
-#include "analysis/figures/task_figures.h"
 #include "analysis/report/html_page.h"
 #include "analysis/report/report.h"
+#include "analysis/statistics/task_analysis.h"
 #include "analysis/text.h"
 #include "data/base/json_text.h"
 #include "protocols/procedures/psychometric.h"

@@ -7,16 +7,14 @@
 #include <utility>
 #include <vector>
 
-#include "analysis/figures/figure_svg.h"
 #include "analysis/figures/figures.h"
-#include "analysis/figures/movement_figures.h"
-#include "analysis/figures/task_figures.h"
+#include "analysis/figures/svg.h"
 #include "analysis/input/study_record.h"
 #include "analysis/input/task_trials.h"
 #include "analysis/input/trials.h"
-#include "analysis/report/movement_report.h"
+#include "analysis/movement/comparison.h"
+#include "analysis/movement/pictures.h"
 #include "analysis/report/report.h"
-#include "analysis/report/task_report.h"
 #include "analysis/statistics/analysis.h"
 #include "analysis/statistics/task_analysis.h"
 #include "data/base/text.h"

@@ -10,7 +10,7 @@
 #include <thread>
 #include <vector>
 
-#include "analysis/figures/figure_svg.h"
+#include "analysis/figures/svg.h"
 #include "rendering/first_contact.h"
 #include "runner/commands/accuracy/report.h"
 #include "runner/commands/shared/command.h"

@@ -14,8 +14,8 @@
 #include <utility>
 #include <vector>
 
-#include "analysis/figures/figure_svg.h"
 #include "analysis/figures/figures.h"
+#include "analysis/figures/svg.h"
 #include "analysis/input/study_record.h"
 #include "analysis/report/report.h"
 #include "analysis/statistics/analysis.h"

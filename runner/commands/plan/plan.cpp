@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-#include "analysis/figures/figure_svg.h"
+#include "analysis/figures/svg.h"
 #include "analysis/report/plan_report.h"
 #include "analysis/statistics/analysis.h"
 #include "analysis/statistics/comparison.h"

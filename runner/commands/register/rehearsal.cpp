@@ -11,7 +11,7 @@
 
 #include "analysis/report/report.h"
 #include "analysis/statistics/analysis.h"
-#include "analysis/statistics/model_study.h"
+#include "analysis/statistics/power.h"
 #include "data/base/checksum.h"
 #include "data/base/random.h"
 #include "data/export/csv.h"

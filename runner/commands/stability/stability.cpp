@@ -7,7 +7,7 @@
 #include <thread>
 #include <vector>
 
-#include "analysis/figures/figure_svg.h"
+#include "analysis/figures/svg.h"
 #include "runner/commands/accuracy/report.h"
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/outputs.h"

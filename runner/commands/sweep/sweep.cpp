@@ -14,10 +14,11 @@
 #include <thread>
 #include <vector>
 
-#include "analysis/figures/figure_svg.h"
-#include "analysis/figures/sweep_figures.h"
-#include "analysis/report/sweep_report.h"
+#include "analysis/figures/figures.h"
+#include "analysis/figures/svg.h"
+#include "analysis/report/report.h"
 #include "analysis/statistics/pattern.h"
+#include "analysis/statistics/sweep_analysis.h"
 #include "data/base/json_text.h"
 #include "data/base/text.h"
 #include "data/store/sweep_file.h"

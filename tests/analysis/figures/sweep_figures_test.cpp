@@ -1,10 +1,10 @@
-#include "analysis/figures/sweep_figures.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <set>
 
+#include "analysis/figures/figures.h"
+#include "analysis/statistics/sweep_analysis.h"
 #include "data/base/random.h"
 #include "tests/analysis/figures/figure_form.h"
 #include "tests/analysis/sweep_table_fixture.h"

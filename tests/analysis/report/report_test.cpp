@@ -11,8 +11,8 @@
 #include <string>
 #include <vector>
 
-#include "analysis/figures/figure_svg.h"
 #include "analysis/figures/figures.h"
+#include "analysis/figures/svg.h"
 #include "analysis/input/trials.h"
 #include "analysis/statistics/analysis.h"
 #include "analysis/statistics/conclusions.h"

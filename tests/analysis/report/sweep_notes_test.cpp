@@ -5,7 +5,8 @@
 #include <sstream>
 #include <string>
 
-#include "analysis/report/sweep_report.h"
+#include "analysis/report/report.h"
+#include "analysis/statistics/sweep_analysis.h"
 #include "tests/analysis/sweep_table_fixture.h"
 
 namespace palpate::analysis {

@@ -6,7 +6,8 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
-#include "analysis/report/task_report.h"
+#include "analysis/report/report.h"
+#include "analysis/statistics/task_analysis.h"
 #include "tests/analysis/report/task_report_fixture.h"
 
 namespace palpate::analysis {

@@ -5,7 +5,8 @@
 #include <cmath>
 #include <limits>
 
-#include "analysis/report/task_report.h"
+#include "analysis/report/report.h"
+#include "analysis/statistics/task_analysis.h"
 #include "tests/analysis/report/task_report_fixture.h"
 
 namespace palpate::analysis {

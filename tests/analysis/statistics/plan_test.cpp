@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "analysis/figures/figure_svg.h"
+#include "analysis/figures/svg.h"
 #include "analysis/input/trials.h"
 #include "analysis/report/plan_report.h"
 #include "analysis/statistics/analysis.h"

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "analysis/report/sweep_report.h"
+#include "analysis/report/report.h"
 #include "data/base/random.h"
 #include "tests/analysis/sweep_table_fixture.h"
 

@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "analysis/figures/figure_svg.h"
+#include "analysis/figures/svg.h"
 #include "runner/commands/accuracy/report.h"
 
 namespace palpate::runner::commands {
