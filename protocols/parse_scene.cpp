@@ -13,7 +13,6 @@
 #include "protocols/parse.h"
 #include "stimuli/mesh_file.h"
 #include "stimuli/shapes.h"
-#include "stimuli/solids/gmsh_file.h"
 #include "stimuli/solids/solid_mesh.h"
 
 namespace palpate::protocols {

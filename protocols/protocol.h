@@ -2,6 +2,7 @@
 // The design of an experiment as plain values. Meaning and default of each key:
 // protocol.schema.json. SI units.
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <map>
@@ -28,7 +29,11 @@ enum class TaskKind {
   adjust,    ///< turns a parameter until the stimulus equals the standard
   external,  ///< another program chooses the stimulus and reports the answer (palpate serve)
 };
-const char* to_string(TaskKind kind);  ///< "identify", ...
+/// "identify", ...
+inline const char* to_string(TaskKind kind) {
+  constexpr std::array kNames = {"identify", "compare", "detect", "rate", "adjust", "external"};
+  return kNames[static_cast<std::size_t>(kind)];
+}
 
 /// A number of a stimulus that is varied from trial to trial.
 struct LevelTarget {
@@ -171,7 +176,10 @@ struct SceneSpec {
 };
 
 enum class RendererKind { point, ray };
-const char* to_string(RendererKind kind);  ///< "point", "ray"
+/// "point", "ray"
+inline const char* to_string(RendererKind kind) {
+  return kind == RendererKind::point ? "point" : "ray";
+}
 
 enum class RendererOrder { fixed, counterbalanced, interleaved };
 enum class OrderKind { random, sequential };
@@ -183,7 +191,8 @@ enum class MaterialLimit { refuse, limit };
 enum class TorqueRule { required, left_out };
 
 enum class NoiseKind { white, pink };
-const char* to_string(NoiseKind kind);  ///< "white", "pink"
+/// "white", "pink"
+inline const char* to_string(NoiseKind kind) { return kind == NoiseKind::white ? "white" : "pink"; }
 
 /// Masking noise in the participant's headphones during trials, against the sound of the device.
 /// Loudness is set at the amplifier.
@@ -300,6 +309,9 @@ struct Protocol {
 };
 
 /// The text shown for a stimulus: its label, else its name. Responses are stored by name.
-const std::string& answer_label(const Protocol& protocol, const std::string& stimulus);
+inline const std::string& answer_label(const Protocol& protocol, const std::string& stimulus) {
+  const auto label = protocol.response.labels.find(stimulus);
+  return label != protocol.response.labels.end() ? label->second : stimulus;
+}
 
 }  // namespace palpate::protocols

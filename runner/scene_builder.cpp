@@ -11,8 +11,8 @@
 #include "protocols/tasks/levels.h"
 #include "rendering/bodies/soft/soft_scene.h"
 #include "stimuli/closed_surface.h"
+#include "stimuli/inset.h"
 #include "stimuli/parts/convex_parts.h"
-#include "stimuli/parts/inset_parts.h"
 #include "stimuli/primitives.h"
 #include "stimuli/shapes.h"
 

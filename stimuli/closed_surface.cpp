@@ -15,7 +15,6 @@
 #include "stimuli/face_triangles.h"
 #include "stimuli/half_edges.h"
 #include "stimuli/mesh_names.h"
-#include "stimuli/winding_check.h"
 
 namespace palpate::stimuli {
 namespace {

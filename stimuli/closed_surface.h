@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -44,5 +45,12 @@ std::vector<std::uint32_t> weld_equal(const std::vector<Vec3>& points);
 /// For each point the number of the point that it is welded to (itself, for the first of its
 /// cluster). Points at most `tolerance` (m) apart are one; all coordinates must be finite.
 std::vector<std::uint32_t> weld(const std::vector<Vec3>& points, double tolerance);
+
+/// \param tolerance  m; places that are not farther than this from the surface do not count
+/// \param name  of a triangle, for messages
+/// \throws MeshError: a shell is turned inside out and in no other, the surface passes through
+/// itself so that it winds round a place a negative number of times, there is no volume
+void check_winding(const ClosedSurface& surface, double tolerance,
+                   const std::function<std::string(std::uint32_t triangle)>& name);
 
 }  // namespace palpate::stimuli

@@ -1,5 +1,3 @@
-#include "stimuli/winding_check.h"
-
 #include <algorithm>
 #include <bit>
 #include <cmath>
@@ -11,6 +9,7 @@
 #include <optional>
 #include <utility>
 
+#include "stimuli/closed_surface.h"
 #include "stimuli/mesh_names.h"
 
 namespace palpate::stimuli {

@@ -84,8 +84,8 @@ def room_of(name):
 # The headers of a room that other rooms use; all others are the room's own business (and that of the rooms within).
 PUBLIC = {
     "stimuli": "closed_surface shapes convex_mesh grid_hull inset large_array mesh_file orientation "
-               "parts/convex_parts parts/inset_parts parts/overlaps parts/facets signed_distance "
-               "primitives solids/gmsh_file solids/solid_mesh vec",
+               "parts/convex_parts parts/facets signed_distance "
+               "primitives solids/solid_mesh vec",
     "rendering": "first_contact probe reach render_fault renderer scene tool",
     "rendering/bodies": "moving_scene",
     "rendering/verification": "explain extreme_cases random_solids reference search union_cases "
@@ -100,7 +100,7 @@ PUBLIC = {
     "data/files": "atomic_file atomic_folder file_permissions text_sink output_check utc",
     "data/store": "export_log protocol_rows schema connection station_database store sweep_file "
                   "forget task_text",
-    "data/export": "bids csv psychds sample_slots settings study_about delimited_row",
+    "data/export": "csv datasets sample_slots settings study_about delimited_row",
     "data/merge": "merge",
     "analysis": "text",
     "analysis/input": "csv_reader trials study_record sweep_table task_trials",

@@ -1,5 +1,3 @@
-#include "data/export/bids.h"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -14,6 +12,7 @@
 
 #include "data/base/json_text.h"
 #include "data/export/dataset_description.h"
+#include "data/export/datasets.h"
 #include "data/export/delimited_row.h"
 #include "data/export/derived_table.h"
 #include "data/export/sample_slots.h"

@@ -1,11 +1,10 @@
-#include "data/export/psychds.h"
-
 #include <optional>
 #include <regex>
 #include <set>
 #include <string_view>
 
 #include "data/export/dataset_description.h"
+#include "data/export/datasets.h"
 #include "data/export/delimited_row.h"
 #include "data/export/derived_table.h"
 #include "data/export/sample_slots.h"

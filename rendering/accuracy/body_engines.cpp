@@ -1,5 +1,4 @@
-#include "rendering/accuracy/body_engines.h"
-
+#include "rendering/accuracy/body_study.h"
 #include "rendering/bodies/moving_scene.h"
 #include "rendering/probe.h"
 #include "rendering/renderer.h"

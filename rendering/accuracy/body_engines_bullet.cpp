@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "rendering/accuracy/body_engines.h"
+#include "rendering/accuracy/body_study.h"
 
 namespace palpate::rendering::peers {
 namespace {

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <cstdarg>
 
-#include "rendering/accuracy/body_engines.h"
+#include "rendering/accuracy/body_study.h"
 
 namespace palpate::rendering::peers {
 namespace {

@@ -6,7 +6,6 @@
 #include <memory>
 #include <numbers>
 
-#include "rendering/accuracy/body_engines.h"
 #include "rendering/bodies/moving_scene.h"
 #include "rendering/renderer.h"
 #include "stimuli/primitives.h"

@@ -3,6 +3,7 @@
 // Bullet and ODE if they are found. World frame, SI units.
 
 #include <functional>
+#include <memory>
 #include <span>
 #include <string>
 #include <vector>
@@ -46,6 +47,18 @@ class BodyEngine {
   virtual void step(double dt) = 0;
   virtual std::vector<BoxMotion> motion() const = 0;
 };
+
+/// The engines; those of other libraries exist if CMake finds the libraries.
+struct BodyEngineKind {
+  std::string name;
+  std::unique_ptr<BodyEngine> (*make)(const BodyCase& of);
+};
+std::vector<BodyEngineKind> body_engines();
+
+namespace peers {
+std::unique_ptr<BodyEngine> make_bullet_bodies(const BodyCase& of);
+std::unique_ptr<BodyEngine> make_ode_bodies(const BodyCase& of);
+}  // namespace peers
 
 struct BodyRow {
   std::string name, measure, engine;

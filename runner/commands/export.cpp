@@ -6,9 +6,8 @@
 #include <thread>
 
 #include "data/base/text.h"
-#include "data/export/bids.h"
 #include "data/export/csv.h"
-#include "data/export/psychds.h"
+#include "data/export/datasets.h"
 #include "data/store/store.h"
 #include "data/store/sweep_file.h"
 #include "runner/commands/movement/movement_export.h"

@@ -19,7 +19,6 @@
 #include "runner/session/simulated_study.h"
 #include "stimuli/closed_surface.h"
 #include "stimuli/parts/convex_parts.h"
-#include "stimuli/parts/overlaps.h"
 #include "stimuli/primitives.h"
 
 namespace palpate::runner::commands {

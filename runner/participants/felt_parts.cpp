@@ -5,8 +5,8 @@
 #include <utility>
 
 #include "stimuli/closed_surface.h"
+#include "stimuli/inset.h"
 #include "stimuli/parts/convex_parts.h"
-#include "stimuli/parts/inset_parts.h"
 #include "stimuli/primitives.h"
 #include "stimuli/shapes.h"
 

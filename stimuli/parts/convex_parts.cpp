@@ -18,7 +18,7 @@
 #include "stimuli/mesh_names.h"
 #include "stimuli/parts/cell.h"
 #include "stimuli/parts/convex_sets.h"
-#include "stimuli/parts/cutting.h"
+#include "stimuli/parts/facets.h"
 #include "stimuli/primitives.h"
 
 namespace palpate::stimuli {

@@ -62,4 +62,15 @@ std::optional<std::vector<ConvexMesh>> convex_as_it_is(const PolygonSoup& soup);
 /// (kMostParts), parts that do not add up
 std::vector<ConvexMesh> cut_into_convex_parts(const PolygonSoup& soup);
 
+// Overlaps of convex parts. One frame for all parts, SI units.
+
+/// m^3; of the intersection. 0 for bodies that abut.
+double common_volume(const ConvexMesh& a, const ConvexMesh& b);
+
+/// One sentence for each two groups of a mesh file that overlap by more than a millionth of the
+/// smaller one. Overlaps are allowed, because an object is the union of its parts, but an author of
+/// parts that should abut wants to know.
+/// \throws as convex_parts
+std::vector<std::string> group_overlaps(const ObjectSpec& spec);
+
 }  // namespace palpate::stimuli

@@ -1,5 +1,3 @@
-#include "stimuli/parts/cutting.h"
-
 #include <algorithm>
 #include <cmath>
 #include <cstdio>

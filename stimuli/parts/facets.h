@@ -3,6 +3,7 @@
 // triangles.
 
 #include <span>
+#include <vector>
 
 #include "stimuli/half_edges.h"
 #include "stimuli/parts/cell.h"
@@ -40,5 +41,18 @@ TriangleSurface triangulate(std::span<const Vec3> corners, const Vec3& normal);
 
 /// The same, about the polygon's own normal.
 TriangleSurface triangulate(std::span<const Vec3> corners);
+
+// Its convex parts.
+
+/// Limit before cutting is refused: a scan with a rough surface would fall into thousands of parts.
+inline constexpr std::size_t kMostConcaveEdges = 4000;
+inline constexpr std::size_t kMostParts = 512;
+
+/// The solid as convex polyhedra with disjoint interiors, before merging. A tree of planes (Fuchs,
+/// Kedem & Naylor 1980; solids: Thibault & Naylor 1987) whose planes are chosen at concave edges:
+/// space is cut into convex cells until the surface inside a cell bounds one convex piece. Adds
+/// faults: too many concave edges or parts, a surface that cuts itself.
+std::vector<std::vector<CellPolygon>> cut_at_concave_edges(const FacetedSolid& solid,
+                                                           PlaneTable& planes, MeshFaults& faults);
 
 }  // namespace palpate::stimuli

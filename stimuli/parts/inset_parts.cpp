@@ -2,8 +2,6 @@
 // the union of the insets of all such sets, and a few large ones suffice: the parts, each grown
 // through its faces on other parts, and near concave edges the sets behind planes through the edge.
 
-#include "stimuli/parts/inset_parts.h"
-
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -14,6 +12,7 @@
 #include <utility>
 
 #include "data/base/random.h"
+#include "stimuli/inset.h"
 #include "stimuli/parts/convex_sets.h"
 
 namespace palpate::stimuli {

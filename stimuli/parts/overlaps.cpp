@@ -1,5 +1,3 @@
-#include "stimuli/parts/overlaps.h"
-
 #include <algorithm>
 #include <cstdint>
 #include <cstdio>

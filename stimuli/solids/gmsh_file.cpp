@@ -1,5 +1,3 @@
-#include "stimuli/solids/gmsh_file.h"
-
 #include <algorithm>
 #include <charconv>
 #include <cmath>
@@ -15,6 +13,7 @@
 
 #include "data/base/text.h"
 #include "stimuli/mesh_formats.h"
+#include "stimuli/solids/solid_mesh.h"
 
 namespace palpate::stimuli {
 namespace {

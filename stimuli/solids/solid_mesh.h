@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include "stimuli/convex_mesh.h"
@@ -39,5 +40,18 @@ SolidMesh mesh_of_box(const Vec3& size, const std::array<int, 3>& counts);
 /// The triangles that bound the solid: two for each face of a hexahedron that no other shares, four
 /// for a quadratic tetrahedron's.
 std::vector<SurfaceTriangle> surface_of(const SolidMesh& mesh);
+
+// Gmsh's mesh files, version 4.1 ASCII, as far as solids of tetrahedra need them.
+
+/// Whether the path ends in .msh.
+bool is_gmsh_file_name(const std::string& path);
+
+/// Reads nodes and tetrahedra of 4 or 10 nodes ($Nodes, $Elements; elements of other dimensions and
+/// other sections are passed over). Tetrahedra of 4 nodes get nodes in the middle of their edges;
+/// inverted ones are turned. Units are metres as they stand; nodes that no tetrahedron uses are
+/// left out.
+/// \param name  named in faults
+/// \throws MeshError with file, line and what was expected, every fault
+SolidMesh read_gmsh(const std::string& name, const std::string& text);
 
 }  // namespace palpate::stimuli

@@ -1,12 +1,12 @@
 // Reading of .msh files, good and bad.
 
-#include "stimuli/solids/gmsh_file.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <string>
+
+#include "stimuli/solids/solid_mesh.h"
 
 namespace palpate::stimuli {
 namespace {

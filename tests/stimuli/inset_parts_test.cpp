@@ -1,7 +1,5 @@
 // Insets of concave solids, against distances to their true surface.
 
-#include "stimuli/parts/inset_parts.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>

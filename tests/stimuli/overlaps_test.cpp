@@ -1,7 +1,5 @@
 // Common volumes of convex parts, against sampled points and known boxes.
 
-#include "stimuli/parts/overlaps.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -11,6 +9,7 @@
 
 #include "data/base/random.h"
 #include "stimuli/orientation.h"
+#include "stimuli/parts/convex_parts.h"
 #include "stimuli/primitives.h"
 #include "tests/shared/temporary_folder.h"
 #include "tests/stimuli/part_checks.h"

@@ -16,7 +16,6 @@
 #include "data/base/input_file.h"
 #include "rendering/probe.h"
 #include "rendering/renderer.h"
-#include "stimuli/solids/gmsh_file.h"
 #include "stimuli/solids/solid_mesh.h"
 
 namespace palpate::rendering {

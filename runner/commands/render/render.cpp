@@ -20,7 +20,7 @@
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/outputs.h"
 #include "runner/commands/shared/scene_notes.h"
-#include "stimuli/parts/overlaps.h"
+#include "stimuli/parts/convex_parts.h"
 
 namespace palpate::runner::commands {
 

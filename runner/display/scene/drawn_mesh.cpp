@@ -12,7 +12,6 @@
 #include "stimuli/parts/facets.h"
 #include "stimuli/primitives.h"
 #include "stimuli/shapes.h"
-#include "stimuli/solids/gmsh_file.h"
 #include "stimuli/solids/solid_mesh.h"
 
 namespace palpate::runner::display {

@@ -1,11 +1,10 @@
 // A BIDS dataset by the program's functions; by its validators: tests/data/export/datasets.
 
-#include "data/export/bids.h"
-
 #include <gtest/gtest.h>
 
 #include <string>
 
+#include "data/export/datasets.h"
 #include "tests/data/store/store_fixture.h"
 
 namespace palpate::data {

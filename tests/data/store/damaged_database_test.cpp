@@ -9,9 +9,8 @@
 #include <random>
 #include <set>
 
-#include "data/export/bids.h"
 #include "data/export/csv.h"
-#include "data/export/psychds.h"
+#include "data/export/datasets.h"
 #include "data/merge/merge.h"
 #include "data/store/store.h"
 #include "tests/data/store/seal_again.h"
