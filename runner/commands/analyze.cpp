@@ -23,7 +23,7 @@
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/outputs.h"
 #include "runner/commands/shared/study_options.h"
-#include "runner/commands/sweep/sweep.h"
+#include "runner/commands/sweep/planned.h"
 
 namespace palpate::runner::commands {
 

@@ -20,7 +20,7 @@
 #include "runner/devices/forcedimension/forcedimension.h"
 #include "runner/devices/haply/inverse3.h"
 #include "runner/devices/mouse.h"
-#include "runner/devices/stroking.h"
+#include "runner/devices/simulated.h"
 #include "runner/devices/touch/touch.h"
 
 namespace palpate::runner::devices {

@@ -2,6 +2,8 @@
 // A station has the parts that a session works with. The `run` command opens a live station and
 // simulate_study() a simulated one; the opener owns the parts until the session is over.
 
+#include <algorithm>
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 
@@ -54,6 +56,11 @@ struct LiveStation : Station {
 };
 
 /// m, the radius about the origin that holds every stimulus of the library in any orientation.
-double largest_reach(const Station& station);
+inline double largest_reach(const Station& station) {
+  double reach = 0;
+  for (std::size_t i = 0; i < station.library.size(); ++i)
+    reach = std::max(reach, station.library.reach(static_cast<int>(i)));
+  return reach;
+}
 
 }  // namespace palpate::runner::session

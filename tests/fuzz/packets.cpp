@@ -15,7 +15,6 @@
 #include "runner/devices/falcon/boot.h"
 #include "runner/devices/falcon/driver.h"
 #include "runner/devices/falcon/parameters.h"
-#include "runner/devices/falcon/serial.h"
 
 namespace {
 

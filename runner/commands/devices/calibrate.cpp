@@ -1,5 +1,3 @@
-#include "runner/commands/devices/calibrate.h"
-
 #include <poll.h>
 #include <unistd.h>
 
@@ -13,6 +11,7 @@
 
 #include "data/base/text.h"
 #include "data/files/utc.h"
+#include "runner/commands/devices/devices.h"
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/outputs.h"
 #include "runner/devices/falcon/calibration.h"

@@ -1,6 +1,8 @@
 // palpate devices: connected devices, their limits and self-tests; the servo's timing on this
 // computer; calibration.
 
+#include "runner/commands/devices/devices.h"
+
 #include <unistd.h>
 
 #include <chrono>
@@ -14,8 +16,6 @@
 #include "data/base/text.h"
 #include "data/files/atomic_file.h"
 #include "runner/bench/servo_timing.h"
-#include "runner/commands/devices/calibrate.h"
-#include "runner/commands/devices/lab_report.h"
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/outputs.h"
 #include "runner/devices/registry.h"

@@ -1,5 +1,3 @@
-#include "runner/commands/devices/lab_report.h"
-
 #include <pwd.h>
 #include <sys/utsname.h>
 #include <unistd.h>
@@ -10,6 +8,7 @@
 #include <string_view>
 #include <thread>
 
+#include "runner/commands/devices/devices.h"
 #include "runner/servo/realtime.h"
 
 namespace palpate::runner::commands {

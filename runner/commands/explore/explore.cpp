@@ -1,5 +1,3 @@
-#include "runner/commands/explore/explore.h"
-
 #include <charconv>
 #include <cmath>
 #include <iostream>

@@ -15,7 +15,6 @@
 #include "runner/commands/render/forces.h"
 #include "runner/commands/run/admission.h"
 #include "runner/commands/run/opening.h"
-#include "runner/commands/serve/live_page.h"
 #include "runner/commands/shared/command.h"
 #include "runner/commands/watch/trial_page.h"
 #include "runner/safety/fault_signals.h"

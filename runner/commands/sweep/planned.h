@@ -9,6 +9,7 @@
 #include "data/sweep_record.h"
 #include "protocols/protocol.h"
 #include "runner/commands/shared/command.h"
+#include "runner/commands/shared/outputs.h"
 #include "runner/sweep/design.h"
 #include "runner/sweep/swept_study.h"
 
@@ -54,5 +55,10 @@ sweep::PointStudy study_of_point(const Sweep& sweep, std::int64_t point);
 /// Runs a point. An exception is the reason why the point failed. \return none: it was stopped
 std::optional<data::SweepRow> run_point(const Sweep& sweep, std::int64_t point,
                                         const std::atomic<bool>& stop);
+
+/// `palpate analyze --sweep`: the analysis as text; puts the requested files into `outputs` without
+/// writing them. \throws UsageError: the file is not a sweep's, or the pattern is invalid
+std::string analyze_sweep_file(const std::string& file, const std::string& pattern,
+                               Outputs& outputs);
 
 }  // namespace palpate::runner::commands

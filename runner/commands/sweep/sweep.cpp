@@ -1,5 +1,3 @@
-#include "runner/commands/sweep/sweep.h"
-
 #include <algorithm>
 #include <atomic>
 #include <chrono>

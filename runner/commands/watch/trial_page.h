@@ -41,7 +41,10 @@ struct TrialPage {
 /// \throws std::invalid_argument if protocol and record disagree
 TrialPage trial_page(const std::vector<WatchedTrial>& trials, bool compare);
 
-std::string_view watch_css();  ///< watch.css, embedded by the build
-std::string_view watch_js();
+// Texts that the build embeds.
+
+std::string_view watch_css();  ///< watch.css
+std::string_view watch_js();   ///< drawing.js and watch.js
+std::string_view live_page();  ///< the watchers' page of palpate serve: live.html with its script
 
 }  // namespace palpate::runner::commands

@@ -96,4 +96,17 @@ std::optional<Packet> PacketStream::take(std::uint8_t byte) noexcept {
   return packet_;
 }
 
+std::string clean_serial(std::span<const std::uint8_t> text) {
+  std::string clean;
+  bool any = false;
+  for (const std::uint8_t byte : text.first(std::min(text.size(), kMaxSerial))) {
+    if (byte == 0) break;
+    const bool plain = (byte >= '0' && byte <= '9') || (byte >= 'A' && byte <= 'Z') ||
+                       (byte >= 'a' && byte <= 'z') || byte == '.' || byte == '_' || byte == '-';
+    any = any || byte != ' ';
+    clean += plain ? static_cast<char>(byte) : '_';
+  }
+  return any ? clean : "";
+}
+
 }  // namespace palpate::runner::devices::falcon

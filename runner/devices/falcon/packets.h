@@ -4,8 +4,11 @@
 // Pure functions over bytes: malformed input only increases a count.
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <span>
+#include <string>
 
 namespace palpate::runner::devices::falcon {
 
@@ -51,5 +54,14 @@ class PacketStream {
   std::size_t size_ = 0;
   std::uint64_t dropped_ = 0;
 };
+
+// Serial numbers come from the device, so they are untrusted text that is printed, stored and
+// compared with files.
+
+inline constexpr std::size_t kMaxSerial = 32;  ///< characters
+
+/// Keeps letters, digits, '.', '_' and '-', replaces others by '_', truncates to kMaxSerial.
+/// \return "": only blanks and zeros
+std::string clean_serial(std::span<const std::uint8_t> text);
 
 }  // namespace palpate::runner::devices::falcon

@@ -1,12 +1,12 @@
 // The open-loop hand of `run --device simulated`: a rest outside, a stroke to the centre and back
 // as a raised cosine, again and again.
 
-#include "runner/devices/stroking.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <glm/geometric.hpp>
+
+#include "runner/devices/simulated.h"
 
 namespace palpate::runner::devices {
 namespace {
