@@ -69,7 +69,8 @@ std::unique_ptr<servo::Device> open_named(const servo::DeviceConfig& config) {
 
 constexpr DeviceKind kKinds[] = {
     {"falcon", "a Novint Falcon: position and force of one point, no orientation", true,
-     falcon::check_falcon, falcon::nominal_falcon, falcon::connected_falcons, falcon::open_falcon},
+     falcon::check_falcon, falcon::nominal_falcon, falcon::connected_falcons, falcon::open_falcon,
+     nullptr, nullptr, true},
     {"falcon2", "two Novint Falcons that hold the ends of a stylus", true, falcon::check_falcon2,
      falcon::nominal_falcon2, falcon::connected_falcons, falcon::open_falcon2, falcon::open_falcon},
 #ifdef PALPATE_FORCEDIMENSION

@@ -33,6 +33,7 @@ struct DeviceKind {
   /// Where the device can move its own arm to find its zero, else nullptr. Loads a maker's library:
   /// call calibrate_by_itself. \return what was done, in words. \throws std::runtime_error
   std::string (*move_to_calibrate)(const servo::DeviceConfig& config) = nullptr;
+  bool force_by_weights = false;  ///< the scale of its force is measured with known weights
 };
 
 std::span<const DeviceKind> device_kinds();

@@ -249,12 +249,12 @@ int calibrate_devices(const devices::DeviceKind& kind, const servo::DeviceConfig
   firmware.add(config.firmware, "--firmware reads it, it would be overwritten");
   const std::string why = data::write_refusal(config.calibration, true, firmware);
   check(why.empty(), "--calibration " + config.calibration + ": " + why);
-  if (kind.name == std::string("falcon")) return calibrate_force(config, values);
+  if (kind.force_by_weights) return calibrate_force(config, values);
   if (kind.open_end != nullptr) return calibrate_pair(kind, config, values);
-  std::string able = "falcon";
+  std::string able;
   for (const devices::DeviceKind& one : devices::device_kinds())
-    if (one.open_end != nullptr || one.move_to_calibrate != nullptr)
-      able += std::string(", ") + one.name;
+    if (one.force_by_weights || one.open_end != nullptr || one.move_to_calibrate != nullptr)
+      able += (able.empty() ? "" : ", ") + std::string(one.name);
   throw UsageError("--calibrate is for the devices " + able + ", not for '" + kind.name +
                    "': other devices have their maker's calibration");
 }
