@@ -5,41 +5,23 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <cstdlib>
 #include <glm/geometric.hpp>
 #include <stdexcept>
 #include <string>
 #include <thread>
 
-#include "runner/bench/allocation_count.h"
 #include "runner/devices/self_test.h"
-#include "tests/runner/devices/forcedimension/stub_state.h"
-#include "tests/shared/temporary_folder.h"
+#include "tests/runner/devices/forcedimension/stubbed_device.h"
 
 namespace palpate::runner::devices::forcedimension {
 namespace {
 
 using testing::StubDevice;
-using testing::StubState;
 
-constexpr int kMinuteOfTicks = 60'000;  // at 1 kHz
-
-class ForceDimension : public ::testing::Test {
+class ForceDimension : public testing::StubbedDevice {
  protected:
-  ForceDimension() {
-    // The stub keeps the first file that it maps: each test rewrites the same file.
-    static const palpate::testing::TemporaryFolder folder;
-    static const std::string path = folder / "stub";
-    setenv("PALPATE_STUB_STATE", path.c_str(), 1);
-    static StubState* const mapped = testing::map_stub_state(path);
-    state_ = mapped;
-    *state_ = StubState{};
-    one().serial = 4711;
-    config_.library = STUB_LIBRARY;
-  }
+  ForceDimension() : StubbedDevice(open, STUB_LIBRARY) {}
 
-  StubDevice& one() { return state_->device[0]; }
-  StubDevice& other() { return state_->device[1]; }
   static servo::DeviceTrouble read(servo::Device& device) { return device.read().trouble; }
   /// Reads until the status has been queried again.
   static servo::DeviceTrouble settle(servo::Device& device) {
@@ -50,17 +32,6 @@ class ForceDimension : public ::testing::Test {
     }
     return trouble;
   }
-  std::string refusal() {
-    try {
-      open(config_);
-      return "";
-    } catch (const std::runtime_error& error) {
-      return error.what();
-    }
-  }
-
-  StubState* state_;
-  servo::DeviceConfig config_;
 };
 
 void expect_near(const Vec3& a, const Vec3& b) {
@@ -141,8 +112,7 @@ TEST_F(ForceDimension, EveryFaultIsTroubleAndZeroForceUntilItIsOver) {
                {"in use", &StubDevice::error, 20, 0, servo::DeviceTrouble::in_use}};
   for (const auto& [name, what, value, well, trouble] : cases) {
     SCOPED_TRACE(name);
-    *state_ = StubState{};
-    one().serial = 4711;
+    make_well();
     const auto device = open(config_);
     ASSERT_EQ(settle(*device), servo::DeviceTrouble::none);
     device->write({0, 0, 1}, Vec3(0));
@@ -166,15 +136,9 @@ TEST_F(ForceDimension, EveryFaultIsTroubleAndZeroForceUntilItIsOver) {
 }
 
 TEST_F(ForceDimension, ReadsAndWritesDoNotAllocate) {
-  if (!bench::counts_allocations()) GTEST_SKIP() << "allocations are not counted under sanitizers";
   const auto device = open(config_);
   ASSERT_EQ(settle(*device), servo::DeviceTrouble::none);
-  const std::uint64_t before = bench::allocations();
-  for (int tick = 0; tick < kMinuteOfTicks; ++tick) {
-    device->read();
-    device->write({0, 0, 1}, Vec3(0));
-  }
-  EXPECT_EQ(bench::allocations(), before);
+  expect_no_allocation(*device);
 }
 
 TEST_F(ForceDimension, AJumpIsImplausible) {

@@ -17,33 +17,18 @@
 #include <string>
 #include <thread>
 
-#include "runner/bench/allocation_count.h"
-#include "tests/runner/devices/forcedimension/stub_state.h"
+#include "tests/runner/devices/forcedimension/stubbed_device.h"
 #include "tests/shared/temporary_folder.h"
 
 namespace palpate::runner::devices::touch {
 namespace {
 
 using testing::StubDevice;
-using testing::StubState;
 
-constexpr int kMinuteOfTicks = 60'000;  // at 1 kHz
-
-class Touch : public ::testing::Test {
+class Touch : public testing::StubbedDevice {
  protected:
-  Touch() {
-    // The stub keeps the first file that it maps: each test rewrites the same file.
-    static const palpate::testing::TemporaryFolder folder;
-    static const std::string path = folder / "stub";
-    setenv("PALPATE_STUB_STATE", path.c_str(), 1);
-    static StubState* const mapped = testing::map_stub_state(path);
-    state_ = mapped;
-    *state_ = StubState{};
-    one().serial = 4711;
-    config_.library = STUB_LIBRARY;
-  }
+  Touch() : StubbedDevice(open, STUB_LIBRARY) {}
 
-  StubDevice& one() { return state_->device[0]; }
   /// Reads like a servo, with a force upwards, until `holds` or a long time-out.
   static bool until(servo::Device& device,
                     const std::function<bool(const servo::DeviceReading&)>& holds, double up = 0) {
@@ -62,17 +47,6 @@ class Touch : public ::testing::Test {
     return until(
         device, [this](const servo::DeviceReading&) { return one().force[1] == 1; }, 1);
   }
-  std::string refusal() {
-    try {
-      open(config_);
-      return "";
-    } catch (const std::runtime_error& error) {
-      return error.what();
-    }
-  }
-
-  StubState* state_;
-  servo::DeviceConfig config_;
 };
 
 TEST_F(Touch, AStylusIsReadInTheWorldFrameAndItsForcesAddUpAtTheTip) {
@@ -134,8 +108,7 @@ TEST_F(Touch, EveryFaultIsTroubleAndZeroForceUntilItIsOver) {
       {"1e9 m", &StubDevice::wrong, 3, 0, servo::DeviceTrouble::implausible}};
   for (const auto& [name, what, value, well, trouble] : cases) {
     SCOPED_TRACE(name);
-    *state_ = StubState{};
-    one().serial = 4711;
+    make_well();
     const auto device = open(config_);
     ASSERT_TRUE(works(*device));
     ASSERT_TRUE(pushes(*device));
@@ -163,15 +136,9 @@ TEST_F(Touch, EveryFaultIsTroubleAndZeroForceUntilItIsOver) {
 }
 
 TEST_F(Touch, ReadsAndWritesDoNotAllocate) {
-  if (!bench::counts_allocations()) GTEST_SKIP() << "allocations are not counted under sanitizers";
   const auto device = open(config_);
   ASSERT_TRUE(works(*device));
-  const std::uint64_t before = bench::allocations();
-  for (int tick = 0; tick < kMinuteOfTicks; ++tick) {
-    device->read();
-    device->write({0, 0, 1}, Vec3(0));
-  }
-  EXPECT_EQ(bench::allocations(), before);
+  expect_no_allocation(*device);
 }
 
 TEST_F(Touch, ACalibrationThatIsDueIsUpdated) {
@@ -183,8 +150,8 @@ TEST_F(Touch, ACalibrationThatIsDueIsUpdated) {
 
 TEST_F(Touch, TwoDevicesAreIdentifiedByNameAndShareOneScheduler) {
   state_->count = 2;
-  state_->device[1].serial = 99;
-  state_->device[1].hand[0] = 0.05;
+  other().serial = 99;
+  other().hand[0] = 0.05;
   config_.serials = {"4711"};
   const auto tip = open(config_);
   config_.serials = {"99"};
