@@ -1,18 +1,21 @@
 #pragma once
-// Reads the files of a ZIP archive (APPNOTE 6.3.10: stored or deflated, ZIP64).
+// Reads the files of a ZIP archive in memory, through libzip.
 
 #include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <memory>
 #include <string>
 #include <string_view>
+
+struct zip;
 
 namespace palpate::stimuli {
 
 /// Thrown to stop reading.
 struct ZipRefused {
-  std::string place;  ///< a byte of the archive or a file's name in it; empty: the archive
+  std::string place;  ///< a file's name in the archive; empty: the archive
   std::string expected, found;
 };
 
@@ -38,16 +41,12 @@ class ZipArchive {
  private:
   struct Entry {
     std::string name;
-    std::uint64_t packed = 0, unpacked = 0, header = 0;  ///< sizes; byte of its local header
-    std::uint32_t checksum = 0, method = 0, flags = 0;
+    std::uint64_t index = 0, unpacked = 0;
   };
-  std::uint64_t number(std::uint64_t at, std::size_t size) const;
-  void find_directory(std::uint64_t& at, std::uint64_t& count) const;
-  std::uint64_t read_entry(std::uint64_t at);
-  void read_large_sizes(Entry& entry, std::uint64_t at, std::uint64_t end) const;
-  std::string_view packed_bytes(const Entry& entry) const;
-
-  std::string_view bytes_;
+  struct Discard {
+    void operator()(zip* archive) const;
+  };
+  std::unique_ptr<zip, Discard> archive_;
   std::uint64_t unpacked_ = 0;
   std::map<std::string, Entry> entries_;
 };
