@@ -56,15 +56,6 @@ std::string shape_key(const stimuli::ObjectSpec& spec, bool side_contact) {
          spec.file;
 }
 
-/// Those of the objects that move.
-std::vector<rendering::MovingObject> moving_of(const std::vector<stimuli::ObjectSpec>& objects) {
-  std::vector<rendering::MovingObject> moving;
-  for (std::size_t i = 0; i < objects.size(); ++i) {
-    if (objects[i].body) moving.push_back({static_cast<int>(i), *objects[i].body, objects[i].pose});
-  }
-  return moving;
-}
-
 /// What object i may collide with, for messages: the first object that moves, or if it moves
 /// itself the first other one. Empty: nothing.
 std::string met_by(const std::vector<stimuli::ObjectSpec>& objects, std::size_t i) {
@@ -288,16 +279,17 @@ bool SceneBuilder::has_concave(const stimuli::ObjectSpec& spec) {
                      [&](const stimuli::ObjectSpec& part) { return has_concave(part); });
 }
 
-/// The closed surfaces of what is felt of an object.
+/// The closed surfaces of an object.
 /// \param in_object  the pose of the shape's own frame
-void SceneBuilder::add_shells(const stimuli::ObjectSpec& spec, const Pose& in_object,
+/// \param felt  only of what is felt of it
+void SceneBuilder::add_shells(const stimuli::ObjectSpec& spec, const Pose& in_object, bool felt,
                               std::vector<rendering::SurfaceShell>& shells) {
   if (spec.shape == stimuli::ShapeKind::compound) {
     for (const stimuli::ObjectSpec& part : spec.parts)
-      add_shells(part, stimuli::compose(in_object, part.pose), shells);
+      add_shells(part, stimuli::compose(in_object, part.pose), felt, shells);
     return;
   }
-  if (!(spec.material.stiffness > 0)) return;
+  if (felt && !(spec.material.stiffness > 0)) return;
   std::shared_ptr<const stimuli::ClosedSurface> surface = concave(spec);
   if (surface == nullptr)
     surface = std::make_shared<const stimuli::ClosedSurface>(
@@ -305,6 +297,23 @@ void SceneBuilder::add_shells(const stimuli::ObjectSpec& spec, const Pose& in_ob
   stimuli::Material material = spec.material;
   material.layers.clear();
   shells.push_back({std::move(surface), in_object, std::move(material)});
+}
+
+std::vector<rendering::MovingObject> SceneBuilder::moving_of(
+    const std::vector<stimuli::ObjectSpec>& objects) {
+  std::vector<rendering::MovingObject> moving;
+  for (std::size_t i = 0; i < objects.size(); ++i) {
+    const stimuli::ObjectSpec& spec = objects[i];
+    if (!spec.body) continue;
+    moving.push_back({static_cast<int>(i), *spec.body, spec.pose});
+    if (!has_concave(spec)) continue;
+    std::vector<rendering::SurfaceShell> felt, all;
+    add_shells(spec, Pose{}, true, felt);
+    add_shells(spec, Pose{}, false, all);
+    if (felt.size() < all.size())
+      moving.back().solid = std::make_shared<const rendering::Surface>(all);
+  }
+  return moving;
 }
 
 SceneBuilder::Placed SceneBuilder::placed(const stimuli::ObjectSpec& spec, int object,
@@ -341,8 +350,11 @@ SceneBuilder::Placed SceneBuilder::placed(const stimuli::ObjectSpec& spec, int o
   if (!placing.by_surface) return out;
   std::shared_ptr<const rendering::Surface> surface;
   std::vector<rendering::SurfaceShell> shells;
-  add_shells(spec, Pose{}, shells);
-  if (shells.empty()) return out;
+  add_shells(spec, Pose{}, true, shells);
+  if (shells.empty()) {
+    out.solids.clear();  // its parts without force are them
+    return out;
+  }
   const stimuli::Material& m = spec.material;
   std::string key;
   if (spec.shape == stimuli::ShapeKind::mesh) {
@@ -447,7 +459,7 @@ StimulusLibrary::StimulusLibrary(const protocols::Protocol& protocol)
       }
       (sides ? with_sides_ : without_sides_).push_back(std::move(objects));
     }
-    moving_.push_back(moving_of({stimulus.object}));
+    moving_.push_back(builder.moving_of({stimulus.object}));
     reaches_.push_back(reach);
   }
 }

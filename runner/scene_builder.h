@@ -40,6 +40,8 @@ class SceneBuilder {
   rendering::Scene build(const std::vector<stimuli::ObjectSpec>& objects, bool side_contact,
                          const rendering::Tool& tool = {}, const Vec3& gravity = Vec3(0),
                          double soft_radius = protocols::kSoftRadius);
+  /// Those of the objects that move. \throws MeshError
+  std::vector<rendering::MovingObject> moving_of(const std::vector<stimuli::ObjectSpec>& objects);
 
  private:
   struct Prepared {
@@ -73,7 +75,7 @@ class SceneBuilder {
   /// A mesh that is not made of convex groups; null: it is, or is no mesh.
   std::shared_ptr<const stimuli::ClosedSurface> concave(const stimuli::ObjectSpec& spec);
   bool has_concave(const stimuli::ObjectSpec& spec);
-  void add_shells(const stimuli::ObjectSpec& spec, const Pose& in_object,
+  void add_shells(const stimuli::ObjectSpec& spec, const Pose& in_object, bool felt,
                   std::vector<rendering::SurfaceShell>& shells);
   void place_layers(Placing& placing);
   std::vector<Prepared> layer_of(const std::vector<PlacedShape>& shapes, double depth,

@@ -55,10 +55,9 @@ MovingBody make_body(const MovingObject& moving, const OwnParts& own) {
     solids.push_back({part.mesh.get(), stimuli::compose(to_object, part.pose)});
   if (solids.empty() && own.surfaces.empty())
     refuse(moving.object, "expected an object with a surface");
-  // Parts of a file with rounded coordinates abut with steps, which their union would count as
-  // outer faces.
   const VolumeMoments moments =
-      own.surfaces.empty()
+      moving.solid != nullptr ? moments_of_surface(*moving.solid, Pose{})
+      : own.surfaces.empty()
           ? moments_of_union(solids)
           : moments_of_surface(*own.surfaces.front().surface,
                                stimuli::compose(to_object, own.surfaces.front().pose));

@@ -4,6 +4,7 @@
 // object in the opposite direction.
 
 #include <cstddef>
+#include <memory>
 #include <optional>
 #include <vector>
 
@@ -17,6 +18,8 @@ struct MovingObject {
   int object = 0;  ///< index; of SceneObject::object
   stimuli::Body body;
   Pose pose;  ///< of the object's frame
+  /// In that frame, what has its mass; null: all of it is felt, or stands for it as convex parts.
+  std::shared_ptr<const Surface> solid = nullptr;
 };
 
 /// Bodies of a scene at most: a step's cost grows with the square of the number of near bodies.

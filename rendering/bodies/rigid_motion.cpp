@@ -8,7 +8,6 @@
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 #include <numbers>
-#include <optional>
 #include <stdexcept>
 
 #include "rendering/surface_search.h"
@@ -27,7 +26,8 @@ struct CutPlane {
 struct PlacedPart {
   std::vector<CutPlane> planes;
   std::vector<Polygon> facets;  ///< as planes
-  double tolerance = 0;         ///< m
+  Vec3 centre;
+  double tolerance = 0;  ///< m
 };
 
 PlacedPart placed_part(const PlacedMesh& placed) {
@@ -44,8 +44,18 @@ PlacedPart placed_part(const PlacedMesh& placed) {
     const Vec3 normal = placed.pose.orientation * facet.normal;
     part.planes.push_back({normal, facet.offset + glm::dot(normal, placed.pose.position)});
   }
+  part.centre = placed.pose.orientation * mesh.centre() + placed.pose.position;
   part.tolerance = 1e-10 * mesh.size();
   return part;
+}
+
+/// Enlarges a part about its centre by a share of its size.
+void grow(PlacedPart& part, double share) {
+  for (CutPlane& plane : part.planes)
+    plane.offset += share * (plane.offset - glm::dot(plane.normal, part.centre));
+  for (Polygon& facet : part.facets) {
+    for (Vec3& corner : facet) corner += share * (corner - part.centre);
+  }
 }
 
 /// Adds the signed moments of the tetrahedra from the origin to a polygon.
@@ -92,14 +102,13 @@ class UnionSurface {
   }
 
   /// Whether the pieces added bound a solid: their areas add up to no vector, and they give the
-  /// same volume along each axis.
-  bool is_closed() const {
-    constexpr double kError = 1e-6;
-    if (!(glm::length(areas_) <= kError * area_)) return false;
+  /// same volume along each axis, except for a share.
+  bool is_closed(double share) const {
+    if (!(glm::length(areas_) <= share * area_)) return false;
     const Mat3 error = along_ - out_.volume * Mat3(1);
     double most = 0;
     for (int axis = 0; axis < 3; ++axis) most = std::max(most, glm::length(error[axis]));
-    return most <= kError * out_.volume;
+    return most <= share * out_.volume;
   }
 
  private:
@@ -165,107 +174,6 @@ class UnionSurface {
   Mat3 along_{0};    // m^3; sum of places times areas
 };
 
-/// Adds of each part what no earlier part covers, in pieces with all their faces: whatever steps
-/// there are between parts, each piece is a solid.
-class UnionPieces {
- public:
-  UnionPieces(const std::vector<PlacedPart>& parts, VolumeMoments& out)
-      : parts_(parts), out_(out) {}
-
-  void add_part(std::size_t index) {
-    Piece piece{{}, parts_[index].planes};
-    for (const Polygon& facet : parts_[index].facets) add_triangles(facet, piece.triangles);
-    add(std::move(piece), 0, index);
-  }
-
- private:
-  struct Piece {
-    std::vector<Polygon> triangles;  ///< closed, even where the facets of its part were not plane
-    std::vector<CutPlane> planes;    ///< around it
-  };
-
-  static void add_triangles(const Polygon& polygon, std::vector<Polygon>& triangles) {
-    for (std::size_t k = 2; k < polygon.size(); ++k)
-      triangles.push_back({polygon[0], polygon[k - 1], polygon[k]});
-  }
-
-  // How far the nearest of some corners is beyond a plane.
-  static double least_height(const std::vector<Polygon>& faces, const CutPlane& plane) {
-    double least = HUGE_VAL;
-    for (const Polygon& face : faces) {
-      for (const Vec3& p : face) least = std::min(least, glm::dot(plane.normal, p) - plane.offset);
-    }
-    return least;
-  }
-
-  static bool apart(const Piece& piece, const PlacedPart& part) {
-    const auto beyond = [&](const std::vector<CutPlane>& planes,
-                            const std::vector<Polygon>& faces) {
-      return std::any_of(planes.begin(), planes.end(), [&](const CutPlane& plane) {
-        return least_height(faces, plane) >= -part.tolerance;
-      });
-    };
-    return beyond(part.planes, piece.triangles) || beyond(piece.planes, part.facets);
-  }
-
-  /// \return the piece outside of the plane; `piece` keeps the rest
-  static Piece cut_off_piece(Piece& piece, const CutPlane& plane) {
-    Piece outside{{}, piece.planes}, inside{{}, piece.planes};
-    const auto is_beyond = [&](const Vec3& p) {
-      return glm::dot(plane.normal, p) - plane.offset > 0;
-    };
-    std::optional<Vec3> middle;  // of the section: any point of it
-    for (const Polygon& triangle : piece.triangles) {
-      Polygon within = triangle;
-      const Polygon beyond = cut_off(within, plane);
-      add_triangles(within, inside.triangles);
-      add_triangles(beyond, outside.triangles);
-      if (within.empty() || beyond.empty()) continue;
-      // The two places where its sides meet the plane: out of it, and into it again.
-      std::array<Vec3, 2> crossed{};
-      for (std::size_t k = 0; k < 3; ++k) {
-        const Vec3 &p = triangle[k], &q = triangle[(k + 1) % 3];
-        if (is_beyond(p) == is_beyond(q)) continue;
-        const double at_p = glm::dot(plane.normal, p) - plane.offset;
-        const double at_q = glm::dot(plane.normal, q) - plane.offset;
-        crossed[is_beyond(p) ? 1 : 0] = p + at_p / (at_p - at_q) * (q - p);
-      }
-      if (!middle) middle = crossed[0];
-      inside.triangles.push_back({*middle, crossed[1], crossed[0]});
-      outside.triangles.push_back({*middle, crossed[0], crossed[1]});
-    }
-    inside.planes.push_back(plane);
-    outside.planes.push_back({-plane.normal, -plane.offset});
-    piece = std::move(inside);
-    return outside;
-  }
-
-  /// \param from  the first part that the piece is compared with \param of  the part it is of
-  void add(Piece piece, std::size_t from, std::size_t of) {
-    while (from < of && apart(piece, parts_[from])) ++from;
-    if (from == of) {
-      for (const Polygon& triangle : piece.triangles) add_polygon(triangle, out_);
-      return;
-    }
-    // Begin with the plane that leaves least inside, so that there are few pieces.
-    std::vector<CutPlane> planes = parts_[from].planes;
-    while (!planes.empty() && !piece.triangles.empty()) {
-      const auto height = [&](const CutPlane& plane) {
-        return least_height(piece.triangles, plane);
-      };
-      const auto next = std::max_element(
-          planes.begin(), planes.end(),
-          [&](const CutPlane& a, const CutPlane& b) { return height(a) < height(b); });
-      Piece outside = cut_off_piece(piece, *next);
-      planes.erase(next);
-      if (!outside.triangles.empty()) add(std::move(outside), from + 1, of);
-    }
-  }
-
-  const std::vector<PlacedPart>& parts_;
-  VolumeMoments& out_;
-};
-
 MassProperties scaled(const VolumeMoments& moments, double density) {
   MassProperties out;
   out.mass = density * moments.volume;
@@ -275,6 +183,44 @@ MassProperties scaled(const VolumeMoments& moments, double density) {
   const double trace = second[0][0] + second[1][1] + second[2][2];
   out.inertia = density * (trace * Mat3(1) - second);
   return out;
+}
+
+}  // namespace
+
+namespace {
+
+constexpr double kClosed = 1e-6;  // share of area and volume
+
+/// \return whether their pieces bound a solid, except for a share
+bool add_union(const std::vector<PlacedPart>& parts, double share, VolumeMoments& out) {
+  out = {};
+  UnionSurface surface(parts, out);
+  for (std::size_t i = 0; i < parts.size(); ++i) surface.add_part(i);
+  return surface.is_closed(share);
+}
+
+/// Parts of a file with rounded coordinates abut with steps: then some faces between them may count
+/// although those of the other part do not. Enlarged unequally, they overlap. What two sizes give
+/// is extrapolated to their own.
+void add_grown_union(const std::vector<PlacedPart>& parts, VolumeMoments& out) {
+  constexpr double kLeast = 1e-9, kMost = 1e-2;  // of their size
+  bool was_closed = false;
+  for (double share = kLeast; share < kMost; share *= 2) {
+    std::vector<PlacedPart> grown = parts;
+    for (std::size_t i = 0; i < grown.size(); ++i) {
+      const double turns = (std::numbers::phi - 1) * (static_cast<double>(i) + 0.5);
+      grow(grown[i], share * (1 + turns - std::floor(turns)));
+    }
+    const VolumeMoments smaller = out;
+    const bool is_closed = add_union(grown, std::max(kClosed, share), out);
+    if (was_closed && is_closed) {
+      out.volume = 2 * smaller.volume - out.volume;
+      out.first = 2.0 * smaller.first - out.first;
+      out.second = 2.0 * smaller.second - out.second;
+      return;
+    }
+    was_closed = is_closed;
+  }
 }
 
 }  // namespace
@@ -292,15 +238,7 @@ VolumeMoments moments_of_union(std::span<const PlacedMesh> parts) {
     placed.push_back(placed_part(about));
   }
   VolumeMoments moments;
-  UnionSurface surface(placed, moments);
-  for (std::size_t i = 0; i < placed.size(); ++i) surface.add_part(i);
-  // Parts of a file with rounded coordinates abut with steps: then some faces between them may
-  // count although those of the other part do not.
-  if (!surface.is_closed()) {
-    moments = {};
-    UnionPieces pieces(placed, moments);
-    for (std::size_t i = 0; i < placed.size(); ++i) pieces.add_part(i);
-  }
+  if (!add_union(placed, kClosed, moments)) add_grown_union(placed, moments);
   moments.about = middle;
   return moments;
 }

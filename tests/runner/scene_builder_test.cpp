@@ -7,10 +7,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <fstream>
 #include <glm/geometric.hpp>
+#include <string>
+#include <vector>
 
+#include "rendering/bodies/moving_scene.h"
 #include "rendering/release.h"
 #include "rendering/render_fault.h"
+#include "tests/shared/temporary_folder.h"
 
 namespace palpate::runner {
 namespace {
@@ -244,6 +249,47 @@ TEST(SceneBuilder, StatesTheGreatestDepthOfACompoundsLayers) {
     EXPECT_EQ(error.faults()[0],
               "/objects/0/layers/0/depth_m: nothing of the object is left at a depth of 0.026 m; "
               "expected less than 0.025 m");
+  }
+}
+
+/// An L of two bars, as a file.
+stimuli::ObjectSpec angle(const std::string& file, const stimuli::Material& material) {
+  std::ofstream(file) << "v 0 0 0\nv .06 0 0\nv .06 .02 0\nv .02 .02 0\nv .02 .06 0\nv 0 .06 0\n"
+                         "v 0 0 .03\nv .06 0 .03\nv .06 .02 .03\nv .02 .02 .03\nv .02 .06 .03\n"
+                         "v 0 .06 .03\nf 6 5 4 3 2 1\nf 7 8 9 10 11 12\nf 1 2 8 7\nf 2 3 9 8\n"
+                         "f 3 4 10 9\nf 4 5 11 10\nf 5 6 12 11\nf 6 1 7 12\n";
+  stimuli::ObjectSpec spec;
+  spec.shape = stimuli::ShapeKind::mesh;
+  spec.file = file;
+  spec.material = material;
+  return spec;
+}
+
+TEST(SceneBuilder, ABodyHasTheMassOfAllItsPartsWhateverIsFeltOfThem) {
+  const palpate::testing::TemporaryFolder folder;
+  const stimuli::Material felt = of(800, {}), layer = of(0, {{0.002, 500, 0, {}}}),
+                          both = of(300, {{0.002, 500, 0, {}}});
+  const auto floor = box({-0.2, -0.2, -0.32}, {0.2, 0.2, -0.3}, felt);
+  const double of_angle = 6e-5, of_box = 8e-6, density = 1000;  // m^3, kg/m^3
+  const Vec3 middle =
+      (of_angle * Vec3(0.022, 0.022, 0.015) + of_box * Vec3(0.2, 0, 0)) / (of_angle + of_box);
+  for (const auto& of_mesh : {felt, layer, both}) {
+    for (const auto& of_other : {felt, layer, both}) {
+      stimuli::ObjectSpec body =
+          compound({angle(folder / "angle.obj", of_mesh),
+                    box({0.19, -0.01, -0.01}, {0.21, 0.01, 0.01}, of_other)});
+      body.body = stimuli::Body{.density = density};
+      for (const std::size_t objects : {1, 2}) {
+        std::vector<stimuli::ObjectSpec> scene{body, floor};
+        scene.resize(objects);
+        const rendering::Scene built = SceneBuilder().build(scene, true);
+        const auto summary = rendering::moving_summary(built);
+        EXPECT_NEAR(summary->heaviest, density * (of_angle + of_box), 1e-9);
+        EXPECT_EQ(summary->part_pairs, objects == 1 ? 0U : 3U) << "each part once";
+        const rendering::RenderState state = built.initial_state();
+        EXPECT_LT(glm::distance(state.motion.bodies()[0].centre, middle), 1e-9);
+      }
+    }
   }
 }
 
