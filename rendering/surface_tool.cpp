@@ -25,6 +25,8 @@ constexpr double kSamePlace = 8;     // skins; within them a returning contact n
 constexpr int kTimes = 2;             // releases by one patch in a tick
 constexpr double kSameValley = 1e-6;  // of the size
 constexpr double kHiddenWay = 4;      // of that root
+constexpr double kSides = 1e-13;      // of the depth; force is wrong by less than that's root
+constexpr double kOnSide = 2;         // skins; from one to the exact place on the same side
 constexpr int kMostInTheWay = 4;
 constexpr int kPieces = 64;  // the first piece of a long cast, at least
 // A list of patches. Where it is used up it is made anew, with this room:
@@ -261,7 +263,8 @@ bool SurfaceTool::let_go_of_slid_planes(const Vec3& at, double slack) {
 
 /// Finds the place of rest without the skin, and the multipliers. False if rounding hides it.
 bool SurfaceTool::find_exact_place() {
-  return planes_.nearest(Vec3(0), 0, kExact * skin_, exact_) ||
+  return (in_valley() && planes_.nearest(Vec3(0), 0, kSides * glm::length(at_), exact_)) ||
+         planes_.nearest(Vec3(0), 0, kExact * skin_, exact_) ||
          planes_.nearest(Vec3(0), 0, kRounding * skin_, exact_);
 }
 
@@ -278,9 +281,15 @@ bool SurfaceTool::past_a_patch_at_rest() const {
   return past && !off;
 }
 
+/// Whether the tool rests on a side of a flat valley.
+bool SurfaceTool::in_valley() const {
+  const auto all = planes_.all();
+  return std::any_of(all.begin(), all.end(), [](const SurfacePlane& plane) { return plane.stays; });
+}
+
 /// Looks for a patch that the tool enters when the skin is removed; sets its plane.
 bool SurfaceTool::in_the_way_at_rest(SurfacePlane& out) {
-  double deepest = kInTheWay * tolerance_;
+  double deepest = in_valley() ? kSides * glm::length(at_) : kInTheWay * tolerance_;
   bool found = false;
   const auto look = [&](const SurfacePatch& patch, const PatchPlane& plane) {
     const double under = plane.depth - glm::dot(plane.normal, exact_);
@@ -363,11 +372,8 @@ bool SurfaceTool::find_goal(Vec3& goal) {
 /// stay even if they hold nothing one skin away.
 bool SurfaceTool::rests() {
   SurfacePlane in_the_way;
-  const auto all = planes_.all();
-  const bool in_valley =
-      std::any_of(all.begin(), all.end(), [](const SurfacePlane& plane) { return plane.stays; });
   const double far =
-      in_valley ? hidden_way(surface_.size(), skin_, glm::length(at_)) : kSamePlace * skin_;
+      in_valley() ? hidden_way(surface_.size(), skin_, glm::length(at_)) : kSamePlace * skin_;
   for (int i = 0; i < kMostInTheWay; ++i) {
     if (!in_the_way_at_rest(in_the_way)) return true;
     take_plane(in_the_way);
@@ -403,7 +409,17 @@ void SurfaceTool::find_rest() {
     let_go_of_idle_planes();
     if (!find_exact_place()) break;
     if (let_go_of_slid_planes(exact_, slack)) continue;
-    if (past_a_patch_at_rest() && !find_goal(exact_)) break;  // the gap is too narrow
+    if (past_a_patch_at_rest()) {
+      // Beyond its border is the valley's other side, or a gap.
+      const PlanesOf<SurfacePlane> sides = planes_;
+      const bool at_rest = rests();
+      if (at_rest && (planes_.all().size() > sides.all().size() ||
+                      glm::distance(at_, exact_) <= kOnSide * skin_))
+        return;
+      planes_ = sides;
+      stuck_ = false;
+      if (!find_goal(exact_)) break;  // the gap is too narrow
+    }
     if (rests()) return;
   }
   stuck_ = true;

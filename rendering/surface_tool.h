@@ -74,6 +74,7 @@ class SurfaceTool {
   void move_to_hit(const Vec3& goal, const PatchHit& hit);
   bool find_exact_place();
   bool rests();
+  bool in_valley() const;
   bool in_the_way_at_rest(SurfacePlane& plane);
   void take_plane(const SurfacePlane& plane);
   void let_go_of_idle_planes();

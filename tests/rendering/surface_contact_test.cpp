@@ -15,6 +15,7 @@
 #include "rendering/verification/surface_stroke.h"
 #include "runner/bench/allocation_count.h"
 #include "stimuli/closed_surface.h"
+#include "stimuli/orientation.h"
 #include "stimuli/primitives.h"
 #include "tests/shared/union_scenes.h"
 
@@ -324,18 +325,31 @@ TEST_P(SurfaceContact, SidesThatRoundingBentBackDoNotTakeTurnsForEver) {
 }
 
 TEST_P(SurfaceContact, AToolRestsAtTheBottomOfAFlatValley) {
-  // Faces of files with rounded coordinates bend by 1e-6 to 1e-3 rad. A tip that is pressed
+  // Faces of files with rounded coordinates bend by 1e-7 to 1e-3 rad. A tip that is pressed
   // between their normals may not see the bottom within its skin.
-  for (double bend = 1e-6; bend < 1e-3; bend *= 1.3) {
-    const Scene scene = scene_of({bent_block(bend)});
-    for (const double deep : {0.0005, 0.003}) {
+  Random random(5);
+  for (double bend = 1e-7; bend < 1; bend *= 1.3) {
+    const Quat turn = stimuli::uniform_rotation(random);
+    const double c = std::cos(bend), s = std::sin(bend);
+    SceneSurface block = surface_of({bent_block(bend)});
+    block.pose.orientation = turn;
+    const Scene scene({}, true, {}, nullptr, {block});
+    for (const double deep : {2e-5, 0.0005, 0.003}) {
       RenderState state = scene.initial_state();
-      press(scene, state, {-1e-5, 0, -deep});
-      for (int i = 1; i < 20; ++i) {
-        const double x = deep * bend * i / 20;
-        const Rendering r = tick(scene, state, standing({x, 0.0003 * i, -deep}));
+      const double wide = deep * std::tan(bend);
+      for (int i = -30; i <= 40; ++i) {
+        // Down before the valley, then across it.
+        const double x = wide * (i < 0 ? -1 : i / 20.0 - 1 + 1e-3 * random.unit());
+        const double z = i < 0 ? 5e-4 * (-1 - i) - deep : -deep;
+        const Vec3 tip(x, 0.0001 * i, z);
+        const Rendering r = tick(scene, state, {turn * tip, turn * (tip + Vec3(0, 0, 0.1))});
         ASSERT_EQ(r.faults, 0U) << bend << ' ' << deep << ' ' << i;
-        ASSERT_NEAR(glm::length(r.force / kStiffness - Vec3(-x, 0, deep)), 0, 1e-5 * deep)
+        const double slope = -z * c + x * s;  // depth
+        const Vec3 expected = z >= 0                 ? Vec3(0)
+                              : x < 0                ? Vec3(0, 0, -z)
+                              : x * c - deep * s < 0 ? Vec3(-x, 0, -z)
+                                                     : slope * Vec3(-s, 0, c);
+        ASSERT_NEAR(glm::length(r.force / kStiffness - turn * expected), 0, 1e-6 * deep)
             << bend << ' ' << deep << ' ' << i;
       }
     }
