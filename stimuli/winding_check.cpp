@@ -34,7 +34,7 @@ struct Box {
   }
 };
 
-/// A tree over the triangles, halved along a space-filling curve.
+/// A tree over the triangles, halved between shells, then along a space-filling curve.
 class Tree {
  public:
   struct Node {
@@ -43,19 +43,24 @@ class Tree {
     Index right = 0;           ///< the left child is the next node; 0: a leaf
   };
 
-  explicit Tree(const ClosedSurface& surface) : surface_(surface) {
+  /// \param shell  of each triangle; all alike: halved along the curve alone
+  Tree(const ClosedSurface& surface, const std::vector<Index>& shell)
+      : surface_(surface), shell_(shell) {
     Box all;
     for (const Vec3& v : surface.vertices) all.add(v);
     const double size = std::max({all.high.x - all.low.x, all.high.y - all.low.y,
                                   all.high.z - all.low.z, std::numeric_limits<double>::min()});
-    std::vector<std::pair<std::uint64_t, Index>> keys(surface.triangles.size());
+    std::vector<Key> keys(surface.triangles.size());
     for (Index t = 0; t < keys.size(); ++t) {
       const Triangle& c = surface.triangles[t];
       const Vec3 middle =
           (surface.vertices[c[0]] + surface.vertices[c[1]] + surface.vertices[c[2]]) / 3.0;
       keys[t] = {morton((middle - all.low) / size), t};
     }
-    std::sort(keys.begin(), keys.end());
+    std::sort(keys.begin(), keys.end(), [&](const Key& a, const Key& b) {
+      const Index of_a = shell[a.second], of_b = shell[b.second];
+      return of_a != of_b ? of_a < of_b : a < b;
+    });
     order_.reserve(keys.size());
     for (const auto& [key, t] : keys) order_.push_back(t);
     nodes_.reserve(keys.size());
@@ -70,8 +75,17 @@ class Tree {
     return box;
   }
 
+  /// Whether no shell has triangles of both.
+  bool shells_apart(const Node& x, const Node& y) const {
+    return last_shell(x) < first_shell(y) || last_shell(y) < first_shell(x);
+  }
+
  private:
+  using Key = std::pair<std::uint64_t, Index>;
   static constexpr Index kLeaf = 4;
+
+  Index first_shell(const Node& node) const { return shell_[order_[node.begin]]; }
+  Index last_shell(const Node& node) const { return shell_[order_[node.end - 1]]; }
 
   // Every third bit.
   static std::uint64_t spread(double x) {
@@ -86,17 +100,24 @@ class Tree {
     return spread(at.x) << 2U | spread(at.y) << 1U | spread(at.z);
   }
 
-  void build(const std::vector<std::pair<std::uint64_t, Index>>& keys, Index begin, Index end) {
+  void build(const std::vector<Key>& keys, Index begin, Index end) {
     const std::size_t self = nodes_.size();
     nodes_.push_back({{}, begin, end, 0});
     if (end - begin <= kLeaf) {
       for (Index i = begin; i < end; ++i) nodes_[self].box.add(box(order_[i]));
       return;
     }
-    // Split where the highest bit changes; halve equal keys.
+    // Split between shells, else where the highest bit changes; halve equal keys.
     Index middle = begin + (end - begin) / 2;
+    const auto of = [&](Index i) { return shell_[keys[i].second]; };
     const std::uint64_t different = keys[begin].first ^ keys[end - 1].first;
-    if (different != 0) {
+    if (of(begin) != of(end - 1)) {
+      const Index shell = std::max(of(middle), of(begin) + 1);
+      middle = static_cast<Index>(
+          std::partition_point(keys.begin() + begin, keys.begin() + end,
+                               [&](const Key& key) { return shell_[key.second] < shell; }) -
+          keys.begin());
+    } else if (different != 0) {
       const std::uint64_t bit = std::bit_floor(different);
       const auto split =
           std::partition_point(keys.begin() + begin, keys.begin() + end,
@@ -112,6 +133,7 @@ class Tree {
   }
 
   const ClosedSurface& surface_;
+  const std::vector<Index>& shell_;
   std::vector<Index> order_;
   std::vector<Node> nodes_;
 };
@@ -157,11 +179,16 @@ class WindingCheck {
  public:
   WindingCheck(const ClosedSurface& surface, double tolerance,
                const std::function<std::string(Index)>& name)
-      : surface_(surface), tolerance_(tolerance), name_(name), tree_(surface) {}
+      : surface_(surface), tolerance_(tolerance), name_(name) {}
 
   void run() {
     check_shells();
     faults_.throw_if_any();
+    // Shells that bound solids and do not pass through themselves add up to no negative number,
+    // wherever they pass through each other.
+    if (all_bound_solids_ && are_simple()) return;
+    shell_.assign(shell_.size(), 0);
+    tree_.emplace(surface_, shell_);
     // Over triangles that cross no others, the number does not change from one to its neighbour.
     // Where two cross, a region of a lower number begins outside both.
     find_crossings();
@@ -198,16 +225,19 @@ class WindingCheck {
   // Volumes of all shells, by the divergence theorem.
   void check_shells() {
     std::vector<char> seen(surface_.triangles.size(), 0);
+    shell_.resize(seen.size());
     double total = 0, total_area = 0;
     for (Index t = 0; t < seen.size(); ++t) {
       if (seen[t] != 0) continue;
       const Vec3 origin = corner(t, 0);
       double volume = 0, whole_area = 0;
       flood(t, seen, [&](Index s) {
+        shell_[s] = t;
         const Vec3 twice = area(s);
         volume += glm::dot(corner(s, 0) - origin, twice) / 6;
         whole_area += glm::length(twice) / 2;
       });
+      all_bound_solids_ &= volume > tolerance_ / 2 * whole_area;
       total += volume;
       total_area += whole_area;
     }
@@ -229,7 +259,7 @@ class WindingCheck {
     stack[left++] = 0;
     while (left > 0) {
       const Index at = stack[--left];
-      const Tree::Node& node = tree_.nodes()[at];
+      const Tree::Node& node = tree_->nodes()[at];
       if (q.x < node.box.low.x || q.x > node.box.high.x || q.y < node.box.low.y ||
           q.y > node.box.high.y || q.z > node.box.high.z)
         continue;
@@ -238,7 +268,7 @@ class WindingCheck {
         stack[left++] = at + 1;
         continue;
       }
-      for (Index i = node.begin; i < node.end; ++i) number += crossing(tree_.triangle(i), q);
+      for (Index i = node.begin; i < node.end; ++i) number += crossing(tree_->triangle(i), q);
     }
     return number;
   }
@@ -307,11 +337,20 @@ class WindingCheck {
     if (size > 0) examine(middle(t) + twice * (2 * tolerance_ / size), t, why);
   }
 
+  // Whether no shell passes through itself.
+  bool are_simple() {
+    in_shells_ = true;
+    tree_.emplace(surface_, shell_);
+    find_crossings();
+    in_shells_ = false;
+    return budget_ > 0;
+  }
+
   void find_crossings() {
     crossed_.assign(surface_.triangles.size(), 0);
     budget_ = 64 * surface_.triangles.size() + 100'000'000;
     cross(0, 0);
-    if (budget_ == 0) {
+    if (budget_ == 0 && !in_shells_) {
       faults_.add("tangled", [] {
         return "too many faces pass through each other; remove those inside of the solid in a "
                "modelling program";
@@ -321,12 +360,13 @@ class WindingCheck {
 
   void cross(Index a, Index b) {
     if (budget_ == 0) return;
-    const Tree::Node &x = tree_.nodes()[a], &y = tree_.nodes()[b];
-    if (a != b && !x.box.meets(y.box)) return;
+    const Tree::Node &x = tree_->nodes()[a], &y = tree_->nodes()[b];
+    if (in_shells_ && tree_->shells_apart(x, y)) return;
+    if (a != b && (!x.box.meets(y.box) || is_apart(x, y.box) || is_apart(y, x.box))) return;
     if (x.right == 0 && y.right == 0) {
       for (Index i = x.begin; i < x.end; ++i) {
         for (Index k = a == b ? i + 1 : y.begin; k < y.end; ++k)
-          cross_pair(tree_.triangle(i), tree_.triangle(k));
+          cross_pair(tree_->triangle(i), tree_->triangle(k));
       }
     } else if (a == b) {
       cross(a + 1, a + 1);
@@ -341,14 +381,29 @@ class WindingCheck {
     }
   }
 
+  // Whether the box is to one side of each triangle of a leaf: of a long one much of its own box
+  // is.
+  bool is_apart(const Tree::Node& leaf, const Box& box) const {
+    if (leaf.right != 0) return false;
+    const Vec3 middle = 0.5 * (box.low + box.high), half = box.high - middle;
+    for (Index i = leaf.begin; i < leaf.end; ++i) {
+      const Index t = tree_->triangle(i);
+      const Vec3 n = area(t);
+      const double reach = glm::dot(glm::abs(n), half) + tolerance_ * glm::length(n);
+      if (std::abs(glm::dot(n, middle - corner(t, 0))) <= reach) return false;
+    }
+    return true;
+  }
+
   void cross_pair(Index s, Index t) {
+    if (in_shells_ && shell_[s] != shell_[t]) return;
     if (budget_ > 0) --budget_;
     int shared = 0;
     for (const Index v : surface_.triangles[s]) {
       for (const Index w : surface_.triangles[t]) shared += v == w ? 1 : 0;
     }
     if (shared >= 2) return;
-    if (shared == 0 && !tree_.box(s).meets(tree_.box(t))) return;
+    if (shared == 0 && !tree_->box(s).meets(tree_->box(t))) return;
     const Vec3 n = area(s), m = area(t);
     std::array<double, 3> of_t{}, of_s{};  // heights over the planes, times the areas
     for (Index k = 0; k < 3; ++k) {
@@ -365,7 +420,8 @@ class WindingCheck {
     const Vec3 along = glm::cross(n, m);
     const double steep = glm::length(along);
     if (steep <= 1e-9 * glm::length(n) * glm::length(m)) {  // in one plane
-      if (shared == 0) crossed_[s] = crossed_[t] = 1;
+      if (shared > 0 || is_beside(s, t) || is_beside(t, s)) return;
+      mark(s, t);
       return;
     }
     Vec3 s_low, s_high, t_low, t_high;
@@ -375,12 +431,32 @@ class WindingCheck {
     const double low = std::max(low_s, low_t), high = std::min(high_s, high_t);
     if (low > high) return;
     if (shared == 1 && high - low <= tolerance_ * steep) return;  // only in the shared corner
-    crossed_[s] = crossed_[t] = 1;
+    mark(s, t);
+    if (in_shells_) return;
     const Vec3 unit_n = glm::normalize(n), unit_m = glm::normalize(m), sum = unit_n + unit_m;
     const double outside = glm::dot(sum, unit_n);  // of both
     if (outside < 1e-3) return;
     const Vec3 at = s_low + along * ((low + high) / 2 / (steep * steep));
     examine(at + sum * (2 * tolerance_ / outside), s, "it passes through itself");
+  }
+
+  void mark(Index s, Index t) {
+    crossed_[s] = crossed_[t] = 1;
+    if (in_shells_) budget_ = 0;  // one is enough
+  }
+
+  // Whether one triangle is beyond some side of another one in its plane.
+  bool is_beside(Index s, Index t) const {
+    const Vec3 n = area(t);
+    for (Index k = 0; k < 3; ++k) {
+      const Vec3 out = glm::cross(corner(t, k + 1) - corner(t, k), n);
+      const double near = tolerance_ * glm::length(out);
+      double least = std::numeric_limits<double>::max();
+      for (Index j = 0; j < 3; ++j)
+        least = std::min(least, glm::dot(out, corner(s, j) - corner(t, k)));
+      if (least > near) return true;
+    }
+    return false;
   }
 
   // The ends of the section of a triangle with a plane; the corners have these heights over it.
@@ -406,8 +482,11 @@ class WindingCheck {
   const ClosedSurface& surface_;
   const double tolerance_;
   const std::function<std::string(Index)>& name_;
-  const Tree tree_;
+  std::optional<Tree> tree_;
   MeshFaults faults_;
+  std::vector<Index> shell_;      ///< of each triangle, its first one
+  bool all_bound_solids_ = true;  ///< none is turned inwards
+  bool in_shells_ = false;        ///< look only for shells that pass through themselves
   std::vector<char> crossed_;
   std::size_t budget_ = 0;
   int accused_ = 0;

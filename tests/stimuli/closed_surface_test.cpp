@@ -332,6 +332,27 @@ TEST(ClosedSurfaceTest, ASmallRegionOfNegativeWindingIsFoundInALargeMesh) {
   EXPECT_NE(refusal_of(sphere).find("negative: face "), std::string::npos);
 }
 
+// In any place, boxes around long bars meet everywhere.
+TEST(ClosedSurfaceTest, ManyBarsThatPassThroughEachOtherAreTaken) {
+  Random random(8);
+  const Quat turn = uniform_rotation(random);
+  constexpr int kBars = 40;  // in each direction and row
+  PolygonSoup soup;
+  for (int axis = 0; axis < 3; ++axis) {
+    for (int i = 0; i < kBars * kBars; ++i) {
+      Vec3 at(0), size(0.0005);
+      at[(axis + 1) % 3] = 0.001 * (i / kBars);
+      at[(axis + 2) % 3] = 0.001 * (i % kBars);
+      at[axis] = 0.0195;
+      size[axis] = 0.041;
+      PolygonSoup bar = box(size);
+      for (Vec3& v : bar.vertices) v = turn * (v + at);
+      add_shell(soup, bar);
+    }
+  }
+  EXPECT_EQ(refusal_of(soup), "");
+}
+
 TEST(ClosedSurfaceTest, SurfacesThatAreNotClosedAreRefusedWithPlaceAndAdvice) {
   PolygonSoup soup = cube(0.04);
   soup.faces.pop_back();
