@@ -381,7 +381,9 @@ void read_file(ObjectReader& reader, const MeshFiles& files, stimuli::ObjectSpec
                         "expected a file that is stored with the protocol; '" + name + "' is not");
   } else if (!std::filesystem::is_regular_file(path, error)) {
     reader.faults().add(reader.pointer("file"),
-                        "expected an existing file; there is no " + path.string());
+                        "expected an existing file; " + (std::filesystem::is_directory(path, error)
+                                                             ? path.string() + " is a folder"
+                                                             : "there is no " + path.string()));
   } else {
     try {
       stimuli::MeshFileBytes read = stimuli::mesh_file_bytes(path.string());

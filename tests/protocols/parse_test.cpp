@@ -13,6 +13,7 @@
 #include "data/base/random.h"
 #include "tests/protocols/parsed_faults.h"
 #include "tests/shared/peak_memory.h"
+#include "tests/shared/temporary_folder.h"
 
 namespace palpate::protocols {
 namespace {
@@ -254,6 +255,19 @@ TEST(Parse, SaysWhereAndWhat) {
     EXPECT_STREQ(error.what(),
                  "p.json:5: /stimuli/0/radius_m: missing; this key is required\n"
                  "p.json:5: /stimuli/0/raduis_m: unknown key; did you mean 'radius_m'?");
+  }
+}
+
+TEST(Parse, SaysThatAMeshFileIsAFolder) {
+  const palpate::testing::TemporaryFolder folder;
+  fs::create_directory(folder / "a.obj");
+  std::ofstream(folder / "s.json") << R"({"objects": [{"shape": "mesh", "file": "a.obj"}]})";
+  try {
+    parse_scene(folder / "s.json");
+    FAIL();
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("/a.obj is a folder"), std::string::npos)
+        << error.what();
   }
 }
 
