@@ -22,11 +22,12 @@ constexpr double kSamePlace = 8;     // skins; within them a returning contact n
 // held `depth` off its goal goes from the nearest place of one side to that of the other, depth
 // times the angle between them, and does not meet the side that it leaves where that way times the
 // angle is less than the skin: on ways of up to the root of skin times depth.
-constexpr int kTimes = 2;             // releases by one patch in a tick
-constexpr double kSameValley = 1e-6;  // of the size
-constexpr double kHiddenWay = 4;      // of that root
-constexpr double kSides = 1e-13;      // of the depth; force is wrong by less than that's root
-constexpr double kOnSide = 2;         // skins; from one to the exact place on the same side
+constexpr int kTimes = 2;               // releases by one patch in a tick
+constexpr double kSameValley = 1e-6;    // of the size
+constexpr double kHiddenWay = 4;        // of that root
+constexpr double kSides = 1e-13;        // of the depth; force is wrong by less than that's root
+constexpr double kSameFace = 1 - 5e-9;  // cosine of 1e-4 rad, by which rounding may bend a face
+constexpr double kOnSide = 2;           // skins; from one to the exact place on the same side
 constexpr int kMostInTheWay = 4;
 constexpr int kPieces = 64;  // the first piece of a long cast, at least
 // A list of patches. Where it is used up it is made anew, with this room:
@@ -372,10 +373,14 @@ bool SurfaceTool::find_goal(Vec3& goal) {
 /// stay even if they hold nothing one skin away.
 bool SurfaceTool::rests() {
   SurfacePlane in_the_way;
-  const double far =
-      in_valley() ? hidden_way(surface_.size(), skin_, glm::length(at_)) : kSamePlace * skin_;
   for (int i = 0; i < kMostInTheWay; ++i) {
     if (!in_the_way_at_rest(in_the_way)) return true;
+    const auto all = planes_.all();
+    const bool flat = std::any_of(all.begin(), all.end(), [&](const SurfacePlane& plane) {
+      return plane.stays || glm::dot(plane.normal, in_the_way.normal) > kSameFace;
+    });
+    const double far =
+        flat ? hidden_way(surface_.size(), skin_, glm::length(at_)) : kSamePlace * skin_;
     take_plane(in_the_way);
     if (stuck_) return false;
     const Vec3 last = exact_;

@@ -356,6 +356,31 @@ TEST_P(SurfaceContact, AToolRestsAtTheBottomOfAFlatValley) {
   }
 }
 
+TEST_P(SurfaceContact, AToolRestsWhereTheFacesOfTwoShellsCross) {
+  // As a rounded file leaves them where shells overlap: the valley has no edge.
+  for (double bend = 1e-8; bend < 1e-4; bend *= 1.5) {
+    const double rise = 0.04 * std::tan(bend), c = std::cos(bend), s = std::sin(bend);
+    const Scene scene =
+        scene_of({box_soup({-0.05, -0.05, -0.08}, {0.05, 0.05, 0}),
+                  prism({{-0.04, -0.07}, {0.04, -0.07}, {0.04, rise}, {-0.04, -rise}}, 0.04)});
+    for (const double deep : {0.002, 0.02, 0.06}) {
+      RenderState state = scene.initial_state();
+      for (double z = 0.01; z > -deep; z -= 5e-4) tick(scene, state, standing({-0.001, 0, z}));
+      for (int i = -20; i <= 40; ++i) {
+        const double x = std::max(deep * bend, 1e-9) * i / 20;
+        const Rendering r = tick(scene, state, standing({x, 0.0001 * i, -deep}));
+        ASSERT_EQ(r.faults, 0U) << bend << ' ' << deep << ' ' << i;
+        const double slope = deep * c + x * s;  // depth
+        const Vec3 expected = x < 0                  ? Vec3(0, 0, deep)
+                              : x * c - deep * s < 0 ? Vec3(-x, 0, deep)
+                                                     : slope * Vec3(-s, 0, c);
+        ASSERT_NEAR(glm::length(r.force / kStiffness - expected), 0, 1e-5 * deep)
+            << bend << ' ' << deep << ' ' << i;
+      }
+    }
+  }
+}
+
 TEST_P(SurfaceContact, AFlatFaceInManyTrianglesHoldsNothingAlongIt) {
   Random random(3);
   for (int round = 0; round < 4; ++round) {
