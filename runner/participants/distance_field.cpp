@@ -244,21 +244,48 @@ class Filling {
   }
 
   // Extends known distances by the eikonal equation (Zhao 2005, "A fast sweeping method for eikonal
-  // equations"): one sweep in each of the eight directions.
+  // equations"): one sweep in each of the eight directions. Nodes wait until a neighbour changes
+  // (Bak, McLaughlin & Renzi 2010, "Some improvements for the fast sweeping method").
   void march(std::vector<float>& values, char side) const {
-    std::vector<char> known(values.size());
-    for (std::size_t i = 0; i < values.size(); ++i) known[i] = values[i] < kUnknown ? 1 : 0;
+    std::vector<char> open(values.size()), waits(values.size());
+    for (std::size_t i = 0; i < values.size(); ++i)
+      open[i] = inside_[i] == side && !(values[i] < kUnknown) ? 1 : 0;
+    const std::size_t row = size(count_[0]), layer = row * size(count_[1]);
+    const auto wake_neighbours = [&](int x, int y, int z) {
+      const std::size_t here = index(x, y, z);
+      const auto wake = [&](bool there, std::size_t i) {
+        if (there) waits[i] = open[i];
+      };
+      wake(x > 0, here - 1);
+      wake(x + 1 < count_[0], here + 1);
+      wake(y > 0, here - row);
+      wake(y + 1 < count_[1], here + row);
+      wake(z > 0, here - layer);
+      wake(z + 1 < count_[2], here + layer);
+    };
+    for (int z = 0; z < count_[2]; ++z) {
+      for (int y = 0; y < count_[1]; ++y) {
+        for (int x = 0; x < count_[0]; ++x) {
+          if (values[index(x, y, z)] < kUnknown) wake_neighbours(x, y, z);
+        }
+      }
+    }
     const auto order = [&](int k, int sweep, std::size_t axis) {
       return (sweep >> axis & 1) != 0 ? count_[axis] - 1 - k : k;
     };
     for (int sweep = 0; sweep < 8; ++sweep) {
       for (int k = 0; k < count_[2]; ++k) {
         for (int j = 0; j < count_[1]; ++j) {
+          const int y = order(j, sweep, 1), z = order(k, sweep, 2);
           for (int i = 0; i < count_[0]; ++i) {
-            const int x = order(i, sweep, 0), y = order(j, sweep, 1), z = order(k, sweep, 2);
+            const int x = order(i, sweep, 0);
             const std::size_t here = index(x, y, z);
-            if (inside_[here] != side || known[here] != 0) continue;
-            values[here] = std::min(values[here], from_neighbours(values, x, y, z));
+            if (waits[here] == 0) continue;
+            waits[here] = 0;
+            const float found = from_neighbours(values, x, y, z);
+            if (!(found < values[here])) continue;
+            values[here] = found;
+            wake_neighbours(x, y, z);
           }
         }
       }
@@ -273,10 +300,12 @@ class Filling {
     };
     const std::size_t here = index(x, y, z);
     const auto row = static_cast<std::size_t>(count_[0]);
-    std::array<float, 3> least{
-        less(x - 1, count_[0] - 1 - x, 1, here), less(y - 1, count_[1] - 1 - y, row, here),
-        less(z - 1, count_[2] - 1 - z, row * static_cast<std::size_t>(count_[1]), here)};
-    std::sort(least.begin(), least.end());
+    const float a = less(x - 1, count_[0] - 1 - x, 1, here),
+                b = less(y - 1, count_[1] - 1 - y, row, here),
+                c = less(z - 1, count_[2] - 1 - z, row * size(count_[1]), here);
+    const float low = std::min(a, b), high = std::max(a, b);
+    const std::array<float, 3> least{std::min(low, c), std::max(low, std::min(high, c)),
+                                     std::max(high, c)};
     if (least[0] == kUnknown) return kUnknown;
     const auto h = static_cast<float>(spacing_);
     const float one = least[0] + h;
