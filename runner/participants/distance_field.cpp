@@ -12,6 +12,7 @@ namespace {
 constexpr double kNodesAcross = 72;     // across the object's longest side and its margins
 constexpr double kLeastMargin = 0.012;  // m
 constexpr int kBand = 6;                // nodes; distances are exact this near the surface
+constexpr double kRounding = 1e-5;      // m; of places in single precision
 constexpr float kUnknown = std::numeric_limits<float>::max();
 
 // Ericson 2005, "Real-Time Collision Detection", 5.1.5.
@@ -354,15 +355,23 @@ DistanceField::DistanceField(const std::vector<PlacedPart>& parts) {
   row_ = count_[0];
   layer_ = row_ * count_[1];
   std::size_t i = 0;
+  double near = 0;  // m; most that a node is nearer than its distance from the box
   for (int z = 0; z < count_[2]; ++z) {
     for (int y = 0; y < count_[1]; ++y) {
       for (int x = 0; x < count_[0]; ++x) {
         // |p| is convex, so what holds at the nodes holds between them; beyond the grid the
-        // distance to it is added.
-        const double far = glm::length(low_ + spacing_ * Vec3(x, y, z));
-        reach_ = std::max(reach_, static_cast<float>(far + 1e-5) - nodes_[i++]);
+        // distance to it is added. The same is true of the farthest plane of a box.
+        const Vec3 p = low_ + spacing_ * Vec3(x, y, z);
+        const float value = nodes_[i++];
+        reach_ = std::max(reach_, static_cast<float>(glm::length(p) + kRounding) - value);
+        const Vec3 off = glm::max(low - p, p - high);
+        near = std::max(near, std::max({off.x, off.y, off.z}) - static_cast<double>(value));
       }
     }
+  }
+  for (int axis = 0; axis < 3; ++axis) {
+    box_.middle[axis] = static_cast<float>((low[axis] + high[axis]) / 2);
+    box_.half[axis] = static_cast<float>(size[axis] / 2 + near + kRounding);
   }
 }
 

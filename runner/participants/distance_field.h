@@ -6,11 +6,10 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <cstring>
 #include <memory>
 #include <vector>
 
-#include "runner/participants/lane_math.h"
+#include "runner/participants/lanes.h"
 #include "stimuli/closed_surface.h"
 #include "stimuli/convex_mesh.h"
 #include "stimuli/large_array.h"
@@ -58,134 +57,90 @@ class DistanceField {
     float slope_x, slope_y, slope_z;  ///< its gradient; of length 1 except at rounded edges
   };
 
-  /// kMost: most places at once, a multiple of kLanes.
-  static constexpr int kMost = 32, kLanes = 16;
-  struct Places {
-    float x[kMost], y[kMost], z[kMost];  // m
-  };
   struct Values {
-    float distance[kMost], slope_x[kMost], slope_y[kMost], slope_z[kMost];
+    lane::Floats distance, slope_x, slope_y, slope_z;
   };
-  /// \param count  number of places; the arrays are read up to the next multiple of kLanes
-  void distances(const Places& places, int count, float* out) const {
-    Cells cells;
-    find_cells(places, count, cells);
-    Four along_x[kMost];
-    for (int i = 0; i < count; ++i) {
-      const Corners corners = corners_of(cells.node[i]);
-      along_x[i] = corners.low + cells.x[i] * (corners.high - corners.low);
+  /// At one place for each lane.
+  lane::Floats distances(const lane::Floats& x, const lane::Floats& y,
+                         const lane::Floats& z) const {
+    const Cells cells = cells_of(x, y, z);
+    lane::Floats at[4];
+    for (int k = 0; k < 4; ++k) {
+      const lane::Pairs side = side_of(cells, k);
+      at[k] = lane::mix(side.first, side.second, cells.x);
     }
-    for (int first = 0; first < count; first += kLanes) {
-      for (int i = first; i < first + kLanes; ++i) {
-        const Four& at = along_x[i];
-        out[i] = mix(mix(at[0], at[1], cells.y[i]), mix(at[2], at[3], cells.y[i]), cells.z[i]) +
-                 cells.beyond[i];
-      }
-    }
+    return lane::mix(lane::mix(at[0], at[1], cells.y), lane::mix(at[2], at[3], cells.y), cells.z) +
+           cells.beyond;
   }
-  void values(const Places& places, int count, Values& out) const {
-    Cells cells;
-    find_cells(places, count, cells);
-    Four along_x[kMost], step_x[kMost];
-    for (int i = 0; i < count; ++i) {
-      const Corners corners = corners_of(cells.node[i]);
-      step_x[i] = corners.high - corners.low;
-      along_x[i] = corners.low + cells.x[i] * step_x[i];
+  Values values(const lane::Floats& x, const lane::Floats& y, const lane::Floats& z) const {
+    const Cells cells = cells_of(x, y, z);
+    lane::Floats at[4], step[4];
+    for (int k = 0; k < 4; ++k) {
+      const lane::Pairs side = side_of(cells, k);
+      step[k] = side.second - side.first;
+      at[k] = side.first + cells.x * step[k];
     }
-    for (int first = 0; first < count; first += kLanes) {
-      for (int i = first; i < first + kLanes; ++i) {
-        const Four &at = along_x[i], &step = step_x[i];
-        const float y = cells.y[i], z = cells.z[i];
-        const float y0 = mix(at[0], at[1], y), y1 = mix(at[2], at[3], y);
-        out.distance[i] = mix(y0, y1, z) + cells.beyond[i];
-        out.slope_x[i] = mix(mix(step[0], step[1], y), mix(step[2], step[3], y), z) * per_spacing_;
-        out.slope_y[i] = mix(at[1] - at[0], at[3] - at[2], z) * per_spacing_;
-        out.slope_z[i] = (y1 - y0) * per_spacing_;
-      }
-    }
+    const lane::Floats y0 = lane::mix(at[0], at[1], cells.y), y1 = lane::mix(at[2], at[3], cells.y);
+    const lane::Floats x0 = lane::mix(step[0], step[1], cells.y),
+                       x1 = lane::mix(step[2], step[3], cells.y);
+    return {lane::mix(y0, y1, cells.z) + cells.beyond, lane::mix(x0, x1, cells.z) * per_spacing_,
+            lane::mix(at[1] - at[0], at[3] - at[2], cells.z) * per_spacing_,
+            (y1 - y0) * per_spacing_};
   }
   float distance(float x, float y, float z) const {
-    float out[kMost];
-    distances(all_at(x, y, z), 1, out);
-    return out[0];
+    return distances(lane::all(x), lane::all(y), lane::all(z))[0];
   }
   Value value(float x, float y, float z) const {
-    Values out;
-    values(all_at(x, y, z), 1, out);
-    return {out.distance[0], out.slope_x[0], out.slope_y[0], out.slope_z[0]};
+    const Values v = values(lane::all(x), lane::all(y), lane::all(z));
+    return {v.distance[0], v.slope_x[0], v.slope_y[0], v.slope_z[0]};
   }
 
   /// m; a place is at least its distance from the origin less this away from the solid.
   float reach() const { return reach_; }
 
- private:
-  using Two = float __attribute__((vector_size(8)));
-  using Four = float __attribute__((vector_size(16)));
-  /// The values at the corners of a cell: at its lowest and highest x, each at the lowest (y, z),
-  /// the next y, the next z, and both.
-  struct Corners {
-    Four low, high;
+  /// A place that is beyond one of its planes by some length is at least that far from the solid.
+  struct Box {
+    float middle[3], half[3];  // m
   };
-  Corners corners_of(std::int32_t node) const {
-    const float* const at = nodes_.data() + node;
-    const auto pair = [](const float* from) {
-      Two out;
-      std::memcpy(&out, from, sizeof out);
-      return out;
-    };
-    const Two a = pair(at), b = pair(at + row_), c = pair(at + layer_),
-              d = pair(at + layer_ + row_);
-    const Four front = __builtin_shufflevector(a, b, 0, 1, 2, 3);
-    const Four back = __builtin_shufflevector(c, d, 0, 1, 2, 3);
-    return {__builtin_shufflevector(front, back, 0, 2, 4, 6),
-            __builtin_shufflevector(front, back, 1, 3, 5, 7)};
-  }
+  const Box& box() const { return box_; }
 
-  // Written for vectorised loops over lanes: 32-bit integers, no branches.
+ private:
   struct Coordinate {
-    std::int32_t cell;
-    float fraction;  // within the cell
-    float off;       // m, beyond the grid
+    lane::Ints cell;
+    lane::Floats fraction;  // within the cell
+    lane::Floats off;       // m, beyond the grid
   };
-  Coordinate coordinate(std::size_t axis, float p) const {
-    const float steps = (p - origin_[axis]) * per_spacing_;
-    const float inside = lane::min(lane::max(steps, 0.0F), last_[axis]);
-    const auto cell = static_cast<std::int32_t>(lane::min(inside, last_[axis] - 1));
-    return {cell, inside - static_cast<float>(cell), (steps - inside) * step_};
+  Coordinate coordinate(std::size_t axis, const lane::Floats& p) const {
+    const lane::Floats last = lane::all(last_[axis]);
+    const lane::Floats steps = (p - origin_[axis]) * per_spacing_;
+    const lane::Floats inside = lane::min(lane::max(steps, lane::Floats{}), last);
+    const auto cell = __builtin_convertvector(lane::min(inside, last - 1.0F), lane::Ints);
+    return {cell, inside - __builtin_convertvector(cell, lane::Floats), (steps - inside) * step_};
   }
   struct Cells {
-    std::int32_t node[kMost];            // lowest node of the cell
-    float x[kMost], y[kMost], z[kMost];  // fractions within the cell
-    float beyond[kMost];                 // m, beyond the grid
+    lane::Ints node;       // lowest node of the cell
+    lane::Floats x, y, z;  // fractions within the cell
+    lane::Floats beyond;   // m, beyond the grid
   };
-  void find_cells(const Places& places, int count, Cells& out) const {
-    for (int first = 0; first < count; first += kLanes) {
-      for (int i = first; i < first + kLanes; ++i) {
-        const Coordinate a = coordinate(0, places.x[i]), b = coordinate(1, places.y[i]),
-                         c = coordinate(2, places.z[i]);
-        out.node[i] = (c.cell * count_[1] + b.cell) * count_[0] + a.cell;
-        out.x[i] = a.fraction;
-        out.y[i] = b.fraction;
-        out.z[i] = c.fraction;
-        out.beyond[i] = std::sqrt(a.off * a.off + b.off * b.off + c.off * c.off);
-      }
-    }
+  Cells cells_of(const lane::Floats& x, const lane::Floats& y, const lane::Floats& z) const {
+    const Coordinate a = coordinate(0, x), b = coordinate(1, y), c = coordinate(2, z);
+    return {c.cell * layer_ + (b.cell * row_ + a.cell), a.fraction, b.fraction, c.fraction,
+            lane::sqrt(a.off * a.off + b.off * b.off + c.off * c.off)};
   }
-  static Places all_at(float x, float y, float z) {
-    Places out;
-    std::fill_n(out.x, kLanes, x);
-    std::fill_n(out.y, kLanes, y);
-    std::fill_n(out.z, kLanes, z);
-    return out;
+  /// The values at the lowest and highest x of the cells; k: at their lowest (y, z), the next y,
+  /// the next z, and both.
+  lane::Pairs side_of(const Cells& cells, int k) const {
+    return lane::pairs(nodes_.data() + (k % 2 != 0 ? row_ : 0) + (k / 2 != 0 ? layer_ : 0),
+                       cells.node);
   }
-  static float mix(float a, float b, float t) { return a + t * (b - a); }
 
   Vec3 low_, high_;
   double spacing_ = 0, margin_ = 0;
   std::array<std::int32_t, 3> count_{};  // nodes
   std::array<float, 3> origin_{}, last_{};
   float per_spacing_ = 0, step_ = 0;
-  float reach_ = 0;                   // m
+  float reach_ = 0;  // m
+  Box box_{};
   std::int32_t row_ = 0, layer_ = 0;  // nodes, from one to the next in y and in z
   stimuli::LargeArray<float> nodes_;  // m, x fastest
 };

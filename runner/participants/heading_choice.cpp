@@ -121,9 +121,9 @@ void HeadingChoice::predict(const SlidingStylus& stylus, const Vec3& shift, Pred
       const ShapeLine to_shape(few_, shape, shape.first, line);
       Deepest deepest;
       if (line.length > 0) {
-        find_along_line(to_shape, line.length, deepest);
+        find_along_line(to_shape, line.length, deepest, count_[s]);
       } else {
-        find_at_tip(to_shape, deepest);
+        find_at_tip(to_shape, deepest, count_[s]);
       }
       for (int i = 0; i < count_[s]; ++i) {
         const FloatVec n = to_shape.world(i, {deepest.x[i], deepest.y[i], deepest.z[i]});

@@ -87,12 +87,26 @@ std::vector<Quat> symmetries(const std::vector<PlacedPart>& parts, const Distanc
   const std::vector<Vec3> points = samples(field);
   // A sharp edge has an error of half a spacing, so single points may differ by a whole one.
   const double most = field.spacing(), usual = field.spacing() / 5;
+  std::vector<float> before;
+  before.reserve(points.size());
+  for (const Vec3& point : points) before.push_back(distance_at(field, point));
   const auto leaves_it = [&](const Quat& turn) {
     double squares = 0;
-    for (const Vec3& point : points) {
-      const double off = distance_at(field, turn * point) - distance_at(field, point);
-      squares += off * off;
-      if (std::abs(off) > most) return false;
+    for (std::size_t first = 0; first < points.size(); first += lane::kWidth) {
+      const std::size_t count = std::min<std::size_t>(lane::kWidth, points.size() - first);
+      lane::Floats x{}, y{}, z{};
+      for (std::size_t i = 0; i < count; ++i) {
+        const Vec3 turned = turn * points[first + i];
+        x[i] = static_cast<float>(turned.x);
+        y[i] = static_cast<float>(turned.y);
+        z[i] = static_cast<float>(turned.z);
+      }
+      const lane::Floats after = field.distances(x, y, z);
+      for (std::size_t i = 0; i < count; ++i) {
+        const double off = after[i] - before[first + i];
+        squares += off * off;
+        if (std::abs(off) > most) return false;
+      }
     }
     return squares <= usual * usual * static_cast<double>(points.size());
   };

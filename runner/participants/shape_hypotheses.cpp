@@ -139,6 +139,13 @@ void ShapeHypotheses::append(const stimuli::ObjectSpec& stimulus) {
     }
   }
   append_order(shape);
+  for (std::size_t a = 0; a < 3; ++a) {
+    for (std::size_t c = 0; c < 3; ++c) {
+      const std::vector<float>& all = axes_[a][c];
+      for (std::size_t i = nearby_axes_[a][c].size(); i < all.size(); ++i)
+        nearby_axes_[a][c].push_back(all[static_cast<std::size_t>(nearby_order_[i])]);
+    }
+  }
 }
 
 /// Along a Z-order curve through the directions of two axes (Morton 1966).
@@ -183,13 +190,16 @@ ShapeHypotheses ShapeHypotheses::one_block_each(const ShapeHypotheses& all) {
   }
   few.nearby_order_.resize(few.axes_[0][0].size());
   std::iota(few.nearby_order_.begin(), few.nearby_order_.end(), 0);
+  few.nearby_axes_ = few.axes_;
   return few;
 }
 
 void ShapeHypotheses::copy_rotation(int to, const ShapeHypotheses& all, int from) {
   for (std::size_t a = 0; a < 3; ++a) {
     for (std::size_t c = 0; c < 3; ++c) {
-      axes_[a][c][static_cast<std::size_t>(to)] = all.axes_[a][c][static_cast<std::size_t>(from)];
+      const float value = all.axes_[a][c][static_cast<std::size_t>(from)];
+      axes_[a][c][static_cast<std::size_t>(to)] = value;
+      nearby_axes_[a][c][static_cast<std::size_t>(to)] = value;
     }
   }
 }

@@ -56,6 +56,8 @@ class ShapeHypotheses {
   /// The hypotheses once more, each shape's so that those of similar rotations are side by side:
   /// what looks at the grid of a field in this order finds it in the cache.
   const int* nearby_order() const { return nearby_order_.data(); }
+  /// axis_component in that order.
+  const float* nearby_component(int a, int c) const { return nearby_axes_[a][c].data(); }
 
   /// Component c of local axis a (x, y, z: 0, 1, 2) in the world frame, of every hypothesis.
   const float* axis_component(int a, int c) const { return axes_[a][c].data(); }
@@ -71,6 +73,7 @@ class ShapeHypotheses {
   std::vector<Shape> shapes_;
   std::array<std::array<std::vector<float>, 3>, 3> axes_;  // axis, component
   std::vector<int> nearby_order_;
+  std::array<std::array<std::vector<float>, 3>, 3> nearby_axes_;
 };
 
 }  // namespace palpate::runner::participants

@@ -80,49 +80,54 @@ class SphereLine {
   float radius_;
 };
 
+/// Lines in the stimulus' frame, side by side.
+template <int kRoom>
+struct LineRows {
+  float start[3][kRoom], along[3][kRoom], direction[3][kRoom];
+};
+
 /// A line in the frames of kBlock rotations of one stimulus.
 class RotatedLine {
  public:
   RotatedLine(const ShapeHypotheses& hypotheses, int first, const Line& line)
-      : hypotheses_(&hypotheses), which_(hypotheses.nearby_order() + first) {
+      : hypotheses_(&hypotheses), first_(first) {
     for (int a = 0; a < 3; ++a) {
-      const float* x = hypotheses.axis_component(a, 0);
-      const float* y = hypotheses.axis_component(a, 1);
-      const float* z = hypotheses.axis_component(a, 2);
+      const float* x = hypotheses.nearby_component(a, 0) + first;
+      const float* y = hypotheses.nearby_component(a, 1) + first;
+      const float* z = hypotheses.nearby_component(a, 2) + first;
       for (int i = 0; i < ShapeHypotheses::kBlock; ++i) {
-        const FloatVec axis{x[which_[i]], y[which_[i]], z[which_[i]]};
-        start_[a][i] = dot(axis, line.start);
-        along_[a][i] = dot(axis, line.along);
-        direction_[a][i] = dot(axis, line.direction);
+        const FloatVec axis{x[i], y[i], z[i]};
+        rows_.start[a][i] = dot(axis, line.start);
+        rows_.along[a][i] = dot(axis, line.along);
+        rows_.direction[a][i] = dot(axis, line.direction);
       }
     }
   }
 
-  FloatVec along(int i) const { return {along_[0][i], along_[1][i], along_[2][i]}; }
+  FloatVec along(int i) const { return {rows_.along[0][i], rows_.along[1][i], rows_.along[2][i]}; }
   float cosine(int i, const FloatVec& v) const {
-    return v.x * direction_[0][i] + v.y * direction_[1][i] + v.z * direction_[2][i];
+    return v.x * rows_.direction[0][i] + v.y * rows_.direction[1][i] + v.z * rows_.direction[2][i];
   }
   FloatVec world(int i, const FloatVec& v) const {
     const auto component = [&](int c) {
-      return v.x * hypotheses_->axis_component(0, c)[which_[i]] +
-             v.y * hypotheses_->axis_component(1, c)[which_[i]] +
-             v.z * hypotheses_->axis_component(2, c)[which_[i]];
+      return v.x * hypotheses_->nearby_component(0, c)[first_ + i] +
+             v.y * hypotheses_->nearby_component(1, c)[first_ + i] +
+             v.z * hypotheses_->nearby_component(2, c)[first_ + i];
     };
     return {component(0), component(1), component(2)};
   }
 
  protected:
   FloatVec at(int i, float s) const {
-    return {start_[0][i] + s * along_[0][i], start_[1][i] + s * along_[1][i],
-            start_[2][i] + s * along_[2][i]};
+    return {rows_.start[0][i] + s * rows_.along[0][i], rows_.start[1][i] + s * rows_.along[1][i],
+            rows_.start[2][i] + s * rows_.along[2][i]};
   }
+
+  LineRows<ShapeHypotheses::kBlock> rows_;
 
  private:
   const ShapeHypotheses* hypotheses_;
-  const int* which_;
-  float start_[3][ShapeHypotheses::kBlock];
-  float along_[3][ShapeHypotheses::kBlock];
-  float direction_[3][ShapeHypotheses::kBlock];
+  int first_;
 };
 
 /// In the cube's frame.
@@ -270,8 +275,9 @@ struct Deepest {
   float z[ShapeHypotheses::kBlock];
 };
 
+/// \param count  as many hypotheses as are needed, if not all; the others may be left out
 template <class ShapeLine>
-void find_at_tip(const ShapeLine& shape, Deepest& out) {
+void find_at_tip(const ShapeLine& shape, Deepest& out, int /*count*/ = ShapeHypotheses::kBlock) {
   for (int i = 0; i < ShapeHypotheses::kBlock; ++i) {
     const SurfacePoint p = shape.surface(i, 0.0f);
     out.distance[i] = p.distance;
@@ -305,7 +311,8 @@ inline void store(const ShapeLine& shape, int i, float s, SlopedSurface& out) {
 /// Bisection: the distance to a convex shape is convex along a line, so the sign of its slope tells
 /// on which side the minimum lies.
 template <class ShapeLine>
-void find_along_line(const ShapeLine& shape, float length, Deepest& out) {
+void find_along_line(const ShapeLine& shape, float length, Deepest& out,
+                     int /*count*/ = ShapeHypotheses::kBlock) {
   // Half length and middle of the bracket.
   float reach = 0.5f * length;
   float middle[ShapeHypotheses::kBlock];
@@ -347,10 +354,178 @@ void find_along_line(const ShapeLine& shape, float length, Deepest& out) {
   }
 }
 
-// Signed distances of one block of hypotheses along one line, for stimuli without a formula. The
-// functions are those of shape_lines.h.
+// Signed distances of hypotheses along one line, for stimuli without a formula.
 
-/// Works in the stimulus' frame.
+/// As many lines as a register has lanes.
+struct LanesOfLines {
+  const DistanceField* field = nullptr;
+  lane::Floats start[3], along[3];
+
+  LanesOfLines() = default;
+  template <class Rows>
+  LanesOfLines(const DistanceField& solid, const Rows& rows, int first) : field(&solid) {
+    for (int a = 0; a < 3; ++a) {
+      start[a] = lane::load(rows.start[a] + first);
+      along[a] = lane::load(rows.along[a] + first);
+    }
+  }
+  lane::Floats distances(const lane::Floats& s) const {
+    return field->distances(start[0] + s * along[0], start[1] + s * along[1],
+                            start[2] + s * along[2]);
+  }
+  DistanceField::Values values(const lane::Floats& s) const {
+    return field->values(start[0] + s * along[0], start[1] + s * along[1], start[2] + s * along[2]);
+  }
+};
+
+/// Where lines enter and leave the box of a solid, grown by some length in each direction.
+class BoxCrossing {
+ public:
+  BoxCrossing() = default;
+  explicit BoxCrossing(const LanesOfLines& lines) {
+    const DistanceField::Box& box = lines.field->box();
+    for (int a = 0; a < 3; ++a) {
+      const lane::Floats along = lines.along[a], off = lines.start[a] - box.middle[a];
+      per_[a] = 1.0F / lane::max(lane::abs(along), lane::all(1e-9F));
+      middle_[a] = (along < 0.0F ? off : -off) * per_[a];
+      half_[a] = box.half[a] * per_[a];
+    }
+  }
+  /// m from the start of each line
+  lane::Floats begin(const lane::Floats& grown) const {
+    const auto of = [&](int a) { return middle_[a] - (half_[a] + grown * per_[a]); };
+    return lane::max(lane::max(of(0), of(1)), of(2));
+  }
+  lane::Floats end(const lane::Floats& grown) const {
+    const auto of = [&](int a) { return middle_[a] + (half_[a] + grown * per_[a]); };
+    return lane::min(lane::min(of(0), of(1)), of(2));
+  }
+
+ private:
+  lane::Floats per_[3], middle_[3], half_[3];
+};
+
+/// A solid that is not convex may have several local minima along a line. Samples it in at most
+/// `kPlaces` steps, fewer where the distance (its slope is at most 1) rules out a new minimum, and
+/// only as far as the box allows one; then refines around the least sample. Finds the minimum
+/// within 0.5 mm. Groups of lines advance together, because a single one would wait for the grid's
+/// memory at each step. Writes the places (m from the start) and distances of kGroups groups.
+template <int kGroups, class Rows>
+void search_groups(const DistanceField& field, const Rows& rows, int first, float length,
+                   float* best_out, float* least_out) {
+  using lane::Floats;
+  constexpr int kPlaces = 16, kHalvings = 5;
+  const Floats step = lane::all(length / kPlaces), whole = lane::all(length),
+               end = lane::all(length + 0.5F * (length / kPlaces));
+  LanesOfLines lines[kGroups];
+  BoxCrossing crossings[kGroups];
+  Floats best[kGroups], least[kGroups], next[kGroups];
+  const auto goes_on = [&](int g) {
+    return (next[g] < end) & (lane::min(next[g], whole) <= crossings[g].end(least[g]));
+  };
+  lane::Ints going{};
+  for (int g = 0; g < kGroups; ++g) {
+    lines[g] = LanesOfLines(field, rows, first + g * lane::kWidth);
+    crossings[g] = BoxCrossing(lines[g]);
+    best[g] = Floats{};
+    least[g] = lines[g].distances(best[g]);
+    next[g] = step;
+    going |= goes_on(g);
+  }
+  while (lane::any(going)) {
+    going = lane::Ints{};
+    for (int g = 0; g < kGroups; ++g) {
+      const Floats place = lane::min(next[g], whole);
+      const Floats d = lines[g].distances(place);
+      const lane::Ints closer = (next[g] < end) & (d < least[g]);
+      least[g] = closer ? d : least[g];
+      best[g] = closer ? place : best[g];
+      next[g] += lane::max(step, d - least[g]);
+      going |= goes_on(g);
+    }
+  }
+  Floats reach = 0.5F * step;
+  for (int k = 0; k < kHalvings; ++k, reach *= 0.5F) {
+    for (int g = 0; g < kGroups; ++g) {
+      const Floats before = lane::max(best[g] - reach, Floats{});
+      const Floats after = lane::min(best[g] + reach, whole);
+      const Floats b = lines[g].distances(after);
+      // There is nothing before the start.
+      const Floats a = lane::any(best[g] > 0.0F) ? lines[g].distances(before) : least[g];
+      const lane::Ints back = (a < least[g]) & (a <= b);
+      const lane::Ints on = ~back & (b < least[g]);
+      least[g] = back ? a : on ? b : least[g];
+      best[g] = back ? before : on ? after : best[g];
+    }
+  }
+  for (int g = 0; g < kGroups; ++g) {
+    const int at = g * lane::kWidth;
+    lane::store(best[g], best_out + at);
+    lane::store(least[g], least_out + at);
+  }
+}
+
+/// The first `count` lines. \param best, least  have room for a block
+template <class Rows>
+void search_lines(const DistanceField& field, const Rows& rows, int count, float length,
+                  float* best, float* least) {
+  constexpr int kGroups = 2;
+  int first = 0;
+  for (; first + lane::kWidth < count; first += kGroups * lane::kWidth)
+    search_groups<kGroups>(field, rows, first, length, best + first, least + first);
+  if (first < count) search_groups<1>(field, rows, first, length, best + first, least + first);
+}
+
+inline FloatVec unit(const FloatVec& v) {
+  const float scale = 1.0F / std::sqrt(lane::max(dot(v, v), kTinyLength * kTinyLength));
+  return {v.x * scale, v.y * scale, v.z * scale};
+}
+
+/// Three rows of vectors.
+struct LanesOfVectors {
+  lane::Floats x, y, z;
+};
+inline lane::Floats dot(const LanesOfVectors& a, const LanesOfVectors& b) {
+  return a.x * b.x + a.y * b.y + a.z * b.z;
+}
+inline LanesOfVectors unit(const LanesOfVectors& v) {
+  const lane::Floats scale =
+      1.0F / lane::sqrt(lane::max(dot(v, v), lane::all(kTinyLength * kTinyLength)));
+  return {v.x * scale, v.y * scale, v.z * scale};
+}
+
+/// The distance, normal and cosine at the place along[i] of the first `count` lines.
+template <class Rows>
+void find_normals(const DistanceField& field, const Rows& rows, int count, float length,
+                  Deepest& out) {
+  for (int i = 0; i < count; i += lane::kWidth) {
+    const lane::Floats place = lane::load(out.along + i);
+    const LanesOfLines lines(field, rows, i);
+    const DistanceField::Values there = lines.values(place);
+    const LanesOfVectors normal = unit(LanesOfVectors{there.slope_x, there.slope_y, there.slope_z});
+    LanesOfVectors n = normal;
+    if (length > 0) {
+      // Between the ends, a contact's normal is perpendicular to the line.
+      const LanesOfVectors u{lines.along[0], lines.along[1], lines.along[2]};
+      const lane::Floats climb = dot(normal, u);
+      const LanesOfVectors across = unit(
+          LanesOfVectors{normal.x - climb * u.x, normal.y - climb * u.y, normal.z - climb * u.z});
+      const lane::Ints between = (place > 0.0F) & (place < length);
+      n = {between ? across.x : normal.x, between ? across.y : normal.y,
+           between ? across.z : normal.z};
+    }
+    const LanesOfVectors direction{lane::load(rows.direction[0] + i),
+                                   lane::load(rows.direction[1] + i),
+                                   lane::load(rows.direction[2] + i)};
+    lane::store(there.distance, out.distance + i);
+    lane::store(dot(n, direction), out.cosine + i);
+    lane::store(n.x, out.x + i);
+    lane::store(n.y, out.y + i);
+    lane::store(n.z, out.z + i);
+  }
+}
+
+/// One block of hypotheses. Has the functions of the other classes of this file.
 class SolidLine : public RotatedLine {
  public:
   SolidLine(const ShapeHypotheses& hypotheses, const ShapeHypotheses::Shape& shape, int first,
@@ -364,183 +539,25 @@ class SolidLine : public RotatedLine {
   SurfacePoint surface(int i, float s) const {
     const FloatVec p = at(i, s);
     const DistanceField::Value v = field_->value(p.x, p.y, p.z);
-    return {v.distance, unit({v.slope_x, v.slope_y, v.slope_z})};
+    return {v.distance, unit(FloatVec{v.slope_x, v.slope_y, v.slope_z})};
   }
-  FloatVec start(int i) const { return at(i, 0); }
   const DistanceField& field() const { return *field_; }
-
-  static FloatVec unit(const FloatVec& v) {
-    const float scale = 1.0f / std::sqrt(lane::max(dot(v, v), kTinyLength * kTinyLength));
-    return {v.x * scale, v.y * scale, v.z * scale};
-  }
+  const LineRows<ShapeHypotheses::kBlock>& rows() const { return rows_; }
 
  private:
   const DistanceField* field_;
 };
-static_assert(DistanceField::kMost == ShapeHypotheses::kBlock);
 
-/// Some hypotheses of a block, side by side, so that no work is done for the others.
-class ChosenLines {
- public:
-  static constexpr int kBlock = ShapeHypotheses::kBlock;
-
-  explicit ChosenLines(const SolidLine& shape) : field_(&shape.field()) {
-    for (int i = 0; i < kBlock; ++i) {
-      const FloatVec start = shape.start(i), along = shape.along(i);
-      which_[i] = i;
-      start_[0][i] = start.x;
-      start_[1][i] = start.y;
-      start_[2][i] = start.z;
-      along_[0][i] = along.x;
-      along_[1][i] = along.y;
-      along_[2][i] = along.z;
-    }
-  }
-
-  int count() const { return count_; }
-  int which(int k) const { return which_[k]; }  ///< of the block's hypotheses
-
-  /// Keeps those for which keep(k); calls move(from, to) for each of them that takes another place.
-  template <class Keep, class Move>
-  void keep_if(const Keep& keep, const Move& move) {
-    int kept = 0;
-    for (int k = 0; k < count_; ++k) {
-      if (!keep(k)) continue;
-      if (kept != k) {
-        which_[kept] = which_[k];
-        for (int a = 0; a < 3; ++a) {
-          start_[a][kept] = start_[a][k];
-          along_[a][kept] = along_[a][k];
-        }
-        move(k, kept);
-      }
-      ++kept;
-    }
-    count_ = kept;
-  }
-
-  /// At the place s[k] of each line.
-  void distances(const float* s, float* out) const {
-    DistanceField::Places places;
-    find_places(s, places);
-    field_->distances(places, count_, out);
-  }
-  void values(const float* s, DistanceField::Values& out) const {
-    DistanceField::Places places;
-    find_places(s, places);
-    field_->values(places, count_, out);
-  }
-
- private:
-  void find_places(const float* s, DistanceField::Places& places) const {
-    constexpr int kLanes = DistanceField::kLanes;
-    for (int first = 0; first < count_; first += kLanes) {
-      for (int i = first; i < first + kLanes; ++i) {
-        places.x[i] = start_[0][i] + s[i] * along_[0][i];
-        places.y[i] = start_[1][i] + s[i] * along_[1][i];
-        places.z[i] = start_[2][i] + s[i] * along_[2][i];
-      }
-    }
-  }
-
-  const DistanceField* field_;
-  int count_ = kBlock;
-  int which_[kBlock];
-  float start_[3][kBlock], along_[3][kBlock];
-};
-
-/// A solid that is not convex may have several local minima along the line. Samples it in at most
-/// `kPlaces` steps, fewer where the distance (its slope is at most 1) rules out a new minimum; then
-/// refines around the least sample. Finds the minimum within 0.5 mm. Many hypotheses advance
-/// together, because a single one would wait for the grid's memory at each step.
-inline void find_along_line(const SolidLine& shape, float length, Deepest& out) {
-  constexpr int kBlock = ShapeHypotheses::kBlock;
-  constexpr int kPlaces = 16;
-  constexpr int kHalvings = 5;
-  const float step = length / kPlaces;
-  const float end = length + 0.5f * step;
-  float found_best[kBlock], found_least[kBlock];
-  {
-    ChosenLines going_on(shape);
-    float best[kBlock] = {}, least[kBlock], next[kBlock], place[kBlock], d[kBlock];
-    going_on.distances(best, least);
-    std::fill_n(next, kBlock, step);
-    while (going_on.count() > 0) {
-      const int count = going_on.count();
-      for (int i = 0; i < kBlock; ++i) place[i] = lane::min(next[i], length);
-      going_on.distances(place, d);
-      int ended = 0;
-      for (int i = 0; i < kBlock; ++i) {
-        const bool closer = next[i] < end && d[i] < least[i];
-        least[i] = closer ? d[i] : least[i];
-        best[i] = closer ? place[i] : best[i];
-        next[i] += lane::max(step, d[i] - least[i]);
-        ended += i < count && !(next[i] < end) ? 1 : 0;
-      }
-      if (4 * ended < count && ended < DistanceField::kLanes) continue;
-      for (int k = 0; k < count; ++k) {
-        found_best[going_on.which(k)] = best[k];
-        found_least[going_on.which(k)] = least[k];
-      }
-      going_on.keep_if([&](int k) { return next[k] < end; },
-                       [&](int from, int to) {
-                         best[to] = best[from];
-                         least[to] = least[from];
-                         next[to] = next[from];
-                       });
-    }
-  }
-  const ChosenLines all(shape);
-  float reach = 0.5f * step;
-  for (int k = 0; k < kHalvings; ++k, reach *= 0.5f) {
-    float before[kBlock], after[kBlock], a[kBlock], b[kBlock];
-    for (int i = 0; i < kBlock; ++i) {
-      before[i] = lane::max(found_best[i] - reach, 0.0f);
-      after[i] = lane::min(found_best[i] + reach, length);
-    }
-    all.distances(before, a);
-    all.distances(after, b);
-    for (int i = 0; i < kBlock; ++i) {
-      const bool back = a[i] < found_least[i] && a[i] <= b[i];
-      const bool on = !back && b[i] < found_least[i];
-      found_least[i] = back ? a[i] : on ? b[i] : found_least[i];
-      found_best[i] = back ? before[i] : on ? after[i] : found_best[i];
-    }
-  }
-  DistanceField::Values there;
-  all.values(found_best, there);
-  for (int i = 0; i < kBlock; ++i) {
-    const FloatVec normal = SolidLine::unit({there.slope_x[i], there.slope_y[i], there.slope_z[i]});
-    // Between the ends, a contact's normal is perpendicular to the line.
-    const bool between = found_best[i] > 0 && found_best[i] < length;
-    const FloatVec u = shape.along(i);
-    const float slope = dot(normal, u);
-    const FloatVec across =
-        SolidLine::unit({normal.x - slope * u.x, normal.y - slope * u.y, normal.z - slope * u.z});
-    const FloatVec n{between ? across.x : normal.x, between ? across.y : normal.y,
-                     between ? across.z : normal.z};
-    out.distance[i] = there.distance[i];
-    out.cosine[i] = shape.cosine(i, n);
-    out.along[i] = found_best[i];
-    out.x[i] = n.x;
-    out.y[i] = n.y;
-    out.z[i] = n.z;
-  }
+inline void find_along_line(const SolidLine& shape, float length, Deepest& out,
+                            int count = ShapeHypotheses::kBlock) {
+  float least[ShapeHypotheses::kBlock];
+  search_lines(shape.field(), shape.rows(), count, length, out.along, least);
+  find_normals(shape.field(), shape.rows(), count, length, out);
 }
 
-inline void find_at_tip(const SolidLine& shape, Deepest& out) {
-  const float tip[ShapeHypotheses::kBlock] = {};
-  DistanceField::Values there;
-  ChosenLines(shape).values(tip, there);
-  for (int i = 0; i < ShapeHypotheses::kBlock; ++i) {
-    const FloatVec n = SolidLine::unit({there.slope_x[i], there.slope_y[i], there.slope_z[i]});
-    out.distance[i] = there.distance[i];
-    out.cosine[i] = shape.cosine(i, n);
-    out.along[i] = 0.0f;
-    out.x[i] = n.x;
-    out.y[i] = n.y;
-    out.z[i] = n.z;
-  }
+inline void find_at_tip(const SolidLine& shape, Deepest& out, int count = ShapeHypotheses::kBlock) {
+  std::fill_n(out.along, ShapeHypotheses::kBlock, 0.0F);
+  find_normals(shape.field(), shape.rows(), count, 0, out);
 }
 
 // The class of lines for each stimulus.

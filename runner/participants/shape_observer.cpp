@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <glm/geometric.hpp>
 #include <limits>
 #include <stdexcept>
@@ -30,6 +31,8 @@ struct Query {
   float direction_precision = 0;  // 1/rad^2
   float inverse_sd = 0;           // 1 / sqrt v, 1/m
   float free_space_weight = 0;
+  /// m; a hypothesis at least that far from the stylus has the likelihood `of_far`.
+  float far = 0, of_far = 0;
   /// For percepts without contact, m: a shape with a smaller bounding sphere is so far from the
   /// stylus that contact is impossible in every orientation. Negative: there is no such radius.
   float surely_free = -1;
@@ -66,30 +69,6 @@ void add_torque_cue(const ShapeLine& shape, const Query& query, const Deepest& d
   }
 }
 
-/// The same, but only for hypotheses that the torque can leave above the floor, because each
-/// distance is a costly look into a grid.
-void add_torque_cue(const SolidLine& shape, const Query& query, const Deepest& deepest,
-                    float* log_likelihood) {
-  ChosenLines lines(shape);
-  lines.keep_if([&](int i) { return log_likelihood[i] > query.torque_needed; }, [](int, int) {});
-  float least[kBlock] = {};
-  for (int i = 0; i < lines.count(); ++i) least[i] = deepest.distance[lines.which(i)];
-  float weights[kBlock] = {};
-  float fits[kBlock] = {};
-  for (int k = 0; k < query.positions; ++k) {
-    float position[kBlock], distance[kBlock] = {};
-    std::fill_n(position, kBlock, query.position[k]);
-    lines.distances(position, distance);
-    for (int i = 0; i < kBlock; ++i) {
-      const float weight = lane::exp(-(distance[i] - least[i]) * query.inverse_scale);
-      weights[i] += weight;
-      fits[i] += weight * query.fit[k];
-    }
-  }
-  for (int i = 0; i < lines.count(); ++i)
-    log_likelihood[lines.which(i)] += lane::log(fits[i] / weights[i] + query.torque_floor);
-}
-
 /// Whether a hypothesis of the block is above the floor if the torque fits perfectly. If not, all
 /// of them are at the floor, whatever the torque.
 bool torque_matters(const Query& query, const float* log_likelihood) {
@@ -101,6 +80,23 @@ bool torque_matters(const Query& query, const float* log_likelihood) {
   return *std::max_element(most, most + 8) > query.torque_needed;
 }
 
+/// Without the torque.
+inline void find_log_likelihoods(const Deepest& deepest, const Query& query,
+                                 float* log_likelihood) {
+  if (query.contact) {
+    for (int i = 0; i < kBlock; ++i) {
+      const float d = deepest.distance[i];
+      log_likelihood[i] =
+          query.direction_precision * (deepest.cosine[i] - 1.0f) - d * d * query.half_precision;
+    }
+  } else {
+    for (int i = 0; i < kBlock; ++i) {
+      log_likelihood[i] =
+          query.free_space_weight * lane::log_normal_cdf(deepest.distance[i] * query.inverse_sd);
+    }
+  }
+}
+
 template <class ShapeLine>
 void find_log_likelihood(const ShapeLine& shape, const Query& query, float* log_likelihood) {
   Deepest deepest;
@@ -109,20 +105,9 @@ void find_log_likelihood(const ShapeLine& shape, const Query& query, float* log_
   } else {
     find_at_tip(shape, deepest);
   }
-  if (query.contact) {
-    for (int i = 0; i < kBlock; ++i) {
-      const float d = deepest.distance[i];
-      log_likelihood[i] =
-          query.direction_precision * (deepest.cosine[i] - 1.0f) - d * d * query.half_precision;
-    }
-    if (query.positions > 0 && torque_matters(query, log_likelihood))
-      add_torque_cue(shape, query, deepest, log_likelihood);
-  } else {
-    for (int i = 0; i < kBlock; ++i) {
-      log_likelihood[i] =
-          query.free_space_weight * lane::log_normal_cdf(deepest.distance[i] * query.inverse_sd);
-    }
-  }
+  find_log_likelihoods(deepest, query, log_likelihood);
+  if (query.positions > 0 && torque_matters(query, log_likelihood))
+    add_torque_cue(shape, query, deepest, log_likelihood);
 }
 
 double weight_of(const Percept& percept, const ObserverSettings& settings) {
@@ -167,10 +152,17 @@ Query make_query(const Percept& percept, const ObserverSettings& settings) {
   query.forgotten = static_cast<float>(1 - kept);
   query.weight = static_cast<float>(weight_of(percept, settings));
 
+  constexpr double kRoundings = 0.001;
+  const double needed = settings.floor - std::log1p(settings.torque_floor) - kRoundings;
+  if (percept.contact) {
+    const double room = kRoundings + 1e-5 / direction_variance;
+    query.far = static_cast<float>(std::sqrt(2 * variance * (room - needed)));
+    query.of_far = static_cast<float>(settings.floor);
+  } else {
+    query.far = static_cast<float>(lane::kLogNormalCdfIsZero * std::sqrt(variance) * (1 + 1e-6));
+  }
   if (percept.contact && percept.ray && percept.along) {
-    constexpr double kRoundings = 0.001;
-    query.torque_needed =
-        static_cast<float>(settings.floor - std::log1p(settings.torque_floor) - kRoundings);
+    query.torque_needed = static_cast<float>(needed);
     query.positions = settings.places_along;
     for (int k = 0; k < query.positions; ++k) {
       const double position = length * k / (query.positions - 1);
@@ -231,10 +223,142 @@ float bounding_radius(const ShapeHypotheses::Shape& shape) {
   }
 }
 
+/// The likelihoods of hypotheses of one solid without a formula. A look into its grid is costly, so
+/// hypotheses that need one are collected until they fill the registers.
+class SolidLikelihoods {
+ public:
+  /// \param log_likelihood  of every hypothesis
+  SolidLikelihoods(const DistanceField& field, const Query& query, float* log_likelihood)
+      : field_(field), query_(query), log_likelihood_(log_likelihood) {}
+
+  /// \param which  the hypotheses of the block's lines
+  void add(const SolidLine& block, const int* which) {
+    for (int first = 0; first < kBlock; first += lane::kWidth) {
+      const BoxCrossing crossing(LanesOfLines(field_, block.rows(), first));
+      const lane::Floats far = lane::all(query_.far);
+      const lane::Floats from = lane::max(crossing.begin(far), lane::Floats{}),
+                         to = lane::min(crossing.end(far), lane::all(query_.line.length));
+      const auto put = [&](const auto& row, auto* waiting) {
+        return lane::store_flagged(lane::load(row + first), from <= to, waiting + lines_.count);
+      };
+      for (int a = 0; a < 3; ++a) {
+        put(block.rows().start[a], lines_.rows.start[a]);
+        put(block.rows().along[a], lines_.rows.along[a]);
+        put(block.rows().direction[a], lines_.rows.direction[a]);
+      }
+      lane::Ints indices;
+      std::memcpy(&indices, which + first, sizeof indices);
+      lines_.count += lane::store_flagged(indices, from <= to, lines_.which + lines_.count);
+      if (lines_.count >= kBlock) {
+        find(kBlock);
+        lines_.drop_block();
+      }
+    }
+  }
+  void finish() {
+    find(lines_.count);
+    if (torque_.count > 0) add_torque(torque_.count);
+  }
+
+ private:
+  /// Lines of several blocks, at most one block and what fills it.
+  struct Waiting {
+    static constexpr int kRoom = 2 * kBlock;
+    int count = 0;
+    int which[kRoom] = {};
+    LineRows<kRoom> rows{};
+    float distance[kRoom] = {}, log_likelihood[kRoom] = {};  // for the torque cue
+
+    void drop_block() {
+      const auto drop = [](auto* row) { std::copy_n(row + kBlock, kBlock, row); };
+      drop(which);
+      for (int a = 0; a < 3; ++a) {
+        drop(rows.start[a]);
+        drop(rows.along[a]);
+        drop(rows.direction[a]);
+      }
+      drop(distance);
+      drop(log_likelihood);
+      count -= kBlock;
+    }
+  };
+
+  void find(int count) {
+    if (query_.ray) {
+      search_lines(field_, lines_.rows, count, query_.line.length, deepest_.along,
+                   deepest_.distance);
+    } else if (!query_.contact) {
+      for (int i = 0; i < count; i += lane::kWidth) {
+        lane::store(LanesOfLines(field_, lines_.rows, i).distances(lane::Floats{}),
+                    deepest_.distance + i);
+      }
+    }
+    if (query_.contact) find_normals(field_, lines_.rows, count, query_.line.length, deepest_);
+    float found[kBlock];
+    find_log_likelihoods(deepest_, query_, found);
+    for (int i = 0; i < count; ++i) log_likelihood_[lines_.which[i]] = found[i];
+    if (query_.positions == 0) return;
+    for (int i = 0; i < count; ++i) {
+      if (!(found[i] > query_.torque_needed)) continue;
+      const int to = torque_.count++;
+      for (int a = 0; a < 3; ++a) {
+        torque_.rows.start[a][to] = lines_.rows.start[a][i];
+        torque_.rows.along[a][to] = lines_.rows.along[a][i];
+      }
+      torque_.which[to] = lines_.which[i];
+      torque_.distance[to] = deepest_.distance[i];
+      torque_.log_likelihood[to] = found[i];
+    }
+    if (torque_.count >= kBlock) {
+      add_torque(kBlock);
+      torque_.drop_block();
+    }
+  }
+
+  void add_torque(int count) {
+    float least[kBlock], weights[kBlock] = {}, fits[kBlock] = {}, distance[kBlock] = {};
+    std::copy_n(torque_.distance, kBlock, least);
+    for (int k = 0; k < query_.positions; ++k) {
+      const float fit = query_.fit[k];
+      for (int i = 0; i < count; i += lane::kWidth) {
+        const LanesOfLines lines(field_, torque_.rows, i);
+        lane::store(lines.distances(lane::all(query_.position[k])), distance + i);
+      }
+      for (int i = 0; i < kBlock; ++i) {
+        const float weight = lane::exp(-(distance[i] - least[i]) * query_.inverse_scale);
+        weights[i] += weight;
+        fits[i] += weight * fit;
+      }
+    }
+    for (int i = 0; i < kBlock; ++i)
+      fits[i] = lane::log(fits[i] / weights[i] + query_.torque_floor);
+    for (int i = 0; i < count; ++i)
+      log_likelihood_[torque_.which[i]] = torque_.log_likelihood[i] + fits[i];
+  }
+
+  const DistanceField& field_;
+  const Query& query_;
+  float* log_likelihood_;
+  Deepest deepest_{};
+  Waiting lines_;   // to be searched
+  Waiting torque_;  // that the torque can leave above the floor
+};
+
+/// Of whole blocks. Has a maximum for each lane, because the compiler may not reorder a single one.
+float greatest(const std::vector<float>& all) {
+  float most[kBlock];
+  std::copy_n(all.begin(), kBlock, most);
+  for (std::size_t first = 0; first < all.size(); first += kBlock) {
+    for (std::size_t i = 0; i < kBlock; ++i) most[i] = lane::max(most[i], all[first + i]);
+  }
+  return *std::max_element(most, most + kBlock);
+}
+
 /// Updates L of all hypotheses of one shape by a percept.
 template <class ShapeLine>
 void update_shape(const ShapeHypotheses& hypotheses, const ShapeHypotheses::Shape& shape,
-                  const Query& query, const ObserverSettings& settings, float* log_posterior) {
+                  const Query& query, const ObserverSettings& settings, float* log_posterior,
+                  float* all_log_likelihoods) {
   const float regained = query.forgotten * log_prior(hypotheses, shape);
   const auto floor = static_cast<float>(settings.floor);
   if (bounding_radius(shape) < query.surely_free) {
@@ -243,15 +367,31 @@ void update_shape(const ShapeHypotheses& hypotheses, const ShapeHypotheses::Shap
       log_posterior[h] = query.kept * log_posterior[h] + regained;  // likelihood 1
     return;
   }
-  const int* const order = hypotheses.nearby_order();
-  for (int first = shape.first; first < shape.first + shape.count; first += kBlock) {
-    const ShapeLine line(hypotheses, shape, first, query.line);
-    float log_likelihood[kBlock];
-    find_log_likelihood(line, query, log_likelihood);
+  const auto add = [&](int first, const float* log_likelihood) {
     for (int i = 0; i < kBlock; ++i) {
-      float& posterior = log_posterior[order[first + i]];
+      float& posterior = log_posterior[first + i];
       posterior =
           query.kept * posterior + regained + query.weight * lane::max(log_likelihood[i], floor);
+    }
+  };
+  const int end = shape.first + shape.count;
+  if constexpr (std::is_same_v<ShapeLine, SolidLine>) {
+    const int blocks = (shape.count + kBlock - 1) / kBlock;
+    std::fill_n(all_log_likelihoods + shape.first, blocks * kBlock, query.of_far);
+    SolidLikelihoods likelihoods(*shape.field, query, all_log_likelihoods);
+    for (int first = shape.first; first < end; first += kBlock) {
+      likelihoods.add(SolidLine(hypotheses, shape, first, query.line),
+                      hypotheses.nearby_order() + first);
+    }
+    likelihoods.finish();
+    for (int first = shape.first; first < end; first += kBlock)
+      add(first, all_log_likelihoods + first);
+  } else {
+    for (int first = shape.first; first < end; first += kBlock) {
+      const ShapeLine line(hypotheses, shape, first, query.line);
+      float log_likelihood[kBlock];
+      find_log_likelihood(line, query, log_likelihood);
+      add(first, log_likelihood);
     }
   }
 }
@@ -267,6 +407,7 @@ ShapeObserver::ShapeObserver(const ShapeHypotheses& hypotheses, const ObserverSe
     : hypotheses_(&hypotheses),
       settings_(settings),
       log_posterior_(static_cast<std::size_t>(hypotheses.padded_size())),
+      log_likelihood_(log_posterior_.size()),
       probabilities_(hypotheses.shapes().size()),
       masses_(log_posterior_.size()) {
   check(settings);
@@ -286,27 +427,22 @@ void ShapeObserver::update(const Percept& percept) {
   const Query query = make_query(percept, settings_);
   for (const ShapeHypotheses::Shape& shape : hypotheses_->shapes()) {
     visit_line_class(shape, [&]<class ShapeLine>(std::type_identity<ShapeLine>) {
-      update_shape<ShapeLine>(*hypotheses_, shape, query, settings_, log_posterior_.data());
+      update_shape<ShapeLine>(*hypotheses_, shape, query, settings_, log_posterior_.data(),
+                              log_likelihood_.data());
     });
   }
   find_posterior();
 }
 
 void ShapeObserver::find_posterior() {
-  // Keep a maximum and a sum for each lane of a block: the compiler may not reorder a single sum.
   const float* const l = log_posterior_.data();
-  float most[kBlock];
-  std::copy_n(l, kBlock, most);
-  for (int first = 0; first < hypotheses_->padded_size(); first += kBlock) {
-    for (int i = 0; i < kBlock; ++i) most[i] = lane::max(most[i], l[first + i]);
-  }
-  const float reference = *std::max_element(most, most + kBlock);
+  const float reference = greatest(log_posterior_);
 
   double total = 0;
   for (std::size_t s = 0; s < probabilities_.size(); ++s) {
     const ShapeHypotheses::Shape& shape = hypotheses_->shapes()[s];
     const int end = shape.first + shape.count;
-    float sums[kBlock] = {};
+    float sums[kBlock] = {};  // one for each lane: the compiler may not reorder a single sum
     for (int first = shape.first; first < end; first += kBlock) {
       for (int i = 0; i < kBlock; ++i) {
         const float mass = lane::exp(l[first + i] - reference);
@@ -324,30 +460,32 @@ void ShapeObserver::find_posterior() {
 }
 
 void ShapeObserver::draw(Random& random, std::span<int> hypotheses) {
-  const float reference = *std::max_element(log_posterior_.begin(), log_posterior_.end());
-  for (std::size_t h = 0; h < masses_.size(); ++h) {
-    masses_[h] = lane::exp(log_posterior_[h] - reference);
-  }
+  const float reference = greatest(log_posterior_);
   double total = 0;
   for (const ShapeHypotheses::Shape& shape : hypotheses_->shapes()) {
-    for (int h = shape.first; h < shape.first + shape.count; ++h) {
-      total += masses_[static_cast<std::size_t>(h)];
+    const int end = shape.first + shape.count;
+    for (int first = shape.first; first < end; first += kBlock) {
+      float mass[kBlock];
+      const float* const l = log_posterior_.data() + first;
+      for (int i = 0; i < kBlock; ++i) mass[i] = lane::exp(l[i] - reference);
+      for (int h = first; h < std::min(first + kBlock, end); ++h)
+        masses_[static_cast<std::size_t>(h)] = total += mass[h - first];
     }
   }
   const auto count = static_cast<double>(hypotheses.size());
   std::size_t drawn = 0;
-  double below = 0;  // mass of the hypotheses up to and including this one
   int last = 0;
   double next = total * random.unit() / count;
   for (const ShapeHypotheses::Shape& shape : hypotheses_->shapes()) {
-    for (int h = shape.first; h < shape.first + shape.count; ++h) {
-      last = h;
-      below += masses_[static_cast<std::size_t>(h)];
-      while (drawn < hypotheses.size() && next < below) {
-        hypotheses[drawn++] = h;
-        next = total * (static_cast<double>(drawn) + random.unit()) / count;
-      }
+    auto at = masses_.begin() + shape.first;
+    const auto end = at + shape.count;
+    while (drawn < hypotheses.size()) {
+      at = std::upper_bound(at, end, next);
+      if (at == end) break;
+      hypotheses[drawn++] = static_cast<int>(at - masses_.begin());
+      next = total * (static_cast<double>(drawn) + random.unit()) / count;
     }
+    last = shape.first + shape.count - 1;
   }
   while (drawn < hypotheses.size()) hypotheses[drawn++] = last;  // if the sum was rounded down
 }

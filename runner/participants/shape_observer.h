@@ -98,9 +98,10 @@ class ShapeObserver {
 
   const ShapeHypotheses* hypotheses_;
   ObserverSettings settings_;
-  std::vector<float> log_posterior_;  // L, of every hypothesis; not normalised
+  std::vector<float> log_posterior_;   // L, of every hypothesis; not normalised
+  std::vector<float> log_likelihood_;  // l, of every hypothesis with a field
   std::vector<double> probabilities_;
-  std::vector<float> masses_;  // of every hypothesis, relative to the greatest; for draws
+  std::vector<double> masses_;  // of the hypotheses of each shape up to this one; for draws
   int best_ = 0;
 };
 

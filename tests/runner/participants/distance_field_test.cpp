@@ -10,6 +10,7 @@
 #include "data/base/random.h"
 #include "runner/participants/felt_parts.h"
 #include "runner/participants/shape_lines.h"
+#include "runner/participants/shape_observer.h"
 #include "stimuli/primitives.h"
 #include "stimuli/signed_distance.h"
 #include "tests/runner/participants/solids.h"
@@ -125,6 +126,21 @@ TEST(DistanceField, NoPlaceIsNearerThanItsReachSays) {
   }
 }
 
+TEST(DistanceField, NoPlaceIsNearerThanThePlanesOfItsBoxSay) {
+  const DistanceField field(test::placed(stimuli::solids::prism(kEll, 0.03).soup));
+  const DistanceField::Box& box = field.box();
+  EXPECT_NEAR(box.half[0], 0.03, 0.001);
+  EXPECT_NEAR(box.half[2], 0.015, 0.001);
+  Random random(7);
+  for (int i = 0; i < 50000; ++i) {
+    const Vec3 p = point_around(random, Vec3(0.03, 0.03, 0.015), i % 2 == 0 ? 0.05 : 0.3);
+    double beyond = -1;
+    for (int a = 0; a < 3; ++a)
+      beyond = std::max(beyond, std::abs(p[a] - double{box.middle[a]}) - double{box.half[a]});
+    ASSERT_GE(test::distance_at(field, p), beyond);
+  }
+}
+
 stimuli::ObjectSpec ell_of_boxes() {
   stimuli::ObjectSpec ell;
   ell.shape = stimuli::ShapeKind::compound;
@@ -189,6 +205,94 @@ TEST(SolidLine, HypothesesAreSearchedIndependently) {
       ASSERT_EQ(found.along[i], best) << trial << " " << i;
       ASSERT_EQ(found.distance[i], line.surface(i, best).distance) << trial << " " << i;
     }
+  }
+}
+
+TEST(SolidLine, TheFirstHypothesesOfABlockCanBeSearchedAlone) {
+  const ShapeHypotheses hypotheses({ell_of_boxes()});
+  const ShapeHypotheses::Shape& shape = hypotheses.shapes()[0];
+  Random random(8);
+  for (int count = 1; count <= ShapeHypotheses::kBlock; ++count) {
+    const Touch touch(shape, random);
+    const SolidLine line(hypotheses, shape, touch.first, touch.line);
+    Deepest all, some;
+    find_along_line(line, touch.line.length, all);
+    find_along_line(line, touch.line.length, some, count);
+    for (int i = 0; i < count; ++i) {
+      ASSERT_EQ(some.distance[i], all.distance[i]) << count << " " << i;
+      ASSERT_EQ(some.cosine[i], all.cosine[i]) << count << " " << i;
+    }
+  }
+}
+
+/// Mean of the hypotheses' likelihoods, each looked at, as in shape_observer.h.
+double plain_likelihood(const ShapeHypotheses& hypotheses, const ShapeHypotheses::Shape& shape,
+                        const ObserverSettings& s, const Percept& percept) {
+  const double v = s.contact_sd * s.contact_sd + s.model_contact_sd * s.model_contact_sd;
+  const double k =
+      1 / (s.direction_sd * s.direction_sd + s.model_direction_sd * s.model_direction_sd);
+  const Vec3 span = percept.tail - percept.tip;
+  const double length = percept.ray ? glm::length(span) : 0;
+  const Line line{to_float(percept.tip), to_float(percept.ray ? span / length : Vec3(0)),
+                  static_cast<float>(length), to_float(percept.direction)};
+  double sum = 0;
+  for (int first = shape.first; first < shape.first + shape.count;
+       first += ShapeHypotheses::kBlock) {
+    const SolidLine solid(hypotheses, shape, first, line);
+    Deepest deepest;
+    if (percept.ray)
+      find_along_line(solid, line.length, deepest);
+    else
+      find_at_tip(solid, deepest);
+    for (int i = 0; i < ShapeHypotheses::kBlock; ++i) {
+      if (hypotheses.nearby_order()[first + i] >= shape.first + shape.count) continue;
+      const double d = deepest.distance[i];
+      double l = 0;
+      if (percept.contact) {
+        l = -d * d / (2 * v) + k * (deepest.cosine[i] - 1);
+        if (percept.along) {
+          double weights = 0, fits = 0;
+          for (int place = 0; place < s.places_along; ++place) {
+            const double along = length * place / (s.places_along - 1);
+            const double height = solid.distance(i, static_cast<float>(along)) - d;
+            const double error = (along - *percept.along) / s.along_sd;
+            weights += std::exp(-height / s.soft_min_scale);
+            fits += std::exp(-height / s.soft_min_scale - error * error / 2);
+          }
+          l += std::log(fits / weights + s.torque_floor);
+        }
+      } else {
+        l = s.free_space_weight * std::log(std::erfc(-d / std::sqrt(2 * v)) / 2);
+      }
+      sum += std::exp(s.beta * std::max(l, s.floor));
+    }
+  }
+  return sum / shape.count;
+}
+
+// The observer leaves out hypotheses whose likelihood is known before they are looked at.
+TEST(SolidLine, TheObserverLeavesOutNothingThatCounts) {
+  stimuli::ObjectSpec slab;
+  slab.shape = stimuli::ShapeKind::box;
+  slab.size = Vec3(0.07, 0.045, 0.02);
+  const ShapeHypotheses hypotheses({ell_of_boxes(), slab});
+  const ObserverSettings settings;
+  ShapeObserver observer(hypotheses, settings);
+  Random random(9);
+  for (int trial = 0; trial < 80; ++trial) {
+    const Vec3 along = glm::normalize(Vec3(random.normal(), random.normal(), random.normal()));
+    Percept percept;
+    percept.contact = trial % 2 == 0;
+    percept.ray = trial % 4 < 2;
+    percept.tip = point_around(random, Vec3(0), 0.02 + 0.06 * random.unit());
+    percept.tail = percept.tip + 0.12 * along;
+    percept.direction = glm::normalize(percept.tip);
+    if (percept.contact && percept.ray && trial % 8 < 4) percept.along = 0.12 * random.unit();
+    observer.reset();
+    observer.update(percept);
+    const double ell = plain_likelihood(hypotheses, hypotheses.shapes()[0], settings, percept);
+    const double box = plain_likelihood(hypotheses, hypotheses.shapes()[1], settings, percept);
+    ASSERT_NEAR(observer.probability(0), ell / (ell + box), 1e-5) << trial;
   }
 }
 

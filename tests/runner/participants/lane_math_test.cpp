@@ -5,6 +5,11 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
+#include <vector>
+
+#include "data/base/random.h"
+#include "runner/participants/lanes.h"
 
 namespace palpate::runner::participants {
 namespace {
@@ -47,6 +52,56 @@ TEST(LaneMath, LogNormalCdfIsZeroFromTheStatedBound) {
   EXPECT_NE(lane::log_normal_cdf(5.0f), 0.0f);
   for (float x = lane::kLogNormalCdfIsZero; x < 1e6f; x *= 1.000001f)
     ASSERT_EQ(lane::log_normal_cdf(x), 0.0f) << x;
+}
+
+// Whatever the width of the processor's registers, each lane has the bits of a single float.
+TEST(Lanes, HaveTheBitsOfSingleFloats) {
+  Random random(1);
+  std::vector<float> x(lane::kWidth), y(lane::kWidth), root(lane::kWidth), mixed(lane::kWidth);
+  for (int trial = 0; trial < 200; ++trial) {
+    for (float& value : x) value = static_cast<float>(random.unit());
+    for (float& value : y) value = static_cast<float>(random.normal());
+    const lane::Floats a = lane::load(x.data()), b = lane::load(y.data());
+    lane::store(lane::sqrt(a), root.data());
+    lane::store(lane::mix(a, b, lane::max(lane::abs(b), lane::all(0.5F))), mixed.data());
+    for (std::size_t i = 0; i < x.size(); ++i) {
+      ASSERT_EQ(root[i], std::sqrt(x[i]));
+      ASSERT_EQ(mixed[i], x[i] + lane::max(std::abs(y[i]), 0.5F) * (y[i] - x[i]));
+    }
+  }
+}
+
+TEST(Lanes, LookUpNeighboursAnywhere) {
+  std::vector<float> table(1000);
+  std::iota(table.begin(), table.end(), 0.0F);
+  Random random(2);
+  for (int trial = 0; trial < 200; ++trial) {
+    lane::Ints at{};
+    for (int i = 0; i < lane::kWidth; ++i)
+      at[i] = static_cast<std::int32_t>(random.below(table.size() - 1));
+    const lane::Pairs found = lane::pairs(table.data(), at);
+    for (int i = 0; i < lane::kWidth; ++i) {
+      ASSERT_EQ(found.first[i], static_cast<float>(at[i]));
+      ASSERT_EQ(found.second[i], static_cast<float>(at[i] + 1));
+    }
+  }
+}
+
+TEST(Lanes, StoreTheFlaggedOnesSideBySide) {
+  lane::Ints numbers{};
+  for (int i = 0; i < lane::kWidth; ++i) numbers[i] = i;
+  for (unsigned pattern = 0; pattern<1U << lane::kWidth; pattern += lane::kWidth> 8 ? 7 : 1) {
+    lane::Ints flags{};
+    std::vector<int> expected, stored(lane::kWidth);
+    for (int i = 0; i < lane::kWidth; ++i) {
+      if ((pattern >> i & 1U) == 0) continue;
+      flags[i] = -1;
+      expected.push_back(i);
+    }
+    ASSERT_EQ(lane::any(flags), pattern != 0);
+    stored.resize(static_cast<std::size_t>(lane::store_flagged(numbers, flags, stored.data())));
+    ASSERT_EQ(stored, expected);
+  }
 }
 
 }  // namespace
