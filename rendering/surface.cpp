@@ -134,6 +134,7 @@ void Surface::find_edges() {
         triangles_[i].touched |= 1U << k;
         other.touched |= 1U << side;
       }
+      if (across > (i << 2 | k)) triangles_[i].owned |= 1U << k;
     }
   }
 }
@@ -147,9 +148,48 @@ void Surface::build_tree() {
   std::vector<std::uint32_t> order(triangles_.size());
   std::iota(order.begin(), order.end(), 0U);
   nodes_.reserve(triangles_.size() / (kWidth - 1) + 16);
-  build_node(middles, order);
+  root_ = build_node(middles, order);
+  sort_by(order);
   nodes_.shrink_to_fit();
-  normals_.shrink_to_fit();
+}
+
+/// Sorts triangles and vertices as the tree has them: what is near in space is near in memory.
+void Surface::sort_by(std::span<const std::uint32_t> order) {
+  std::vector<std::uint32_t>& place = in_files_;
+  place.resize(order.size());
+  for (std::uint32_t i = 0; i < order.size(); ++i) place[order[i]] = i;
+  constexpr std::uint32_t kNone = ~0U;
+  std::vector<std::uint32_t> vertex_place(vertices_.size(), kNone);
+  stimuli::LargeArray<SurfaceTriangle> triangles;
+  stimuli::LargeArray<Vec3> vertices;
+  triangles.reserve(triangles_.size());
+  vertices.reserve(vertices_.size());
+  for (const std::uint32_t from : order) {
+    SurfaceTriangle& t = triangles.emplace_back(triangles_[from]);
+    for (std::size_t k = 0; k < 3; ++k) {
+      std::uint32_t& corner = vertex_place[t.corners[k]];
+      if (corner == kNone) {
+        corner = static_cast<std::uint32_t>(vertices.size());
+        vertices.push_back(vertices_[t.corners[k]]);
+      }
+      t.corners[k] = corner;
+      t.across[k] = place[SurfaceTriangle::triangle_of(t.across[k])] << 2 |
+                    SurfaceTriangle::side_of(t.across[k]);
+    }
+  }
+  const auto rename = [&](const auto& self, std::uint32_t name) -> void {
+    Node& node = nodes_[index_of(name)];
+    for (std::size_t k = 0; k < kWidth && node.low[0][k] <= node.high[0][k]; ++k) {
+      if (!is_leaf(name)) {
+        self(self, node.children[k]);
+      } else {
+        node.children[k] = place[node.children[k]];
+      }
+    }
+  };
+  rename(rename, root_);
+  triangles_ = std::move(triangles);
+  vertices_ = std::move(vertices);
 }
 
 /// Divides the triangles among the children of a new node. All nodes are full, except for the last
@@ -162,12 +202,10 @@ std::uint32_t Surface::build_node(std::span<const Vec3> middles,
     node.low[k] = Lanes{} + std::numeric_limits<float>::infinity();
     node.high[k] = -node.low[k];
   }
-  Normals normals;
-  node.leaf = triangles.size() <= kWidth;
+  const bool leaf = triangles.size() <= kWidth;
   std::size_t share = 1;  // triangles of a child
   while (share * kWidth < triangles.size()) share *= kWidth;
   nodes_.push_back(node);
-  normals_.push_back(normals);
   std::size_t child = 0;
   const auto divide = [&](const auto& self, std::span<std::uint32_t> some) -> void {
     if (some.size() > share) {
@@ -178,14 +216,13 @@ std::uint32_t Surface::build_node(std::span<const Vec3> middles,
       return;
     }
     set_box(some, child, node);
-    set_normals(some, child, normals);
-    node.children[child] = node.leaf ? some.front() : build_node(middles, some);
+    set_normals(some, child, node);
+    node.children[child] = leaf ? some.front() : build_node(middles, some);
     ++child;
   };
   divide(divide, triangles);
   nodes_[index] = node;
-  normals_[index] = normals;
-  return index;
+  return index << 1 | (leaf ? 1U : 0U);
 }
 
 void Surface::set_box(std::span<const std::uint32_t> triangles, std::size_t child,
@@ -204,7 +241,7 @@ void Surface::set_box(std::span<const std::uint32_t> triangles, std::size_t chil
 }
 
 void Surface::set_normals(std::span<const std::uint32_t> triangles, std::size_t child,
-                          Normals& normals) const {
+                          Node& node) const {
   Vec3 low(HUGE_VAL), high(-HUGE_VAL);
   const auto add = [&](const Vec3& normal) {
     low = glm::min(low, normal);
@@ -214,14 +251,23 @@ void Surface::set_normals(std::span<const std::uint32_t> triangles, std::size_t 
     const SurfaceTriangle& t = triangles_[index];
     add(t.normal);
     for (std::uint32_t k = 0; k < 3; ++k) {
-      if (owns(t, index, k) && t.touches(k))
+      if (t.owns(k) && t.touches(k))
         add(triangles_[SurfaceTriangle::triangle_of(t.across[k])].normal);
     }
   }
-  for (int k = 0; k < 3; ++k)
-    normals.middle[static_cast<std::size_t>(k)][child] =
-        static_cast<float>(0.5 * (low[k] + high[k]));
-  normals.radius[child] = rounded_up(0.5 * glm::length(high - low) + 1e-6);
+  Vec3 middle;
+  for (int k = 0; k < 3; ++k) {
+    const auto rounded = static_cast<float>(0.5 * (low[k] + high[k]));
+    node.middle[static_cast<std::size_t>(k)][child] = rounded;
+    middle[k] = rounded;
+  }
+  double top = -HUGE_VAL;
+  for (const std::uint32_t index : triangles) {
+    for (const std::uint32_t corner : triangles_[index].corners)
+      top = std::max(top, glm::dot(middle, vertices_[corner] - centre_));
+  }
+  node.top[child] = rounded_up(top);
+  node.radius[child] = rounded_up(0.5 * glm::length(high - low) + 1e-6);
 }
 
 int Surface::winding(const Vec3& point) const {

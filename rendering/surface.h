@@ -23,17 +23,14 @@ struct alignas(64) SurfaceTriangle {
   /// Side k is from corner k to corner k + 1. The neighbour's index times four, plus its side.
   std::array<std::uint32_t, 3> across{};
   std::uint32_t shell = 0;    ///< index in Surface::materials()
-  std::uint32_t touched = 0;  ///< bit k: side k is not concave, so a segment can touch it
+  std::uint16_t touched = 0;  ///< bit k: side k is not concave, so a segment can touch it
+  std::uint16_t owned = 0;    ///< bit k: of the two triangles at side k it is the first in its file
 
   static constexpr std::uint32_t triangle_of(std::uint32_t side) { return side >> 2; }
   static constexpr std::uint32_t side_of(std::uint32_t side) { return side & 3; }
   bool touches(std::uint32_t k) const { return (touched >> k & 1) != 0; }
+  bool owns(std::uint32_t k) const { return (owned >> k & 1) != 0; }
 };
-
-/// Whether this triangle owns the side k that it shares with another.
-inline bool owns(const SurfaceTriangle& triangle, std::uint32_t index, std::uint32_t k) {
-  return triangle.across[k] > (index << 2 | k);
-}
 
 /// A closed surface as it stands in an object.
 struct SurfaceShell {
@@ -53,8 +50,7 @@ inline constexpr std::uint8_t kAll = 31;
 struct SegmentMotion {
   Vec3 start, end;          ///< m, the ends at first
   Vec3 start_way, end_way;  ///< m, their motion
-  double start_room = 0;    ///< m; the start may be so far off
-  double end_room = 0;      ///< m; the same of the end, and of points between interpolated
+  double room = 0;          ///< m; each point may be so far off
   double turn = 0;          ///< m; one end may be so far off relative to the other
 };
 
@@ -64,27 +60,27 @@ class Surface {
   explicit Surface(std::span<const SurfaceShell> shells);
 
   const stimuli::LargeArray<Vec3>& vertices() const { return vertices_; }
+  /// Near triangles are near in the array.
   const stimuli::LargeArray<SurfaceTriangle>& triangles() const { return triangles_; }
   const std::vector<stimuli::Material>& materials() const { return materials_; }
   Vec3 centre() const { return centre_; }    ///< of a sphere about it
   double radius() const { return radius_; }  ///< m, of that sphere
   double size() const { return 2 * radius_; }
 
-  /// Of the tree: the boxes of up to eight children side by side, relative to the centre, in single
-  /// precision and rounded outwards. An unused box is empty.
+  /// Of the tree: up to eight children side by side, relative to the centre, in single precision.
   static constexpr std::size_t kWidth = 8;
   using Lanes = float __attribute__((vector_size(sizeof(float) * kWidth)));
   struct alignas(64) Node {
-    std::array<Lanes, 3> low{}, high{};
-    std::array<std::uint32_t, kWidth> children{};  ///< of a leaf: triangles; else nodes
-    bool leaf = false;
-  };
-  /// For each child a ball around the normals of its triangles and of their neighbours across
-  /// touched edges.
-  struct alignas(64) Normals {
+    std::array<Lanes, 3> low{}, high{};  ///< m, boxes, rounded outwards; an unused one is empty
+    /// A ball around the normals of the triangles and of their neighbours across touched edges.
     std::array<Lanes, 3> middle{};
     Lanes radius{};
+    Lanes top{};  ///< m; no triangle is higher in the direction of the ball's middle
+    std::array<std::uint32_t, kWidth> children{};  ///< of a leaf: triangles; else names of nodes
   };
+  /// The name of a node: its index times two, plus 1 for a leaf.
+  static constexpr std::uint32_t index_of(std::uint32_t node) { return node >> 1; }
+  static constexpr bool is_leaf(std::uint32_t node) { return (node & 1) != 0; }
 
   // Searches; defined in surface_search.h.
 
@@ -98,6 +94,9 @@ class Surface {
   template <class Visit>
   void touchable(const SegmentMotion& motion, const Visit& visit) const;
 
+  /// Indices in triangles() in the order of the files.
+  const std::vector<std::uint32_t>& in_files() const { return in_files_; }
+
   /// How often the surface winds round a point that does not lie on it.
   int winding(const Vec3& point) const;
 
@@ -105,16 +104,17 @@ class Surface {
   void add(const SurfaceShell& shell);
   void find_edges();
   void build_tree();
+  void sort_by(std::span<const std::uint32_t> order);
   std::uint32_t build_node(std::span<const Vec3> middles, std::span<std::uint32_t> triangles);
   void set_box(std::span<const std::uint32_t> triangles, std::size_t child, Node& node) const;
-  void set_normals(std::span<const std::uint32_t> triangles, std::size_t child,
-                   Normals& normals) const;
+  void set_normals(std::span<const std::uint32_t> triangles, std::size_t child, Node& node) const;
 
   stimuli::LargeArray<Vec3> vertices_;
   stimuli::LargeArray<SurfaceTriangle> triangles_;
   std::vector<stimuli::Material> materials_;
+  std::vector<std::uint32_t> in_files_;
   stimuli::LargeArray<Node> nodes_;
-  stimuli::LargeArray<Normals> normals_;  // by node
+  std::uint32_t root_ = 0;
   Vec3 centre_;
   double radius_ = 0;
 };

@@ -80,7 +80,7 @@ bool SurfaceTool::far_away() {
   bool clear = true;
   for (std::size_t j = 0; j < now.count && clear; ++j) {
     const PosedTool::Segment& b = now.segments[j];
-    clear = is_clear({b.start, b.end(true), Vec3(0), Vec3(0), room, room, 2 * room});
+    clear = is_clear({b.start, b.end(true), Vec3(0), Vec3(0), room, 2 * room});
   }
   own_.clear = now;
   own_.clear_room = clear ? room - 4 * skin_ : 0;
@@ -94,7 +94,7 @@ bool SurfaceTool::far_away() {
   for (std::size_t j = 0; j < now.count; ++j) {
     const PosedTool::Segment &a = before.segments[j], &b = now.segments[j];
     if (!is_clear({a.start, a.end(true), b.start - a.start, b.end(true) - a.end(true),
-                   aside + 4 * skin_, aside + 4 * skin_, 2 * aside}))
+                   aside + 4 * skin_, 2 * aside}))
       return false;
   }
   return true;

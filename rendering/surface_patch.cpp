@@ -61,7 +61,7 @@ void sweep_end(const Surface& surface, std::uint32_t index, std::uint8_t segment
   const double fall = -glm::dot(t.normal, way);
   if (!(fall > 0) || start > fall) return;
   const double time = std::max(0.0, start / fall);
-  if (time >= first.time) return;
+  if (!first.yields_to(time, segment, index)) return;
   PatchPolygon polygon;
   polygon.count = 3;
   for (std::size_t k = 0; k < 3; ++k) polygon.corners[k] = surface.vertices()[t.corners[k]];
@@ -82,10 +82,10 @@ void sweep_edge(const Surface& surface, std::uint32_t side, std::uint8_t segment
                c2 = glm::dot(change, way), end = c0 + c1 + c2;
   const double edge_length = glm::length(e), length = glm::length(from.along);
   const double rounding = tolerance * edge_length * length;
-  const double bend = std::abs(c2) + rounding;
+  const double bend = 0.25 * std::abs(c2) + rounding;  // at most, off the line from c0 to the end
   if (std::min(c0, end) > bend || std::max(c0, end) < -bend) return;
   const auto try_at = [&](double time) {
-    if (!(time <= 1) || !(time < first.time)) return;
+    if (!(time <= 1) || !first.yields_to(time, segment, SurfaceTriangle::triangle_of(side))) return;
     const Vec3 along = from.along + time * turn;
     const double left = glm::dot(edge.left.normal, along),
                  right = glm::dot(edge.right.normal, along), level = kSilhouette * length;
@@ -206,7 +206,7 @@ void cast_on_patch(const Surface& surface, const SurfacePatch& patch, const Patc
                end = glm::dot(plane.normal, to) - plane.depth;
   if (end > 0 || start < -tolerance || !(end < start)) return;
   const double time = std::max(0.0, start / (start - end));
-  if (time >= first.time) return;
+  if (!first.yields_to(time, patch.segment, patch.triangle())) return;
   if (meets(polygon_of(surface, patch, tool), from, to - from)) first = {patch, time};
 }
 
@@ -224,7 +224,7 @@ void sweep_triangle(const Surface& surface, std::uint32_t index, std::uint8_t se
                last_slope = glm::dot(t.normal, to.along),
                level = 2 * kSilhouette * glm::length(from.along);
   for (std::uint32_t k = 0; k < 3; ++k) {
-    if ((what >> k & 1) == 0 || !owns(t, index, k) || !t.touches(k)) continue;
+    if ((what >> k & 1) == 0 || !t.owns(k) || !t.touches(k)) continue;
     // Both triangles face the same way all the time.
     const Vec3& beyond = surface.triangles()[SurfaceTriangle::triangle_of(t.across[k])].normal;
     const double first_beyond = glm::dot(beyond, from.along),

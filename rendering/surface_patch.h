@@ -89,6 +89,11 @@ struct PatchHit {
   SurfacePatch patch;
   double time = 2;  ///< fraction of the motion; above 1: no hit
   bool hit() const { return time <= 1; }
+  /// Whether a patch that is met then replaces this one: the earlier one, else the first triangle,
+  /// so that the order of a search does not matter.
+  bool yields_to(double then, std::uint8_t segment, std::uint32_t triangle) const {
+    return then < time || (then == time && segment == patch.segment && triangle < patch.triangle());
+  }
 };
 
 /// Replaces `first` if a translation from `from` to `to` enters the patch earlier.
@@ -114,7 +119,7 @@ void for_each_patch(const Surface& surface, std::uint32_t index, std::uint8_t se
     visit(SurfacePatch{index << 2, segment, !tip, SurfacePatch::Kind::face});
   if ((what & surface_pair::kSides) == 0 || along == Vec3(0)) return;
   for (std::uint32_t k = 0; k < 3; ++k) {
-    if ((what >> k & 1) == 0 || !owns(triangle, index, k) || !triangle.touches(k)) continue;
+    if ((what >> k & 1) == 0 || !triangle.owns(k) || !triangle.touches(k)) continue;
     if (by_tip(surface.triangles()[SurfaceTriangle::triangle_of(triangle.across[k])], along) == tip)
       continue;
     visit(SurfacePatch{index << 2 | k, segment, false, SurfacePatch::Kind::edge});

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
 #include "rendering/surface.h"
@@ -30,50 +31,34 @@ class SurfaceQuery {
     const Vec3 c = a + motion.start_way, d = b + motion.end_way;    // at last
     const Vec3 along = b - a, later = d - c;
     const double length2 = std::max(glm::dot(along, along), glm::dot(later, later));
-    length_ = std::sqrt(length2);
-    const double size = radius + length_ + std::sqrt(std::max(glm::dot(a, a), glm::dot(c, c)));
-    const double slack = kRounding * size;
-    const double start_room = motion.start_room + slack, end_room = motion.end_room + slack;
-    for (int k = 0; k < 3; ++k) {
-      start_.set(k, std::min(a[k], c[k]) - start_room, std::max(a[k], c[k]) + start_room);
-      end_.set(k, std::min(b[k], d[k]) - end_room, std::max(b[k], d[k]) + end_room);
-      all_.low[k] = std::min(start_.low[k], end_.low[k]);
-      all_.high[k] = std::max(start_.high[k], end_.high[k]);
-      along_[k] = static_cast<float>(along[k]);
-      along_last_[k] = static_cast<float>(later[k]);
-    }
+    const double length = std::sqrt(length2);
+    const double size = radius + length + std::sqrt(std::max(glm::dot(a, a), glm::dot(c, c)));
+    const double room = motion.room + kRounding * size;
+    first_ = {a, along};
+    last_ = {c, later};
+    room_ = static_cast<float>(room);
     moves_ = motion.start_way != Vec3(0) || motion.end_way != Vec3(0);
+    start_ = Box(a, c, room);
     is_point_ = !(length2 > 0);
     if (is_point_) return;
-    turn_ = static_cast<float>(motion.turn + kRounding * length_);
-    // Separating axes of a box and a segment (Ericson 2005, 5.3.3).
-    const Vec3 middle = along + later;
-    const auto add = [&](const Vec3& axis) {
-      const double axis2 = glm::dot(axis, axis);
-      if (!(axis2 > kRounding * kRounding * kRounding * kRounding * length2 * length2)) return;
-      const Vec3 unit = axis / std::sqrt(axis2);
-      const double from = glm::dot(unit, a), to = glm::dot(unit, c), tail_from = glm::dot(unit, b),
-                   tail_to = glm::dot(unit, d);
-      Axis& out = axes_[axis_count_++];
-      for (int k = 0; k < 3; ++k) out.unit[k] = static_cast<float>(unit[k]);
-      out.low = static_cast<float>(
-          std::min(std::min(from, to) - start_room, std::min(tail_from, tail_to) - end_room));
-      out.high = static_cast<float>(
-          std::max(std::max(from, to) + start_room, std::max(tail_from, tail_to) + end_room));
-    };
-    if (moves_) {
-      const bool start_moves =
-          glm::dot(motion.start_way, motion.start_way) > glm::dot(motion.end_way, motion.end_way);
-      add(glm::cross(middle, start_moves ? motion.start_way : motion.end_way));
-    }
-    add({0, middle.z, -middle.y});
-    add({-middle.z, 0, middle.x});
-    add({middle.y, -middle.x, 0});
+    end_ = Box(b, d, room);
+    length_ = static_cast<float>(length);
+    turn_ = static_cast<float>(motion.turn + kRounding * length);
+    // The axis along which the segment is longest: across it, a box has only a portion beside it.
+    const Vec3 middle = glm::abs(along + later);
+    const int k = middle.x >= middle.y && middle.x >= middle.z ? 0 : middle.y >= middle.z ? 1 : 2;
+    axis_ = static_cast<std::size_t>(k);
+    const double least = kLeastSlope * length;
+    divides_ = (along[k] > least && later[k] > least) || (along[k] < -least && later[k] < -least);
+    if (!divides_) return;
+    up_ = along[k] > 0;
+    passing_ = Passing(a[k], along[k], up_ ? room : -room);
+    passing_last_ = Passing(c[k], later[k], up_ ? room : -room);
   }
 
   /// The children that the moving segment may meet: one bit each.
   unsigned met(const Surface::Node& node) const {
-    return bits_of(all_.meets(node) & between_planes(node));
+    return bits_of(is_point_ ? start_.meets(node) : portion_in(node).meets);
   }
 
   struct Touched {
@@ -81,47 +66,75 @@ class SurfaceQuery {
     unsigned any() const { return start | end | side; }
   };
   /// The children that the segment may touch with each end, and on a silhouette edge.
-  Touched touched(const Surface::Node& node, const Surface::Normals& normals) const {
+  Touched touched(const Surface::Node& node) const {
     Touched out;
-    const Flags met = all_.meets(node);
-    if (bits_of(met) == 0) return out;
+    const Flags at_start = start_.meets(node);
     if (is_point_) {
-      out.start = bits_of(met);
+      out.start = bits_of(at_start);
       return out;
     }
     const auto along = [&](const std::array<float, 3>& v) -> Lanes {
-      return v[0] * normals.middle[0] + v[1] * normals.middle[1] + v[2] * normals.middle[2];
+      return v[0] * node.middle[0] + v[1] * node.middle[1] + v[2] * node.middle[2];
     };
-    const Lanes turned = along(along_), turned_last = moves_ ? along(along_last_) : turned;
-    out.start = bits_of(start_.meets(node));
-    out.end = bits_of(end_.meets(node));
+    const Lanes height = along(first_.from), slope = along(first_.along);
+    const Lanes height_last = moves_ ? along(last_.from) : height;
+    const Lanes slope_last = moves_ ? along(last_.along) : slope;
+    const Lanes top = node.top + room_;  // above it nothing is touched
+    out.start = bits_of(at_start & (least(height, height_last) <= top));
+    out.end = bits_of(end_.meets(node) & (least(height + slope, height_last + slope_last) <= top));
     // Of a silhouette one normal is to either side of the segment.
-    const Lanes flat = static_cast<float>(length_) * normals.radius + turn_;
-    const Flags across =
-        met & (least(turned, turned_last) <= flat) & (most(turned, turned_last) >= -flat);
-    if (bits_of(across) == 0) return out;
-    out.side = bits_of(across & between_planes(node));
+    const Lanes flat = length_ * node.radius + turn_;
+    const Flags across = (least(slope, slope_last) <= flat) & (most(slope, slope_last) >= -flat);
+    const Portion beside = portion_in(node);
+    Lanes lowest = least(height + beside.from * slope, height + beside.to * slope);
+    if (moves_) {
+      lowest = least(lowest, least(height_last + beside.from * slope_last,
+                                   height_last + beside.to * slope_last));
+    }
+    out.side = bits_of(across & beside.meets & (lowest <= top));
     return out;
   }
 
  private:
   using Flags = std::int32_t __attribute__((vector_size(sizeof(Lanes))));
   static constexpr double kRounding = 1e-6;
+  static constexpr double kLeastSlope = 0.1;  // of the length; a steeper axis divides the segment
 
+  static std::array<float, 3> to_floats(const Vec3& v) {
+    return {static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z)};
+  }
+  struct Line {
+    std::array<float, 3> from{}, along{};
+    Line() = default;
+    Line(const Vec3& at, const Vec3& way) : from(to_floats(at)), along(to_floats(way)) {}
+  };
   struct Box {
     std::array<float, 3> low{}, high{};
-    void set(int k, double from, double to) {
-      low[static_cast<std::size_t>(k)] = static_cast<float>(from);
-      high[static_cast<std::size_t>(k)] = static_cast<float>(to);
+    Box() = default;
+    Box(const Vec3& a, const Vec3& b, double room) {
+      for (int k = 0; k < 3; ++k) {
+        low[static_cast<std::size_t>(k)] = static_cast<float>(std::min(a[k], b[k]) - room);
+        high[static_cast<std::size_t>(k)] = static_cast<float>(std::max(a[k], b[k]) + room);
+      }
     }
     Flags meets(const Surface::Node& node) const {
       return (node.low[0] <= high[0]) & (node.high[0] >= low[0]) & (node.low[1] <= high[1]) &
              (node.high[1] >= low[1]) & (node.low[2] <= high[2]) & (node.high[2] >= low[2]);
     }
   };
-  struct Axis {
-    std::array<float, 3> unit{};
-    float low = 0, high = 0;
+  /// Fractions of the segment at which it passes a box's faces across the axis: scale * face + at.
+  struct Passing {
+    float scale = 0, enter = 0, leave = 0;
+    Passing() = default;
+    Passing(double start, double along, double room)
+        : scale(static_cast<float>(1 / along)),
+          enter(static_cast<float>((-room - start) / along)),
+          leave(static_cast<float>((room - start) / along)) {}
+  };
+  /// The fractions of the segment that are beside a box, and whether these meet it.
+  struct Portion {
+    Lanes from, to;
+    Flags meets;
   };
 
   static unsigned bits_of(const Flags& flags) {
@@ -138,35 +151,64 @@ class SurfaceQuery {
   static Lanes least(const Lanes& a, const Lanes& b) { return a < b ? a : b; }
   static Lanes most(const Lanes& a, const Lanes& b) { return a > b ? a : b; }
 
-  Flags between_planes(const Surface::Node& node) const {
-    Flags out = ~Flags{};
-    for (std::size_t i = 0; i < axis_count_; ++i) {
-      const Axis& axis = axes_[i];
-      Lanes low{}, high{};
-      for (std::size_t k = 0; k < 3; ++k) {
-        const bool down = axis.unit[k] < 0;
-        low += axis.unit[k] * (down ? node.high[k] : node.low[k]);
-        high += axis.unit[k] * (down ? node.low[k] : node.high[k]);
+  Portion portion_in(const Surface::Node& node) const {
+    Portion out{Lanes{}, Lanes{} + 1.0F, ~Flags{}};
+    if (divides_) {
+      const Lanes &near = up_ ? node.low[axis_] : node.high[axis_],
+                  &far = up_ ? node.high[axis_] : node.low[axis_];
+      Lanes enter = near * passing_.scale + passing_.enter,
+            leave = far * passing_.scale + passing_.leave;
+      if (moves_) {
+        enter = least(enter, near * passing_last_.scale + passing_last_.enter);
+        leave = most(leave, far * passing_last_.scale + passing_last_.leave);
       }
-      out &= (low <= axis.high) & (high >= axis.low);
+      out.from = most(enter, out.from);
+      out.to = least(leave, out.to);
+      out.meets = out.from <= out.to;
+    }
+    for (std::size_t k = 0; k < 3; ++k) {
+      if (k == axis_ && divides_) continue;
+      const auto bounds = [&](const Line& line, Lanes& low, Lanes& high) {
+        const Lanes a = line.from[k] + out.from * line.along[k],
+                    b = line.from[k] + out.to * line.along[k];
+        low = least(a, b);
+        high = most(a, b);
+      };
+      Lanes low, high;
+      bounds(first_, low, high);
+      if (moves_) {
+        Lanes low_last, high_last;
+        bounds(last_, low_last, high_last);
+        low = least(low, low_last);
+        high = most(high, high_last);
+      }
+      out.meets &= (low <= node.high[k] + room_) & (high >= node.low[k] - room_);
     }
     return out;
   }
 
-  Box start_, end_, all_;
-  std::array<float, 3> along_{}, along_last_{};
-  double length_ = 0;
+  Line first_, last_;
+  Box start_, end_;
+  Passing passing_, passing_last_;
+  std::size_t axis_ = 0;
+  float length_ = 0;
+  float room_ = 0;
   float turn_ = 0;
   bool moves_ = false;
   bool is_point_ = false;
-  std::array<Axis, 4> axes_;
-  std::size_t axis_count_ = 0;
+  bool divides_ = false;  ///< the axis divides the segment
+  bool up_ = false;       ///< the segment goes up along the axis
 };
 
 /// The nodes that a search has still to look at.
 class OpenNodes {
  public:
+  /// So many are looked at together: the processor waits for them at the same time.
+  static constexpr std::size_t kTogether = 8;
+
+  explicit OpenNodes(std::uint32_t root) { nodes_[count_++] = root; }
   bool empty() const { return count_ == 0; }
+  std::size_t together() const { return std::min(count_, kTogether); }
   std::uint32_t take() { return nodes_[--count_]; }
   /// Adds the children of these bits; the first is taken first.
   void add(const Surface::Node& node, unsigned bits) {
@@ -179,7 +221,7 @@ class OpenNodes {
 
  private:
   // At most 11 levels of eight children hold 2^32 triangles.
-  std::array<std::uint32_t, 12 * Surface::kWidth> nodes_;
+  std::array<std::uint32_t, 12 * Surface::kWidth * kTogether> nodes_;
   std::size_t count_ = 0;
 };
 
@@ -190,20 +232,18 @@ void Surface::near_segment(const Vec3& start, const Vec3& along, const Visit& vi
   still.start = start;
   still.end = start + along;
   const SurfaceQuery query(still, centre_, radius_);
-  OpenNodes open;
-  std::uint32_t at = 0;
-  for (;;) {
-    const Node& node = nodes_[at];
+  OpenNodes open(root_);
+  while (!open.empty()) {
+    const std::uint32_t at = open.take();
+    const Node& node = nodes_[index_of(at)];
     unsigned bits = query.met(node);
-    if (node.leaf) {
-      for (; bits != 0; bits &= bits - 1) {
-        if (!visit(node.children[static_cast<std::size_t>(std::countr_zero(bits))])) return;
-      }
-    } else {
+    if (!is_leaf(at)) {
       open.add(node, bits);
+      continue;
     }
-    if (open.empty()) return;
-    at = open.take();
+    for (; bits != 0; bits &= bits - 1) {
+      if (!visit(node.children[static_cast<std::size_t>(std::countr_zero(bits))])) return;
+    }
   }
 }
 
@@ -211,12 +251,22 @@ template <class Visit>
 void Surface::touchable(const SegmentMotion& motion, const Visit& visit) const {
   if (nodes_.empty()) return;
   const SurfaceQuery query(motion, centre_, radius_);
-  OpenNodes open;
-  std::uint32_t at = 0;
-  for (;;) {
-    const Node& node = nodes_[at];
-    const SurfaceQuery::Touched touched = query.touched(node, normals_[at]);
-    if (node.leaf) {
+  OpenNodes open(root_);
+  std::array<std::uint32_t, OpenNodes::kTogether> names;
+  std::array<SurfaceQuery::Touched, OpenNodes::kTogether> found;
+  while (!open.empty()) {
+    const std::size_t count = open.together();
+    for (std::size_t i = 0; i < count; ++i) {
+      names[i] = open.take();
+      found[i] = query.touched(nodes_[index_of(names[i])]);
+    }
+    for (std::size_t i = 0; i < count; ++i) {
+      const Node& node = nodes_[index_of(names[i])];
+      const SurfaceQuery::Touched& touched = found[i];
+      if (!is_leaf(names[i])) {
+        open.add(node, touched.any());
+        continue;
+      }
       for (unsigned bits = touched.any(); bits != 0; bits &= bits - 1) {
         const auto k = static_cast<unsigned>(std::countr_zero(bits));
         const unsigned what = ((touched.start >> k & 1) != 0 ? surface_pair::kTip : 0U) |
@@ -224,11 +274,7 @@ void Surface::touchable(const SegmentMotion& motion, const Visit& visit) const {
                               ((touched.side >> k & 1) != 0 ? surface_pair::kSides : 0U);
         if (!visit(node.children[k], static_cast<std::uint8_t>(what))) return;
       }
-    } else {
-      open.add(node, touched.any());
     }
-    if (open.empty()) return;
-    at = open.take();
   }
 }
 

@@ -30,15 +30,19 @@ constexpr double kSameFace = 1 - 5e-9;  // cosine of 1e-4 rad, by which rounding
 constexpr double kOnSide = 2;           // skins; from one to the exact place on the same side
 constexpr int kMostInTheWay = 4;
 constexpr int kPieces = 64;  // the first piece of a long cast, at least
-// A list of patches. Where it is used up it is made anew, with this room:
-constexpr double kFirstRoom = 0.01, kMostRoom = 0.25;  // of the size
-constexpr double kLeastRoom = 8;                       // skins
-constexpr double kMore = 1.5, kLess = 0.5;  // of the last one, where it had few patches; many
-constexpr std::size_t kFew = 6, kMany = 24;
-constexpr double kTwice = 2;            // of the stride, after a turn
-constexpr double kGrown = 4;            // of the last one at most, in one orientation
-constexpr double kSlower = 0.75;        // of the stride; it shrinks to that in a tick
-constexpr double kUsedUp = 0.5;         // of the room is left, and a way is longer
+// A list of patches along a way. Where it is used up it is made anew:
+constexpr double kFirstWay = 0.01;  // of the size; the longest way of a tool that has not moved
+constexpr double kTwice = 2;        // of the stride; else the longest way
+constexpr double kSlower = 0.75;    // of the stride; it shrinks to that in a tick
+constexpr double kAside = 0.5;      // of the way: room to its sides
+constexpr double kThin = 0.125;     // the same, where the tool may go on in another direction
+// Where triangles are so many strides long, a list about a place lasts for some ticks.
+constexpr double kLasting = 8, kOfSide = 0.5;  // strides; room, of a side
+constexpr double kMostRoom = 0.25;             // of the size
+constexpr double kLeastRoom = 8;               // skins
+constexpr double kLess = 0.5;                  // of room and way with too many patches
+constexpr std::size_t kMany = 48;              // patches of a segment
+constexpr double kUsedUp = 0.25;        // of the room is left, and a way is longer than a list
 constexpr double kSameTurn = 0.125;     // of the tolerance; a turn that moves ends by less
 constexpr double kListed = 16;          // tolerances; error of a listed plane
 constexpr double kAlmostAlong = 1e-2;   // rad; closer to its edge its error is larger
@@ -69,7 +73,7 @@ void SurfaceTool::list_triangle(std::uint32_t index, std::uint8_t what, std::uin
   if ((what & surface_pair::kTail) != 0 && own <= level) add_face(true);
   if ((what & surface_pair::kSides) == 0) return;
   for (std::uint32_t k = 0; k < 3; ++k) {
-    if (!owns(t, index, k) || !t.touches(k)) continue;
+    if (!t.owns(k) || !t.touches(k)) continue;
     const SurfaceTriangle& beyond = surface_.triangles()[SurfaceTriangle::triangle_of(t.across[k])];
     const double other = glm::dot(beyond.normal, along);
     if (std::min(own, other) > level || std::max(own, other) < -level) continue;
@@ -83,45 +87,49 @@ void SurfaceTool::list_triangle(std::uint32_t index, std::uint8_t what, std::uin
   }
 }
 
-/// Lists what is within own_.room of the listed tool; false if that is more than `most`.
+/// Lists what is within own_.room of the listed way; false if that is more than `most`.
 bool SurfaceTool::fill_list(std::size_t most) {
   own_.patches.clear();
   bool fits = true;
   const double room = own_.room + 4 * skin_;
   for (std::size_t j = 0; j < own_.listed.count && fits; ++j) {
     const PosedTool::Segment& segment = own_.listed.segments[j];
-    surface_.touchable({segment.start, segment.end(true), Vec3(0), Vec3(0), room, room, 0},
-                       [&](std::uint32_t triangle, std::uint8_t what) {
-                         list_triangle(triangle, what, static_cast<std::uint8_t>(j));
-                         return fits = own_.patches.size() + kOfTriangle <= most;
-                       });
+    surface_.touchable(
+        {segment.start, segment.end(true), own_.listed_way, own_.listed_way, room, 0},
+        [&](std::uint32_t triangle, std::uint8_t what) {
+          list_triangle(triangle, what, static_cast<std::uint8_t>(j));
+          return fits = own_.patches.size() + kOfTriangle <= most;
+        });
   }
   return fits;
 }
 
-/// Lists the patches near the turned tool at a translation, with as much room as a short list
-/// allows.
-void SurfaceTool::list_about(const Vec3& at) {
-  // A list that ends with a turn needs room for one tick.
-  const bool turned = !own_.has_list || !same_turn();
-  const double enough = !(own_.stride > 0) ? HUGE_VAL
-                        : turned           ? kTwice * own_.stride
-                                           : kGrown * own_.room;
+/// m, room for a list that lasts for many ticks on triangles of this size; 0: it would not.
+double SurfaceTool::lasting_room() const {
+  if (!in_list_ || own_.carrying_count == 0) return 0;
+  const auto& corners = surface_.triangles()[own_.carrying[0].triangle()].corners;
+  const double side =
+      glm::length(surface_.vertices()[corners[1]] - surface_.vertices()[corners[0]]);
+  return side > kLasting * own_.stride ? kOfSide * side : 0;
+}
+
+/// Lists the patches near the turned tool on a way, with as much room as a short list allows.
+void SurfaceTool::list_about(const Vec3& at, const Vec3& way, double aside) {
+  const double size = surface_.size(), least = kLeastRoom * skin_;
   own_.listed = turned_;
   for (std::size_t j = 0; j < turned_.count; ++j) own_.listed.segments[j].start += at;
-  const double least = kLeastRoom * skin_;
-  if (!(own_.wanted_room > 0)) own_.wanted_room = kFirstRoom * surface_.size();
-  own_.room = std::clamp(std::min(own_.wanted_room, enough), least, kMostRoom * surface_.size());
+  own_.listed_way = way;
+  own_.room = std::clamp(std::max(aside, lasting_room()), least, kMostRoom * size);
   own_.has_list = false;
   while (!own_.has_list) {
     const bool smallest = own_.room <= least;
-    own_.has_list = fill_list(smallest ? kMostPatches : kMany * turned_.count);
+    own_.has_list =
+        fill_list(smallest ? kMostPatches : std::min(kMany * turned_.count, kMostPatches));
     if (own_.has_list || smallest) break;
     own_.room = std::max(least, kLess * own_.room);
+    own_.listed_way *= kLess;
   }
-  const bool is_short = own_.has_list && own_.patches.size() < kFew * turned_.count;
-  if (own_.room < own_.wanted_room && is_short) return;
-  own_.wanted_room = is_short ? kMore * own_.room : own_.room;
+  find_list();
 }
 
 /// Whether the tool has its orientation in the list.
@@ -136,16 +144,50 @@ bool SurfaceTool::same_turn() const {
   return true;
 }
 
-/// m, how far the tool may still be translated before the list is incomplete; 0 after a turn.
-double SurfaceTool::room_left(const Vec3& at) const {
-  if (!own_.has_list || !same_turn()) return 0;
-  return own_.room - glm::length(from_list() + at);
+/// m^2, squared distance of a translation from the listed way.
+double SurfaceTool::off_way2(const Vec3& at) const {
+  const Vec3 from = moved_ + at, &way = own_.listed_way;
+  const Vec3 off = from - std::clamp(glm::dot(from, way) * per_way2_, 0.0, 1.0) * way;
+  return glm::dot(off, off);
 }
 
-/// Renews the list if it is used up, or too short for a way from here.
-void SurfaceTool::keep_list(const Vec3& at, double way) {
-  const double room = room_left(at);
-  if (!(room > std::min(way, kUsedUp * own_.room))) list_about(at);
+/// Whether the list is complete about there. \param share  of its room
+bool SurfaceTool::in_room(const Vec3& at, double share) const {
+  return in_list_ && off_way2(at) < share * share * own_.room * own_.room;
+}
+
+/// Looks whether there is a list for this orientation.
+void SurfaceTool::find_list() {
+  in_list_ = own_.has_list && same_turn();
+  if (!in_list_) return;
+  moved_ = from_list();
+  const double way2 = glm::dot(own_.listed_way, own_.listed_way);
+  per_way2_ = way2 > 0 ? 1 / way2 : 0;
+}
+
+/// Finds the first listed patch on a straight line.
+/// \param done  fraction of the way that need not be looked at; the rest begins within the list's
+/// room \return fraction up to which the list is complete
+double SurfaceTool::cast_on_list(const Vec3& from, const Vec3& to, double done,
+                                 PatchHit& first) const {
+  const Vec3 start = from + moved_, end = to + moved_, way = to - from;
+  const double error = kListed * tolerance_;
+  for (const NearPatch& near : own_.patches) {
+    const double above = glm::dot(near.plane.normal, start) - near.plane.depth,
+                 under = near.plane.depth - glm::dot(near.plane.normal, end);
+    if (under < -error || above < -error) continue;
+    // Later than the first so far.
+    if (above - error > first.time * (above + under + 2 * error)) continue;
+    if (!exists(surface_, near.patch, turned_)) continue;
+    cast_on_patch(surface_, near.patch, rendering::plane_of(surface_, near.patch, turned_), turned_,
+                  from, to, tolerance_, first);
+  }
+  // The list is for a convex region.
+  if (in_room(to)) return 1;
+  const double length = glm::length(way);
+  const double far = std::min(1.0, done + glm::length(own_.listed_way) / length);
+  if (in_room(from + far * way)) return far;
+  return std::min(1.0, done + (own_.room - std::sqrt(off_way2(from + done * way))) / length);
 }
 
 /// Finds the first patch on a straight line.
@@ -154,34 +196,31 @@ PatchHit SurfaceTool::cast(const Vec3& from, const Vec3& to) {
   const Vec3 way = to - from;
   const double length = glm::length(way);
   if (!(length > 0)) return first;
-  keep_list(from, length);
+  const double far = own_.stride > 0 ? kTwice * own_.stride : kFirstWay * surface_.size();
   double done = 0;
-  const double room = room_left(from);
-  if (room > 0) {
-    const Vec3 moved = from_list(), start = from + moved, end = to + moved;
-    const double error = kListed * tolerance_;
-    for (const NearPatch& near : own_.patches) {
-      const double above = glm::dot(near.plane.normal, start) - near.plane.depth,
-                   under = near.plane.depth - glm::dot(near.plane.normal, end);
-      if (under < -error || above < -error) continue;
-      // Later than the first so far.
-      if (above - error > first.time * (above + under + 2 * error)) continue;
-      if (!exists(surface_, near.patch, turned_)) continue;
-      cast_on_patch(surface_, near.patch, rendering::plane_of(surface_, near.patch, turned_),
-                    turned_, from, to, tolerance_, first);
-    }
-    done = std::min(1.0, room / length);
-    if (first.time <= done || done == 1) return first;
-    first = {};
+  if (length <= far ? in_room(from) && in_room(to) : in_room(from, 1 - kUsedUp)) {
+    done = cast_on_list(from, to, 0, first);
+    if (first.time <= done || done >= 1) return first;
   }
-  double piece = std::max({own_.room, skin_, length / kPieces}) / length;
+  // The list is used up, or too short for the way: renew it.
+  const double rest = length - done * length;
+  list_about(from + done * way, std::min(rest, far) / length * way,
+             (fresh_ || rest > far ? kThin : kAside) * std::min(rest, far));
+  fresh_ = true;
+  if (in_list_) {
+    first = {};
+    done = cast_on_list(from, to, done, first);
+    if (first.time <= done || done >= 1) return first;
+  }
+  first = {};
+  double piece = std::max({own_.room, far, skin_, length / kPieces}) / length;
   while (done < 1) {
     const double end = std::min(1.0, done + piece);
     const Vec3 middle = from + done * way, step = (end - done) * way;
     for (std::size_t j = 0; j < turned_.count; ++j) {
       const PosedTool::Segment& segment = turned_.segments[j];
       surface_.touchable(
-          {segment.start + middle, segment.end(true) + middle, step, step, 2 * skin_, 2 * skin_, 0},
+          {segment.start + middle, segment.end(true) + middle, step, step, 2 * skin_, 0},
           [&](std::uint32_t triangle, std::uint8_t what) {
             for_each_patch(surface_, triangle, static_cast<std::uint8_t>(j), what, segment.along,
                            [&](const SurfacePatch& patch) {
@@ -294,7 +333,10 @@ bool SurfaceTool::in_the_way_at_rest(SurfacePlane& out) {
   bool found = false;
   const auto look = [&](const SurfacePatch& patch, const PatchPlane& plane) {
     const double under = plane.depth - glm::dot(plane.normal, exact_);
-    if (!(under > deepest) || plane.depth - glm::dot(plane.normal, at_) > tolerance_) return;
+    if (!(under > deepest || (found && under == deepest && patch.segment == out.patch.segment &&
+                              patch.triangle() < out.patch.triangle())) ||
+        plane.depth - glm::dot(plane.normal, at_) > tolerance_)
+      return;
     if (holds(patch)) return;
     PatchHit hit;
     cast_on_patch(surface_, patch, plane, turned_, at_, exact_, tolerance_, hit);
@@ -303,9 +345,8 @@ bool SurfaceTool::in_the_way_at_rest(SurfacePlane& out) {
     found = true;
     out = {patch, plane.normal, plane.depth};
   };
-  keep_list(exact_, 0);
-  if (room_left(exact_) > 0) {
-    const Vec3 moved = from_list(), rest = exact_ + moved, now = at_ + moved;
+  if (in_room(exact_)) {
+    const Vec3 rest = exact_ + moved_, now = at_ + moved_;
     for (const NearPatch& near : own_.patches) {
       const Vec3& normal = near.plane.normal;
       if (glm::dot(normal, rest) - near.plane.depth > kListed * tolerance_ ||
@@ -318,16 +359,15 @@ bool SurfaceTool::in_the_way_at_rest(SurfacePlane& out) {
   }
   for (std::size_t j = 0; j < turned_.count; ++j) {
     const PosedTool::Segment& segment = turned_.segments[j];
-    surface_.touchable({segment.start + exact_, segment.end(true) + exact_, Vec3(0), Vec3(0),
-                        4 * skin_, 4 * skin_, 0},
-                       [&](std::uint32_t triangle, std::uint8_t what) {
-                         for_each_patch(surface_, triangle, static_cast<std::uint8_t>(j), what,
-                                        segment.along, [&](const SurfacePatch& patch) {
-                                          look(patch,
-                                               rendering::plane_of(surface_, patch, turned_));
-                                        });
-                         return true;
-                       });
+    surface_.touchable(
+        {segment.start + exact_, segment.end(true) + exact_, Vec3(0), Vec3(0), 4 * skin_, 0},
+        [&](std::uint32_t triangle, std::uint8_t what) {
+          for_each_patch(surface_, triangle, static_cast<std::uint8_t>(j), what, segment.along,
+                         [&](const SurfacePatch& patch) {
+                           look(patch, rendering::plane_of(surface_, patch, turned_));
+                         });
+          return true;
+        });
   }
   return found;
 }
@@ -394,6 +434,8 @@ bool SurfaceTool::rests() {
 /// Moves the ideal tool as near to the virtual one as the surface allows.
 void SurfaceTool::translate() {
   const Vec3 from = at_;
+  fresh_ = false;
+  find_list();
   find_rest();
   own_.stride = std::max(glm::length(at_ - from), kSlower * own_.stride);
 }
@@ -468,13 +510,13 @@ PatchHit SurfaceTool::sweep(const PosedTool& from, const PosedTool& to, const Ve
   for (std::size_t j = 0; j < to.count; ++j) {
     const PosedTool::Segment& a = from.segments[j];
     const PosedTool::Segment b{to.segments[j].start + shift, to.segments[j].along};
-    surface_.touchable({a.start, a.end(true), b.start - a.start, b.end(true) - a.end(true),
-                        2 * skin_, 2 * skin_, 0},
-                       [&](std::uint32_t triangle, std::uint8_t what) {
-                         sweep_triangle(surface_, triangle, static_cast<std::uint8_t>(j), what, a,
-                                        b, tolerance_, slack, first);
-                         return true;
-                       });
+    surface_.touchable(
+        {a.start, a.end(true), b.start - a.start, b.end(true) - a.end(true), 2 * skin_, 0},
+        [&](std::uint32_t triangle, std::uint8_t what) {
+          sweep_triangle(surface_, triangle, static_cast<std::uint8_t>(j), what, a, b, tolerance_,
+                         slack, first);
+          return true;
+        });
   }
   return first;
 }

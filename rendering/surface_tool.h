@@ -59,14 +59,17 @@ class SurfaceTool {
   PatchHit sweep(const PosedTool& from, const PosedTool& to, const Vec3& shift) const;
 
   // Translating.
-  void keep_list(const Vec3& at, double way);
-  void list_about(const Vec3& at);
+  double lasting_room() const;
+  void list_about(const Vec3& at, const Vec3& way, double aside);
   bool fill_list(std::size_t most);
   void list_triangle(std::uint32_t index, std::uint8_t what, std::uint8_t segment);
   bool same_turn() const;
-  double room_left(const Vec3& at) const;
+  double off_way2(const Vec3& at) const;
+  bool in_room(const Vec3& at, double share = 1) const;
+  void find_list();
   Vec3 from_list() const { return turned_.segments[0].start - own_.listed.segments[0].start; }
   PatchHit cast(const Vec3& from, const Vec3& to);
+  double cast_on_list(const Vec3& from, const Vec3& to, double done, PatchHit& first) const;
   void resume_planes();
   void translate();
   void find_rest();
@@ -113,6 +116,10 @@ class SurfaceTool {
   std::array<Parted, 8> parted_;  ///< the last patches that released the tool in this tick
   std::size_t parted_count_ = 0;
   double first_hit_ = 0;  ///< PatchHit::time of the first cast of a step
+  bool fresh_ = false;    ///< the list was made in this step
+  bool in_list_ = false;  ///< the list is for the tool's orientation
+  Vec3 moved_;            ///< m; then: from the listed tool to the turned one
+  double per_way2_ = 0;   ///< 1/m^2; then: of the listed way's squared length
   bool stuck_ = false;
   bool in_crack_ = false;  ///< opposite planes are less than a skin apart
 };

@@ -82,12 +82,12 @@ struct NearPatch {
 struct SurfaceState {
   std::array<SurfacePatch, kMostPlanes> carrying;  ///< held the ideal tool at the last tick
   std::size_t carrying_count = 0;
-  /// All that the tool can touch while it is translated by less than `room`, m, from `listed`.
+  /// All that the tool can touch while it is less than `room`, m, off the straight way.
   std::vector<NearPatch> patches;
-  PosedTool listed;
+  PosedTool listed;  ///< where the way begins
+  Vec3 listed_way;
   double room = 0;
-  double wanted_room = 0;  ///< for the next list
-  double stride = 0;       ///< m, how far the ideal tool is translated in a tick, about
+  double stride = 0;  ///< m, how far the ideal tool is translated in a tick, about
   bool has_list = false;
   /// The tool touches nothing while no end of it is farther than `clear_room`, m, from `clear`.
   PosedTool clear;

@@ -63,10 +63,10 @@ void SharpEdges::add_surface(const rendering::PlacedSurface& placed) {
   const auto world = [&](std::uint32_t vertex) {
     return placed.world_vector(surface.vertices()[vertex]) + placed.position;
   };
-  for (std::uint32_t i = 0; i < triangles.size(); ++i) {
+  for (const std::uint32_t i : surface.in_files()) {
     for (std::uint32_t k = 0; k < 3; ++k) {
       const std::uint32_t beyond = triangles[i].across[k];
-      if (beyond < (i << 2 | k)) continue;
+      if (!triangles[i].owns(k)) continue;
       const Vec3& other = triangles[rendering::SurfaceTriangle::triangle_of(beyond)].normal;
       if (!turns(triangles[i].normal, other)) continue;
       const std::uint32_t v0 = triangles[i].corners[k], v1 = triangles[i].corners[(k + 1) % 3];

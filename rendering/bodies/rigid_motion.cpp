@@ -249,10 +249,10 @@ namespace {
 bool covers_twice(const Surface& surface) {
   constexpr std::size_t kAsked = 4096;
   constexpr double kBelow = 1e-7;  // of the size
-  const auto& triangles = surface.triangles();
+  const std::vector<std::uint32_t>& triangles = surface.in_files();
   const std::size_t stride = 1 + triangles.size() / kAsked;
   for (std::size_t i = 0; i < triangles.size(); i += stride) {
-    const SurfaceTriangle& t = triangles[i];
+    const SurfaceTriangle& t = surface.triangles()[triangles[i]];
     const Vec3 middle = (surface.vertices()[t.corners[0]] + surface.vertices()[t.corners[1]] +
                          surface.vertices()[t.corners[2]]) /
                         3.0;
@@ -323,7 +323,8 @@ VolumeMoments own_moments(const Surface& surface) {
   moments.about = surface.centre();
   if (!covers_twice(surface)) {
     Polygon corners(3);
-    for (const SurfaceTriangle& t : surface.triangles()) {
+    for (const std::uint32_t index : surface.in_files()) {
+      const SurfaceTriangle& t = surface.triangles()[index];
       for (std::size_t k = 0; k < 3; ++k)
         corners[k] = surface.vertices()[t.corners[k]] - moments.about;
       add_polygon(corners, moments);
