@@ -90,8 +90,11 @@ TEST_F(SimulatedStudy, IsTheSameForAnyNumberOfJobs) {
 }
 
 TEST_F(SimulatedStudy, IsTheSameHoweverOftenItIsStopped) {
+  using Clock = std::chrono::steady_clock;
   const protocols::Protocol p = protocol();
+  const auto began = Clock::now();
   simulate(p, folder_ / "whole.db", 2);
+  const auto whole = std::chrono::duration_cast<std::chrono::microseconds>(Clock::now() - began);
   const fs::path db = folder_ / "stopped.db";
   Random random(11);
   int stops = 0;
@@ -100,12 +103,14 @@ TEST_F(SimulatedStudy, IsTheSameHoweverOftenItIsStopped) {
     data::Store store = data::Store::open(db, data::Store::Mode::write_or_create);
     std::atomic<bool> stop{false};
     // A stop before the first report still finishes and records the current trials. Stop later at
-    // times: on a busy machine 40 ms may be too short to begin.
-    const auto longest = 40 + 2 * static_cast<std::uint64_t>(stops);
-    std::jthread stopper([&, after = random.below(longest)] {
-      std::this_thread::sleep_for(std::chrono::milliseconds(after));
-      stop = true;
-    });
+    // times: on a machine that has become busy a quarter of the study's time may be too short to
+    // begin.
+    const double longest = static_cast<double>(whole.count()) * (0.25 + 0.01 * stops);
+    std::jthread stopper(
+        [&, after = std::chrono::microseconds(static_cast<std::int64_t>(random.unit() * longest))] {
+          std::this_thread::sleep_for(after);
+          stop = true;
+        });
     const StudyProgress progress =
         simulate_study(p, store, participants::load_simulated_settings(""),
                        {.participants = 3, .seed = 1, .jobs = 2}, stop, {});
