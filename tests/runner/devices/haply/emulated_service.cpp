@@ -72,6 +72,8 @@ void EmulatedService::accept() {
     sockets_->acceptor.accept(*socket, error);
     if (error || quit_.load()) return;
     if (!on_.load()) continue;  // closed at once
+    // Else a second reply in a row waits up to 40 ms for the receipt of the first.
+    socket->set_option(tcp::no_delay(true), error);
     const std::scoped_lock lock(sockets_->mutex);
     sockets_->open.push_back(socket);
     sockets_->threads.emplace_back([this, socket] {
