@@ -185,13 +185,9 @@ MassProperties scaled(const VolumeMoments& moments, double density) {
   return out;
 }
 
-}  // namespace
-
-namespace {
-
 constexpr double kClosed = 1e-6;  // share of area and volume
 
-/// \return whether their pieces bound a solid, except for a share
+/// Adds up the outer surface of the parts. \return whether it bounds a solid, except for a share
 bool add_union(const std::vector<PlacedPart>& parts, double share, VolumeMoments& out) {
   out = {};
   UnionSurface surface(parts, out);
@@ -200,8 +196,8 @@ bool add_union(const std::vector<PlacedPart>& parts, double share, VolumeMoments
 }
 
 /// Parts of a file with rounded coordinates abut with steps: then some faces between them may count
-/// although those of the other part do not. Enlarged unequally, they overlap. What two sizes give
-/// is extrapolated to their own.
+/// although those of the other part do not. Enlarged unequally, they overlap. The moments of two
+/// sizes are extrapolated to the parts' own; if no two bound a solid, the last are taken.
 void add_grown_union(const std::vector<PlacedPart>& parts, VolumeMoments& out) {
   constexpr double kLeast = 1e-9, kMost = 1e-2;  // of their size
   bool was_closed = false;
