@@ -352,7 +352,7 @@ SceneBuilder::Placed SceneBuilder::placed(const stimuli::ObjectSpec& spec, int o
   std::vector<rendering::SurfaceShell> shells;
   add_shells(spec, Pose{}, true, shells);
   if (shells.empty()) {
-    out.solids.clear();  // its parts without force are them
+    out.solids.clear();  // its parts without force serve as solids
     return out;
   }
   const stimuli::Material& m = spec.material;
