@@ -18,7 +18,7 @@ struct MovingObject {
   int object = 0;  ///< index; of SceneObject::object
   stimuli::Body body;
   Pose pose;  ///< of the object's frame
-  /// In that frame, what has its mass; null: all of it is felt, or stands for it as convex parts.
+  /// All of the object, in its frame, for its mass; null: what is felt of it, or its convex parts.
   std::shared_ptr<const Surface> solid = nullptr;
 };
 
