@@ -136,8 +136,11 @@ void SurfaceTool::follow() {
     };
     go(0);
     if (!planes_.empty() && steps < kContactSteps) {
-      // Finer steps find the patch that is met first. A tool that does not turn is free until then.
-      const bool turns = tick_.sides && angle * tool_size() > kExact * skin_;
+      // Finer steps find the patch that is met first. A tool that neither turns nor grows is free
+      // until then.
+      const double growth =
+          carried_ != nullptr ? 0 : std::abs(glm::length(tick_.tool.d) - glm::length(from.d));
+      const bool turns = tick_.sides && angle * tool_size() + growth > kExact * skin_;
       const double free = turns || steps > 1 ? 0 : first_hit_ * kContactSteps - kExact;
       steps = kContactSteps;
       own_.carrying_count = 0;

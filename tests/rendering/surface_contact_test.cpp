@@ -324,6 +324,20 @@ TEST_P(SurfaceContact, SidesThatRoundingBentBackDoNotTakeTurnsForEver) {
   }
 }
 
+TEST_P(SurfaceContact, AStylusThatGrowsIntoAFaceTouchesIt) {
+  // Two devices hold the ends, so the stylus has no fixed length.
+  if (!GetParam()->side_contact()) return;
+  const Scene scene = scene_of({bent_block(0.1)});
+  RenderState state = scene.initial_state();
+  const auto hanging = [](const Vec3& tail, double length) {
+    return LineProbe{tail + Vec3(0, 0, length), tail};
+  };
+  tick(scene, state, hanging({-0.02, 0, 3e-6}, 0.06));
+  const Rendering r = tick(scene, state, hanging({-0.0196, 0, -1.4e-4}, 0.0601));
+  EXPECT_EQ(r.faults, 0U);
+  EXPECT_NEAR(glm::length(r.force - kStiffness * Vec3(0, 0, 1.4e-4)), 0, 1e-9);
+}
+
 TEST_P(SurfaceContact, AToolRestsAtTheBottomOfAFlatValley) {
   // Faces of files with rounded coordinates bend by 1e-7 to 1e-3 rad. A tip that is pressed
   // between their normals may not see the bottom within its skin.
