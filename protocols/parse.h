@@ -41,8 +41,11 @@ enum class OtherFiles { read, refuse };
 Protocol parse_protocol_text(const std::string& text, const std::string& file_name,
                              const StoredFiles& stored = {}, OtherFiles others = OtherFiles::read);
 
+/// The text of a scene file; of a mesh file that of a scene which holds this mesh alone.
+std::string read_scene_text(const std::string& path);
+
 /// Reads and checks a scene file: {"objects": [...], "tool": ..., "reach": ...}. Mesh files are
-/// resolved relative to it.
+/// resolved relative to it. A mesh file is read as a scene of one object.
 /// \throws InputError with every fault.
 SceneSpec parse_scene(const std::string& path);
 /// \param file_name  named in faults; mesh files are in its folder

@@ -356,6 +356,7 @@ constexpr NumberRange kBreakForce{0, 1000, "N", true};
 constexpr NumberRange kDamping{0, 1000, "N s/m"};
 constexpr NumberRange kFriction{0, 10};
 constexpr std::size_t kMaxLayers = 16;
+constexpr NumberRange kScale{0, 1000, "", true};
 constexpr NumberRange kSubdivisions{0, 8};  // 8: 1.3 million triangles
 constexpr NumberRange kSegments{3, 4096};
 constexpr int kMaxCompounds = 8;  // within each other
@@ -435,7 +436,7 @@ stimuli::ObjectSpec read_nested(ObjectReader& reader, const stimuli::Material& d
   if (!shape) {
     // Without a shape no key of any shape is called unknown.
     for (const char* key : {"radius_m", "height_m", "edge_m", "size_m", "subdivisions", "segments",
-                            "file", "parts"}) {
+                            "file", "scale", "parts"}) {
       reader.member(key);
     }
     return spec;
@@ -448,7 +449,10 @@ stimuli::ObjectSpec read_nested(ObjectReader& reader, const stimuli::Material& d
   if (traits.size) reader.vector("size_m", spec.size, kLength, Presence::required);
   if (traits.subdivisions) reader.integer("subdivisions", spec.subdivisions, kSubdivisions);
   if (traits.segments) reader.integer("segments", spec.segments, kSegments);
-  if (spec.shape == stimuli::ShapeKind::mesh) read_file(reader, files, spec);
+  if (spec.shape == stimuli::ShapeKind::mesh) {
+    read_file(reader, files, spec);
+    reader.number("scale", spec.scale, kScale);
+  }
   if (spec.shape == stimuli::ShapeKind::compound) {
     read_parts(reader, files, compounds, spec);
   } else if (spec.material.stiffness == 0 && spec.material.layers.empty()) {
@@ -516,8 +520,14 @@ std::string folder_of(const std::string& file) {
   return std::filesystem::path(file).parent_path().string();
 }
 
+std::string read_scene_text(const std::string& path) {
+  if (!stimuli::is_mesh_file_name(path)) return read_text_file(path);
+  const std::string name = std::filesystem::path(path).filename().string();
+  return json{{"objects", {{{"shape", "mesh"}, {"file", name}}}}}.dump();
+}
+
 SceneSpec parse_scene(const std::string& path) {
-  return parse_scene_text(read_text_file(path), path);
+  return parse_scene_text(read_scene_text(path), path);
 }
 
 SceneSpec parse_scene_text(const std::string& text, const std::string& path) {

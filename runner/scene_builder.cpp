@@ -50,7 +50,7 @@ std::shared_ptr<const stimuli::ConvexMesh> in_frame(const stimuli::ConvexMesh& m
 std::string shape_key(const stimuli::ObjectSpec& spec, bool side_contact) {
   std::string key = std::to_string(static_cast<int>(spec.shape)) + (side_contact ? "s" : "p");
   for (const double value :
-       {spec.radius, spec.height, spec.edge, spec.size.x, spec.size.y, spec.size.z})
+       {spec.radius, spec.height, spec.edge, spec.size.x, spec.size.y, spec.size.z, spec.scale})
     key += ' ' + key_of(value);
   return key + ' ' + std::to_string(spec.subdivisions) + ' ' + std::to_string(spec.segments) + ' ' +
          spec.file;

@@ -203,6 +203,10 @@ PolygonSoup polygons_of(const ObjectSpec& spec) {
     case ShapeKind::mesh: {
       PolygonSoup soup =
           spec.file_bytes ? read_mesh(spec.file, *spec.file_bytes) : read_mesh_file(spec.file);
+      if (spec.scale != 1) {
+        for (Vec3& vertex : soup.vertices) vertex *= spec.scale;
+        soup.coordinate_error *= spec.scale;
+      }
       check_reach(soup, spec.file);
       return soup;
     }

@@ -3,12 +3,15 @@
 #include <cstddef>
 #include <iomanip>
 #include <iostream>
+#include <nlohmann/json.hpp>
 #include <sstream>
 
 #include "data/base/text.h"
+#include "protocols/json_document.h"
 #include "protocols/parse.h"
 #include "protocols/schedule.h"
 #include "protocols/tasks/texts.h"
+#include "runner/commands/render/forces.h"
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/scene_notes.h"
 #include "runner/commands/shared/task_words.h"
@@ -51,7 +54,7 @@ void check_meshes(const stimuli::ObjectSpec& object, const std::string& pointer,
 void print_overlaps(const stimuli::ObjectSpec& object, const std::string& name, std::ostream& out) {
   for (const stimuli::ObjectSpec& part : object.parts) print_overlaps(part, name, out);
   for (const std::string& overlap : stimuli::group_overlaps(object))
-    out << "  note        stimulus " << name << " (" << printable(object.file_name)
+    out << "  note        " << name << " (" << printable(object.file_name)
         << "): " << printable(overlap) << "\n";
 }
 
@@ -180,15 +183,44 @@ void print_fitness(const protocols::Protocol& protocol, const StimulusLibrary& l
   print_verdict("simulate", session::simulation_faults(shown, library, settings), limited, out);
 }
 
+/// Whether it is a scene; else it is a protocol, or what should be one.
+bool is_scene(const std::string& text, const std::string& path) {
+  protocols::FaultList faults(path);
+  const nlohmann::json root = protocols::read_json(text, faults);
+  return root.is_object() && root.contains("objects") && !root.contains("stimuli");
+}
+
+/// Checks a scene, or a mesh alone, as both renderers show it.
+/// \throws protocols::InputError, stimuli::MeshError with every fault
+void validate_scene(const std::string& text, const std::string& path, std::ostream& out) {
+  const protocols::SceneSpec spec = protocols::parse_scene_text(text, path);
+  std::vector<protocols::Fault> faults;
+  for (std::size_t i = 0; i < spec.objects.size(); ++i)
+    check_meshes(spec.objects[i], "/objects/" + std::to_string(i), path, faults);
+  if (!faults.empty()) throw protocols::InputError(faults);
+  build_scene(path, spec, renderer_named("point"));
+  const rendering::Scene scene = build_scene(path, spec, renderer_named("ray"));
+  out << printable(path) << "\n  objects     " << spec.objects.size() << "\n";
+  for (const std::string& note : scene_notes(spec, scene)) out << "  note        " << note << "\n";
+  for (std::size_t i = 0; i < spec.objects.size(); ++i)
+    print_overlaps(spec.objects[i], "/objects/" + std::to_string(i), out);
+  out << "  touch it    palpate explore " << printable(path) << "\n";
+}
+
 }  // namespace
 
 int validate_command(const std::vector<std::string>& args) {
   CommandLine line;
-  line.usage = "palpate validate PROTOCOL.json [--language CODE | --texts] [--calibration FILE]";
+  line.usage =
+      "palpate validate PROTOCOL.json [--language CODE | --texts] [--calibration FILE]\n"
+      "       palpate validate SCENE.json\n"
+      "       palpate validate MESH.stl";
   line.summary =
       "Checks a protocol with its meshes and its schedule, and lists all faults. Lists the\n"
-      "devices that can run it, whether it can be simulated, and the reasons if not.";
+      "devices that can run it, whether it can be simulated, and the reasons if not.\n"
+      "Or checks a scene, or a mesh file alone: its size in mm, and what was cleaned.";
   line.example = R"(  palpate validate protocols/ho2000.json
+  palpate validate bunny.stl
   palpate validate protocols/roughness-magnitude.json --texts > texts.de.json   to be translated
   palpate validate protocols/roughness-magnitude.json --language de)";
   std::string language, calibration;
@@ -212,7 +244,15 @@ int validate_command(const std::vector<std::string>& args) {
   if (!calibration.empty() && measured.empty())
     throw UsageError("--calibration: there is no " + printable(devices::chain_file(calibration)) +
                      "; make it with palpate devices --timing --device NAME --calibration FILE");
-  protocols::Protocol protocol = protocols::parse_protocol(file);
+  const std::string text = protocols::read_scene_text(file);
+  if (is_scene(text, file)) {
+    if (texts || !language.empty() || !calibration.empty())
+      throw UsageError(printable(file) +
+                       " is no protocol: leave out --texts, --language and --calibration");
+    validate_scene(text, file, std::cout);
+    return 0;
+  }
+  protocols::Protocol protocol = protocols::parse_protocol_text(text, file);
   if (!language.empty()) protocols::translate(protocol, file, language);
   if (texts) {
     std::cout << protocols::texts_json(protocol);
@@ -232,7 +272,7 @@ int validate_command(const std::vector<std::string>& args) {
   for (const protocols::StimulusSpec& stimulus : protocol.stimuli) {
     for (const std::string& note : mesh_notes(stimulus.object))
       std::cout << "  mesh        stimulus " << stimulus.name << ": " << note << "\n";
-    print_overlaps(stimulus.object, stimulus.name, std::cout);
+    print_overlaps(stimulus.object, "stimulus " + stimulus.name, std::cout);
   }
   const StimulusLibrary library(protocol);
   for (std::size_t i = 0; i < protocol.stimuli.size(); ++i) {

@@ -227,7 +227,7 @@ PYBIND11_MODULE(_palpate, module) {
   module.def(
       "settings", [](int version) { return participants::simulated_settings_text("", version); },
       py::arg("version"));
-  module.def("read", &protocols::read_text_file, py::arg("path"));
+  module.def("read", &protocols::read_scene_text, py::arg("path"));
 }
 
 }  // namespace palpate::runner

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "data/base/text.h"
+#include "stimuli/mesh_file.h"
 #include "stimuli/mesh_formats.h"
 #include "stimuli/solids/solid_mesh.h"
 
@@ -288,6 +289,13 @@ SolidMesh read_gmsh(const std::string& name, const std::string& text) {
     faults.throw_if_any();
   }
   return GmshReader(name, text).read();
+}
+
+SolidMesh solid_of_file(const ObjectSpec& spec) {
+  SolidMesh solid =
+      read_gmsh(spec.file, spec.file_bytes ? *spec.file_bytes : mesh_file_bytes(spec.file).bytes);
+  for (Vec3& node : solid.nodes) node *= spec.scale;
+  return solid;
 }
 
 }  // namespace palpate::stimuli

@@ -54,4 +54,7 @@ bool is_gmsh_file_name(const std::string& path);
 /// \throws MeshError with file, line and what was expected, every fault
 SolidMesh read_gmsh(const std::string& name, const std::string& text);
 
+/// The same of an object's file, scaled. \throws MeshError
+SolidMesh solid_of_file(const ObjectSpec& spec);
+
 }  // namespace palpate::stimuli

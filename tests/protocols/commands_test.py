@@ -13,7 +13,7 @@ import sys
 import tempfile
 import unittest
 
-PALPATE, SOURCE = sys.argv.pop(1), pathlib.Path(sys.argv.pop(1))
+PALPATE, SOURCE = sys.argv.pop(1), pathlib.Path(sys.argv.pop(1)).resolve()
 HO2000 = str(SOURCE / "protocols" / "ho2000.json")
 BAD = SOURCE / "tests" / "protocols" / "bad"
 COLUMNS = ("participant_id session block trial renderer shape orientation_w orientation_x "
@@ -90,6 +90,27 @@ class Validate(unittest.TestCase):
         said = run("validate", str(SOURCE / "protocols" / "roughness-magnitude.json")).stdout.decode()
         self.assertIn("keyboard    needed beside a device's buttons for numbers of 'estimate', 'age' of page 'about-you'\n", said)
         self.assertNotIn("keyboard", run("validate", str(SOURCE / "protocols" / "stiffness-2afc.json")).stdout.decode())
+
+    def test_a_scene_or_a_mesh_alone_is_checked(self):
+        mesh = SOURCE / "tests" / "protocols" / "good" / "tetrahedron.obj"
+        with tempfile.TemporaryDirectory() as folder:
+            scene, part = pathlib.Path(folder) / "scene.json", pathlib.Path(folder) / "part.obj"
+            scene.write_text(json.dumps({"objects": [{"shape": "mesh", "file": str(mesh)}]}), "utf-8")
+            part.write_bytes(mesh.read_bytes())
+            for path in (scene, part):
+                done = run("validate", str(path))
+                self.assertEqual((done.returncode, done.stderr), (0, b""))
+                self.assertRegex(done.stdout.decode(), r"/objects/0: .*tetrahedron.obj: 20 x 20 x 20 mm, 4 faces\n"
+                                 if path == scene else r"/objects/0: part.obj: 20 x 20 x 20 mm, 4 faces\n")
+                self.assertIn(f"palpate explore {path}\n", done.stdout.decode())
+                self.assertEqual(run("validate", str(path), "--texts").returncode, 2)
+            part.write_text("".join(line for line in part.read_text().splitlines(True) if line != "f 1 2 4\n"))
+            scene.write_text('{"objects": [{"shape": "cube"}]}')
+            for path, words in ((part, b"part.obj: /objects/0/file: open: edge "), (scene, b"scene.json:1: /objects/0/edge_m: "),
+                                (pathlib.Path(folder) / "no.stl", b"there is no ")):
+                refused = run("validate", str(path))
+                self.assertEqual((refused.returncode, refused.stdout), (2, b""))
+                self.assertIn(words, refused.stderr)
 
     def test_missing_file_and_wrong_usage(self):
         self.assertEqual(run("validate", "nowhere.json").returncode, 2)

@@ -124,6 +124,7 @@ TEST(Parse, ReadsEveryKey) {
   EXPECT_EQ(p.stimuli[2].object.material.stiffness, 400);
   EXPECT_EQ(p.stimuli[3].object.edge, 0.04);
   EXPECT_EQ(p.stimuli[4].object.file, kFolder + "good/tetrahedron.obj");
+  EXPECT_EQ(p.stimuli[4].object.scale, 1.25);
   const stimuli::ObjectSpec& dumbbell = p.stimuli[5].object;
   ASSERT_EQ(dumbbell.parts.size(), 2u);
   EXPECT_EQ(dumbbell.parts[0].material.stiffness, 700);  // the compound's

@@ -76,6 +76,7 @@ std::map<std::string, json> keys_of_an_object() {
     const char* stimulus = cylinder             ? "/stimuli/1"
                            : place == "/edge_m" ? "/stimuli/2"
                            : box                ? "/stimuli/3"
+                           : place == "/scale"  ? "/stimuli/4"
                                                 : "/stimuli/0";
     out[stimulus + place] = key;
   }
@@ -116,6 +117,7 @@ json values(const stimuli::ObjectSpec& o) {
           values(o.size),
           o.segments,
           o.subdivisions,
+          o.scale,
           parts,
           values(o.pose.position),
           {q.w, q.x, q.y, q.z},
@@ -191,9 +193,11 @@ const json kShapes = json::parse(R"({"version": 1, "name": "p", "renderers": ["p
                "layers": [{"depth_m": 0.001, "stiffness_n_per_m": 100}], "body": {"mass_kg": 0.1}},
               {"name": "b", "shape": "cylinder", "radius_m": 0.02, "height_m": 0.03},
               {"name": "c", "shape": "cube", "edge_m": 0.02},
-              {"name": "d", "shape": "box", "size_m": [0.02, 0.02, 0.02]}],
+              {"name": "d", "shape": "box", "size_m": [0.02, 0.02, 0.02]},
+              {"name": "e", "shape": "mesh", "file": ")" PALPATE_SOURCE_DIR
+                                 R"(/tests/protocols/good/tetrahedron.obj"}],
   "repetitions": 10, "reach": {"factor": 2}, "practice": {"repetitions": 1}, "masking_noise": {},
-  "response": {"keys": {"1": "a", "2": "b", "3": "c", "4": "d"}}})");
+  "response": {"keys": {"1": "a", "2": "b", "3": "c", "4": "d", "5": "e"}}})");
 
 void expect_default(const std::string& place, const json& key) {
   const json::json_pointer pointer(place);

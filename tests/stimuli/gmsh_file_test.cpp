@@ -52,6 +52,18 @@ TEST(GmshFile, TetrahedraGetMiddlesAndAreTurnedOutward) {
   EXPECT_EQ(surface_of(mesh).size(), 6U * 4U);
 }
 
+TEST(GmshFile, AnObjectScalesItsNodes) {
+  ObjectSpec organ;
+  organ.shape = ShapeKind::mesh;
+  organ.file = "organ.msh";
+  organ.file_bytes = std::make_shared<const std::string>(two_tetrahedra());
+  organ.scale = 0.001;
+  const std::vector<Vec3> nodes = read_gmsh("organ.msh", two_tetrahedra()).nodes;
+  const std::vector<Vec3> scaled = solid_of_file(organ).nodes;
+  ASSERT_EQ(scaled.size(), nodes.size());
+  for (std::size_t i = 0; i < nodes.size(); ++i) EXPECT_EQ(scaled[i], 0.001 * nodes[i]);
+}
+
 TEST(GmshFile, QuadraticTetrahedraKeepTheirMiddles) {
   // Gmsh's order of edges: 01, 12, 02, 03, 23, 13.
   const std::string text =

@@ -13,7 +13,6 @@
 #include <string>
 #include <utility>
 
-#include "data/base/input_file.h"
 #include "rendering/probe.h"
 #include "rendering/renderer.h"
 #include "stimuli/solids/solid_mesh.h"
@@ -161,8 +160,7 @@ constexpr int kPlainResolution = 10;               // if a description gives non
 
 stimuli::SolidMesh mesh_of(const stimuli::ObjectSpec& spec, int resolution) {
   if (spec.shape != stimuli::ShapeKind::mesh) return stimuli::mesh_of_primitive(spec, resolution);
-  return stimuli::read_gmsh(spec.file,
-                            spec.file_bytes ? *spec.file_bytes : read_whole(spec.file, 1U << 31));
+  return stimuli::solid_of_file(spec);
 }
 
 [[noreturn]] void refuse(const std::string& fault) { throw stimuli::MeshError({fault}); }

@@ -205,9 +205,11 @@ int explore_command(const std::vector<std::string>& args) {
       "along a path without a display (--frames, --animation). Shown are the objects, the ideal\n"
       "tool (where it would be if objects were solid), the virtual one (orange, as the hand\n"
       "holds it), each contact place with the force on the tool, and the torque on the hand\n"
-      "(violet). In the window Esc and F12 command zero force.";
+      "(violet). In the window Esc and F12 command zero force. A mesh file in place of a scene is\n"
+      "touched alone, in its own coordinates, m.";
   line.example =
       "  palpate explore protocols/scenes/fig17a-engine.json\n"
+      "  palpate explore bunny.stl\n"
       "  palpate explore protocols/scenes/fig17a-engine.json \\\n"
       "      --trajectory protocols/scenes/fig17a-engine.csv --frames engine --every 100ms\n"
       "  palpate explore scene.json --trajectory path.csv --animation scene.webp --size 640x360\n";

@@ -298,8 +298,9 @@ int render_command(const std::vector<std::string>& args) {
   line.example =
       "  palpate render --scene cube.json --renderer ray --trajectory path.csv --out forces.csv\n"
       "  palpate render --scene cube.json --renderer ray --explain\n";
-  line.options.add_options()                                                                  //
-      ("scene", po::value<std::string>()->required()->value_name("FILE"), "scene, JSON")      //
+  line.options.add_options()  //
+      ("scene", po::value<std::string>()->required()->value_name("FILE"),
+       "scene, JSON; or a mesh file, alone")                                                  //
       ("renderer", po::value<std::string>()->required()->value_name("NAME"), "point or ray")  //
       ("trajectory", po::value<std::string>()->value_name("FILE"),
        (std::string("path of the stylus, CSV with the columns ") + kTrajectoryHeader +

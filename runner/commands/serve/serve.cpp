@@ -175,7 +175,7 @@ int serve_scene(const po::variables_map& values, const RunSettings& run) {
   protocols::SceneSpec spec;
   std::string text;
   if (!path.empty()) {
-    text = protocols::read_text_file(path);
+    text = protocols::read_scene_text(path);
     spec = protocols::parse_scene_text(text, path);
   }
   const double rate = values["rate"].as<double>();

@@ -75,8 +75,8 @@ std::vector<std::string> mesh_notes(const stimuli::ObjectSpec& object) {
   std::string note = printable(object.file_name) + ": " + text;
   if (largest > kBeyondHands) {
     note +=
-        "; larger than a metre: expected coordinates in metres, which a file in millimetres "
-        "becomes scaled by 0.001";
+        "; larger than a metre: expected coordinates in metres; for a file in millimetres give "
+        "\"scale\": 0.001 beside \"file\"";
   } else if (largest < kBelowTouch) {
     note += "; smaller than a tenth of a millimetre: expected coordinates in metres";
   }

@@ -8,7 +8,6 @@
 #include <span>
 #include <utility>
 
-#include "data/base/input_file.h"
 #include "stimuli/parts/facets.h"
 #include "stimuli/primitives.h"
 #include "stimuli/shapes.h"
@@ -17,7 +16,6 @@
 namespace palpate::runner::display {
 namespace {
 
-constexpr std::size_t kMostFileBytes = std::size_t{1} << 31;
 constexpr int kSides = 24;
 constexpr float kFlattest = 0.866F;  // least cosine between normals that are smoothed
 
@@ -75,9 +73,7 @@ DrawnMesh surface_mesh(std::span<const Vec3> places,
 DrawnMesh triangles_of(const stimuli::ObjectSpec& object) {
   DrawnMesh out;
   if (object.shape == stimuli::ShapeKind::mesh && stimuli::is_gmsh_file_name(object.file)) {
-    const stimuli::SolidMesh solid = stimuli::read_gmsh(
-        object.file,
-        object.file_bytes ? *object.file_bytes : read_whole(object.file, kMostFileBytes));
+    const stimuli::SolidMesh solid = stimuli::solid_of_file(object);
     return surface_mesh(solid.nodes, stimuli::surface_of(solid), {});
   }
   add_object(object, Pose(), out);

@@ -94,7 +94,8 @@ def render(scene: Union[Path, Mapping[str, Any]], trajectory: Union[Path, Mappin
            renderer: str) -> Columns:
     """Forces on the hand along a path of the stylus, as `palpate render` gives them.
 
-    scene: the file, or its content as a dict; meshes that a dict names are looked for in the working folder.
+    scene: the file (or a mesh file alone), or its content as a dict; meshes that a dict names are looked for in the
+        working folder.
     trajectory: a CSV file, or columns by name (a dict, or a structured array as numpy.genfromtxt(names=True) gives it):
         t (s, ascending), tip_x, tip_y, tip_z, tail_x, tail_y, tail_z (m) and, for a tool's +x, side_x, side_y, side_z.
     renderer: "point" or "ray".

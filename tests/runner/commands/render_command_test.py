@@ -7,6 +7,7 @@ import csv
 import json
 import os
 import pathlib
+import re
 import subprocess
 import sys
 import unittest
@@ -60,6 +61,34 @@ class Render(CommandCase):
         self.assertAlmostEqual(rows[1]["ideal_tip_z"], 0.025, 12)
         self.assertAlmostEqual(rows[1]["device1_z"], 0.8, 12)
         self.assertEqual([rows[1][f"torque_{k}"] for k in "xyz"], [0, 0, 0])
+
+    def test_a_mesh_file_is_a_scene_of_one_object(self):
+        mesh = self.file("engine.obj", (PROTOCOLS / "scenes" / "engine.obj").read_text())
+        path = self.file("flange.csv", self.HEADER + "0,0.061,0.031,0.01,0.061,0.031,0.13\n0.01,0.061,0.031,0.004,0.061,0.031,0.124\n")
+        scene, out = self.file("scene.json", '{"objects": [{"shape": "mesh", "file": "engine.obj"}]}'), self.dir / "out.csv"
+        rows = []
+        for name in (scene, mesh):
+            self.palpate("render", "--scene", name, "--renderer", "ray", "--trajectory", path, "--out", out, "--force")
+            with open(out, newline="") as file:
+                rows.append(list(csv.DictReader(file)))
+        self.assertTrue(rows[0] == rows[1])
+        self.assertAlmostEqual(float(rows[0][1]["force_z"]), 800 * 0.002, 9)
+
+    def test_a_file_in_millimetres_is_scaled(self):
+        text = (PROTOCOLS / "scenes" / "engine.obj").read_text()
+        self.file("metres.obj", text)
+        self.file("millimetres.obj", re.sub(r"(?m)^v (\S+) (\S+) (\S+)", lambda v: "v " + " ".join(repr(1000 * float(c)) for c in v.groups()), text))
+        press = [[0, 0.061, 0.031, 0.01, 0.061, 0.031, 0.13], [0.01, 0.061, 0.031, 0.004, 0.061, 0.031, 0.124]]
+        in_metres = self.render('{"objects": [{"shape": "mesh", "file": "metres.obj"}]}', "ray", press)
+        scaled = self.render('{"objects": [{"shape": "mesh", "file": "millimetres.obj", "scale": 0.001}]}', "ray", press)
+        for key in ("force_x", "force_y", "force_z", "torque_x", "torque_y", "torque_z", "depth"):
+            self.assertAlmostEqual(scaled[1][key], in_metres[1][key], 9)
+        self.assertAlmostEqual(scaled[1]["force_z"], 800 * 0.002, 6)
+        said = self.palpate("validate", self.dir / "millimetres.obj").stdout
+        self.assertIn('give "scale": 0.001 beside "file"', said)
+        for scale in ("0", "-1", '"mm"'):
+            scene = self.file("bad.json", '{"objects": [{"shape": "mesh", "file": "metres.obj", "scale": ' + scale + '}]}')
+            self.assertIn("/objects/0/scale: expected", self.palpate("validate", scene, status=2).stderr)
 
     def test_a_stick_laid_across_an_edge_is_split_by_equation_1(self):
         d = 0.12 / 2 ** 0.5  # the stick in the x = 0 plane, at 45 degrees over the edge (y, z) = (0.025, 0.025)

@@ -131,6 +131,15 @@ def test_forces_equal_the_programs_bit_by_bit(program, tmp_path, renderer, extra
     assert_same(palpate.render(str(tmp_path / "s.json"), columns, renderer), text)
 
 
+def test_a_mesh_file_is_a_scene_of_one_object(protocols):
+    mesh, columns = protocols / "shapes" / "torus.obj", path_of_stylus()
+    columns["tip_x"] += 0.035
+    alone, scene = (palpate.render(given, columns, "point")
+                    for given in (mesh, {"objects": [{"shape": "mesh", "file": str(mesh)}]}))
+    assert all(np.array_equal(alone[name], scene[name]) for name in alone)
+    assert np.abs(alone["force_z"]).max() > 0
+
+
 def test_faults_have_the_programs_words(program, tmp_path):
     bad = with_(QUICK, repetitions=0, colour="red")
     (tmp_path / "p.json").write_text(json.dumps(bad))
