@@ -28,11 +28,33 @@ Volume volume_of(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) {
   return {value, 8 * std::numeric_limits<double>::epsilon() * most};
 }
 
+constexpr double kSliver = 1e-6;  // height of the length
+// A lower triangle has no area, only rounding.
+constexpr double kRoundings = 8 * std::numeric_limits<double>::epsilon();
+
 float rounded_up(double value) {
   const auto near = static_cast<float>(value);
   return static_cast<double>(near) < value
              ? std::nextafter(near, std::numeric_limits<float>::infinity())
              : near;
+}
+
+/// Of a triangle without area: that of the neighbour over its longest side, which it lies along.
+Vec3 normal_of_neighbours(std::uint32_t index, const stimuli::LargeArray<Vec3>& vertices,
+                          const stimuli::LargeArray<SurfaceTriangle>& triangles) {
+  for (std::size_t steps = triangles.size(); steps > 0; --steps) {
+    const SurfaceTriangle& t = triangles[index];
+    if (t.normal != Vec3(0)) return t.normal;
+    std::size_t longest = 0;
+    double most = -1;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const double length = glm::distance(vertices[t.corners[k]], vertices[t.corners[(k + 1) % 3]]);
+      if (length > most) longest = k;
+      most = std::max(most, length);
+    }
+    index = SurfaceTriangle::triangle_of(t.across[longest]);
+  }
+  return {0, 0, 1};
 }
 
 /// Moves the `first` triangles along the longest extent of the middles to the front.
@@ -96,8 +118,14 @@ void Surface::add(const SurfaceShell& shell) {
     Vec3 normal = ab2 >= bc2 && ab2 >= ca2 ? (bc2 > ca2 ? glm::cross(ab, bc) : glm::cross(ca, ab))
                   : bc2 >= ca2             ? (ab2 > ca2 ? glm::cross(ab, bc) : glm::cross(bc, ca))
                                            : (ab2 > bc2 ? glm::cross(ca, ab) : glm::cross(bc, ca));
+    // Rounding tilts a sliver's normal along its length, where it matters most.
+    const Vec3& longest = ab2 >= bc2 && ab2 >= ca2 ? ab : bc2 >= ca2 ? bc : ca;
+    const double longest2 = glm::dot(longest, longest), reach = std::sqrt(longest2);
+    if (glm::dot(normal, normal) < kSliver * kSliver * longest2 * longest2)
+      normal -= glm::dot(normal, longest) / longest2 * longest;
     const double length = glm::length(normal);
-    t.normal = length > 0 ? normal / length : Vec3(0, 0, 1);
+    const bool has_area = length > kRoundings * (reach + glm::length(a)) * reach;
+    t.normal = has_area ? normal / length : Vec3(0);
     t.offset = glm::dot(t.normal, a);
     for (std::size_t k = 0; k < 3; ++k) {
       const std::uint32_t beyond = shell.surface->across[i][k];
@@ -110,6 +138,12 @@ void Surface::add(const SurfaceShell& shell) {
     }
   }
   materials_.push_back(shell.material);
+  for (std::uint32_t i = base; i < triangles_.size(); ++i) {
+    SurfaceTriangle& t = triangles_[i];
+    if (t.normal != Vec3(0)) continue;
+    t.normal = normal_of_neighbours(i, vertices_, triangles_);
+    t.offset = glm::dot(t.normal, vertices_[t.corners[0]]);
+  }
 }
 
 void Surface::find_edges() {

@@ -324,6 +324,61 @@ TEST_P(SurfaceContact, SidesThatRoundingBentBackDoNotTakeTurnsForEver) {
   }
 }
 
+/// A cube of 0.1 m with a triangle whose corners are in one line, along an edge of its lower face.
+stimuli::ClosedSurface cube_with_a_flat_triangle() {
+  stimuli::ClosedSurface cube = stimuli::closed_surface(box_soup(Vec3(-0.05), Vec3(0.05))).surface;
+  const auto normal = [&](const std::array<std::uint32_t, 3>& t) {
+    const auto& v = cube.vertices;
+    return glm::normalize(glm::cross(v[t[1]] - v[t[0]], v[t[2]] - v[t[0]]));
+  };
+  for (std::uint32_t low = 0; low < cube.triangles.size(); ++low) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::uint32_t side = cube.across[low][k];
+      if (normal(cube.triangles[low]).z > -0.9 || normal(cube.triangles[side]).x < 0.9) continue;
+      const std::uint32_t a = cube.triangles[low][k], b = cube.triangles[low][(k + 1) % 3];
+      std::size_t j = 0;
+      while (cube.triangles[side][j] != b) ++j;
+      const std::uint32_t c = cube.triangles[side][(j + 2) % 3];
+      const std::uint32_t over_ac = cube.across[side][(j + 1) % 3],
+                          over_cb = cube.across[side][(j + 2) % 3];
+      const auto middle = static_cast<std::uint32_t>(cube.vertices.size());
+      cube.vertices.push_back(0.75 * cube.vertices[a] + 0.25 * cube.vertices[b]);
+      const auto flat = static_cast<std::uint32_t>(cube.triangles.size()), other = flat + 1;
+      cube.triangles[side] = {b, middle, c};
+      cube.across[side] = {flat, other, over_cb};
+      cube.triangles.push_back({b, a, middle});
+      cube.across.push_back({low, other, side});
+      cube.triangles.push_back({middle, a, c});
+      cube.across.push_back({flat, over_ac, side});
+      cube.across[low][k] = flat;
+      for (std::uint32_t& beyond : cube.across[over_ac]) {
+        if (beyond == side) beyond = other;
+      }
+      return cube;
+    }
+  }
+  return cube;
+}
+
+TEST_P(SurfaceContact, ATriangleWithoutAreaLeavesNoGap) {
+  if (!GetParam()->side_contact()) return;
+  const std::vector<SurfaceShell> shells = {
+      {std::make_shared<const stimuli::ClosedSurface>(cube_with_a_flat_triangle()), Pose{},
+       spring()}};
+  const Scene scene({}, true, {}, nullptr, {{std::make_shared<const Surface>(shells), Pose{}, 0}});
+  const Vec3 edge(0.05, 0, -0.05), out = glm::normalize(Vec3(1, 0, -1)),
+                                   along = 0.05 * glm::normalize(Vec3(1, 0.1, 1));
+  for (double y = -0.045; y < 0.046; y += 0.01) {
+    RenderState state = scene.initial_state();
+    Rendering r;
+    for (int i = -100; i <= 20; ++i) {
+      const Vec3 tip = edge + Vec3(0, y, 0) - along - 1e-4 * i * out;
+      r = tick(scene, state, {tip, tip + 2.0 * along});
+    }
+    ASSERT_NEAR(glm::length(r.force - kStiffness * 0.002 * out), 0, 1e-4) << y;
+  }
+}
+
 TEST_P(SurfaceContact, AStylusThatGrowsIntoAFaceTouchesIt) {
   // Two devices hold the ends, so the stylus has no fixed length.
   if (!GetParam()->side_contact()) return;
