@@ -284,6 +284,8 @@ TEST(SpeedAccuracyTableValues, ChangesArePairedOverParticipants) {
 TEST(LearningTableValues, BinsAreEighthsOfTheTrialsWithARenderer) {
   const Study study({"point", "ray"});
   const Table table = learning_table(study.analysis());
+  EXPECT_EQ(table.header, (std::vector<std::string>{"renderer", "1/8", "2/8", "3/8", "4/8", "5/8",
+                                                    "6/8", "7/8", "8/8"}));
   ASSERT_EQ(table.rows.size(), 2U);
   constexpr std::size_t kBin = kTrials / 8;
   for (std::size_t r = 0; r < 2; ++r) {

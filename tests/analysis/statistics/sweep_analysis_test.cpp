@@ -71,6 +71,24 @@ TEST(PatternShare, AGridHasNoInterval) {
   }
 }
 
+TEST(SweepAnalysis, LooksForThePapersPatternWhereItsShapesAndRenderersAre) {
+  // Two settings: one as in the paper, one where the sphere gains as much.
+  SweepTable table = table_of("lhs", {{0.2}, {0.8}}, [](const auto&) { return Outcome{22, 1}; });
+  EXPECT_FALSE(analyze_sweep(table, "", "1").pattern) << "the cone alone";
+  for (const auto& [shape, gains] : std::vector<std::pair<std::string, std::vector<double>>>{
+           {"cube", {11, 11}}, {"sphere", {0, 22}}, {"cylinder", {0, 0}}}) {
+    table.shapes.push_back(shape);
+    table.columns.insert(table.columns.end(), {"gain_" + shape, "gain_se_" + shape});
+    table.values.insert(table.values.end(), {gains, {1, 1}});
+  }
+  const SweepAnalysis papers = analyze_sweep(table, "", "1");
+  ASSERT_TRUE(papers.pattern);
+  EXPECT_TRUE(papers.pattern->of_the_paper);
+  EXPECT_NEAR(*papers.pattern->share, 0.5, 1e-12);
+  table.renderers = {"point", "other"};
+  EXPECT_FALSE(analyze_sweep(table, "", "1").pattern) << "other renderers";
+}
+
 TEST(SweepAnalysis, SaysOfEachTotalIndexWhetherChanceIsAPartOfIt) {
   Random random(6);
   const auto points = saltelli_points(2, 200, [&] { return random.unit(); });

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "data/export/dataset_description.h"
+#include "data/export/delimited_row.h"
 #include "tests/data/export/csv_fixture.h"
 
 namespace palpate::data {
@@ -47,6 +48,20 @@ TEST_F(ExportCsv, TheCodebookDescribesEveryColumnAndBit) {
   EXPECT_EQ(bits.at("2048"), "old-reading: ...");
   EXPECT_TRUE(shapes.contains("'-cube")) << "as it stands in the table";
   EXPECT_EQ(by_name(rows(), 1).at("shape"), "'-cube");
+}
+
+TEST(SampleColumns, HaveOneUnitForTheCoordinatesOfAQuantity) {
+  std::map<std::string, std::string> unit_of;
+  for (const Column& column : sample_columns()) {
+    const std::string name = column.name;
+    if (name.size() < 3 || name[name.size() - 2] != '_' || name.back() < 'x') continue;
+    const auto [unit, first] = unit_of.emplace(name.substr(0, name.size() - 2), column.unit);
+    EXPECT_EQ(unit->second, column.unit) << name;
+  }
+  const std::map<std::string, std::string> expected{{"tip", "m"},     {"tail", "m"},
+                                                    {"force", "N"},   {"torque", "N m"},
+                                                    {"device1", "N"}, {"device2", "N"}};
+  EXPECT_EQ(unit_of, expected);
 }
 
 TEST_F(ExportCsv, TheCodebookOverwritesNoOtherFile) {

@@ -178,6 +178,18 @@ TEST_F(StoreRefusals, AnAttemptIsCutOffForAReason) {
   EXPECT_THROW(store.cut_off_attempt(run, "device fault"), StoreRefused) << "none is open";
 }
 
+TEST_F(StoreRefusals, ASimulatedTrialHasAPlanOfItsSession) {
+  Store store = open();
+  const auto run = store.begin_run(store.enrol(a_protocol(), "S1", {}, true, 1), a_run());
+  TrialRecord other_session = a_record(1), no_shape = a_record(1), no_number = a_record(1);
+  other_session.session = run.session + 1;
+  no_shape.shape = "";
+  no_number.trial = 0;
+  for (const TrialRecord& record : {other_session, no_shape, no_number})
+    EXPECT_THROW(store.record_simulated(run, {record}), StoreRefused);
+  store.record_simulated(run, {a_record(1)});
+}
+
 TEST_F(StoreRefusals, AnExportTellsOfEvery256thTrial) {
   Store store = open();
   const auto run = store.begin_run(store.enrol(a_protocol(), "S1", {}, true, 1), a_run());
