@@ -74,6 +74,22 @@ bool SurfaceTool::far_away() {
   const double step = std::sqrt(step2), near = surface_.radius() + step + 2 * skin_;
   if (distance2 > near * near) return true;
   if (own_.clear_room > 0 && from_clear2 < own_.clear_room * own_.clear_room) return true;
+  // In this tick it turns about its tip, by less than kStep at once, and translates.
+  const double angle = angle_between(carried_, last, tick_.tool);
+  const double aside = glm::length(placed_.local_vector(tick_.tool.tip - last.tip)) + angle * step;
+  const auto is_free = [&] {
+    if (angle > kStep) return false;
+    for (std::size_t j = 0; j < now.count; ++j) {
+      const PosedTool::Segment &a = before.segments[j], &b = now.segments[j];
+      if (!is_clear({a.start, a.end(true), b.start - a.start, b.end(true) - a.end(true),
+                     aside + 4 * skin_, 2 * aside}))
+        return false;
+    }
+    return true;
+  };
+  // Without room at the last tick there is hardly any now.
+  const bool had_room = own_.clear_room > 0;
+  if (!had_room && angle <= kStep && !is_free()) return false;
   // Look for room for some ticks.
   const double size = surface_.size(), needed = 2 * step + 8 * skin_;
   const double room = std::max(needed, own_.wanted_clear_room);
@@ -87,17 +103,7 @@ bool SurfaceTool::far_away() {
   own_.wanted_clear_room =
       std::clamp((clear ? 2 : 0.5) * room, kSmallRoom * size, kLargeRoom * size);
   if (clear) return true;
-  // Else for this one: it turns about its tip, by less than kStep at once, and translates.
-  const double angle = angle_between(carried_, last, tick_.tool);
-  if (angle > kStep) return false;
-  const double aside = glm::length(placed_.local_vector(tick_.tool.tip - last.tip)) + angle * step;
-  for (std::size_t j = 0; j < now.count; ++j) {
-    const PosedTool::Segment &a = before.segments[j], &b = now.segments[j];
-    if (!is_clear({a.start, a.end(true), b.start - a.start, b.end(true) - a.end(true),
-                   aside + 4 * skin_, 2 * aside}))
-      return false;
-  }
-  return true;
+  return had_room ? is_free() : angle <= kStep;
 }
 
 /// Moves the ideal tool from a pose outside the surface as near to another pose as it can get.

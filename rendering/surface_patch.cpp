@@ -189,14 +189,19 @@ bool meets(const PatchPolygon& polygon, const Vec3& from, const Vec3& way) {
 
 double distance_off(const PatchPolygon& polygon, const Vec3& normal, const Vec3& at) {
   const Vec3 p = at - glm::dot(normal, at - polygon.corners[0]) * normal;
+  const auto next = [&](std::size_t k) -> const Vec3& {
+    return polygon.corners[k + 1 == polygon.count ? 0 : k + 1];
+  };
   bool over = true;
-  double nearest = HUGE_VAL;
-  for (std::size_t k = 0; k < polygon.count; ++k) {
-    const Vec3 &a = polygon.corners[k], &b = polygon.corners[k + 1 == polygon.count ? 0 : k + 1];
-    over = over && glm::dot(normal, glm::cross(b - a, p - a)) >= 0;
-    nearest = std::min(nearest, to_side(p, a, b));
+  for (std::size_t k = 0; k < polygon.count && over; ++k) {
+    const Vec3& a = polygon.corners[k];
+    over = glm::dot(normal, glm::cross(next(k) - a, p - a)) >= 0;
   }
-  return over ? 0 : std::sqrt(nearest);
+  if (over) return 0;
+  double nearest = HUGE_VAL;
+  for (std::size_t k = 0; k < polygon.count; ++k)
+    nearest = std::min(nearest, to_side(p, polygon.corners[k], next(k)));
+  return std::sqrt(nearest);
 }
 
 void cast_on_patch(const Surface& surface, const SurfacePatch& patch, const PatchPlane& plane,

@@ -37,11 +37,17 @@ class SurfaceQuery {
     first_ = {a, along};
     last_ = {c, later};
     room_ = static_cast<float>(room);
-    moves_ = motion.start_way != Vec3(0) || motion.end_way != Vec3(0);
     start_ = Box(a, c, room);
     is_point_ = !(length2 > 0);
     if (is_point_) return;
     end_ = Box(b, d, room);
+    // A segment that only translates is at rest among boxes that are larger by its way.
+    turns_ = motion.start_way != motion.end_way;
+    if (!turns_) way_ = to_floats(motion.start_way);
+    const Vec3 way = turns_ ? Vec3(0) : motion.start_way;
+    const Vec3 below = room + glm::max(way, 0.0), above = room - glm::min(way, 0.0);
+    below_ = to_floats(below);
+    above_ = to_floats(above);
     length_ = static_cast<float>(length);
     turn_ = static_cast<float>(motion.turn + kRounding * length);
     // The axis along which the segment is longest: across it, a box has only a portion beside it.
@@ -52,8 +58,9 @@ class SurfaceQuery {
     divides_ = (along[k] > least && later[k] > least) || (along[k] < -least && later[k] < -least);
     if (!divides_) return;
     up_ = along[k] > 0;
-    passing_ = Passing(a[k], along[k], up_ ? room : -room);
-    passing_last_ = Passing(c[k], later[k], up_ ? room : -room);
+    const double enter = up_ ? -below[k] : above[k], leave = up_ ? above[k] : -below[k];
+    passing_ = Passing(a[k], along[k], enter, leave);
+    passing_last_ = Passing(c[k], later[k], enter, leave);
   }
 
   /// The children that the moving segment may meet: one bit each.
@@ -76,9 +83,11 @@ class SurfaceQuery {
     const auto along = [&](const std::array<float, 3>& v) -> Lanes {
       return v[0] * node.middle[0] + v[1] * node.middle[1] + v[2] * node.middle[2];
     };
-    const Lanes height = along(first_.from), slope = along(first_.along);
-    const Lanes height_last = moves_ ? along(last_.from) : height;
-    const Lanes slope_last = moves_ ? along(last_.along) : slope;
+    Lanes height = along(first_.from);
+    const Lanes slope = along(first_.along);
+    if (!turns_) height += least(along(way_), Lanes{});
+    const Lanes height_last = turns_ ? along(last_.from) : height;
+    const Lanes slope_last = turns_ ? along(last_.along) : slope;
     const Lanes top = node.top + room_;  // above it nothing is touched
     out.start = bits_of(at_start & (least(height, height_last) <= top));
     out.end = bits_of(end_.meets(node) & (least(height + slope, height_last + slope_last) <= top));
@@ -87,7 +96,7 @@ class SurfaceQuery {
     const Flags across = (least(slope, slope_last) <= flat) & (most(slope, slope_last) >= -flat);
     const Portion beside = portion_in(node);
     Lanes lowest = least(height + beside.from * slope, height + beside.to * slope);
-    if (moves_) {
+    if (turns_) {
       lowest = least(lowest, least(height_last + beside.from * slope_last,
                                    height_last + beside.to * slope_last));
     }
@@ -126,10 +135,10 @@ class SurfaceQuery {
   struct Passing {
     float scale = 0, enter = 0, leave = 0;
     Passing() = default;
-    Passing(double start, double along, double room)
+    Passing(double start, double along, double enter_room, double leave_room)
         : scale(static_cast<float>(1 / along)),
-          enter(static_cast<float>((-room - start) / along)),
-          leave(static_cast<float>((room - start) / along)) {}
+          enter(static_cast<float>((enter_room - start) / along)),
+          leave(static_cast<float>((leave_room - start) / along)) {}
   };
   /// The fractions of the segment that are beside a box, and whether these meet it.
   struct Portion {
@@ -158,7 +167,7 @@ class SurfaceQuery {
                   &far = up_ ? node.high[axis_] : node.low[axis_];
       Lanes enter = near * passing_.scale + passing_.enter,
             leave = far * passing_.scale + passing_.leave;
-      if (moves_) {
+      if (turns_) {
         enter = least(enter, near * passing_last_.scale + passing_last_.enter);
         leave = most(leave, far * passing_last_.scale + passing_last_.leave);
       }
@@ -176,25 +185,27 @@ class SurfaceQuery {
       };
       Lanes low, high;
       bounds(first_, low, high);
-      if (moves_) {
+      if (turns_) {
         Lanes low_last, high_last;
         bounds(last_, low_last, high_last);
         low = least(low, low_last);
         high = most(high, high_last);
       }
-      out.meets &= (low <= node.high[k] + room_) & (high >= node.low[k] - room_);
+      out.meets &= (low <= node.high[k] + above_[k]) & (high >= node.low[k] - below_[k]);
     }
     return out;
   }
 
   Line first_, last_;
+  std::array<float, 3> way_{};              ///< of a segment that does not turn
+  std::array<float, 3> below_{}, above_{};  ///< m; boxes are larger by it
   Box start_, end_;
   Passing passing_, passing_last_;
   std::size_t axis_ = 0;
   float length_ = 0;
   float room_ = 0;
   float turn_ = 0;
-  bool moves_ = false;
+  bool turns_ = false;  ///< its ends have different ways
   bool is_point_ = false;
   bool divides_ = false;  ///< the axis divides the segment
   bool up_ = false;       ///< the segment goes up along the axis

@@ -38,6 +38,7 @@ constexpr double kAside = 0.5;      // of the way: room to its sides
 constexpr double kThin = 0.125;     // the same, where the tool may go on in another direction
 // Where triangles are so many strides long, a list about a place lasts for some ticks.
 constexpr double kLasting = 8, kOfSide = 0.5;  // strides; room, of a side
+constexpr double kMore = 3, kFew = 0.25;       // on finer ones: times the room; of a side, at most
 constexpr double kMostRoom = 0.25;             // of the size
 constexpr double kLeastRoom = 8;               // skins
 constexpr double kLess = 0.5;                  // of room and way with too many patches
@@ -104,13 +105,14 @@ bool SurfaceTool::fill_list(std::size_t most) {
   return fits;
 }
 
-/// m, room for a list that lasts for many ticks on triangles of this size; 0: it would not.
-double SurfaceTool::lasting_room() const {
-  if (!in_list_ || own_.carrying_count == 0) return 0;
+/// m, room for a list on triangles of this size: more than `aside` where that adds few of them.
+double SurfaceTool::room_on_triangles(double aside) const {
+  if (!in_list_ || own_.carrying_count == 0) return aside;
   const auto& corners = surface_.triangles()[own_.carrying[0].triangle()].corners;
   const double side =
       glm::length(surface_.vertices()[corners[1]] - surface_.vertices()[corners[0]]);
-  return side > kLasting * own_.stride ? kOfSide * side : 0;
+  if (side > kLasting * own_.stride) return std::max(aside, kOfSide * side);
+  return std::max(aside, std::min(kMore * aside, kFew * side));
 }
 
 /// Lists the patches near the turned tool on a way, with as much room as a short list allows.
@@ -119,7 +121,7 @@ void SurfaceTool::list_about(const Vec3& at, const Vec3& way, double aside) {
   own_.listed = turned_;
   for (std::size_t j = 0; j < turned_.count; ++j) own_.listed.segments[j].start += at;
   own_.listed_way = way;
-  own_.room = std::clamp(std::max(aside, lasting_room()), least, kMostRoom * size);
+  own_.room = std::clamp(room_on_triangles(aside), least, kMostRoom * size);
   own_.has_list = false;
   while (!own_.has_list) {
     const bool smallest = own_.room <= least;

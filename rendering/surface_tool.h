@@ -59,7 +59,7 @@ class SurfaceTool {
   PatchHit sweep(const PosedTool& from, const PosedTool& to, const Vec3& shift) const;
 
   // Translating.
-  double lasting_room() const;
+  double room_on_triangles(double aside) const;
   void list_about(const Vec3& at, const Vec3& way, double aside);
   bool fill_list(std::size_t most);
   void list_triangle(std::uint32_t index, std::uint8_t what, std::uint8_t segment);
