@@ -168,6 +168,12 @@ void Surface::find_edges() {
         triangles_[i].touched |= 1U << k;
         other.touched |= 1U << side;
       }
+      // Rounding folds slivers over a ridge, so that each of its edges seems to be concave. There
+      // patches face as those of convex edges; in a groove they are buried.
+      if (!triangles_[i].touches(k) && glm::dot(triangles_[i].normal, other.normal) < 0) {
+        triangles_[i].touched |= 9U << k;
+        other.touched |= 9U << side;
+      }
       if (across > (i << 2 | k)) triangles_[i].owned |= 1U << k;
     }
   }

@@ -22,13 +22,15 @@ struct alignas(64) SurfaceTriangle {
   std::array<std::uint32_t, 3> corners{};  ///< counter-clockwise seen from outside
   /// Side k is from corner k to corner k + 1. The neighbour's index times four, plus its side.
   std::array<std::uint32_t, 3> across{};
-  std::uint32_t shell = 0;    ///< index in Surface::materials()
-  std::uint16_t touched = 0;  ///< bit k: side k is not concave, so a segment can touch it
-  std::uint16_t owned = 0;    ///< bit k: of the two triangles at side k it is the first in its file
+  std::uint32_t shell = 0;  ///< index in Surface::materials()
+  /// Bit k: side k is not concave, so a segment can touch it, or folded. Bit 3 + k: it is folded.
+  std::uint16_t touched = 0;
+  std::uint16_t owned = 0;  ///< bit k: of the two triangles at side k it is the first in its file
 
   static constexpr std::uint32_t triangle_of(std::uint32_t side) { return side >> 2; }
   static constexpr std::uint32_t side_of(std::uint32_t side) { return side & 3; }
   bool touches(std::uint32_t k) const { return (touched >> k & 1) != 0; }
+  bool folded(std::uint32_t k) const { return (touched >> (3 + k) & 1) != 0; }
   bool owns(std::uint32_t k) const { return (owned >> k & 1) != 0; }
 };
 

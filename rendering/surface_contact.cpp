@@ -257,8 +257,9 @@ class Lying {
       from = end;
       if (towards_end ? from >= 1 : from <= 0) break;
       const SurfaceTriangle& beyond = surface_.triangles()[SurfaceTriangle::triangle_of(at.next)];
+      const std::uint32_t side = SurfaceTriangle::side_of(at.next);
       // Across a hollow, the segment touches only one of its sides.
-      if (!beyond.touches(SurfaceTriangle::side_of(at.next)) &&
+      if ((!beyond.touches(side) || beyond.folded(side)) &&
           glm::dot(beyond.normal, surface_.triangles()[triangle].normal) < kFlat)
         break;
       triangle = SurfaceTriangle::triangle_of(at.next);

@@ -15,6 +15,7 @@ constexpr double kSilhouette = 1e-12;  // of the length; tolerance of a segment 
 struct EdgeOf {
   const SurfaceTriangle &left, &right;
   Vec3 v0, v1;
+  bool folded = false;
 };
 
 EdgeOf edge_of(const Surface& surface, std::uint32_t side) {
@@ -22,7 +23,7 @@ EdgeOf edge_of(const Surface& surface, std::uint32_t side) {
   const std::uint32_t k = SurfaceTriangle::side_of(side);
   const SurfaceTriangle& right = surface.triangles()[SurfaceTriangle::triangle_of(left.across[k])];
   return {left, right, surface.vertices()[left.corners[k]],
-          surface.vertices()[left.corners[(k + 1) % 3]]};
+          surface.vertices()[left.corners[(k + 1) % 3]], left.folded(k)};
 }
 
 /// The contact normal of an edge and a segment: perpendicular to both, between the triangles'
@@ -35,7 +36,7 @@ Vec3 edge_normal(const EdgeOf& edge, const Vec3& along, double left, double righ
   Vec3 across = left >= 0 ? glm::cross(e, along) : glm::cross(along, e);
   const double size2 = glm::dot(across, across);
   if (size2 > kAlongEdge * kAlongEdge * glm::dot(e, e) * glm::dot(along, along) &&
-      glm::dot(across, between) > 0)
+      (edge.folded || !(glm::dot(across, between) < 0)))
     return across / std::sqrt(size2);
   const double length = glm::length(between);
   if (length > 0) return between / length;

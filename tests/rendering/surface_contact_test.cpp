@@ -379,6 +379,28 @@ TEST_P(SurfaceContact, ATriangleWithoutAreaLeavesNoGap) {
   }
 }
 
+TEST_P(SurfaceContact, ARidgeWithASliverFoldedOverItHoldsAStylus) {
+  // As rounding does it, within the tolerance of winding numbers.
+  if (!GetParam()->side_contact()) return;
+  const Vec3 ridge(0.05, 0.003, 0.05), out = glm::normalize(Vec3(1, 0, 1)),
+                                       along = 0.05 * glm::normalize(Vec3(1, 0.1, -1));
+  for (const double high : {4e-8, 1e-6, 1e-4}) {
+    for (const double over : {-1e-12, 0.0, 1e-13, 1e-12}) {
+      const Scene scene = scene_of({prism(
+          {{-0.05, -0.05}, {0.05, -0.05}, {0.05, 0.05 + high}, {0.05 + over, 0.05}, {-0.05, 0.05}},
+          0.05)});
+      RenderState state = scene.initial_state();
+      Rendering r;
+      for (int i = -100; i <= 20; ++i) {
+        const Vec3 tip = ridge - along - 1e-4 * i * out;
+        r = tick(scene, state, {tip, tip + 2.0 * along});
+      }
+      ASSERT_NEAR(glm::length(r.force), 2 + kStiffness * high * std::sqrt(0.5), 1e-5)
+          << high << ' ' << over;
+    }
+  }
+}
+
 TEST_P(SurfaceContact, AStylusThatGrowsIntoAFaceTouchesIt) {
   // Two devices hold the ends, so the stylus has no fixed length.
   if (!GetParam()->side_contact()) return;
