@@ -195,7 +195,7 @@ void Surface::build_tree() {
 
 /// Sorts triangles and vertices as the tree has them: what is near in space is near in memory.
 void Surface::sort_by(std::span<const std::uint32_t> order) {
-  std::vector<std::uint32_t>& place = in_files_;
+  std::vector<std::uint32_t>& place = file_order_;
   place.resize(order.size());
   for (std::uint32_t i = 0; i < order.size(); ++i) place[order[i]] = i;
   constexpr std::uint32_t kNone = ~0U;

@@ -97,7 +97,7 @@ class Surface {
   void touchable(const SegmentMotion& motion, const Visit& visit) const;
 
   /// Indices in triangles() in the order of the files.
-  const std::vector<std::uint32_t>& in_files() const { return in_files_; }
+  const std::vector<std::uint32_t>& file_order() const { return file_order_; }
 
   /// How often the surface winds round a point that does not lie on it.
   int winding(const Vec3& point) const;
@@ -114,7 +114,7 @@ class Surface {
   stimuli::LargeArray<Vec3> vertices_;
   stimuli::LargeArray<SurfaceTriangle> triangles_;
   std::vector<stimuli::Material> materials_;
-  std::vector<std::uint32_t> in_files_;
+  std::vector<std::uint32_t> file_order_;
   stimuli::LargeArray<Node> nodes_;
   std::uint32_t root_ = 0;
   Vec3 centre_;

@@ -63,7 +63,7 @@ void SharpEdges::add_surface(const rendering::PlacedSurface& placed) {
   const auto world = [&](std::uint32_t vertex) {
     return placed.world_vector(surface.vertices()[vertex]) + placed.position;
   };
-  for (const std::uint32_t i : surface.in_files()) {
+  for (const std::uint32_t i : surface.file_order()) {
     for (std::uint32_t k = 0; k < 3; ++k) {
       const std::uint32_t beyond = triangles[i].across[k];
       if (!triangles[i].owns(k)) continue;

@@ -245,7 +245,7 @@ namespace {
 bool covers_twice(const Surface& surface) {
   constexpr std::size_t kAsked = 4096;
   constexpr double kBelow = 1e-7;  // of the size
-  const std::vector<std::uint32_t>& triangles = surface.in_files();
+  const std::vector<std::uint32_t>& triangles = surface.file_order();
   const std::size_t stride = 1 + triangles.size() / kAsked;
   for (std::size_t i = 0; i < triangles.size(); i += stride) {
     const SurfaceTriangle& t = surface.triangles()[triangles[i]];
@@ -319,7 +319,7 @@ VolumeMoments own_moments(const Surface& surface) {
   moments.about = surface.centre();
   if (!covers_twice(surface)) {
     Polygon corners(3);
-    for (const std::uint32_t index : surface.in_files()) {
+    for (const std::uint32_t index : surface.file_order()) {
       const SurfaceTriangle& t = surface.triangles()[index];
       for (std::size_t k = 0; k < 3; ++k)
         corners[k] = surface.vertices()[t.corners[k]] - moments.about;
