@@ -42,7 +42,8 @@ float rounded_up(double value) {
 /// Of a triangle without area: that of the neighbour over its longest side, which it lies along.
 Vec3 normal_of_neighbours(std::uint32_t index, const stimuli::LargeArray<Vec3>& vertices,
                           const stimuli::LargeArray<SurfaceTriangle>& triangles) {
-  for (std::size_t steps = triangles.size(); steps > 0; --steps) {
+  constexpr int kMostSteps = 1000;  // two such triangles may lie along each other
+  for (int step = 0; step < kMostSteps; ++step) {
     const SurfaceTriangle& t = triangles[index];
     if (t.normal != Vec3(0)) return t.normal;
     std::size_t longest = 0;
