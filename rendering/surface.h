@@ -68,6 +68,7 @@ class Surface {
   Vec3 centre() const { return centre_; }    ///< of a sphere about it
   double radius() const { return radius_; }  ///< m, of that sphere
   double size() const { return 2 * radius_; }
+  double coordinate_error() const { return coordinate_error_; }  ///< m, of the worst shell
 
   /// Of the tree: up to eight children side by side, relative to the centre, in single precision.
   static constexpr std::size_t kWidth = 8;
@@ -115,6 +116,7 @@ class Surface {
   stimuli::LargeArray<SurfaceTriangle> triangles_;
   std::vector<stimuli::Material> materials_;
   std::vector<std::uint32_t> file_order_;
+  double coordinate_error_ = 0;
   stimuli::LargeArray<Node> nodes_;
   std::uint32_t root_ = 0;
   Vec3 centre_;

@@ -487,7 +487,11 @@ class Cleaner {
 
 }  // namespace
 
-CleanedSurface closed_surface(const PolygonSoup& soup) { return Cleaner(soup).run(); }
+CleanedSurface closed_surface(const PolygonSoup& soup) {
+  CleanedSurface cleaned = Cleaner(soup).run();
+  cleaned.surface.coordinate_error = soup.coordinate_error;
+  return cleaned;
+}
 
 namespace {
 

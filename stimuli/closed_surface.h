@@ -23,6 +23,7 @@ struct ClosedSurface {
   /// The triangle beyond the side from corner k to corner k + 1. Where more than two triangles meet
   /// in an edge, each two neighbours have solid between them.
   std::vector<std::array<std::uint32_t, 3>> across;
+  double coordinate_error = 0;  ///< m, of each coordinate as its file rounds it; 0: not rounded
 };
 
 /// The surface that polygons bound, and what was done to them to get it.

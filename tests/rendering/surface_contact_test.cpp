@@ -472,6 +472,25 @@ TEST_P(SurfaceContact, AToolRestsWhereTheFacesOfTwoShellsCross) {
   }
 }
 
+TEST_P(SurfaceContact, ACrackThatRoundingOpensBetweenShellsLetsNothingIn) {
+  // A block on a plate, as an assembly is written with single precision.
+  constexpr double kError = 4e-9;
+  for (double gap : {-kError, 0.0, 0.1 * kError, 0.5 * kError, kError, 2 * kError}) {
+    stimuli::PolygonSoup plate = box_soup({-0.05, -0.05, -0.02}, {0.05, 0.05, 0}),
+                         block = box_soup({0, -0.02, gap}, {0.03, 0.02, 0.03});
+    plate.coordinate_error = block.coordinate_error = kError;
+    const Scene scene = scene_of({plate, block});
+    RenderState state = scene.initial_state();
+    for (double z = 0.01; z > -0.002; z -= 5e-4) tick(scene, state, standing({-0.01, 0.003, z}));
+    for (double x = -0.01; x < 0.01; x += 3e-4) {
+      const Rendering r = tick(scene, state, standing({x, 0.003, -0.002}));
+      ASSERT_EQ(r.faults, 0U) << gap << ' ' << x;
+      const Vec3 expected(-std::max(0.0, x), 0, 0.002);
+      ASSERT_NEAR(glm::length(r.force / kStiffness - expected), 0, 1e-8) << gap << ' ' << x;
+    }
+  }
+}
+
 TEST_P(SurfaceContact, AFlatFaceInManyTrianglesHoldsNothingAlongIt) {
   Random random(3);
   for (int round = 0; round < 4; ++round) {
