@@ -79,7 +79,7 @@ struct ObjectSpec {
   int segments = 64;      ///< cone, cylinder: corners of the rim
   std::string file_name;  ///< mesh: as the scene or protocol names its file
   std::string file;       ///< mesh: resolved path of a file that mesh_file.h reads
-  double scale = 1;  ///< mesh: m for each unit of the file
+  double scale = 1;       ///< mesh: m for each unit of the file
   /// mesh: paths of all files read from the disk for it, including a .gltf's buffers.
   std::vector<std::string> files_read;
   /// mesh: the file's contents when the protocol or scene was read; nullptr: read them from the
