@@ -39,21 +39,25 @@ float rounded_up(double value) {
              : near;
 }
 
-/// Of a triangle without area: that of the neighbour over its longest side, which it lies along.
+/// The normal for a triangle without area: that of the neighbour over its longest side, along which
+/// it lies. If that one has no area either, its neighbours are asked in the same way.
 Vec3 normal_of_neighbours(std::uint32_t index, const stimuli::LargeArray<Vec3>& vertices,
                           const stimuli::LargeArray<SurfaceTriangle>& triangles) {
-  constexpr int kMostSteps = 1000;  // two such triangles may lie along each other
+  constexpr int kMostSteps = 1000;
+  std::uint32_t entered = 3;  // side; not taken back: two such triangles may lie along each other
   for (int step = 0; step < kMostSteps; ++step) {
     const SurfaceTriangle& t = triangles[index];
     if (t.normal != Vec3(0)) return t.normal;
-    std::size_t longest = 0;
+    std::uint32_t longest = 0;
     double most = -1;
-    for (std::size_t k = 0; k < 3; ++k) {
+    for (std::uint32_t k = 0; k < 3; ++k) {
       const double length = glm::distance(vertices[t.corners[k]], vertices[t.corners[(k + 1) % 3]]);
-      if (length > most) longest = k;
-      most = std::max(most, length);
+      if (k == entered || !(length > most)) continue;
+      longest = k;
+      most = length;
     }
     index = SurfaceTriangle::triangle_of(t.across[longest]);
+    entered = SurfaceTriangle::side_of(t.across[longest]);
   }
   return {0, 0, 1};
 }

@@ -6,8 +6,11 @@
 
 #include <array>
 #include <cmath>
+#include <map>
 #include <numbers>
 #include <span>
+#include <utility>
+#include <vector>
 
 #include "data/base/random.h"
 #include "rendering/surface_patch.h"
@@ -324,58 +327,84 @@ TEST_P(SurfaceContact, SidesThatRoundingBentBackDoNotTakeTurnsForEver) {
   }
 }
 
-/// A cube of 0.1 m with a triangle whose corners are in one line, along an edge of its lower face.
-stimuli::ClosedSurface cube_with_a_flat_triangle() {
+using Corners = std::array<std::uint32_t, 3>;
+
+/// The triangle beyond each side. \param triangles  closed, two to an edge
+std::vector<Corners> neighbours_of(const std::vector<Corners>& triangles) {
+  std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t> over;
+  for (std::uint32_t i = 0; i < triangles.size(); ++i) {
+    for (std::size_t k = 0; k < 3; ++k) over[{triangles[i][(k + 1) % 3], triangles[i][k]}] = i;
+  }
+  std::vector<Corners> across(triangles.size());
+  for (std::size_t i = 0; i < triangles.size(); ++i) {
+    for (std::size_t k = 0; k < 3; ++k)
+      across[i][k] = over.at({triangles[i][k], triangles[i][(k + 1) % 3]});
+  }
+  return across;
+}
+
+/// A cube of 0.1 m with a triangle whose corners are in one line along an edge of its lower face,
+/// or with two of them, each along the other.
+stimuli::ClosedSurface cube_with_flat_triangles(bool two) {
   stimuli::ClosedSurface cube = stimuli::closed_surface(box_soup(Vec3(-0.05), Vec3(0.05))).surface;
-  const auto normal = [&](const std::array<std::uint32_t, 3>& t) {
-    const auto& v = cube.vertices;
-    return glm::normalize(glm::cross(v[t[1]] - v[t[0]], v[t[2]] - v[t[0]]));
+  std::vector<Vec3>& places = cube.vertices;
+  std::vector<Corners>& triangles = cube.triangles;
+  const auto normal = [&](const Corners& t) {
+    return glm::normalize(glm::cross(places[t[1]] - places[t[0]], places[t[2]] - places[t[0]]));
   };
-  for (std::uint32_t low = 0; low < cube.triangles.size(); ++low) {
+  // Puts a corner at a share of the side from a to b and divides the triangle there.
+  const auto divide = [&](std::uint32_t triangle, std::size_t k, double share) {
+    const std::uint32_t a = triangles[triangle][k], b = triangles[triangle][(k + 1) % 3],
+                        apex = triangles[triangle][(k + 2) % 3];
+    const auto middle = static_cast<std::uint32_t>(places.size());
+    places.push_back((1 - share) * places[a] + share * places[b]);
+    triangles[triangle] = {a, middle, apex};
+    triangles.push_back({middle, b, apex});
+    triangles.push_back({b, middle, a});
+  };
+  for (std::uint32_t low = 0; low < 12; ++low) {
     for (std::size_t k = 0; k < 3; ++k) {
       const std::uint32_t side = cube.across[low][k];
-      if (normal(cube.triangles[low]).z > -0.9 || normal(cube.triangles[side]).x < 0.9) continue;
-      const std::uint32_t a = cube.triangles[low][k], b = cube.triangles[low][(k + 1) % 3];
+      if (normal(triangles[low]).z > -0.9 || normal(triangles[side]).x < 0.9) continue;
+      const std::uint32_t b = triangles[low][(k + 1) % 3];
       std::size_t j = 0;
-      while (cube.triangles[side][j] != b) ++j;
-      const std::uint32_t c = cube.triangles[side][(j + 2) % 3];
-      const std::uint32_t over_ac = cube.across[side][(j + 1) % 3],
-                          over_cb = cube.across[side][(j + 2) % 3];
-      const auto middle = static_cast<std::uint32_t>(cube.vertices.size());
-      cube.vertices.push_back(0.75 * cube.vertices[a] + 0.25 * cube.vertices[b]);
-      const auto flat = static_cast<std::uint32_t>(cube.triangles.size()), other = flat + 1;
-      cube.triangles[side] = {b, middle, c};
-      cube.across[side] = {flat, other, over_cb};
-      cube.triangles.push_back({b, a, middle});
-      cube.across.push_back({low, other, side});
-      cube.triangles.push_back({middle, a, c});
-      cube.across.push_back({flat, over_ac, side});
-      cube.across[low][k] = flat;
-      for (std::uint32_t& beyond : cube.across[over_ac]) {
-        if (beyond == side) beyond = other;
-      }
+      while (triangles[side][j] != b) ++j;
+      divide(side, j, 0.75);
+      if (two) divide(low, k, 0.4);
+      cube.across = neighbours_of(triangles);
       return cube;
     }
   }
   return cube;
 }
 
-TEST_P(SurfaceContact, ATriangleWithoutAreaLeavesNoGap) {
+TEST_P(SurfaceContact, TrianglesWithoutAreaLeaveNoGap) {
   if (!GetParam()->side_contact()) return;
-  const std::vector<SurfaceShell> shells = {
-      {std::make_shared<const stimuli::ClosedSurface>(cube_with_a_flat_triangle()), Pose{},
-       spring()}};
-  const Scene scene({}, true, {}, nullptr, {{std::make_shared<const Surface>(shells), Pose{}, 0}});
-  const Vec3 edge(0.05, 0, -0.05), out = glm::normalize(Vec3(1, 0, -1)),
-                                   along = 0.05 * glm::normalize(Vec3(1, 0.1, 1));
-  for (double y = -0.045; y < 0.046; y += 0.01) {
-    RenderState state = scene.initial_state();
-    Rendering r;
-    for (int i = -100; i <= 20; ++i) {
-      const Vec3 tip = edge + Vec3(0, y, 0) - along - 1e-4 * i * out;
-      r = tick(scene, state, {tip, tip + 2.0 * along});
+  for (const bool two : {false, true}) {
+    const std::vector<SurfaceShell> shells = {
+        {std::make_shared<const stimuli::ClosedSurface>(cube_with_flat_triangles(two)), Pose{},
+         spring()}};
+    const auto surface = std::make_shared<const Surface>(shells);
+    int flat = 0;
+    for (const SurfaceTriangle& t : surface->triangles()) {
+      const auto at = [&](std::size_t k) { return surface->vertices()[t.corners[k]]; };
+      if (glm::length(glm::cross(at(1) - at(0), at(2) - at(0))) > 1e-12) continue;
+      ++flat;
+      EXPECT_TRUE(t.normal == Vec3(1, 0, 0) || t.normal == Vec3(0, 0, -1)) << "of its neighbours";
     }
-    ASSERT_NEAR(glm::length(r.force - kStiffness * 0.002 * out), 0, 1e-4) << y;
+    ASSERT_EQ(flat, two ? 2 : 1);
+    const Scene scene({}, true, {}, nullptr, {{surface, Pose{}, 0}});
+    const Vec3 edge(0.05, 0, -0.05), out = glm::normalize(Vec3(1, 0, -1)),
+                                     along = 0.05 * glm::normalize(Vec3(1, 0.1, 1));
+    for (double y = -0.045; y < 0.046; y += 0.01) {
+      RenderState state = scene.initial_state();
+      Rendering r;
+      for (int i = -100; i <= 20; ++i) {
+        const Vec3 tip = edge + Vec3(0, y, 0) - along - 1e-4 * i * out;
+        r = tick(scene, state, {tip, tip + 2.0 * along});
+      }
+      ASSERT_NEAR(glm::length(r.force - kStiffness * 0.002 * out), 0, 1e-4) << two << ' ' << y;
+    }
   }
 }
 
