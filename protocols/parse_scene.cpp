@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "data/base/text.h"
 #include "protocols/json_document.h"
 #include "protocols/parse.h"
 #include "stimuli/mesh_file.h"
@@ -523,6 +524,8 @@ std::string folder_of(const std::string& file) {
 std::string read_scene_text(const std::string& path) {
   if (!stimuli::is_mesh_file_name(path)) return read_text_file(path);
   const std::string name = std::filesystem::path(path).filename().string();
+  if (!is_plain_utf8(name))
+    throw InputError({{path, "(file)", "a name in UTF-8, as scenes are", 0}});
   return json{{"objects", {{{"shape", "mesh"}, {"file", name}}}}}.dump();
 }
 

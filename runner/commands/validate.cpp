@@ -23,6 +23,7 @@
 #include "stimuli/closed_surface.h"
 #include "stimuli/parts/convex_parts.h"
 #include "stimuli/primitives.h"
+#include "stimuli/solids/solid_mesh.h"
 
 namespace palpate::runner::commands {
 namespace {
@@ -40,6 +41,10 @@ void check_meshes(const stimuli::ObjectSpec& object, const std::string& pointer,
   }
   const std::string where = object.shape == stimuli::ShapeKind::mesh ? pointer + "/file" : pointer;
   try {
+    if (stimuli::is_gmsh_file_name(object.file)) {
+      stimuli::solid_of_file(object);
+      return;
+    }
     const stimuli::PolygonSoup soup = stimuli::polygons_of(object);
     if (!stimuli::convex_as_it_is(soup)) stimuli::closed_surface(soup);
   } catch (const stimuli::MeshError& error) {
@@ -52,6 +57,7 @@ void check_meshes(const stimuli::ObjectSpec& object, const std::string& pointer,
 /// Prints overlapping groups of a mesh file: accepted, but probably unintended if parts should
 /// abut.
 void print_overlaps(const stimuli::ObjectSpec& object, const std::string& name, std::ostream& out) {
+  if (object.soft) return;  // tetrahedra do not overlap
   for (const stimuli::ObjectSpec& part : object.parts) print_overlaps(part, name, out);
   for (const std::string& overlap : stimuli::group_overlaps(object))
     out << "  note        " << name << " (" << printable(object.file_name)
@@ -183,11 +189,11 @@ void print_fitness(const protocols::Protocol& protocol, const StimulusLibrary& l
   print_verdict("simulate", session::simulation_faults(shown, library, settings), limited, out);
 }
 
-/// Whether it is a scene; else it is a protocol, or what should be one.
+/// Whether it is a scene: those have no version. Else it is a protocol, or what should be one.
 bool is_scene(const std::string& text, const std::string& path) {
   protocols::FaultList faults(path);
   const nlohmann::json root = protocols::read_json(text, faults);
-  return root.is_object() && root.contains("objects") && !root.contains("stimuli");
+  return root.is_object() && root.contains("objects") && !root.contains("version");
 }
 
 /// Checks a scene, or a mesh alone, as both renderers show it.

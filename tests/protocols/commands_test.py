@@ -6,6 +6,7 @@ Usage: commands_test.py PALPATE SOURCE_DIR
 import csv
 import io
 import json
+import os
 import pathlib
 import statistics
 import subprocess
@@ -106,11 +107,31 @@ class Validate(unittest.TestCase):
                 self.assertEqual(run("validate", str(path), "--texts").returncode, 2)
             part.write_text("".join(line for line in part.read_text().splitlines(True) if line != "f 1 2 4\n"))
             scene.write_text('{"objects": [{"shape": "cube"}]}')
+            unnamed = os.path.join(os.fsencode(folder), b"bad\xff.obj")
+            pathlib.Path(os.fsdecode(unnamed)).write_bytes(mesh.read_bytes())
+            refused = run("validate", unnamed)
+            self.assertEqual((refused.returncode, refused.stdout), (2, b""))
+            self.assertIn(b"a name in UTF-8", refused.stderr)
             for path, words in ((part, b"part.obj: /objects/0/file: open: edge "), (scene, b"scene.json:1: /objects/0/edge_m: "),
                                 (pathlib.Path(folder) / "no.stl", b"there is no ")):
                 refused = run("validate", str(path))
                 self.assertEqual((refused.returncode, refused.stdout), (2, b""))
                 self.assertIn(words, refused.stderr)
+
+    def test_soft_objects_of_tetrahedra_are_checked(self):
+        solid = SOURCE / "tests" / "protocols" / "good" / "tetrahedra.msh"
+        soft = {"shape": "mesh", "file": str(solid), "soft": {"young_pa": 50000}}
+        protocol = {"version": 1, "name": "own", "renderers": ["point"], "repetitions": 1, "stimuli": [
+            {"name": "organ", **soft}, {"name": "ball", "shape": "sphere", "radius_m": 0.02}],
+            "response": {"keys": {"1": "organ", "2": "ball"}}}
+        with tempfile.TemporaryDirectory() as folder:
+            path = pathlib.Path(folder) / "own.json"
+            for document in (protocol, {"objects": [soft]}):
+                path.write_text(json.dumps(document), "utf-8")
+                done = run("validate", str(path))
+                self.assertEqual((done.returncode, done.stderr), (0, b""))
+            path.write_text(json.dumps({"version": 1, "name": "own", "objects": [soft]}), "utf-8")
+            self.assertIn(b"/stimuli: missing", run("validate", str(path)).stderr)
 
     def test_missing_file_and_wrong_usage(self):
         self.assertEqual(run("validate", "nowhere.json").returncode, 2)
