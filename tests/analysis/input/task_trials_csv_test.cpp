@@ -2,20 +2,18 @@
 
 #include <gtest/gtest.h>
 
-#include <cstdio>
 #include <fstream>
 #include <string>
 
 #include "analysis/input/task_trials.h"
 #include "protocols/parse.h"
+#include "tests/shared/temporary_folder.h"
 
 namespace palpate::analysis {
 namespace {
 
 class TaskTrialsCsv : public ::testing::Test {
  protected:
-  ~TaskTrialsCsv() override { std::remove(path_.c_str()); }
-
   TaskTable read(const std::string& rows) {
     std::ofstream(path_)
         << "participant_id,session,block,trial,task,block_name,renderer,shape,level,"
@@ -33,7 +31,8 @@ class TaskTrialsCsv : public ::testing::Test {
     return "";
   }
 
-  const std::string path_ = ::testing::TempDir() + "task_trials_csv_test.csv";
+  const palpate::testing::TemporaryFolder folder_;
+  const std::string path_ = folder_ / "trials.csv";
 };
 
 TEST_F(TaskTrialsCsv, GivesEachTrialThatIsNotPractice) {
