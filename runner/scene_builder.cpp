@@ -4,7 +4,9 @@
 #include <charconv>
 #include <cstddef>
 #include <cstring>
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <limits>
 #include <sstream>
 #include <stdexcept>
 
@@ -66,6 +68,26 @@ std::string met_by(const std::vector<stimuli::ObjectSpec>& objects, std::size_t 
     if (objects[i].body) return "/objects/" + std::to_string(k) + " as it moves";
   }
   return {};
+}
+
+/// m; the size of the box of the corners that faces use.
+Vec3 box_of(const stimuli::PolygonSoup& soup) {
+  Vec3 low(std::numeric_limits<double>::max()), high = -low;
+  for (const auto& face : soup.faces) {
+    for (const std::uint32_t v : face) {
+      low = glm::min(low, soup.vertices[v]);
+      high = glm::max(high, soup.vertices[v]);
+    }
+  }
+  return high - low;
+}
+
+std::vector<std::shared_ptr<const stimuli::ConvexMesh>> shared(
+    std::vector<stimuli::ConvexMesh> parts) {
+  std::vector<std::shared_ptr<const stimuli::ConvexMesh>> out;
+  for (stimuli::ConvexMesh& part : parts)
+    out.push_back(std::make_shared<const stimuli::ConvexMesh>(std::move(part)));
+  return out;
 }
 
 bool has_layers(const stimuli::ObjectSpec& spec) {
@@ -153,8 +175,8 @@ const std::vector<SceneBuilder::Prepared>& SceneBuilder::prepare(const stimuli::
   if (depth > 0) {
     meshes = stimuli::inset_union(surface_of(spec, side_contact), depth);
   } else {
-    for (stimuli::ConvexMesh& part : stimuli::convex_parts(spec))
-      meshes.push_back(std::make_shared<const stimuli::ConvexMesh>(std::move(part)));
+    if (spec.shape == stimuli::ShapeKind::mesh) meshes = mesh(spec).parts;
+    if (meshes.empty()) meshes = shared(stimuli::convex_parts(spec));
   }
   return prepared_.emplace(key, with_trees(meshes, side_contact)).first->second;
 }
@@ -260,21 +282,24 @@ void SceneBuilder::place(const stimuli::ObjectSpec& spec, const Pose& parent, Pl
   if (!spec.material.layers.empty()) placing.layered.push_back({&spec, pose});
 }
 
-std::shared_ptr<const stimuli::ClosedSurface> SceneBuilder::concave(
-    const stimuli::ObjectSpec& spec) {
-  if (spec.shape != stimuli::ShapeKind::mesh) return nullptr;
+const LoadedMesh& SceneBuilder::mesh(const stimuli::ObjectSpec& spec) {
   const std::string key = shape_key(spec, false);
-  if (const auto known = concave_.find(key); known != concave_.end()) return known->second;
-  std::shared_ptr<const stimuli::ClosedSurface> surface;
+  if (const auto known = meshes_.find(key); known != meshes_.end()) return known->second;
   const stimuli::PolygonSoup soup = stimuli::polygons_of(spec);
-  if (!stimuli::convex_as_it_is(soup))
-    surface = std::make_shared<const stimuli::ClosedSurface>(stimuli::closed_surface(soup).surface);
-  return concave_.emplace(key, surface).first->second;
+  LoadedMesh loaded{box_of(soup), soup.faces.size(), soup.group_names.size() > 1, {}, {}, {}};
+  if (auto parts = stimuli::convex_as_it_is(soup)) {
+    loaded.parts = shared(std::move(*parts));
+  } else {
+    stimuli::CleanedSurface cleaned = stimuli::closed_surface(soup);
+    loaded.surface = std::make_shared<const stimuli::ClosedSurface>(std::move(cleaned.surface));
+    loaded.notes = std::move(cleaned.notes);
+  }
+  return meshes_.emplace(key, std::move(loaded)).first->second;
 }
 
 bool SceneBuilder::has_concave(const stimuli::ObjectSpec& spec) {
   if (spec.soft) return false;
-  if (spec.shape != stimuli::ShapeKind::compound) return concave(spec) != nullptr;
+  if (spec.shape == stimuli::ShapeKind::mesh) return mesh(spec).surface != nullptr;
   return std::any_of(spec.parts.begin(), spec.parts.end(),
                      [&](const stimuli::ObjectSpec& part) { return has_concave(part); });
 }
@@ -290,7 +315,8 @@ void SceneBuilder::add_shells(const stimuli::ObjectSpec& spec, const Pose& in_ob
     return;
   }
   if (felt && !(spec.material.stiffness > 0)) return;
-  std::shared_ptr<const stimuli::ClosedSurface> surface = concave(spec);
+  std::shared_ptr<const stimuli::ClosedSurface> surface;
+  if (spec.shape == stimuli::ShapeKind::mesh) surface = mesh(spec).surface;
   if (surface == nullptr)
     surface = std::make_shared<const stimuli::ClosedSurface>(
         stimuli::closed_surface(stimuli::polygons_of(spec)).surface);
@@ -411,11 +437,10 @@ rendering::Scene SceneBuilder::build(const std::vector<stimuli::ObjectSpec>& obj
   }
 }
 
-StimulusLibrary::StimulusLibrary(const protocols::Protocol& protocol)
+StimulusLibrary::StimulusLibrary(const protocols::Protocol& protocol, SceneBuilder builder)
     : soft_radius_(protocol.tool.radius > 0 ? protocol.tool.radius : protocols::kSoftRadius),
       gravity_(protocol.gravity),
       tool_(tool_of(protocol.tool)) {
-  SceneBuilder builder;
   for (const protocols::StimulusSpec& stimulus : protocols::with_all_levels(protocol).stimuli) {
     double reach = 0;
     soft_.emplace_back();

@@ -28,10 +28,24 @@ WorkspaceMap workspace_of(const protocols::Protocol& protocol);
 /// m, virtual frame: how far along the stylus the hand is from the virtual tip.
 double grip_from_virtual_tip(const protocols::Protocol& protocol);
 
+/// A mesh file as it was read.
+struct LoadedMesh {
+  Vec3 size = Vec3(0);  ///< m, of its box
+  std::size_t faces = 0;
+  bool has_groups = false;
+  std::vector<std::shared_ptr<const stimuli::ConvexMesh>> parts;  ///< if it is of convex groups
+  std::shared_ptr<const stimuli::ClosedSurface> surface;          ///< else
+  std::vector<std::string> notes;  ///< what was cleaned to get the surface
+};
+
 /// Builds a scene of objects: of the convex parts of their surfaces and layers, or of closed
-/// surfaces where those are not convex; equal shapes share one mesh and its search trees.
+/// surfaces where those are not convex; equal shapes share one mesh and its search trees. A mesh
+/// file is read once, however many scenes are built.
 class SceneBuilder {
  public:
+  /// Reads a mesh file, other than of tetrahedra, if that has not been done.
+  /// \throws MeshError, std::runtime_error for an unreadable file
+  const LoadedMesh& mesh(const stimuli::ObjectSpec& spec);
   /// \throws MeshError where a shape is no solid that falls into convex parts, where nothing of it
   /// is left for a layer, where a layer cannot be made of convex parts (inset_union), or where what
   /// moves passes a limit, with the place as a JSON pointer.
@@ -72,8 +86,6 @@ class SceneBuilder {
   /// \param meets  what it may collide with, for messages; empty: nothing
   Placed placed(const stimuli::ObjectSpec& spec, int object, bool side_contact,
                 const std::string& meets);
-  /// A mesh that is not made of convex groups; null: it is, or is no mesh.
-  std::shared_ptr<const stimuli::ClosedSurface> concave(const stimuli::ObjectSpec& spec);
   bool has_concave(const stimuli::ObjectSpec& spec);
   void add_shells(const stimuli::ObjectSpec& spec, const Pose& in_object, bool felt,
                   std::vector<rendering::SurfaceShell>& shells);
@@ -82,8 +94,7 @@ class SceneBuilder {
                                  const Placing& placing, Pose& pose);
 
   std::map<std::string, std::vector<Prepared>> prepared_;  ///< the parts of each shape
-  /// Of each mesh by its shape; null where it is made of convex groups.
-  std::map<std::string, std::shared_ptr<const stimuli::ClosedSurface>> concave_;
+  std::map<std::string, LoadedMesh> meshes_;               ///< by shape
   std::map<std::string, std::shared_ptr<const rendering::Surface>> surfaces_;
 };
 
@@ -92,7 +103,7 @@ class SceneBuilder {
 class StimulusLibrary {
  public:
   /// \throws MeshError naming the stimulus.
-  explicit StimulusLibrary(const protocols::Protocol& protocol);
+  explicit StimulusLibrary(const protocols::Protocol& protocol, SceneBuilder builder = {});
 
   /// The trial's stimulus in the trial's orientation, about the origin of the workspace.
   rendering::Scene scene(const protocols::Trial& trial) const;

@@ -5,6 +5,7 @@
 #include <iostream>
 #include <nlohmann/json.hpp>
 #include <sstream>
+#include <utility>
 
 #include "data/base/text.h"
 #include "protocols/json_document.h"
@@ -32,10 +33,11 @@ constexpr double kTypicalTrial = 10;  // s; a little more than in the paper
 
 /// Builds every mesh of an object, as a session does, and adds its faults.
 void check_meshes(const stimuli::ObjectSpec& object, const std::string& pointer,
-                  const std::string& file, std::vector<protocols::Fault>& faults) {
+                  const std::string& file, SceneBuilder& builder,
+                  std::vector<protocols::Fault>& faults) {
   if (object.shape == stimuli::ShapeKind::compound) {
     for (std::size_t i = 0; i < object.parts.size(); ++i) {
-      check_meshes(object.parts[i], pointer + "/parts/" + std::to_string(i), file, faults);
+      check_meshes(object.parts[i], pointer + "/parts/" + std::to_string(i), file, builder, faults);
     }
     return;
   }
@@ -43,10 +45,11 @@ void check_meshes(const stimuli::ObjectSpec& object, const std::string& pointer,
   try {
     if (stimuli::is_gmsh_file_name(object.file)) {
       stimuli::solid_of_file(object);
-      return;
+    } else if (object.shape == stimuli::ShapeKind::mesh) {
+      builder.mesh(object);
+    } else {
+      stimuli::convex_parts(object);
     }
-    const stimuli::PolygonSoup soup = stimuli::polygons_of(object);
-    if (!stimuli::convex_as_it_is(soup)) stimuli::closed_surface(soup);
   } catch (const stimuli::MeshError& error) {
     for (const std::string& fault : error.faults()) faults.push_back({file, where, fault});
   } catch (const std::runtime_error& error) {
@@ -56,9 +59,11 @@ void check_meshes(const stimuli::ObjectSpec& object, const std::string& pointer,
 
 /// Prints overlapping groups of a mesh file: accepted, but probably unintended if parts should
 /// abut.
-void print_overlaps(const stimuli::ObjectSpec& object, const std::string& name, std::ostream& out) {
+void print_overlaps(const stimuli::ObjectSpec& object, const std::string& name,
+                    SceneBuilder& builder, std::ostream& out) {
   if (object.soft) return;  // tetrahedra do not overlap
-  for (const stimuli::ObjectSpec& part : object.parts) print_overlaps(part, name, out);
+  for (const stimuli::ObjectSpec& part : object.parts) print_overlaps(part, name, builder, out);
+  if (object.shape != stimuli::ShapeKind::mesh || !builder.mesh(object).has_groups) return;
   for (const std::string& overlap : stimuli::group_overlaps(object))
     out << "  note        " << name << " (" << printable(object.file_name)
         << "): " << printable(overlap) << "\n";
@@ -201,15 +206,17 @@ bool is_scene(const std::string& text, const std::string& path) {
 void validate_scene(const std::string& text, const std::string& path, std::ostream& out) {
   const protocols::SceneSpec spec = protocols::parse_scene_text(text, path);
   std::vector<protocols::Fault> faults;
+  SceneBuilder builder;
   for (std::size_t i = 0; i < spec.objects.size(); ++i)
-    check_meshes(spec.objects[i], "/objects/" + std::to_string(i), path, faults);
+    check_meshes(spec.objects[i], "/objects/" + std::to_string(i), path, builder, faults);
   if (!faults.empty()) throw protocols::InputError(faults);
-  build_scene(path, spec, renderer_named("point"));
-  const rendering::Scene scene = build_scene(path, spec, renderer_named("ray"));
+  build_scene(builder, path, spec, renderer_named("point"));
+  const rendering::Scene scene = build_scene(builder, path, spec, renderer_named("ray"));
   out << printable(path) << "\n  objects     " << spec.objects.size() << "\n";
-  for (const std::string& note : scene_notes(spec, scene)) out << "  note        " << note << "\n";
+  for (const std::string& note : scene_notes(spec, scene, builder))
+    out << "  note        " << note << "\n";
   for (std::size_t i = 0; i < spec.objects.size(); ++i)
-    print_overlaps(spec.objects[i], "/objects/" + std::to_string(i), out);
+    print_overlaps(spec.objects[i], "/objects/" + std::to_string(i), builder, out);
   out << "  touch it    palpate explore " << printable(path) << "\n";
 }
 
@@ -265,8 +272,10 @@ int validate_command(const std::vector<std::string>& args) {
     return 0;
   }
   std::vector<protocols::Fault> faults;
+  SceneBuilder builder;
   for (std::size_t i = 0; i < protocol.stimuli.size(); ++i) {
-    check_meshes(protocol.stimuli[i].object, "/stimuli/" + std::to_string(i), file, faults);
+    check_meshes(protocol.stimuli[i].object, "/stimuli/" + std::to_string(i), file, builder,
+                 faults);
   }
   if (!faults.empty()) throw protocols::InputError(faults);
   print_summary(protocol, std::cout);
@@ -276,11 +285,11 @@ int validate_command(const std::vector<std::string>& args) {
         << "  texts       built in, in English; a protocol in another language gives its own: "
         << list(built_in) << "\n";
   for (const protocols::StimulusSpec& stimulus : protocol.stimuli) {
-    for (const std::string& note : mesh_notes(stimulus.object))
+    for (const std::string& note : mesh_notes(stimulus.object, builder))
       std::cout << "  mesh        stimulus " << stimulus.name << ": " << note << "\n";
-    print_overlaps(stimulus.object, "stimulus " + stimulus.name, std::cout);
+    print_overlaps(stimulus.object, "stimulus " + stimulus.name, builder, std::cout);
   }
-  const StimulusLibrary library(protocol);
+  const StimulusLibrary library(protocol, std::move(builder));
   for (std::size_t i = 0; i < protocol.stimuli.size(); ++i) {
     const rendering::SoftObject* const soft = library.soft(i);
     const auto felt = soft != nullptr ? elements_felt(*soft) : std::nullopt;

@@ -160,7 +160,8 @@ py::dict render(const Document& given, const std::vector<commands::TimedPose>& p
     const py::gil_scoped_release unlocked;
     const rendering::Renderer& renderer = commands::renderer_named(renderer_name);
     const protocols::SceneSpec spec = protocols::parse_scene_text(given.text, given.file);
-    const rendering::Scene scene = commands::build_scene(given.file, spec, renderer);
+    SceneBuilder builder;
+    const rendering::Scene scene = commands::build_scene(builder, given.file, spec, renderer);
     const bool tool = scene.tool() != nullptr;
     table = std::make_unique<data::ColumnTable>(commands::force_columns(tool));
     Interruption interruption;

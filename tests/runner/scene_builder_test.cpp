@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <fstream>
 #include <glm/geometric.hpp>
 #include <string>
@@ -290,6 +291,25 @@ TEST(SceneBuilder, ABodyHasTheMassOfAllItsPartsWhateverIsFeltOfThem) {
         EXPECT_LT(glm::distance(state.motion.bodies()[0].centre, middle), 1e-9);
       }
     }
+  }
+}
+
+TEST(SceneBuilder, ReadsAMeshFileOnceForAllItsScenes) {
+  const palpate::testing::TemporaryFolder folder;
+  const std::string concave = folder / "angle.obj", convex = folder / "corner.obj";
+  const stimuli::ObjectSpec bracket = angle(concave, of(800, {}));
+  std::ofstream(convex) << "v 0 0 0\nv .1 0 0\nv 0 .2 0\nv 0 0 .3\n"
+                           "f 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n";
+  stimuli::ObjectSpec corner = bracket;
+  corner.file = convex;
+  SceneBuilder builder;
+  EXPECT_EQ(builder.mesh(bracket).faces, 8U);
+  EXPECT_LT(glm::distance(builder.mesh(corner).size, Vec3(0.1, 0.2, 0.3)), 1e-12);
+  ASSERT_TRUE(std::filesystem::remove(concave) && std::filesystem::remove(convex));
+  for (const bool sides : {false, true}) {
+    const rendering::Scene scene = builder.build({bracket, corner}, sides);
+    EXPECT_EQ(scene.surfaces().size(), 1U);
+    EXPECT_EQ(scene.parts().size(), 1U);
   }
 }
 

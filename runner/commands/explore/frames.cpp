@@ -157,7 +157,8 @@ DrawnFrames draw_frames(const std::string& scene_path, const protocols::SceneSpe
                         const rendering::Renderer& renderer, const std::vector<TimedPose>& poses,
                         const FrameSettings& settings) {
   const std::vector<std::size_t> rows = shown_rows(poses, settings.every);
-  const rendering::Scene scene = build_scene(scene_path, spec, renderer);
+  SceneBuilder builder;
+  const rendering::Scene scene = build_scene(builder, scene_path, spec, renderer);
   const TouchedScene touched = touch(scene, spec, renderer, poses, rows);
   display::SceneDrawing drawing(spec.objects, tool_of(spec.tool));
   drawing.add_compiled(scene);
@@ -187,7 +188,7 @@ DrawnFrames draw_frames(const std::string& scene_path, const protocols::SceneSpe
   DrawnFrames out{.pictures = touched.moments.size(),
                   .animation = {},
                   .seconds = poses.back().t - poses.front().t,
-                  .notes = scene_notes(spec, scene),
+                  .notes = scene_notes(spec, scene, builder),
                   .tick_median_ns = median,
                   .tick_p99_ns = p99};
   if (settings.animate)

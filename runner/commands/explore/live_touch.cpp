@@ -61,7 +61,8 @@ RecordedTouch::RecordedTouch(std::string scene_path, protocols::SceneSpec spec,
 }
 
 void RecordedTouch::touch() {
-  const rendering::Scene scene = build_scene(scene_path_, spec_, renderer_);
+  SceneBuilder builder;
+  const rendering::Scene scene = build_scene(builder, scene_path_, spec_, renderer_);
   const std::size_t stride =
       (poses_.size() + display::Timeline::kMost - 2) / (display::Timeline::kMost - 1);
   std::size_t row = 0;
@@ -126,8 +127,9 @@ display::ExploreSettings window_settings(const protocols::SceneSpec& spec,
                                          const rendering::Renderer& renderer,
                                          const HandsOnSettings& settings) {
   display::SceneDrawing drawing(spec.objects, tool_of(spec.tool));
-  const rendering::Scene scene = build_scene(settings.scene_path, spec, renderer);
-  for (const std::string& note : scene_notes(spec, scene))
+  SceneBuilder builder;
+  const rendering::Scene scene = build_scene(builder, settings.scene_path, spec, renderer);
+  for (const std::string& note : scene_notes(spec, scene, builder))
     std::cerr << printable(settings.scene_path) << ": " << note << '\n';
   drawing.add_compiled(scene);
   display::ExploreSettings out{
@@ -254,8 +256,10 @@ protocols::SceneSpec LiveTouch::with_objects(
 }
 
 void LiveTouch::prepare(const std::vector<stimuli::ObjectSpec>& objects) {
-  servo_.prepare(build_scene(settings_.scene_path, with_objects(objects), *settings_.renderer),
-                 *settings_.renderer, kAnywhere);
+  SceneBuilder builder;
+  servo_.prepare(
+      build_scene(builder, settings_.scene_path, with_objects(objects), *settings_.renderer),
+      *settings_.renderer, kAnywhere);
 }
 
 std::int64_t LiveTouch::period_ns() const {
@@ -346,8 +350,9 @@ void LiveTouch::stop_or_go_on(std::optional<std::vector<stimuli::ObjectSpec>> wa
     const std::vector<stimuli::ObjectSpec> before = std::exchange(shown_, std::move(*wanted));
     try {
       if (held) {
+        SceneBuilder builder;
         static_cast<void>(
-            build_scene(settings_.scene_path, with_objects(shown_), *settings_.renderer));
+            build_scene(builder, settings_.scene_path, with_objects(shown_), *settings_.renderer));
         anew_ = true;
       } else {
         prepare(shown_);

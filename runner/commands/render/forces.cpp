@@ -205,12 +205,12 @@ const rendering::Renderer& renderer_named(const std::string& name) {
                                     : protocols::RendererKind::point);
 }
 
-rendering::Scene build_scene(const std::string& path, const protocols::SceneSpec& spec,
+rendering::Scene build_scene(SceneBuilder& builder, const std::string& path,
+                             const protocols::SceneSpec& spec,
                              const rendering::Renderer& renderer) {
   try {
-    return SceneBuilder().build(spec.objects, renderer.side_contact(), tool_of(spec.tool),
-                                spec.gravity,
-                                spec.tool.radius > 0 ? spec.tool.radius : protocols::kSoftRadius);
+    return builder.build(spec.objects, renderer.side_contact(), tool_of(spec.tool), spec.gravity,
+                         spec.tool.radius > 0 ? spec.tool.radius : protocols::kSoftRadius);
   } catch (const stimuli::MeshError& error) {
     std::vector<std::string> faults;
     for (const std::string& fault : error.faults()) {

@@ -11,6 +11,7 @@
 #include "rendering/probe.h"
 #include "rendering/renderer.h"
 #include "runner/commands/shared/outputs.h"
+#include "runner/scene_builder.h"
 
 namespace palpate::runner::commands {
 
@@ -94,8 +95,8 @@ class BodyTable {
 const rendering::Renderer& renderer_named(const std::string& name);
 
 /// \param path  named in faults. \throws stimuli::MeshError
-rendering::Scene build_scene(const std::string& path, const protocols::SceneSpec& spec,
-                             const rendering::Renderer& renderer);
+rendering::Scene build_scene(SceneBuilder& builder, const std::string& path,
+                             const protocols::SceneSpec& spec, const rendering::Renderer& renderer);
 
 /// Gets a row of the path, its tick, and the renderer's state after it.
 using TickVisitor = std::function<void(const TimedPose&, const rendering::Rendering&,

@@ -262,21 +262,25 @@ std::string given(const po::variables_map& values, const char* option, const cha
 
 /// Of groups of mesh files that overlap.
 void add_overlaps(const stimuli::ObjectSpec& object, const std::string& pointer,
-                  std::vector<std::string>& notes) {
+                  SceneBuilder& builder, std::vector<std::string>& notes) {
   for (std::size_t i = 0; i < object.parts.size(); ++i)
-    add_overlaps(object.parts[i], pointer + "/parts/" + std::to_string(i), notes);
+    add_overlaps(object.parts[i], pointer + "/parts/" + std::to_string(i), builder, notes);
+  if (object.shape != stimuli::ShapeKind::mesh || !builder.mesh(object).has_groups) return;
   for (const std::string& overlap : stimuli::group_overlaps(object))
     notes.push_back(pointer + " (" + printable(object.file_name) + "): " + printable(overlap));
 }
 
-void explain_scene(Outputs& outputs, const rendering::Scene& scene,
-                   const protocols::SceneSpec& spec, const rendering::Renderer& renderer) {
+void explain_scene(Outputs& outputs, const std::string& path, const protocols::SceneSpec& spec,
+                   const rendering::Renderer& renderer) {
+  SceneBuilder builder;
+  const rendering::Scene scene = build_scene(builder, path, spec, renderer);
   Explanation explanation = explain_with_costs(scene, renderer);
   for (std::size_t i = 0; i < spec.objects.size(); ++i) {
     if (!spec.objects[i].soft)
-      add_overlaps(spec.objects[i], "/objects/" + std::to_string(i), explanation.notes);
+      add_overlaps(spec.objects[i], "/objects/" + std::to_string(i), builder, explanation.notes);
   }
-  for (std::string& note : scene_notes(spec, scene)) explanation.notes.push_back(std::move(note));
+  for (std::string& note : scene_notes(spec, scene, builder))
+    explanation.notes.push_back(std::move(note));
   std::cout << to_text(explanation);
   outputs.put("json", to_json(explanation).dump(2) + "\n");
   outputs.write();
@@ -327,7 +331,7 @@ int render_command(const std::vector<std::string>& args) {
   if (explains) {
     const protocols::SceneSpec spec = protocols::parse_scene(scene_path);
     for (const stimuli::ObjectSpec& object : spec.objects) outputs.protect(object);
-    explain_scene(outputs, build_scene(scene_path, spec, renderer), spec, renderer);
+    explain_scene(outputs, scene_path, spec, renderer);
     return 0;
   }
   const std::string trajectory = given(*values, "trajectory", "unless --explain is given");
@@ -335,7 +339,8 @@ int render_command(const std::vector<std::string>& args) {
   const protocols::SceneSpec spec = protocols::parse_scene(scene_path);
   for (const stimuli::ObjectSpec& object : spec.objects) outputs.protect(object);
   const std::vector<TimedPose> poses = read_trajectory(trajectory);
-  const rendering::Scene scene = build_scene(scene_path, spec, renderer);
+  SceneBuilder builder;
+  const rendering::Scene scene = build_scene(builder, scene_path, spec, renderer);
   ForceTable table(scene.tool() != nullptr);
   BodyTable bodies;
   render_along(scene, spec, renderer, poses,
@@ -347,7 +352,7 @@ int render_command(const std::vector<std::string>& args) {
   outputs.put("out", table.text());
   outputs.put("bodies", bodies.text());
   outputs.write();
-  for (const std::string& note : scene_notes(spec, scene))
+  for (const std::string& note : scene_notes(spec, scene, builder))
     std::cerr << printable(scene_path) << ": " << note << '\n';
   std::cerr << printable_lines(table.warnings(trajectory));
   return 0;

@@ -51,27 +51,20 @@ std::optional<std::string> elements_felt(const rendering::SoftObject& object) {
   return text;
 }
 
-std::vector<std::string> mesh_notes(const stimuli::ObjectSpec& object) {
+std::vector<std::string> mesh_notes(const stimuli::ObjectSpec& object, SceneBuilder& builder) {
   std::vector<std::string> notes;
   for (const stimuli::ObjectSpec& part : object.parts) {
-    for (std::string& note : mesh_notes(part)) notes.push_back(std::move(note));
+    for (std::string& note : mesh_notes(part, builder)) notes.push_back(std::move(note));
   }
   if (object.shape != stimuli::ShapeKind::mesh || object.soft) return notes;
-  const stimuli::PolygonSoup soup = stimuli::polygons_of(object);
-  Vec3 low(std::numeric_limits<double>::max()), high = -low;
-  for (const auto& face : soup.faces) {
-    for (const std::uint32_t v : face) {
-      low = glm::min(low, soup.vertices[v]);
-      high = glm::max(high, soup.vertices[v]);
-    }
-  }
-  const Vec3 size = 1000.0 * (high - low);
+  const LoadedMesh& mesh = builder.mesh(object);
+  const Vec3 size = 1000.0 * mesh.size;
   char text[160];
   const double largest = std::max({size.x, size.y, size.z});
   std::snprintf(
       text, sizeof text,
       largest < 1000 ? "%.4g x %.4g x %.4g mm, %zu faces" : "%.0f x %.0f x %.0f mm, %zu faces",
-      size.x, size.y, size.z, soup.faces.size());
+      size.x, size.y, size.z, mesh.faces);
   std::string note = printable(object.file_name) + ": " + text;
   if (largest > kBeyondHands) {
     note +=
@@ -80,20 +73,24 @@ std::vector<std::string> mesh_notes(const stimuli::ObjectSpec& object) {
   } else if (largest < kBelowTouch) {
     note += "; smaller than a tenth of a millimetre: expected coordinates in metres";
   }
-  try {
-    for (const std::string& done : stimuli::closed_surface(soup).notes) note += "; " + done;
-  } catch (const stimuli::MeshError&) {
-    // It is convex anyway, within its coordinates' error.
+  std::vector<std::string> cleaned = mesh.notes;
+  if (mesh.surface == nullptr) {
+    try {
+      cleaned = stimuli::closed_surface(stimuli::polygons_of(object)).notes;
+    } catch (const stimuli::MeshError&) {
+      // It is convex anyway, within its coordinates' error.
+    }
   }
+  for (const std::string& done : cleaned) note += "; " + done;
   notes.push_back(std::move(note));
   return notes;
 }
 
 std::vector<std::string> scene_notes(const protocols::SceneSpec& spec,
-                                     const rendering::Scene& scene) {
+                                     const rendering::Scene& scene, SceneBuilder& builder) {
   std::vector<std::string> notes = objects_passed_through(spec);
   for (std::size_t i = 0; i < spec.objects.size(); ++i) {
-    for (const std::string& note : mesh_notes(spec.objects[i]))
+    for (const std::string& note : mesh_notes(spec.objects[i], builder))
       notes.push_back("/objects/" + std::to_string(i) + ": " + note);
   }
   for (const auto& object : rendering::soft_objects(scene)) {

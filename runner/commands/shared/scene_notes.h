@@ -7,6 +7,7 @@
 
 #include "protocols/parse.h"
 #include "rendering/bodies/soft/soft_scene.h"
+#include "runner/scene_builder.h"
 
 namespace palpate::runner::commands {
 
@@ -19,10 +20,11 @@ std::optional<std::string> elements_felt(const rendering::SoftObject& object);
 
 /// For each mesh file of an object: its size in mm, so that wrong units are noticed, and the
 /// changes to its polygons. Without line ends.
-std::vector<std::string> mesh_notes(const stimuli::ObjectSpec& object);
+/// \param builder  of its scene: it has read the files
+std::vector<std::string> mesh_notes(const stimuli::ObjectSpec& object, SceneBuilder& builder);
 
 /// All these notes of a scene, with places.
 std::vector<std::string> scene_notes(const protocols::SceneSpec& spec,
-                                     const rendering::Scene& scene);
+                                     const rendering::Scene& scene, SceneBuilder& builder);
 
 }  // namespace palpate::runner::commands
