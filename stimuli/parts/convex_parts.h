@@ -68,9 +68,9 @@ std::vector<ConvexMesh> cut_into_convex_parts(const PolygonSoup& soup);
 double common_volume(const ConvexMesh& a, const ConvexMesh& b);
 
 /// One sentence for each two groups of a mesh file that overlap by more than a millionth of the
-/// smaller one. Overlaps are allowed, because an object is the union of its parts, but an author of
-/// parts that should abut wants to know.
-/// \throws as convex_parts
+/// smaller one; of many the three largest, and how many more there are. Overlaps are allowed,
+/// because an object is the union of its parts, but an author of parts that should abut wants to
+/// know. \throws as convex_parts
 std::vector<std::string> group_overlaps(const ObjectSpec& spec);
 
 }  // namespace palpate::stimuli

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cstddef>
 #include <cstdint>
 #include <cstdio>
 #include <glm/geometric.hpp>
@@ -13,6 +14,7 @@ namespace {
 
 constexpr double kCoplanar = 1e-9;  // of the size
 constexpr double kNothing = 1e-6;   // of a group's volume
+constexpr std::size_t kMostSentences = 3;
 
 /// The piece of a plane polygon behind a plane.
 std::vector<Vec3> behind(const std::vector<Vec3>& polygon, const Facet& plane) {
@@ -57,12 +59,36 @@ struct Group {
   double volume = 0;  // m^3
 };
 
-std::string sentence(const Group& a, const Group& b, double common) {
+struct Overlap {
+  double share = 0;  // of the smaller group
+  std::string sentence;
+};
+
+Overlap overlap_of(const Group& a, const Group& b, double common) {
   const Group& less = a.volume <= b.volume ? a : b;
   char text[120];
   std::snprintf(text, sizeof text, " overlap by %.3g m^3, %.3g %% of ", common,
                 100 * common / less.volume);
-  return a.name + " and " + b.name + text + less.name + "; they are touched as one object";
+  return {common / less.volume,
+          a.name + " and " + b.name + text + less.name + "; they are touched as one object"};
+}
+
+/// The largest first; the number of those left out in a last sentence.
+std::vector<std::string> largest_of(std::vector<Overlap> overlaps) {
+  std::stable_sort(overlaps.begin(), overlaps.end(),
+                   [](const Overlap& a, const Overlap& b) { return a.share > b.share; });
+  std::vector<std::string> sentences;
+  for (const Overlap& overlap : overlaps) {
+    if (sentences.size() == kMostSentences && overlaps.size() > kMostSentences + 1) {
+      char text[120];
+      std::snprintf(text, sizeof text, "%zu more pairs of groups overlap, by at most %.3g %%",
+                    overlaps.size() - kMostSentences, 100 * overlap.share);
+      sentences.emplace_back(text);
+      break;
+    }
+    sentences.push_back(overlap.sentence);
+  }
+  return sentences;
 }
 
 }  // namespace
@@ -78,14 +104,14 @@ std::vector<std::string> group_overlaps(const ObjectSpec& spec) {
   const PolygonSoup soup = polygons_of(spec);
   if (soup.group_names.size() < 2) return {};
   std::vector<Group> groups;
-  std::vector<std::string> sentences;
+  std::vector<std::string> unknown;
+  std::vector<Overlap> overlaps;
   for (const SolidGroup& solid : solid_groups(soup)) {
     Group group{solid.name, {}};
     try {
       group.parts = convex_parts(solid.soup);
     } catch (const MeshError&) {
-      sentences.push_back(solid.name +
-                          " falls into no convex parts: where it overlaps others is not known");
+      unknown.push_back(solid.name);
       continue;
     }
     for (const ConvexMesh& part : group.parts) group.volume += volume_of(part);
@@ -97,8 +123,16 @@ std::vector<std::string> group_overlaps(const ObjectSpec& spec) {
       for (const ConvexMesh& a : groups[i].parts)
         for (const ConvexMesh& b : groups[k].parts) common += common_volume(a, b);
       if (common > kNothing * std::min(groups[i].volume, groups[k].volume))
-        sentences.push_back(sentence(groups[i], groups[k], common));
+        overlaps.push_back(overlap_of(groups[i], groups[k], common));
     }
+  }
+  std::vector<std::string> sentences = largest_of(std::move(overlaps));
+  if (unknown.size() == 1) {
+    sentences.push_back(unknown.front() +
+                        " falls into no convex parts: where it overlaps others is not known");
+  } else if (!unknown.empty()) {
+    sentences.push_back(unknown.front() + " and " + std::to_string(unknown.size() - 1) +
+                        " more groups fall into no convex parts: where they overlap is not known");
   }
   return sentences;
 }

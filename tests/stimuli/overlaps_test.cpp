@@ -67,33 +67,44 @@ TEST(CommonVolume, OfSolidsInAnyOrientationIsThatOfSampledPoints) {
   }
 }
 
-TEST(GroupOverlaps, NameTheGroupsAndHowMuch) {
+/// Of a file of cubes in a row, each a group. \param places  m, of their centres
+std::vector<std::string> overlaps_of_cubes(const std::vector<double>& places) {
   const testing::TemporaryFolder folder;
-  const auto notes = [&](double apart) {
-    const std::string path = folder / "overlapping_groups.obj";
-    std::ofstream file(path);
-    for (int b = 0; b < 2; ++b) {
-      file << "g box" << b << "\n";
-      const PolygonSoup box = cube(0.02);
-      for (const Vec3& v : box.vertices)
-        file << "v " << v.x + b * apart << ' ' << v.y << ' ' << v.z << '\n';
-      for (const auto& face : box.faces) {
-        file << 'f';
-        for (const std::uint32_t corner : face) file << ' ' << 8 * b + static_cast<int>(corner) + 1;
-        file << '\n';
-      }
+  ObjectSpec spec;
+  spec.shape = ShapeKind::mesh;
+  spec.file = folder / "cubes.obj";
+  std::ofstream file(spec.file);
+  for (std::size_t b = 0; b < places.size(); ++b) {
+    file << "g box" << b << "\n";
+    const PolygonSoup box = cube(0.02);
+    for (const Vec3& v : box.vertices)
+      file << "v " << v.x + places[b] << ' ' << v.y << ' ' << v.z << '\n';
+    for (const auto& face : box.faces) {
+      file << 'f';
+      for (const std::uint32_t corner : face) file << ' ' << 8 * b + corner + 1;
+      file << '\n';
     }
-    file.close();
-    ObjectSpec spec;
-    spec.shape = ShapeKind::mesh;
-    spec.file = path;
-    return group_overlaps(spec);
-  };
-  EXPECT_EQ(notes(0.015), std::vector<std::string>{
-                              "group 'box0' and group 'box1' overlap by 2e-06 m^3, 25 % of group "
-                              "'box0'; they are touched as one object"});
-  EXPECT_TRUE(notes(0.02).empty());
-  EXPECT_TRUE(notes(0.03).empty());
+  }
+  file.close();
+  return group_overlaps(spec);
+}
+
+TEST(GroupOverlaps, NameTheGroupsAndHowMuch) {
+  EXPECT_EQ(overlaps_of_cubes({0, 0.015}),
+            std::vector<std::string>{"group 'box0' and group 'box1' overlap by 2e-06 m^3, 25 % of "
+                                     "group 'box0'; they are touched as one object"});
+  EXPECT_TRUE(overlaps_of_cubes({0, 0.02}).empty());
+  EXPECT_TRUE(overlaps_of_cubes({0, 0.03}).empty());
+}
+
+TEST(GroupOverlaps, OfManyNameTheLargest) {
+  const std::vector<std::string> said =
+      overlaps_of_cubes({0, 0.019, 0.037, 0.054, 0.07, 0.085, 0.104});
+  ASSERT_EQ(said.size(), 4U);
+  EXPECT_TRUE(said[0].starts_with("group 'box4' and group 'box5' overlap by 2e-06 m^3, 25 %"));
+  EXPECT_TRUE(said[1].starts_with("group 'box3' and group 'box4' overlap by 1.6e-06 m^3, 20 %"));
+  EXPECT_TRUE(said[2].starts_with("group 'box2' and group 'box3' overlap by 1.2e-06 m^3, 15 %"));
+  EXPECT_EQ(said[3], "3 more pairs of groups overlap, by at most 10 %");
 }
 
 }  // namespace
