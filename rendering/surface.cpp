@@ -102,6 +102,7 @@ Surface::Surface(std::span<const SurfaceShell> shells) {
   radius_ *= 1 + 1e-15;
   find_edges();
   build_tree();
+  seam_ = widest_seam();
 }
 
 void Surface::add(const SurfaceShell& shell) {

@@ -69,6 +69,9 @@ class Surface {
   double radius() const { return radius_; }  ///< m, of that sphere
   double size() const { return 2 * radius_; }
   double coordinate_error() const { return coordinate_error_; }  ///< m, of the worst shell
+  /// m, the widest gap or step that rounding of coordinates has made between faces of two shells
+  /// that abut; 0: none
+  double seam() const { return seam_; }
 
   /// Of the tree: up to eight children side by side, relative to the centre, in single precision.
   static constexpr std::size_t kWidth = 8;
@@ -105,6 +108,9 @@ class Surface {
 
  private:
   void add(const SurfaceShell& shell);
+  double widest_seam() const;
+  template <class Visit>
+  void near_box(const Vec3& low, const Vec3& high, const Visit& visit) const;
   void find_edges();
   void build_tree();
   void sort_by(std::span<const std::uint32_t> order);
@@ -116,7 +122,7 @@ class Surface {
   stimuli::LargeArray<SurfaceTriangle> triangles_;
   std::vector<stimuli::Material> materials_;
   std::vector<std::uint32_t> file_order_;
-  double coordinate_error_ = 0;
+  double coordinate_error_ = 0, seam_ = 0;
   stimuli::LargeArray<Node> nodes_;
   std::uint32_t root_ = 0;
   Vec3 centre_;

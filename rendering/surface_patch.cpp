@@ -207,13 +207,16 @@ double distance_off(const PatchPolygon& polygon, const Vec3& normal, const Vec3&
 
 void cast_on_patch(const Surface& surface, const SurfacePatch& patch, const PatchPlane& plane,
                    const PosedTool& tool, const Vec3& from, const Vec3& to, double tolerance,
-                   PatchHit& first) {
+                   double border, PatchHit& first) {
   const double start = glm::dot(plane.normal, from) - plane.depth,
                end = glm::dot(plane.normal, to) - plane.depth;
   if (end > 0 || start < -tolerance || !(end < start)) return;
   const double time = std::max(0.0, start / (start - end));
   if (!first.yields_to(time, patch.segment, patch.triangle())) return;
-  if (meets(polygon_of(surface, patch, tool), from, to - from)) first = {patch, time};
+  const PatchPolygon polygon = polygon_of(surface, patch, tool);
+  if (meets(polygon, from, to - from) ||
+      (border > 0 && distance_off(polygon, plane.normal, from + time * (to - from)) <= border))
+    first = {patch, time};
 }
 
 void sweep_triangle(const Surface& surface, std::uint32_t index, std::uint8_t segment,

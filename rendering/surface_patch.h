@@ -98,9 +98,10 @@ struct PatchHit {
 
 /// Replaces `first` if a translation from `from` to `to` enters the patch earlier.
 /// \param tolerance  m; a tool less than this behind a plane counts as before it
+/// \param border  m; so far beyond its border the patch is met as well
 void cast_on_patch(const Surface& surface, const SurfacePatch& patch, const PatchPlane& plane,
                    const PosedTool& tool, const Vec3& from, const Vec3& to, double tolerance,
-                   PatchHit& first);
+                   double border, PatchHit& first);
 
 /// The same for a segment whose ends move linearly, over all patches of a triangle and its own
 /// sides. \param what   patches to test; bits of surface_pair \param slack  m; edges and segment

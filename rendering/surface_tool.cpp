@@ -10,14 +10,18 @@
 namespace palpate::rendering {
 namespace {
 
-constexpr int kRounds = 96;          // casts a tick at most; then the ideal tool keeps its place
-constexpr double kSlidOff = 4;       // skins; farther off its patch, a contact has ended
-constexpr double kAtRest = 2e-12;    // of the size; the same without the skin
-constexpr double kOnPatch = 1e-11;   // of the size
-constexpr double kRounding = 0.125;  // of the skin; tolerance of its width
-constexpr double kLessSkin = 0.25;   // of the skin, repeatedly, in a gap narrower than two
-constexpr double kInTheWay = 0.25;   // of the tolerance; a patch that is deeper holds the tool
-constexpr double kSamePlace = 8;     // skins; within them a returning contact never left
+constexpr int kRounds = 96;           // casts a tick at most; then the ideal tool keeps its place
+constexpr double kSlidOff = 4;        // skins; farther off its patch, a contact has ended
+constexpr double kAtRest = 2e-12;     // of the size; the same without the skin
+constexpr double kOffSeam = 3;        // seams; so far beyond its border a patch closes a crack
+constexpr double kMouth = 1;          // seams; a free tool meets a patch so far beyond its border
+constexpr double kUnderSeam = 1.25;   // seams; the side of a step that rounding makes is no deeper
+constexpr double kBesideStep = 0.99;  // cosine; of the faces that it parts
+constexpr double kOnPatch = 1e-11;    // of the size
+constexpr double kRounding = 0.125;   // of the skin; tolerance of its width
+constexpr double kLessSkin = 0.25;    // of the skin, repeatedly, in a gap narrower than two
+constexpr double kInTheWay = 0.25;    // of the tolerance; a patch that is deeper holds the tool
+constexpr double kSamePlace = 8;      // skins; within them a returning contact never left
 // The skin hides the bottom of a flat valley: its sides would alternate endlessly. A tool that is
 // held `depth` off its goal goes from the nearest place of one side to that of the other, depth
 // times the angle between them, and does not meet the side that it leaves where that way times the
@@ -167,6 +171,9 @@ void SurfaceTool::find_list() {
   per_way2_ = way2 > 0 ? 1 / way2 : 0;
 }
 
+/// m; free tools do not enter cracks that rounding has opened.
+double SurfaceTool::border() const { return planes_.empty() ? kMouth * surface_.seam() : 0; }
+
 /// Finds the first listed patch on a straight line.
 /// \param done  fraction of the way that need not be looked at; the rest begins within the list's
 /// room \return fraction up to which the list is complete
@@ -182,7 +189,7 @@ double SurfaceTool::cast_on_list(const Vec3& from, const Vec3& to, double done,
     if (above - error > first.time * (above + under + 2 * error)) continue;
     if (!exists(surface_, near.patch, turned_)) continue;
     cast_on_patch(surface_, near.patch, rendering::plane_of(surface_, near.patch, turned_), turned_,
-                  from, to, tolerance_, first);
+                  from, to, tolerance_, border(), first);
   }
   // The list is for a convex region.
   if (in_room(to)) return 1;
@@ -228,7 +235,7 @@ PatchHit SurfaceTool::cast(const Vec3& from, const Vec3& to) {
                            [&](const SurfacePatch& patch) {
                              cast_on_patch(surface_, patch,
                                            rendering::plane_of(surface_, patch, turned_), turned_,
-                                           from, to, tolerance_, first);
+                                           from, to, tolerance_, border(), first);
                            });
             return true;
           });
@@ -329,6 +336,16 @@ bool SurfaceTool::in_valley() const {
   return std::any_of(all.begin(), all.end(), [](const SurfacePlane& plane) { return plane.stays; });
 }
 
+/// Whether a patch that the tool enters when the skin is removed is the side of a step that
+/// rounding has made. \param under  m, how deep it enters
+bool SurfaceTool::is_step(const PatchPlane& plane, double under) const {
+  if (!(under <= kUnderSeam * surface_.seam())) return false;
+  const auto all = planes_.all();
+  return std::none_of(all.begin(), all.end(), [&](const SurfacePlane& held) {
+    return glm::dot(held.normal, plane.normal) > kBesideStep;
+  });
+}
+
 /// Looks for a patch that the tool enters when the skin is removed; sets its plane.
 bool SurfaceTool::in_the_way_at_rest(SurfacePlane& out) {
   double deepest = in_valley() ? kSides * glm::length(at_) : kInTheWay * tolerance_;
@@ -339,9 +356,9 @@ bool SurfaceTool::in_the_way_at_rest(SurfacePlane& out) {
                               patch.triangle() < out.patch.triangle())) ||
         plane.depth - glm::dot(plane.normal, at_) > tolerance_)
       return;
-    if (holds(patch)) return;
+    if (holds(patch) || is_step(plane, under)) return;
     PatchHit hit;
-    cast_on_patch(surface_, patch, plane, turned_, at_, exact_, tolerance_, hit);
+    cast_on_patch(surface_, patch, plane, turned_, at_, exact_, tolerance_, 0, hit);
     if (!hit.hit()) return;
     deepest = under;
     found = true;
@@ -444,7 +461,7 @@ void SurfaceTool::translate() {
 
 void SurfaceTool::find_rest() {
   parted_count_ = 0;
-  const double slack = kAtRest * surface_.size();
+  const double slack = std::max(kAtRest * surface_.size(), kOffSeam * surface_.seam());
   for (int round = 0; round < kRounds && !stuck_; ++round) {
     Vec3 goal;
     if (!find_goal(goal)) break;

@@ -68,6 +68,7 @@ class SurfaceTool {
   bool in_room(const Vec3& at, double share = 1) const;
   void find_list();
   Vec3 from_list() const { return turned_.segments[0].start - own_.listed.segments[0].start; }
+  double border() const;
   PatchHit cast(const Vec3& from, const Vec3& to);
   double cast_on_list(const Vec3& from, const Vec3& to, double done, PatchHit& first) const;
   void resume_planes();
@@ -78,6 +79,7 @@ class SurfaceTool {
   bool find_exact_place();
   bool rests();
   bool in_valley() const;
+  bool is_step(const PatchPlane& plane, double under) const;
   bool in_the_way_at_rest(SurfacePlane& plane);
   void take_plane(const SurfacePlane& plane);
   void let_go_of_idle_planes();

@@ -90,6 +90,14 @@ std::vector<std::shared_ptr<const stimuli::ConvexMesh>> shared(
   return out;
 }
 
+/// Whether rounding made steps or gaps between parts that the law of unions would feel: it has a
+/// thinner skin.
+bool has_seams(const std::vector<rendering::SurfaceShell>& shells) {
+  constexpr double kFelt = 5e-10;  // of the size
+  const rendering::Surface surface(shells);
+  return surface.seam() > kFelt * surface.size();
+}
+
 bool has_layers(const stimuli::ObjectSpec& spec) {
   if (spec.shape != stimuli::ShapeKind::compound) return !spec.material.layers.empty();
   return std::any_of(spec.parts.begin(), spec.parts.end(), has_layers);
@@ -286,19 +294,54 @@ const LoadedMesh& SceneBuilder::mesh(const stimuli::ObjectSpec& spec) {
   const std::string key = shape_key(spec, false);
   if (const auto known = meshes_.find(key); known != meshes_.end()) return known->second;
   const stimuli::PolygonSoup soup = stimuli::polygons_of(spec);
-  LoadedMesh loaded{box_of(soup), soup.faces.size(), soup.group_names.size() > 1, {}, {}, {}};
-  if (auto parts = stimuli::convex_as_it_is(soup)) {
-    loaded.parts = shared(std::move(*parts));
-  } else {
+  LoadedMesh loaded{box_of(soup),
+                    soup.faces.size(),
+                    soup.group_names.size() > 1,
+                    soup.coordinate_error > 0,
+                    {},
+                    {},
+                    {}};
+  const auto take_surface = [&] {
     stimuli::CleanedSurface cleaned = stimuli::closed_surface(soup);
     loaded.surface = std::make_shared<const stimuli::ClosedSurface>(std::move(cleaned.surface));
     loaded.notes = std::move(cleaned.notes);
+  };
+  auto parts = stimuli::convex_as_it_is(soup);
+  if (!parts) {
+    take_surface();
+  } else if (parts->size() == 1 || !loaded.is_rounded) {
+    loaded.parts = shared(std::move(*parts));
+  } else {
+    try {
+      take_surface();
+    } catch (const stimuli::MeshError&) {
+      // Its groups are convex within their coordinates' error, and that is enough.
+    }
+    if (loaded.surface == nullptr || !has_seams({{loaded.surface, {}, {}}})) {
+      loaded.parts = shared(std::move(*parts));
+      loaded.surface = nullptr;
+      loaded.notes.clear();
+    }
   }
   return meshes_.emplace(key, std::move(loaded)).first->second;
 }
 
-bool SceneBuilder::has_concave(const stimuli::ObjectSpec& spec) {
+bool SceneBuilder::is_surface(const stimuli::ObjectSpec& spec) {
   if (spec.soft) return false;
+  if (has_concave(spec)) return true;
+  if (spec.shape != stimuli::ShapeKind::compound || !is_rounded(spec)) return false;
+  std::vector<rendering::SurfaceShell> shells;
+  add_shells(spec, Pose{}, false, shells);
+  return has_seams(shells);
+}
+
+bool SceneBuilder::is_rounded(const stimuli::ObjectSpec& spec) {
+  if (spec.shape == stimuli::ShapeKind::mesh) return mesh(spec).is_rounded;
+  return std::any_of(spec.parts.begin(), spec.parts.end(),
+                     [&](const stimuli::ObjectSpec& part) { return is_rounded(part); });
+}
+
+bool SceneBuilder::has_concave(const stimuli::ObjectSpec& spec) {
   if (spec.shape == stimuli::ShapeKind::mesh) return mesh(spec).surface != nullptr;
   return std::any_of(spec.parts.begin(), spec.parts.end(),
                      [&](const stimuli::ObjectSpec& part) { return has_concave(part); });
@@ -332,7 +375,7 @@ std::vector<rendering::MovingObject> SceneBuilder::moving_of(
     const stimuli::ObjectSpec& spec = objects[i];
     if (!spec.body) continue;
     moving.push_back({static_cast<int>(i), *spec.body, spec.pose});
-    if (!has_concave(spec)) continue;
+    if (!is_surface(spec)) continue;
     std::vector<rendering::SurfaceShell> felt, all;
     add_shells(spec, Pose{}, true, felt);
     add_shells(spec, Pose{}, false, all);
@@ -347,7 +390,7 @@ SceneBuilder::Placed SceneBuilder::placed(const stimuli::ObjectSpec& spec, int o
   Placed out;
   // A solid of tetrahedra need not fall into convex parts, and nothing rigid is made of it.
   if (spec.soft && spec.shape == stimuli::ShapeKind::mesh) return out;
-  Placing placing{object, side_contact, has_layers(spec), has_concave(spec), out.parts};
+  Placing placing{object, side_contact, has_layers(spec), is_surface(spec), out.parts};
   std::string reason = "its layers are made of convex parts, and it falls into none: ";
   try {
     place(spec, Pose{}, placing);

@@ -32,10 +32,11 @@ double grip_from_virtual_tip(const protocols::Protocol& protocol);
 struct LoadedMesh {
   Vec3 size = Vec3(0);  ///< m, of its box
   std::size_t faces = 0;
-  bool has_groups = false;
-  std::vector<std::shared_ptr<const stimuli::ConvexMesh>> parts;  ///< if it is of convex groups
-  std::shared_ptr<const stimuli::ClosedSurface> surface;          ///< else
-  std::vector<std::string> notes;  ///< what was cleaned to get the surface
+  bool has_groups = false, is_rounded = false;
+  /// If it is made of convex groups that abut without gaps and steps.
+  std::vector<std::shared_ptr<const stimuli::ConvexMesh>> parts;
+  std::shared_ptr<const stimuli::ClosedSurface> surface;  ///< else
+  std::vector<std::string> notes;                         ///< what was cleaned to get the surface
 };
 
 /// Builds a scene of objects: of the convex parts of their surfaces and layers, or of closed
@@ -86,7 +87,10 @@ class SceneBuilder {
   /// \param meets  what it may collide with, for messages; empty: nothing
   Placed placed(const stimuli::ObjectSpec& spec, int object, bool side_contact,
                 const std::string& meets);
+  /// Whether the object is felt as one closed surface, not as convex parts.
+  bool is_surface(const stimuli::ObjectSpec& spec);
   bool has_concave(const stimuli::ObjectSpec& spec);
+  bool is_rounded(const stimuli::ObjectSpec& spec);
   void add_shells(const stimuli::ObjectSpec& spec, const Pose& in_object, bool felt,
                   std::vector<rendering::SurfaceShell>& shells);
   void place_layers(Placing& placing);

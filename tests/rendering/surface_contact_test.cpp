@@ -520,6 +520,73 @@ TEST_P(SurfaceContact, ACrackThatRoundingOpensBetweenShellsLetsNothingIn) {
   }
 }
 
+/// A corner as a file with so many decimals has it.
+Vec3 rounded(const Vec3& corner, double decimals) {
+  const double unit = std::pow(10.0, -decimals);
+  Vec3 out;
+  for (int c = 0; c < 3; ++c) out[c] = unit * std::round(corner[c] / unit);
+  return out;
+}
+
+TEST_P(SurfaceContact, AStepThatRoundingMakesBetweenShellsHoldsNothing) {
+  // Two blocks of different sizes with their upper faces in one plane, turned.
+  Random random(11);
+  for (const int decimals : {5, 6, 7, 8, 9}) {
+    for (int round = 0; round < 20; ++round) {
+      const Quat turn = glm::angleAxis(3 * random.unit(), direction(random));
+      std::vector<stimuli::PolygonSoup> blocks{
+          box_soup({-0.05, -0.025, -0.05}, {0, 0.025, 0}),
+          box_soup({0, -0.03 - 0.01 * random.unit(), -0.03}, {0.05, 0.03, 0})};
+      for (stimuli::PolygonSoup& block : blocks) {
+        for (Vec3& v : block.vertices) v = rounded(turn * v, decimals);
+        block.coordinate_error = 0.5 * std::pow(10.0, -decimals);
+      }
+      const Scene scene = scene_of(blocks);
+      const Vec3 along = turn * Vec3(1, 0, 0), up = turn * Vec3(0, 0, 1);
+      const double way = round % 2 == 0 ? 1 : -1, depth = 1e-3;
+      RenderState state = scene.initial_state();
+      const auto touch = [&](double x, double height) {
+        const Vec3 tip = way * x * along + height * up;
+        return tick(scene, state, {tip, tip + turn * Vec3(0.02, 0.01, 0.11)});
+      };
+      // Straight down where the blocks meet.
+      for (double height = 2e-3; height > -depth; height -= 1e-4) touch(0, height);
+      ASSERT_NEAR(glm::dot(touch(0, -depth).force, up) / kStiffness, depth, 0.01 * depth)
+          << decimals << ' ' << round;
+      state = scene.initial_state();
+      // Faces may be tilted by rounding: from end to end by some coordinate errors.
+      const double tilt = 4 * blocks[0].coordinate_error / 0.03;
+      // Slowly over the seam.
+      for (double height = 2e-3; height > -depth; height -= 1e-4) touch(-0.02, height);
+      for (double x = -0.02; x < 0.02; x += std::abs(x) < 1e-4 ? 3e-7 : 2e-4) {
+        const Rendering r = touch(x, -depth);
+        ASSERT_EQ(r.faults, 0U) << decimals << ' ' << round << ' ' << x;
+        const Vec3 off = r.force / kStiffness - depth * up;
+        ASSERT_LT(glm::length(off), 1e-9 + tilt * depth + 4 * blocks[0].coordinate_error)
+            << decimals << ' ' << round << ' ' << x;
+      }
+    }
+  }
+}
+
+TEST(SurfaceSeam, IsAsWideAsTheGapBetweenTwoShellsWithinTheirError) {
+  constexpr double kError = 1e-7;
+  const auto seam = [&](const Vec3& low, double error) {
+    stimuli::PolygonSoup plate = box_soup({-0.05, -0.05, -0.02}, {0.05, 0.05, 0}),
+                         block = box_soup(low, low + Vec3(0.03, 0.04, 0.03));
+    plate.coordinate_error = block.coordinate_error = error;
+    return surface_of({plate, block}).surface->seam();
+  };
+  EXPECT_NEAR(seam({0, -0.02, kError}, kError), kError, 1e-15) << "a gap under a block";
+  EXPECT_NEAR(seam({0, -0.02, -2 * kError}, kError), 2 * kError, 1e-15) << "an overlap";
+  EXPECT_NEAR(seam({0.05, -0.02, -0.03 + 3 * kError}, kError), 3 * kError, 1e-15) << "a step";
+  EXPECT_EQ(seam({0, -0.02, 5 * kError}, kError), 0) << "more than rounding";
+  EXPECT_EQ(seam({0, -0.02, -0.01}, kError), 0) << "shells that pass through each other";
+  EXPECT_EQ(seam({0.06, -0.02, -0.01}, kError), 0) << "apart";
+  EXPECT_LT(seam({0, -0.02, 0}, kError), 1e-15) << "exact";
+  EXPECT_EQ(seam({0, -0.02, kError}, 0), 0) << "coordinates that are not rounded";
+}
+
 TEST_P(SurfaceContact, AFlatFaceInManyTrianglesHoldsNothingAlongIt) {
   Random random(3);
   for (int round = 0; round < 4; ++round) {

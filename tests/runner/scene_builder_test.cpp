@@ -10,7 +10,9 @@
 #include <filesystem>
 #include <fstream>
 #include <glm/geometric.hpp>
+#include <iomanip>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "rendering/bodies/moving_scene.h"
@@ -292,6 +294,70 @@ TEST(SceneBuilder, ABodyHasTheMassOfAllItsPartsWhateverIsFeltOfThem) {
       }
     }
   }
+}
+
+/// Two blocks that abut, each a group of a file. \param step  m, from one upper face to the other
+stimuli::ObjectSpec two_blocks(const std::string& file, double step) {
+  std::ofstream out(file);
+  out << std::fixed << std::setprecision(7);
+  for (const double x : {0.0, 0.05}) {
+    out << "g block" << x << '\n';
+    const double top = x > 0 ? 0.0123457 + step : 0.0123457;
+    for (const double z : {-0.0213579, top}) {
+      for (const auto& [dx, y] : {std::pair{0, 0}, {1, 0}, {1, 1}, {0, 1}})
+        out << "v " << x + 0.05 * dx << ' ' << 0.04 * y << ' ' << z << '\n';
+    }
+    const char* const base = x > 0 ? "f 12 11 10 9\nf 13 14 15 16\nf 9 10 14 13\nf 10 11 15 14\n"
+                                     "f 11 12 16 15\nf 12 9 13 16\n"
+                                   : "f 4 3 2 1\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\n"
+                                     "f 4 1 5 8\n";
+    out << base;
+  }
+  stimuli::ObjectSpec spec;
+  spec.shape = stimuli::ShapeKind::mesh;
+  spec.file = file;
+  spec.material = of(800, {});
+  return spec;
+}
+
+TEST(SceneBuilder, GroupsWithAStepOfRoundingBetweenThemAreOneSurface) {
+  const palpate::testing::TemporaryFolder folder;
+  const stimuli::ObjectSpec exact = two_blocks(folder / "exact.obj", 0),
+                            stepped = two_blocks(folder / "stepped.obj", 1e-7),
+                            meant = two_blocks(folder / "meant.obj", 1e-3);
+  SceneBuilder builder;
+  EXPECT_EQ(builder.mesh(exact).parts.size(), 2U);
+  EXPECT_EQ(builder.mesh(meant).parts.size(), 2U);
+  EXPECT_TRUE(builder.mesh(stepped).parts.empty());
+  for (const auto& object : {stepped, compound({stepped})}) {
+    const rendering::Scene scene = builder.build({object}, true);
+    ASSERT_EQ(scene.surfaces().size(), 1U);
+    EXPECT_NEAR(scene.surfaces()[0].surface->seam(), 1e-7, 1e-12);
+  }
+}
+
+TEST(SceneBuilder, FilesThatAbutWithAStepOfRoundingAreOneSurface) {
+  const palpate::testing::TemporaryFolder folder;
+  const auto block = [&](const char* name, double low, double high, double top) {
+    std::ofstream out(folder / name);
+    out << std::fixed << std::setprecision(7);
+    for (const double z : {-0.0213579, top}) {
+      for (const auto& [x, y] : {std::pair{low, 0.0}, {high, 0.0}, {high, 0.04}, {low, 0.04}})
+        out << "v " << x << ' ' << y << ' ' << z << '\n';
+    }
+    out << "f 4 3 2 1\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n";
+    stimuli::ObjectSpec spec;
+    spec.shape = stimuli::ShapeKind::mesh;
+    spec.file = folder / name;
+    spec.material = of(800, {});
+    return spec;
+  };
+  const auto left = block("left.obj", 0, 0.05, 0.0123457);
+  const auto level = block("level.obj", 0.05, 0.08, 0.0123457);
+  const auto higher = block("higher.obj", 0.05, 0.08, 0.0123458);
+  EXPECT_EQ(SceneBuilder().build({compound({left, level})}, true).parts().size(), 2U);
+  EXPECT_EQ(SceneBuilder().build({compound({left, higher})}, true).surfaces().size(), 1U);
+  EXPECT_EQ(SceneBuilder().build({left, higher}, true).surfaces().size(), 0U) << "two objects";
 }
 
 TEST(SceneBuilder, ReadsAMeshFileOnceForAllItsScenes) {
