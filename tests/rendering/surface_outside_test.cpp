@@ -119,13 +119,13 @@ PolygonSoup overlapping_shells(Random& random) {
 
 /// Cells by chance, in waves. Strips of 1 um divide every face.
 PolygonSoup noise_with_slivers(Random& random) {
-  std::array<bool, 343> filled;
+  std::array<bool, 125> filled;
   for (bool& cell : filled) cell = random.unit() < 0.5;
   const double high = uniform(random, 0, 0.3);
   return lattice(
-      Cell(14),
+      Cell(10),
       [&](const Cell& c) {
-        const int cell = c.x / 2 + 7 * (c.y / 2) + 49 * (c.z / 2);
+        const int cell = c.x / 2 + 5 * (c.y / 2) + 25 * (c.z / 2);
         return filled[static_cast<std::size_t>(cell)];
       },
       [&](const Cell& c) {
