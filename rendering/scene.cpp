@@ -132,11 +132,8 @@ void Scene::prepare_for_law(PartGroup& group) {
 }
 
 void Scene::add_surfaces(std::vector<SceneSurface> surfaces, TickFeatures& features) {
-  constexpr double kRounding = 1e-12, kSkin = 1e-9, kThickSkin = 1e-7,
-                   kThickestSkin = 1e-3;  // of the size
-  // Between shells that abut, rounding opens cracks so wide; the tip must not slip into them.
-  constexpr double kWidestCrack = 4;  // coordinates' errors
-  constexpr double kOverSeam = 1.5;   // times its width
+  constexpr double kRounding = 1e-12, kSkin = 1e-9, kThickestSkin = 1e-3;  // of the size
+  constexpr double kOverSeam = 1.5;                                        // times its width
   constexpr double kRoundings = 8 * std::numeric_limits<double>::epsilon();
   auto pairs = static_cast<std::uint32_t>(parts_.size() * segments());
   for (SceneSurface& placed : surfaces) {
@@ -149,11 +146,10 @@ void Scene::add_surfaces(std::vector<SceneSurface> surfaces, TickFeatures& featu
     surface.tolerance = kRounding * surface.surface->size() +
                         kRoundings * (glm::length(surface.sphere_centre) +
                                       glm::length(surface.surface->centre()) + tool_reach_);
-    const double size = surface.surface->size();
-    surface.skin =
-        std::max({kSkin * size, 64 * surface.tolerance,
-                  std::min(kWidestCrack * surface.surface->coordinate_error(), kThickSkin * size),
-                  std::min(kOverSeam * surface.surface->seam(), kThickestSkin * size)});
+    // Over steps and cracks that rounding leaves between shells.
+    const double over_seam =
+        std::min(kOverSeam * surface.surface->seam(), kThickestSkin * surface.surface->size());
+    surface.skin = std::max({kSkin * surface.surface->size(), 64 * surface.tolerance, over_seam});
     surface.object = placed.object;
     surface.group = static_cast<std::uint32_t>(groups_.size());
     surface.first_material = static_cast<std::uint32_t>(parts_.size() + materials_.size());

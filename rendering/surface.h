@@ -68,7 +68,6 @@ class Surface {
   Vec3 centre() const { return centre_; }    ///< of a sphere about it
   double radius() const { return radius_; }  ///< m, of that sphere
   double size() const { return 2 * radius_; }
-  double coordinate_error() const { return coordinate_error_; }  ///< m, of the worst shell
   /// m, the widest gap or step that rounding of coordinates has made between faces of two shells
   /// that abut; 0: none
   double seam() const { return seam_; }
@@ -122,7 +121,8 @@ class Surface {
   stimuli::LargeArray<SurfaceTriangle> triangles_;
   std::vector<stimuli::Material> materials_;
   std::vector<std::uint32_t> file_order_;
-  double coordinate_error_ = 0, seam_ = 0;
+  double coordinate_error_ = 0;  ///< m, of the worst shell
+  double seam_ = 0;
   stimuli::LargeArray<Node> nodes_;
   std::uint32_t root_ = 0;
   Vec3 centre_;
