@@ -179,13 +179,25 @@ SurfacePatch patch_after_turn(const Surface& surface, const SurfacePatch& patch,
 }
 
 bool meets(const PatchPolygon& polygon, const Vec3& from, const Vec3& way) {
-  std::array<Vec3, 4> to;
-  for (std::size_t k = 0; k < polygon.count; ++k) to[k] = polygon.corners[k] - from;
+  // Seen along the way, in two dimensions: each corner is rounded once, then signs are exact.
+  const Vec3 size = glm::abs(way);
+  const int z = size.x > size.y ? (size.x > size.z ? 0 : 2) : (size.y > size.z ? 1 : 2);
+  const int x = (z + 1) % 3, y = (z + 2) % 3;
+  const double shear_x = way[x] / way[z], shear_y = way[y] / way[z];
+  std::array<double, 4> u{}, v{};
   for (std::size_t k = 0; k < polygon.count; ++k) {
-    const Vec3& next = to[k + 1 == polygon.count ? 0 : k + 1];
-    if (!(glm::dot(way, glm::cross(to[k], next)) <= 0)) return false;
+    const Vec3 to = polygon.corners[k] - from;
+    u[k] = to[x] - shear_x * to[z];
+    v[k] = to[y] - shear_y * to[z];
   }
-  return true;
+  const auto turns_right = [&](std::size_t i, std::size_t k) {
+    const double one = u[i] * v[k], other = u[k] * v[i];
+    double turn = one - other;  // the products keep their order in rounding
+    if (one == other) turn = std::fma(u[i], v[k], -one) - std::fma(u[k], v[i], -other);
+    return (way[z] > 0 ? turn : -turn) <= 0;
+  };
+  if (turns_right(0, 1) && turns_right(1, 2) && turns_right(2, 0)) return true;
+  return polygon.count == 4 && turns_right(0, 2) && turns_right(2, 3) && turns_right(3, 0);
 }
 
 double distance_off(const PatchPolygon& polygon, const Vec3& normal, const Vec3& at) {

@@ -9,7 +9,8 @@ import subprocess
 import sys
 import unittest
 
-ASKED_FOR = ("side_of",)  # exact products by std::fma, in stimuli/winding_check.cpp
+# Exact products by std::fma, in stimuli/winding_check.cpp and rendering/surface_patch.cpp.
+ASKED_FOR = ("side_of", "rendering5meets")
 
 
 class FusedOperations(unittest.TestCase):

@@ -587,6 +587,41 @@ TEST(SurfaceSeam, IsAsWideAsTheGapBetweenTwoShellsWithinTheirError) {
   EXPECT_EQ(seam({0, -0.02, kError}, 0), 0) << "coordinates that are not rounded";
 }
 
+TEST(SurfacePoint, AWayStraightIntoACornerIsStopped) {
+  // A prism with a notch, turned, in single precision.
+  Random random(1);
+  int tried = 0;
+  for (int round = 0; round < 100; ++round) {
+    const double notch = 0.002 + 0.018 * random.unit();
+    stimuli::PolygonSoup soup = prism({{-0.03, -0.02},
+                                       {0.03, -0.02},
+                                       {0.03, 0.02},
+                                       {0.01, 0.02},
+                                       {0, 0.02 - notch},
+                                       {-0.01, 0.02},
+                                       {-0.03, 0.02}},
+                                      0.01);
+    const Quat turn = glm::angleAxis(3 * random.unit(), direction(random));
+    for (Vec3& v : soup.vertices) {
+      v = turn * v;
+      for (int c = 0; c < 3; ++c) v[c] = static_cast<double>(static_cast<float>(v[c]));
+    }
+    const SceneSurface placed = surface_of({soup});
+    const Scene scene({}, false, {}, nullptr, {placed});
+    for (int i = 0; i < 1000; ++i) {
+      const Vec3 corner = soup.vertices[random.below(soup.vertices.size())];
+      const Vec3 out = direction(random), from = corner + 1e-3 * out, to = corner - 1e-4 * out;
+      if (placed.surface->winding(from) > 0 || placed.surface->winding(to) <= 0) continue;
+      ++tried;
+      RenderState state = scene.initial_state();
+      point_renderer().tick(scene, state, {from, from + Vec3(0, 0, 0.1)}, kTick);
+      const Rendering r = point_renderer().tick(scene, state, {to, to + Vec3(0, 0, 0.1)}, kTick);
+      ASSERT_GT(r.contacts, 0) << "round " << round << ", try " << i;
+    }
+  }
+  EXPECT_GT(tried, 10000);
+}
+
 TEST_P(SurfaceContact, AFlatFaceInManyTrianglesHoldsNothingAlongIt) {
   Random random(3);
   for (int round = 0; round < 4; ++round) {
