@@ -144,7 +144,8 @@ void Surface::add(const SurfaceShell& shell) {
     }
   }
   materials_.push_back(shell.material);
-  coordinate_error_ = std::max(coordinate_error_, shell.surface->coordinate_error);
+  coordinate_error_ =
+      std::max(coordinate_error_, shell.surface->coordinate_error + shell.pose_error);
   for (std::uint32_t i = base; i < triangles_.size(); ++i) {
     SurfaceTriangle& t = triangles_[i];
     if (t.normal != Vec3(0)) continue;

@@ -39,6 +39,7 @@ struct SurfaceShell {
   std::shared_ptr<const stimuli::ClosedSurface> surface;
   Pose pose;  ///< in the object
   stimuli::Material material;
+  double pose_error = 0;  ///< m, of its corners, as the pose's numbers are rounded
 };
 
 /// Bits for the parts of a triangle and a segment that can touch.

@@ -21,6 +21,9 @@
 namespace palpate::runner {
 namespace {
 
+// Of a part's reach: poses are written with six decimals or more.
+constexpr double kPoseError = 1e-5;
+
 std::string key_of(double value) {
   char text[32];
   return {text, std::to_chars(text, text + sizeof text, value).ptr};
@@ -294,13 +297,7 @@ const LoadedMesh& SceneBuilder::mesh(const stimuli::ObjectSpec& spec) {
   const std::string key = shape_key(spec, false);
   if (const auto known = meshes_.find(key); known != meshes_.end()) return known->second;
   const stimuli::PolygonSoup soup = stimuli::polygons_of(spec);
-  LoadedMesh loaded{box_of(soup),
-                    soup.faces.size(),
-                    soup.group_names.size() > 1,
-                    soup.coordinate_error > 0,
-                    {},
-                    {},
-                    {}};
+  LoadedMesh loaded{box_of(soup), soup.faces.size(), soup.group_names.size() > 1, {}, {}, {}};
   const auto take_surface = [&] {
     stimuli::CleanedSurface cleaned = stimuli::closed_surface(soup);
     loaded.surface = std::make_shared<const stimuli::ClosedSurface>(std::move(cleaned.surface));
@@ -309,7 +306,7 @@ const LoadedMesh& SceneBuilder::mesh(const stimuli::ObjectSpec& spec) {
   auto parts = stimuli::convex_as_it_is(soup);
   if (!parts) {
     take_surface();
-  } else if (parts->size() == 1 || !loaded.is_rounded) {
+  } else if (parts->size() == 1) {
     loaded.parts = shared(std::move(*parts));
   } else {
     try {
@@ -317,7 +314,7 @@ const LoadedMesh& SceneBuilder::mesh(const stimuli::ObjectSpec& spec) {
     } catch (const stimuli::MeshError&) {
       // Its groups are convex within their coordinates' error, and that is enough.
     }
-    if (loaded.surface == nullptr || !has_seams({{loaded.surface, {}, {}}})) {
+    if (loaded.surface == nullptr || !has_seams({{loaded.surface, {}, {}, 0}})) {
       loaded.parts = shared(std::move(*parts));
       loaded.surface = nullptr;
       loaded.notes.clear();
@@ -329,16 +326,14 @@ const LoadedMesh& SceneBuilder::mesh(const stimuli::ObjectSpec& spec) {
 bool SceneBuilder::is_surface(const stimuli::ObjectSpec& spec) {
   if (spec.soft) return false;
   if (has_concave(spec)) return true;
-  if (spec.shape != stimuli::ShapeKind::compound || !is_rounded(spec)) return false;
-  std::vector<rendering::SurfaceShell> shells;
-  add_shells(spec, Pose{}, false, shells);
-  return has_seams(shells);
-}
-
-bool SceneBuilder::is_rounded(const stimuli::ObjectSpec& spec) {
-  if (spec.shape == stimuli::ShapeKind::mesh) return mesh(spec).is_rounded;
-  return std::any_of(spec.parts.begin(), spec.parts.end(),
-                     [&](const stimuli::ObjectSpec& part) { return is_rounded(part); });
+  if (spec.shape != stimuli::ShapeKind::compound) return false;
+  try {
+    std::vector<rendering::SurfaceShell> shells;
+    add_shells(spec, Pose{}, false, shells);
+    return has_seams(shells);
+  } catch (const stimuli::MeshError&) {
+    return false;  // convex within its coordinates' error only
+  }
 }
 
 bool SceneBuilder::has_concave(const stimuli::ObjectSpec& spec) {
@@ -360,12 +355,21 @@ void SceneBuilder::add_shells(const stimuli::ObjectSpec& spec, const Pose& in_ob
   if (felt && !(spec.material.stiffness > 0)) return;
   std::shared_ptr<const stimuli::ClosedSurface> surface;
   if (spec.shape == stimuli::ShapeKind::mesh) surface = mesh(spec).surface;
-  if (surface == nullptr)
-    surface = std::make_shared<const stimuli::ClosedSurface>(
-        stimuli::closed_surface(stimuli::polygons_of(spec)).surface);
+  if (surface == nullptr) {
+    std::shared_ptr<const stimuli::ClosedSurface>& known = convex_[shape_key(spec, false)];
+    if (known == nullptr)
+      known = std::make_shared<const stimuli::ClosedSurface>(
+          stimuli::closed_surface(stimuli::polygons_of(spec)).surface);
+    surface = known;
+  }
   stimuli::Material material = spec.material;
   material.layers.clear();
-  shells.push_back({std::move(surface), in_object, std::move(material)});
+  double error = 0;
+  if (in_object.position != Vec3(0) || in_object.orientation != Quat(1, 0, 0, 0)) {
+    for (const Vec3& v : surface->vertices) error = std::max(error, glm::length(v));
+    error = kPoseError * (error + glm::length(in_object.position));
+  }
+  shells.push_back({std::move(surface), in_object, std::move(material), error});
 }
 
 std::vector<rendering::MovingObject> SceneBuilder::moving_of(

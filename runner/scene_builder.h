@@ -32,7 +32,7 @@ double grip_from_virtual_tip(const protocols::Protocol& protocol);
 struct LoadedMesh {
   Vec3 size = Vec3(0);  ///< m, of its box
   std::size_t faces = 0;
-  bool has_groups = false, is_rounded = false;
+  bool has_groups = false;
   /// If it is made of convex groups that abut without gaps and steps.
   std::vector<std::shared_ptr<const stimuli::ConvexMesh>> parts;
   std::shared_ptr<const stimuli::ClosedSurface> surface;  ///< else
@@ -90,7 +90,6 @@ class SceneBuilder {
   /// Whether the object is felt as one closed surface, not as convex parts.
   bool is_surface(const stimuli::ObjectSpec& spec);
   bool has_concave(const stimuli::ObjectSpec& spec);
-  bool is_rounded(const stimuli::ObjectSpec& spec);
   void add_shells(const stimuli::ObjectSpec& spec, const Pose& in_object, bool felt,
                   std::vector<rendering::SurfaceShell>& shells);
   void place_layers(Placing& placing);
@@ -99,6 +98,7 @@ class SceneBuilder {
 
   std::map<std::string, std::vector<Prepared>> prepared_;  ///< the parts of each shape
   std::map<std::string, LoadedMesh> meshes_;               ///< by shape
+  std::map<std::string, std::shared_ptr<const stimuli::ClosedSurface>> convex_;  ///< by shape
   std::map<std::string, std::shared_ptr<const rendering::Surface>> surfaces_;
 };
 
