@@ -53,7 +53,7 @@ MAY_INCLUDE = {
     "runner/serve": SERVO | {"protocols", "runner/safety", "runner/session"},
     "runner/sweep": SERVO | {"protocols", "runner/participants"},
     "runner/stability": SERVO | {"protocols", "rendering/bodies", "runner/devices"},
-    "runner/bench": SERVO | {"data/files", "runner/safety", "runner/devices"},
+    "runner/bench": set(),
 }
 # The commands, the Python module and main() may include everything.
 EVERYTHING = ("runner/commands", "runner/main.cpp", "runner/python")
@@ -128,7 +128,7 @@ PUBLIC = {
     "runner/serve": "network served_scene served_session",
     "runner/sweep": "design swept_study",
     "runner/stability": "boundary integrators soft_map",
-    "runner/bench": "servo_timing tick_cost",
+    "runner/bench": "allocation_count",
     "runner/commands": "render/forces shared/command shared/task_words shared/study_options",
 }
 

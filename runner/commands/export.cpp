@@ -1,16 +1,23 @@
 #include <algorithm>
 #include <atomic>
+#include <cstddef>
 #include <iostream>
+#include <map>
 #include <stdexcept>
 #include <string>
 #include <thread>
+#include <tuple>
+#include <utility>
 
+#include "analysis/text.h"
 #include "data/base/text.h"
 #include "data/export/csv.h"
 #include "data/export/datasets.h"
+#include "data/export/settings.h"
 #include "data/store/store.h"
 #include "data/store/sweep_file.h"
-#include "runner/commands/movement/movement_export.h"
+#include "runner/commands/movement/movement_study.h"
+#include "runner/commands/movement/touched_trial.h"
 #include "runner/commands/shared/about_file.h"
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/progress_line.h"
@@ -18,6 +25,61 @@
 
 namespace palpate::runner::commands {
 namespace {
+
+// Movement in exports: the contact of each sample, and the measures of each trial.
+
+/// Adds movement to the settings of an export. Must outlive that export.
+class MovementExport {
+ public:
+  MovementExport(data::Store& store, std::string mesh_folder)
+      : store_(store), stimuli_(std::move(mesh_folder)) {}
+
+  /// Adds places and normals of the contacts to the samples, by rendering each trial again.
+  void add_contacts(data::ExportSettings& settings);
+  /// Tables of the measures. \throws UsageError: no trial has samples
+  void add_measures(data::ExportSettings& settings, const MovementRequest& request);
+  /// Trials without contacts because rendering does not reproduce their recorded forces.
+  std::size_t not_rendered() const { return not_rendered_; }
+
+ private:
+  data::Store& store_;
+  StudyStimuli stimuli_;
+  std::size_t not_rendered_ = 0;
+  std::map<MovementStudy::TrialKey, data::DerivedMeasures::Values> measured_;
+};
+
+void MovementExport::add_contacts(data::ExportSettings& settings) {
+  settings.contacts = [this](const data::StoredTrial& trial) {
+    auto contacts = contacts_of(*stimuli_.of(store_, trial), trial);
+    if (contacts.empty() && !trial.record.samples.empty()) ++not_rendered_;
+    return contacts;
+  };
+}
+
+void MovementExport::add_measures(data::ExportSettings& settings, const MovementRequest& request) {
+  MovementStudy study = measure_study(request);
+  require_samples(study, request.database);
+  for (const auto& [trial, row] : study.rows) {
+    data::DerivedMeasures::Values& values = measured_[trial];
+    values.missing = study.missing[row];
+    if (values.missing.empty())
+      values.numbers.assign(study.table.values[row].begin(), study.table.values[row].end());
+  }
+  data::DerivedMeasures derived;
+  derived.name = "movement";
+  derived.how = "The path was filtered with a low pass at " +
+                analysis::fixed(request.settings.cutoff, 1) +
+                " Hz; contacts come from rendering each trial again, to the bit.";
+  for (const auto& one : analysis::measure_definitions()) {
+    derived.columns.push_back({one.name, std::string("Movement: ") + one.meaning, one.unit});
+  }
+  derived.of = [this](const data::StoredTrial& trial) {
+    const auto found = measured_.find(key_of(trial));
+    if (found != measured_.end()) return found->second;
+    return data::DerivedMeasures::Values{{}, "it was added while the export was written"};
+  };
+  settings.derived = std::move(derived);
+}
 
 namespace po = boost::program_options;
 
