@@ -1,20 +1,90 @@
 #pragma once
 // The complete analysis of a study as values, which reports and figures present.
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "analysis/input/trials.h"
-#include "analysis/statistics/anova.h"
 #include "analysis/statistics/censored.h"
 #include "analysis/statistics/comparison.h"
 #include "analysis/statistics/describe.h"
 #include "analysis/statistics/mixed_model.h"
-#include "analysis/statistics/practice.h"
+#include "analysis/statistics/paired.h"
 
 namespace palpate::analysis {
+
+// Effects of practice on the gain: learning over trials, and order of the renderers.
+
+/// Number of bins of equal length into which a participant's trials with a renderer are divided, in
+/// order.
+constexpr std::size_t kLearningBins = 8;
+
+/// Mean over participants of log times (natural log of s) in a bin, relative to the participant's
+/// mean for the shape, so that the mix of shapes in a bin does not bias it.
+struct LearningBin {
+  std::size_t n_participants = 0, n_trials = 0;
+  std::optional<double> mean_log;     ///< with the renderer's overall mean added back
+  std::optional<double> se_mean_log;  ///< over participants, of the relative part
+};
+
+/// Smallest number of usable trials with a renderer for which a participant's slope is estimated:
+/// fewer extrapolate too far to 100 trials.
+constexpr std::size_t kSlopeTrials = 32;
+
+/// Learning with one renderer. A participant's slope is the least-squares slope of log time on the
+/// number of the trial with this renderer, within shapes; mean and t interval are over
+/// participants.
+struct Learning {
+  std::array<LearningBin, kLearningBins> bins;
+  TTest slope;  ///< per 100 trials, in log seconds; sd, se, t, df, p, interval over participants
+  std::optional<double> mean_slope;  ///< per 100 trials; negative: faster with practice
+  std::size_t n_participants = 0;
+};
+
+/// Participants' gains (mean log renderer - mean log reference) by the renderer that came first.
+struct OrderGroup {
+  std::size_t n_participants = 0;
+  std::optional<double> mean_log_ratio;
+};
+
+/// Two-period crossover (Hills & Armitage 1979). Practice speeds up the renderer that comes second,
+/// which biases the gain by the same amount upwards with the reference first and downwards with the
+/// renderer first.
+struct OrderEffect {
+  OrderGroup reference_first, renderer_first;
+  std::string undefined;  ///< reason why the two orders cannot be compared; empty: they can
+  /// Mean log ratio with reference first minus with renderer first; negative: practice shortens
+  /// times.
+  std::optional<double> difference;
+  TTest test;  ///< of the difference, pooled variance
+  /// Mean of the two groups' mean log ratios: the gain free of the effect of order.
+  std::optional<double> balanced_log_ratio;
+  std::optional<Interval> balanced_ci95;  ///< of log ratio
+};
+
+/// Effects of practice on the gain of a renderer over the reference.
+struct PairPractice {
+  TTest slope_difference;  ///< renderer - reference, participants with both, per 100 trials
+  std::optional<double> mean_slope_difference;
+  std::size_t n_interleaved = 0;    ///< participants with both interleaved: no order
+  OrderEffect all_shapes;           ///< mean over shapes, participants with a pair in each
+  std::vector<OrderEffect> shapes;  ///< one for each of table.shapes
+};
+
+/// All effects of practice.
+struct Practice {
+  std::vector<Learning> learning;   ///< one for each of table.renderers
+  std::vector<PairPractice> pairs;  ///< one for each of renderer_pairs()
+  std::size_t n_tests =
+      0;  ///< tests (slopes and orders) with a p: one family for Holm's adjustment
+};
+
+/// \param too_fast s, as in describe()
+Practice practice_effects(const TrialTable& table, const Description& description, double too_fast);
 
 /// Choices of the user.
 struct AnalysisSettings {

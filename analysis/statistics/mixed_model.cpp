@@ -2,13 +2,226 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
+#include <boost/math/distributions/chi_squared.hpp>
+#include <boost/math/distributions/fisher_f.hpp>
+#include <boost/math/distributions/normal.hpp>
 #include <boost/math/distributions/students_t.hpp>
 #include <cmath>
+#include <functional>
+#include <limits>
+#include <map>
+#include <tuple>
 #include <utility>
 
 #include "analysis/statistics/reml.h"
 
 namespace palpate::analysis {
+
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::RowVectorXd;
+using Eigen::VectorXd;
+
+constexpr double kNoVariance = 1e-10;  // relative to the mean, as for the paired tests
+constexpr double kRounding = 1e-10;    // relative, of epsilons and eigenvalues
+
+constexpr const char* kFlat = "the effect is equal in all participants (no variance)";
+
+/// Orthonormal Helmert contrasts of `levels`, one a row, each summing to 0.
+MatrixXd contrasts(Index levels) {
+  MatrixXd rows = MatrixXd::Zero(levels - 1, levels);
+  for (Index i = 0; i + 1 < levels; ++i) {
+    const auto before = static_cast<double>(i + 1);
+    rows.row(i).head(i + 1).setConstant(1 / std::sqrt(before * (before + 1)));
+    rows(i, i + 1) = -before / std::sqrt(before * (before + 1));
+  }
+  return rows;
+}
+
+MatrixXd average(Index levels) {
+  return MatrixXd::Constant(1, levels, 1 / std::sqrt(static_cast<double>(levels)));
+}
+
+/// Participants' scores on an effect's contrasts, split into their mean and the deviations from it.
+struct Scores {
+  RowVectorXd mean;
+  MatrixXd rest;  // participants x contrasts
+  double ss = 0, ss_error = 0;
+};
+
+/// \param cells participants x (renderer-major cells)
+Scores score(const MatrixXd& cells, const MatrixXd& of_renderer, const MatrixXd& of_shape) {
+  const Index n = cells.rows(), p = of_renderer.rows() * of_shape.rows();
+  const Index shapes = of_shape.cols();
+  MatrixXd weights(cells.cols(), p);
+  for (Index i = 0; i < of_renderer.rows(); ++i) {
+    for (Index r = 0; r < of_renderer.cols(); ++r) {
+      weights.block(r * shapes, i * of_shape.rows(), shapes, of_shape.rows()) =
+          of_renderer(i, r) * of_shape.transpose();
+    }
+  }
+  const MatrixXd all = cells * weights;
+  Scores out;
+  out.mean = all.colwise().mean();
+  out.rest = all.rowwise() - out.mean;
+  out.ss = static_cast<double>(n) * out.mean.squaredNorm();
+  out.ss_error = out.rest.squaredNorm();
+  return out;
+}
+
+double f_upper_tail(double f, double num_df, double den_df) {
+  return cdf(complement(boost::math::fisher_f(num_df, den_df), f));
+}
+
+/// Mauchly's W from the eigenvalues of the contrasts' scatter matrix. \param df n - 1
+void mauchly(const VectorXd& eigenvalues, double df, double n_cells, Sphericity& out) {
+  const auto p = static_cast<double>(eigenvalues.size());
+  const double log_w =
+      std::min(0.0, eigenvalues.array().log().sum() - p * std::log(eigenvalues.sum() / p));
+  const double rho = 1 - (2 * p * p + p + 2) / (6 * p * df);
+  const double z = -df * rho * log_w, f = p * (p + 1) / 2 - 1;
+  const double first = cdf(complement(boost::math::chi_squared(f), z));
+  const double next = cdf(complement(boost::math::chi_squared(f + 4), z));
+  const auto series = [&](double in_doubt) {
+    const double second = (p + 2) * (p - 1) * (p - 2) *
+                          (2 * p * p * p + 6 * p * p + 3 * in_doubt + 2) /
+                          (288 * std::pow(df * p * rho, 2));
+    return std::clamp(first + second * (next - first), 0.0, 1.0);
+  };
+  out.mauchly_w = std::exp(log_w);
+  out.mauchly_p = series(n_cells);
+  out.mauchly_p_box = series(p);
+}
+
+void add_reason(std::string& reasons, const char* reason) {
+  reasons += (reasons.empty() ? "" : "; ") + std::string(reason);
+}
+
+Sphericity sphericity(const Scores& scores, double n_cells, const AnovaEffect& effect) {
+  Sphericity out;
+  const auto n = static_cast<double>(scores.rest.rows());
+  const auto p = static_cast<double>(scores.rest.cols());
+  if (p < 2) {
+    out.undefined = "one degree of freedom: nothing to test or to correct";
+    return out;
+  }
+  if (!effect.undefined.empty()) {
+    out.undefined = effect.undefined;
+    return out;
+  }
+  // Use the smaller of X X' and X'X, which have the same non-zero eigenvalues.
+  const bool wide = scores.rest.cols() > scores.rest.rows();
+  const MatrixXd scatter = wide ? MatrixXd(scores.rest * scores.rest.transpose())
+                                : MatrixXd(scores.rest.transpose() * scores.rest);
+  const double e = std::min(1.0, scatter.trace() * scatter.trace() / (p * scatter.squaredNorm()));
+  out.gg_epsilon = e;
+  out.gg_p = f_upper_tail(*effect.f, *effect.num_df * e, *effect.den_df * e);
+  if (n - 1 < p) {
+    add_reason(out.undefined, "Mauchly's test needs more participants than degrees of freedom");
+  } else {
+    const VectorXd eigenvalues =
+        Eigen::SelfAdjointEigenSolver<MatrixXd>(scatter, Eigen::EigenvaluesOnly).eigenvalues();
+    if (eigenvalues.minCoeff() <= 1e-14 * eigenvalues.maxCoeff()) {
+      add_reason(out.undefined, "Mauchly's test: some contrast of the effect does not vary");
+    } else {
+      mauchly(eigenvalues, n - 1, n_cells, out);
+    }
+  }
+  const double denominator = n - 1 - p * e;  // >= 0 up to rounding
+  if (denominator <= kRounding * n) {
+    add_reason(out.undefined, "Huynh and Feldt's epsilon: too few participants");
+  } else {
+    out.hf_epsilon_raw = (n * p * e - 2) / (p * denominator);
+    out.hf_epsilon_used = std::min(1.0, *out.hf_epsilon_raw);
+    out.hf_p = f_upper_tail(*effect.f, *effect.num_df * *out.hf_epsilon_used,
+                            *effect.den_df * *out.hf_epsilon_used);
+  }
+  return out;
+}
+
+void test(const Scores& scores, double all_error, double n_cells, AnovaEffect& effect) {
+  const auto n = static_cast<double>(scores.rest.rows());
+  const auto p = static_cast<double>(scores.rest.cols());
+  effect.num_df = p;
+  effect.den_df = p * (n - 1);
+  const double spread = std::sqrt(scores.ss_error / *effect.den_df);
+  const double scale = kNoVariance * std::max(1.0, scores.mean.norm());
+  if (spread <= scale) {
+    effect.undefined = kFlat;
+  } else {
+    effect.f = (scores.ss / p) / (scores.ss_error / *effect.den_df);
+    effect.p = f_upper_tail(*effect.f, p, *effect.den_df);
+  }
+  // Eta squared is 0 / 0 without any variance.
+  if (std::sqrt((scores.ss + all_error) / n) > kNoVariance) {
+    effect.generalized_eta_squared = scores.ss / (scores.ss + all_error);
+  }
+  effect.sphericity = sphericity(scores, n_cells, effect);
+}
+
+}  // namespace
+
+RmAnova rm_anova(const ParticipantCells& participant_cells) {
+  RmAnova out;
+  constexpr std::array kNames{"renderer", "shape", "renderer:shape"};
+  for (std::size_t i = 0; i < kNames.size(); ++i) out.effects[i].name = kNames[i];
+  const std::size_t n_renderers = participant_cells.size();
+  const std::size_t n_shapes = n_renderers == 0 ? 0 : participant_cells[0].size();
+  const std::size_t n_participants = n_shapes == 0 ? 0 : participant_cells[0][0].size();
+  const auto cell = [&](std::size_t p, std::size_t c) -> const ParticipantCell& {
+    return participant_cells[c / n_shapes][c % n_shapes][p];
+  };
+  std::vector<std::size_t> complete;
+  for (std::size_t p = 0; p < n_participants; ++p) {
+    bool all = true;
+    for (std::size_t c = 0; all && c < n_renderers * n_shapes; ++c) all = cell(p, c).n_used > 0;
+    (all ? complete : out.dropped).push_back(p);
+  }
+  out.n_participants_used = complete.size();
+
+  const auto refuse = [&](std::size_t effect, const std::string& reason) {
+    out.effects[effect].undefined = out.effects[effect].sphericity.undefined = reason;
+  };
+  if (complete.size() < 2) {
+    out.undefined = complete.empty() ? "no participant has a time in every cell"
+                                     : "one participant, so no variance between participants";
+    for (std::size_t i = 0; i < kNames.size(); ++i) refuse(i, out.undefined);
+    return out;
+  }
+  if (n_renderers < 2) out.undefined = "only one renderer in the data";
+  if (n_shapes < 2) add_reason(out.undefined, "only one shape in the data");
+
+  MatrixXd cells(static_cast<Index>(complete.size()), static_cast<Index>(n_renderers * n_shapes));
+  for (Index i = 0; i < cells.rows(); ++i) {
+    for (Index c = 0; c < cells.cols(); ++c) {
+      cells(i, c) =
+          cell(complete[static_cast<std::size_t>(i)], static_cast<std::size_t>(c)).mean_log;
+    }
+  }
+  const auto renderers = static_cast<Index>(n_renderers), shapes = static_cast<Index>(n_shapes);
+  const std::array<Scores, 3> scores{score(cells, contrasts(renderers), average(shapes)),
+                                     score(cells, average(renderers), contrasts(shapes)),
+                                     score(cells, contrasts(renderers), contrasts(shapes))};
+  double all_error = score(cells, average(renderers), average(shapes)).ss_error;
+  for (const Scores& effect : scores) all_error += effect.ss_error;
+  for (std::size_t i = 0; i < scores.size(); ++i) {
+    if (scores[i].rest.cols() == 0) {
+      refuse(i, out.undefined);
+    } else {
+      test(scores[i], all_error, static_cast<double>(cells.cols()), out.effects[i]);
+    }
+  }
+  if (out.undefined.empty() && std::ranges::all_of(out.effects, [](const AnovaEffect& effect) {
+        return !effect.undefined.empty();
+      })) {
+    out.undefined = kFlat;
+    // Without error variance eta squared would be 1 for any difference.
+    for (AnovaEffect& effect : out.effects) effect.generalized_eta_squared.reset();
+  }
+  return out;
+}
 
 namespace {
 
@@ -270,6 +483,289 @@ MixedModel mixed_model(const ParticipantCells& participant_cells,
     for (ModelEstimate& contrast : contrasts) contrast.p_holm = adjusted[test++];
   }
   return out;
+}
+
+using SmoothFunction = std::function<double(const Eigen::VectorXd&)>;
+
+/// A local minimum of a smooth function by Broyden, Fletcher, Goldfarb & Shanno's method, with
+/// central differences for its gradient.
+Eigen::VectorXd minimize_smooth(const SmoothFunction& function, Eigen::VectorXd start);
+
+/// Second derivatives by central differences.
+Eigen::MatrixXd numerical_hessian(const SmoothFunction& function, const Eigen::VectorXd& place);
+
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+VectorXd numerical_gradient(const SmoothFunction& function, const VectorXd& place) {
+  VectorXd gradient(place.size());
+  VectorXd moved = place;
+  for (Eigen::Index i = 0; i < place.size(); ++i) {
+    const double h = 1e-5 * std::max(1.0, std::abs(place[i]));
+    moved[i] = place[i] + h;
+    const double above = function(moved);
+    moved[i] = place[i] - h;
+    gradient[i] = (above - function(moved)) / (2 * h);
+    moved[i] = place[i];
+  }
+  return gradient;
+}
+
+}  // namespace
+
+VectorXd minimize_smooth(const SmoothFunction& function, VectorXd start) {
+  VectorXd place = std::move(start), gradient = numerical_gradient(function, place);
+  double value = function(place);
+  MatrixXd inverse = MatrixXd::Identity(place.size(), place.size());
+  // Values are exact to about 1e-13 of their size, which limits the detectable gain.
+  const double least_gain = 1e-12 * (1 + std::abs(value));
+  for (int i = 0, idle = 0; i < 500 && idle < 2; ++i) {
+    VectorXd step = -inverse * gradient;
+    if (!(step.dot(gradient) < 0)) {
+      inverse.setIdentity();
+      step = -gradient;
+    }
+    if (step.norm() > 5) step *= 5 / step.norm();
+    double next = function(place + step);
+    for (int halved = 0; !(next <= value + 1e-4 * step.dot(gradient)); ++halved) {
+      if (halved == 40) return place;
+      step *= 0.5;
+      next = function(place + step);
+    }
+    idle = value - next < least_gain ? idle + 1 : 0;
+    place += step;
+    const VectorXd changed = numerical_gradient(function, place);
+    const VectorXd y = changed - gradient;
+    const double curvature = step.dot(y);
+    if (curvature > 1e-14) {
+      const MatrixXd left =
+          MatrixXd::Identity(place.size(), place.size()) - step * y.transpose() / curvature;
+      inverse = left * inverse * left.transpose() + step * step.transpose() / curvature;
+    }
+    gradient = changed;
+    value = next;
+  }
+  return place;
+}
+
+MatrixXd numerical_hessian(const SmoothFunction& function, const VectorXd& place) {
+  const Eigen::Index n = place.size();
+  MatrixXd hessian(n, n);
+  const double h = 1e-3;
+  const auto at = [&](Eigen::Index i, double a, Eigen::Index j, double b) {
+    VectorXd moved = place;
+    moved[i] += a;
+    moved[j] += b;
+    return function(moved);
+  };
+  for (Eigen::Index i = 0; i < n; ++i) {
+    for (Eigen::Index j = 0; j <= i; ++j) {
+      hessian(i, j) = hessian(j, i) =
+          (at(i, h, j, h) - at(i, h, j, -h) - at(i, -h, j, h) + at(i, -h, j, -h)) / (4 * h * h);
+    }
+  }
+  return hessian;
+}
+
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+double log1pexp(double x) { return x > 0 ? x + std::log1p(std::exp(-x)) : std::log1p(std::exp(x)); }
+
+/// Cells of one participant.
+struct Cluster {
+  MatrixXd fixed, random;
+  VectorXd trials, successes;
+};
+
+/// Log density of answers and effects at u, with the matrix of second derivatives.
+struct Joint {
+  double value = 0;
+  VectorXd gradient;
+  MatrixXd information;
+};
+
+Joint joint_at(const Cluster& cluster, const VectorXd& offset, const MatrixXd& scaled,
+               const VectorXd& u) {
+  const VectorXd eta = offset + scaled * u;
+  Joint joint;
+  joint.value = -0.5 * u.squaredNorm();
+  VectorXd residual(eta.size()), weight(eta.size());
+  for (Eigen::Index i = 0; i < eta.size(); ++i) {
+    const double p = 1 / (1 + std::exp(-eta[i]));
+    joint.value += cluster.successes[i] * eta[i] - cluster.trials[i] * log1pexp(eta[i]);
+    residual[i] = cluster.successes[i] - cluster.trials[i] * p;
+    weight[i] = cluster.trials[i] * p * (1 - p);
+  }
+  joint.gradient = scaled.transpose() * residual - u;
+  joint.information =
+      scaled.transpose() * weight.asDiagonal() * scaled + MatrixXd::Identity(u.size(), u.size());
+  return joint;
+}
+
+/// Laplace's approximation of the log likelihood of a participant.
+double laplace(const Cluster& cluster, const VectorXd& beta, const MatrixXd& factor) {
+  const VectorXd offset = cluster.fixed * beta;
+  const MatrixXd scaled = cluster.random * factor;
+  VectorXd u = VectorXd::Zero(factor.cols());
+  Joint joint = joint_at(cluster, offset, scaled, u);
+  for (int i = 0; i < 100; ++i) {
+    const VectorXd step = joint.information.ldlt().solve(joint.gradient);
+    if (step.norm() < 1e-11 * (1 + u.norm())) break;
+    double length = 1;
+    Joint next = joint_at(cluster, offset, scaled, u + step);
+    while (!(next.value >= joint.value) && length > 1e-8) {
+      length *= 0.5;
+      next = joint_at(cluster, offset, scaled, u + length * step);
+    }
+    u += length * step;
+    joint = next;
+  }
+  return joint.value - 0.5 * std::log(joint.information.determinant());
+}
+
+/// Lower triangle: one or two standard deviations and the parameter of their correlation.
+MatrixXd factor_of(const VectorXd& parameters, Eigen::Index effects) {
+  MatrixXd factor = MatrixXd::Zero(effects, effects);
+  factor(0, 0) = parameters[0];
+  if (effects == 2) {
+    factor(1, 0) = parameters[1];
+    factor(1, 1) = parameters[2];
+  }
+  return factor;
+}
+
+std::vector<Cluster> clusters_of(const std::vector<BinomialCell>& cells) {
+  std::map<std::size_t, std::vector<const BinomialCell*>> by_participant;
+  for (const BinomialCell& cell : cells) {
+    if (cell.trials > 0) by_participant[cell.participant].push_back(&cell);
+  }
+  std::vector<Cluster> clusters;
+  for (const auto& [participant, own] : by_participant) {
+    const auto rows = static_cast<Eigen::Index>(own.size());
+    Cluster cluster{MatrixXd(rows, static_cast<Eigen::Index>(own[0]->fixed.size())),
+                    MatrixXd(rows, static_cast<Eigen::Index>(own[0]->random.size())),
+                    VectorXd(rows), VectorXd(rows)};
+    for (Eigen::Index i = 0; i < rows; ++i) {
+      const BinomialCell& cell = *own[static_cast<std::size_t>(i)];
+      for (Eigen::Index j = 0; j < cluster.fixed.cols(); ++j)
+        cluster.fixed(i, j) = cell.fixed[static_cast<std::size_t>(j)];
+      for (Eigen::Index j = 0; j < cluster.random.cols(); ++j)
+        cluster.random(i, j) = cell.random[static_cast<std::size_t>(j)];
+      cluster.trials[i] = cell.trials;
+      cluster.successes[i] = cell.successes;
+    }
+    clusters.push_back(std::move(cluster));
+  }
+  return clusters;
+}
+
+std::string reason_without_model(const std::vector<Cluster>& clusters) {
+  if (clusters.size() < 2) return "fewer than two participants";
+  double trials = 0, successes = 0;
+  MatrixXd products = MatrixXd::Zero(clusters[0].fixed.cols(), clusters[0].fixed.cols());
+  for (const Cluster& cluster : clusters) {
+    trials += cluster.trials.sum();
+    successes += cluster.successes.sum();
+    products += cluster.fixed.transpose() * cluster.fixed;
+  }
+  if (successes == 0 || successes == trials) return "all answers are alike";
+  if (products.fullPivLu().rank() < products.rows())
+    return "the predictors depend on each other: a combination of levels has no trials";
+  return "";
+}
+
+void fill_coefficients(MixedLogistic& model, const std::vector<std::string>& names,
+                       const VectorXd& beta, const MatrixXd& covariance) {
+  for (Eigen::Index i = 0; i < beta.size(); ++i) {
+    LogisticCoefficient c;
+    c.name = names[static_cast<std::size_t>(i)];
+    c.estimate = beta[i];
+    c.se = std::sqrt(std::max(0.0, covariance(i, i)));
+    c.z = c.estimate / c.se;
+    c.p = 2 * cdf(complement(boost::math::normal(), std::abs(c.z)));
+    c.ci95 = {c.estimate - 1.959963984540054 * c.se, c.estimate + 1.959963984540054 * c.se};
+    model.coefficients.push_back(c);
+  }
+}
+
+void fill_variances(MixedLogistic& model, const MatrixXd& factor) {
+  const MatrixXd covariance = factor * factor.transpose();
+  for (Eigen::Index i = 0; i < covariance.rows(); ++i)
+    model.random_sds.push_back(std::sqrt(covariance(i, i)));
+  constexpr double kZero = 1e-3;  // log odds
+  for (Eigen::Index i = 0; i < factor.rows(); ++i) model.singular |= std::abs(factor(i, i)) < kZero;
+  if (factor.rows() == 2 && model.random_sds[0] > kZero && model.random_sds[1] > kZero)
+    model.random_correlation = covariance(1, 0) / model.random_sds[0] / model.random_sds[1];
+}
+
+}  // namespace
+
+MixedLogistic mixed_logistic(const std::vector<BinomialCell>& cells,
+                             const std::vector<std::string>& names) {
+  MixedLogistic model;
+  const std::vector<Cluster> clusters = clusters_of(cells);
+  model.participants = clusters.size();
+  for (const Cluster& cluster : clusters)
+    model.trials += static_cast<std::size_t>(cluster.trials.sum());
+  model.undefined = reason_without_model(clusters);
+  if (!model.undefined.empty()) return model;
+  const Eigen::Index fixed = clusters[0].fixed.cols(), effects = clusters[0].random.cols();
+  const Eigen::Index spreads = effects * (effects + 1) / 2;
+  const auto loss = [&](const VectorXd& x) {
+    const MatrixXd factor = factor_of(x.tail(spreads), effects);
+    double sum = 0;
+    for (const Cluster& cluster : clusters) sum -= laplace(cluster, x.head(fixed), factor);
+    return sum;
+  };
+  VectorXd start = VectorXd::Zero(fixed + spreads);
+  start[fixed] = 0.5;
+  if (effects == 2) start[fixed + 2] = 0.5;
+  const VectorXd best = minimize_smooth(loss, start);
+  // Perfect separation by a predictor has no finite odds.
+  if (best.head(fixed).cwiseAbs().maxCoeff() > 12) {
+    model.undefined = "a level has no wrong or no correct answers: its odds are infinite";
+    return model;
+  }
+  const MatrixXd hessian = numerical_hessian(loss, best);
+  // On the boundary only the block of fixed effects is regular.
+  const MatrixXd factor = factor_of(best.tail(spreads), effects);
+  fill_variances(model, factor);
+  const MatrixXd covariance = model.singular
+                                  ? MatrixXd(hessian.topLeftCorner(fixed, fixed).inverse())
+                                  : MatrixXd(hessian.inverse());
+  model.log_likelihood = -loss(best);
+  fill_coefficients(model, names, best.head(fixed), covariance);
+  return model;
+}
+
+MixedLogistic accuracy_model(const TrialTable& table) {
+  std::vector<std::string> names{"(Intercept)"};
+  for (std::size_t r = 1; r < table.renderers.size(); ++r)
+    names.push_back("renderer" + table.renderers[r]);
+  for (std::size_t s = 1; s < table.shapes.size(); ++s) names.push_back("shape" + table.shapes[s]);
+  std::map<std::tuple<std::uint32_t, std::uint16_t, std::uint16_t>, BinomialCell> cells;
+  for (const TrialRow& row : table.rows) {
+    BinomialCell& cell = cells[{row.participant, row.renderer, row.shape}];
+    cell.trials += 1;
+    cell.successes += row.correct ? 1 : 0;
+  }
+  std::vector<BinomialCell> list;
+  for (auto& [key, cell] : cells) {
+    const auto& [participant, renderer, shape] = key;
+    cell.participant = participant;
+    cell.fixed.assign(names.size(), 0);
+    cell.fixed[0] = 1;
+    if (renderer > 0) cell.fixed[renderer] = 1;
+    if (shape > 0) cell.fixed[table.renderers.size() - 1 + shape] = 1;
+    cell.random = {1};
+    list.push_back(cell);
+  }
+  return mixed_logistic(list, names);
 }
 
 }  // namespace palpate::analysis

@@ -3,15 +3,56 @@
 // restricted maximum likelihood (REML), like R's lme4 (Bates et al. 2015) and lmerTest (Kuznetsova
 // et al. 2017).
 
+#include <array>
 #include <cstddef>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "analysis/input/trials.h"
 #include "analysis/statistics/describe.h"
 #include "analysis/statistics/paired.h"
 
 namespace palpate::analysis {
+
+// Two-way repeated-measures analysis of variance, renderer x shape, on participants' mean log times
+// (natural log of s).
+
+/// Test of sphericity of an effect's contrasts, and the corrected p values.
+struct Sphericity {
+  /// Reason for missing values; empty: all are defined. With one degree of freedom sphericity holds
+  /// trivially and all are missing.
+  std::string undefined;
+  std::optional<double> mauchly_w;  ///< W = det S / (tr S / p)^p; Mauchly (1940)
+  /// By the chi-squared series of Box (1949) to second order. mauchly_p_box: as in Box; mauchly_p:
+  /// as in R's afex and car, which once use the number of cells in place of Box's number of
+  /// contrasts.
+  std::optional<double> mauchly_p, mauchly_p_box;
+  std::optional<double> gg_epsilon, gg_p;                       ///< Greenhouse & Geisser (1959)
+  std::optional<double> hf_epsilon_raw, hf_epsilon_used, hf_p;  ///< Huynh & Feldt (1976); used <= 1
+};
+
+/// F test of a main effect or the interaction.
+struct AnovaEffect {
+  std::string name;       ///< "renderer", "shape", "renderer:shape"
+  std::string undefined;  ///< reason if F is missing; empty: defined
+  std::optional<double> num_df, den_df, f, p;
+  /// SS / (SS + SS_participants + all three error SS); Olejnik & Algina (2003).
+  std::optional<double> generalized_eta_squared;
+  Sphericity sphericity;
+};
+
+/// The analysis of variance.
+struct RmAnova {
+  std::string
+      undefined;  ///< reason if there is no two-way analysis; single effects may still be defined
+  std::size_t n_participants_used = 0;
+  std::array<AnovaEffect, 3> effects;  ///< renderer, shape, renderer:shape
+  std::vector<std::size_t> dropped;    ///< participants without a time in some cell
+};
+
+/// Analyses the participants with a time in every cell; any numbers of renderers and shapes.
+RmAnova rm_anova(const ParticipantCells& participant_cells);
 
 /// Estimate and test of a coefficient or contrast (natural log of s) with Satterthwaite's degrees
 /// of freedom.
@@ -56,5 +97,41 @@ struct MixedModel {
 MixedModel mixed_model(const ParticipantCells& participant_cells,
                        const std::vector<std::string>& renderers,
                        const std::vector<std::string>& shapes);
+
+// Mixed logistic regression by maximum likelihood with Laplace's approximation, like R's
+// lme4::glmer(..., family = binomial) with its default nAGQ = 1 (Bates et al. 2015).
+
+/// Trials of a participant with the same predictors.
+struct BinomialCell {
+  std::size_t participant = 0;
+  double trials = 0, successes = 0;
+  std::vector<double> fixed;   ///< a row of the fixed effects' design
+  std::vector<double> random;  ///< a row of the participant's effects' design; one or two
+};
+
+struct LogisticCoefficient {
+  std::string name;
+  double estimate = 0, se = 0;  ///< log odds
+  double z = 0, p = 0;          ///< Wald, two-sided
+  Interval ci95;
+};
+
+struct MixedLogistic {
+  std::string undefined;
+  bool singular = false;  ///< a participants' standard deviation is 0, or their correlation +-1
+  std::size_t participants = 0, trials = 0;
+  double log_likelihood = 0;  ///< of single trials in their order, as in glmer
+  std::vector<LogisticCoefficient> coefficients;
+  std::vector<double> random_sds;
+  std::optional<double> random_correlation;
+};
+
+/// \param names  of the fixed effects
+MixedLogistic mixed_logistic(const std::vector<BinomialCell>& cells,
+                             const std::vector<std::string>& names);
+
+/// correct ~ renderer + shape + (1 | participant), with the first renderer and shape as reference;
+/// a time-out is wrong.
+MixedLogistic accuracy_model(const TrialTable& table);
 
 }  // namespace palpate::analysis

@@ -9,7 +9,6 @@
 #include <string>
 #include <vector>
 
-#include "analysis/statistics/anova.h"
 #include "data/base/random.h"
 
 namespace palpate::analysis {

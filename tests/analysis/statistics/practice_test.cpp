@@ -1,4 +1,3 @@
-#include "analysis/statistics/practice.h"
 
 #include <gtest/gtest.h>
 

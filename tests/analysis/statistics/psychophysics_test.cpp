@@ -7,8 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "analysis/statistics/discrimination.h"
-#include "analysis/statistics/mixed_logistic.h"
-#include "analysis/statistics/scaling.h"
+#include "analysis/statistics/mixed_model.h"
 #include "analysis/statistics/task_analysis.h"
 #include "analysis/statistics/task_comparisons.h"
 #include "data/base/random.h"
