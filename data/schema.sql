@@ -107,7 +107,7 @@ CREATE UNIQUE INDEX one_record_a_trial ON attempts (session_id, trial) WHERE sta
 CREATE UNIQUE INDEX one_open_attempt_a_run ON attempts (run_id) WHERE state = 'running';
 CREATE INDEX attempts_of_run ON attempts (run_id);
 
--- Servo-rate samples of an attempt, packed; the packing is described in samples_codec.h.
+-- Servo-rate samples of an attempt, packed; the packing is described in store/attempts.h.
 CREATE TABLE samples (
   attempt_id INTEGER PRIMARY KEY REFERENCES attempts (id),
   packing INTEGER NOT NULL CHECK (packing >= 1),

@@ -4,7 +4,7 @@
 #include <cstdlib>
 #include <string>
 
-#include "data/store/samples_codec.h"
+#include "data/store/attempts.h"
 #include "data/store/store.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

@@ -1,5 +1,3 @@
-#include "data/store/samples_codec.h"
-
 #include <gtest/gtest.h>
 #include <zlib.h>
 
@@ -9,6 +7,7 @@
 #include <random>
 #include <stdexcept>
 
+#include "data/store/attempts.h"
 #include "data/store/store.h"
 #include "tests/shared/peak_memory.h"
 
@@ -200,7 +199,7 @@ std::string a_bomb(std::size_t count) {
   stream.next_out = reinterpret_cast<Bytef*>(packed.data());
   stream.avail_out = static_cast<uInt>(packed.size());
   uLong crc = crc32_z(0, nullptr, 0);
-  constexpr int kBytesASample = 187;  // as data/store/samples_codec.h has it
+  constexpr int kBytesASample = 187;  // as data/store/attempts.h has it
   for (int i = 0; i < kBytesASample; ++i) {
     stream.next_in = const_cast<Bytef*>(zeros.data());
     stream.avail_in = static_cast<uInt>(count);

@@ -47,7 +47,7 @@ def slope(points):
 
 
 def column(planes, offset, rows, size):
-    """Of the packing in data/store/samples_codec.h: byte planes, most significant first, of differences."""
+    """Of the packing in data/store/attempts.h: byte planes, most significant first, of differences."""
     values, value = [], 0
     for parts in zip(*(planes[offset + i * rows:offset + (i + 1) * rows] for i in range(size))):
         value = (value + int.from_bytes(parts, "big")) % 256**size
