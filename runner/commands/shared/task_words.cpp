@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "data/base/random.h"
-#include "protocols/procedures/recovery.h"
+#include "protocols/procedures/procedure.h"
 #include "protocols/tasks/levels.h"
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/outputs.h"
