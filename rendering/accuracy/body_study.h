@@ -2,6 +2,7 @@
 // Bodies that move and collide, against known answers: error and run time of our own step, beside
 // Bullet and ODE if they are found. World frame, SI units.
 
+#include <cstddef>
 #include <functional>
 #include <memory>
 #include <span>
@@ -78,5 +79,22 @@ struct BodyTickCost {
   std::size_t ticks = 0;
 };
 BodyTickCost body_tick_cost(bool quick, const std::function<double()>& now);
+
+// Errors of soft bodies against known solutions, and the cost of a step. Not for the servo.
+
+/// One measured quantity of one solid.
+struct SoftRow {
+  std::string name, truth;
+  std::size_t nodes = 0, elements = 0;
+  double value = 0, reference = 0;  ///< in `unit`; the error is their difference
+  std::string unit;
+  double error = 0;    ///< share of the reference; in `unit` for the last two cases
+  double step_ns = 0;  ///< of a step of the body; 0: no step
+};
+
+/// \param quick  without the meshes that take seconds to build
+/// \param now    ns, a clock
+std::vector<SoftRow> soft_study(bool quick, const std::function<double()>& now,
+                                const std::function<void(double)>& progress);
 
 }  // namespace palpate::rendering

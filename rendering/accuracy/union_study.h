@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "rendering/accuracy/error_summary.h"
+#include "rendering/accuracy/methods.h"
 #include "rendering/verification/union_cases.h"
 
 namespace palpate::rendering {

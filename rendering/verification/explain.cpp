@@ -9,7 +9,7 @@
 
 #include "rendering/probes.h"
 #include "rendering/tick.h"
-#include "rendering/verification/surface_stroke.h"
+#include "rendering/verification/random_solids.h"
 
 namespace palpate::rendering {
 namespace {

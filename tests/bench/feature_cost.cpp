@@ -13,7 +13,7 @@
 
 #include "rendering/probes.h"
 #include "rendering/tick.h"
-#include "rendering/verification/surface_stroke.h"
+#include "rendering/verification/random_solids.h"
 #include "stimuli/primitives.h"
 #include "tests/bench/least_tick.h"
 #include "tests/bench/measured_tick.h"

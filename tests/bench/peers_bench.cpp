@@ -18,8 +18,8 @@
 #include "rendering/accuracy/local_depths.h"
 #include "rendering/accuracy/methods.h"
 #include "rendering/renderer.h"
+#include "rendering/verification/random_solids.h"
 #include "rendering/verification/reference.h"
-#include "rendering/verification/surface_stroke.h"
 #include "runner/servo/tick_clock.h"
 #include "stimuli/primitives.h"
 

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "protocols/parse.h"
-#include "rendering/verification/surface_stroke.h"
+#include "rendering/verification/random_solids.h"
 #include "runner/session/session.h"
 #include "tests/bench/unlogged_trial.h"
 

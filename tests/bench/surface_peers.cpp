@@ -25,7 +25,7 @@
 #include <vector>
 
 #include "rendering/renderer.h"
-#include "rendering/verification/surface_stroke.h"
+#include "rendering/verification/random_solids.h"
 #include "runner/servo/tick_clock.h"
 #include "stimuli/closed_surface.h"
 #include "stimuli/primitives.h"

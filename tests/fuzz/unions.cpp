@@ -4,7 +4,7 @@
 #include <cstdlib>
 #include <iostream>
 
-#include "rendering/verification/union_search.h"
+#include "rendering/verification/search.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace palpate::rendering;

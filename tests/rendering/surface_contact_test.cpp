@@ -15,7 +15,7 @@
 #include "data/base/random.h"
 #include "rendering/surface_patch.h"
 #include "rendering/surface_search.h"
-#include "rendering/verification/surface_stroke.h"
+#include "rendering/verification/random_solids.h"
 #include "runner/bench/allocation_count.h"
 #include "stimuli/closed_surface.h"
 #include "stimuli/orientation.h"

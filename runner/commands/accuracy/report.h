@@ -11,12 +11,10 @@
 #include "analysis/report/tables.h"
 #include "rendering/accuracy/body_study.h"
 #include "rendering/accuracy/paper_first_contact.h"
-#include "rendering/accuracy/soft_study.h"
 #include "rendering/accuracy/study.h"
 #include "rendering/accuracy/union_study.h"
 #include "rendering/verification/extreme_cases.h"
 #include "rendering/verification/search.h"
-#include "rendering/verification/union_search.h"
 #include "stimuli/shapes.h"
 
 namespace palpate::runner::commands {

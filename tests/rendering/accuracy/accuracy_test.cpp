@@ -9,7 +9,6 @@
 #include <numbers>
 
 #include "rendering/accuracy/analytic_stroke.h"
-#include "rendering/accuracy/error_summary.h"
 #include "rendering/accuracy/methods.h"
 #include "stimuli/primitives.h"
 #include "tests/shared/probe_paths.h"

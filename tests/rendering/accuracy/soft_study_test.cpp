@@ -1,8 +1,6 @@
 // The rows of soft bodies: each number under its name, errors by their definition, and bounds that
 // follow from the references.
 
-#include "rendering/accuracy/soft_study.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -15,6 +13,7 @@
 #include <vector>
 
 #include "rendering/accuracy/analytic_stroke.h"
+#include "rendering/accuracy/body_study.h"
 
 namespace palpate::rendering {
 namespace {

@@ -6,7 +6,7 @@
 #include <glm/geometric.hpp>
 
 #include "data/base/random.h"
-#include "rendering/bodies/body_contacts.h"
+#include "rendering/bodies/body_world.h"
 #include "rendering/probe.h"
 #include "runner/bench/allocation_count.h"
 #include "tests/rendering/bodies/body_fixtures.h"

@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "rendering/bodies/body_world.h"
-#include "rendering/bodies/moving_bodies.h"
 #include "rendering/bodies/moving_scene.h"
 #include "rendering/bodies/rigid_motion.h"
 #include "rendering/renderer.h"

@@ -1,7 +1,5 @@
 // A tool on a soft body: Hertz, several contacts, the two rates, and the rules of a servo.
 
-#include "rendering/bodies/soft/soft_contact.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -10,9 +10,8 @@
 #include <vector>
 
 #include "data/base/random.h"
+#include "rendering/verification/search.h"
 #include "rendering/verification/union_cases.h"
-#include "rendering/verification/union_oracle.h"
-#include "rendering/verification/union_search.h"
 
 namespace palpate::rendering {
 namespace {

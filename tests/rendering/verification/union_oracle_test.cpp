@@ -1,8 +1,6 @@
 // The oracle of contact with unions of convex parts: against closed forms and other brute force.
 // By the definition of an ideal tool: union_oracle_audit_test.cpp.
 
-#include "rendering/verification/union_oracle.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -12,8 +10,8 @@
 #include "rendering/renderer.h"
 #include "rendering/verification/random_solids.h"
 #include "rendering/verification/reference.h"
+#include "rendering/verification/search.h"
 #include "rendering/verification/union_cases.h"
-#include "rendering/verification/union_search.h"
 #include "stimuli/orientation.h"
 #include "stimuli/primitives.h"
 

@@ -1,14 +1,14 @@
 // The search over unions of convex parts finds no error in the renderer, and finds the errors of
 // broken ones.
 
-#include "rendering/verification/union_search.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <limits>
 #include <set>
 #include <utility>
+
+#include "rendering/verification/search.h"
 
 namespace palpate::rendering {
 namespace {
