@@ -2,6 +2,10 @@
 // Draws scenes: one drawing code for windows and files. OpenGL 3.3 forward renderer with several
 // samples a pixel, soft shadows of a lamp and of the sky, and a hemisphere light.
 
+#include <glm/mat4x4.hpp>
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+#include <glm/vec4.hpp>
 #include <map>
 #include <memory>
 #include <optional>
@@ -9,8 +13,140 @@
 #include <vector>
 
 #include "runner/display/scene/camera.h"
-#include "runner/display/scene/gl_parts.h"
+#include "runner/display/scene/drawn_mesh.h"
 #include "runner/display/scene/picture.h"
+
+namespace palpate::runner::display {
+
+// Owners of OpenGL objects, which free them. All need a current OpenGL 3.3 context, also in their
+// destructors.
+
+/// \throws DisplayError if the current context is too old to draw scenes
+void require_opengl();
+
+/// Whether the CPU draws instead of a graphics card.
+bool draws_in_software();
+
+/// Call after the last drawing into a target, before drawing into another. If the CPU draws, waits
+/// until it has finished. Without the wait Mesa's software driver (llvmpipe, seen in 22.3.6) may
+/// free a target's fence while the thread that signals it still uses it; that thread then writes
+/// into freed memory.
+void finish_target();
+
+/// \throws DisplayError naming `doing` if OpenGL reports an error
+void check_opengl(const char* doing);
+
+/// A mesh on the graphics card.
+class GlMesh {
+ public:
+  explicit GlMesh(const DrawnMesh& mesh);
+  ~GlMesh();
+  GlMesh(const GlMesh&) = delete;
+  GlMesh& operator=(const GlMesh&) = delete;
+  void draw() const;
+
+ private:
+  unsigned vertices_ = 0, buffer_ = 0;
+  int corners_ = 0;
+};
+
+class GlProgram {
+ public:
+  /// \throws DisplayError with the driver's reason
+  GlProgram(const char* vertex_shader, const char* fragment_shader);
+  ~GlProgram();
+  GlProgram(const GlProgram&) = delete;
+  GlProgram& operator=(const GlProgram&) = delete;
+
+  void use() const;
+  // Set uniforms of the program in use.
+  void set(const char* name, float value) const;
+  void set(const char* name, int value) const;
+  void set(const char* name, const glm::vec2& value) const;
+  void set(const char* name, const glm::vec3& value) const;
+  void set(const char* name, const glm::vec4& value) const;
+  void set(const char* name, const glm::mat4& value) const;
+
+ private:
+  int place_of(const char* name) const;
+  unsigned program_ = 0;
+};
+
+/// A render target with several samples a pixel, and its resolved texture.
+class GlCanvas {
+ public:
+  ~GlCanvas();
+  GlCanvas() = default;
+  GlCanvas(const GlCanvas&) = delete;
+  GlCanvas& operator=(const GlCanvas&) = delete;
+
+  /// Resizes it (px) and binds it. \throws DisplayError: too large for the driver
+  void begin(int width, int height, int samples);
+  /// Resolves the samples into the texture.
+  void end() const;
+  unsigned texture() const { return texture_; }
+  /// Rows from the top, three bytes a pixel: red, green, blue.
+  std::string pixels() const;
+
+ private:
+  void discard();
+  int width_ = 0, height_ = 0, samples_ = 0;
+  unsigned samples_frame_ = 0, samples_colour_ = 0, samples_depth_ = 0, frame_ = 0, texture_ = 0;
+};
+
+/// A shadow map: distances from a light.
+class GlDepthMap {
+ public:
+  explicit GlDepthMap(int size);
+  ~GlDepthMap();
+  GlDepthMap(const GlDepthMap&) = delete;
+  GlDepthMap& operator=(const GlDepthMap&) = delete;
+  void begin() const;
+  /// Binds it as the texture of a shadow sampler.
+  void read_as(int unit) const;
+
+ private:
+  int size_;
+  unsigned frame_ = 0, texture_ = 0;
+};
+
+// Text over a picture.
+
+/// The point of the text that is positioned: its left end at mid-height, its centre, its lower left
+/// corner.
+enum class TextAnchor { left, centre, lower_left };
+
+class GlText {
+ public:
+  GlText();
+  ~GlText();
+  GlText(const GlText&) = delete;
+  GlText& operator=(const GlText&) = delete;
+
+  /// Begins the texts of a picture, drawn into the bound target. \param size  px, of the font
+  void begin(const glm::vec2& picture, double size, const Theme& theme);
+  void draw(const std::string& text, const glm::vec2& at, TextAnchor anchor);
+  /// Size of the text as drawn, px.
+  glm::vec2 size_of(const std::string& text) { return known(text).size; }
+  void end();
+
+ private:
+  struct Known {
+    unsigned texture = 0;
+    glm::vec2 size{0, 0};
+    bool used = false;
+  };
+  const Known& known(const std::string& text);
+
+  GlProgram program_;
+  unsigned nothing_ = 0;  ///< vertex array without data: the shader computes the vertices
+  std::map<std::string, Known> known_;
+  glm::vec2 picture_{1, 1};
+  double size_ = 0;
+  const Theme* theme_ = nullptr;
+};
+
+}  // namespace palpate::runner::display
 
 namespace palpate::runner::display::shaders {
 

@@ -1,6 +1,6 @@
 // Preloaded into a program that draws with Mesa's software driver: delays each drawing thread's
 // signal that it has finished, as if another program had taken its processor. Memory freed too
-// early is then still in use (runner/display/scene/gl_parts.h, finish_target).
+// early is then still in use (runner/display/scene/scene_renderer.h, finish_target).
 
 #include <dlfcn.h>
 #include <pthread.h>
