@@ -84,17 +84,15 @@ def room_of(name):
 # The headers of a room that other rooms use; all others are the room's own business (and that of the rooms within).
 PUBLIC = {
     "stimuli": "closed_surface shapes convex_mesh grid_hull inset large_array mesh_file orientation "
-               "parts/convex_parts parts/facets signed_distance "
-               "primitives solids/solid_mesh vec",
+               "parts/convex_parts parts/facets primitives solids/solid_mesh vec",
     "rendering": "first_contact probe reach render_fault renderer scene tool",
     "rendering/bodies": "moving_scene",
-    "rendering/verification": "explain extreme_cases random_solids reference search union_cases "
-                              "union_search",
-    "rendering/accuracy": "body_study paper_first_contact peers soft_study study union_study",
+    "rendering/verification": "explain extreme_cases random_solids reference search union_cases",
+    "rendering/accuracy": "body_study paper_first_contact peers study union_study",
     "rendering/bodies/soft": "soft_scene",
     "protocols": "answer_keys difference json_document parse protocol schedule sweep_space "
                  "tasks/task_plan tasks/levels tasks/texts",
-    "protocols/procedures": "procedure procedure_spec psychometric recovery",
+    "protocols/procedures": "procedure procedure_spec psychometric",
     "data/base": "checksum input_file json_text random text",
     "data": "column_table record sweep_record",
     "data/files": "atomic_file atomic_folder file_permissions text_sink output_check utc",
@@ -115,19 +113,19 @@ PUBLIC = {
                     "shared_value tick_clock tick_source touched_places triple_buffer",
     "runner/safety": "fault_signals guarded_device shared_memory",
     "runner/sound": "masking_noise",
-    "runner/devices": "device_delay mouse registry replay self_test simulated",
-    "runner/devices/falcon": "calibration open stylus_from_ends weighing",
+    "runner/devices": "device_delay mouse registry self_test simulated",
+    "runner/devices/falcon": "calibration falcon stylus_from_ends",
     "runner/display": "display explore_window mailbox text_display timeline window",
     "runner/display/scene": "camera picture drawn_mesh image_file painter scene_drawing "
                             "scene_renderer",
     "runner/participants": "keyboard respondent response_box simulated_settings simulated "
                            "task_participant",
-    "runner/session": "device_check live_forces session_plan live_session markers near_codes "
+    "runner/session": "device_check live_forces session_plan live_session markers "
                       "preflight run_record replay sample_stream session simulated_study "
                       "socket_advisor station",
     "runner/serve": "network served_scene served_session",
-    "runner/sweep": "design swept_study",
-    "runner/stability": "boundary integrators soft_map",
+    "runner/sweep": "swept_study",
+    "runner/stability": "boundary",
     "runner/bench": "allocation_count",
     "runner/commands": "render/forces shared/command shared/task_words shared/study_options",
 }

@@ -9,7 +9,7 @@
 #include <memory>
 #include <vector>
 
-#include "runner/participants/lanes.h"
+#include "runner/participants/lane_math.h"
 #include "stimuli/closed_surface.h"
 #include "stimuli/convex_mesh.h"
 #include "stimuli/large_array.h"

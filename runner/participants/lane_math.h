@@ -6,6 +6,10 @@
 #include <bit>
 #include <cmath>
 #include <cstdint>
+#include <cstring>
+#if defined(__SSE2__)
+#include <immintrin.h>
+#endif
 
 namespace palpate::runner::participants::lane {
 
@@ -71,6 +75,130 @@ inline float log_normal_cdf(float x) {
   const float lower = lane::log(0.5f * t) + h - a * a;  // ln Phi(-|x|)
   const float upper = lane::log(1.0f - lane::exp(lower));
   return x < 0.0f ? lower : upper;
+}
+
+// As many floats as a register holds, for loops that compilers do not vectorise by themselves. Each
+// lane has the operations of a single float, so results are the same to the bit at every width.
+
+#if defined(__AVX512F__)
+inline constexpr int kWidth = 16;
+#elif defined(__AVX__)
+inline constexpr int kWidth = 8;
+#else
+inline constexpr int kWidth = 4;
+#endif
+
+using Floats = float __attribute__((vector_size(4 * kWidth)));
+using Ints = std::int32_t __attribute__((vector_size(4 * kWidth)));  ///< also flags: 0 or -1
+
+inline Floats load(const float* from) {
+  Floats out;
+  std::memcpy(&out, from, sizeof out);
+  return out;
+}
+inline void store(const Floats& from, float* to) { std::memcpy(to, &from, sizeof from); }
+inline Floats all(float value) { return value - Floats{}; }
+
+inline Floats max(const Floats& a, const Floats& b) { return a > b ? a : b; }
+inline Floats min(const Floats& a, const Floats& b) { return a < b ? a : b; }
+inline Floats abs(const Floats& x) { return max(x, -x); }
+inline Floats mix(const Floats& a, const Floats& b, const Floats& t) { return a + t * (b - a); }
+
+inline Floats sqrt(const Floats& x) {
+  Floats out;
+#if defined(__AVX512F__)
+  out = reinterpret_cast<Floats>(_mm512_maskz_sqrt_ps(0xffff, reinterpret_cast<__m512>(x)));
+#elif defined(__AVX__)
+  out = reinterpret_cast<Floats>(_mm256_sqrt_ps(reinterpret_cast<__m256>(x)));
+#elif defined(__SSE2__)
+  out = reinterpret_cast<Floats>(_mm_sqrt_ps(reinterpret_cast<__m128>(x)));
+#else
+  for (int i = 0; i < kWidth; ++i) out[i] = std::sqrt(x[i]);
+#endif
+  return out;
+}
+
+inline bool any(const Ints& flags) {
+#if defined(__AVX512F__)
+  const auto bits = reinterpret_cast<__m512i>(flags);
+  return _mm512_test_epi32_mask(bits, bits) != 0;
+#elif defined(__AVX__)
+  return _mm256_movemask_ps(reinterpret_cast<__m256>(flags)) != 0;
+#elif defined(__SSE2__)
+  return _mm_movemask_ps(reinterpret_cast<__m128>(flags)) != 0;
+#else
+  std::int32_t either = 0;
+  for (int i = 0; i < kWidth; ++i) either |= flags[i];
+  return either != 0;
+#endif
+}
+
+/// Stores the flagged lanes side by side. \return their number. \param to  has room for all lanes
+template <class T>
+int store_flagged(const T& from, const Ints& flags, void* to) {
+  static_assert(sizeof from == sizeof flags);
+#if defined(__AVX512F__)
+  const auto bits = reinterpret_cast<__m512i>(flags);
+  const __mmask16 chosen = _mm512_test_epi32_mask(bits, bits);
+  _mm512_storeu_si512(to, _mm512_maskz_compress_epi32(chosen, reinterpret_cast<__m512i>(from)));
+  return __builtin_popcount(chosen);
+#else
+  int count = 0;
+  for (int i = 0; i < kWidth; ++i) {
+    const auto value = from[i];
+    std::memcpy(static_cast<char*>(to) + sizeof value * static_cast<std::size_t>(count), &value,
+                sizeof value);
+    count -= flags[i];
+  }
+  return count;
+#endif
+}
+
+/// Neighbours in memory, for each lane.
+struct Pairs {
+  Floats first, second;
+};
+
+/// from[at[i]] and from[at[i] + 1]
+inline Pairs pairs(const float* from, const Ints& at) {
+#if defined(__AVX512F__)
+  // The functions without a mask have false alarms of g++ 12 (its bug 105593).
+  const auto eight = [&](const __m256i places) {
+    return _mm512_castpd_ps(_mm512_mask_i32gather_pd(_mm512_setzero_pd(), 0xff, places, from, 4));
+  };
+  const auto places = reinterpret_cast<__m512i>(at);
+  const __m512 low = eight(_mm512_maskz_extracti64x4_epi64(0xff, places, 0)),
+               high = eight(_mm512_maskz_extracti64x4_epi64(0xff, places, 1));
+  const __m512i even = _mm512_setr_epi32(0, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 26, 28, 30);
+  const __m512i odd = _mm512_setr_epi32(1, 3, 5, 7, 9, 11, 13, 15, 17, 19, 21, 23, 25, 27, 29, 31);
+  return {reinterpret_cast<Floats>(_mm512_permutex2var_ps(low, even, high)),
+          reinterpret_cast<Floats>(_mm512_permutex2var_ps(low, odd, high))};
+#else
+  using Two = float __attribute__((vector_size(8)));
+  using Four = float __attribute__((vector_size(16)));
+  const auto two = [&](int i) {
+    Two out;
+    std::memcpy(&out, from + at[i], sizeof out);
+    return out;
+  };
+  struct Fours {
+    Four first, second;
+  };
+  const auto four = [&](int i) {
+    const Four low = __builtin_shufflevector(two(i), two(i + 1), 0, 1, 2, 3),
+               high = __builtin_shufflevector(two(i + 2), two(i + 3), 0, 1, 2, 3);
+    return Fours{__builtin_shufflevector(low, high, 0, 2, 4, 6),
+                 __builtin_shufflevector(low, high, 1, 3, 5, 7)};
+  };
+#if defined(__AVX__)
+  const Fours low = four(0), high = four(4);
+  return {__builtin_shufflevector(low.first, high.first, 0, 1, 2, 3, 4, 5, 6, 7),
+          __builtin_shufflevector(low.second, high.second, 0, 1, 2, 3, 4, 5, 6, 7)};
+#else
+  const Fours only = four(0);
+  return {only.first, only.second};
+#endif
+#endif
 }
 
 }  // namespace palpate::runner::participants::lane

@@ -13,8 +13,34 @@
 
 namespace palpate::runner::participants {
 
+// Distinguishable orientations of a stimulus.
+
+// The surface at which a stimulus is felt first.
+
+/// The convex parts of the outermost surface that has a stiffness, relative to the centre of the
+/// workspace. That is the object's surface or, if its stiffness is 0, the uppermost layer with a
+/// stiffness. The simulated participant does not know the layers below it.
+/// \throws MeshError
+std::vector<PlacedPart> felt_parts(const stimuli::ObjectSpec& stimulus);
+
+/// Whether there is such a surface.
+bool can_be_felt(const stimuli::ObjectSpec& stimulus);
+
+/// Point i of n of a super-Fibonacci spiral, evenly spread over all rotations (Alexa 2022,
+/// "Super-Fibonacci Spirals: Fast, Low-Discrepancy Sampling of SO(3)", algorithm 1).
+Quat super_fibonacci(int i, int n);
+
+/// The rotations about the origin that map a solid to itself, the identity first: its field then
+/// changes by at most a fifth of its spacing (root mean square, near the surface). An axis of
+/// symmetry runs through a corner, or the middle of an edge or a facet, of the convex hull; turns
+/// by 360 degrees over 2 to 32 are tried about each.
+std::vector<Quat> symmetries(const std::vector<PlacedPart>& parts, const DistanceField& field);
+
+/// Rotations some 11 to 14 degrees apart: of each set that is equivalent by symmetry, the smallest.
+std::vector<Mat3> distinct_rotations(const std::vector<Quat>& group);
+
 /// Shape x rotation grid modulo the shape's symmetry. Immutable, so threads can share it. A
-/// stimulus is represented by the surface that is felt first (felt_parts.h), placed relative to the
+/// stimulus is represented by the surface that is felt first (felt_parts), placed relative to the
 /// centre of the workspace. The four analytic shapes, if centred, have formulas. Any other stimulus
 /// has a distance field and some 4600 rotations 14 degrees apart; with symmetries fewer, 11 degrees
 /// apart. Sphere: 1 hypothesis. Cone: 380 directions of the axis. Cylinder: 150 undirected axes.

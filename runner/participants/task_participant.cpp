@@ -3,10 +3,308 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <glm/geometric.hpp>
+#include <glm/gtc/quaternion.hpp>
+#include <limits>
+#include <string>
+#include <tuple>
 
+#include "protocols/parse.h"
 #include "protocols/tasks/levels.h"
+#include "stimuli/primitives.h"
 
 namespace palpate::runner::participants {
+namespace {
+
+constexpr double kLeastDepth = 2e-4;        // m; below it force over depth is noise
+constexpr double kLevelStep = 1e-3;         // change of the level, for the derivative
+constexpr double kLeastSensitivity = 1e-3;  // movement of the surface for that of the level, m/m
+
+double box_distance(const Vec3& size, const Vec3& point) {
+  const Vec3 beyond = glm::abs(point) - 0.5 * size;
+  return glm::length(glm::max(beyond, Vec3(0))) +
+         std::min(std::max({beyond.x, beyond.y, beyond.z}), 0.0);
+}
+
+/// Distance to the surface, m; NaN for a mesh.
+double distance_to(const stimuli::ObjectSpec& object, const Vec3& point) {
+  const Vec3 local = glm::conjugate(object.pose.orientation) * (point - object.pose.position);
+  switch (object.shape) {
+    case stimuli::ShapeKind::mesh:
+      return std::numeric_limits<double>::quiet_NaN();
+    case stimuli::ShapeKind::box:
+      return box_distance(object.size, local);
+    case stimuli::ShapeKind::compound: {
+      double least = std::numeric_limits<double>::infinity();
+      for (const stimuli::ObjectSpec& part : object.parts) {
+        const double one = distance_to(part, local);
+        if (!(one >= least)) least = one;
+      }
+      return least;
+    }
+    default:
+      return stimuli::signed_distance(object, local).distance;
+  }
+}
+
+bool is_length(const std::string& pointer) {
+  return pointer.ends_with("_m") || pointer.find("_m/") != std::string::npos;
+}
+
+}  // namespace
+
+bool have_one_form(const stimuli::ObjectSpec& a, const stimuli::ObjectSpec& b) {
+  const auto form = [](const stimuli::ObjectSpec& o) {
+    return std::tuple(o.shape, o.radius, o.height, o.edge, o.size.x, o.size.y, o.size.z, o.file,
+                      o.parts.size(), o.pose.position.x, o.pose.position.y, o.pose.position.z,
+                      o.pose.orientation.w, o.pose.orientation.x, o.pose.orientation.y,
+                      o.pose.orientation.z);
+  };
+  if (form(a) != form(b)) return false;
+  for (std::size_t i = 0; i < a.parts.size(); ++i) {
+    if (!have_one_form(a.parts[i], b.parts[i])) return false;
+  }
+  return true;
+}
+
+bool differ_in_stiffness(const protocols::Protocol& protocol, const protocols::TaskBlock& block) {
+  const auto object = [&](std::size_t i) -> const stimuli::ObjectSpec& {
+    return protocol.stimuli[static_cast<std::size_t>(block.stimuli[i])].object;
+  };
+  for (std::size_t i = 0; i < block.stimuli.size(); ++i) {
+    for (std::size_t k = 0; k < i; ++k) {
+      if (!have_one_form(object(i), object(k)) ||
+          object(i).material.stiffness == object(k).material.stiffness)
+        return false;
+    }
+  }
+  return block.stimuli.size() > 1;
+}
+
+void LevelPercept::begin(const protocols::Trial& trial, const protocols::Interval& interval) {
+  const auto& block = protocol_.blocks[static_cast<std::size_t>(trial.task_block)];
+  orientation_ = trial.orientation;
+  stiffness_sum_ = squares_ = products_ = 0;
+  contact_ticks_ = 0;
+  level_.reset();
+  of_stiffness_ = block.level ? block.level->pointer == "/stiffness_n_per_m"
+                              : block.task == protocols::TaskKind::identify &&
+                                    differ_in_stiffness(protocol_, block);
+  if (block.level && interval.stimulus >= 0 && is_length(block.level->pointer))
+    know_object(block, interval);
+}
+
+void LevelPercept::know_object(const protocols::TaskBlock& block,
+                               const protocols::Interval& interval) {
+  const std::optional<double> level =
+      interval.level ? interval.level : protocols::own_level(protocol_, block, interval.stimulus);
+  if (!level) return;
+  for (const double step : {kLevelStep * std::abs(*level), -kLevelStep * std::abs(*level)}) {
+    try {
+      object_ = protocols::at_level(protocol_, block, interval.stimulus, *level).object;
+      other_ = protocols::at_level(protocol_, block, interval.stimulus, *level + step).object;
+      step_ = step;
+      if (step != 0) level_ = level;
+      return;
+    } catch (const protocols::InputError&) {  // out of range: step the other way
+    }
+  }
+}
+
+void LevelPercept::add(const servo::Sample& sample) {
+  const rendering::Rendering& felt = sample.rendering;
+  if (felt.contacts == 0 || !(felt.deepest.depth > kLeastDepth)) return;
+  stiffness_sum_ += glm::length(felt.force) / felt.deepest.depth;
+  ++contact_ticks_;
+}
+
+void LevelPercept::add(const Percept& percept) {
+  if (!level_ || !percept.contact || (percept.ray && !percept.along)) return;
+  Vec3 place = percept.tip;
+  if (percept.ray) place += *percept.along * glm::normalize(percept.tail - percept.tip);
+  place = glm::conjugate(orientation_) * place;
+  const double outside = distance_to(object_, place);
+  const double slope = (distance_to(other_, place) - outside) / step_;
+  if (!std::isfinite(outside) || !std::isfinite(slope)) return;
+  squares_ += slope * slope;
+  products_ += slope * outside;
+}
+
+std::optional<double> LevelPercept::stiffness() const {
+  if (!of_stiffness_ || contact_ticks_ == 0) return std::nullopt;
+  return stiffness_sum_ / contact_ticks_;
+}
+
+std::optional<double> LevelPercept::length() const {
+  if (!level_ || !(squares_ > kLeastSensitivity * kLeastSensitivity)) return std::nullopt;
+  return *level_ - products_ / squares_;
+}
+
+using protocols::TaskBlock;
+using protocols::TaskKind;
+
+void TaskJudgement::begin(const protocols::Trial& trial, const Random& random) {
+  trial_ = trial;
+  random_ = random;
+  estimates_.clear();
+  own_.reset();
+  turns_ = 1;
+  standard_.reset();
+  evidence_ = 0;
+}
+
+const TaskBlock& TaskJudgement::block() const {
+  return protocol_.blocks[static_cast<std::size_t>(trial_.task_block)];
+}
+
+double TaskJudgement::level_of(const protocols::Interval& interval) const {
+  if (interval.level) return *interval.level;
+  if (interval.stimulus < 0) return 0;
+  return protocols::own_level(protocol_, block(), interval.stimulus)
+      .value_or(1 + interval.stimulus);
+}
+
+int TaskJudgement::index_of(const char* name) const {
+  const auto& answers = block().answers;
+  const auto at = std::find_if(answers.begin(), answers.end(),
+                               [name](const auto& answer) { return answer.name == name; });
+  return static_cast<int>(at - answers.begin());
+}
+
+/// Standard deviation, in the level's unit.
+double TaskJudgement::noise_of_difference(double reference) const {
+  if (block().level && block().level->orientation) return settings_.turn_sd;
+  if (reference != 0) return settings_.weber * std::abs(reference);
+  const std::vector<double> levels = protocols::levels_of(block());
+  if (levels.empty()) return 0;
+  return settings_.weber * std::max(std::abs(levels.front()), std::abs(levels.back()));
+}
+
+void TaskJudgement::feel(const protocols::Interval& interval, const Felt& felt) {
+  measured_ = felt.measured.has_value();
+  touched_ = felt.touched;
+  last_level_ = felt.measured.value_or(level_of(interval));
+  double reference = last_level_;
+  if (block().standard) {
+    protocols::Interval standard;
+    standard.stimulus = *block().standard;
+    reference = level_of(standard);
+  }
+  feels_standard_ = interval.standard;
+  if (!felt.touched && block().task == TaskKind::adjust) {  // no answer is needed yet
+    (interval.standard ? standard_ : own_).reset();
+    return;
+  }
+  if (const auto levels = protocols::levels_of(block()); !felt.touched && !levels.empty())
+    last_level_ = levels.front() + random_.unit() * (levels.back() - levels.front());
+  const double sd = felt.noisy ? 0 : noise_of_difference(reference) / std::sqrt(2.0);
+  const double estimate = last_level_ + sd * random_.normal();
+  estimates_.push_back(estimate);
+  (interval.standard ? standard_ : own_) = estimate;
+  if (!interval.standard) shown_ = level_of(interval);
+  noise_ = noise_of_difference(reference);
+}
+
+/// Index of the chosen interval.
+std::optional<int> TaskJudgement::compared() {
+  const TaskBlock& asked = block();
+  if (estimates_.size() < 2) return std::nullopt;
+  double reference = estimates_.front();
+  if (asked.standard)
+    reference = protocols::own_level(protocol_, asked, *asked.standard).value_or(reference);
+  const double sd = std::max(1e-300, noise_of_difference(reference));
+  if (asked.same_different) {
+    evidence_ = std::abs(estimates_[0] - estimates_[1]) / sd;
+    return index_of(evidence_ > 1 ? "different" : "same");
+  }
+  const auto [least, most] = std::minmax_element(estimates_.begin(), estimates_.end());
+  evidence_ = (*most - *least) / sd;
+  const auto at = (asked.asks_smaller ? least : most) - estimates_.begin();
+  return index_of(std::to_string(at + 1).c_str());
+}
+
+int TaskJudgement::detected() {
+  double yes = settings_.false_alarm;
+  if (!trial_.catch_trial && touched_) {
+    yes = 1 - settings_.lapse;
+    if (trial_.level) {
+      const protocols::PsychometricParticipant typical = protocols::typical_participant(
+          protocol_, block(),
+          {settings_.threshold, settings_.spread, settings_.false_alarm, settings_.lapse});
+      yes =
+          protocols::psychometric_probability(typical.function, typical.parameters, *trial_.level);
+    }
+  }
+  evidence_ = 4 * std::abs(yes - 0.5);
+  return index_of(random_.unit() < yes ? "yes" : "no");
+}
+
+/// Feels the other interval first, then turns and feels again.
+int TaskJudgement::adjusted() {
+  if (!own_ || !standard_) return index_of("switch");
+  const TaskBlock& asked = block();
+  const double apart = *standard_ - *own_;
+  if (std::abs(apart) <= std::max(asked.turn / 2, noise_)) return index_of("done");
+  if (feels_standard_) return index_of("switch");
+  const bool up = apart > 0;
+  if (up ? shown_ >= *asked.most : shown_ <= *asked.least) return index_of("done");
+  turns_ = static_cast<int>(std::max(1L, std::lround(std::min(std::abs(apart) / asked.turn, 1e6))));
+  return index_of(up ? "up" : "down");
+}
+
+int TaskJudgement::identified() {
+  int found = trial_.stimulus;
+  evidence_ = 2;
+  if (measured_ && !block().level) {
+    const auto apart = [&](int stimulus) {
+      const double own =
+          protocol_.stimuli[static_cast<std::size_t>(stimulus)].object.material.stiffness;
+      return std::abs(std::log(std::max(own, 1e-3) / std::max(estimates_.back(), 1e-3)));
+    };
+    found = *std::min_element(block().stimuli.begin(), block().stimuli.end(),
+                              [&](int a, int b) { return apart(a) < apart(b); });
+    evidence_ = std::max(0.0, 2 - apart(found) / settings_.weber);
+  }
+  return index_of(protocol_.stimuli[static_cast<std::size_t>(found)].name.c_str());
+}
+
+int TaskJudgement::answer() {
+  const auto count = static_cast<std::uint64_t>(std::max<std::size_t>(1, block().answers.size()));
+  if (block().task == TaskKind::adjust) return adjusted();
+  if (block().task == TaskKind::detect) return detected();
+  if (random_.unit() < settings_.lapse) return static_cast<int>(random_.below(count));
+  switch (block().task) {
+    case TaskKind::compare:
+      return compared().value_or(0);
+    case TaskKind::rate: {
+      // The step nearest to the level's place among all levels.
+      const std::vector<double> levels = protocols::levels_of(block());
+      const double range = levels.empty() ? 0 : levels.back() - levels.front();
+      const double place = range > 0 ? (estimates_.back() - levels.front()) / range : 0.5;
+      const double step = std::clamp(place, 0.0, 1.0) * static_cast<double>(count - 1);
+      return static_cast<int>(std::lround(step));
+    }
+    default:
+      return identified();
+  }
+}
+
+double TaskJudgement::number() {
+  const TaskBlock& asked = block();
+  double scale = 10;
+  if (asked.standard && asked.modulus > 0 && estimates_.size() > 1)
+    scale = asked.modulus / std::pow(std::abs(estimates_.front()), settings_.exponent);
+  const double judged = scale * std::pow(std::abs(last_level_), settings_.exponent) *
+                        std::exp(settings_.number_sd * random_.normal());
+  const double rounded = std::round(judged * 100) / 100;
+  return std::clamp(rounded, asked.least.value_or(rounded), asked.most.value_or(rounded));
+}
+
+int TaskJudgement::confidence(int steps) const {
+  const double share = std::min(evidence_ / 2, 0.999);
+  return static_cast<int>(share * steps);
+}
+
 namespace {
 
 constexpr double kLook = 1.5;       // s of exploration in each interval after the first contact

@@ -1,7 +1,7 @@
 #pragma once
 // A simulated participant for the tasks of version 2. It identifies shapes as SimulatedParticipant
 // does, percept by percept. In all other tasks it explores likewise for a while and judges levels
-// from contact (task_judgement.h) if contact reveals them; the model is given the other levels.
+// from contact if contact reveals them; the model is given the other levels.
 
 #include <cstdint>
 #include <map>
@@ -10,11 +10,136 @@
 #include <string>
 #include <vector>
 
+#include "data/base/random.h"
+#include "protocols/protocol.h"
+#include "protocols/schedule.h"
 #include "runner/participants/respondent.h"
+#include "runner/participants/shape_observer.h"
 #include "runner/participants/simulated.h"
-#include "runner/participants/task_judgement.h"
+#include "runner/servo/sample.h"
 
 namespace palpate::runner::participants {
+
+// How a simulated participant judges levels: one noisy estimate for each felt stimulus. A model
+// that is not fitted to any person.
+//
+//   compare   each interval gives an estimate, its level with noise; the largest (smallest) is
+//             chosen. Of two intervals, the comparison is chosen with probability
+//             Phi((level - standard) / (sqrt(2) sd)) = Phi((level - standard) / (weber standard)).
+//             same_different: differ by more than sd
+//   detect    "yes" by a psychometric function (protocols/tasks/levels.h)
+//   rate      number = level^exponent, times exp(noise)
+//   adjust    feels both; turns as often as needed if its estimates were true; feels the turned one
+//             again; done when they are "same" by the criterion above, or less than half a turn
+//             apart, or when it turns no further. Returns to an interval that it did not touch
+//   identify  stimuli that differ in stiffness only: the nearest stiffness, as a ratio, to the
+//             estimate; shapes: SimulatedParticipant; else correct, except for lapses
+// With probability `lapse` the answer is random.
+
+// Estimates a level from exploration: one estimate for each interval.
+//
+//   stiffness   mean of force over depth in ticks with contact, without noise. Also used to
+//               identify stimuli that differ in stiffness only
+//   a length    ("..._m") that changes the felt surface: knowing the kind of object, it takes
+//               the level whose surface passes best through the felt places (least squares,
+//               linearised at the true level). The places have the noise of the model's percepts
+//   any other   (friction, damping, depth of layers, angles, meshes): no estimate
+
+class LevelPercept {
+ public:
+  /// \param protocol  must outlive it
+  explicit LevelPercept(const protocols::Protocol& protocol) : protocol_(protocol) {}
+
+  /// Before an interval. \param trial  of version 2
+  void begin(const protocols::Trial& trial, const protocols::Interval& interval);
+  void add(const servo::Sample& sample);
+  void add(const Percept& percept);
+  int contact_ticks() const { return contact_ticks_; }
+
+  /// Without noise: the participant's is added later.
+  std::optional<double> stiffness() const;
+  /// With the noise of the percepts.
+  std::optional<double> length() const;
+
+ private:
+  void know_object(const protocols::TaskBlock& block, const protocols::Interval& interval);
+
+  const protocols::Protocol& protocol_;
+  Quat orientation_{1, 0, 0, 0};
+  bool of_stiffness_ = false;
+  double stiffness_sum_ = 0;  ///< N/m
+  int contact_ticks_ = 0;
+  std::optional<double> level_;  ///< m; none: no length
+  double step_ = 0;              ///< m, change of the level from `object_` to `other_`
+  stimuli::ObjectSpec object_, other_;
+  double squares_ = 0, products_ = 0;  ///< of the normal equation
+};
+
+/// Whether the stimuli of a block differ in stiffness only.
+bool differ_in_stiffness(const protocols::Protocol& protocol, const protocols::TaskBlock& block);
+
+/// Whether two objects have the same form in the same place.
+bool have_one_form(const stimuli::ObjectSpec& a, const stimuli::ObjectSpec& b);
+
+struct JudgementSettings {
+  double weber = 0.15;     ///< noise of a difference of two estimates, as a share of the standard
+                           ///< (of the largest level where that is 0)
+  double turn_sd = 3;      ///< degrees; the same where an orientation is judged
+  double threshold = 0.5;  ///< detect: as a share of the range of levels from the hard end
+  double spread = 0.1;     ///< detect: sd of the function, likewise
+  double false_alarm = 0.05;
+  double lapse = 0.02;
+  double exponent = 0.8;   ///< rate
+  double number_sd = 0.1;  ///< rate: sd of the log
+};
+
+class TaskJudgement {
+ public:
+  /// \param protocol  must outlive it
+  TaskJudgement(const protocols::Protocol& protocol, const JudgementSettings& settings)
+      : protocol_(protocol), settings_(settings) {}
+
+  /// Before the first interval of a trial.
+  void begin(const protocols::Trial& trial, const Random& random);
+  /// The sensation of an interval.
+  struct Felt {
+    std::optional<double> measured;  ///< measured level (above); none: the true one
+    bool noisy = false;              ///< `measured` includes the noise already
+    bool touched = true;             ///< false: the level was not felt
+  };
+  void feel(const protocols::Interval& interval, const Felt& felt);
+  /// The answer: index into TaskBlock::answers; rate without a scale: into nothing.
+  int answer();
+  /// adjust: key presses of the last answer, if it turns.
+  int turns() const { return turns_; }
+  double number();  ///< rate: the number typed
+  int confidence(int steps) const;
+
+ private:
+  const protocols::TaskBlock& block() const;
+  double level_of(const protocols::Interval& interval) const;
+  int index_of(const char* name) const;
+  std::optional<int> compared();
+  int detected();
+  int adjusted();
+  int identified();
+  double noise_of_difference(double reference) const;
+
+  const protocols::Protocol& protocol_;
+  JudgementSettings settings_;
+  protocols::Trial trial_;
+  Random random_{0};
+  std::vector<double> estimates_;         ///< of the intervals so far
+  std::optional<double> own_, standard_;  ///< adjust: as last felt
+  double shown_ = 0;                      ///< adjust: level at which own_ was felt
+  double noise_ = 0;                      ///< sd of a difference from the standard
+  int turns_ = 1;
+  bool feels_standard_ = false;
+  double last_level_ = 0;
+  bool measured_ = false;  ///< whether the last interval was
+  bool touched_ = true;    ///< likewise
+  double evidence_ = 0;    ///< how clear the answer was, in sd
+};
 
 /// Hypotheses for each block of a protocol; null: nothing to identify, or stimuli of one shape.
 using BlockHypotheses = std::vector<std::shared_ptr<const ShapeHypotheses>>;

@@ -9,7 +9,7 @@
 #include <stdexcept>
 #include <string_view>
 
-#include "runner/devices/haply/messages.h"
+#include "runner/devices/haply/inverse3.h"
 
 namespace haply = palpate::runner::devices::haply;
 

@@ -9,8 +9,6 @@
 #include <numbers>
 #include <stdexcept>
 
-#include "stimuli/signed_distance.h"
-
 namespace palpate::stimuli {
 namespace {
 

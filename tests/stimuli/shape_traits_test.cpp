@@ -7,7 +7,6 @@
 
 #include "stimuli/primitives.h"
 #include "stimuli/shapes.h"
-#include "stimuli/signed_distance.h"
 
 namespace palpate::stimuli {
 namespace {

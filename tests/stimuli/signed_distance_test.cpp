@@ -1,4 +1,3 @@
-#include "stimuli/signed_distance.h"
 
 #include <gtest/gtest.h>
 

@@ -16,6 +16,13 @@
 
 namespace palpate::runner::commands {
 
+// Participant codes that are easily mistaken for each other.
+
+/// The codes of `known` that `code` may stand for: spelt otherwise (P01, p01, P1, PO1), or one
+/// letter away (PP01, SUJB01). Codes that differ only by digits are different participants: P01,
+/// P02.
+std::vector<std::string> near_codes(const std::string& code, const std::vector<std::string>& known);
+
 // The due session, the trial to resume from, and a withdrawal of the participant.
 
 /// The session that is due or was requested. \throws UsageError: none is due, the requested one

@@ -24,8 +24,6 @@
 #include "runner/commands/shared/outputs.h"
 #include "runner/commands/shared/progress_line.h"
 #include "runner/stability/boundary.h"
-#include "runner/stability/integrators.h"
-#include "runner/stability/soft_map.h"
 
 namespace palpate::runner::commands {
 namespace {

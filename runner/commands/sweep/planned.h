@@ -10,7 +10,6 @@
 #include "protocols/protocol.h"
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/outputs.h"
-#include "runner/sweep/design.h"
 #include "runner/sweep/swept_study.h"
 
 namespace palpate::runner::commands {

@@ -4,14 +4,34 @@
 
 #include <cstdint>
 #include <optional>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
-#include "runner/devices/falcon/guide.h"
 #include "runner/servo/device.h"
 #include "stimuli/vec.h"
 
 namespace palpate::runner::devices::falcon {
+
+// Dialog with the experimenter during a guided procedure. It never blocks: the devices need a tick
+// every millisecond while a question waits for its answer.
+
+/// Shows texts and questions, and polls for answers.
+class Guide {
+ public:
+  virtual ~Guide() = default;
+  virtual void say(const std::string& text) = 0;
+  /// Shows a request, to be confirmed with ENTER.
+  virtual void ask(const std::string& text) = 0;
+  enum class Answer : std::uint8_t { none, go_on, stop };
+  /// The answer to the last request, if there is one yet; never blocks.
+  virtual Answer answer() = 0;
+};
+
+/// A guided procedure gave no result; what() gives the reason and the remedy.
+class GuideError : public std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
 
 /// Asks the experimenter to pull the grip out and push it in until the device is homed. Zero force.
 /// \throws GuideError if stopped or if the device is unplugged.
@@ -77,5 +97,34 @@ CalibrationVerdict judge_pair(const Calibration& calibration, const std::string&
                               const std::string& tail, std::int64_t unix_ns);
 /// The more severe state, with both texts.
 CalibrationVerdict both(const CalibrationVerdict& a, const CalibrationVerdict& b);
+
+// Calibration of a Falcon's force with known weights. The device has no force sensor, but a
+// position controller can hold its grip: the weight equals the commanded force with it minus that
+// without it. The grip moves slowly up and down during each measurement, so that friction cancels.
+
+struct WeighingSettings {
+  std::vector<double> weights = {0.1, 0.2, 0.4};  ///< kg, each hung at the grip in turn
+  double gravity = 9.80665;                       ///< m/s^2
+  double settle = 3;                              ///< s, before each measurement
+  double cycle = 4;                               ///< s, once up and down
+  int cycles = 2;
+  double sweep = 0.004;  ///< m, each way
+};
+
+/// One weight's measurement.
+struct Weighing {
+  double weight = 0;  ///< N
+  Vec3 force;         ///< N, world frame, mean force commanded, by the nominal scale
+};
+
+/// The scale from weighings (the first without a weight). \throws GuideError if they are
+/// inconsistent: force does not rise with weight, or is far from linear.
+ForceCalibration fit_scale(const std::vector<Weighing>& weighings);
+
+/// The whole guided procedure, at 1 kHz. Zero force before and after.
+/// \param device  one Falcon, opened with its nominal scale; a guard process should own it
+/// \throws GuideError if stopped, if the device is lost, or if the grip drifts away.
+ForceCalibration weigh(servo::Device& device, servo::Clock& clock, Guide& guide,
+                       const WeighingSettings& settings);
 
 }  // namespace palpate::runner::devices::falcon

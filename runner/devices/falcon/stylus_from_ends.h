@@ -7,7 +7,6 @@
 
 #include "rendering/probe.h"
 #include "runner/devices/falcon/calibration.h"
-#include "runner/devices/falcon/guide.h"
 #include "runner/servo/device.h"
 #include "stimuli/vec.h"
 

@@ -11,7 +11,6 @@
 
 #include "rendering/verification/reference.h"
 #include "stimuli/primitives.h"
-#include "stimuli/signed_distance.h"
 #include "tests/shared/probe_paths.h"
 
 namespace palpate::rendering {

@@ -6,7 +6,6 @@
 #include <glm/geometric.hpp>
 
 #include "stimuli/primitives.h"
-#include "stimuli/signed_distance.h"
 #include "tests/shared/probe_paths.h"
 #include "tests/shared/random_mesh.h"
 

@@ -152,7 +152,7 @@ class Rights(unittest.TestCase):
         limits = dict(re.findall(r"^@palpate - (\w+) (\w+)$", (INSTALL / "limits.conf").read_text(), re.M))
         self.assertEqual(limits["memlock"], "unlimited")
         asked = [int(re.search(r"\bint priority = (\d+);", (SOURCES / "runner" / header).read_text()).group(1))
-                 for header in ("servo/realtime.h", "safety/guard.h")]
+                 for header in ("servo/realtime.h", "safety/guarded_device.h")]
         self.assertEqual(int(limits["rtprio"]), max(asked))
 
 

@@ -4,7 +4,7 @@
 
 #include <string>
 
-#include "runner/participants/task_judgement.h"
+#include "runner/participants/task_participant.h"
 #include "tests/runner/participants/judge.h"
 
 namespace palpate::runner::participants::judged {

@@ -8,11 +8,10 @@
 #include <limits>
 
 #include "data/base/random.h"
-#include "runner/participants/felt_parts.h"
+#include "runner/participants/shape_hypotheses.h"
 #include "runner/participants/shape_lines.h"
 #include "runner/participants/shape_observer.h"
 #include "stimuli/primitives.h"
-#include "stimuli/signed_distance.h"
 #include "tests/runner/participants/solids.h"
 
 namespace palpate::runner::participants {

@@ -1,11 +1,11 @@
 // The exploring hand, without a device: the stylus is always at the hand's target.
 
-#include "runner/participants/explorer.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <glm/geometric.hpp>
+
+#include "runner/participants/simulated.h"
 
 namespace palpate::runner::participants {
 namespace {

@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "data/base/random.h"
-#include "runner/participants/lanes.h"
 
 namespace palpate::runner::participants {
 namespace {

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "protocols/parse.h"
-#include "runner/participants/task_judgement.h"
+#include "runner/participants/task_participant.h"
 
 namespace palpate::runner::participants {
 namespace {

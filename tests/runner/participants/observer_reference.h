@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "runner/participants/shape_observer.h"
-#include "stimuli/signed_distance.h"
+#include "stimuli/primitives.h"
 
 namespace palpate::runner::participants::test {
 

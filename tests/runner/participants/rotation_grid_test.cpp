@@ -1,5 +1,3 @@
-#include "runner/participants/rotation_grid.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -7,7 +5,7 @@
 #include <glm/geometric.hpp>
 #include <numbers>
 
-#include "runner/participants/felt_parts.h"
+#include "runner/participants/shape_hypotheses.h"
 #include "stimuli/orientation.h"
 #include "stimuli/primitives.h"
 #include "tests/runner/participants/solids.h"

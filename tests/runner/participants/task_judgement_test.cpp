@@ -1,7 +1,6 @@
-// Simulated judgements against their definitions in task_judgement.h: shares of many draws against
-// closed forms of the normal distribution (4 standard errors), and single ones without noise.
-
-#include "runner/participants/task_judgement.h"
+// Simulated judgements against their definitions in task_participant.h: shares of many draws
+// against closed forms of the normal distribution (4 standard errors), and single ones without
+// noise.
 
 #include <gtest/gtest.h>
 
@@ -11,6 +10,7 @@
 #include <vector>
 
 #include "protocols/parse.h"
+#include "runner/participants/task_participant.h"
 #include "tests/runner/participants/judge.h"
 
 namespace palpate::runner::participants::judged {

@@ -4,7 +4,7 @@
 
 #include <string>
 
-#include "runner/safety/guard.h"
+#include "runner/safety/guarded_device.h"
 
 namespace palpate::runner::safety {
 namespace {

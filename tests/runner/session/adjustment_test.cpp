@@ -66,7 +66,7 @@ Settings simulated(std::uint64_t seed) {
   return found;
 }
 
-/// The same model written independently from its description in task_judgement.h, without a hand:
+/// The same model written independently from its description in task_participant.h, without a hand:
 /// two estimates whose difference has the model's noise, turned according to the estimates until
 /// both are "same".
 Settings expected() {

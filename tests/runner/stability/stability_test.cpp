@@ -9,8 +9,6 @@
 
 #include "runner/servo/passivity.h"
 #include "runner/stability/boundary.h"
-#include "runner/stability/integrators.h"
-#include "runner/stability/soft_map.h"
 
 namespace palpate::runner::stability {
 namespace {

@@ -1,9 +1,9 @@
-#include "runner/sweep/design.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <set>
+
+#include "runner/sweep/swept_study.h"
 
 namespace palpate::runner::sweep {
 namespace {

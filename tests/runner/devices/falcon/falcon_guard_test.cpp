@@ -13,7 +13,7 @@
 #include <string>
 #include <thread>
 
-#include "runner/devices/falcon/open.h"
+#include "runner/devices/falcon/falcon.h"
 #include "runner/safety/guarded_device.h"
 #include "runner/servo/realtime.h"
 #include "tests/runner/devices/falcon/emulated_bus.h"

@@ -6,7 +6,7 @@
 #include <numbers>
 #include <vector>
 
-#include "runner/devices/falcon/kinematics.h"
+#include "runner/devices/falcon/falcon.h"
 #include "runner/devices/falcon/parameters.h"
 
 namespace palpate::runner::devices::falcon {

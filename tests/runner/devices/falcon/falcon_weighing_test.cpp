@@ -4,8 +4,8 @@
 #include <memory>
 #include <string>
 
+#include "runner/devices/falcon/calibration.h"
 #include "runner/devices/falcon/falcon.h"
-#include "runner/devices/falcon/weighing.h"
 #include "tests/runner/devices/falcon/emulator.h"
 #include "tests/runner/devices/falcon/fake_transport.h"
 #include "tests/runner/devices/falcon/line_clock.h"

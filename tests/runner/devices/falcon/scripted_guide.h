@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "runner/devices/falcon/guide.h"
+#include "runner/devices/falcon/calibration.h"
 
 namespace palpate::runner::devices::falcon::testing {
 

@@ -6,9 +6,9 @@
 #include <cstdint>
 #include <vector>
 
-#include "runner/devices/replay.h"
+#include "runner/session/replay.h"
 
-namespace palpate::runner::devices {
+namespace palpate::runner::session {
 namespace {
 namespace replaying {
 
@@ -85,4 +85,4 @@ TEST(ReplayDevice, LimitsNothing) {
 
 }  // namespace replaying
 }  // namespace
-}  // namespace palpate::runner::devices
+}  // namespace palpate::runner::session

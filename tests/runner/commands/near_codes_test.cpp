@@ -1,8 +1,8 @@
-#include "runner/session/near_codes.h"
-
 #include <gtest/gtest.h>
 
-namespace palpate::runner::session {
+#include "runner/commands/run/admission.h"
+
+namespace palpate::runner::commands {
 namespace {
 
 using Codes = std::vector<std::string>;
@@ -49,4 +49,4 @@ TEST(NearCodes, ShortCodesThatDifferByALetterAreNotNear) {
 }
 
 }  // namespace
-}  // namespace palpate::runner::session
+}  // namespace palpate::runner::commands
