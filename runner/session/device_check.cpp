@@ -513,13 +513,13 @@ std::vector<std::string> incompatibilities(const protocols::Protocol& protocol,
                                             felt_gain(protocol), protocol.passivity_controller);
       if (device.actuated_freedom == 0 || can.reason.empty()) return;
       refused = true;
-      faults.add(stimulus.name, StimulusFaults::Check::material,
-                 sentence(" has ", of_parts, can.reason, ": soften /material, raise ",
-                          "/servo/rate_hz, ", protocol.reach ? "lessen /reach/factor, " : "",
-                          passivity_advice(protocol, material, device, can),
-                          protocol.version == 2
-                              ? "or keep the levels below"
-                              : "or have it limited by /servo/material_limit \"limit\""));
+      faults.add(
+          stimulus.name, StimulusFaults::Check::material,
+          sentence(" has ", of_parts, can.reason, ": soften /material, raise ", "/servo/rate_hz, ",
+                   protocol.reach ? "lessen /reach/factor, " : "",
+                   passivity_advice(protocol, material, device, can),
+                   protocol.blocks.empty() ? "or have it limited by /servo/material_limit \"limit\""
+                                           : "or keep the levels below"));
     };
     visit_materials(stimulus.object,
                     [&](const stimuli::Material& material) { check_material(material, ""); });

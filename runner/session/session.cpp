@@ -438,10 +438,10 @@ void Session::tell_level() {
 }
 
 void Session::begin_task_block() {
-  if (station_.protocol.version == 1) return;
-  const protocols::TaskBlock& block = task_of(station_.plan.next());
-  show_pages(PageSpec::When::between, block.name);
-  read_instructions(block);
+  const protocols::TaskBlock* const block = station_.plan.next_block();
+  if (block == nullptr) return;
+  show_pages(PageSpec::When::between, block->name);
+  read_instructions(*block);
 }
 
 void Session::read_instructions(const protocols::TaskBlock& block) {
@@ -450,9 +450,8 @@ void Session::read_instructions(const protocols::TaskBlock& block) {
 
 /// Shows the block's instructions again when a session resumes within a block.
 void Session::resume_task_block() {
-  if (station_.protocol.version == 1 || station_.plan.finished() || station_.plan.block_begins())
-    return;
-  read_instructions(task_of(station_.plan.next()));
+  const protocols::TaskBlock* const block = station_.plan.next_block();
+  if (block != nullptr && !station_.plan.block_begins()) read_instructions(*block);
 }
 
 bool Session::has_open_pages() const {
@@ -529,7 +528,7 @@ std::string trip_reason(std::uint32_t faults, servo::DeviceTrouble trouble) {
 Session::Session(const Station& station, participants::Respondent& participant,
                  SessionEvents* events, double least_reach)
     : station_(station), participant_(participant), events_(events), least_reach_(least_reach) {
-  if (station.protocol.version == 1) return;
+  if (station.protocol.blocks.empty()) return;
   scenes_ = std::make_unique<LevelScenes>(station.protocol);
   least_reach_ = std::max(least_reach, largest_reach(station));  // the same for every level
 }

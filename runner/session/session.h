@@ -247,7 +247,7 @@ class Session {
   data::TrialRecord record_;             ///< of the trial under way
   ContactLog contact_;                   ///< likewise
   servo::ServoQuality quality_;          ///< likewise, of its intervals so far
-  std::unique_ptr<LevelScenes> scenes_;  ///< version 2
+  std::unique_ptr<LevelScenes> scenes_;  ///< of blocks of tasks
   int asked_trial_ = 0;                  ///< the last trial for which an advisor was asked
 };
 

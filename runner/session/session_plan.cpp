@@ -80,6 +80,11 @@ SessionPlan::SessionPlan(const protocols::Protocol& protocol, int participant_nu
   if (!trials_.empty()) first_practice_block_ = trials_.front().block + (warms_up ? 1 : 0);
 }
 
+const protocols::TaskBlock* SessionPlan::next_block() const {
+  if (finished() || next().task_block < 0) return nullptr;
+  return &protocol_->blocks[static_cast<std::size_t>(next().task_block)];
+}
+
 bool SessionPlan::block_begins() const {
   if (tasks_) return tasks_->block_begins();
   return next_ == 0 || trials_[next_].block != trials_[next_ - 1].block;

@@ -51,6 +51,8 @@ class SessionPlan {
   bool finished() const { return tasks_ ? tasks_->finished() : next_ == trials_.size(); }
   /// \pre not finished()
   const protocols::Trial& next() const { return tasks_ ? tasks_->next() : trials_[next_]; }
+  /// The block of tasks of the next trial; nullptr: it belongs to none, or the session is finished.
+  const protocols::TaskBlock* next_block() const;
   std::size_t done() const { return tasks_ ? tasks_->done() : next_; }
   /// As far as known now.
   std::size_t size() const { return tasks_ ? tasks_->size() : trials_.size(); }

@@ -74,7 +74,7 @@ void run_simulated_session(const SimulatedStudy& study, const SimulatedSession& 
                      workspace_of(protocol));
   if (protocol.passivity_controller) servo.control_passivity();
   std::unique_ptr<participants::Respondent> participant;
-  if (protocol.version == 2) {
+  if (!protocol.blocks.empty()) {
     participant = std::make_unique<participants::TaskParticipant>(
         own, study.hypotheses, study.of_blocks, stylus, protocol, study.seed, session.participant);
   } else {
@@ -309,7 +309,7 @@ class Recorder {
            std::string event)
       : store_(store), work_(work), event_(std::move(event)) {
     for (const Work& w : work_) plans_.push_back(plan_of(protocol, w));
-    has_pages_ = protocol.version == 2;
+    has_pages_ = !protocol.blocks.empty();
   }
 
   void record(std::deque<std::pair<std::size_t, data::TrialRecord>>&& came,
@@ -392,9 +392,9 @@ devices::SimulatedStylus simulated_stylus(const protocols::Protocol& protocol,
 
 std::vector<stimuli::ObjectSpec> shapes_of(const protocols::Protocol& protocol) {
   std::vector<stimuli::ObjectSpec> shapes;
-  // Tasks of version 2 other than identification do not ask for the shape. Any shape serves for
-  // exploring; two equal shapes are never told apart, so the observer continues to perceive.
-  if (protocol.version == 2) return {stimuli::ObjectSpec{}, stimuli::ObjectSpec{}};
+  // Blocks of tasks do not ask for the shape. Any shape serves for exploring; two equal shapes are
+  // never told apart, so the observer continues to perceive.
+  if (!protocol.blocks.empty()) return {stimuli::ObjectSpec{}, stimuli::ObjectSpec{}};
   for (const protocols::StimulusSpec& stimulus : protocol.stimuli)
     shapes.push_back(stimulus.object);
   return shapes;
@@ -420,10 +420,10 @@ std::vector<std::string> simulation_faults(const protocols::Protocol& protocol,
     faults.emplace_back(
         "another program says what a block of the task 'external' shows: palpate serve runs it");
   }
-  for (const protocols::StimulusSpec& stimulus : protocol.stimuli) {
-    if (protocol.version == 2) break;  // its tasks do not ask for the shape
-    const std::string fault = participants::ShapeHypotheses::fault_of(stimulus.object);
-    if (!fault.empty()) faults.push_back("stimulus '" + stimulus.name + "': " + fault);
+  const std::vector<stimuli::ObjectSpec> shapes = shapes_of(protocol);
+  for (std::size_t i = 0; i < shapes.size(); ++i) {
+    const std::string fault = participants::ShapeHypotheses::fault_of(shapes[i]);
+    if (!fault.empty()) faults.push_back("stimulus '" + protocol.stimuli[i].name + "': " + fault);
   }
   try {  // patched settings may be invalid
     const participants::ShapeHypotheses hypotheses({stimuli::ObjectSpec{}});

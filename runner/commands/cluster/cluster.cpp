@@ -471,9 +471,9 @@ int begin(const ClusterSettings& settings, ClusterJob job, const protocols::Prot
 }
 
 /// Stimuli that a participant feels: each interval of a task, adaptive blocks at their longest.
-/// \param repetitions  of version 1
+/// \param repetitions  without blocks of tasks
 double stimuli_felt(const protocols::Protocol& protocol, int repetitions) {
-  if (protocol.version == 1)
+  if (protocol.blocks.empty())
     return static_cast<double>(protocol.stimuli.size() * protocol.renderers.size()) * repetitions;
   double felt = 0;
   for (const protocols::TaskBlock& block : protocol.blocks) {
