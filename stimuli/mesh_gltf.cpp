@@ -48,7 +48,6 @@ class GltfValue {
   std::size_t size() const;                      ///< of a list; none: 0
   std::string text(const char* expected) const;  ///< \param expected  "a name"
   double number() const;                         ///< finite
-  double number_or(double otherwise) const { return present() ? number() : otherwise; }
   /// A whole number from 0 to 2^53, also written as 3.0.
   /// \param expected  "a number of bytes"
   std::size_t whole(const std::string& expected) const;

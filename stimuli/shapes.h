@@ -37,7 +37,6 @@ struct Material {
   std::vector<Layer> layers;    ///< of other stiffness under the surface, by increasing depth
 
   bool has_friction() const { return friction_static > 0; }
-  bool plain_spring() const { return damping == 0 && !has_friction() && layers.empty(); }
 };
 
 /// The material of a soft object.

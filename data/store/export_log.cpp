@@ -124,7 +124,7 @@ void ExportedParticipants::add(const Participant& participant) {
   if (std::find(ids_.begin(), ids_.end(), participant.id) == ids_.end()) {
     ids_.push_back(participant.id);
   }
-  (participant.simulated ? any_simulated_ : any_real_) = true;
+  any_simulated_ |= participant.simulated;
 }
 
 std::string ExportedParticipants::record(const std::string& database, const std::string& path,

@@ -36,7 +36,6 @@ class ExportedParticipants {
  public:
   void add(const Participant& participant);
   bool any_simulated() const { return any_simulated_; }
-  bool all_simulated() const { return any_simulated_ && !any_real_; }
 
   /// \return the reason why it was not recorded (read-only disk), or "". \throws StoreRefused: one
   /// of them was withdrawn meanwhile.
@@ -45,7 +44,7 @@ class ExportedParticipants {
 
  private:
   std::vector<std::int64_t> ids_;  // without duplicates
-  bool any_simulated_ = false, any_real_ = false;
+  bool any_simulated_ = false;
 };
 
 }  // namespace palpate::data

@@ -389,13 +389,6 @@ Estimate Procedure::estimate() const {
   return std::visit([](const auto& run) { return run.estimate(); }, run_);
 }
 
-Procedure procedure_after(const ProcedureSpec& spec, std::uint64_t seed,
-                          const std::vector<Response>& history) {
-  Procedure procedure(spec, seed);
-  for (const Response& response : history) procedure.record(response);
-  return procedure;
-}
-
 InterleavedTracks::InterleavedTracks(const std::vector<ProcedureSpec>& specs, std::uint64_t seed)
     : seed_(seed) {
   for (std::size_t i = 0; i < specs.size(); ++i) {

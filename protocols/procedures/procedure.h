@@ -143,10 +143,6 @@ class Procedure {
   std::vector<Response> history_;
 };
 
-/// The procedure after these answers.
-Procedure procedure_after(const ProcedureSpec& spec, std::uint64_t seed,
-                          const std::vector<Response>& history);
-
 /// A level and the track that requests it.
 struct TrackLevel {
   std::size_t track = 0;

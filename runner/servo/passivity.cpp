@@ -33,7 +33,6 @@ DeviceForces PassivityController::damping(const Ends& at, const DeviceForces& sc
       const double b = std::min(excess_ * tick_ / moved, settings_.most_damping);
       out.device1 = -b / tick_ * moved1;
       out.device2 = -b / tick_ * moved2;
-      taken_ += b / tick_ * moved;
     }
   }
   started_ = true;
@@ -52,7 +51,7 @@ void PassivityController::reset() noexcept {
   last_ = {};
   commanded_ = scene_ = {};
   towards1_ = towards2_ = Vec3(0);
-  excess_ = taken_ = 0;
+  excess_ = 0;
 }
 
 }  // namespace palpate::runner::servo

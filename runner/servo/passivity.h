@@ -39,7 +39,6 @@ class PassivityController {
   void reset() noexcept;
 
   double excess() const noexcept { return excess_; }  ///< J, fed to the hand and not yet dissipated
-  double taken_out() const noexcept { return taken_; }  ///< J, by damping since reset
 
  private:
   PassivitySettings settings_;
@@ -48,7 +47,7 @@ class PassivityController {
   Ends last_{};
   DeviceForces commanded_{}, scene_{};  ///< of the last tick
   Vec3 towards1_, towards2_;  ///< unit, along the last force on each device; zero: none yet
-  double excess_ = 0, taken_ = 0;
+  double excess_ = 0;
 };
 
 }  // namespace palpate::runner::servo

@@ -1,9 +1,12 @@
 #include "runner/session/sample_stream.h"
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <condition_variable>
+#include <cstddef>
+#include <cstdint>
 #include <limits>
 #include <mutex>
 #include <stdexcept>
@@ -21,6 +24,11 @@ constexpr std::chrono::milliseconds kChunk(20);
 constexpr double kRingSeconds = 4;  // a longer stall means worse trouble
 constexpr double kSecondsPerNs = 1e-9;
 
+/// A channel of the stream, as in its description.
+struct StreamChannel {
+  const char *label, *unit, *type;
+};
+
 constexpr std::array<StreamChannel, 20> kChannels = {{
     {"tip_x", "m", "Position"},    {"tip_y", "m", "Position"},    {"tip_z", "m", "Position"},
     {"tail_x", "m", "Position"},   {"tail_y", "m", "Position"},   {"tail_z", "m", "Position"},
@@ -30,6 +38,25 @@ constexpr std::array<StreamChannel, 20> kChannels = {{
     {"device2_x", "N", "Force"},   {"device2_y", "N", "Force"},   {"device2_z", "N", "Force"},
     {"depth", "m", "Depth"},       {"contacts", "1", "Count"},
 }};
+
+/// The values of one tick: tip, tail (m), force (N), torque (N m), device1, device2 (N), depth (m),
+/// contacts; a stored sample has the same values under the same names.
+struct StreamRow {
+  std::int64_t time_ns = 0;  ///< session clock
+  std::array<double, 20> values{};
+};
+
+StreamRow stream_row(const servo::Sample& sample) noexcept {
+  StreamRow row{sample.time_ns, {}};
+  std::size_t at = 0;
+  for (const Vec3& vector : {sample.probe.tip, sample.probe.tail, sample.rendering.force,
+                             sample.rendering.torque, sample.device1, sample.device2}) {
+    for (int i = 0; i < 3; ++i) row.values[at++] = vector[i];
+  }
+  row.values[at++] = sample.rendering.deepest.depth;
+  row.values[at] = servo::recorded_contacts(sample.rendering.contacts);
+  return row;
+}
 
 std::string stream_name(const std::string& where) {
   if (where == "lsl") return "palpate-samples";
@@ -111,20 +138,6 @@ class Outlet {
 };
 
 }  // namespace sample_stream
-
-std::span<const StreamChannel> stream_channels() noexcept { return kChannels; }
-
-StreamRow stream_row(const servo::Sample& sample) noexcept {
-  StreamRow row{sample.time_ns, {}};
-  std::size_t at = 0;
-  for (const Vec3& vector : {sample.probe.tip, sample.probe.tail, sample.rendering.force,
-                             sample.rendering.torque, sample.device1, sample.device2}) {
-    for (int i = 0; i < 3; ++i) row.values[at++] = vector[i];
-  }
-  row.values[at++] = sample.rendering.deepest.depth;
-  row.values[at] = servo::recorded_contacts(sample.rendering.contacts);
-  return row;
-}
 
 /// The ring and the thread that empties it.
 class SampleStream::Sender {

@@ -2,9 +2,7 @@
 // The servo's samples, sent live to other recorders as a regular stream of Lab Streaming Layer.
 // Nothing waits for it: samples that it cannot take are counted and dropped.
 
-#include <array>
 #include <atomic>
-#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -14,21 +12,6 @@
 #include "runner/servo/tick_source.h"
 
 namespace palpate::runner::session {
-
-/// A channel of the stream, as in its description.
-struct StreamChannel {
-  const char *label, *unit, *type;
-};
-
-/// The values of one tick: tip, tail (m), force (N), torque (N m), device1, device2 (N), depth (m),
-/// contacts; a stored sample has the same values under the same names.
-struct StreamRow {
-  std::int64_t time_ns = 0;  ///< session clock
-  std::array<double, 20> values{};
-};
-StreamRow stream_row(const servo::Sample& sample) noexcept;
-/// The channels of StreamRow::values, in their order.
-std::span<const StreamChannel> stream_channels() noexcept;
 
 class SampleStream {
  public:

@@ -211,7 +211,6 @@ class SoftBody {
   /// The surface node of a node; kInside: not on the surface.
   std::uint32_t surface_index(std::uint32_t node) const { return surface_index_[node]; }
   bool is_fixed(std::uint32_t node) const { return is_fixed_[node]; }
-  std::size_t free_nodes() const { return free_nodes_.size(); }
   std::size_t factor_entries() const { return factor_.entries(); }
 
   SoftState rest() const;

@@ -487,11 +487,6 @@ std::vector<servo::ConnectedDevice> connected_falcons(const servo::DeviceConfig&
   return connected;
 }
 
-CalibrationVerdict judge_calibration(const std::string& path,
-                                     const std::vector<std::string>& serials) {
-  return judge(calibration_in(path), serials);
-}
-
 std::unique_ptr<FalconDriver> open_driver(const std::string& serial, const std::string& firmware,
                                           const Calibration& calibration) {
   const auto image = image_in(firmware);  // read first: report a bad file before opening the device

@@ -230,11 +230,6 @@ std::unique_ptr<servo::Device> open_falcon(const servo::DeviceConfig& config);
 /// have their registration. \throws TransportError, InputError.
 std::unique_ptr<servo::Device> open_falcon2(const servo::DeviceConfig& config);
 
-/// State of all calibrations that these devices need. Two serial numbers are a pair, tip and tail.
-/// \param path  empty: none. \throws InputError.
-CalibrationVerdict judge_calibration(const std::string& path,
-                                     const std::vector<std::string>& serials);
-
 /// The driver of one Falcon, with the calibrated scale of force if there is a plausible one. Shows
 /// the progress of an upload on a terminal. \throws TransportError, InputError.
 std::unique_ptr<FalconDriver> open_driver(const std::string& serial, const std::string& firmware,
