@@ -110,7 +110,7 @@ PUBLIC = {
     "analysis/report": "html_page hypotheses plan_report report tables",
     "runner": "",
     "runner/servo": "device force_limiter passivity realtime ring sample servo servo_thread "
-                    "shared_value tick_clock tick_source touched_places triple_buffer",
+                    "shared_value tick_source touched_places triple_buffer",
     "runner/safety": "fault_signals guarded_device shared_memory",
     "runner/sound": "masking_noise",
     "runner/devices": "device_delay mouse registry self_test simulated",
@@ -126,7 +126,7 @@ PUBLIC = {
     "runner/serve": "network served_scene served_session",
     "runner/sweep": "swept_study",
     "runner/stability": "boundary",
-    "runner/bench": "allocation_count",
+    "runner/bench": "tick_meters",
     "runner/commands": "render/forces shared/command shared/task_words shared/study_options",
 }
 

@@ -19,10 +19,9 @@
 
 #include "data/base/random.h"
 #include "rendering/renderer.h"
-#include "runner/bench/allocation_count.h"
+#include "runner/bench/tick_meters.h"
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/outputs.h"
-#include "runner/servo/tick_clock.h"
 #include "stimuli/closed_surface.h"
 #include "stimuli/primitives.h"
 
@@ -69,11 +68,11 @@ class TickTimer {
  public:
   static constexpr double kTick = 1e-3;  ///< s
 
-  TickTimer() : ns_(servo::nanoseconds_per_count()) {
+  TickTimer() : ns_(bench::nanoseconds_per_count()) {
     std::vector<std::uint64_t> empty(100'000);
     for (auto& count : empty) {
-      const std::uint64_t start = servo::begin_count();
-      count = servo::end_count() - start;
+      const std::uint64_t start = bench::begin_count();
+      count = bench::end_count() - start;
     }
     empty_ns_ = at(empty, 0.5);
   }
@@ -83,9 +82,9 @@ class TickTimer {
                             rendering::RenderState& state, const rendering::LineProbe& probe,
                             bool touching_wanted) {
     const std::uint64_t allocated = bench::allocations();
-    const std::uint64_t start = servo::begin_count();
+    const std::uint64_t start = bench::begin_count();
     rendering::Rendering rendering = renderer.tick(scene, state, probe, kTick);
-    const std::uint64_t count = servo::end_count() - start;
+    const std::uint64_t count = bench::end_count() - start;
     allocations_ += bench::allocations() - allocated;
     if ((rendering.contacts > 0) == touching_wanted) counts_.push_back(count);
     return rendering;

@@ -20,7 +20,7 @@
 #include "rendering/renderer.h"
 #include "rendering/verification/random_solids.h"
 #include "rendering/verification/reference.h"
-#include "runner/servo/tick_clock.h"
+#include "runner/bench/tick_meters.h"
 #include "stimuli/primitives.h"
 
 namespace palpate::bench {
@@ -113,7 +113,7 @@ struct ExactDepths {
 
 Row run(const rendering::MethodDefinition& kind, const stimuli::ConvexMesh& mesh, const Path& path,
         const ExactDepths& exact, bool segment, double seconds) {
-  const double ns = runner::servo::nanoseconds_per_count();
+  const double ns = runner::bench::nanoseconds_per_count();
   const auto most = static_cast<std::uint64_t>(seconds * 1e9 / ns);
   const std::unique_ptr<rendering::ContactMethod> method = kind.make(mesh, segment);
   Row row;
@@ -125,9 +125,9 @@ Row run(const rendering::MethodDefinition& kind, const stimuli::ConvexMesh& mesh
   std::uint64_t spent = 0;
   // A method with history must come in from outside; the others may begin anywhere.
   for (std::size_t i = kind.has_history ? 0 : kWarm - 1; i < path.size() && spent < most; ++i) {
-    const std::uint64_t start = runner::servo::begin_count();
+    const std::uint64_t start = runner::bench::begin_count();
     const rendering::ContactEstimate estimate = method->tick(path[i]);
-    const std::uint64_t count = runner::servo::end_count() - start;
+    const std::uint64_t count = runner::bench::end_count() - start;
     if (i < kWarm) continue;
     spent += count;
     counts.push_back(count);

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "runner/bench/allocation_count.h"
+#include "runner/bench/tick_meters.h"
 #include "tests/shared/union_scenes.h"
 
 namespace palpate::rendering {

@@ -16,7 +16,7 @@
 #include "rendering/surface_patch.h"
 #include "rendering/surface_search.h"
 #include "rendering/verification/random_solids.h"
-#include "runner/bench/allocation_count.h"
+#include "runner/bench/tick_meters.h"
 #include "stimuli/closed_surface.h"
 #include "stimuli/orientation.h"
 #include "stimuli/primitives.h"

@@ -6,7 +6,7 @@
 #include <cstring>
 #include <limits>
 
-#include "runner/bench/allocation_count.h"
+#include "runner/bench/tick_meters.h"
 #include "tests/shared/random_mesh.h"
 #include "tests/shared/render_checks.h"
 

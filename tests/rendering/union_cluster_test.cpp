@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "rendering/union_contact.h"
-#include "runner/bench/allocation_count.h"
+#include "runner/bench/tick_meters.h"
 #include "tests/shared/random_clusters.h"
 
 namespace palpate::rendering {

@@ -8,7 +8,7 @@
 #include <numbers>
 
 #include "rendering/union_state.h"
-#include "runner/bench/allocation_count.h"
+#include "runner/bench/tick_meters.h"
 #include "tests/shared/union_scenes.h"
 
 namespace palpate::rendering {

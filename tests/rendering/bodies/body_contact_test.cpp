@@ -8,7 +8,7 @@
 #include "data/base/random.h"
 #include "rendering/bodies/body_world.h"
 #include "rendering/probe.h"
-#include "runner/bench/allocation_count.h"
+#include "runner/bench/tick_meters.h"
 #include "tests/rendering/bodies/body_fixtures.h"
 
 namespace palpate::rendering::test {

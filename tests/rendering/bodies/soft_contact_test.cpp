@@ -9,7 +9,7 @@
 
 #include "data/base/random.h"
 #include "rendering/bodies/soft/soft_scene.h"
-#include "runner/bench/allocation_count.h"
+#include "runner/bench/tick_meters.h"
 
 namespace palpate::rendering {
 namespace {

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "rendering/renderer.h"
-#include "runner/bench/allocation_count.h"
+#include "runner/bench/tick_meters.h"
 #include "stimuli/primitives.h"
 
 namespace palpate::rendering {

@@ -13,7 +13,7 @@
 #include <string>
 #include <vector>
 
-#include "runner/bench/allocation_count.h"
+#include "runner/bench/tick_meters.h"
 #include "tests/runner/participants/ideal_touches.h"
 
 namespace palpate::runner::participants {

@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
 
-#include "runner/bench/allocation_count.h"
+#include "runner/bench/tick_meters.h"
 #include "runner/participants/shape_observer.h"
 #include "tests/runner/participants/observer_reference.h"
 

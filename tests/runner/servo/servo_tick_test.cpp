@@ -15,7 +15,7 @@
 #include <cstdlib>
 #include <cstring>
 
-#include "runner/bench/allocation_count.h"
+#include "runner/bench/tick_meters.h"
 #include "runner/servo/servo_thread.h"
 #include "stimuli/primitives.h"
 

@@ -16,7 +16,7 @@
 #include "data/base/random.h"
 #include "rendering/bodies/soft/soft_scene.h"
 #include "rendering/renderer.h"
-#include "runner/bench/allocation_count.h"
+#include "runner/bench/tick_meters.h"
 #include "runner/servo/servo_thread.h"
 #include "tests/runner/fake_device.h"
 

@@ -9,7 +9,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "runner/bench/allocation_count.h"
+#include "runner/bench/tick_meters.h"
 #include "runner/servo/device.h"
 #include "tests/runner/devices/forcedimension/stub_state.h"
 #include "tests/shared/temporary_folder.h"

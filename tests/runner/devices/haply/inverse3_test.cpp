@@ -12,7 +12,7 @@
 #include <stdexcept>
 #include <thread>
 
-#include "runner/bench/allocation_count.h"
+#include "runner/bench/tick_meters.h"
 #include "tests/runner/devices/haply/emulated_service.h"
 
 namespace palpate::runner::devices::haply {

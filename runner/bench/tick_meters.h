@@ -1,14 +1,13 @@
 #pragma once
-// A clock fast enough to time one tick of a renderer.
+// What one tick costs: its time by a fast clock, and its heap allocations.
 
 #include <chrono>
 #include <cstdint>
-
 #if defined(__x86_64__)
 #include <x86intrin.h>
 #endif
 
-namespace palpate::runner::servo {
+namespace palpate::runner::bench {
 
 /// Counts of a fast clock. On x86 the time stamp counter: reading it costs some 10 ns.
 inline std::uint64_t begin_count() {
@@ -42,4 +41,11 @@ inline double nanoseconds_per_count() {
   return passed.count() / counts;
 }
 
-}  // namespace palpate::runner::servo
+/// Heap allocations of this thread so far, counted by a replaced operator new. Always 0 under
+/// sanitizers, which have their own operator new.
+std::uint64_t allocations();
+
+/// Whether allocations() counts.
+bool counts_allocations();
+
+}  // namespace palpate::runner::bench

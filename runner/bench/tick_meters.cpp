@@ -1,4 +1,4 @@
-#include "runner/bench/allocation_count.h"
+#include "runner/bench/tick_meters.h"
 
 #include <cstdlib>
 #include <new>
