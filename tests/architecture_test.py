@@ -120,8 +120,8 @@ PUBLIC = {
                             "scene_renderer",
     "runner/participants": "keyboard respondent response_box simulated_settings simulated "
                            "task_participant",
-    "runner/session": "device_check live_forces session_plan live_session markers "
-                      "preflight run_record replay sample_stream session simulated_study "
+    "runner/session": "device_check live_forces session_plan live_session recorders "
+                      "preflight run_record replay session simulated_study "
                       "socket_advisor station",
     "runner/serve": "network served_scene served_session",
     "runner/sweep": "swept_study",

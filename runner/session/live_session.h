@@ -9,7 +9,7 @@
 
 #include "runner/participants/keyboard.h"
 #include "runner/session/live_forces.h"
-#include "runner/session/markers.h"
+#include "runner/session/recorders.h"
 #include "runner/session/session.h"
 #include "runner/session/station.h"
 

@@ -16,8 +16,8 @@
 #include <vector>
 
 #include "rendering/bodies/moving_scene.h"
-#include "rendering/release.h"
 #include "rendering/render_fault.h"
+#include "rendering/union_contact.h"
 #include "tests/shared/temporary_folder.h"
 
 namespace palpate::runner {

@@ -35,7 +35,7 @@
 #include "runner/safety/shared_memory.h"
 #include "runner/servo/realtime.h"
 #include "runner/servo/servo_thread.h"
-#include "runner/session/markers.h"
+#include "runner/session/recorders.h"
 #include "stimuli/primitives.h"
 
 namespace palpate::runner::commands {

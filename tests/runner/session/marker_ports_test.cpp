@@ -21,7 +21,7 @@
 #include <utility>
 #include <vector>
 
-#include "runner/session/markers.h"
+#include "runner/session/recorders.h"
 
 namespace {
 
