@@ -14,7 +14,6 @@
 #include "rendering/contact.h"
 #include "rendering/contact_detection.h"
 #include "rendering/equivalent_point.h"
-#include "rendering/release.h"
 #include "rendering/renderer.h"
 #include "rendering/scene.h"
 #include "rendering/surface_contact.h"

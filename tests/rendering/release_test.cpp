@@ -1,9 +1,8 @@
-// Layers under a surface, layers that break, and hooks (rendering/release.h).
-
-#include "rendering/release.h"
+// Layers under a surface, layers that break, and hooks (rendering/union_contact.h).
 
 #include <gtest/gtest.h>
 
+#include "rendering/union_contact.h"
 #include "tests/shared/union_scenes.h"
 
 namespace palpate::rendering {
