@@ -118,7 +118,7 @@ PUBLIC = {
     "runner/display": "display explore_window mailbox text_display timeline window",
     "runner/display/scene": "camera picture drawn_mesh image_file painter scene_drawing "
                             "scene_renderer",
-    "runner/participants": "keyboard respondent response_box simulated_settings simulated "
+    "runner/participants": "keyboard respondent simulated_settings simulated "
                            "task_participant",
     "runner/session": "device_check live_forces session_plan live_session recorders "
                       "preflight run_record replay session simulated_study "

@@ -11,7 +11,7 @@
 #include "runner/commands/run/settings.h"
 #include "runner/devices/registry.h"
 #include "runner/display/window.h"
-#include "runner/participants/response_box.h"
+#include "runner/participants/keyboard.h"
 #include "runner/safety/guarded_device.h"
 #include "runner/scene_builder.h"
 #include "runner/servo/servo_thread.h"
