@@ -1,7 +1,5 @@
 #pragma once
-// Linear mixed model log(response_time) ~ renderer * shape + (1 + renderer | participant) by
-// restricted maximum likelihood (REML), like R's lme4 (Bates et al. 2015) and lmerTest (Kuznetsova
-// et al. 2017).
+// Models of trials within participants: analysis of variance, linear and logistic mixed models.
 
 #include <array>
 #include <cstddef>
@@ -53,6 +51,10 @@ struct RmAnova {
 
 /// Analyses the participants with a time in every cell; any numbers of renderers and shapes.
 RmAnova rm_anova(const ParticipantCells& participant_cells);
+
+// Linear mixed model log(response_time) ~ renderer * shape + (1 + renderer | participant) by
+// restricted maximum likelihood (REML), like R's lme4 (Bates et al. 2015) and lmerTest (Kuznetsova
+// et al. 2017).
 
 /// Estimate and test of a coefficient or contrast (natural log of s) with Satterthwaite's degrees
 /// of freedom.

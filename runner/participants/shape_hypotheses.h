@@ -13,8 +13,6 @@
 
 namespace palpate::runner::participants {
 
-// Distinguishable orientations of a stimulus.
-
 // The surface at which a stimulus is felt first.
 
 /// The convex parts of the outermost surface that has a stiffness, relative to the centre of the
@@ -25,6 +23,8 @@ std::vector<PlacedPart> felt_parts(const stimuli::ObjectSpec& stimulus);
 
 /// Whether there is such a surface.
 bool can_be_felt(const stimuli::ObjectSpec& stimulus);
+
+// Distinguishable orientations of a stimulus.
 
 /// Point i of n of a super-Fibonacci spiral, evenly spread over all rotations (Alexa 2022,
 /// "Super-Fibonacci Spirals: Fast, Low-Discrepancy Sampling of SO(3)", algorithm 1).

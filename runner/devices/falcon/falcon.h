@@ -1,6 +1,5 @@
 #pragma once
-// A Novint Falcon as a device: position and force of one point, no rotation. All calls from one
-// thread.
+// A Novint Falcon: kinematics, driver, and device. All calls from one thread.
 
 #include <array>
 #include <cstdint>
@@ -20,9 +19,6 @@
 #include "stimuli/vec.h"
 
 namespace palpate::runner::devices::falcon {
-
-// The driver of one Falcon: position of its grip and force on it. `falcon` uses one, `falcon2` two.
-// Each servo tick calls update, then push; neither throws nor waits.
 
 // Kinematics and statics of the Falcon: encoder counts to position, force to motor torques. Lengths
 // in m, angles in rad, in the Falcon's own frame: x right, y up, z out of the device towards the
@@ -70,6 +66,9 @@ Vec3 force_of(const Jacobian& j, const Vec3& torque) noexcept;
 /// The largest force (N) that can be rendered in every direction at a position with no torque above
 /// `max_torque` (N m); 0: out of reach.
 double force_in_every_direction(const Vec3& position, double max_torque) noexcept;
+
+// The driver of one Falcon: position of its grip and force on it. `falcon` uses one, `falcon2` two.
+// Each servo tick calls update, then push; neither throws nor waits.
 
 struct DriverSettings {
   double counts_per_torque = kCountsPerTorque;  ///< 1/(N m); from the calibration
@@ -155,6 +154,7 @@ class FalconDriver {
 /// The largest force (N) that the motors can render in every direction everywhere in the workspace.
 double guaranteed_force(double counts_per_torque);
 
+/// Position and force of one point, no rotation.
 class FalconDevice final : public servo::Device {
  public:
   /// \param calibration  state of its force calibration, for DeviceCapabilities
