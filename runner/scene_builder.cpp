@@ -88,6 +88,7 @@ Vec3 box_of(const stimuli::PolygonSoup& soup) {
 std::vector<std::shared_ptr<const stimuli::ConvexMesh>> shared(
     std::vector<stimuli::ConvexMesh> parts) {
   std::vector<std::shared_ptr<const stimuli::ConvexMesh>> out;
+  out.reserve(parts.size());
   for (stimuli::ConvexMesh& part : parts)
     out.push_back(std::make_shared<const stimuli::ConvexMesh>(std::move(part)));
   return out;

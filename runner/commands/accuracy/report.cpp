@@ -460,6 +460,8 @@ constexpr const char* kQuestion =
     "direction 10 degrees, surface position 1 mm), and below what a device resolves (0.03 mm); "
     "point and ray.";
 
+}  // namespace
+
 void put_wrapped(std::ostream& out, const std::string& text) {
   constexpr std::size_t kColumns = 98;
   for (const std::string& line : analysis::wrapped(
@@ -467,8 +469,6 @@ void put_wrapped(std::ostream& out, const std::string& text) {
     out << "  " << line << "\n";
   }
 }
-
-}  // namespace
 
 void put_table(std::ostream& out, const analysis::Table& table) {
   std::vector<std::size_t> widths;

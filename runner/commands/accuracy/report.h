@@ -64,6 +64,8 @@ std::string significant(double value);
 std::string share(std::size_t part, std::size_t all);
 /// "327,680"
 std::string thousands(long long n);
+/// Writes a text in lines of at most 98 columns, indented, for a terminal.
+void put_wrapped(std::ostream& out, const std::string& text);
 /// Writes a table for a terminal.
 void put_table(std::ostream& out, const analysis::Table& table);
 

@@ -115,7 +115,7 @@ std::string submit(const std::vector<std::string>& arguments) {
   std::string command = "sbatch --parsable";
   for (const std::string& argument : arguments) command += " " + shell_quoted(argument);
   const Output said = run(command);
-  const std::string job = said.text.substr(0, said.text.find(';'));  // "123;cluster"
+  std::string job = said.text.substr(0, said.text.find(';'));  // "123;cluster"
   const bool number = !job.empty() && std::all_of(job.begin(), job.end(),
                                                   [](char c) { return c >= '0' && c <= '9'; });
   if (said.status == 127)

@@ -26,6 +26,7 @@
 #include "data/base/text.h"
 #include "data/files/atomic_file.h"
 #include "data/files/utc.h"
+#include "runner/commands/run/opening.h"
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/outputs.h"
 #include "runner/devices/device_delay.h"
@@ -759,14 +760,6 @@ void add_options(CommandLine& line) {
   add_calibrate_options(line.options);
 }
 
-const devices::DeviceKind& kind_of(const std::string& name) {
-  try {
-    return devices::device_kind(name);
-  } catch (const std::invalid_argument& error) {
-    throw UsageError(std::string("--device: ") + error.what());
-  }
-}
-
 /// \param only  the kind that was named, or nullptr for all. \return the exit status
 int list_devices(const devices::DeviceKind* only, const servo::DeviceConfig& config, Json& report) {
   try {
@@ -845,7 +838,7 @@ int devices_command(const std::vector<std::string>& args) {
   }
   const bool named = values->count("device") > 0;
   const std::string name = named ? (*values)["device"].as<std::string>() : "";
-  const devices::DeviceKind* const only = named ? &kind_of(name) : nullptr;
+  const devices::DeviceKind* const only = named ? &find_device_kind(name) : nullptr;
   if (values->count("calibrate") > 0) {
     if (!named) throw UsageError("--calibrate: name the device with --device");
     return calibrate_devices(*only, config, *values);

@@ -355,10 +355,6 @@ void add_explore_options(CommandLine& line) {
       ("force", "replace existing files and frames");
 }
 
-std::string text_of(const po::variables_map& values, const char* option) {
-  return values.count(option) > 0 ? values[option].as<std::string>() : std::string();
-}
-
 int draw_pictures(const po::variables_map& values, const rendering::Renderer& renderer) {
   FrameSettings settings{.size = parse_size(text_of(values, "size")),
                          .every = parse_every(text_of(values, "every")),

@@ -29,10 +29,6 @@ namespace {
 
 namespace po = boost::program_options;
 
-std::string text_of(const po::variables_map& values, const char* option) {
-  return values.count(option) > 0 ? values[option].as<std::string>() : std::string();
-}
-
 /// Surfaces in the world, for watchers.
 std::string picture_of(const std::vector<stimuli::ObjectSpec>& objects) {
   constexpr std::size_t kMostTriangles = 6000;  // of all

@@ -157,6 +157,10 @@ std::optional<po::variables_map> CommandLine::parse(const std::vector<std::strin
   return values;
 }
 
+std::string text_of(const po::variables_map& values, const char* option) {
+  return values.count(option) > 0 ? values[option].as<std::string>() : std::string();
+}
+
 void warn_of_exposure(const std::string& database) {
   const std::string exposure = data::access_warning(database);
   if (!exposure.empty()) std::cerr << "warning: " << printable(exposure) << "\n";

@@ -55,6 +55,9 @@ struct CommandLine {
   std::optional<boost::program_options::variables_map> parse(const std::vector<std::string>& args);
 };
 
+/// The value of an option; empty if it was not given.
+std::string text_of(const boost::program_options::variables_map& values, const char* option);
+
 /// Warns on stderr if other users can read the database or create files beside it.
 void warn_of_exposure(const std::string& database);
 

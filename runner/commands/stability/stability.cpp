@@ -341,14 +341,6 @@ double integrator_gain(const StabilityReport& report) {
   return worst;
 }
 
-void put_wrapped(std::ostream& out, const std::string& text) {
-  constexpr std::size_t kColumns = 98;
-  for (const std::string& line : analysis::wrapped(
-           text, [](std::string_view part) { return analysis::width(part) <= kColumns; })) {
-    out << "  " << line << "\n";
-  }
-}
-
 std::vector<std::string> how_to_read() {
   std::vector<std::string> notes;
   notes.emplace_back(
