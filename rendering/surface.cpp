@@ -32,6 +32,14 @@ constexpr double kSliver = 1e-6;  // height of the length
 // A lower triangle has no area, only rounding.
 constexpr double kRoundings = 8 * std::numeric_limits<double>::epsilon();
 
+/// Whether rounding of the normals may be larger than the bend of an edge. A segment along the two
+/// triangles may then see them as those of a convex edge, although its corners make it concave.
+bool is_flat(const Vec3& left, const Vec3& right) {
+  constexpr double kFlat = 1e-9;  // rad
+  const Vec3 bend = left - right;
+  return glm::dot(bend, bend) <= kFlat * kFlat;
+}
+
 float rounded_up(double value) {
   const auto near = static_cast<float>(value);
   return static_cast<double>(near) < value
@@ -172,7 +180,8 @@ void Surface::find_edges() {
       const std::uint32_t across = triangles_[i].across[k];
       SurfaceTriangle& other = triangles_[SurfaceTriangle::triangle_of(across)];
       const std::uint32_t side = SurfaceTriangle::side_of(across);
-      if (triangles_[i].touches(k) || other.touches(side)) {
+      if (triangles_[i].touches(k) || other.touches(side) ||
+          is_flat(triangles_[i].normal, other.normal)) {
         triangles_[i].touched |= 1U << k;
         other.touched |= 1U << side;
       }

@@ -20,6 +20,7 @@
 #include "stimuli/closed_surface.h"
 #include "stimuli/orientation.h"
 #include "stimuli/primitives.h"
+#include "tests/shared/random_polyhedron.h"
 #include "tests/shared/union_scenes.h"
 
 namespace palpate::rendering {
@@ -29,6 +30,7 @@ namespace surfaces {
 using testing::box_soup;
 using testing::kTick;
 using testing::object_of;
+using testing::prism;
 
 constexpr double kStiffness = 1000;  // N/m
 
@@ -50,24 +52,6 @@ SceneSurface surface_of(const std::vector<stimuli::PolygonSoup>& soups) {
 
 Scene scene_of(const std::vector<stimuli::PolygonSoup>& soups, const Tool& tool = {}) {
   return Scene({}, true, tool, nullptr, {surface_of(soups)});
-}
-
-/// A prism along y over a polygon in x and z, counter-clockwise seen along +y from behind.
-stimuli::PolygonSoup prism(const std::vector<std::array<double, 2>>& outline, double half_depth) {
-  stimuli::PolygonSoup soup;
-  const auto n = static_cast<std::uint32_t>(outline.size());
-  for (const double y : {-half_depth, half_depth}) {
-    for (const auto& [x, z] : outline) soup.vertices.emplace_back(x, y, z);
-  }
-  auto& front = soup.faces.emplace_back();
-  for (std::uint32_t i = 0; i < n; ++i) front.push_back(i);
-  auto& back = soup.faces.emplace_back();
-  for (std::uint32_t i = n; i-- > 0;) back.push_back(n + i);
-  for (std::uint32_t i = 0; i < n; ++i) {
-    const std::uint32_t k = (i + 1) % n;
-    soup.faces.push_back({k, i, n + i, n + k});
-  }
-  return soup;
 }
 
 /// A block whose upper side bends up (a valley) or down (a ridge) by an angle along x = 0.
@@ -587,39 +571,26 @@ TEST(SurfaceSeam, IsAsWideAsTheGapBetweenTwoShellsWithinTheirError) {
   EXPECT_EQ(seam({0, -0.02, kError}, 0), 0) << "coordinates that are not rounded";
 }
 
-TEST(SurfacePoint, AWayStraightIntoACornerIsStopped) {
-  // A prism with a notch, turned, in single precision.
+/// Rounding decides with which end such a stylus touches each of the face's triangles, and whether
+/// their edges are convex.
+TEST(SurfaceStylus, OneThatLiesOnAFaceIsHeldWhileItSlides) {
   Random random(1);
-  int tried = 0;
-  for (int round = 0; round < 100; ++round) {
-    const double notch = 0.002 + 0.018 * random.unit();
-    stimuli::PolygonSoup soup = prism({{-0.03, -0.02},
-                                       {0.03, -0.02},
-                                       {0.03, 0.02},
-                                       {0.01, 0.02},
-                                       {0, 0.02 - notch},
-                                       {-0.01, 0.02},
-                                       {-0.03, 0.02}},
-                                      0.01);
-    const Quat turn = glm::angleAxis(3 * random.unit(), direction(random));
-    for (Vec3& v : soup.vertices) {
-      v = turn * v;
-      for (int c = 0; c < 3; ++c) v[c] = static_cast<double>(static_cast<float>(v[c]));
-    }
-    const SceneSurface placed = surface_of({soup});
-    const Scene scene({}, false, {}, nullptr, {placed});
-    for (int i = 0; i < 1000; ++i) {
-      const Vec3 corner = soup.vertices[random.below(soup.vertices.size())];
-      const Vec3 out = direction(random), from = corner + 1e-3 * out, to = corner - 1e-4 * out;
-      if (placed.surface->winding(from) > 0 || placed.surface->winding(to) <= 0) continue;
-      ++tried;
-      RenderState state = scene.initial_state();
-      point_renderer().tick(scene, state, {from, from + Vec3(0, 0, 0.1)}, kTick);
-      const Rendering r = point_renderer().tick(scene, state, {to, to + Vec3(0, 0, 0.1)}, kTick);
-      ASSERT_GT(r.contacts, 0) << "round " << round << ", try " << i;
+  for (int round = 0; round < 40000; ++round) {
+    const Quat turn = stimuli::uniform_rotation(random);
+    // The face is divided into strips.
+    stimuli::PolygonSoup soup = prism(
+        {{-0.02, -0.02}, {0.02, -0.02}, {0.02, 0}, {0.01, 0}, {0, 0}, {-0.01, 0}, {-0.02, 0}},
+        0.05);
+    for (Vec3& v : soup.vertices) v = turn * v;
+    const Scene scene = scene_of({soup});
+    const Vec3 along = turn * Vec3(0.1, 0.02 * random.unit(), 0);
+    RenderState state = scene.initial_state();
+    for (int i = 0; i < 8; ++i) {
+      const Vec3 tip = turn * Vec3(-0.06 + 5e-5 * i, -0.03 + 1e-4 * i, i == 0 ? 1e-3 : -1e-4 * i);
+      const Rendering r = ray_renderer().tick(scene, state, {tip, tip + along}, kTick);
+      ASSERT_NEAR(glm::length(r.force), 0.1 * i, 1e-9) << round << ' ' << i;
     }
   }
-  EXPECT_GT(tried, 10000);
 }
 
 TEST_P(SurfaceContact, AFlatFaceInManyTrianglesHoldsNothingAlongIt) {

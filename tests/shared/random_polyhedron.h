@@ -1,5 +1,6 @@
 #pragma once
-// Convex polyhedra as polygon soups for property tests. SI units; centred at the origin.
+// Polyhedra as polygon soups for property tests. SI units; random ones are convex, centred at the
+// origin.
 
 #include <array>
 #include <cmath>
@@ -100,6 +101,25 @@ inline stimuli::PolygonSoup triangulated(const stimuli::PolygonSoup& soup) {
     }
   }
   return out;
+}
+
+/// A prism along y over a polygon in x and z, counter-clockwise seen along +y from behind.
+inline stimuli::PolygonSoup prism(const std::vector<std::array<double, 2>>& outline,
+                                  double half_depth) {
+  stimuli::PolygonSoup soup;
+  const auto n = static_cast<std::uint32_t>(outline.size());
+  for (const double y : {-half_depth, half_depth}) {
+    for (const auto& [x, z] : outline) soup.vertices.emplace_back(x, y, z);
+  }
+  auto& front = soup.faces.emplace_back();
+  for (std::uint32_t i = 0; i < n; ++i) front.push_back(i);
+  auto& back = soup.faces.emplace_back();
+  for (std::uint32_t i = n; i-- > 0;) back.push_back(n + i);
+  for (std::uint32_t i = 0; i < n; ++i) {
+    const std::uint32_t k = (i + 1) % n;
+    soup.faces.push_back({k, i, n + i, n + k});
+  }
+  return soup;
 }
 
 /// Turned, scaled by `scale` and then moved.
