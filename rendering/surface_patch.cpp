@@ -178,7 +178,7 @@ SurfacePatch patch_after_turn(const Surface& surface, const SurfacePatch& patch,
   return {triangle << 2, patch.segment, !by_tip(edge.left, along), PatchKind::face};
 }
 
-bool meets(const PatchPolygon& polygon, const Vec3& from, const Vec3& way) {
+bool meets(const PatchPolygon& polygon, const Vec3& from, const Vec3& way, double border) {
   // Seen along the way, in two dimensions: each corner is rounded once, then signs are exact.
   const Vec3 size = glm::abs(way);
   const int z = size.x > size.y ? (size.x > size.z ? 0 : 2) : (size.y > size.z ? 1 : 2);
@@ -194,7 +194,9 @@ bool meets(const PatchPolygon& polygon, const Vec3& from, const Vec3& way) {
     const double one = u[i] * v[k], other = u[k] * v[i];
     double turn = one - other;  // the products keep their order in rounding
     if (one == other) turn = std::fma(u[i], v[k], -one) - std::fma(u[k], v[i], -other);
-    return (way[z] > 0 ? turn : -turn) <= 0;
+    if (way[z] < 0) turn = -turn;
+    return turn <= 0 ||
+           (border > 0 && turn <= border * (std::abs(u[k] - u[i]) + std::abs(v[k] - v[i])));
   };
   if (turns_right(0, 1) && turns_right(1, 2) && turns_right(2, 0)) return true;
   return polygon.count == 4 && turns_right(0, 2) && turns_right(2, 3) && turns_right(3, 0);
@@ -226,8 +228,9 @@ void cast_on_patch(const Surface& surface, const SurfacePatch& patch, const Patc
   const double time = std::max(0.0, start / (start - end));
   if (!first.yields_to(time, patch.segment, patch.triangle())) return;
   const PatchPolygon polygon = polygon_of(surface, patch, tool);
-  if (meets(polygon, from, to - from) ||
-      (border > 0 && distance_off(polygon, plane.normal, from + time * (to - from)) <= border))
+  const Vec3 way = to - from;
+  if (meets(polygon, from, way, std::min(border, tolerance)) ||
+      (border > tolerance && distance_off(polygon, plane.normal, from + time * way) <= border))
     first = {patch, time};
 }
 

@@ -75,8 +75,9 @@ SurfacePatch patch_after_turn(const Surface& surface, const SurfacePatch& patch,
 
 /// Whether a line in the direction of `way` from `from`, against the normal, goes through the
 /// polygon. One expression decides for both patches at a side (Woop, Benthin & Wald 2013), and one
-/// that goes through the side itself goes through both.
-bool meets(const PatchPolygon& polygon, const Vec3& from, const Vec3& way);
+/// that goes through the side itself goes through both. \param border  m; a line that passes beside
+/// a side goes through it as well, no farther than one to two times this, seen along an axis
+bool meets(const PatchPolygon& polygon, const Vec3& from, const Vec3& way, double border = 0);
 
 /// m, distance of a translation from the polygon along its plane; 0 above the polygon.
 double distance_off(const PatchPolygon& polygon, const Vec3& normal, const Vec3& at);

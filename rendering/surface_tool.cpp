@@ -84,10 +84,12 @@ void SurfaceTool::list_triangle(std::uint32_t index, std::uint8_t what, std::uin
     if (std::min(own, other) > level || std::max(own, other) < -level) continue;
     const SurfacePatch patch{index << 2 | k, segment, false, SurfacePatch::Kind::edge};
     own_.patches.push_back({plane_of(surface_, patch, own_.listed), patch});
-    // The normal of an edge that lies almost along the segment is sensitive to rounding.
+    // Rounding may turn the normal of an edge that lies almost along the segment, or reverse that
+    // of one between triangles that do.
     const Vec3 e = surface_.vertices()[t.corners[(k + 1) % 3]] - surface_.vertices()[t.corners[k]];
     const Vec3 across = glm::cross(e, along);
-    if (glm::dot(across, across) < kAlmostAlong * kAlmostAlong * glm::dot(e, e) * length2)
+    if ((own >= 0) == (other >= 0) ||
+        glm::dot(across, across) < kAlmostAlong * kAlmostAlong * glm::dot(e, e) * length2)
       own_.patches.back().plane = {};
   }
 }
@@ -171,8 +173,10 @@ void SurfaceTool::find_list() {
   per_way2_ = way2 > 0 ? 1 / way2 : 0;
 }
 
-/// m; free tools do not enter cracks that rounding has opened.
-double SurfaceTool::border() const { return planes_.empty() ? kMouth * surface_.seam() : 0; }
+/// m; free tools do not enter cracks that rounding has opened, in the file or between patches.
+double SurfaceTool::border() const {
+  return planes_.empty() ? std::max(tolerance_, kMouth * surface_.seam()) : 0;
+}
 
 /// Finds the first listed patch on a straight line.
 /// \param done  fraction of the way that need not be looked at; the rest begins within the list's
@@ -465,10 +469,16 @@ void SurfaceTool::find_rest() {
   for (int round = 0; round < kRounds && !stuck_; ++round) {
     Vec3 goal;
     if (!find_goal(goal)) break;
-    const PatchHit hit = cast(at_, goal);
-    if (round == 0) first_hit_ = hit.time;
+    // A free tool stops before a patch that its goal is less than a skin away from: on a patch, and
+    // on another's border, rounding would decide whether a later cast meets either.
+    const Vec3 way = goal - at_;
+    const double length = glm::length(way);
+    const double ahead = planes_.empty() && length > 0 ? 1 + skin_ / length : 1;
+    const Vec3 far_goal = ahead > 1 ? at_ + ahead * way : goal;
+    const PatchHit hit = cast(at_, far_goal);
+    if (round == 0) first_hit_ = ahead * hit.time;
     if (hit.hit()) {
-      move_to_hit(goal, hit);
+      move_to_hit(far_goal, hit);
       continue;
     }
     at_ = goal;

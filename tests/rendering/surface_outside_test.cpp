@@ -361,6 +361,111 @@ void SurfaceOutside::touch(const Segments& segments, std::uint64_t seed) {
   EXPECT_EQ(noticed, shifted);
 }
 
+PolygonSoup notched_prism(Random& random) {
+  const double notch = uniform(random, 0.002, 0.02);
+  return testing::prism({{-0.03, -0.02},
+                         {0.03, -0.02},
+                         {0.03, 0.02},
+                         {0.01, 0.02},
+                         {0, 0.02 - notch},
+                         {-0.01, 0.02},
+                         {-0.03, 0.02}},
+                        0.01);
+}
+
+PolygonSoup dented_ball(Random& random) {
+  PolygonSoup soup = stimuli::icosphere(0.03, 1);
+  for (Vec3& v : soup.vertices) v *= uniform(random, 0.7, 1.2);
+  return soup;
+}
+
+/// A tool that crosses a corner or the middle of an edge, to the bit, in one tick or in two of
+/// which the first ends there; a stylus crosses with an end or its middle, in any direction or
+/// along the edge.
+class ExactAim {
+ public:
+  struct Ways {
+    std::array<LineProbe, 3> poses;
+    int count = 0;
+  };
+  ExactAim(const stimuli::ClosedSurface& mesh, bool sides) : mesh_(mesh), sides_(sides) {}
+
+  Ways next(Random& random) const {
+    const auto& corners = mesh_.triangles[random.below(mesh_.triangles.size())];
+    const Vec3 &a = mesh_.vertices[corners[0]], &b = mesh_.vertices[corners[1]],
+               &c = mesh_.vertices[corners[2]];
+    const Vec3 normal = glm::normalize(glm::cross(b - a, c - a));
+    const Vec3 at = random.unit() < 0.5 ? a : 0.5 * (a + b);
+    const Vec3 out =
+        random.unit() < 0.4 ? normal : glm::normalize(normal + 0.8 * random_direction(random));
+    const std::array<Vec3, 3> directions = {b - a, normal, random_direction(random)};
+    const Vec3 along = uniform(random, 0.01, 0.05) * glm::normalize(directions[random.below(3)]);
+    const double part = sides_ ? 0.5 * static_cast<double>(random.below(3)) : 0;
+    const bool ends_there = random.unit() < 0.5;
+    Ways ways;
+    for (const double height : {1e-3, 0.0, -1e-4}) {
+      if (height == 0 && !ends_there) continue;
+      const Vec3 tip = at + height * out - part * along;
+      ways.poses[static_cast<std::size_t>(ways.count++)] = {tip, tip + along};
+    }
+    return ways;
+  }
+
+ private:
+  const stimuli::ClosedSurface& mesh_;
+  bool sides_;
+};
+
+/// Tries that fell through.
+/// \param tried  counts those that would enter the solid
+int through(PolygonSoup soup, bool sides, Random& random, int& tried) {
+  constexpr int kTries = 3000;
+  soup = testing::placed(soup, stimuli::uniform_rotation(random), 1, Vec3(0));
+  const auto mesh = std::make_shared<const stimuli::ClosedSurface>(
+      stimuli::closed_surface(as_written(soup, Written::single_precision)).surface);
+  const WindingOracle oracle(*mesh);
+  const auto inside = [&](const LineProbe& at, double depth) {
+    return oracle.holds({at.tip, sides ? at.tail - at.tip : Vec3(0)}, depth);
+  };
+  stimuli::Material spring;
+  spring.stiffness = kStiffness;
+  const std::vector<SurfaceShell> shells = {{mesh, Pose{}, spring}};
+  const Scene scene({}, sides, {}, nullptr, {{std::make_shared<const Surface>(shells), Pose{}, 0}});
+  const ExactAim aim(*mesh, sides);
+  int out = 0;
+  for (int i = 0; i < kTries; ++i) {
+    const ExactAim::Ways ways = aim.next(random);
+    const auto last = static_cast<std::size_t>(ways.count - 1);
+    if (inside(ways.poses[0], 0) || !inside(ways.poses[last], 1e-6)) continue;
+    RenderState state = scene.initial_state();
+    const auto tick = [&](std::size_t k) {
+      return (sides ? ray_renderer() : point_renderer()).tick(scene, state, ways.poses[k], 1e-3);
+    };
+    if (tick(0).faults != 0) continue;  // it lies on the corner from the start
+    ++tried;
+    Rendering r;
+    for (std::size_t k = 1; k <= last; ++k) r = tick(k);
+    out += r.contacts == 0 || inside(r.ideal, 2e-9 * oracle.size()) ? 1 : 0;
+  }
+  return out;
+}
+
+void aim_at_edges(bool sides) {
+  int tried = 0;
+  for (int seed = 1; seed <= testing::rounds(15); ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    Random random(static_cast<std::uint64_t>(seed));
+    EXPECT_EQ(through(notched_prism(random), sides, random, tried), 0);
+    EXPECT_EQ(through(dented_ball(random), sides, random, tried), 0);
+    EXPECT_EQ(through(overlapping_shells(random), sides, random, tried), 0);
+  }
+  EXPECT_GT(tried, 30000);
+}
+
+TEST(SurfaceAim, APointThatPassesExactlyOverAnEdgeIsStopped) { aim_at_edges(false); }
+
+TEST(SurfaceAim, AStylusThatPassesExactlyOverAnEdgeIsStopped) { aim_at_edges(true); }
+
 TEST_P(SurfaceOutside, APointStaysOutside) { touch_meshes({{Vec3(0), Vec3(0)}}); }
 
 TEST_P(SurfaceOutside, AStylusStaysOutside) { touch_meshes({{Vec3(0), Vec3(0, 0, kLength)}}); }
