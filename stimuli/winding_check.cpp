@@ -28,11 +28,89 @@ struct Box {
     low = glm::min(low, box.low);
     high = glm::max(high, box.high);
   }
+  double extent() const { return high.x - low.x + (high.y - low.y) + (high.z - low.z); }  // m
   bool meets(const Box& box) const {
     return low.x <= box.high.x && box.low.x <= high.x && low.y <= box.high.y &&
            box.low.y <= high.y && low.z <= box.high.z && box.low.z <= high.z;
   }
 };
+
+// Sign of (b - a) x (q - a) in x and y with q moved by an infinitesimal (e, e^2): never 0 unless a
+// and b coincide. Exact, so neighbours agree on the side that they share.
+int side_of(const Vec3& a, const Vec3& b, const Vec3& q) {
+  const double left = (b.x - a.x) * (q.y - a.y), right = (b.y - a.y) * (q.x - a.x);
+  const double det = left - right;
+  // Shewchuk 1997, orient2d: the error of the plain formula.
+  if (std::abs(det) > 3.4e-16 * (std::abs(left) + std::abs(right))) return det > 0 ? 1 : -1;
+  // The six products as exact sums of two numbers, added without error.
+  std::array<double, 12> sum{};
+  std::size_t count = 0;
+  const auto add = [&](double value) {
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+      const double total = value + sum[i], back = total - value;
+      const double error = (value - (total - back)) + (sum[i] - back);
+      if (error != 0) sum[kept++] = error;
+      value = total;
+    }
+    sum[kept++] = value;
+    count = kept;
+  };
+  const auto add_product = [&](double x, double y) {
+    const double product = x * y;
+    add(std::fma(x, y, -product));
+    add(product);
+  };
+  add_product(a.x, b.y);
+  add_product(-a.y, b.x);
+  add_product(b.x, q.y);
+  add_product(-b.y, q.x);
+  add_product(q.x, a.y);
+  add_product(-q.y, a.x);
+  if (sum[count - 1] != 0) return sum[count - 1] > 0 ? 1 : -1;
+  if (b.y != a.y) return b.y < a.y ? 1 : -1;
+  return b.x > a.x ? 1 : b.x < a.x ? -1 : 0;
+}
+
+constexpr Index kNoSheet = std::numeric_limits<Index>::max();
+
+/// Names the plane region of each triangle, if it is large. Its triangles need not be compared with
+/// each other: where it lies on itself, its border does, and the triangles beyond the border are
+/// found there. Those of a polygon with many corners are long, and all their boxes meet.
+std::vector<Index> sheets_of(const ClosedSurface& surface, double tolerance) {
+  constexpr std::size_t kLeast = 64;  // triangles
+  const auto corner = [&](Index t, std::size_t k) -> const Vec3& {
+    return surface.vertices[surface.triangles[t][k]];
+  };
+  const auto area = [&](Index t) {
+    return glm::cross(corner(t, 1) - corner(t, 0), corner(t, 2) - corner(t, 0));
+  };
+  std::vector<Index> sheet(surface.triangles.size(), kNoSheet), region;
+  for (Index first = 0; first < sheet.size(); ++first) {
+    const Vec3 twice = area(first);
+    if (sheet[first] != kNoSheet || twice == Vec3(0)) continue;
+    const Vec3 normal = glm::normalize(twice), origin = corner(first, 0);
+    const auto is_in_plane = [&](Index t) {
+      bool near = glm::dot(area(t), normal) > 0;
+      for (std::size_t k = 0; k < 3; ++k)
+        near = near && std::abs(glm::dot(normal, corner(t, k) - origin)) <= 0.5 * tolerance;
+      return near;
+    };
+    region = {first};
+    sheet[first] = first;
+    for (std::size_t i = 0; i < region.size(); ++i) {
+      for (const Index t : surface.across[region[i]]) {
+        if (sheet[t] != kNoSheet || !is_in_plane(t)) continue;
+        sheet[t] = first;
+        region.push_back(t);
+      }
+    }
+    if (region.size() < kLeast) {
+      for (const Index t : region) sheet[t] = kNoSheet;
+    }
+  }
+  return sheet;
+}
 
 /// A tree over the triangles, halved between shells, then along a space-filling curve.
 class Tree {
@@ -41,11 +119,13 @@ class Tree {
     Box box;
     Index begin = 0, end = 0;  ///< of `order`
     Index right = 0;           ///< the left child is the next node; 0: a leaf
+    Index sheet = 0;           ///< of all its triangles, or kNoSheet
   };
 
   /// \param shell  of each triangle; all alike: halved along the curve alone
-  Tree(const ClosedSurface& surface, const std::vector<Index>& shell)
-      : surface_(surface), shell_(shell) {
+  Tree(const ClosedSurface& surface, const std::vector<Index>& shell,
+       const std::vector<Index>& sheet)
+      : surface_(surface), shell_(shell), sheet_(sheet) {
     Box all;
     for (const Vec3& v : surface.vertices) all.add(v);
     const double size = std::max({all.high.x - all.low.x, all.high.y - all.low.y,
@@ -102,9 +182,12 @@ class Tree {
 
   void build(const std::vector<Key>& keys, Index begin, Index end) {
     const std::size_t self = nodes_.size();
-    nodes_.push_back({{}, begin, end, 0});
+    nodes_.push_back({{}, begin, end, 0, sheet_[order_[begin]]});
     if (end - begin <= kLeaf) {
-      for (Index i = begin; i < end; ++i) nodes_[self].box.add(box(order_[i]));
+      for (Index i = begin; i < end; ++i) {
+        nodes_[self].box.add(box(order_[i]));
+        if (sheet_[order_[i]] != nodes_[self].sheet) nodes_[self].sheet = kNoSheet;
+      }
       return;
     }
     // Split between shells, else where the highest bit changes; halve equal keys.
@@ -130,50 +213,16 @@ class Tree {
     build(keys, middle, end);
     nodes_[self].box = nodes_[self + 1].box;
     nodes_[self].box.add(nodes_[right].box);
+    const Index sheet = nodes_[self + 1].sheet;
+    nodes_[self].sheet = nodes_[right].sheet == sheet ? sheet : kNoSheet;
   }
 
   const ClosedSurface& surface_;
   const std::vector<Index>& shell_;
+  const std::vector<Index>& sheet_;
   std::vector<Index> order_;
   std::vector<Node> nodes_;
 };
-
-// Sign of (b - a) x (q - a) in x and y with q moved by an infinitesimal (e, e^2): never 0 unless a
-// and b coincide. Exact, so neighbours agree on the side that they share.
-int side_of(const Vec3& a, const Vec3& b, const Vec3& q) {
-  const double left = (b.x - a.x) * (q.y - a.y), right = (b.y - a.y) * (q.x - a.x);
-  const double det = left - right;
-  // Shewchuk 1997, orient2d: the error of the plain formula.
-  if (std::abs(det) > 3.4e-16 * (std::abs(left) + std::abs(right))) return det > 0 ? 1 : -1;
-  // The six products as exact sums of two numbers, added without error.
-  std::array<double, 12> sum{};
-  std::size_t count = 0;
-  const auto add = [&](double value) {
-    std::size_t kept = 0;
-    for (std::size_t i = 0; i < count; ++i) {
-      const double total = value + sum[i], back = total - value;
-      const double error = (value - (total - back)) + (sum[i] - back);
-      if (error != 0) sum[kept++] = error;
-      value = total;
-    }
-    sum[kept++] = value;
-    count = kept;
-  };
-  const auto add_product = [&](double x, double y) {
-    const double product = x * y;
-    add(std::fma(x, y, -product));
-    add(product);
-  };
-  add_product(a.x, b.y);
-  add_product(-a.y, b.x);
-  add_product(b.x, q.y);
-  add_product(-b.y, q.x);
-  add_product(q.x, a.y);
-  add_product(-q.y, a.x);
-  if (sum[count - 1] != 0) return sum[count - 1] > 0 ? 1 : -1;
-  if (b.y != a.y) return b.y < a.y ? 1 : -1;
-  return b.x > a.x ? 1 : b.x < a.x ? -1 : 0;
-}
 
 class WindingCheck {
  public:
@@ -184,11 +233,12 @@ class WindingCheck {
   void run() {
     check_shells();
     faults_.throw_if_any();
+    sheet_ = sheets_of(surface_, tolerance_);
     // Shells that bound solids and do not pass through themselves add up to no negative number,
     // wherever they pass through each other.
     if (all_bound_solids_ && are_simple()) return;
     shell_.assign(shell_.size(), 0);
-    tree_.emplace(surface_, shell_);
+    tree_.emplace(surface_, shell_, sheet_);
     // Over triangles that cross no others, the number does not change from one to its neighbour.
     // Where two cross, a region of a lower number begins outside both.
     find_crossings();
@@ -340,7 +390,7 @@ class WindingCheck {
   // Whether no shell passes through itself.
   bool are_simple() {
     in_shells_ = true;
-    tree_.emplace(surface_, shell_);
+    tree_.emplace(surface_, shell_, sheet_);
     find_crossings();
     in_shells_ = false;
     return budget_ > 0;
@@ -362,6 +412,7 @@ class WindingCheck {
     if (budget_ == 0) return;
     const Tree::Node &x = tree_->nodes()[a], &y = tree_->nodes()[b];
     if (in_shells_ && tree_->shells_apart(x, y)) return;
+    if (x.sheet == y.sheet && x.sheet != kNoSheet) return;
     if (a != b && (!x.box.meets(y.box) || is_apart(x, y.box) || is_apart(y, x.box))) return;
     if (x.right == 0 && y.right == 0) {
       for (Index i = x.begin; i < x.end; ++i) {
@@ -372,7 +423,9 @@ class WindingCheck {
       cross(a + 1, a + 1);
       cross(x.right, x.right);
       cross(a + 1, x.right);
-    } else if (y.right == 0 || (x.right != 0 && x.end - x.begin >= y.end - y.begin)) {
+    } else if (y.right == 0 || (x.right != 0 && x.box.extent() >= y.box.extent())) {
+      // The larger box is halved, not the larger number: leaves of long triangles know best what
+      // they are apart from.
       cross(a + 1, b);
       cross(x.right, b);
     } else {
@@ -381,16 +434,21 @@ class WindingCheck {
     }
   }
 
-  // Whether the box is to one side of each triangle of a leaf: of a long one much of its own box
-  // is.
+  // Whether each triangle of a leaf is apart from the box: of a long one, much of its own box is.
   bool is_apart(const Tree::Node& leaf, const Box& box) const {
     if (leaf.right != 0) return false;
     const Vec3 middle = 0.5 * (box.low + box.high), half = box.high - middle;
+    const auto beyond = [&](const Vec3& way, const Vec3& from) {
+      const double reach = glm::dot(glm::abs(way), half) + tolerance_ * glm::length(way);
+      return glm::dot(way, middle - from) - reach;
+    };
     for (Index i = leaf.begin; i < leaf.end; ++i) {
       const Index t = tree_->triangle(i);
       const Vec3 n = area(t);
-      const double reach = glm::dot(glm::abs(n), half) + tolerance_ * glm::length(n);
-      if (std::abs(glm::dot(n, middle - corner(t, 0))) <= reach) return false;
+      bool apart = beyond(n, corner(t, 0)) > 0 || beyond(-n, corner(t, 0)) > 0;
+      for (Index k = 0; k < 3 && !apart; ++k)
+        apart = beyond(glm::cross(corner(t, k + 1) - corner(t, k), n), corner(t, k)) > 0;
+      if (!apart) return false;
     }
     return true;
   }
@@ -485,6 +543,7 @@ class WindingCheck {
   std::optional<Tree> tree_;
   MeshFaults faults_;
   std::vector<Index> shell_;      ///< of each triangle, its first one
+  std::vector<Index> sheet_;      ///< of each triangle
   bool all_bound_solids_ = true;  ///< none is turned inwards
   bool in_shells_ = false;        ///< look only for shells that pass through themselves
   std::vector<char> crossed_;

@@ -332,6 +332,45 @@ TEST(ClosedSurfaceTest, ASmallRegionOfNegativeWindingIsFoundInALargeMesh) {
   EXPECT_NE(refusal_of(sphere).find("negative: face "), std::string::npos);
 }
 
+// The triangles of such faces are long, so that all their boxes meet.
+TEST(ClosedSurfaceTest, FacesOfManyTrianglesAreTaken) {
+  // A toothed wheel whose ends are fans, and a ring.
+  constexpr std::uint32_t kSides = 60000;
+  for (const bool is_ring : {false, true}) {
+    PolygonSoup soup;
+    const auto add_circle = [&](double z, double radius, double tooth) {
+      for (std::uint32_t i = 0; i < kSides; ++i) {
+        const double a = 2 * std::numbers::pi * i / kSides, r = radius + tooth * std::sin(40 * a);
+        soup.vertices.emplace_back(r * std::cos(a), r * std::sin(a), z);
+      }
+    };
+    for (const double z : {0.0, 0.01}) add_circle(z, 0.02, is_ring ? 0 : 0.002);
+    if (is_ring) {
+      for (const double z : {0.0, 0.01}) add_circle(z, 0.01, 0);
+    } else {
+      soup.vertices.insert(soup.vertices.end(), {Vec3(0), Vec3(0, 0, 0.01)});
+    }
+    for (std::uint32_t i = 0; i < kSides; ++i) {
+      const std::uint32_t k = (i + 1) % kSides, up = kSides, in = 2 * kSides;
+      const auto add_quad = [&](std::uint32_t a, std::uint32_t b, std::uint32_t c,
+                                std::uint32_t d) {
+        soup.faces.push_back({a, b, c});
+        soup.faces.push_back({a, c, d});
+      };
+      add_quad(i, k, up + k, up + i);
+      if (is_ring) {
+        add_quad(in + k, in + i, in + up + i, in + up + k);
+        add_quad(k, i, in + i, in + k);
+        add_quad(up + i, up + k, in + up + k, in + up + i);
+      } else {
+        soup.faces.push_back({k, i, in});
+        soup.faces.push_back({up + i, up + k, in + 1});
+      }
+    }
+    EXPECT_EQ(refusal_of(soup), "");
+  }
+}
+
 // In any place, boxes around long bars meet everywhere.
 TEST(ClosedSurfaceTest, ManyBarsThatPassThroughEachOtherAreTaken) {
   Random random(8);
