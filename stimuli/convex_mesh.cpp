@@ -288,17 +288,42 @@ bool ConvexMesh::Builder::fill(ConvexMesh& out, const HalfEdges& mesh,
   return true;
 }
 
+/// m^3, no more than that of the hull of all points: of the outermost in some directions. Far
+/// quicker than the whole hull.
+double least_hull_volume(const std::vector<Vec3>& points) {
+  constexpr int kDirections = 64;
+  constexpr double kGolden = 2.399963229728653;  // rad
+  std::vector<Vec3> outermost;
+  for (int i = 0; i < kDirections; ++i) {
+    const double z = (2 * i + 1.0) / kDirections - 1, r = std::sqrt(1 - z * z);
+    const Vec3 way(r * std::cos(kGolden * i), r * std::sin(kGolden * i), z);
+    outermost.push_back(*std::max_element(
+        points.begin(), points.end(),
+        [&](const Vec3& a, const Vec3& b) { return glm::dot(way, a) < glm::dot(way, b); }));
+  }
+  const PolygonSoup hull = grid_hull(outermost, 0).soup;
+  double volume = 0;
+  for (const std::vector<Index>& face : hull.faces) {
+    const Vec3 a = hull.vertices[face[0]] - points[0], b = hull.vertices[face[1]] - points[0],
+               c = hull.vertices[face[2]] - points[0];
+    volume += glm::dot(a, glm::cross(b, c)) / 6;
+  }
+  return volume;
+}
+
 bool ConvexMesh::Builder::fill_from_hull(ConvexMesh& out, const HalfEdges& mesh,
                                          const std::vector<FaceShape>& shapes) {
+  // A surface that winds round twice has the corners of its hull and convex edges: volumes differ.
+  const Bulk is = bulk_of(mesh, shapes);
+  const double most = kDeepest * mesh.error * is.area;
+  if (least_hull_volume(mesh.points) - is.volume > 2 * most) return false;
   const GridHull hull = grid_hull(mesh.points, mesh.error);
   if (hull.soup.faces.empty() || hull.depth > kDeepest * mesh.error) return false;
   MeshFaults hull_faults;
   const HalfEdges hull_mesh = link_half_edges(hull.soup, hull_faults);
   if (!hull_faults.empty()) return false;
   const std::vector<FaceShape> hull_shapes = shapes_of(hull_mesh);
-  // A surface that winds round twice has the corners of its hull and convex edges: volumes differ.
-  const Bulk is = bulk_of(mesh, shapes), could_be = bulk_of(hull_mesh, hull_shapes);
-  if (std::abs(could_be.volume - is.volume) > kDeepest * mesh.error * is.area) return false;
+  if (std::abs(bulk_of(hull_mesh, hull_shapes).volume - is.volume) > most) return false;
   Index count = 0;
   const std::vector<Index> merged = coplanar_regions(hull_mesh, hull_shapes, count);
   if (fill(out, hull_mesh, merged, count, hull_faults) && hull_faults.empty()) return true;
