@@ -292,6 +292,8 @@ class FaceCutter {
     for (Index i = 0; i < count_; ++i) {
       if (concave(i)) concave_.push_back(i);
     }
+    std::sort(concave_.begin(), concave_.end(),
+              [&](Index a, Index b) { return at_[a].x < at_[b].x; });
   }
 
   std::vector<Triangle> run() {
@@ -355,7 +357,11 @@ class FaceCutter {
   // Whether a concave corner lies in the triangle that would be cut off.
   bool occupied(Index i) const {
     const Vec2 &a = at_[previous_[i]], &b = at_[i], &c = at_[next_[i]];
-    return std::any_of(concave_.begin(), concave_.end(), [&](Index k) {
+    const auto first = std::lower_bound(concave_.begin(), concave_.end(), std::min({a.x, b.x, c.x}),
+                                        [&](Index k, double x) { return at_[k].x < x; });
+    const auto end = std::upper_bound(first, concave_.end(), std::max({a.x, b.x, c.x}),
+                                      [&](double x, Index k) { return x < at_[k].x; });
+    return std::any_of(first, end, [&](Index k) {
       const Vec2& p = at_[k];
       if (gone_[k] != 0 || p == a || p == b || p == c) return false;
       return turn_of(a, b, p) >= 0 && turn_of(b, c, p) >= 0 && turn_of(c, a, p) >= 0;
@@ -378,7 +384,8 @@ class FaceCutter {
   const Index count_;
   std::vector<Index> next_, previous_;
   std::vector<char> gone_;
-  std::vector<Index> version_, concave_;  // once concave; some no longer are
+  std::vector<Index> version_;
+  std::vector<Index> concave_;  // along x; once concave, some no longer are
   std::priority_queue<Ear> ears_;
   std::vector<Triangle> triangles_;
 };
