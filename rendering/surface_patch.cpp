@@ -98,9 +98,10 @@ void sweep_edge(const Surface& surface, std::uint32_t side, std::uint8_t segment
     const Vec3 normal = glm::cross(e, along);
     const double size2 = glm::dot(normal, normal);
     if (!(size2 > 0)) return;
+    const double reach = glm::length(along);
     const double u = glm::dot(glm::cross(apart, along), normal) / size2 * edge_length;
-    const double s = glm::dot(glm::cross(apart, e), normal) / size2 * length;
-    if (u < -slack || u > edge_length + slack || s < -slack || s > length + slack) return;
+    const double s = glm::dot(glm::cross(apart, e), normal) / size2 * reach;
+    if (u < -slack || u > edge_length + slack || s < -slack || s > reach + slack) return;
     first = {{side, segment, false, PatchKind::edge}, std::max(0.0, time)};
   };
   if (std::abs(c0) <= rounding) try_at(0);
@@ -239,7 +240,7 @@ void sweep_triangle(const Surface& surface, std::uint32_t index, std::uint8_t se
                     double tolerance, double slack, PatchHit& first) {
   if ((what & surface_pair::kTip) != 0)
     sweep_end(surface, index, segment, false, from.start, to.start, tolerance, first);
-  if (from.along == Vec3(0)) return;
+  if (from.along == Vec3(0) && to.along == Vec3(0)) return;
   if ((what & surface_pair::kTail) != 0)
     sweep_end(surface, index, segment, true, from.end(true), to.end(true), tolerance, first);
   if ((what & surface_pair::kSides) == 0) return;

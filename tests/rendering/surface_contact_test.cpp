@@ -571,6 +571,16 @@ TEST(SurfaceSeam, IsAsWideAsTheGapBetweenTwoShellsWithinTheirError) {
   EXPECT_EQ(seam({0, -0.02, kError}, 0), 0) << "coordinates that are not rounded";
 }
 
+TEST(SurfaceStylus, OneThatGrowsFromItsTipDoesNotEnter) {
+  const Scene scene = scene_of({box_soup({-0.05, -0.05, -0.02}, {0.05, 0.05, 0})});
+  RenderState state = scene.initial_state();
+  const Vec3 tip(0.001, 0.002, 0.001);
+  ray_renderer().tick(scene, state, {tip, tip}, kTick);
+  const Rendering r = ray_renderer().tick(scene, state, {tip, tip - Vec3(0, 0, 0.04)}, kTick);
+  EXPECT_NEAR(r.force.z, kStiffness * 0.039, 1e-6);
+  EXPECT_NEAR(r.ideal.tail.z, 0, 1e-9);
+}
+
 /// Rounding decides with which end such a stylus touches each of the face's triangles, and whether
 /// their edges are convex.
 TEST(SurfaceStylus, OneThatLiesOnAFaceIsHeldWhileItSlides) {
@@ -578,9 +588,9 @@ TEST(SurfaceStylus, OneThatLiesOnAFaceIsHeldWhileItSlides) {
   for (int round = 0; round < 40000; ++round) {
     const Quat turn = stimuli::uniform_rotation(random);
     // The face is divided into strips.
-    stimuli::PolygonSoup soup = prism(
-        {{-0.02, -0.02}, {0.02, -0.02}, {0.02, 0}, {0.01, 0}, {0, 0}, {-0.01, 0}, {-0.02, 0}},
-        0.05);
+    stimuli::PolygonSoup soup =
+        prism({{-0.02, -0.02}, {0.02, -0.02}, {0.02, 0}, {0.01, 0}, {0, 0}, {-0.01, 0}, {-0.02, 0}},
+              0.05);
     for (Vec3& v : soup.vertices) v = turn * v;
     const Scene scene = scene_of({soup});
     const Vec3 along = turn * Vec3(0.1, 0.02 * random.unit(), 0);
