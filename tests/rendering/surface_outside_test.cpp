@@ -292,19 +292,19 @@ void SurfaceOutside::touch(const Segments& segments, std::uint64_t seed) {
   const auto mesh = std::make_shared<const stimuli::ClosedSurface>(
       stimuli::closed_surface(as_written(soup, kind.how)).surface);
   const WindingOracle oracle(*mesh);
+  stimuli::Material spring;
+  spring.stiffness = kStiffness;
+  const std::vector<SurfaceShell> shells = {{mesh, Pose{}, spring}};
+  const auto surface = std::make_shared<const Surface>(shells);
   // Ideal tools keep this distance from their contacts (rendering/README.md, closed surfaces), so
   // places that are nearer to the outside are not judged.
-  const double skin =
-      std::max(1e-9 * oracle.size(), std::min(4 * mesh->coordinate_error, 1e-7 * oracle.size()));
+  const double skin = std::max(1e-9 * oracle.size(), 1.5 * surface->seam());
   const auto inside = [&](const Pose& at, double depth) {
     return std::any_of(segments.begin(), segments.end(), [&](const auto& s) {
       return oracle.holds({at.position + at.orientation * s[0], at.orientation * (s[1] - s[0])},
                           depth);
     });
   };
-  stimuli::Material spring;
-  spring.stiffness = kStiffness;
-  const std::vector<SurfaceShell> shells = {{mesh, Pose{}, spring}};
   const bool bent = segments.size() > 1, sides = segments[0][0] != segments[0][1];
   Tool tool;
   std::vector<Vec3> points = {Vec3(0)};
@@ -312,8 +312,7 @@ void SurfaceOutside::touch(const Segments& segments, std::uint64_t seed) {
     points.insert(points.end(), {from, glm::mix(from, to, 0.3), to});
     if (bent) tool.segments.push_back({from, to});
   }
-  const Scene scene({}, sides, tool, nullptr,
-                    {{std::make_shared<const Surface>(shells), Pose{}, 0}});
+  const Scene scene({}, sides, tool, nullptr, {{surface, Pose{}, 0}});
   const Renderer& renderer = sides ? ray_renderer() : point_renderer();
 
   int contacts = 0, shifted = 0, noticed = 0;
