@@ -1,4 +1,4 @@
-"""What the simulated participants show, over many seeds: the README's tables by one command.
+"""What the simulated participants show, over many seeds: the tables of RESULTS.md by one command.
 
 Usage: model_seeds.py PALPATE FOLDER [--seeds 101-120] [--studies version-3,steps-1-2,...] [--table-only]
 
