@@ -2,10 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <nlohmann/json.hpp>
 
+#include "analysis/input/stored_protocol.h"
 #include "analysis/text.h"
-#include "data/base/json_text.h"
 #include "data/base/text.h"
 #include "data/store/store.h"
 
@@ -36,14 +35,8 @@ void remember(const std::string& value, std::vector<std::string>& known) {
 }
 
 ProtocolText protocol_text(const data::ProtocolInfo& info) {
-  ProtocolText protocol{info.name, info.sha256, info.text, {}, {}};
-  protocol.title = title_of_protocol(info.text);
-  const auto json = json_or_discarded(info.text);
-  if (!json.is_object()) return protocol;
-  if (json.contains("seed") && json["seed"].is_number_integer()) {
-    protocol.seed = json["seed"].dump();
-  }
-  return protocol;
+  const StoredProtocol stored = read_stored_protocol(info.text);
+  return {info.name, info.sha256, info.text, stored.title, stored.seed};
 }
 
 void add_trial(const data::TrialRecord& record, ServoQuality& servo) {
@@ -63,12 +56,6 @@ void add_trial(const data::TrialRecord& record, ServoQuality& servo) {
 }
 
 }  // namespace
-
-std::string title_of_protocol(const std::string& text) {
-  const auto json = json_or_discarded(text);
-  if (!json.is_object() || !json.contains("title") || !json["title"].is_string()) return "";
-  return json["title"].get<std::string>();
-}
 
 StudyRecord read_study_record(const std::string& database) {
   data::Store store = data::Store::open(database, data::Store::Mode::read_only);

@@ -46,9 +46,6 @@ struct ServoQuality {
   double max_force = 0;                              ///< N, largest of all trials
 };
 
-/// The title in a protocol's text; "": none.
-std::string title_of_protocol(const std::string& text);
-
 /// A protocol as stored in the database.
 struct ProtocolText {
   std::string name, sha256, text;

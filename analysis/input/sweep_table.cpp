@@ -5,6 +5,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "analysis/input/stored_protocol.h"
 #include "data/base/json_text.h"
 #include "data/store/sweep_file.h"
 #include "protocols/parse.h"
@@ -41,14 +42,6 @@ std::vector<std::vector<std::string>> words_of(const data::SweepPlan& plan) {
   return out;
 }
 
-void read_protocol(const std::string& text, SweepTable& table) {
-  const auto json = json_or_discarded(text);
-  if (!json.is_object()) return;
-  if (json.contains("name") && json["name"].is_string()) table.protocol_name = json["name"];
-  if (json.contains("repetitions") && json["repetitions"].is_number())
-    table.repetitions = json["repetitions"];
-}
-
 }  // namespace
 
 std::optional<std::size_t> SweepTable::column(std::string_view name) const {
@@ -67,7 +60,9 @@ SweepTable read_sweep_table(const std::string& path) {
   table.seed = plan.seed;
   table.participants = plan.participants;
   table.program_version = plan.program_version;
-  read_protocol(plan.protocol, table);
+  const StoredProtocol protocol = read_stored_protocol(plan.protocol);
+  table.protocol_name = protocol.name;
+  table.repetitions = protocol.repetitions;
   table.parameters = plan.parameters;
   table.shapes = plan.shapes;
   table.renderers = plan.renderers;

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "analysis/input/csv_reader.h"
+#include "analysis/input/stored_protocol.h"
 #include "analysis/input/study_record.h"
 #include "analysis/input/trials.h"
 #include "analysis/text.h"
@@ -298,13 +299,12 @@ void note_once(const std::string& value, std::vector<std::string>& known) {
 
 }  // namespace
 
-bool has_tasks(const std::string& database) {
+bool has_protocol_of_version_2(const std::string& database) {
   data::Store store = data::Store::open(database, data::Store::Mode::read_only);
-  for (const data::ProtocolInfo& protocol : store.protocols()) {
-    const auto json = json_or_discarded(protocol.text);
-    if (json.is_object() && json.contains("version") && json["version"] == 2) return true;
-  }
-  return false;
+  const auto protocols = store.protocols();
+  return std::any_of(protocols.begin(), protocols.end(), [](const data::ProtocolInfo& protocol) {
+    return read_stored_protocol(protocol.text).version == 2;
+  });
 }
 
 TaskTrial task_trial_of(const std::string& participant, const data::TrialRecord& record) {
@@ -368,7 +368,7 @@ TaskTable read_task_trials_store(const std::string& path, const std::string& pro
       table.procedures[one.sha256] = protocols::procedures_of_blocks(one.text, path);
     const bool used = std::ranges::any_of(
         table.protocols, [&](const auto& known) { return known.second == one.sha256; });
-    if (used && table.title.empty()) table.title = title_of_protocol(one.text);
+    if (used && table.title.empty()) table.title = read_stored_protocol(one.text).title;
   }
   table.provenance.protocol_name = listed(names);
   table.provenance.observer_sha256 = listed(observers);

@@ -4,7 +4,6 @@
 #include <array>
 #include <charconv>
 #include <cmath>
-#include <nlohmann/json.hpp>
 #include <numeric>
 #include <optional>
 #include <stdexcept>
@@ -14,9 +13,9 @@
 #include <vector>
 
 #include "analysis/input/csv_reader.h"
+#include "analysis/input/stored_protocol.h"
 #include "analysis/input/study_record.h"
 #include "analysis/text.h"
-#include "data/base/json_text.h"
 #include "data/files/text_sink.h"
 #include "data/store/store.h"
 #include "data/store/task_text.h"
@@ -529,20 +528,6 @@ TrialTable read_trials_csv(const std::string& path) { return CsvTrials(path).rea
 
 namespace {
 
-/// Names of the stimuli in the order of a stored protocol. Not validated again: it was valid when
-/// stored, and its mesh files may be missing now.
-std::vector<std::string> stimuli_of(const std::string& protocol_text) {
-  std::vector<std::string> names;
-  const auto json = json_or_discarded(protocol_text);
-  if (!json.is_object() || !json.contains("stimuli") || !json["stimuli"].is_array()) return names;
-  for (const auto& stimulus : json["stimuli"]) {
-    if (stimulus.is_object() && stimulus.contains("name") && stimulus["name"].is_string()) {
-      names.push_back(stimulus["name"].get<std::string>());
-    }
-  }
-  return names;
-}
-
 void note(const std::string& value, std::vector<std::string>& known) {
   if (!value.empty() && std::find(known.begin(), known.end(), value) == known.end()) {
     known.push_back(value);
@@ -557,7 +542,7 @@ TrialTable read_trials_store(const std::string& path) {
   provenance.source = path;
   std::vector<std::string> listed, protocol_names, observers;
   for (const data::ProtocolInfo& protocol : store.protocols()) {
-    for (const std::string& name : stimuli_of(protocol.text)) note(name, listed);
+    for (const std::string& name : read_stored_protocol(protocol.text).stimuli) note(name, listed);
   }
   TrialTableBuilder builder;
   const data::TorqueNotes notes(store);

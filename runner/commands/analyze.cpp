@@ -124,7 +124,8 @@ void analyze_tasks_of(const std::string& database, const std::string& csv,
 /// Whether the data are of tasks; the later reader reports unreadable data.
 bool is_of_tasks(const std::string& database, const std::string& csv) {
   try {
-    return csv.empty() ? analysis::has_tasks(database) : analysis::has_task_column(csv);
+    return csv.empty() ? analysis::has_protocol_of_version_2(database)
+                       : analysis::has_task_column(csv);
   } catch (const std::runtime_error&) {
     return false;
   }
