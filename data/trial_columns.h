@@ -1,7 +1,7 @@
 #pragma once
 // The columns measured over a trial's servo ticks. A new column needs a row of kMeasured, a member
-// of TrialRecord and a migration (store/schema.cpp); SQL, reading, writing, checks, seal, exports
-// and codebooks follow the table.
+// of TrialRecord and a migration (an .sql file in store/, named in data/CMakeLists.txt, and
+// kSchemaVersion); SQL, reading, writing, checks, seal, exports and codebooks follow the table.
 
 #include <cstdint>
 #include <limits>
@@ -16,7 +16,7 @@ struct MeasuredColumn {
   const char* name;  ///< in `attempts` and, if it has a description, in exports
   std::variant<std::uint64_t TrialRecord::*, std::int64_t TrialRecord::*,
                std::uint32_t TrialRecord::*, bool TrialRecord::*, double TrialRecord::*,
-               std::optional<double> TrialRecord::*>
+               std::optional<double> TrialRecord::*, std::optional<std::int64_t> TrialRecord::*>
       member;
   int since;  ///< version of the schema that added the column
   /// Exported after the columns of schema 1, in the table's order. Empty: placed separately.
