@@ -37,16 +37,17 @@
 #include "runner/servo/ring.h"
 
 namespace palpate::runner::session {
-namespace {
 
 // liblsl, loaded at run time: Debian has no package for it, and its wire protocol is not specified.
 
+namespace lsl {
+
 /// Stays loaded until the program ends: it has threads of its own.
-class LslLibrary {
+class Library {
  public:
   /// \param user  named in messages, such as "markers to lsl". \throws std::runtime_error if liblsl
   /// is not installed
-  explicit LslLibrary(std::string user) : user_(std::move(user)) {
+  explicit Library(std::string user) : user_(std::move(user)) {
     for (const char* library : {"liblsl.so.2", "liblsl.so", "liblsl.so.1"}) {
       handle_ = dlopen(library, RTLD_NOW | RTLD_LOCAL);
       if (handle_ != nullptr) return;
@@ -68,6 +69,10 @@ class LslLibrary {
   const std::string user_;
   void* handle_ = nullptr;
 };
+
+}  // namespace lsl
+
+namespace {
 
 constexpr std::size_t kMostWaiting = 1000;
 
@@ -447,7 +452,7 @@ class LslSink final : public MarkerSink {
 
  private:
   const bool with_code_;
-  const LslLibrary library_;
+  const lsl::Library library_;
   void* (*create_info_)(const char*, const char*, std::int32_t, double, int, const char*) = nullptr;
   void* (*create_outlet_)(void*, std::int32_t, std::int32_t) = nullptr;
   std::int32_t (*push_)(void*, const char**, double) = nullptr;
@@ -518,6 +523,17 @@ std::unique_ptr<MarkerSink> open_marker_sink(const std::string& name, MarkerCode
   refuse(name);
 }
 
+namespace lsl {
+
+/// The values of one tick: tip, tail (m), force (N), torque (N m), device1, device2 (N), depth (m),
+/// contacts; a stored sample has the same values under the same names.
+struct SampleRow {
+  std::int64_t time_ns = 0;  ///< session clock
+  std::array<double, 20> values{};
+};
+
+}  // namespace lsl
+
 namespace {
 
 constexpr std::chrono::milliseconds kChunk(20);
@@ -539,15 +555,8 @@ constexpr std::array<StreamChannel, 20> kChannels = {{
     {"depth", "m", "Depth"},       {"contacts", "1", "Count"},
 }};
 
-/// The values of one tick: tip, tail (m), force (N), torque (N m), device1, device2 (N), depth (m),
-/// contacts; a stored sample has the same values under the same names.
-struct StreamRow {
-  std::int64_t time_ns = 0;  ///< session clock
-  std::array<double, 20> values{};
-};
-
-StreamRow stream_row(const servo::Sample& sample) noexcept {
-  StreamRow row{sample.time_ns, {}};
+lsl::SampleRow stream_row(const servo::Sample& sample) noexcept {
+  lsl::SampleRow row{sample.time_ns, {}};
   std::size_t at = 0;
   for (const Vec3& vector : {sample.probe.tip, sample.probe.tail, sample.rendering.force,
                              sample.rendering.torque, sample.device1, sample.device2}) {
@@ -566,12 +575,11 @@ std::string stream_name(const std::string& where) {
 
 }  // namespace
 
-namespace sample_stream {
+namespace lsl {
 
-/// An outlet of liblsl.
-class Outlet {
+class SampleOutlet {
  public:
-  Outlet(const std::string& name, double rate) : library_("stream to lsl") {
+  SampleOutlet(const std::string& name, double rate) : library_("stream to lsl") {
     void* (*create_info)(const char*, const char*, std::int32_t, double, int, const char*) =
         nullptr;
     void* (*create_outlet)(void*, std::int32_t, std::int32_t) = nullptr;
@@ -595,9 +603,9 @@ class Outlet {
       library_.fail("liblsl gave no stream");
     }
   }
-  Outlet(const Outlet&) = delete;
-  Outlet& operator=(const Outlet&) = delete;
-  ~Outlet() {
+  SampleOutlet(const SampleOutlet&) = delete;
+  SampleOutlet& operator=(const SampleOutlet&) = delete;
+  ~SampleOutlet() {
     destroy_outlet_(outlet_);
     destroy_info_(info_);
   }
@@ -628,7 +636,7 @@ class Outlet {
     }
   }
 
-  const LslLibrary library_;
+  const Library library_;
   std::int32_t (*push_)(void*, const double*, unsigned long, const double*) = nullptr;
   double (*clock_)() = nullptr;
   void (*destroy_outlet_)(void*) = nullptr;
@@ -637,7 +645,7 @@ class Outlet {
   void* outlet_ = nullptr;
 };
 
-}  // namespace sample_stream
+}  // namespace lsl
 
 /// The ring and the thread that empties it.
 class SampleStream::Sender {
@@ -698,7 +706,7 @@ class SampleStream::Sender {
       values_.clear();
       times_.clear();
       const double ahead = seconds_ahead();
-      StreamRow row;
+      lsl::SampleRow row;
       while (times_.size() < ring_.capacity() && ring_.pop(row)) {
         values_.insert(values_.end(), row.values.begin(), row.values.end());
         times_.push_back(static_cast<double>(row.time_ns) * kSecondsPerNs + ahead);
@@ -710,9 +718,9 @@ class SampleStream::Sender {
     if (!times_.empty() && !outlet_.push(values_, times_)) dropped_ += times_.size();
   }
 
-  sample_stream::Outlet outlet_;
+  lsl::SampleOutlet outlet_;
   servo::RealClock clock_;
-  servo::Ring<StreamRow> ring_;
+  servo::Ring<lsl::SampleRow> ring_;
   std::vector<double> values_, times_;  ///< the thread's own
   std::atomic<std::uint64_t> dropped_{0};
   std::mutex mutex_;
