@@ -11,7 +11,7 @@
 
 #include "data/base/random.h"
 #include "rendering/bodies/soft/soft_body.h"
-#include "tests/rendering/bodies/soft_fixtures.h"
+#include "tests/rendering/bodies/soft/soft_fixtures.h"
 
 namespace palpate::rendering {
 namespace {
