@@ -72,9 +72,9 @@ class Faces {
       const bool past_angle = towards_end ? angle >= 1 : angle <= -1;
       const bool beside = !(at.portion.enter <= at.portion.leave);
       if (past_angle || beside || (i > 0 && std::abs(angle) >= 1)) {
-        const bool goes_on = continues(face, from, i > 0 ? foot(last, from) : on, towards_end);
-        if (!goes_on && (past_angle || beside)) break;
-        if (goes_on) {
+        const bool continued = continues(face, from, i > 0 ? foot(last, from) : on, towards_end);
+        if (!continued && (past_angle || beside)) break;
+        if (continued) {
           angle = turned_to(face);
           at = crossed(face, towards_end);
         }

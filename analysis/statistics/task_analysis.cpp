@@ -237,8 +237,8 @@ std::vector<std::size_t> reversals_of(const Track& track) {
   std::array<int, 2> moves_after{0, 0};
   for (std::size_t i = 1; i < track.levels.size(); ++i) {
     const bool success = track.successes[i - 1];
-    const bool goes_on = i > 1 && alike > 0 && track.successes[i - 2] == success;
-    alike = goes_on ? alike + 1 : 1;
+    const bool continues = i > 1 && alike > 0 && track.successes[i - 2] == success;
+    alike = continues ? alike + 1 : 1;
     const double change = track.levels[i] - track.levels[i - 1];
     if (change == 0) continue;
     const int way = change > 0 ? 1 : -1;

@@ -208,7 +208,7 @@ class Search {
 
   void beside(const fs::path& folder) {
     std::error_code error;
-    for (fs::directory_iterator at(folder, error), end; !error && at != end && goes_on();
+    for (fs::directory_iterator at(folder, error), end; !error && at != end && may_continue();
          at.increment(error)) {
       const fs::path& path = at->path();
       if (leave_out_.contains(path)) continue;
@@ -227,7 +227,7 @@ class Search {
   std::vector<std::string> found() const { return {found_.begin(), found_.end()}; }
 
  private:
-  bool goes_on() { return left_ > 0 && left_-- > 0 && bytes_ < kMostBytes; }
+  bool may_continue() { return left_ > 0 && left_-- > 0 && bytes_ < kMostBytes; }
 
   /// A folder with the code in a name: datasets name files and folders after participants.
   bool names_in(const fs::path& folder) {
@@ -246,8 +246,8 @@ class Search {
       return;
     }
     std::error_code error;
-    for (fs::recursive_directory_iterator at(folder, error), end; !error && at != end && goes_on();
-         at.increment(error)) {
+    for (fs::recursive_directory_iterator at(folder, error), end;
+         !error && at != end && may_continue(); at.increment(error)) {
       if (leave_out_.contains(at->path())) {
         at.disable_recursion_pending();
       } else if (fs::is_regular_file(at->symlink_status(error))) {

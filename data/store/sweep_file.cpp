@@ -590,7 +590,7 @@ void SweepFile::record(const std::vector<SweepRow>& rows) {
 
 void SweepFile::finish() { rewrite(false); }
 
-void SweepFile::rewrite(bool goes_on) {
+void SweepFile::rewrite(bool writing) {
   const AtomicFolder folder(impl_->file);
   const std::string ordered = folder / "ordered.sweep";
   SweepCopy copy(ordered, impl_->tables.plan);
@@ -603,7 +603,7 @@ void SweepFile::rewrite(bool goes_on) {
                      ": cannot be put in order: " + std::generic_category().message(errno));
   }
   sync_path(fs::path(impl_->file).parent_path().string(), impl_->path);
-  impl_->connect(goes_on);
+  impl_->connect(writing);
 }
 
 struct SweepCopy::Impl {

@@ -64,7 +64,7 @@ class SweepFile {
  private:
   friend class SweepCopy;
   struct Impl;
-  void rewrite(bool goes_on);
+  void rewrite(bool writing);
   explicit SweepFile(std::unique_ptr<Impl> impl);
   std::unique_ptr<Impl> impl_;
 };

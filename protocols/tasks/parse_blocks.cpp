@@ -145,9 +145,9 @@ std::string read_answer_name(const json& value, const std::string& pointer, std:
 void read_key(const std::string& key, const json& value, const std::string& pointer,
               std::vector<TaskAnswer>& answers, std::set<std::string>& given, KeysTaken& taken,
               FaultList& faults) {
-  const bool goes_on = std::find(std::begin(kGoOn), std::end(kGoOn), key) != std::end(kGoOn);
+  const bool continues = std::find(std::begin(kGoOn), std::end(kGoOn), key) != std::end(kGoOn);
   const std::string fault =
-      goes_on ? "expected another key: '" + key + "' continues in every task" : taken.add(key);
+      continues ? "expected another key: '" + key + "' continues in every task" : taken.add(key);
   if (!fault.empty()) faults.add(pointer, fault);
   std::string label;
   const std::size_t before = faults.count();

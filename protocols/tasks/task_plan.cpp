@@ -510,7 +510,7 @@ void TaskPlan::add_round() {
   fixed_.insert(fixed_.end(), more.begin(), more.end());
 }
 
-bool TaskPlan::block_goes_on() {
+bool TaskPlan::block_continues() {
   if (tracks_) return tracks_->next().has_value() && unanswered_ < most_unanswered(block());
   const auto& criterion = block().criterion;
   if (!criterion) return shown_ < fixed_.size();
@@ -547,7 +547,7 @@ Trial TaskPlan::adaptive_trial() const {
 void TaskPlan::find_next() {
   next_.reset();
   while (at_ < order_.size()) {
-    if (block_goes_on()) break;
+    if (block_continues()) break;
     if (++at_ < order_.size()) begin_block();
   }
   if (at_ >= order_.size()) return;

@@ -81,7 +81,7 @@ class TaskPlan {
  private:
   void begin_block();
   void add_round();
-  bool block_goes_on();
+  bool block_continues();
   bool criterion_met() const;
   void find_next();
   Trial adaptive_trial() const;

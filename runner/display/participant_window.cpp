@@ -537,12 +537,13 @@ class PageLayout {
                         std::min({kSmallestUnit * ui_scale, height / 16, width / 20})})),
         keys_(canvas, page, unit_, 0.94 * width, kMostKeys * height) {
     const double margin = 2.5 * unit_;
-    const bool goes_on = page.kind == Page::Kind::text;
+    const bool continues = page.kind == Page::Kind::text;
     const bool typing = page.typing != Page::Typing::none;
     go_on_top_ = height - margin - 1.9 * unit_;
-    keys_top_ = (goes_on ? go_on_top_ - 2 * unit_ : height - margin - 1.2 * unit_) - keys_.height();
+    keys_top_ =
+        (continues ? go_on_top_ - 2 * unit_ : height - margin - 1.2 * unit_) - keys_.height();
     reply_top_ =
-        (page.keys.empty() ? (goes_on ? go_on_top_ : height - unit_) : keys_top_) - 2.4 * unit_;
+        (page.keys.empty() ? (continues ? go_on_top_ : height - unit_) : keys_top_) - 2.4 * unit_;
     top_ = margin + 0.6 * unit_;
     typed_top_ = reply_top_ - (typing ? 4 * unit_ : 0);
     count_top_ = typed_top_ - (page.seconds_left > 0 ? 4.5 * unit_ : 0);

@@ -434,7 +434,7 @@ std::optional<Answer> KeyboardRespondent::typed_answer(const std::string& key) {
 std::optional<Answer> KeyboardRespondent::meaning_in_interval(const std::string& key) {
   Answer answer;
   if (!view_.answers) {
-    answer.goes_on = true;
+    answer.continues = true;
     if (key == "space" || key == "enter") return answer;
     reply();
     return std::nullopt;
@@ -459,7 +459,7 @@ void KeyboardRespondent::listen_to_buttons(unsigned pressed, std::int64_t time_n
   if (pressed == 0) return;
   Answer answer;
   answer.time_ns = time_ns;
-  answer.goes_on = !view_.answers;
+  answer.continues = !view_.answers;
   const std::size_t count = view_.answers ? task()->answers.size() : 8;
   for (std::size_t i = 0; i < count && i < 8; ++i) {
     if ((pressed >> i & 1U) == 0) continue;

@@ -16,7 +16,7 @@ namespace palpate::runner::participants {
 struct Answer {
   int stimulus = 0;          ///< index into Protocol::stimuli; version 2: into TaskBlock::answers
   std::int64_t time_ns = 0;  ///< session clock, when the event arrived
-  bool goes_on = false;      ///< no answer; continue with the next interval
+  bool continues = false;    ///< no answer; continue with the next interval
   double number = 0;         ///< rate: the typed number
   int times = 1;             ///< adjust: number of turns at once
   /// external: as the program reports; none: correct if it names the stimulus.

@@ -503,7 +503,7 @@ void search_groups(const DistanceField& field, const Rows& rows, int first, floa
   LanesOfLines lines[kGroups];
   BoxCrossing crossings[kGroups];
   Floats best[kGroups], least[kGroups], next[kGroups];
-  const auto goes_on = [&](int g) {
+  const auto unfinished = [&](int g) {
     return (next[g] < end) & (lane::min(next[g], whole) <= crossings[g].end(least[g]));
   };
   lane::Ints going{};
@@ -513,7 +513,7 @@ void search_groups(const DistanceField& field, const Rows& rows, int first, floa
     best[g] = Floats{};
     least[g] = lines[g].distances(best[g]);
     next[g] = step;
-    going |= goes_on(g);
+    going |= unfinished(g);
   }
   while (lane::any(going)) {
     going = lane::Ints{};
@@ -524,7 +524,7 @@ void search_groups(const DistanceField& field, const Rows& rows, int first, floa
       least[g] = closer ? d : least[g];
       best[g] = closer ? place : best[g];
       next[g] += lane::max(step, d - least[g]);
-      going |= goes_on(g);
+      going |= unfinished(g);
     }
   }
   Floats reach = 0.5F * step;

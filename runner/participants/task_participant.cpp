@@ -314,7 +314,8 @@ constexpr std::uint64_t kPages = 10;     // likewise
 constexpr int kMostIntervals = 64;       // trials of the hand within one of the session
 
 /// Whether the observer of shapes can identify a block's stimuli.
-bool is_told_by_shape(const protocols::Protocol& protocol, const protocols::TaskBlock& block) {
+bool is_identified_by_shape(const protocols::Protocol& protocol,
+                            const protocols::TaskBlock& block) {
   if (block.task != protocols::TaskKind::identify || block.level) return false;
   for (std::size_t i = 0; i < block.stimuli.size(); ++i) {
     const auto object = [&](std::size_t k) -> const stimuli::ObjectSpec& {
@@ -342,7 +343,7 @@ BlockHypotheses block_hypotheses(const protocols::Protocol& protocol) {
   std::map<std::vector<int>, std::shared_ptr<const ShapeHypotheses>> known;
   for (const protocols::TaskBlock& block : protocol.blocks) {
     all.emplace_back();
-    if (!is_told_by_shape(protocol, block)) continue;
+    if (!is_identified_by_shape(protocol, block)) continue;
     std::shared_ptr<const ShapeHypotheses>& shared = known[block.stimuli];
     if (!shared) {
       std::vector<stimuli::ObjectSpec> objects;
@@ -380,8 +381,8 @@ const protocols::TaskBlock& TaskParticipant::block() const {
 void TaskParticipant::begin_trial(const protocols::Trial& trial) {
   trial_ = trial;
   felt_ = 0;
-  const auto& told_apart = of_blocks_[static_cast<std::size_t>(trial.task_block)];
-  identifier_ = told_apart ? &identifiers_.at(told_apart.get()) : nullptr;
+  const auto& identified = of_blocks_[static_cast<std::size_t>(trial.task_block)];
+  identifier_ = identified ? &identifiers_.at(identified.get()) : nullptr;
   judgement_.begin(trial, Random(seed_, {static_cast<std::uint64_t>(number_),
                                          static_cast<std::uint64_t>(trial.session),
                                          static_cast<std::uint64_t>(trial.trial), kJudgement}));
@@ -407,7 +408,7 @@ Answer TaskParticipant::answer(std::int64_t time_ns) {
   Answer given;
   given.time_ns = answered_ns_ = time_ns;
   if (!view_.answers) {
-    given.goes_on = true;
+    given.continues = true;
   } else if (block().task == protocols::TaskKind::rate && block().answers.empty()) {
     given.number = judgement_.number();
   } else {

@@ -320,8 +320,8 @@ void ServedScene::take(const servo::Sample& sample) {
   last_ns_ = sample.time_ns;
   if (trial_ && !trial_->holds) take_first(sample);
   if (!trial_ || sample.phase != servo::Phase::feeling) return;
-  if ((sample.faults & servo::servo_fault::kTripped) != 0 && !trial_->told_off) {
-    trial_->told_off = true;
+  if ((sample.faults & servo::servo_fault::kTripped) != 0 && !trial_->forces_off_sent) {
+    trial_->forces_off_sent = true;
     shown_.store(false);
     held_by_ = why_off(sample);
     tell("forces_off", sample.time_ns, {{"reason", held_by_}});

@@ -83,7 +83,7 @@ class ServedScene {
     bool holds = false;  ///< forces are on, and `start` was answered
     std::int64_t zero_ns = 0, first_contact_ns = 0, tick_ns = 0;
     int without_contact = 0;  ///< ticks
-    bool in_contact = false, told_off = false;
+    bool in_contact = false, forces_off_sent = false;
   };
   protocols::SceneSpec read(const std::string& text, const rendering::Renderer& renderer) const;
   void load(nlohmann::json scene);

@@ -381,11 +381,11 @@ void LiveSession::attend() {
   if (!monitor_.in_trial() || monitor_.asking()) respondent_.look_at_buttons(forces_.newest());
   if (!station_.screen.open())
     throw EndOfSession(data::RunEnd::aborted, "the participant's screen was closed", true);
-  if (std::string trouble = station_.screen.trouble(); trouble != told_trouble_) {
-    told_trouble_ = std::move(trouble);
-    if (!told_trouble_.empty()) {
-      say(told_trouble_);
-      const nlohmann::ordered_json event = {{"input_trouble", told_trouble_}};
+  if (std::string trouble = station_.screen.trouble(); trouble != shown_trouble_) {
+    shown_trouble_ = std::move(trouble);
+    if (!shown_trouble_.empty()) {
+      say(shown_trouble_);
+      const nlohmann::ordered_json event = {{"input_trouble", shown_trouble_}};
       station_.record.note(station_.clock.now_ns(), event.dump());
     }
   }

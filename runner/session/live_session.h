@@ -128,7 +128,7 @@ class LiveSession final : public participants::Attendant {
   participants::KeyboardRespondent respondent_;
   Session session_;
   std::deque<display::ConsoleCommand> commands_;  ///< not obeyed yet
-  std::string told_trouble_;                      ///< of the participant's inputs, as shown last
+  std::string shown_trouble_;                     ///< of the participant's inputs, as shown last
   enum class Stop { no, after_trial, after_block } stop_ = Stop::no;
 };
 

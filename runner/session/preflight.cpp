@@ -213,7 +213,7 @@ class PreflightDialogue {
   PreflightDialogue(const LiveStation& station, const std::vector<std::string>& news)
       : station_(station),
         preflight_(needs_of(station)),
-        told_ns_(station.clock.now_ns() - kReading_ns / 2) {  // waits half a second for news
+        shown_ns_(station.clock.now_ns() - kReading_ns / 2) {  // waits half a second for news
     state_.study = station.protocol.name;
     state_.participant = station.record.participant().code;
     state_.session = station.record.session();
@@ -337,9 +337,9 @@ class PreflightDialogue {
   void show() {
     display::Checklist list = checklist();
     const std::int64_t now = station_.clock.now_ns();
-    if (list.instruction != told_ && now - told_ns_ > kReading_ns) {
-      told_ = list.instruction;
-      told_ns_ = now;
+    if (list.instruction != shown_ && now - shown_ns_ > kReading_ns) {
+      shown_ = list.instruction;
+      shown_ns_ = now;
       display::Page page;
       page.kind = display::Page::Kind::checklist;
       page.checklist = list;
@@ -354,8 +354,8 @@ class PreflightDialogue {
   const LiveStation& station_;
   Preflight preflight_;
   display::ConsoleState state_;
-  std::string told_;            ///< the instruction on show
-  std::int64_t told_ns_;        ///< shown since then; session clock
+  std::string shown_;           ///< the instruction on show
+  std::int64_t shown_ns_;       ///< shown since then; session clock
   std::int64_t pushed_ns_ = 0;  ///< when the last push ended; session clock
   std::vector<display::ConsoleCommand>
       while_pushed_;  ///< commands that came during a push: not obeyed yet

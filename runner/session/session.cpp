@@ -264,7 +264,7 @@ std::optional<participants::Answer> Session::wait_in_interval(
     if (feeling) record_.response_ns = sample.time_ns;
     const std::optional<participants::Answer> answer = participant_.step(sample);
     const bool over = feeling && limit && sample.time_ns - record_.onset_ns >= limit_ns;
-    const bool meant = answer && answer->goes_on != view.answers;
+    const bool meant = answer && answer->continues != view.answers;
     if (meant && (!limit || answer->time_ns - record_.onset_ns < limit_ns)) return answer;
     if (over) return std::nullopt;
   }

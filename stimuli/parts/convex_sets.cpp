@@ -64,10 +64,10 @@ SetGrowth::SetGrowth(const std::vector<MeshPointer>& parts, double abuts) : abut
 std::optional<ConvexSet> SetGrowth::through(const ConvexSet& set, std::uint32_t f,
                                             const ConvexMesh& beyond) const {
   const Facet& face = set.mesh->facets()[f];
-  bool goes_on = false;
+  bool extends = false;
   for (const Vec3& v : beyond.vertices())
-    goes_on |= glm::dot(face.normal, v) - face.offset > 4 * tolerance_;
-  if (!goes_on) return std::nullopt;
+    extends |= glm::dot(face.normal, v) - face.offset > 4 * tolerance_;
+  if (!extends) return std::nullopt;
   for (const Vec3& corner : corners_of(*set.mesh, f))
     if (height_over(beyond, corner) > tolerance_) return std::nullopt;
   const auto same = [&](const HalfSpace& plane, const Vec3& normal, double offset) {

@@ -113,7 +113,7 @@ class Tasks(TaskStudy):
         self.assertEqual(done.returncode, 2)
         self.assertIn("expected each trial once", done.stderr)
 
-    def test_several_protocols_are_told_apart(self):
+    def test_several_protocols_are_distinguished(self):
         rows = [{**row, "protocol_name": "one", "protocol_sha256": "ab12cd34ef"} for row in self.forced(random.Random(9), 350, 0.5)]
         rows += [{**row, "protocol_name": "two", "protocol_sha256": "77aa55"} for row in self.forced(random.Random(9), 390, 0.5)]
         self.write(rows)

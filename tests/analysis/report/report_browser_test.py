@@ -101,7 +101,7 @@ class Report(unittest.TestCase):
         self.assertEqual(self.browser.run("document.querySelector('#person').options[1].value"), who)
         self.assertEqual(self.browser.run("document.querySelectorAll('.drawing b').length"), 0)
 
-    def test_many_renderers_are_told_apart_and_their_names_are_text(self):
+    def test_many_renderers_are_distinguished_and_their_names_are_text(self):
         csv = self.dir / "renderers.csv"
         renderers = ["</script><b>x</b>", "tip 2", "tip 3", "tip 4", "tip 5", "tip 6", "tip 7"]
         rows = [f"{p},1,1,{i},{r},{s},{s},1,{2 + 0.3 * (i % 5) + 0.2 * len(s) + 0.1 * (i * ord(p) % 7)}\n" for p in "ABC"

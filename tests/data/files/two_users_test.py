@@ -121,7 +121,7 @@ class TwoUsers(unittest.TestCase):
             lock.unlink()
         self.assertEqual(list(self.own.iterdir()), [])
 
-    def test_a_folder_that_others_can_write_to_is_told_once(self):
+    def test_a_folder_that_others_can_write_to_is_reported_once(self):
         self.assertEqual(self.simulate().stderr.count("others can write to the folder"), 1)
         self.assertEqual(self.simulate(db=self.own / "s.db").stderr, "")
         theirs = self.folder("theirs", 0o777, OTHER)

@@ -33,7 +33,7 @@ class DevicesMarkers(CommandCase):
         self.assertEqual(done.stdout.count("sent to"), 14)
         self.assertEqual([line["code"] for line in lines], CODES)
 
-    def test_wrong_use_is_told(self):
+    def test_wrong_use_is_reported(self):
         self.assertIn("parport:PATH[:PULSE_MS]", self.palpate("devices", "--markers", "usb:1", status=2).stderr)
         self.assertIn("1 to 100 ms", self.palpate("devices", "--markers", "parport:/dev/null:200", status=2).stderr)
         self.assertIn("no parallel port", self.palpate("devices", "--markers", "parport:/dev/null", status=1).stderr)

@@ -181,7 +181,7 @@ class Watch(CommandCase):
         self.assertNotRegex(re.sub(r"http://www\.w3\.org/2000/svg", "", text), r"https?://")
         self.assertIn("SIMULATED PARTICIPANT", text)
 
-    def test_wrong_use_is_told(self):
+    def test_wrong_use_is_reported(self):
         db = self.study()
         watch = ["watch", "--db", db, "--out", self.dir / "page.html"]
         said = self.palpate(*watch, "--trial", "S001/1/9", status=2).stderr

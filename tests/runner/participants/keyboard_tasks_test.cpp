@@ -216,7 +216,7 @@ TEST_F(KeyboardTasks, OnlyTheExperimenterTypesSpokenAnswers) {
   begin(1, {1, 2, false, true, nullptr});
   EXPECT_FALSE(answer(2));
   EXPECT_TRUE(person_->spoken("", clock_.now_ns()));
-  EXPECT_TRUE(answer()->goes_on);
+  EXPECT_TRUE(answer()->continues);
 }
 
 TEST_F(KeyboardTasks, TextsMayHaveAnyLettersAndMayBeRequired) {

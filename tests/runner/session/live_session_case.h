@@ -74,7 +74,7 @@ class Console final : public display::ExperimenterConsole {
     std::vector<display::ConsoleCommand> out = std::exchange(next, {});
     if (in_state && in_state->first == last.state)
       out.push_back(std::exchange(in_state, std::nullopt)->second);
-    if (last.state == "paused" && goes_on) {
+    if (last.state == "paused" && resumes) {
       ++pauses;
       if (repair) repair();
       out.push_back({display::ConsoleCommand::Kind::go_on, "", clock_.now_ns()});
@@ -99,7 +99,7 @@ class Console final : public display::ExperimenterConsole {
   std::function<void(const display::ConsoleState&)> shown;
   std::vector<display::ConsoleCommand> next;
   std::function<void()> repair;
-  bool goes_on = false;                             ///< after a pause
+  bool resumes = false;                             ///< after a pause
   bool clears = true;                               ///< faults
   std::optional<display::ConsoleCommand> in_fault;  ///< sent once
   std::string* in_fault_sees = nullptr;             ///< the reason shown at that time

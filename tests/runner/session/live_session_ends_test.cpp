@@ -57,9 +57,9 @@ TEST_F(LiveSessions, AWithdrawalCountsInEveryStateAndSpelling) {
                                  "W" + std::to_string(++number));
     console_.next.clear();
     console_.last = {};
-    console_.clears = console_.goes_on = std::string(state) != "fault";
+    console_.clears = console_.resumes = std::string(state) != "fault";
     if (state == std::string("paused")) {
-      console_.goes_on = false;
+      console_.resumes = false;
       console_.next = {{display::ConsoleCommand::Kind::pause, "", 0}};
     }
     const std::string& text = texts[static_cast<std::size_t>(number) % texts.size()];

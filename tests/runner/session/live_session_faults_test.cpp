@@ -102,7 +102,7 @@ TEST_F(LiveSessions, ALateGuardPausesTheSessionAndAnEndedOneEndsIt) {
     return reading;
   });
   screen_.answers = false;
-  console_.goes_on = true;
+  console_.resumes = true;
   console_.clears = false;
   console_.repair = [&] {
     EXPECT_EQ(console_.last.held_by,
@@ -158,7 +158,7 @@ TEST_F(LiveSessions, HeadphonesPulledOutInATrialCutItOffAndPauseUntilTheyAreBack
     return at(0.1);
   });
   screen_.answers = false;
-  console_.goes_on = true;
+  console_.resumes = true;
   console_.repair = [&] {  // at the second try
     if (console_.pauses == 2) *plugged = screen_.answers = true;
   };
