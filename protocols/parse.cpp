@@ -282,7 +282,7 @@ void read_session_settings(ObjectReader& reader, Protocol& protocol) {
 
 void read_renderer_order(ObjectReader& reader, Protocol& protocol) {
   protocol.renderer_order = RendererOrder::fixed;
-  if (protocol.version == 2) return;  // its blocks say it
+  if (protocol.version == 2) return;  // set by each block
   protocol.renderer_order = RendererOrder::counterbalanced;
   reader.choice("renderer_order", protocol.renderer_order,
                 {{"fixed", RendererOrder::fixed},

@@ -126,7 +126,7 @@ void expect_contact(const ScenePart& part, PartState& state, const LineProbe& fr
     watch_surface<Probe>(part, state, from, probe);
 }
 
-/// Contact with a part that was not in contact at the last tick; kind none if there is none.
+/// Contact with a part that was not in contact at the last tick; kind `none` without contact.
 /// \param before  the probe at the last tick, world frame; null at the first tick of all
 template <class Probe>
 WalkResult detect_contact(const ScenePart& part, PartState& state, const LineProbe* before,

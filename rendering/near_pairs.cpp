@@ -618,8 +618,8 @@ bool list_near_parts(const Scene& scene, RenderState& state, const Distance2& di
     }
     return false;
   }
-  // A leap lists too many parts, and so may a crowd: keep such a list only until a shorter one is
-  // possible.
+  // After a jump, or in a dense scene, the list is long. Replace it as soon as a shorter one
+  // suffices.
   const double mean = scene.mean_radius(), soon = kReachShare * mean;
   const bool leaps = step > soon;
   double others = state.nearby.room - moved;  // m, at least, of every part that is not nearby

@@ -97,8 +97,8 @@ constexpr double kFarthest = 1e6;
 
 inline bool within_range(const Vec3& v) { return glm::dot(v, v) <= kFarthest * kFarthest; }
 
-/// Contact with one part, followed from the last tick or newly detected; kind none if there is
-/// none. Mesh frame.
+/// Contact with one part, followed from the last tick or newly detected; kind `none` without
+/// contact. Mesh frame.
 /// \param before  the probe at the last tick, world frame; null at the first tick of all
 /// \param tip     m
 /// \param d       tail - tip of the probe, m

@@ -911,8 +911,8 @@ void update_objects(UnionTick& tick) {
   for (std::size_t i = 0; i < all.breaking.size(); ++i) {
     const std::uint32_t object = tick.scene.breaking()[i].object_state;
     if (!all.breaking[i].giving_way) continue;
-    // Restore them a tick later, so that the ideal tool comes from outside. It may be inside them
-    // if the virtual one has passed right through the object.
+    // Restore the parts one tick later, so that the ideal tool comes from outside. It may be inside
+    // them if the virtual tool has passed through the object.
     if (all.breaking[i].was_left) {
       restore(tick, i);
     } else {

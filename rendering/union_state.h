@@ -192,8 +192,9 @@ class PlanesOf {
     return solve(spaces, tolerance, origin, point);
   }
 
-  /// The same nearest to the virtual tool, from `at`: keeps no more than the present distance from
-  /// each plane, and crosses no plane that `at` is above, except by `rounding`.
+  /// The point nearest to the virtual tool (the origin), starting at `at`. Stays above each plane
+  /// by `skin`, or by the height of `at` where that is less; crosses no plane that `at` is above,
+  /// except by `rounding`.
   bool nearest_from(const Vec3& at, double skin, double tolerance, double rounding, Vec3& point) {
     std::array<PlaneBound, kMostPlanes> spaces;
     for (std::size_t i = 0; i < count_; ++i) {

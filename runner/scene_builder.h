@@ -47,9 +47,9 @@ class SceneBuilder {
   /// Reads a mesh file, other than of tetrahedra, if that has not been done.
   /// \throws MeshError, std::runtime_error for an unreadable file
   const LoadedMesh& mesh(const stimuli::ObjectSpec& spec);
-  /// \throws MeshError where a shape is no solid that falls into convex parts, where nothing of it
-  /// is left for a layer, where a layer cannot be made of convex parts (inset_union), or where what
-  /// moves passes a limit, with the place as a JSON pointer.
+  /// \throws MeshError with the place as a JSON pointer: a shape cannot be cut into convex parts, a
+  /// layer is empty or cannot be made of convex parts (inset_union), or a moving object exceeds a
+  /// limit.
   /// \param gravity  m/s^2, on what moves or gives
   /// \param soft_radius  m, of the tool where it touches what gives
   rendering::Scene build(const std::vector<stimuli::ObjectSpec>& objects, bool side_contact,
@@ -102,7 +102,7 @@ class SceneBuilder {
   std::map<std::string, std::shared_ptr<const rendering::Surface>> surfaces_;
 };
 
-/// The stimuli of a protocol, and each at every level that can be told before (levels.h), built
+/// The stimuli of a protocol, and each at every level known in advance (levels.h), built
 /// once, and the scene of each trial. Threads may share it.
 class StimulusLibrary {
  public:

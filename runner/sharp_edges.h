@@ -12,12 +12,12 @@ namespace palpate::runner {
 /// The sharp edges of a scene's parts, those at which the surface turns by kLeastTurn or more, and
 /// the sharp vertices that are on none of them (the tip of a cone): there some two facets differ by
 /// as much. So the facets of a round shape have none, and the rims of a cylinder are sharp. An edge
-/// of a convex part counts also where the union of the parts goes on smoothly. Parts of layers
+/// of a convex part counts also where the union of the parts is smooth. Parts of layers
 /// count where there is no surface above them. Immutable, so threads can share it.
 class SharpEdges {
  public:
   static constexpr double kLeastTurn = 0.5235987755982988;  ///< rad; 30 degrees
-  /// More edges and vertices than this are a texture: none is told from the next.
+  /// More edges and vertices than this are treated as texture: no edge is resolved.
   static constexpr std::size_t kMost = 2000;
 
   SharpEdges() = default;

@@ -188,7 +188,7 @@ class Flattening {
     return move(from, t, k, n, j) || move(to, n, j, t, k);
   }
 
-  // Moves the corner that side k of t begins in to the side's other end.
+  // Collapses side k of t onto its second corner.
   bool move(const std::vector<std::pair<Index, Index>>& around, Index t, Index k, Index n,
             Index j) {
     const Index to = triangles_[t][(k + 1) % 3];

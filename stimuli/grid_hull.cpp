@@ -116,7 +116,7 @@ class Hull {
     return true;
   }
 
-  // Gives each point to the face, from `first` on, that it is highest above.
+  // Assigns each point to the face (index >= `first`) that it is farthest above.
   void hand_out(const std::vector<Index>& points, Index first) {
     for (const Index point : points) {
       Index best = first;

@@ -424,8 +424,8 @@ class WindingCheck {
       cross(x.right, x.right);
       cross(a + 1, x.right);
     } else if (y.right == 0 || (x.right != 0 && x.box.extent() >= y.box.extent())) {
-      // The larger box is halved, not the larger number: leaves of long triangles know best what
-      // they are apart from.
+      // Halve the larger box, not the larger number of triangles: leaves with long triangles
+      // separate best (is_apart tests each triangle).
       cross(a + 1, b);
       cross(x.right, b);
     } else {

@@ -56,7 +56,7 @@ struct NamedFigure {
 struct GroupMean {
   std::string renderer;
   std::vector<NamedFigure> participants;
-  std::size_t n_undetermined = 0;  ///< functions whose threshold the data do not tell: left out
+  std::size_t n_undetermined = 0;  ///< functions whose threshold is undetermined: left out
   std::optional<double> mean;      ///< none: nobody has a figure
   std::optional<double> sd;        ///< n - 1; of natural logarithms where the mean is geometric
   std::optional<Interval> ci95;    ///< t over participants; none below two, or without variance
@@ -81,7 +81,7 @@ struct TaskComparison {
   /// Renderers, or "BLOCK, STIMULUS"; the first is the reference.
   std::vector<std::string> conditions;
   bool logarithms = false;
-  std::size_t n_undetermined = 0;  ///< functions whose threshold the data do not tell: left out
+  std::size_t n_undetermined = 0;  ///< functions whose threshold is undetermined: left out
   ThresholdComparison comparison;
 };
 

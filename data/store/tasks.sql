@@ -1,6 +1,6 @@
 -- Schema version 5: trials of tasks, and answers to pages.
 
--- What a trial of version 2 of protocols has besides, as JSON (store/task_text.h): task, block_name,
+-- Additional values of a trial of a version 2 protocol, as JSON (store/task_text.h): task, block_name,
 -- track, level, standard_level, catch_trial; of a completed one also intervals with their onsets,
 -- success, number, confidence. NULL: version 1. Sealed where it is there (seals.h).
 ALTER TABLE attempts ADD COLUMN task TEXT;

@@ -28,8 +28,8 @@ class EndOfSession : public std::runtime_error {
   bool failed;  ///< ended by a signal or fault
 };
 
-/// The end that the experimenter's "quit" with these words asks for. Any form of "withdraw" among
-/// them, in upper or lower case, records a withdrawal.
+/// How the session ends after ":quit WORDS" from the experimenter. Any form of "withdraw" among the
+/// words, in upper or lower case, records a withdrawal.
 EndOfSession end_by_experimenter(const std::string& words);
 
 // A hold prevents the next trial of a live session: the experimenter's pause, or a fault that

@@ -183,7 +183,7 @@ std::uint64_t permuted(std::uint64_t value, std::uint64_t count, std::uint64_t k
   return value;
 }
 
-// JSON pointers into documents: set a value, and say which pointers are near to one that is none.
+// JSON pointers into documents: set a value; suggest pointers similar to an unknown one.
 
 /// The value that a pointer leads to; nullptr: there is none.
 const nlohmann::json* value_at(const nlohmann::json& document, const std::string& pointer);

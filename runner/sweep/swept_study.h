@@ -41,8 +41,8 @@ DesignKind design_kind(const std::string& name);
 
 class Design {
  public:
-  /// \param wanted  points at most: a grid and saltelli have the greatest number up to it that they
-  /// can. \throws std::invalid_argument: that is none
+  /// \param wanted  points at most; grid and saltelli round down to a possible number.
+  /// \throws std::invalid_argument if that is 0
   Design(DesignKind kind, std::int64_t wanted, std::uint64_t seed,
          const std::vector<protocols::SweepParameter>& parameters);
 

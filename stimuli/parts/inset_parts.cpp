@@ -103,8 +103,8 @@ class UnionInset {
     }
     return done >= 1;
   }
-  /// The share of the way at which it leaves the part; 0 where it is outside the part at the share
-  /// `at`.
+  /// Fraction of the path at which it leaves the part; 0 if the path is outside the part at the
+  /// fraction `at`.
   double way_inside(const ConvexMesh& part, const Vec3& from, const Vec3& way, double at) const {
     double low = 0, high = 1;
     for (const Facet& facet : part.facets()) {

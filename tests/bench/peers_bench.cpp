@@ -145,7 +145,7 @@ Row run(const rendering::MethodDefinition& kind, const stimuli::ConvexMesh& mesh
   return row;
 }
 
-/// Ours as it is shipped, the plainest that is exact, and the libraries that were found.
+/// The shipped renderer, the simplest exact one, and each library found.
 std::vector<rendering::MethodDefinition> compared() {
   std::vector<rendering::MethodDefinition> kinds;
   for (rendering::MethodDefinition& kind : rendering::contact_methods()) {

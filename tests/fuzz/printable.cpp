@@ -1,5 +1,5 @@
-// Whatever is printed: what comes out cannot move a cursor, colour a line or turn its direction,
-// and is UTF-8 that stays as it is when it is made printable again.
+// Printable text never moves the cursor, colours a line or reverses direction. It is UTF-8; making
+// it printable twice changes nothing.
 
 #include <cstdlib>
 #include <string>

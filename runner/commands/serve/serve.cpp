@@ -103,7 +103,7 @@ class Server {
   Server(const po::variables_map& values, safety::FaultSignals& signals)
       : values_(values), signals_(signals), network_(settings_of(values)) {}
   ~Server() {
-    network_.end();  // it asks what is served
+    network_.end();  // first: it calls the served object
     signals_.watch(static_cast<servo::ServoThread*>(nullptr));
     signals_.watch(static_cast<safety::GuardedDevice*>(nullptr));
   }
@@ -111,7 +111,7 @@ class Server {
   Server& operator=(const Server&) = delete;
 
   serve::Network& network() { return network_; }
-  /// Says where it is, and answers from now on. \param served  a ServedScene or ServedSession
+  /// Prints the address and starts answering. \param served  a ServedScene or ServedSession
   template <class Served>
   void begin(Served& served, servo::ServoThread& servo) {
     signals_.watch(&servo);

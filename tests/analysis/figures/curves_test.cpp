@@ -1,4 +1,4 @@
-// Curves and marks that are told apart, and what they say when they are pointed at.
+// Curves and marks are distinguishable; tooltips name them.
 
 #include <gtest/gtest.h>
 
