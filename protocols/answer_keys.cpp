@@ -158,9 +158,8 @@ void refuse_equal_codes(const EventCodes& given, const EventCodes& all, const st
     for (const auto& [other, same] : all) {
       // Report a pair once, at the later name.
       if (same != code || other == name || (given.contains(other) && other > name)) continue;
-      faults.add(
-          child_pointer(pointer, name),
-          "expected a code of its own; " + std::to_string(code) + " is that of '" + other + "'");
+      faults.add(child_pointer(pointer, name),
+                 "expected a unique code; " + std::to_string(code) + " is that of '" + other + "'");
       break;
     }
   }

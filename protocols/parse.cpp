@@ -58,9 +58,8 @@ void check_labels(const Protocol& protocol, const std::string& pointer, FaultLis
     const std::string& label = answer_label(protocol, stimulus);
     const auto [before, is_new] = key_of.emplace(label, key);
     if (is_new || protocol.response.keys.at(before->second) == stimulus) continue;
-    faults.add(child_pointer(pointer, key), "expected a label of its own; '" + label +
-                                                "' is what the key '" + before->second +
-                                                "' says already");
+    faults.add(child_pointer(pointer, key), "expected a unique label; the key '" + before->second +
+                                                "' has the label '" + label + "' already");
   }
 }
 
@@ -193,7 +192,7 @@ void read_stimuli(ObjectReader& reader, Protocol& protocol, const MeshFiles& fil
     const std::string& name = protocol.stimuli.back().name;
     if (!name.empty() && !names.insert(name).second) {
       reader.faults().add(item.pointer("name"),
-                          "expected a name of its own, found '" + name + "' again");
+                          "expected a unique name, found '" + name + "' again");
     }
   }
 }

@@ -337,10 +337,11 @@ void read_soft(ObjectReader& reader, stimuli::ObjectSpec& spec) {
   refuse_with(reader, spec.body.has_value(), "body",
               "expected body or soft, not both: a soft object moves by itself with fixed: none");
   refuse_with(reader, spec.material.has_friction(), "friction_static",
-              "expected none on a soft object: friction on soft objects is not rendered");
+              "expected no friction on a soft object: it is not rendered there");
   refuse_with(reader, spec.material.damping > 0, "damping_ns_per_m",
-              "expected none on a soft object: its damping is soft/damping_s");
-  refuse_with(reader, !spec.material.layers.empty(), "layers", "expected none on a soft object");
+              "expected no damping on a soft object: set soft/damping_s");
+  refuse_with(reader, !spec.material.layers.empty(), "layers",
+              "expected no layers on a soft object");
 }
 
 namespace {

@@ -203,7 +203,7 @@ void check_together(const SweepSpace& space, FaultList& faults) {
     const std::string place = child_pointer("/parameters", i);
     if (!one.name.empty() && !names.insert(one.name).second) {
       faults.add(child_pointer(place, "name"),
-                 "expected a name of its own, found '" + one.name + "' again");
+                 "expected a unique name, found '" + one.name + "' again");
     }
     for (std::size_t j = 0; j < i; ++j) {
       const SweepParameter& other = space.parameters[j];

@@ -396,13 +396,13 @@ SceneBuilder::Placed SceneBuilder::placed(const stimuli::ObjectSpec& spec, int o
   // A solid of tetrahedra need not fall into convex parts, and nothing rigid is made of it.
   if (spec.soft && spec.shape == stimuli::ShapeKind::mesh) return out;
   Placing placing{object, side_contact, has_layers(spec), is_surface(spec), out.parts};
-  std::string reason = "its layers are made of convex parts, and it falls into none: ";
+  std::string reason = "layers need convex parts, and it cannot be cut into them: ";
   try {
     place(spec, Pose{}, placing);
     place_layers(placing);
     if (placing.by_surface && !meets.empty()) {
       reason = "it may meet " + meets +
-               ", and collisions are of convex parts, of which it falls into none: ";
+               ", and collisions need convex parts; it cannot be cut into them: ";
       for (const PlacedShape& shape : placing.all) {
         for (const Prepared& part : prepare(*shape.spec, 0, side_contact)) {
           out.solids.push_back({part.mesh, shape.pose, shape.spec->material, object, part.trees});

@@ -239,7 +239,8 @@ HalfEdges link_half_edges(const PolygonSoup& soup, MeshFaults& faults, Pieces pi
     faults.add("crowded", [&] {
       char error[32];
       std::snprintf(error, sizeof error, "%.1g", mesh.error);
-      return std::to_string(moved) + " vertices cannot be told from others near them, with " +
+      return std::to_string(moved) +
+             " vertices are indistinguishable from others near them, with " +
              "coordinates known to " + error +
              " m; the faults above may result from that: expected more digits or fewer vertices";
     });

@@ -617,7 +617,8 @@ std::string cell_text(const TaskCell& cell) {
   if (!cell.expected_easier && !cell.functions.empty() && cell.no_function.empty() &&
       (cell.functions.front().model.function.easier == protocols::Easier::lower) !=
           cell.functions.front().reversed)
-    text += "  successes fall as the level rises; no protocol here says which was asked for\n";
+    text +=
+        "  successes fall as the level rises; no protocol states which direction was asked for\n";
   for (const ParticipantFunction& one : cell.functions)
     text += function_text(one, cell.expected_easier);
   if (cell.magnitude) text += magnitude_text(cell);

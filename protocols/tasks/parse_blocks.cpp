@@ -234,7 +234,7 @@ void read_answers(ObjectReader& reader, const Protocol& protocol, TaskBlock& blo
     if (!labels.insert(answer.label).second) {
       reader.faults().add(
           reader.pointer(answers_key(block.task)),
-          "expected a label of its own for each answer, found '" + answer.label + "' again");
+          "expected a unique label for each answer, found '" + answer.label + "' again");
     }
   }
   if (block.task == TaskKind::external) return;  // the program may ask for it
@@ -650,8 +650,7 @@ std::string block_pointer(std::size_t i) { return "/blocks/" + std::to_string(i)
 
 void check_names(ObjectReader& item, const std::string& name, std::set<std::string>& names) {
   if (!name.empty() && !names.insert(name).second)
-    item.faults().add(item.pointer("name"),
-                      "expected a name of its own, found '" + name + "' again");
+    item.faults().add(item.pointer("name"), "expected a unique name, found '" + name + "' again");
 }
 
 void check_sessions(const Protocol& protocol, FaultList& faults) {

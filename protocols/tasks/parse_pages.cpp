@@ -135,7 +135,7 @@ void read_choices(ObjectReader& reader, PageItem& item) {
     if (text.empty()) {
       reader.faults().add(pointer, "expected a text that is not empty" + found_text(value));
     } else if (std::find(item.choices.begin(), item.choices.end(), text) != item.choices.end()) {
-      reader.faults().add(pointer, "expected a text of its own, found '" + text + "' again");
+      reader.faults().add(pointer, "expected a unique text, found '" + text + "' again");
     }
     item.choices.push_back(text);
   }
@@ -175,7 +175,7 @@ void read_items(ObjectReader& reader, PageSpec& page) {
     const std::string& name = page.items.back().name;
     if (!name.empty() && !names.insert(name).second) {
       reader.faults().add(item.pointer("name"),
-                          "expected a name of its own, found '" + name + "' again");
+                          "expected a unique name, found '" + name + "' again");
     }
   }
 }
@@ -321,7 +321,7 @@ void read_pages(ObjectReader& reader, Protocol& protocol, const MeshFiles& files
     const std::string& name = protocol.pages.back().name;
     if (!name.empty() && !names.insert(name).second) {
       reader.faults().add(item.pointer("name"),
-                          "expected a name of its own, found '" + name + "' again");
+                          "expected a unique name, found '" + name + "' again");
     }
   }
 }

@@ -218,7 +218,7 @@ void translate(Protocol& protocol, const std::string& language, const std::strin
     if (place.label && value->is_string() &&
         !labels.emplace(group_of(place.key), value->get<std::string>()).second) {
       faults.add(child_pointer("", place.key),
-                 "expected a label of its own, found '" + value->get<std::string>() + "' again");
+                 "expected a unique label, found '" + value->get<std::string>() + "' again");
     }
   }
   for (const auto& [key, value] : given.items()) {

@@ -189,12 +189,12 @@ int analyze_command(const std::vector<std::string>& args) {
       "shape with intervals and tests, accuracy, learning and exclusions. In data with other\n"
       "renderers each is compared with the first (point if it is among them). The conclusion\n"
       "and the tables go to stdout. Existing files are replaced only with --force.\n"
-      "Of a sweep: in what share of the settings a pattern holds, how the gains are spread, and\n"
-      "what they depend on (Sobol indices of a saltelli design, rank correlations of others).\n"
-      "Of protocols of version 2 (databases, exports with a column 'task'): thresholds, PSE and\n"
+      "For a sweep: the share of settings in which a pattern holds, the spread of the gains, and\n"
+      "their causes (Sobol indices of a saltelli design, rank correlations of others).\n"
+      "For protocols of version 2 (databases, exports with a column 'task'): thresholds, PSE and\n"
       "JND, d', magnitude estimation, adjustment, information and confidence, by task.\n"
-      "With --movement: what the hand did (path, speed, smoothness, contact, force, strokes,\n"
-      "procedures, coverage), from the servo samples of a database.";
+      "With --movement: measures of the hand's movement (path, speed, smoothness, contact,\n"
+      "force, strokes, procedures, coverage), from the servo samples of a database.";
   line.example =
       "  palpate analyze --db study.db\n"
       "  palpate analyze --csv trials.csv --json analysis.json --report report.html\n"
@@ -217,7 +217,7 @@ int analyze_command(const std::vector<std::string>& args) {
   add("pattern", po::value(&pattern)->value_name("EXPR"),
       "of a sweep: what to look for at each point; default: the paper's pattern");
   add("protocol", po::value(&protocol)->value_name("NAME"),
-      "of which protocol, where there are several: its name, or what its SHA-256 begins with");
+      "which of several protocols: its name, or the beginning of its SHA-256");
   add("json", po::value(&json)->value_name("FILE"), "write every number as JSON");
   add("report", po::value(&report)->value_name("FILE.html"), "write a report as an HTML page");
   add("figures", po::value(&figures)->value_name("DIR"),
@@ -232,7 +232,7 @@ int analyze_command(const std::vector<std::string>& args) {
   MovementRequest movement;
   movement.jobs = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
   std::string movement_csv;
-  add("movement", "measure what the hand did, in place of the times");
+  add("movement", "measure the movement of the hand instead of the times");
   add("movement-csv", po::value(&movement_csv)->value_name("FILE"),
       "with --movement: write every measure, a row a trial");
   add("cutoff-hz", po::value(&movement.settings.cutoff)->default_value(20, "20")->value_name("F"),
@@ -240,8 +240,8 @@ int analyze_command(const std::vector<std::string>& args) {
   add("jobs", po::value(&movement.jobs)->default_value(movement.jobs)->value_name("J"),
       "with --movement: threads");
   add("meshes", po::value(&movement.mesh_folder)->value_name("DIR"),
-      "with --movement: where the protocol's mesh files are, for a database of before they were "
-      "kept in it; default: the working directory");
+      "with --movement: folder of the protocol's mesh files, for an old database that does not "
+      "have them; default: the working directory");
   const auto values = line.parse(args);
   if (!values) return 0;
   check(*values, settings, line.usage);

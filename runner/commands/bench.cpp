@@ -636,8 +636,8 @@ int bench_command(const std::vector<std::string>& args) {
   line.summary =
       "Measures the run time of the renderers' ticks on this machine, each tick separately,\n"
       "in nanoseconds, in five rounds of the same ticks. The lowest median and the lowest 99th\n"
-      "percentile are kept: what other programs take away is not the tick's. Quit them\n"
-      "nevertheless: they slow down all rounds.";
+      "percentile are kept, to leave out the load of other programs. Quit them nevertheless:\n"
+      "they slow down all rounds.";
   line.example =
       "  palpate bench                       a table, about a minute\n"
       "  palpate bench --json bench.json     the same for programs\n";

@@ -175,8 +175,8 @@ void add_options(CommandLine& line) {
   add("movement", po::bool_switch(),
       "bids and psych-ds: tables of the measures of movement as well (analyze --movement)");
   add("meshes", po::value<std::string>()->default_value("", "")->value_name("DIR"),
-      "with --contacts, --movement: where the protocol's mesh files are, for a database of before "
-      "they were kept in it; default: the working directory");
+      "with --contacts, --movement: folder of the protocol's mesh files, for an old database that "
+      "does not have them; default: the working directory");
   add("force", po::bool_switch(), "replace an existing export");
 }
 

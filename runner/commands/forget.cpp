@@ -50,7 +50,7 @@ void print(const data::ParticipantSummary& holdings, const std::string& code,
   }
   if (holdings.mentions > 0) {
     std::cout << "Notes on other participants that say " << printable(code) << ": "
-              << holdings.mentions << "; they are left as they are\n";
+              << holdings.mentions << "; they are not changed\n";
   }
 }
 

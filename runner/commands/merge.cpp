@@ -72,8 +72,8 @@ void merge_shards(const std::string& out, const std::vector<std::string>& inputs
   if (done.failed > 0) std::cout << ", " << done.failed << " of them failed";
   std::cout << "\n";
   if (done.points < done.plan.points)
-    std::cerr << "the others are in none of the files; 'palpate sweep' with --db " << printable(out)
-              << " goes on with them\n";
+    std::cerr << "the other points are in none of the files; compute them with: palpate sweep "
+              << "... --db " << printable(out) << "\n";
 }
 
 }  // namespace
@@ -87,7 +87,7 @@ int merge_command(const std::vector<std::string>& args) {
       "content, one number for two codes (unless --renumber), different protocols under one\n"
       "name. Participants who have withdrawn at one station are left out altogether. Merging\n"
       "a merged database again with its parts changes nothing. The files of a sweep's shards are\n"
-      "merged likewise, if they are of one plan; the result has the bytes of a sweep in one go.";
+      "merged, too, if they have one plan; the result has the bytes of an uninterrupted sweep.";
   line.example =
       "  palpate merge --out all.db station1.db station2.db\n"
       "  palpate merge --out all2.db all.db station3.db\n"

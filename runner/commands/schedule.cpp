@@ -77,7 +77,7 @@ int schedule_command(const std::vector<std::string>& args) {
       "palpate schedule PROTOCOL.json (--participant N | --recover N) [--format table|csv|json]";
   line.summary =
       "Prints the trials that a participant will get, in order, without running them.\n"
-      "Where answers choose the levels: the rule, and an example.";
+      "If answers choose the levels: prints the rule and an example.";
   line.example =
       "  palpate schedule protocols/ho2000.json --participant 1\n"
       "  palpate schedule protocols/ho2000.json --participant 2 --format csv > order.csv\n"

@@ -56,7 +56,7 @@ std::string state_detail(const ConsoleState& state) {
   const std::size_t colon = state.state.find(": ");
   if (colon != std::string::npos) return state.state.substr(colon + 2);
   for (const char* const page : {"instructions", "practice begins", "block begins", "rest"}) {
-    if (state.state == page) return "space bar goes on";
+    if (state.state == page) return "space bar continues";
   }
   if (state.state == "end") return "space bar ends it";
   if (state.state != "homing") return {};

@@ -462,7 +462,7 @@ bool limit_as_recorded(protocols::Protocol& protocol, const std::string& event) 
           material_of(protocol, one.at("stimulus").get<std::string>(), one.at("part").get<int>());
       if (material.stiffness != one.at("asked_stiffness_n_per_m").get<double>() ||
           material.damping != one.at("asked_damping_ns_per_m").get<double>()) {
-        throw std::invalid_argument("the record limits another material than the protocol has");
+        throw std::invalid_argument("the recorded limit does not match the protocol's material");
       }
       scale_down(material, one.at("share").get<double>());
     }

@@ -232,7 +232,7 @@ void SessionMonitor::recorded(const data::TrialRecord& record) {
   if ((record.faults & servo::servo_fault::kMissedTicks) != 0)
     say("trial " + std::to_string(record.trial) + " missed " + std::to_string(record.missed_ticks) +
         " ticks, up to " + milliseconds(record.longest_period_ns) +
-        " apart, which is on record: the computer was busy");
+        " apart (recorded): the computer was busy");
   const bool nothing_there = record.task && record.task->catch_trial;
   if (!record.response.empty() && !touched_ && !nothing_there) {
     say("trial " + std::to_string(record.trial) + " was answered before the first contact");
@@ -454,8 +454,7 @@ void LiveSession::obey(const display::ConsoleCommand& command) {
         say("the participant answers; --spoken lets the experimenter do it");
       } else if (!respondent_.spoken(command.text, command.time_ns)) {
         say("'" + command.text +
-            "' is no answer now: forces are not on yet, it is none of the answers, or it is out of "
-            "range");
+            "' is not accepted: forces are off, or it is not a valid answer or out of range");
       }
       break;
     case Kind::quit:

@@ -418,7 +418,7 @@ std::vector<std::string> simulation_faults(const protocols::Protocol& protocol,
   std::vector<std::string> faults = incompatibilities(protocol, library, device.capabilities());
   if (protocols::is_external(protocol)) {
     faults.emplace_back(
-        "another program says what a block of the task 'external' shows: palpate serve runs it");
+        "another program chooses the stimuli of the task 'external': palpate serve runs it");
   }
   const std::vector<stimuli::ObjectSpec> shapes = shapes_of(protocol);
   for (std::size_t i = 0; i < shapes.size(); ++i) {

@@ -710,10 +710,10 @@ std::vector<SoftCase> soft_cases_elsewhere(std::uint64_t seed) {
 
 std::string soft_map_text(const std::vector<SoftSwing>& map) {
   std::string out =
-      "Soft bodies: worst swing of the force, in % of it, while the tool is held still,\n"
-      "over springs of 200 to 3000 N/m and tools of 2 and 10 mm, of all that scenes allow.\n"
-      "Held for 1.5 s; without damping up to 12.5 s, until it swings by at most 1 % in a second.\n"
-      "-: none allowed\n\n"
+      "Soft bodies: largest oscillation of the force, % of its mean, while the tool is held\n"
+      "still; over springs of 200 to 3000 N/m and tools of 2 and 10 mm, among permitted settings.\n"
+      "Held for 1.5 s; without damping up to 12.5 s, until it varies by at most 1 % in a second.\n"
+      "-: none permitted\n\n"
       "       Pa ";
   char cell[48];
   for (const double rate : kRates) {

@@ -337,7 +337,7 @@ void check_whole_numbers(const SweepParameter& one, std::size_t number,
     if (!one.values[i].is_number_integer() || std::abs(one.values[i].get<double>()) < kMostExact)
       continue;
     faults.add(child_pointer(child_pointer(child_pointer("/parameters", number), "values"), i),
-               "expected a whole number below 2^53, which is told from its neighbours" +
+               "expected a whole number below 2^53 (larger ones are not exact)" +
                    protocols::found_text(one.values[i]));
   }
 }

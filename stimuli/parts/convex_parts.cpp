@@ -355,8 +355,8 @@ std::vector<ConvexMesh> cut_once(const PolygonSoup& soup, bool& is_surface) {
       parts.emplace_back(part);
     } catch (const MeshError& error) {
       faults.add("not convex", [&] {
-        return "part " + std::to_string(parts.size() + 1) +
-               " of what it was cut into is no convex mesh: " + error.faults()[0];
+        return "after cutting, part " + std::to_string(parts.size() + 1) +
+               " is not convex: " + error.faults()[0];
       });
     }
   }

@@ -236,7 +236,7 @@ class Tasks(TaskStudy):
             # All alike: it may be what the task asked for.
             self.found([row | {"success": 1 - row["success"]} for row in rows_of_a_study(seed) if row["task"] == "compare"])
             self.assertEqual(self.analyze().stdout.count(
-                "successes fall as the level rises; no protocol here says which was asked for"), 2)
+                "successes fall as the level rises; no protocol states which direction was asked for"), 2)
 
     def test_a_column_that_the_table_lacks_is_named_once(self):
         rows = [row for row in rows_of_a_study(1) if row["task"] == "compare"]

@@ -165,9 +165,10 @@ TEST(ConvexMeshFaults, NamesVerticesTooNearToDistinguish) {
   EXPECT_EQ(faults_of(soup), std::vector<std::string>());
   soup.coordinate_error = 5e-4;
   EXPECT_TRUE(mentions(faults_of(soup), "shared edge"));
-  EXPECT_TRUE(mentions(faults_of(soup),
-                       "1 vertices cannot be told from others near them, with coordinates known to "
-                       "0.0005 m"));
+  EXPECT_TRUE(
+      mentions(faults_of(soup),
+               "1 vertices are indistinguishable from others near them, with coordinates known to "
+               "0.0005 m"));
 }
 
 TEST(ConvexMeshFaults, NamesAnEdgeOfFourFaces) {

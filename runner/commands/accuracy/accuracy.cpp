@@ -218,7 +218,7 @@ int accuracy_command(const std::vector<std::string>& args) {
   line.summary =
       "Error of the rendered forces against run time: every method over every tessellation of\n"
       "every analytic shape, and which tessellation to choose; contact with concave objects and\n"
-      "with tools of several segments, beside simpler ways to do it; soft bodies. Takes four\n"
+      "with tools of several segments, compared with simpler methods; soft bodies. Takes four\n"
       "minutes, with --quick half a minute. Status 1 when a tick of the search is wrong or an\n"
       "extreme case fails.";
   line.example =
@@ -243,7 +243,7 @@ int accuracy_command(const std::vector<std::string>& args) {
   add("report", po::value(&page)->value_name("FILE"),
       "write all of it, with the figure, as one HTML page");
   add("search", po::value(&search_ticks)->value_name("TICKS"),
-      "instead of all that: search this many random ticks for wrong ones");
+      "only search this many random ticks for errors");
   add("unions", "search clusters of 3 to 8 convex parts with tools of 1 to 3 segments");
   add("seed", po::value(&seed)->value_name("N")->default_value(1), "of the search");
   add("jobs", po::value(&jobs)->value_name("J"),

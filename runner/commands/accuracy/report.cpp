@@ -364,7 +364,7 @@ analysis::Table union_search_table(const rendering::UnionCounts& c, std::uint64_
 
 analysis::Table soft_table(const AccuracyReport& report) {
   analysis::Table table;
-  table.caption = "Soft bodies: what is known of them against what is computed";
+  table.caption = "Soft bodies: known solutions against the computed ones";
   table.header = {"case",      "truth", "nodes",   "elements", "value",
                   "reference", "unit",  "error %", "ms a step"};
   table.n_names = 2;
@@ -393,9 +393,8 @@ analysis::Table body_table(const AccuracyReport& report) {
     table.rows.push_back(
         {row.name, row.measure, row.engine, significant(row.error), significant(row.us_per_step)});
   table.notes.emplace_back(
-      "Boxes, steps of 1 ms, against closed forms; the largest error over all steps where "
-      "something "
-      "is to stay as it is, else that at the end.");
+      "Boxes, steps of 1 ms, against closed forms; the error is the largest over all steps for "
+      "quantities that must stay constant, else that at the end.");
   const rendering::BodyTickCost& cost = report.body_tick;
   table.notes.push_back(
       "Ten dumbbells and a rocket of nine parts that the probe pushes among each other, " +

@@ -554,10 +554,10 @@ int bundle_command(const std::vector<std::string>& args) {
   add("about", po::value(&options.about)->value_name("FILE"),
       "authors, license, funding, as for 'palpate export'; a license is "
       "required");
-  add("out", po::value(&options.out)->value_name("FOLDER"), "to be made");
+  add("out", po::value(&options.out)->value_name("FOLDER"), "a new folder");
   add("format", po::value(&options.format)->default_value("psych-ds")->value_name("NAME"),
       "of the dataset: psych-ds or bids");
-  add("verify", po::value(&options.verify)->value_name("FOLDER"), "a bundle to be made again");
+  add("verify", po::value(&options.verify)->value_name("FOLDER"), "the bundle to verify");
   add("force", po::bool_switch(&options.force), "replace an earlier bundle");
   const auto values = line.parse(args);
   if (!values) return 0;

@@ -54,10 +54,11 @@ int check_command(const std::vector<std::string>& args) {
   line.usage =
       "palpate check REGISTRATION --db FILE [--analysis FILE] [--json FILE] [--report FILE.html]";
   line.summary =
-      "Holds a study against its registration (a folder that 'palpate register' made): protocol,\n"
-      "order of trials, numbers, dates, settings of the analysis, versions, what was left out;\n"
-      "each deviation with its evidence. Then the verdict on each hypothesis. Exit status 1 if\n"
-      "there is a deviation.";
+      "Compares a study with its registration (a folder that 'palpate register' made): protocol,\n"
+      "order of trials, numbers, dates, settings of the analysis, versions, omissions. Lists each\n"
+      "deviation with its evidence, then the verdict on each hypothesis. Exit status 1 if there "
+      "is\n"
+      "a deviation.";
   line.example =
       "  palpate check registration --db study.db\n"
       "  palpate check registration --db study.db --analysis analysis.json --report check.html";
@@ -85,7 +86,7 @@ int check_command(const std::vector<std::string>& args) {
   if (values->count("too-fast-s")) {
     if (!(too_fast > 0)) throw UsageError("--too-fast-s: expected a time in s above 0");
     if (reported.too_fast)
-      throw UsageError("--too-fast-s: --analysis says it already; give one of them");
+      throw UsageError("--too-fast-s: --analysis has this limit already; give one of them");
     reported.too_fast = too_fast;
   }
   if (values->count("alpha")) {

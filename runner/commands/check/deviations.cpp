@@ -94,7 +94,7 @@ CheckPoint of_registration(const std::string& folder) {
     out.sentence = "The registration has changed since it was made.";
   }
   if (const auto filled = filled_in(folder); !filled.empty())
-    out.sentence += " Filled in, as it asks: " + analysis::joined(filled) + ".";
+    out.sentence += " Fields filled in as requested: " + analysis::joined(filled) + ".";
   return out;
 }
 
@@ -202,7 +202,7 @@ CheckPoint of_order(const Registration& registered, const StudyData& study) {
   out.sentence = "Every participant's trials came in the order that was registered for the number.";
   if (beyond > 0)
     out.sentence += " " + counted(beyond, "number is", "numbers are") +
-                    " beyond those registered; the order follows from the protocol all the same.";
+                    " beyond those registered; the protocol determines the order of these, too.";
   if (out.evidence.empty()) return out;
   out.finding = Finding::deviation;
   out.sentence = counted(out.evidence.size(), "participant", "participants") +
@@ -228,7 +228,7 @@ CheckPoint of_participants(const Registration& registered, const StudyData& stud
   }
   for (int number = 1; static_cast<std::size_t>(number) <= registered.participants; ++number) {
     if (!used.contains(number))
-      out.evidence.push_back("nobody has number " + std::to_string(number));
+      out.evidence.push_back("no participant has number " + std::to_string(number));
   }
   cut(out.evidence);
   return out;
@@ -390,7 +390,7 @@ CheckPoint of_torque(const Registration& registered, const StudyData& study) {
       noted(study, [](const std::string& note) { return note == data::kTorqueLeftOutNote; });
   const bool allowed = registered.protocol.torque == protocols::TorqueRule::left_out;
   if (!allowed)
-    return left_out("torque", "Torque", "No session says that torque was left out.",
+    return left_out("torque", "Torque", "No session records that torque was left out.",
                     "Sessions were run without the torque of the ray.", sessions);
   const bool all = sessions.size() == study.runs.size();
   return left_out("torque", "Torque",
@@ -470,22 +470,23 @@ StudyCheck check_study(const Registration& registered, const std::string& folder
     out.points.push_back(
         of_reported(table, reported, reported.too_fast.value_or(registered.too_fast)));
   out.points.push_back(of_versions(registered, study));
-  out.points.push_back(left_out(
-      "calibration", "Calibration of the device", "No session says that calibration was left out.",
-      "Sessions were run without a stored calibration of the device.",
-      noted(study, [](const std::string& note) {
-        return note.starts_with("pre-flight: ") && note.ends_with("WITHOUT calibration");
-      })));
+  out.points.push_back(left_out("calibration", "Calibration of the device",
+                                "No session records that calibration was left out.",
+                                "Sessions were run without a stored calibration of the device.",
+                                noted(study, [](const std::string& note) {
+                                  return note.starts_with("pre-flight: ") &&
+                                         note.ends_with("WITHOUT calibration");
+                                })));
   out.points.push_back(left_out(
       "noise", "Masking noise",
-      registered.protocol.masking_noise ? "No session says that the noise was left out."
+      registered.protocol.masking_noise ? "No session records that the noise was left out."
                                         : "The protocol has no masking noise.",
       "Sessions were run without the protocol's masking noise.",
       noted(study,
             [](const std::string& note) { return note == R"({"masking_noise":"left out"})"; })));
   out.points.push_back(left_out(
       "sounds", "Sounds",
-      registered.protocol.sounds ? "No session says that they were left out."
+      registered.protocol.sounds ? "No session records that they were left out."
                                  : "The protocol has no sounds.",
       "Sessions were run without the protocol's sounds.",
       noted(study, [](const std::string& note) { return note == R"({"sounds":"left out"})"; })));

@@ -191,7 +191,8 @@ ClusterJob read_job(const fs::path& folder) {
     const json in = read_json(protocols::read_text_file(path));
     if (in.at("version") != kVersion) {
       throw UsageError(path + ": expected version " + std::to_string(kVersion) + ", found " +
-                       json_excerpt(in.at("version")) + "; go on with the program that wrote it");
+                       json_excerpt(in.at("version")) +
+                       "; resume it with the program that wrote it");
     }
     ClusterJob job;
     job.work = in.at("work");
@@ -288,8 +289,8 @@ void require_own_scripts(const fs::path& folder) {
     if (fault.empty()) continue;
     throw UsageError(
         path.string() + ": " + fault +
-        "; what another user put there would run as yours. If all of it is as you left "
-        "it: chmod -R go-w " +
+        "; another user's files there would run under your account. If nothing was changed: "
+        "chmod -R go-w " +
         shell_quoted(folder.string()));
   }
 }
@@ -335,9 +336,9 @@ void write_scripts(const fs::path& folder, const ClusterJob& job, const std::str
   const std::string enter = "cd " + shell_quoted(folder.string());
   const std::string extension = job.extension();
   write_script(folder / "shard.sh",
-               "# One shard; started again, it goes on where it was.\n" + enter +
-                   " || exit 1\nexec " + program + " " + command +
-                   " --jobs 1 --shard \"${1:-$SLURM_ARRAY_TASK_ID}/" + std::to_string(job.shards) +
+               "# One shard. Run again to resume.\n" + enter + " || exit 1\nexec " + program + " " +
+                   command + " --jobs 1 --shard \"${1:-$SLURM_ARRAY_TASK_ID}/" +
+                   std::to_string(job.shards) +
                    "\" \\\n  --db \"parts/part$(printf %06d \"${1:-$SLURM_ARRAY_TASK_ID}\")" +
                    extension + "\"\n");
   const std::string given = job.work == "sweep" ? "--sweep" : "--db";
@@ -425,7 +426,7 @@ fs::path make_folder(const ClusterSettings& settings) {
   fs::path folder = fs::absolute(settings.folder).lexically_normal();
   if (fs::exists(folder) && !(fs::is_directory(folder) && fs::is_empty(folder)))
     throw UsageError("--dir " + settings.folder +
-                     ": exists and is not empty; 'palpate cluster submit' goes on with a folder");
+                     ": exists and is not empty; resume it with 'palpate cluster submit'");
   fs::create_directories(folder);
   struct stat found {};
   if (::stat(folder.c_str(), &found) != 0 || found.st_uid != ::geteuid())
@@ -580,7 +581,7 @@ int cluster_status(const std::string& given) {
   }
   if (!stopped.empty() && !job.array_job.empty()) {
     std::cout << "not done: shards " << array_text(stopped)
-              << "; logs/shard-K.log says why; they go on with: palpate cluster submit "
+              << "; logs/shard-K.log says why; resume them with: palpate cluster submit "
               << printable(given) << "\n";
   }
   if (done == job.shards) {
@@ -646,8 +647,8 @@ void add_options(CommandLine& line, ClusterSettings& settings) {
       ("dir", po::value(&settings.folder)->value_name("DIR"),
        "a new folder, on a disk that all nodes share")  //
       ("time", po::value(&settings.time)->value_name("T"),
-       "limit for a task, as sbatch takes it")                                                 //
-      ("partition", po::value(&settings.partition)->value_name("NAME"), "as sbatch takes it")  //
+       "limit for a task, in the format of sbatch")                                            //
+      ("partition", po::value(&settings.partition)->value_name("NAME"), "partition of Slurm")  //
       ("no-submit", po::bool_switch(&settings.no_submit), "write the folder, submit nothing");
 }
 

@@ -306,8 +306,8 @@ double parse_every(const std::string& text) {
 ViewAngles parse_view(const std::string& text) {
   const auto parts = split(text, ',');
   const char* const expected =
-      "degrees to the right and up (-85 to 85), and if need be how many times as large (0.01 to "
-      "100), such as 30,20 or 30,20,1.5";
+      "degrees to the right and up (-85 to 85), and optionally the zoom (0.01 to 100), such as "
+      "30,20 or 30,20,1.5";
   std::vector<double> values;
   for (const std::string_view part : parts) {
     const auto value = number_of<double>(part);

@@ -318,13 +318,13 @@ hypotheses.json:
       "what 'palpate plan --json' wrote for the protocol's repetitions");
   add("hypotheses", po::value(&options.hypotheses)->required()->value_name("FILE"),
       "the hypotheses, as below");
-  add("out", po::value(&options.out)->required()->value_name("FOLDER"), "to be made");
+  add("out", po::value(&options.out)->required()->value_name("FOLDER"), "a new folder");
   add("participants", po::value(&options.participants)->value_name("N"),
-      "how many there will be; default: as the plan says");
+      "planned number; default: that of the plan");
   add("too-fast-s", po::value(&options.too_fast)->default_value(0.2, "0.2")->value_name("SECONDS"),
       "correct answers faster than this will be excluded from the times");
   add("db", po::value(&options.database)->value_name("FILE"),
-      "the study's database, if there is one already: how many sessions it holds is said");
+      "the study's database, if it exists; the registration states its number of sessions");
   add("studies", po::value(&options.studies)->default_value(200)->value_name("N"),
       "simulated with the planned effect, and as many with none");
   add("seed", po::value(&options.seed)->default_value(1)->value_name("S"),

@@ -535,8 +535,8 @@ std::string registration_markdown(const Registration& made,
       "| `analysis-simulated.json` | the analysis of both |\n"
       "| `SHA256SUMS` | checksums of all files but this one and `osf.json` |\n"
       "\nAnswer the questions in this file and in `osf.json`, which `SHA256SUMS` leaves out; leave "
-      "the other files as they are. After the study, `palpate check` holds the data against this "
-      "folder.\n";
+      "the other files as they are. After the study, `palpate check` compares the data with "
+      "this folder.\n";
   out += "\nMade with " + as_markdown(made.build) +
          "; simulated participants of `palpate simulate` "
          "are version " +

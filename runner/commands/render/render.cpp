@@ -216,7 +216,7 @@ std::string to_text(const Explanation& e) {
       "2\n"
       "mm deep); in a tick they overlap, so shares of the tick in contact need not add up to 100 "
       "%.\n"
-      "-: does not run, did not happen, or cannot be told apart.\n";
+      "-: does not run, did not happen, or cannot be separated.\n";
   return out;
 }
 

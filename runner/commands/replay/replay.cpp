@@ -221,9 +221,9 @@ int replay_command(const std::vector<std::string>& args) {
   CommandLine line;
   line.usage = "palpate replay --db FILE --trial CODE/SESSION/TRIAL [--compare] [--out FILE.csv]";
   line.summary =
-      "Puts a stored trial through the servo and its renderer again: the forces must be the\n"
-      "recorded ones, bit by bit; of a trial of several intervals, in each of them. Needs servo\n"
-      "samples (\"samples\": true in the protocol). Status 1 when a tick differs.";
+      "Renders a stored trial again, through the servo. In each interval of the trial the forces\n"
+      "must equal the recorded ones, bit by bit. Needs servo samples (\"samples\": true in the\n"
+      "protocol). Status 1 when a tick differs.";
   line.example =
       "  palpate replay --db study.db --trial P03/1/12\n"
       "  palpate replay --db study.db --trial P03/1/12 --compare --out both.csv   (and what the\n"
@@ -233,16 +233,16 @@ int replay_command(const std::vector<std::string>& args) {
   auto add = line.options.add_options();
   namespace po = boost::program_options;
   add("db", po::value(&db)->value_name("FILE")->required(), "the study's database; only read");
-  add("trial", po::value(&trial)->value_name("CODE/SESSION/TRIAL")->required(), "which trial");
+  add("trial", po::value(&trial)->value_name("CODE/SESSION/TRIAL")->required(), "the trial");
   add("protocol", po::value(&protocol)->value_name("NAME"),
-      "of which protocol, where the code is in several");
+      "the protocol, if the code is in several");
   add("meshes", po::value(&folder)->value_name("DIR"),
-      "where the protocol's mesh files are, for a database of before they were kept in it;\n"
-      "default: the working directory");
+      "folder of the protocol's mesh files, for an old database that does not have them; default: "
+      "the working directory");
   add("compare", "also show what the other renderer would have shown");
   add("out", po::value(&out)->value_name("FILE.csv"), "write every tick");
   add("json", po::value(&json)->value_name("FILE"), "write the figures as JSON");
-  add("force", "replace files that are there");
+  add("force", "replace existing files");
   const auto values = line.parse(args);
   if (!values) return 0;
   Outputs outputs(*values, {"out", "json"}, {"db"});

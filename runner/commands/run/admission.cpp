@@ -222,10 +222,10 @@ std::string withdrawn_when(data::Store& store, const std::string& code) {
 }
 
 void throw_withdrawn(const std::string& code, const std::string& when) {
-  throw UsageError(
-      "participant " + code + " has withdrawn" + (when.empty() ? "" : " (" + when + ")") +
-      " and is not started again: add --after-withdrawal where the participant asks to "
-      "take part again; 'palpate forget' removes what is on record");
+  throw UsageError("participant " + code + " has withdrawn" +
+                   (when.empty() ? "" : " (" + when + ")") +
+                   " and cannot resume. If the participant asks to take part again, add "
+                   "--after-withdrawal; 'palpate forget' removes the data on record");
 }
 
 void refuse_withdrawn(data::Store& store, const std::string& code) {
@@ -356,8 +356,8 @@ void confirm_new(const RunSettings& settings, const std::string& code,
   if (!on_a_terminal()) {
     if (!near.empty()) {
       throw UsageError("--participant " + code + ": is not in " + settings.database + ", but " +
-                       alike + " there: give the code that was meant, or add --new-participant " +
-                       "if " + code + " is somebody new");
+                       alike + " there: correct the code, or add --new-participant if " + code +
+                       " is a new participant");
     }
     say(code + " is new in " + settings.database);
     return;
@@ -368,14 +368,15 @@ void confirm_new(const RunSettings& settings, const std::string& code,
   if (!near.empty()) question += alike + " there: a typing error?\n";
   const auto answer = ask(printable_lines(question) + "Is " + code + " a new participant? [y/N] ");
   if (answer != "y" && answer != "Y" && answer != "yes")
-    throw UsageError("nobody was enrolled, no session was started; the same command asks again");
+    throw UsageError(
+        "no participant was enrolled, no session was started; the same command asks again");
 }
 
 void confirm_participant(const RunSettings& settings, const std::string& code, const Known& known) {
   if (known.enrolled || known.earlier) {
     if (!settings.new_participant) return;
     throw UsageError("--new-participant: " + code + " is in " + settings.database +
-                     " already; leave the option out to go on with " + code +
+                     " already; leave the option out to resume " + code +
                      ", or give the new participant another code");
   }
   if (std::find(known.codes.begin(), known.codes.end(), code) == known.codes.end()) {
@@ -385,7 +386,7 @@ void confirm_participant(const RunSettings& settings, const std::string& code, c
   }
   for (const std::string& difference : known.others)
     say("others were enrolled with another text of this protocol (" + difference + ")" +
-        (known.number ? "; numbers count on where only texts differ" : ""));
+        (known.number ? "; if only texts differ, participant numbers continue" : ""));
 }
 
 std::optional<std::int64_t> written_ns(const std::string& file) {

@@ -78,7 +78,7 @@ void print_outcome(const session::LiveStation& station, const data::Participant&
               station.record.session(), outcome.recorded, outcome.trials,
               data::to_string(outcome.end));
   for (const std::string& note : outcome.unkept)
-    std::fprintf(stderr, "not on record, as nobody was enrolled: %s\n",
+    std::fprintf(stderr, "not recorded, as no participant was enrolled: %s\n",
                  printable_lines(note).c_str());
   if (!outcome.reason.empty())
     std::fprintf(stderr, "%s\n", printable_lines(outcome.reason).c_str());
@@ -304,7 +304,7 @@ int run_command(const std::vector<std::string>& args) {
   if (protocols::is_external(admission.protocol))
     throw UsageError(
         "this protocol has a block of the task 'external': palpate serve runs it, with the program "
-        "that says what is shown");
+        "that chooses the stimuli");
   settings.participant = admission.participant;
   protocols::Protocol& protocol = admission.protocol;
   translate_texts(settings, admission);

@@ -55,8 +55,8 @@ std::optional<RunSettings> parse_run_settings(const std::vector<std::string>& ar
       "A live session: resumes an unfinished one, else begins the next. Every trial is on disk\n"
       "before the next one starts. The participant answers with the protocol's keys; Escape or\n"
       "F12 turns the forces off (emergency). 'palpate devices' lists the devices. A new\n"
-      "participant is enrolled when the first trial begins; a code that is not in the database\n"
-      "yet is asked about first.";
+      "participant is enrolled when the first trial begins; palpate asks first if the code is not\n"
+      "in the database.";
   line.example =
       R"(  palpate run protocols/ho2000.json --db study.db --participant P03 --device falcon2 --hand right --consent 2024-05
   palpate run protocols/quick.json --db try.db --participant T1 --device mouse
@@ -69,25 +69,25 @@ std::optional<RunSettings> parse_run_settings(const std::vector<std::string>& ar
       ("db", po::value(&settings.database)->required()->value_name("FILE"),
        "database; created or resumed")  //
       ("participant", po::value(&settings.participant)->required()->value_name("CODE"),
-       "pseudonym, 1 to 32 letters and digits; -: asked for, or a line of standard input, so that "
-       "no other user of this computer sees it")  //
+       "pseudonym, 1 to 32 letters and digits; -: ask for it, or read a line of standard input, to "
+       "hide it from other users of this computer")  //
       ("new-participant", po::bool_switch(&settings.new_participant),
-       "CODE is somebody new: do not ask, whatever it looks like")  //
+       "CODE is a new participant: do not ask, even if it resembles another code")  //
       ("after-withdrawal", po::bool_switch(&settings.after_withdrawal),
        "CODE has withdrawn and asks to take part again; recorded")  //
       ("number", po::value(&number)->value_name("N"),
        "orders the counterbalancing; default: the next unused one")  //
       ("changed-protocol", po::value(&settings.changed_protocol)->value_name("stored|texts"),
-       "where CODE began with another text of the protocol: continue with it as it is stored (the "
-       "default), or, where only texts differ, with the new texts; without it a terminal is "
-       "asked")  //
+       "if the protocol has changed since CODE began: stored (the default) keeps the old one; "
+       "texts "
+       "takes new texts if nothing else differs; without the option you are asked on a terminal")  //
       ("device", po::value(&settings.device)->required()->value_name("NAME"),
        "a kind of device (palpate devices lists them)")  //
       ("ask", po::value(&settings.advisor)->value_name("SOCKET"),
        "Unix domain socket of a program that proposes the levels of adaptive blocks")  //
       ("ask-time-out-s",
        po::value(&settings.advisor_time_out)->default_value(1, "1")->value_name("S"),
-       "without an answer in that time the block's own procedure chooses, which is on record")  //
+       "after this time without an answer the block's own procedure chooses; recorded")  //
       ("session", po::value(&session)->value_name("N"),
        "default: the first that is not completed")  //
       ("consent", po::value(&settings.consent)->value_name("VERSION"),
@@ -102,8 +102,7 @@ std::optional<RunSettings> parse_run_settings(const std::vector<std::string>& ar
        "serial port of a box whose bytes are keys (9600 baud, 8N1), as the protocol's responses "
        "say; beside the keyboard")  //
       ("language", po::value(&settings.language)->value_name("CODE"),
-       "show the protocol's texts as texts.CODE.json, or NAME.texts.CODE.json, beside it says "
-       "them")  //
+       "show the texts of NAME.texts.CODE.json, or texts.CODE.json, beside the protocol")  //
       ("response-latency", po::value(&latency)->value_name("SECONDS"),
        "of keyboard or buttons, where it was measured; recorded, never subtracted")  //
       ("markers", po::value(&settings.markers)->composing()->value_name("WHERE"),
@@ -116,7 +115,7 @@ std::optional<RunSettings> parse_run_settings(const std::vector<std::string>& ar
        "--markers names")  //
       ("stream", po::value(&settings.stream)->value_name("lsl[:NAME]"),
        "send every tick of a trial, 20 channels of pose and force, to Lab Streaming Layer, where "
-       "liblsl is installed; whoever is on the network may listen")  //
+       "liblsl is installed; anyone on the network can listen")  //
       ("marker-codes", po::bool_switch(&settings.marker_codes),
        "markers that leave this computer (udp to another one, lsl) carry the participant's code, "
        "in "

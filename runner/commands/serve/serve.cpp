@@ -314,12 +314,12 @@ int serve_command(const std::vector<std::string>& args) {
       "              [--token-file FILE] [--allow-origin URL ...]\n"
       "palpate serve --device NAME --protocol P.json --db FILE --participant CODE ...";
   line.summary =
-      "Lets another program put scenes before the hand: messages in JSON over a WebSocket of\n"
-      "127.0.0.1, or a line each over a Unix socket (protocols/serve.schema.json). It says\n"
-      "which scene and when; the forces are palpate's, limited and guarded. A program that is\n"
-      "silent for half a second, or goes, ends them. Ctrl-C ends it. With a protocol it is a\n"
-      "session on record: the program begins each trial and says the answer, and in blocks of the\n"
-      "task 'external' what is shown.";
+      "Serves scenes to another program: messages in JSON over a WebSocket of 127.0.0.1, or a\n"
+      "line each over a Unix socket (protocols/serve.schema.json). The program chooses scenes and\n"
+      "their times; palpate renders, limits and guards the forces. They end if the program\n"
+      "disconnects or is silent for 0.5 s. Ctrl-C ends serving. With a protocol it is a recorded\n"
+      "session: the program begins each trial and gives the answer, and in blocks of the task\n"
+      "'external' chooses the stimulus.";
   line.example =
       "  palpate serve --device simulated --scene scene.json\n"
       "  palpate serve --device inverse3 --socket /run/user/1000/palpate --token-file token.json\n"

@@ -145,7 +145,7 @@ std::string what_happened(const ChangedProtocol& changed,
 }
 
 ProtocolChoice ask_which(const std::string& code, bool only_texts) {
-  std::string question = "  s  use the protocol as it is stored (Enter alone)\n";
+  std::string question = "  s  use the stored protocol (Enter alone)\n";
   if (only_texts) question += "  t  use the new texts\n";
   question +=
       "  n  begin as a new participant under another code\n  q  quit\n" + code + ", which? ";
@@ -199,8 +199,8 @@ ProtocolChoice choose_protocol(const ChangedProtocol& changed) {
   const std::string happened = what_happened(changed, differs);
   if (changed.option == "texts" && !differs.only_texts()) {
     throw UsageError("--changed-protocol texts: " + happened +
-                     ": not only texts. Leave the option out to resume with the protocol as it is "
-                     "stored, or begin again with another --participant");
+                     ": not only texts. Leave the option out to resume with the stored protocol, "
+                     "or begin again with another --participant");
   }
   if (changed.option == "texts") {
     say(happened + "; resuming with the new texts");
@@ -214,7 +214,7 @@ ProtocolChoice choose_protocol(const ChangedProtocol& changed) {
     say(happened);
     return ask_which(changed.code, differs.only_texts());
   }
-  say(happened + "; resuming with the protocol as it is stored" +
+  say(happened + "; resuming with the stored protocol" +
       (!changed.option.empty() || differs.nothing() ? ""
        : differs.only_texts() ? ". --changed-protocol texts shows the new texts"
                               : ". To begin again, give another --participant"));

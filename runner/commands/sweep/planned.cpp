@@ -104,7 +104,7 @@ void add_sweep_options(CommandLine& line, SweepSettings& settings) {
       ("space", po::value(&settings.space)->required()->value_name("FILE"),
        "what varies, and how (JSON)")  //
       ("points", po::value(&settings.points)->required()->value_name("N"),
-       "studies; a grid and saltelli have the greatest number up to it that they can")  //
+       "number of studies; grid and saltelli round down to a possible number")  //
       ("design",
        po::value(&settings.design)->default_value("lhs")->value_name("lhs|sobol|grid|saltelli"),
        "how the points lie: Latin hypercube, Sobol's sequence, all combinations, or Saltelli's "

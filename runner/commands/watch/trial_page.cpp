@@ -306,7 +306,7 @@ class PageBuilder {
     const PictureMesh mesh = picture_mesh(object, most_triangles_);
     if (mesh.all_triangles > mesh.triangles.size())
       note("The picture of " + name + " has " + std::to_string(mesh.triangles.size()) + " of its " +
-           std::to_string(mesh.all_triangles) + " triangles; forces and contacts are of all.");
+           std::to_string(mesh.all_triangles) + " triangles; forces and contacts use all of them.");
     if (object.soft)
       note(
           "A soft object is drawn at rest; contacts and forces are those of its surface as it "

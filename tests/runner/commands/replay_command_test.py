@@ -155,7 +155,7 @@ class Replay(CommandCase):
             seals.seal_again(base)
         base.close()
         refused = self.palpate("replay", "--db", db, "--trial", "S001/1/1", status=2)
-        self.assertIn("limits another material", refused.stderr)
+        self.assertIn("the recorded limit does not match", refused.stderr)
 
     def test_compares_with_the_other_renderer_tick_by_tick(self):
         db, trials = self.study()

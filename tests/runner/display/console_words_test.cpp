@@ -25,7 +25,7 @@ TEST(ConsoleWords, ABreakIsNamedWithItsDuration) {
 
 TEST(ConsoleWords, APageToReadNamesTheKeyToPress) {
   for (const char* const word : {"instructions", "practice begins", "block begins", "rest"})
-    EXPECT_EQ(state_detail(in(word)), "space bar goes on") << word;
+    EXPECT_EQ(state_detail(in(word)), "space bar continues") << word;
   EXPECT_EQ(state_detail(in("end")), "space bar ends it");
   EXPECT_EQ(state_detail(in("trial")), "");
   ConsoleState held = in("rest");

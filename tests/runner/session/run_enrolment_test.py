@@ -24,7 +24,7 @@ class Enrolment(Live):
                 terminal.type(end)
                 self.finish(terminal)
                 self.assertIn("participant P01 (not enrolled), session 1: 0 of 4 trials on record", terminal.text)
-        self.assertIn("not on record, as nobody was enrolled: came late", terminal.text)
+        self.assertIn("not recorded, as no participant was enrolled: came late", terminal.text)
         self.assertEqual(self.codes(self.db), [])
         self.assertEqual(self.sql("SELECT count(*) FROM protocols"), [(0,)])
         terminal = self.begin(code="P02")
@@ -52,7 +52,7 @@ class Enrolment(Live):
         self.assertEqual(self.ends(), ["withdrawn"])
         with self.run_session() as refused:
             self.assertEqual(refused.finish(), 2)
-            self.assertRegex(refused.text, r"P01 has withdrawn \(today \d\d:\d\d\) and is not started again")
+            self.assertRegex(refused.text, r"P01 has withdrawn \(today \d\d:\d\d\) and cannot resume")
 
     def test_a_failure_before_the_first_trial_enrols_no_participant(self):
         without_display = {name: value for name, value in os.environ.items() if "DISPLAY" not in name}
@@ -73,7 +73,7 @@ class Enrolment(Live):
             terminal.wait_for("Is PO1 a new participant? [y/N]")
             terminal.type("\n")
             self.assertEqual(terminal.finish(), 2)
-            self.assertIn("nobody was enrolled", terminal.text)
+            self.assertIn("no participant was enrolled", terminal.text)
         with self.run_session(code="P02", sure=False) as terminal:
             terminal.wait_for("others (P01)")
             terminal.wait_for("Is P02 a new participant? [y/N]")
@@ -269,9 +269,9 @@ class Changed(Live):
             self.assertIn("1 of 4 trials on record; aborted", said)
             return said
 
-        self.assertIn("resuming with the protocol as it is stored. --changed-protocol texts shows", piped())
+        self.assertIn("resuming with the stored protocol. --changed-protocol texts shows", piped())
         self.assertIn("resuming with the new texts", piped("--changed-protocol", "texts"))
-        self.assertIn("resuming with the protocol as it is stored\n", piped("--changed-protocol", "stored"))
+        self.assertIn("resuming with the stored protocol\n", piped("--changed-protocol", "stored"))
         self.assertEqual(self.shown_texts(), [None, None, "sit down", None])
         self.assertEqual(self.codes(self.db), ["K1"])
 
@@ -280,14 +280,14 @@ class Changed(Live):
         path.write_text(json.dumps(PROTOCOL, indent=3, sort_keys=True))
         with unittest.mock.patch.object(self, "protocol", lambda **_: path):
             with self.run_session(code="K1") as terminal:
-                terminal.wait_for("(only its layout); resuming with the protocol as it is stored")
+                terminal.wait_for("(only its layout); resuming with the stored protocol")
                 self.finish(terminal)
         self.assertEqual(self.codes(self.db), ["K1"])
 
     def test_new_participants_with_new_texts_get_the_next_number(self):
         terminal = self.begin(code="K2", **self.TEXTS)
         self.assertIn("participant K2 has number 2; session 1 of 1", terminal.text)
-        self.assertIn("with another text of this protocol (only texts: /texts/break); numbers count on", terminal.text)
+        self.assertIn("with another text of this protocol (only texts: /texts/break); if only texts differ, participant numbers continue", terminal.text)
         terminal.type(":quit\n")
         self.finish(terminal)
         done = self.run_piped("--number", "1", code="K3", **self.TEXTS)

@@ -247,7 +247,7 @@ TEST_F(Check, SwappedTrialsAreADeviation) {
 
 TEST_F(Check, AMissingParticipantIsADeviation) {
   run({.participants = 3});
-  expect_alone(check(), "participants", {"nobody has number 4"});
+  expect_alone(check(), "participants", {"no participant has number 4"});
 }
 
 TEST_F(Check, AnAdditionalParticipantIsADeviation) {
