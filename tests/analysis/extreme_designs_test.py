@@ -41,7 +41,8 @@ def log_normal(generator):
     return lambda *cell: f"{generator.lognormvariate(2, 0.4):.6f}"
 
 
-DRAW = random.Random(3)
+SEED = 3
+DRAW = random.Random(SEED)
 SOME = log_normal(DRAW)
 # name: (rows, status of mixed_model, of rm_anova, of its effects)
 DESIGNS = {

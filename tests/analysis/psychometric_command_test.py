@@ -97,7 +97,8 @@ def trials_of(case, standard):
 
 class PsychometricFunctions(TaskStudy):
     def test_levels_on_one_side_of_the_standard_are_a_forced_choice(self):
-        draw = random.Random(3)
+        seed = 3
+        draw = random.Random(seed)
         rows = []
         for row in rows_of_a_study(1):
             if row["task"] == "compare":
@@ -217,7 +218,8 @@ class PsychometricFunctions(TaskStudy):
         self.assertIn("levels below 0 have no place on a logarithmic scale", done.stdout)
 
     def test_catch_trials_tell_guesses_on_a_logarithmic_scale_too(self):
-        draw = random.Random(8)
+        seed = 8
+        draw = random.Random(seed)
         for function in ("logistic", "normal", "weibull"):
             rows = [{"participant_id": "T1", "session": 1, "block": 1, "trial": i + 1, "renderer": "ray", "shape": "bump", "correct": "",
                      "task": "detect", "block_name": "b", "track": 1, "level": level or "", "catch_trial": int(level == 0),
@@ -234,7 +236,8 @@ class PsychometricFunctions(TaskStudy):
             self.assertAlmostEqual(one["bayes"]["threshold"], one["fit"]["threshold"], delta=0.15)
 
     def test_three_intervals_are_guessed_by_a_third(self):
-        rows = [{**row, "interval_onsets": "0;1;2"} for row in self.forced(random.Random(5), 350, 1 / 3)]
+        seed = 5
+        rows = [{**row, "interval_onsets": "0;1;2"} for row in self.forced(random.Random(seed), 350, 1 / 3)]
         cell, = self.found(rows)["cells"]
         self.assertEqual((cell["n_intervals"], cell["forced_choice"]), (3, True))
         held = 0
@@ -253,7 +256,8 @@ class PsychometricFunctions(TaskStudy):
         self.assertIn("both sides", cell["psychometric_functions"][0]["fit"]["reason"])
 
     def test_same_different_has_guesses_of_its_catch_trials_and_a_d_prime(self):
-        draw = random.Random(6)
+        seed = 6
+        draw = random.Random(seed)
         rows = self.forced(draw, 350, 0.2)
         for row in rows:
             row["response"] = "different" if row["success"] else "same"

@@ -68,7 +68,8 @@ class Tasks(TaskStudy):
             self.assertAlmostEqual(bits["stimulus_entropy_bits"], 1, places=9)
 
     def test_thresholds_that_nothing_tells_are_not_compared(self):
-        draw = random.Random(7)
+        seed = 7
+        draw = random.Random(seed)
         rows = self.forced(draw, 350, 0.5)
         for row in rows:
             row["participant_id"] += "" if row["participant_id"] != "T4" else "x"
@@ -103,7 +104,8 @@ class Tasks(TaskStudy):
         self.assertIn("comparison_interval", done.stderr)
 
     def test_trials_given_twice_are_refused_and_somebody_may_be_called_NA(self):
-        rows = self.forced(random.Random(8), 350, 0.5)
+        seed = 8
+        rows = self.forced(random.Random(seed), 350, 0.5)
         for row in rows:
             row["participant_id"] = row["participant_id"].replace("T1", "NA")
         cell, = self.found(rows)["cells"]
@@ -114,8 +116,9 @@ class Tasks(TaskStudy):
         self.assertIn("expected each trial once", done.stderr)
 
     def test_several_protocols_are_distinguished(self):
-        rows = [{**row, "protocol_name": "one", "protocol_sha256": "ab12cd34ef"} for row in self.forced(random.Random(9), 350, 0.5)]
-        rows += [{**row, "protocol_name": "two", "protocol_sha256": "77aa55"} for row in self.forced(random.Random(9), 390, 0.5)]
+        seed = 9
+        rows = [{**row, "protocol_name": "one", "protocol_sha256": "ab12cd34ef"} for row in self.forced(random.Random(seed), 350, 0.5)]
+        rows += [{**row, "protocol_name": "two", "protocol_sha256": "77aa55"} for row in self.forced(random.Random(seed), 390, 0.5)]
         self.write(rows)
         done = self.analyze()
         self.assertEqual(done.returncode, 2)
@@ -270,7 +273,8 @@ class Tasks(TaskStudy):
             self.assertEqual(track["reversal_trials"], turns, stop)
 
     def test_columns_that_look_like_others_are_named(self):
-        rows = self.forced(random.Random(4), 350, 0.5)
+        seed = 4
+        rows = self.forced(random.Random(seed), 350, 0.5)
         plain = self.found(rows)
         self.assertEqual(plain["warnings"], [])
         for found, meant in (("Level", "level"), (" level", "level"), ("Catch Trial", "catch_trial"), ("sucess", "success"),

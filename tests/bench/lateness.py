@@ -84,7 +84,8 @@ def ratio_of_medians(ours, theirs, draws=10_000):
         return statistics.median(a for a, _ in pairs) / below if below else None
 
     pairs = list(zip(ours, theirs))
-    chance = random.Random(1)
+    seed = 1
+    chance = random.Random(seed)
     drawn = [ratio([chance.choice(pairs) for _ in pairs]) for _ in range(draws)]
     drawn = sorted(d for d in drawn if d is not None)
     if ratio(pairs) is None or len(drawn) < draws * 0.95:

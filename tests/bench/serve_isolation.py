@@ -116,7 +116,8 @@ def measure(program, seconds, crowd):
 
 
 def flood(program, minutes):
-    chance = random.Random(1)
+    seed = 1
+    chance = random.Random(seed)
     with tempfile.TemporaryDirectory() as folder:
         server = Server(program, pathlib.Path(folder))
         deaf, loud = server.watcher(), server.watcher()

@@ -2,6 +2,7 @@
 
 #include <benchmark/benchmark.h>
 
+#include <cstdint>
 #include <glm/geometric.hpp>
 #include <vector>
 
@@ -22,7 +23,8 @@ std::vector<stimuli::ObjectSpec> four_shapes() {
 
 /// Touches all over a sphere of the size of the stimuli, the stylus leaning on it.
 std::vector<runner::participants::Percept> percepts(bool ray, bool contact) {
-  Random random(1);
+  constexpr std::uint64_t kSeed = 1;
+  Random random(kSeed);
   const auto direction = [&random] {
     return glm::normalize(Vec3(random.normal(), random.normal(), random.normal()));
   };

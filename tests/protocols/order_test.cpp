@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <map>
 #include <numeric>
@@ -87,7 +88,8 @@ std::vector<Protocol::Order> all_limits() {
 // Checks feasibility, and that both methods of drawing find a valid order whenever there is one.
 TEST(Order, AgreesWithBruteForceOnEverySmallCase) {
   int solvable = 0, unsolvable = 0;
-  Random random(1);
+  constexpr std::uint64_t kSeed = 1;
+  Random random(kSeed);
   for (const Protocol::Order& order : all_limits()) {
     for (int stimuli = 1; stimuli <= 4; ++stimuli) {
       for_each_counts(stimuli, 8, [&](const Counts& counts) {
@@ -113,7 +115,8 @@ TEST(Order, AgreesWithBruteForceOnEverySmallCase) {
 
 // Construction can give every valid order: it excludes only invalid ones.
 TEST(Order, ConstructionReachesEveryValidOrder) {
-  Random random(2);
+  constexpr std::uint64_t kSeed = 2;
+  Random random(kSeed);
   for (const auto& order : {limits(1), limits(2), limits({}, 3)}) {
     for (const Counts& counts : {Counts{2, 2, 2}, Counts{3, 2, 2}, Counts{4, 2, 1}}) {
       const std::vector<Sequence> expected = all_valid(counts, order);
@@ -126,7 +129,8 @@ TEST(Order, ConstructionReachesEveryValidOrder) {
 }
 
 TEST(Order, HoldsTightLimits) {
-  Random random(3);
+  constexpr std::uint64_t kSeed = 3;
+  Random random(kSeed);
   for (int i = 0; i < 50; ++i) {
     // Only one valid order.
     EXPECT_EQ(order_block({5, 4}, limits(1), kNames, random),
@@ -140,7 +144,8 @@ TEST(Order, HoldsTightLimits) {
 }
 
 TEST(Order, HoldsLimitsInBigBlocks) {
-  Random random(4);
+  constexpr std::uint64_t kSeed = 4;
+  Random random(kSeed);
   const Counts counts = {2500, 2500, 2500, 2500};
   for (const auto& order :
        {limits(1), limits(2), limits(3), limits({}, 2), limits({}, 3), limits({}, 4)}) {
@@ -156,7 +161,8 @@ TEST(Order, HoldsLimitsInBigBlocks) {
 }
 
 TEST(Order, RefusalSaysWhyAndWhatWouldHelp) {
-  Random random(5);
+  constexpr std::uint64_t kSeed = 5;
+  Random random(kSeed);
   const auto refusal = [&](const Counts& counts, const Protocol::Order& order) {
     try {
       order_block(counts, order, kNames, random);
@@ -185,7 +191,8 @@ TEST(Order, TheBudgetOfDrawsGrowsWithTheBlock) {
 }
 
 TEST(Order, SequentialRepeatsTheList) {
-  Random random(6);
+  constexpr std::uint64_t kSeed = 6;
+  Random random(kSeed);
   Protocol::Order order = limits(1);
   order.kind = OrderKind::sequential;
   EXPECT_EQ(order_block({2, 2, 2}, order, kNames, random), (Sequence{0, 1, 2, 0, 1, 2}));
@@ -225,7 +232,8 @@ void expect_equally_likely(const Case& c, std::uint64_t seed, std::size_t budget
 
 // A session resumed with a newer program must keep its order.
 TEST(Order, StaysTheSameFromOneVersionOfTheProgramToTheNext) {
-  Random one(5), two(5), three(5);
+  constexpr std::uint64_t kSeed = 5;
+  Random one(kSeed), two(kSeed), three(kSeed);
   EXPECT_EQ(order_block({6, 6, 6}, limits(1), kNames, one, 0),
             (Sequence{0, 2, 1, 2, 0, 1, 0, 1, 2, 1, 2, 0, 1, 0, 2, 1, 0, 2}));
   EXPECT_EQ(order_block({4, 4, 4, 4}, limits({}, 3), kNames, two, 0),

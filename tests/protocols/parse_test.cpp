@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <fstream>
 #include <sstream>
@@ -352,7 +353,8 @@ TEST(Parse, UnreadableFilesAreInputErrors) {
 TEST(Parse, SurvivesDamage) {
   const std::string good = text_of(kFolder + "good/everything.json");
   const std::string pieces = "{}[]\",:0-1e9.\\\xff\n truenull";
-  Random random(11);
+  constexpr std::uint64_t kSeed = 11;
+  Random random(kSeed);
   int refused = 0;
   for (int i = 0; i < 3000; ++i) {
     std::string text = good;

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <glm/geometric.hpp>
 
 #include "rendering/contact_detection.h"
@@ -108,7 +109,8 @@ TEST(SupportMap, LeadsToTheFarthestVertexInFewSteps) {
   const stimuli::ConvexMesh mesh(stimuli::icosphere(0.03, 6));
   const SupportMap map(mesh);
   ASSERT_FALSE(map.empty());
-  Random random(5);
+  constexpr std::uint64_t kSeed = 5;
+  Random random(kSeed);
   for (int i = 0; i < 2000; ++i) {
     const Vec3 direction = 3.0 * testing::random_direction(random);
     const Vec3& near = mesh.vertices()[map.near_support(direction)];

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cstdint>
 #include <numbers>
 
 #include "tests/shared/random_mesh.h"
@@ -232,7 +233,8 @@ testing::ProbePath along_sphere(Random& random, int ticks) {
 
 // Along edges and faces of fine meshes, in every direction.
 TEST(SegmentFace, EquationTwoHoldsOverTriangles) {
-  Random random(5);
+  constexpr std::uint64_t kSeed = 5;
+  Random random(kSeed);
   int from_edges = 0, from_faces = 0;
   for (const int subdivisions : {2, 3, 4, 5}) {
     const auto mesh =

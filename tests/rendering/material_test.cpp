@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdint>
 #include <glm/geometric.hpp>
 #include <memory>
 #include <vector>
@@ -134,7 +135,8 @@ TEST(Friction, OfTheSideOfTheStylusTurnsIt) {
 }
 
 TEST(Friction, NeverGivesEnergyOverClosedPathsOnAFace) {
-  Random random(11);
+  constexpr std::uint64_t kSeed = 11;
+  Random random(kSeed);
   const auto between = [&](double low, double high) { return low + (high - low) * random.unit(); };
   for (int round = 0; round < 50; ++round) {
     stimuli::Material material = frictional(between(0.1, 1), 0);

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdint>
 #include <glm/geometric.hpp>
 #include <memory>
 #include <vector>
@@ -40,7 +41,8 @@ TEST(Reach, StretchesAboutThePivot) {
 }
 
 TEST(Reach, IsUndoneByItsInverse) {
-  Random random(5);
+  constexpr std::uint64_t kSeed = 5;
+  Random random(kSeed);
   for (int i = 0; i < 1000; ++i) {
     const Reach reach = some_reach(random);
     const LineProbe real{vector(random), vector(random)};
@@ -62,7 +64,8 @@ LineProbe virtual_motion(Reach reach, const LineProbe& motion) {
 }
 
 TEST(Reach, ForcesDoTheSameWorkForEveryMotionOfTheEnds) {
-  Random random(6);
+  constexpr std::uint64_t kSeed = 6;
+  Random random(kSeed);
   for (int i = 0; i < 20000; ++i) {
     const Reach reach = some_reach(random);
     const LineProbe motion{vector(random), vector(random)};
@@ -85,7 +88,8 @@ TEST(Reach, AContactsForceDoesTheSameWorkAtItsPlaceAndAtTheHand) {
   std::vector<SceneObject> objects(1);
   objects[0].mesh = std::make_shared<const stimuli::ConvexMesh>(stimuli::cube(0.05));
   const Scene scene(std::move(objects));
-  Random random(7);
+  constexpr std::uint64_t kSeed = 7;
+  Random random(kSeed);
   int contacts = 0;
   for (int i = 0; i < 300; ++i) {
     Reach reach{.factor = 5, .fraction = i % 2 == 0 ? 1 : 0.5};
@@ -121,7 +125,8 @@ TEST(Reach, TheGainIsTheSquareOfTheLever) {
   EXPECT_NEAR(stiffness_gain({.factor = 3, .in_world = true}, 0), 9, 1e-15);
   // Stretched five times about the tail, the tip moves by 5 of the real tip less 4 of the tail.
   EXPECT_NEAR(stiffness_gain({.factor = 5, .fraction = 1}, 0), 25 + 16, 1e-13);
-  Random random(8);
+  constexpr std::uint64_t kSeed = 8;
+  Random random(kSeed);
   for (int i = 0; i < 1000; ++i) {
     const Reach reach = some_reach(random);
     const double along = random.unit(), k = 700;

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cstdint>
+
 #include "runner/bench/tick_meters.h"
 #include "tests/shared/union_scenes.h"
 
@@ -194,7 +196,8 @@ TEST_P(SeveralParts, ACompoundBesideOthersFeelsAsAlone) {
 // when it goes in.
 TEST_P(SeveralParts, ASurfaceTouchedExactlyIsFeltOncePushed) {
   constexpr double kPressed = 1e-3;  // m
-  Random random(9);
+  constexpr std::uint64_t kSeed = 9;
+  Random random(kSeed);
   for (int i = 0; i < 2000; ++i) {
     const Pose pose{0.1 * Vec3(random.normal(), random.normal(), random.normal()),
                     stimuli::uniform_rotation(random)};

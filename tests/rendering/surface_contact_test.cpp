@@ -6,6 +6,7 @@
 
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <map>
 #include <numbers>
 #include <span>
@@ -212,7 +213,8 @@ class SurfaceContact : public ::testing::TestWithParam<const Renderer*> {
 };
 
 TEST_P(SurfaceContact, TheIdealToolIsNeverInside) {
-  Random random(11);
+  constexpr std::uint64_t kSeed = 11;
+  Random random(kSeed);
   for (int round = 0; round < 6; ++round) {
     const stimuli::PolygonSoup soup = as_in_a_file(
         round % 2 == 0 ? torus(12 + round, 8, 0.03, 0.01) : stairs(random, 2 + round % 3, 0.05),
@@ -246,7 +248,8 @@ TEST_P(SurfaceContact, TheIdealToolIsNeverInside) {
 }
 
 TEST_P(SurfaceContact, AConvexMeshGivesTheForcesOfTheWalk) {
-  Random random(5);
+  constexpr std::uint64_t kSeed = 5;
+  Random random(kSeed);
   const stimuli::PolygonSoup soup = stimuli::icosphere(0.03, 2);
   const SceneSurface placed = surface_of({soup});
   const Scene surface({}, true, {}, nullptr, {placed});
@@ -431,7 +434,8 @@ TEST_P(SurfaceContact, AStylusThatGrowsIntoAFaceTouchesIt) {
 TEST_P(SurfaceContact, AToolRestsAtTheBottomOfAFlatValley) {
   // Faces of files with rounded coordinates bend by 1e-7 to 1e-3 rad. A tip that is pressed
   // between their normals may not see the bottom within its skin.
-  Random random(5);
+  constexpr std::uint64_t kSeed = 5;
+  Random random(kSeed);
   for (double bend = 1e-7; bend < 1; bend *= 1.3) {
     const Quat turn = stimuli::uniform_rotation(random);
     const double c = std::cos(bend), s = std::sin(bend);
@@ -514,7 +518,8 @@ Vec3 rounded(const Vec3& corner, double decimals) {
 
 TEST_P(SurfaceContact, AStepThatRoundingMakesBetweenShellsHoldsNothing) {
   // Two blocks of different sizes with their upper faces in one plane, turned.
-  Random random(11);
+  constexpr std::uint64_t kSeed = 11;
+  Random random(kSeed);
   for (const int decimals : {5, 6, 7, 8, 9}) {
     for (int round = 0; round < 20; ++round) {
       const Quat turn = glm::angleAxis(3 * random.unit(), direction(random));
@@ -584,7 +589,8 @@ TEST(SurfaceStylus, OneThatGrowsFromItsTipDoesNotEnter) {
 /// Rounding decides with which end such a stylus touches each of the face's triangles, and whether
 /// their edges are convex.
 TEST(SurfaceStylus, OneThatLiesOnAFaceIsHeldWhileItSlides) {
-  Random random(1);
+  constexpr std::uint64_t kSeed = 1;
+  Random random(kSeed);
   for (int round = 0; round < 40000; ++round) {
     const Quat turn = stimuli::uniform_rotation(random);
     // The face is divided into strips.
@@ -604,7 +610,8 @@ TEST(SurfaceStylus, OneThatLiesOnAFaceIsHeldWhileItSlides) {
 }
 
 TEST_P(SurfaceContact, AFlatFaceInManyTrianglesHoldsNothingAlongIt) {
-  Random random(3);
+  constexpr std::uint64_t kSeed = 3;
+  Random random(kSeed);
   for (int round = 0; round < 4; ++round) {
     // A plate of 20 x 20 cells, turned, in single precision.
     stimuli::PolygonSoup soup;
@@ -737,7 +744,8 @@ TEST_P(SurfaceContact, AFineMeshIsNotEnteredByAStylusThatTurnsFast) {
 /// A segment is laid against a triangle or an edge, then its ends are moved away by as much as they
 /// may move: the triangle is still among those that it can touch.
 TEST(SurfaceTree, FindsAllThatAMovingSegmentCanTouch) {
-  Random random(23);
+  constexpr std::uint64_t kSeed = 23;
+  Random random(kSeed);
   const SceneSurface placed = surface_of({wavy_ball(3)});
   const Surface& surface = *placed.surface;
   int sides = 0;

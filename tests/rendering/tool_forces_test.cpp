@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cstdint>
+
 #include "rendering/contact.h"
 #include "rendering/renderer.h"
 #include "tests/shared/random_clusters.h"
@@ -15,7 +17,8 @@ using testing::kTick;
 using testing::random_tool;
 
 TEST(ToolForces, AreSplitOnTwoDevicesAndTurnTheHand) {
-  Random random(11);
+  constexpr std::uint64_t kSeed = 11;
+  Random random(kSeed);
   int off_axis = 0;
   for (int i = 0; i < 300; ++i) {
     const std::size_t segments = 1 + random.below(Tool::kMostSegments);
@@ -54,7 +57,8 @@ TEST(ToolForces, AreSplitOnTwoDevicesAndTurnTheHand) {
 
 // One segment from tip to tail is the plain stylus, and so are its pieces.
 TEST(ToolForces, AToolThatIsTheStylusFeelsAsTheStylus) {
-  Random random(12);
+  constexpr std::uint64_t kSeed = 12;
+  Random random(kSeed);
   int in_contact = 0, same = 0;
   for (const std::size_t pieces : {1u, 2u, 5u, 16u}) {
     const auto mesh =

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cstdint>
+
 #include "rendering/union_contact.h"
 #include "runner/bench/tick_meters.h"
 #include "tests/shared/random_clusters.h"
@@ -104,7 +106,8 @@ TEST_P(UnionCluster, ThePartsOrderPlaceAndSizeDoNotMatter) {
 
 TEST_P(UnionCluster, AFastToolIsStoppedByAThinPlate) {
   const bool sides = GetParam()->side_contact();
-  Random random(7);
+  constexpr std::uint64_t kSeed = 7;
+  Random random(kSeed);
   for (int i = 0; i < 400; ++i) {
     const double thickness = 1e-3 * std::pow(0.01, random.unit());
     const std::size_t segments = sides ? static_cast<std::size_t>(i) % 4 : 0;
@@ -133,7 +136,8 @@ TEST_P(UnionCluster, AFastToolIsStoppedByAThinPlate) {
 
 TEST_P(UnionCluster, NothingIsAllocatedAndNoNaNGetsThrough) {
   const bool sides = GetParam()->side_contact();
-  Random random(8);
+  constexpr std::uint64_t kSeed = 8;
+  Random random(kSeed);
   for (std::size_t segments = 0; segments <= (sides ? 16u : 0u); segments += 4) {
     const Scene scene(cluster(random), sides, random_tool(random, segments));
     RenderState state = scene.initial_state();

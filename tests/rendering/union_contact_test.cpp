@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cstdint>
 #include <numbers>
 
 #include "rendering/union_state.h"
@@ -58,7 +59,8 @@ std::vector<stimuli::PolygonSoup> valley() {
 }
 
 TEST_P(UnionContact, AValleyOverASeamHoldsTheTipFromBothSides) {
-  Random random(3);
+  constexpr std::uint64_t kSeed = 3;
+  Random random(kSeed);
   for (int i = 0; i < 50; ++i) {
     const Pose pose = i == 0 ? Pose{} : testing::random_pose(random, 0.2);
     const Scene scene(object_of(valley(), pose, kStiffness));
@@ -108,7 +110,8 @@ TEST_P(UnionContact, AStickInThePlaneOfAWallIsHeldByTheFloorAlone) {
 
 TEST_P(UnionContact, ACrackAsWideAsRoundingLetsNothingIn) {
   constexpr double kPressed = 1e-3;
-  Random random(5);
+  constexpr std::uint64_t kSeed = 5;
+  Random random(kSeed);
   for (int i = 0; i < 300; ++i) {
     const Pose pose = testing::random_pose(random, 0.1);
     const Scene scene(object_of({box_soup({-0.05, -0.05, -0.04}, {0, 0.05, 0}),

@@ -49,7 +49,8 @@ class ClosedMeshes(unittest.TestCase):
 
     def test_large_meshes_take_little_memory(self):
         with tempfile.TemporaryDirectory() as scratch:
-            folder, rng = pathlib.Path(scratch), np.random.default_rng(3)
+            seed = 3
+            folder, rng = pathlib.Path(scratch), np.random.default_rng(seed)
             for n, most in ((2560, 300), (7900, 900))[:1 + (ROUNDS > 1)]:
                 v, f = closed_meshes.knot(rng, n, 64)
                 closed_meshes.write(str(folder / "large.stl"), v, f)

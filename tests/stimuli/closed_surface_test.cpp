@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <glm/geometric.hpp>
 #include <limits>
 #include <numbers>
@@ -111,7 +112,8 @@ TEST(ClosedSurfaceTest, ASurfaceOfTrianglesIsKeptUnchanged) {
 
 // Any outline, so concave, and with hundreds of corners.
 TEST(ClosedSurfaceTest, FacesOfAnyOutlineAreCutIntoTrianglesOfTheSameVolume) {
-  Random random(5);
+  constexpr std::uint64_t kSeed = 5;
+  Random random(kSeed);
   for (int i = 0; i < 200; ++i) {
     solids::Outline outline;
     const auto corners = 3 + random.below(i % 10 == 0 ? 400 : 30);
@@ -168,7 +170,8 @@ TEST(ClosedSurfaceTest, AFaceWithABridgeToAHoleIsAccepted) {
 }
 
 TEST(ClosedSurfaceTest, TrianglesWithoutAreaAreRemovedAndTheSurfaceStaysClosed) {
-  Random random(9);
+  constexpr std::uint64_t kSeed = 9;
+  Random random(kSeed);
   for (int i = 0; i < 100; ++i) {
     // A corner on the middle of an edge belongs to a triangle without area on one side of it.
     PolygonSoup soup = triangulated(cube(0.04));
@@ -226,7 +229,8 @@ TEST(ClosedSurfaceTest, CornersAreWeldedByPlaceNotByDistance) {
 }
 
 TEST(ClosedSurfaceTest, CornersThatDifferInTheLastDigitAreWeldedOnlyOnOpenEdges) {
-  Random random(11);
+  constexpr std::uint64_t kSeed = 11;
+  Random random(kSeed);
   PolygonSoup apart;
   apart.coordinate_error = 0x1p-24 * 0.1;
   const PolygonSoup sphere = placed(icosphere(0.03, 2), uniform_rotation(random), 1, Vec3(0.05));
@@ -250,7 +254,8 @@ TEST(ClosedSurfaceTest, CornersThatDifferInTheLastDigitAreWeldedOnlyOnOpenEdges)
 }
 
 TEST(ClosedSurfaceTest, AnEdgeIsCutAtACornerOfANeighbourThatLiesOnIt) {
-  Random random(13);
+  constexpr std::uint64_t kSeed = 13;
+  Random random(kSeed);
   for (int i = 0; i < 50; ++i) {
     // One face of a cube in two halves; its neighbours lack the corners between.
     PolygonSoup soup = cube(0.04);
@@ -373,7 +378,8 @@ TEST(ClosedSurfaceTest, FacesOfManyTrianglesAreTaken) {
 
 // In any place, boxes around long bars meet everywhere.
 TEST(ClosedSurfaceTest, ManyBarsThatPassThroughEachOtherAreTaken) {
-  Random random(8);
+  constexpr std::uint64_t kSeed = 8;
+  Random random(kSeed);
   const Quat turn = uniform_rotation(random);
   constexpr int kBars = 40;  // in each direction and row
   PolygonSoup soup;
@@ -432,7 +438,8 @@ TEST(ClosedSurfaceTest, AGapIsDistinguishedFromAHole) {
 
 // The winding number of the surface, seen from random places, is that of the polygons.
 TEST(ClosedSurfaceTest, RandomShellsGiveTheirUnion) {
-  Random random(17);
+  constexpr std::uint64_t kSeed = 17;
+  Random random(kSeed);
   for (int i = 0; i < 60; ++i) {
     PolygonSoup soup;
     std::vector<TriangleSurface> shells;

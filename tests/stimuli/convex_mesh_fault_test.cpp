@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <iterator>
 #include <limits>
 #include <numbers>
@@ -221,7 +222,8 @@ TEST(ConvexMeshFaults, FindsAHollowWhoseFoldsAreWithinTheError) {
 TEST(ConvexMeshFaults, FindsConvexEdgesThatWindTwice) {
   EXPECT_FAULT(double_star_pyramids(), "wound vertex");
   EXPECT_FAULT(star_prism(), "wound facet");
-  Random random(1);
+  constexpr std::uint64_t kSeed = 1;
+  Random random(kSeed);
   for (int i = 0; i < 20; ++i) {
     const Quat turn = uniform_rotation(random);
     EXPECT_FAULT(placed(double_star_pyramids(), turn, 0.05, Vec3(0.2)), "wound vertex");
@@ -308,7 +310,8 @@ TEST(ConvexMeshFaults, ListsEveryKindButOnlyTheFirstOfEach) {
 
 // Any soup either becomes a mesh or is refused; nothing else may happen.
 TEST(ConvexMeshFaults, RandomSoupsNeverCrash) {
-  Random random(2);
+  constexpr std::uint64_t kSeed = 2;
+  Random random(kSeed);
   for (int i = 0; i < 3000; ++i) {
     PolygonSoup soup = random.below(2) == 0 ? triangulated(cube(1)) : icosphere(1, 1);
     for (std::uint64_t damage = 1 + random.below(4); damage > 0; --damage) {

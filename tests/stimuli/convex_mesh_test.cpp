@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
@@ -63,7 +64,8 @@ TEST(ConvexMesh, PrimitivesHaveTheirFacets) {
 }
 
 TEST(ConvexMesh, CoplanarTrianglesBecomeOneFacet) {
-  Random random(1);
+  constexpr std::uint64_t kSeed = 1;
+  Random random(kSeed);
   for (int i = 0; i < 20; ++i) {
     const Quat turn = uniform_rotation(random);
     const Vec3 to(random.normal(), random.normal(), random.normal());
@@ -74,7 +76,8 @@ TEST(ConvexMesh, CoplanarTrianglesBecomeOneFacet) {
 }
 
 TEST(ConvexMesh, VerticesWithinFacetsAndAlongEdgesAreDropped) {
-  Random random(2);
+  constexpr std::uint64_t kSeed = 2;
+  Random random(kSeed);
   for (int i = 0; i < 5; ++i) {
     const Quat turn = uniform_rotation(random);
     expect_counts(placed(cut(cube(0.06), 4), turn, 1, Vec3(0.1)), {8, 12, 6});
@@ -85,7 +88,8 @@ TEST(ConvexMesh, VerticesWithinFacetsAndAlongEdgesAreDropped) {
 }
 
 TEST(ConvexMesh, DuplicateVerticesAreWelded) {
-  Random random(3);
+  constexpr std::uint64_t kSeed = 3;
+  Random random(kSeed);
   const PolygonSoup whole = triangulated(cube(0.06));
   PolygonSoup soup;
   for (const auto& face : whole.faces) {
@@ -123,14 +127,16 @@ TEST(ConvexMesh, TrianglesWithoutAreaJoinTheirNeighbour) {
   soup.vertices.emplace_back(0, -1, -1);  // between 0 and 1
   soup.faces[0] = {0, 3, 2, 1, 8};
   soup.faces.push_back({1, 0, 8});
-  Random random(4);
+  constexpr std::uint64_t kSeed = 4;
+  Random random(kSeed);
   for (int i = 0; i < 20; ++i) {
     expect_counts(placed(soup, uniform_rotation(random), 0.05, Vec3(0.02)), {8, 12, 6});
   }
 }
 
 TEST(ConvexMesh, RandomPolyhedraSatisfyEveryInvariant) {
-  Random random(5);
+  constexpr std::uint64_t kSeed = 5;
+  Random random(kSeed);
   for (int i = 0; i < 200; ++i) {
     const int points = 4 + i % 40;
     const Vec3 axes(1, 0.01 + random.unit(), 0.01 + random.unit());
@@ -146,7 +152,8 @@ TEST(ConvexMesh, RandomPolyhedraSatisfyEveryInvariant) {
 }
 
 TEST(ConvexMesh, NeedlesAndPlatesSurvive) {
-  Random random(6);
+  constexpr std::uint64_t kSeed = 6;
+  Random random(kSeed);
   for (const double aspect : {1e2, 1e4, 1e6}) {
     for (const double length : {2e-4, 0.05, 20.0}) {
       const Quat turn = uniform_rotation(random);
@@ -165,7 +172,8 @@ TEST(ConvexMesh, NeedlesAndPlatesSurvive) {
 }
 
 TEST(ConvexMesh, WorksAKilometreFromTheOrigin) {
-  Random random(7);
+  constexpr std::uint64_t kSeed = 7;
+  Random random(kSeed);
   for (const double scale : {1e-4, 1e-3, 0.05, 100.0}) {
     for (int i = 0; i < 10; ++i) {
       const auto far = [&](const PolygonSoup& soup) {
@@ -183,7 +191,8 @@ TEST(ConvexMesh, WorksAKilometreFromTheOrigin) {
 }
 
 TEST(ConvexMesh, SinglePrecisionCoordinatesKeepTheFacets) {
-  Random random(8);
+  constexpr std::uint64_t kSeed = 8;
+  Random random(kSeed);
   for (int i = 0; i < 50; ++i) {
     const auto rounded = [&](PolygonSoup soup) {
       soup = placed(triangulated(soup), uniform_rotation(random), 0.06, Vec3(0.1));
@@ -200,7 +209,8 @@ TEST(ConvexMesh, SinglePrecisionCoordinatesKeepTheFacets) {
 }
 
 TEST(ConvexMesh, CutHullsInSinglePrecisionAreNotRefused) {
-  Random random(10);
+  constexpr std::uint64_t kSeed = 10;
+  Random random(kSeed);
   for (int i = 0; i < 300; ++i) {
     // In separate statements: compilers differ in the order of arguments.
     const double thin = 0.03 + 0.97 * random.unit(), flat = 0.03 + 0.97 * random.unit();
@@ -291,7 +301,8 @@ TEST(ConvexMesh, HullsOfCrowdedAndRoundedPointsAreNotRefused) {
 // sphere lie within the same small part of the array.
 TEST(ConvexMesh, NeighboursInSpaceAreNeighboursInMemory) {
   PolygonSoup soup = icosphere(0.03, 5);
-  Random(9).shuffle(soup.faces);
+  constexpr std::uint64_t kSeed = 9;
+  Random(kSeed).shuffle(soup.faces);
   const ConvexMesh mesh(soup);
   std::size_t near = 0;
   for (const Edge& edge : mesh.edges()) {

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstdint>
 #include <glm/geometric.hpp>
 #include <limits>
 #include <vector>
@@ -27,7 +28,8 @@ double highest_above(const PolygonSoup& soup, const Vec3& point) {
 
 TEST(GridHull, HoldsEveryPointAndIsClosed) {
   for (const double away : {0.0, 1000.0}) {
-    Random random(5);
+    constexpr std::uint64_t kSeed = 5;
+    Random random(kSeed);
     std::vector<Vec3> points;
     for (int i = 0; i < 400; ++i) {
       const Vec3 on = uniform_rotation(random) * Vec3(0, 0, 0.03);

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <glm/geometric.hpp>
 #include <glm/gtc/quaternion.hpp>
 #include <glm/mat3x3.hpp>
@@ -94,7 +95,8 @@ void expect_as_defined(const ConvexMesh& mesh, double depth, const ConvexMesh& i
 }
 
 TEST(Inset, IsTheIntersectionOfTheMovedHalfSpaces) {
-  Random random(31);
+  constexpr std::uint64_t kSeed = 31;
+  Random random(kSeed);
   int vanished = 0;
   for (int body = 0; body < 40; ++body) {
     const ConvexMesh mesh = random_body(random, 6 + static_cast<int>(9 * random.unit()));
@@ -113,7 +115,8 @@ TEST(Inset, IsTheIntersectionOfTheMovedHalfSpaces) {
 }
 
 TEST(Inset, IsEmptyFromTheInradiusOn) {
-  Random random(32);
+  constexpr std::uint64_t kSeed = 32;
+  Random random(kSeed);
   for (int body = 0; body < 20; ++body) {
     const ConvexMesh mesh = random_body(random, 8);
     const double r = largest_inscribed_ball(mesh).radius;
@@ -128,7 +131,8 @@ TEST(Inset, IsEmptyFromTheInradiusOn) {
 }
 
 TEST(Inset, TheLargestBallIsInsideAndNoneIsLarger) {
-  Random random(33);
+  constexpr std::uint64_t kSeed = 33;
+  Random random(kSeed);
   for (int body = 0; body < 30; ++body) {
     const ConvexMesh mesh = random_body(random, 7);
     const Ball ball = largest_inscribed_ball(mesh);
@@ -162,7 +166,8 @@ TEST(Inset, TheLargestBallIsInsideAndNoneIsLarger) {
 }
 
 TEST(Inset, OfACubeIsACube) {
-  Random random(34);
+  constexpr std::uint64_t kSeed = 34;
+  Random random(kSeed);
   const Quat rotation = uniform_rotation(random);
   const ConvexMesh mesh(turned(cube(0.05), rotation));
   const auto in = inset(mesh, 0.004);
@@ -217,7 +222,8 @@ TEST(Inset, OfASphereIsAsDefinedHoweverLittleItsFacetsMove) {
 }
 
 TEST(Inset, OfAPlateStaysAPlate) {
-  Random random(35);
+  constexpr std::uint64_t kSeed = 35;
+  Random random(kSeed);
   const ConvexMesh mesh(turned(cylinder(0.03, 0.002, 64), uniform_rotation(random)));
   for (const double share : {0.5, 0.99, 0.9999}) {
     const auto in = inset(mesh, 0.001 * share);
@@ -232,7 +238,8 @@ TEST(Inset, ACornerSplitByRoundingIsOneCorner) {
   // A pyramid of 48 sides whose planes miss its apex by about 1e-12 of its size.
   constexpr double kSize = 0.06;
   constexpr int kSides = 48;
-  Random random(36);
+  constexpr std::uint64_t kSeed = 36;
+  Random random(kSeed);
   for (int body = 0; body < 20; ++body) {
     const Quat rotation = uniform_rotation(random);
     const Vec3 apex = rotation * Vec3(0, 0, 0.5 * kSize);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <functional>
 #include <string>
 #include <utility>
@@ -291,7 +292,8 @@ TEST(Mesh3mf, MemoryStaysInProportionToTheFile) {
 
 TEST(Mesh3mf, DamagedFilesAreRefusedOrRead) {
   const std::string text = model(object(box()), kItem);
-  Random random(5);
+  constexpr std::uint64_t kSeed = 5;
+  Random random(kSeed);
   int taken = 0;
   for (const bool deflated : {false, true}) {
     for (const bool large : {false, true}) {

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <cstdint>
 #include <string>
 
 #include "data/base/random.h"
@@ -262,7 +263,8 @@ TEST(MeshGltfFaults, SurfacesAreNamedByPrimitiveAndNode) {
 
 // Damaged files give only a soup or a MeshError.
 TEST(MeshGltfFaults, DamagedFilesNeverCrash) {
-  Random random(4);
+  constexpr std::uint64_t kSeed = 4;
+  Random random(kSeed);
   const std::string files[] = {
       document(), gltf::binary_file(document(R"([{"mesh": 0}])", ""), gltf::box_buffer())};
   int taken = 0;

@@ -4,13 +4,15 @@
 
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <numbers>
 
 namespace palpate::stimuli {
 namespace {
 
 TEST(UniformRotation, GivesTheSameBitsOnEveryCompiler) {
-  Random random(7);
+  constexpr std::uint64_t kSeed = 7;
+  Random random(kSeed);
   const Quat first = uniform_rotation(random), second = uniform_rotation(random);
   EXPECT_EQ(first.w, 0x1.bd988d9d86a2cp-2);
   EXPECT_EQ(first.x, -0x1.2a260959ce800p-3);
@@ -20,7 +22,9 @@ TEST(UniformRotation, GivesTheSameBitsOnEveryCompiler) {
   EXPECT_EQ(second.x, -0x1.5c7d25291ff10p-2);
   EXPECT_EQ(second.y, 0x1.b5e9dfa8b4601p-2);
   EXPECT_EQ(second.z, -0x1.6a50434ef6cfap-1);
-  Random other(3);  // its first draw is negative: the quaternion is negated
+  // Its first draw is negative: the quaternion is negated.
+  constexpr std::uint64_t kSeedOfNegated = 3;
+  Random other(kSeedOfNegated);
   const Quat third = uniform_rotation(other);
   EXPECT_EQ(third.w, 0x1.cb5051b91b9a6p-1);
   EXPECT_EQ(third.x, -0x1.2eef64fb71834p-2);
@@ -29,7 +33,8 @@ TEST(UniformRotation, GivesTheSameBitsOnEveryCompiler) {
 }
 
 TEST(UniformRotation, IsUnitWithPositiveRealPart) {
-  Random random(3);
+  constexpr std::uint64_t kSeed = 3;
+  Random random(kSeed);
   for (int i = 0; i < 10000; ++i) {
     const Quat q = uniform_rotation(random);
     EXPECT_GE(q.w, 0);
@@ -55,7 +60,8 @@ std::size_t azimuth_cell(double x, double y, std::size_t cells) {
 
 TEST(UniformRotation, TurnsAnAxisToEveryDirectionEquallyOften) {
   for (const Vec3& axis : {Vec3(1, 0, 0), Vec3(0, 1, 0), Vec3(0, 0, 1), Vec3(0.6, 0, 0.8)}) {
-    Random random(5);
+    constexpr std::uint64_t kSeed = 5;
+    Random random(kSeed);
     std::array<int, 64> counts{};  // equal areas: 8 slices in z, 8 sectors
     for (int i = 0; i < kDraws; ++i) {
       const Vec3 p = uniform_rotation(random) * axis;
@@ -69,7 +75,8 @@ TEST(UniformRotation, TurnsAnAxisToEveryDirectionEquallyOften) {
 // The direction of one axis can be uniform without the rotation being so: the turn about it must
 // be uniform as well.
 TEST(UniformRotation, TurnsAboutAnAxisEquallyOften) {
-  Random random(6);
+  constexpr std::uint64_t kSeed = 6;
+  Random random(kSeed);
   std::array<int, 16> counts{};
   for (int i = 0; i < kDraws; ++i) {
     const Quat q = uniform_rotation(random);
@@ -80,7 +87,8 @@ TEST(UniformRotation, TurnsAboutAnAxisEquallyOften) {
 
 // The angle a of a uniform rotation has the distribution (a - sin a) / pi.
 TEST(UniformRotation, HasTheAnglesOfHaarMeasure) {
-  Random random(8);
+  constexpr std::uint64_t kSeed = 8;
+  Random random(kSeed);
   std::array<int, 20> counts{};
   for (int i = 0; i < kDraws; ++i) {
     const double angle = 2 * std::acos(std::min(1.0, uniform_rotation(random).w));

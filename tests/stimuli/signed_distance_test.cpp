@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <glm/geometric.hpp>
 #include <limits>
 #include <numbers>
@@ -99,7 +100,8 @@ void expect_lipschitz(const Shape& shape, double reach, Random& random) {
 }
 
 TEST(SignedDistance, OfPrimitivesIsTheNearestPoint) {
-  Random random(1);
+  constexpr std::uint64_t kSeed = 1;
+  Random random(kSeed);
   for (const ShapeKind shape : kShapes) {
     expect_nearest(solid_of(shape), 0.1, random);
     expect_nearest(solid_of(shape, 0.05, 0.02), 0.1, random);
@@ -107,7 +109,8 @@ TEST(SignedDistance, OfPrimitivesIsTheNearestPoint) {
 }
 
 TEST(SignedDistance, OfPrimitivesHasTheNormalAsGradient) {
-  Random random(2);
+  constexpr std::uint64_t kSeed = 2;
+  Random random(kSeed);
   for (const ShapeKind shape : kShapes) {
     expect_gradient(solid_of(shape), 0.08, random);
     expect_gradient(solid_of(shape, 0.02, 0.1), 0.08, random);
@@ -154,7 +157,8 @@ TEST(SignedDistance, OfAMeshOrCompoundSpecIsRefused) {
 }
 
 TEST(SignedDistance, OfPolyhedraIsTheNearestPoint) {
-  Random random(3);
+  constexpr std::uint64_t kSeed = 3;
+  Random random(kSeed);
   for (int i = 0; i < 6; ++i) {
     const ConvexMesh mesh(testing::random_polyhedron(random, 16 + 4 * i, Vec3(0.5, 0.4, 0.3)));
     if (signed_distance(mesh, Vec3(0)).distance > -0.02) continue;
@@ -166,7 +170,8 @@ TEST(SignedDistance, OfPolyhedraIsTheNearestPoint) {
 }
 
 TEST(SignedDistance, OfACubeMeshIsThatOfTheCube) {
-  Random random(4);
+  constexpr std::uint64_t kSeed = 4;
+  Random random(kSeed);
   const ConvexMesh mesh(cube(0.06));
   for (int i = 0; i < 2000; ++i) {
     const Vec3 point = random_point(random, 0.08);
@@ -188,7 +193,8 @@ TEST(SignedDistance, OverACornerItIsTheDistanceOfTheCorner) {
 }
 
 TEST(SignedDistance, OnTheSurfaceTheNormalIsAFacets) {
-  Random random(5);
+  constexpr std::uint64_t kSeed = 5;
+  Random random(kSeed);
   for (int i = 0; i < 50; ++i) {
     const ConvexMesh mesh(placed(cube(0.06), uniform_rotation(random), 1, Vec3(0.1)));
     for (const Vec3& corner : mesh.vertices()) {
@@ -203,7 +209,8 @@ TEST(SignedDistance, OnTheSurfaceTheNormalIsAFacets) {
 
 // An inscribed mesh lies within the analytic shape, and the gap falls with the square of the step.
 TEST(SignedDistance, OfFinerMeshesTendsToThatOfTheShape) {
-  Random random(6);
+  constexpr std::uint64_t kSeed = 6;
+  Random random(kSeed);
   const auto worst = [&](const ObjectSpec& spec) {
     const ConvexMesh mesh(polygons_of(spec));
     double gap = 0;

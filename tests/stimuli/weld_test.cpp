@@ -34,7 +34,8 @@ Numbers by_all_pairs(const std::vector<Vec3>& points, double tolerance) {
 }
 
 TEST(Weld, TakesTheFirstOfEachCluster) {
-  Random random(7);
+  constexpr std::uint64_t kSeed = 7;
+  Random random(kSeed);
   int welded = 0;
   for (int round = 0; round < testing::rounds(200); ++round) {
     std::vector<Vec3> points;

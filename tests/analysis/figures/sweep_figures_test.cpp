@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstdint>
 #include <set>
 
 #include "analysis/figures/figures.h"
@@ -36,7 +37,8 @@ Outcome mostly_first(const std::vector<double>& x) {
 }
 
 TEST(SweepFigures, ShowAsManyPointsAsTheySay) {
-  Random random(2);
+  constexpr std::uint64_t kSeed = 2;
+  Random random(kSeed);
   for (const std::size_t n : {1U, 399U, 400U, 401U, 799U, 800U, 2500U}) {
     std::vector<std::vector<double>> points;
     for (std::size_t i = 0; i < n; ++i) points.push_back({random.unit(), random.unit()});
@@ -54,7 +56,8 @@ TEST(SweepFigures, ChosenPointsAreOfTheWholeDesign) {
   for (const Mark& dot : dots_of(grid, "scatter")) levels.insert(dot.x.at(0));
   EXPECT_EQ(levels.size(), 7u);
 
-  Random random(3);
+  constexpr std::uint64_t kSeed = 3;
+  Random random(kSeed);
   const SweepTable saltelli =
       table_of("saltelli", saltelli_points(3, 400, [&] { return random.unit(); }), mostly_first);
   std::vector<int> samples(5);
@@ -64,7 +67,8 @@ TEST(SweepFigures, ChosenPointsAreOfTheWholeDesign) {
 }
 
 TEST(SweepFigures, HaveTheirForm) {
-  Random random(3);
+  constexpr std::uint64_t kSeed = 3;
+  Random random(kSeed);
   const auto draw = [&] { return random.unit(); };
   for (const SweepTable& table :
        {table_of("grid", grid_points(2, 7), mostly_first),

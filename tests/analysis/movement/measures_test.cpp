@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <glm/geometric.hpp>
 #include <numbers>
 
@@ -153,7 +154,8 @@ TEST(Signal, TheFilterIsDownByThreeDecibelAtTheCutOff) {
 }
 
 TEST(Signal, NoiseAddsItsPathAndTheFilterTakesItAway) {
-  Random random(7);
+  constexpr std::uint64_t kSeed = 7;
+  Random random(kSeed);
   std::vector<Vec3> rest;
   for (int i = 0; i < 20000; ++i)
     rest.push_back(30e-6 * Vec3(random.normal(), random.normal(), random.normal()));
@@ -270,7 +272,8 @@ TEST(Measures, TwiceTheNoiseChangesFewOfThem) {
   const TouchedSurface surface(draw_places(sphere(0.03), TouchedSurface::kPlaces));
   const auto noisy = [&](double sd) {
     MovementTrial trial = still;
-    Random random(5);
+    constexpr std::uint64_t kSeed = 5;
+    Random random(kSeed);
     for (Vec3& tip : trial.tip) tip += sd * Vec3(random.normal(), random.normal(), random.normal());
     return measure(trial, &surface, {});
   };

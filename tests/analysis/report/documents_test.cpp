@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <utility>
@@ -28,7 +29,8 @@ using Json = nlohmann::ordered_json;
 /// Eight participants, four shapes; with `limit` above 0 some trials end there (s).
 Analysis study_with(const std::vector<std::string>& renderers, double limit = 0) {
   TrialTableBuilder builder;
-  Random random(7);
+  constexpr std::uint64_t kSeed = 7;
+  Random random(kSeed);
   for (int p = 0; p < 8; ++p) {
     const std::string participant = "P" + std::to_string(p);
     int trial = 0;

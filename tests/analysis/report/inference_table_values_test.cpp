@@ -11,6 +11,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -57,7 +58,8 @@ struct Study {
       : renderers(std::move(names)),
         log_times(renderers.size(), {kShapes, std::vector<Values>(kParticipants)}),
         wrong(renderers.size(), {kShapes, std::vector<std::size_t>(kParticipants)}) {
-    Random random(71);
+    constexpr std::uint64_t kSeed = 71;
+    Random random(kSeed);
     for (std::size_t p = 0; p < kParticipants; ++p) {
       const double intercept = 0.4 * random.normal();
       for (std::size_t r = 0; r < renderers.size(); ++r) {

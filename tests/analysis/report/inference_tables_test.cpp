@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -20,7 +21,8 @@ namespace {
 /// index of the renderer.
 Analysis varied_study(const std::vector<std::string>& renderers) {
   TrialTableBuilder builder;
-  Random random(23);
+  constexpr std::uint64_t kSeed = 23;
+  Random random(kSeed);
   for (int p = 0; p < 12; ++p) {
     const std::string name = std::to_string(p);
     const double intercept = 0.4 * random.normal();

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <nlohmann/json.hpp>
 #include <sstream>
 #include <string>
@@ -34,7 +35,8 @@ struct Study {
 
 Analysis analysis_of_study(const Study& study) {
   TrialTableBuilder builder;
-  Random random(11);
+  constexpr std::uint64_t kSeed = 11;
+  Random random(kSeed);
   for (std::size_t p = 0; p < study.participants.size(); ++p) {
     int number = 0;
     for (const auto& renderer : study.renderers) {

@@ -7,6 +7,7 @@
 
 #include <boost/math/distributions/normal.hpp>
 #include <cmath>
+#include <cstdint>
 #include <fstream>
 #include <functional>
 #include <map>
@@ -178,7 +179,8 @@ TEST(Censored, IsAtTheTopOfTheLikelihoodWrittenOut) {
 }
 
 TEST(Censored, IsThePairedTTestWhereNobodyTimesOutAndAllHaveAsManyTrials) {
-  Random random(8);
+  constexpr std::uint64_t kSeed = 8;
+  Random random(kSeed);
   const TrialTable table = table_of(simulated(random, 6, 5, -0.3, 0.2, 1e9));
   const CensoredEstimate found = estimate_all(table);
   const Description description = describe(table, 0.2);
@@ -220,7 +222,8 @@ TEST(Censored, HoldsItsIntervalWhereThePrimaryOneLeavesTheTruth) {
 }
 
 TEST(Censored, TakesTheParticipantWhoNeverAnswersInTimeWithOneRenderer) {
-  Random random(12);
+  constexpr std::uint64_t kSeed = 12;
+  Random random(kSeed);
   auto rows = simulated(random, 4, 6, -0.3, 0.1, 60);
   const double without = *estimate_all(table_of(rows)).log_ratio;
   for (int i = 0; i < 6; ++i) {

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdint>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -111,7 +112,8 @@ TEST(BootstrapOracle, SameResamplesGiveTheSameInterval) {
 
 TEST(BootstrapOracle, OwnResamplesComeCloseToMany) {
   for (const Json& set : load("bca")) {
-    Random random(1);
+    constexpr std::uint64_t kSeed = 1;
+    Random random(kSeed);
     const Bootstrap found = bootstrap_mean(set["differences"].get<std::vector<double>>(), random);
     ASSERT_EQ(found.undefined, "");
     EXPECT_EQ(found.resamples, 9999U);

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdint>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -19,7 +20,8 @@ namespace {
 const std::string kPairedFixtures = PALPATE_SOURCE_DIR "/tests/analysis/fixtures/";
 
 Bootstrap bootstrap(const std::vector<double>& differences) {
-  Random random(5);
+  constexpr std::uint64_t kSeed = 5;
+  Random random(kSeed);
   return bootstrap_mean(differences, random, 999);
 }
 
@@ -91,7 +93,8 @@ TEST(PercentReduction, PositiveWhenTheRayIsFasterAndEndsSwap) {
 }
 
 TEST(Properties, SignsFlipTogether) {
-  Random random(9);
+  constexpr std::uint64_t kSeed = 9;
+  Random random(kSeed);
   for (int round = 0; round < 50; ++round) {
     std::vector<double> d, flipped;
     for (std::size_t i = 0; i < 3 + random.below(30); ++i) {
@@ -110,7 +113,8 @@ TEST(Properties, SignsFlipTogether) {
 }
 
 TEST(Wilcoxon, TheApproximationBeyondTheLimitMeetsTheExactP) {
-  Random random(4);
+  constexpr std::uint64_t kSeed = 4;
+  Random random(kSeed);
   std::vector<double> d;
   while (d.size() < kExactWilcoxon) d.push_back(random.normal() + 0.1);
   const Wilcoxon exact = wilcoxon(d);
@@ -153,7 +157,8 @@ TEST(Bootstrap, HoldsTheMeanAsOftenAsIsSaid) {
 TEST(Bootstrap, RepeatsFromItsSeed) {
   const std::vector<double> d{-0.2, -0.1, 0.05, -0.4, -0.15};
   EXPECT_EQ(bootstrap(d).log_ratio_ci95->low, bootstrap(d).log_ratio_ci95->low);
-  Random other(6);
+  constexpr std::uint64_t kSeed = 6;
+  Random other(kSeed);
   EXPECT_NE(bootstrap(d).log_ratio_ci95->low, bootstrap_mean(d, other, 999).log_ratio_ci95->low);
 }
 

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <nlohmann/json.hpp>
 #include <sstream>
 #include <string>
@@ -220,7 +221,8 @@ TEST(Pilot, GivesBackWhatItWasDrawnFrom) {
 /// `one_more` a ninth without times in one cell.
 Analysis uneven_pilot(bool one_more, const std::string& missing_with = "ray") {
   TrialTableBuilder builder;
-  Random random(17);
+  constexpr std::uint64_t kSeed = 17;
+  Random random(kSeed);
   for (int p = 0; p < (one_more ? 9 : 8); ++p) {
     int trial = 0;
     const std::string name = std::to_string(p);

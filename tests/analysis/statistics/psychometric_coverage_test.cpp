@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <cstdio>
 #include <vector>
 
@@ -94,7 +95,8 @@ TEST(PsychometricFit, IntervalsCoverTheTruthIn200SimulatedStudies) {
 // Where the lower end is held at 0, the fit is bad and the JND too large.
 TEST(PsychometricFit, LapsesAtBothEndsAreNoBadFit) {
   PsychometricModel both{{}, {}, {0, true, 0.06}, true}, upper_only{{}, {}, {0, true, 0.06}};
-  Random random(11, {0xc2});
+  constexpr std::uint64_t kSeed = 11;
+  Random random(kSeed, {0xc2});
   constexpr int kStudies = 40;
   int bad = 0, bad_upper = 0;
   double ratio = 0, ratio_upper = 0;
@@ -164,7 +166,8 @@ TEST(PsychometricFit, QuickRefitsGiveTheGoodnessOfWholeOnes) {
 }
 
 TEST(PsychometricFit, DevianceOfARightModelHasAnEvenPAndOfAWrongOneASmall) {
-  Random random(4);
+  constexpr std::uint64_t kSeed = 4;
+  Random random(kSeed);
   int below_fifth = 0;
   for (int study = 0; study < 60; ++study) {
     const auto counts = simulate_counts({}, {4, 1.2, 0, 0}, random);

@@ -4,6 +4,7 @@
 
 #include <Eigen/Dense>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 
 #include "analysis/statistics/quantiles.h"
@@ -74,7 +75,8 @@ Eigen::VectorXd residual(const std::vector<std::vector<double>>& others,
 }
 
 TEST(RankCorrelations, PartialOnesAreThoseOfTheResiduals) {
-  Random random(3);
+  constexpr std::uint64_t kSeed = 3;
+  Random random(kSeed);
   std::vector<std::vector<double>> inputs(4, std::vector<double>(60));
   std::vector<double> output(60);
   for (std::size_t i = 0; i < 60; ++i) {
@@ -102,7 +104,8 @@ TEST(RankCorrelations, PartialOnesAreThoseOfTheResiduals) {
 
 // In 95 % of samples Fisher's interval holds the correlation that they were drawn from: none, here.
 TEST(RankCorrelations, IntervalsHoldTheTruthAsOftenAsTheySay) {
-  Random random(11);
+  constexpr std::uint64_t kSeed = 11;
+  Random random(kSeed);
   int spearman = 0, partial = 0;
   constexpr int kSamples = 1000;
   for (int s = 0; s < kSamples; ++s) {
@@ -126,7 +129,8 @@ double half_on_z(const Interval& ci) { return (std::atanh(ci.high) - std::atanh(
 // Fisher (1924): h variables that are held constant take h points away. Each of p parameters' rank
 // correlations holds p - 1 others constant; with one it is Spearman's, with the same interval.
 TEST(RankCorrelations, EachParameterHeldConstantTakesOnePointAway) {
-  Random random(21);
+  constexpr std::uint64_t kSeed = 21;
+  Random random(kSeed);
   for (const std::size_t parameters : {1U, 2U, 3U, 5U}) {
     constexpr std::size_t n = 10;
     std::vector<std::vector<double>> inputs(parameters, std::vector<double>(n));
@@ -152,7 +156,8 @@ TEST(RankCorrelations, EachParameterHeldConstantTakesOnePointAway) {
 
 // A strong correlation, few points.
 TEST(RankCorrelations, IntervalsOfStrongOnesHoldTheTruthAsOftenAsTheySay) {
-  Random random(12);
+  constexpr std::uint64_t kSeed = 12;
+  Random random(kSeed);
   const auto sample = [&](std::size_t n) {
     std::vector<std::vector<double>> inputs(3, std::vector<double>(n));
     std::vector<double> output(n);
@@ -205,7 +210,8 @@ constexpr double kFirstShare = kOfFirst / (kOfFirst + kOfChance);
 
 // The variance of x1's part is 100/12, that of chance the mean of (1 + 4 x1)^2.
 TEST(SobolIndices, ChanceWithinThePointsIsInNoTotalIndex) {
-  Random random(8);
+  constexpr std::uint64_t kSeed = 8;
+  Random random(kSeed);
   const NoisySweep sweep = noisy_sweep(4000, random);
   const SobolIndices found = sobol_indices(sweep.outputs, sweep.errors, 3, 1);
   EXPECT_NEAR(found.variance, kOfFirst + kOfChance, 0.6);
@@ -223,7 +229,8 @@ TEST(SobolIndices, ChanceWithinThePointsIsInNoTotalIndex) {
 }
 
 TEST(SobolIndices, IntervalsOfInertParametersHoldZeroAsOftenAsTheySay) {
-  Random random(9);
+  constexpr std::uint64_t kSeed = 9;
+  Random random(kSeed);
   int inert = 0, first = 0;
   constexpr int kSweeps = 150;
   for (int s = 0; s < kSweeps; ++s) {
@@ -239,7 +246,8 @@ TEST(SobolIndices, IntervalsOfInertParametersHoldZeroAsOftenAsTheySay) {
 
 // Some of the studies have one participant with times: no standard error.
 TEST(SobolIndices, StandardErrorsThatAreMissingAreTakenFromTheOthers) {
-  Random random(10);
+  constexpr std::uint64_t kSeed = 10;
+  Random random(kSeed);
   NoisySweep sweep = noisy_sweep(2000, random);
   const double all = *sobol_indices(sweep.outputs, sweep.errors, 3, 1).of[2].total;
   for (std::size_t i = 0; i < sweep.errors.size(); i += 3) sweep.errors[i] = kUndefined;
@@ -247,7 +255,8 @@ TEST(SobolIndices, StandardErrorsThatAreMissingAreTakenFromTheOthers) {
 }
 
 TEST(SobolIndices, BasePointsWithGapsAreLeftOut) {
-  Random random(5);
+  constexpr std::uint64_t kSeed = 5;
+  Random random(kSeed);
   std::vector<double> outputs;
   for (int base = 0; base < 50; ++base) {
     const double a = random.unit(), b = random.unit(), a2 = random.unit(), b2 = random.unit();

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 
 #include "analysis/report/report.h"
 #include "data/base/random.h"
@@ -19,7 +20,8 @@ Outcome nothing(const std::vector<double>&) { return {}; }
 // The samples of a base point share coordinates: with 29 parameters 31 of them say little more than
 // two. The truth is one half, by symmetry.
 TEST(PatternShare, IntervalOfSaltellisSamplesHoldsTheTruthAsOftenAsItSays) {
-  Random random(4);
+  constexpr std::uint64_t kSeed = 4;
+  Random random(kSeed);
   constexpr int kSweeps = 400;
   for (const std::size_t parameters : {3U, 29U}) {
     int held = 0;
@@ -34,7 +36,8 @@ TEST(PatternShare, IntervalOfSaltellisSamplesHoldsTheTruthAsOftenAsItSays) {
 }
 
 TEST(PatternShare, OfSaltellisSamplesAAndBCount) {
-  Random random(5);
+  constexpr std::uint64_t kSeed = 5;
+  Random random(kSeed);
   SweepTable table =
       table_of("saltelli", saltelli_points(4, 10, [&] { return random.unit(); }), nothing);
   table.failed[7] = true;  // the B of the second base point
@@ -90,7 +93,8 @@ TEST(SweepAnalysis, LooksForThePapersPatternWhereItsShapesAndRenderersAre) {
 }
 
 TEST(SweepAnalysis, SaysOfEachTotalIndexWhetherChanceIsAPartOfIt) {
-  Random random(6);
+  constexpr std::uint64_t kSeed = 6;
+  Random random(kSeed);
   const auto points = saltelli_points(2, 200, [&] { return random.unit(); });
   const auto noisy = [&](const std::vector<double>& x) {
     return Outcome{10 * x[0] + 3 * random.normal(), 3};

@@ -7,6 +7,7 @@
 
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <utility>
 #include <vector>
 
@@ -30,7 +31,8 @@ ThresholdPlanSettings asked(std::size_t trials, std::vector<std::size_t> partici
 double power_of_six(double mean) {
   constexpr int kStudies = 20000, kPeople = 6;
   constexpr double kCritical = 2.570582;  // t, 5 degrees of freedom
-  Random random(77);
+  constexpr std::uint64_t kSeed = 77;
+  Random random(kSeed);
   int found = 0;
   for (int s = 0; s < kStudies; ++s) {
     double sum = 0, squares = 0;

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -20,7 +21,8 @@ TEST(EditDistance, CountsInsertedDeletedAndReplacedBytes) {
 }
 
 TEST(EditDistance, IsAMetric) {
-  Random random(3);
+  constexpr std::uint64_t kSeed = 3;
+  Random random(kSeed);
   std::vector<std::string> words;
   for (int i = 0; i < 12; ++i) {
     std::string word;

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <cstdint>
 #include <random>
 #include <string>
 
@@ -66,7 +67,8 @@ TEST(Printable, CutsBetweenCharacters) {
 }
 
 TEST(Printable, IsPlainForAnyInput) {
-  std::mt19937 generator(7);
+  constexpr std::uint32_t kSeed = 7;
+  std::mt19937 generator(kSeed);
   for (int i = 0; i < 2000; ++i) {
     std::string text;
     for (int k = 0; k < 12; ++k) text += static_cast<char>(generator() & 0xFFU);

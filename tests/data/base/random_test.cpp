@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <numeric>
 #include <set>
 
@@ -64,7 +65,8 @@ TEST(Random, StreamsDifferByElementsOrderAndLength) {
 }
 
 TEST(Random, BelowIsUniformAndStaysBelow) {
-  Random random(11);
+  constexpr std::uint64_t kSeed = 11;
+  Random random(kSeed);
   std::array<int, 7> counts{};
   constexpr int kSamples = 70000;
   for (int i = 0; i < kSamples; ++i) ++counts.at(random.below(7));
@@ -76,7 +78,8 @@ TEST(Random, BelowIsUniformAndStaysBelow) {
 }
 
 TEST(Random, UnitFillsTheHalfOpenInterval) {
-  Random random(12);
+  constexpr std::uint64_t kSeed = 12;
+  Random random(kSeed);
   double low = 1, high = 0, sum = 0;
   constexpr int kSamples = 100000;
   for (int i = 0; i < kSamples; ++i) {
@@ -93,7 +96,8 @@ TEST(Random, UnitFillsTheHalfOpenInterval) {
 }
 
 TEST(Random, NormalHasTheMomentsOfTheStandardNormal) {
-  Random random(13);
+  constexpr std::uint64_t kSeed = 13;
+  Random random(kSeed);
   constexpr int kSamples = 200000;
   double sum = 0, squares = 0, fourth = 0, neighbours = 0, last = 0;
   for (int i = 0; i < kSamples; ++i) {
@@ -112,7 +116,8 @@ TEST(Random, NormalHasTheMomentsOfTheStandardNormal) {
 }
 
 TEST(Random, ShuffleGivesEveryOrderEquallyOften) {
-  Random random(14);
+  constexpr std::uint64_t kSeed = 14;
+  Random random(kSeed);
   std::array<int, 24> counts{};
   constexpr int kSamples = 24000;
   for (int i = 0; i < kSamples; ++i) {

@@ -5,6 +5,7 @@
 #include <SQLiteCpp/Transaction.h>
 #include <gtest/gtest.h>
 
+#include <cstdint>
 #include <functional>
 #include <random>
 #include <set>
@@ -126,7 +127,8 @@ TEST_F(DamagedDatabase, AnUndamagedDatabaseIsExported) {
 }
 
 TEST_F(DamagedDatabase, DamagedBytesAnywhere) {
-  std::mt19937 random(11);
+  constexpr std::uint32_t kSeed = 11;
+  std::mt19937 random(kSeed);
   for (int round = 0; round < palpate::testing::rounds(80); ++round) {
     std::string damaged = original_;
     const int times = 1 + static_cast<int>(random() % 3);
@@ -143,7 +145,8 @@ TEST_F(DamagedDatabase, DamagedBytesAnywhere) {
 }
 
 TEST_F(DamagedDatabase, TruncatedAnywhere) {
-  std::mt19937 random(12);
+  constexpr std::uint32_t kSeed = 12;
+  std::mt19937 random(kSeed);
   for (int round = 0; round < 60; ++round) {
     const std::size_t size = round % 2 == 0 ? 4096 * (random() % (original_.size() / 4096))
                                             : random() % original_.size();

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <chrono>
+#include <cstdint>
 #include <map>
 #include <random>
 #include <sstream>
@@ -88,7 +89,8 @@ void expect_nothing_lost(const std::string& path, const Said& said) {
 TEST(Durability, ASessionKilledAtAnyMomentLosesNothingAndResumes) {
   constexpr int kTrials = 30;
   constexpr int kKills = 120;
-  std::mt19937 random(2000);
+  constexpr std::uint32_t kSeed = 2000;
+  std::mt19937 random(kSeed);
   int kills = 0, databases = 0, cut_off_in_all = 0;
   while (kills < kKills) {
     const TemporaryFolder folder;
@@ -152,7 +154,8 @@ TEST(Durability, ASimulationKilledAtAnyMomentExportsTheSameBytes) {
   const std::string whole = folder / "whole.db";
   EXPECT_EQ(ChildProcess({"simulate", whole, std::to_string(kTrials), "1"}).wait(), 0);
   const std::string expected = export_of(whole);
-  std::mt19937 random(7);
+  constexpr std::uint32_t kSeed = 7;
+  std::mt19937 random(kSeed);
   int kills = 0;
   for (int database = 0; kills < 20; ++database) {
     const std::string path = folder / ("cut" + std::to_string(database) + ".db");

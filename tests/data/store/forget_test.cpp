@@ -4,6 +4,7 @@
 #include <signal.h>
 
 #include <chrono>
+#include <cstdint>
 #include <random>
 #include <thread>
 #include <tuple>
@@ -139,7 +140,8 @@ TEST_F(Forgetting, AReaderKeepsTheWalAndTheSameCallFinishesLater) {
 
 TEST_F(Forgetting, KilledAtAnyMomentItIsAllThereOrTheSameCallFinishes) {
   const std::string original = contents_of(path_);
-  std::mt19937 random(7);
+  constexpr std::uint32_t kSeed = 7;
+  std::mt19937 random(kSeed);
   // The next kill comes sooner or later depending on the outcome, so that slow machines see both
   // outcomes.
   double longest_us = 45'000;

@@ -3,6 +3,7 @@
 
 #include <bit>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <random>
 #include <stdexcept>
@@ -44,7 +45,8 @@ void expect_same_bits(const std::vector<SampleRecord>& samples) {
 
 /// A stroke over an object, sampled at 1 kHz with sensor noise.
 std::vector<SampleRecord> a_stroke(int ticks) {
-  std::mt19937 noise(7);
+  constexpr std::uint32_t kSeed = 7;
+  std::mt19937 noise(kSeed);
   std::vector<SampleRecord> samples(static_cast<std::size_t>(ticks));
   for (int t = 0; t < ticks; ++t) {
     auto& s = samples[static_cast<std::size_t>(t)];
@@ -64,7 +66,8 @@ std::vector<SampleRecord> a_stroke(int ticks) {
 }
 
 TEST(SamplesCodec, BodiesComeBackAndOtherSamplesKeepTheirPacking) {
-  std::mt19937_64 random(4);
+  constexpr std::uint64_t kSeed = 4;
+  std::mt19937_64 random(kSeed);
   std::vector<SampleRecord> samples = a_stroke(50);
   std::vector<BodyRecord> bodies;
   EXPECT_EQ(packing_for(bodies), kPlainSamplesPacking);
@@ -103,7 +106,8 @@ TEST(SamplesCodec, BodiesComeBackAndOtherSamplesKeepTheirPacking) {
 }
 
 TEST(SamplesCodec, EveryBitPatternComesBack) {
-  std::mt19937_64 random(1);
+  constexpr std::uint64_t kSeed = 1;
+  std::mt19937_64 random(kSeed);
   std::vector<SampleRecord> samples(257);
   for (auto& s : samples) {
     s.tick = static_cast<std::uint32_t>(random());

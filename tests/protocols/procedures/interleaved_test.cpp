@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <cstdint>
 #include <map>
 
 #include "protocols/procedures/procedure.h"
@@ -46,7 +47,8 @@ std::vector<ShownTrial> run_tracks(InterleavedTracks tracks, Random& random) {
 }
 
 TEST(InterleavedProcedures, EveryRoundHasATrialOfEveryUnfinishedTrack) {
-  Random random(5);
+  constexpr std::uint64_t kSeed = 5;
+  Random random(kSeed);
   const std::vector<ShownTrial> shown = run_tracks({one_of_each(), 3}, random);
   std::map<std::size_t, std::size_t> counts;
   for (std::size_t i = 0; i < shown.size(); ++i) {
@@ -78,7 +80,8 @@ TEST(InterleavedProcedures, AResumedSessionContinuesTheSame) {
 }
 
 TEST(InterleavedProcedures, OrderIsRandom) {
-  Random one(1), two(1);
+  constexpr std::uint64_t kSeed = 1;
+  Random one(kSeed), two(kSeed);
   const auto first = run_tracks({one_of_each(), 1}, one);
   const auto second = run_tracks({one_of_each(), 2}, two);
   int other = 0;
@@ -91,7 +94,8 @@ TEST(InterleavedProcedures, NoneExceedsTheTrialsOfItsSpec) {
   for (const ProcedureSpec& spec : one_of_each()) {
     for (const double share : {0.0, 0.5, 1.0}) {
       Procedure procedure(spec, 4);
-      Random random(8);
+      constexpr std::uint64_t kSeed = 8;
+      Random random(kSeed);
       while (const auto level = procedure.next_level())
         procedure.record({*level, random.unit() < share});
       EXPECT_LE(procedure.history().size(), most_trials(spec));
@@ -124,7 +128,8 @@ TEST(InterleavedProcedures, TracksThatShareTablesLearnFromTheirOwnAnswers) {
   const ProcedureSpec quest = one_of_each()[2];
   InterleavedTracks two({quest, quest}, 9);
   Procedure alone[2]{{quest, 1}, {quest, 2}};
-  Random random(3);
+  constexpr std::uint64_t kSeed = 3;
+  Random random(kSeed);
   while (const auto next = two.next()) {
     EXPECT_EQ(alone[next->track].next_level(), next->level);
     const Response answer{next->level, random.unit() < (next->track == 0 ? 0.9 : 0.3)};

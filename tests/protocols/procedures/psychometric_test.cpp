@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 
 #include "protocols/procedures/portable_math.h"
@@ -88,7 +89,8 @@ TEST(Psychometric, LowerIsEasierMirrors) {
 
 TEST(Psychometric, ParticipantAnswersAsOftenAsTheFunctionSays) {
   const PsychometricParticipant participant{{}, {10, 1, 0.5, 0.1}};
-  Random random(3);
+  constexpr std::uint64_t kSeed = 3;
+  Random random(kSeed);
   int successes = 0;
   for (int i = 0; i < 100000; ++i) successes += participant.succeeds(11, random) ? 1 : 0;
   const double p = 0.5 + 0.4 / (1 + std::exp(-1.0));

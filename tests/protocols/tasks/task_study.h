@@ -1,6 +1,7 @@
 #pragma once
 // A study of three blocks, and its trials with answers that depend on the trial alone.
 
+#include <cstdint>
 #include <nlohmann/json.hpp>
 #include <vector>
 
@@ -41,7 +42,8 @@ inline Protocol parsed(const nlohmann::json& document) {
 
 /// Answers that depend on the trial alone.
 inline TrialOutcome answer_to(const Trial& trial) {
-  Random random(99, {static_cast<std::uint64_t>(trial.trial)});
+  constexpr std::uint64_t kSeed = 99;
+  Random random(kSeed, {static_cast<std::uint64_t>(trial.trial)});
   const bool success = random.unit() < (trial.level.value_or(400) > 380 ? 0.9 : 0.4);
   return {success, success, random.unit() > 0.05};
 }

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <map>
 #include <numbers>
@@ -146,7 +147,8 @@ TEST(ErrorTally, AnglesAreAngles) {
 }
 
 TEST(PlainWalk, InDoubleIsTheWalk) {
-  Random random(1);
+  constexpr std::uint64_t kSeed = 1;
+  Random random(kSeed);
   for (const stimuli::ShapeKind shape : kShapes) {
     const stimuli::ConvexMesh mesh(stimuli::polygons_of(primitive(shape, 2)));
     const PlainWalk<double> plain(mesh);

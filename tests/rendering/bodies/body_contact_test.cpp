@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdint>
 #include <glm/geometric.hpp>
 
 #include "data/base/random.h"
@@ -194,7 +195,8 @@ TEST(BodyContact, SlopeAndFriction) {
 
 /// Contacts between bodies conserve momentum and do not increase energy.
 TEST(BodyContact, MomentumStaysWhateverHappens) {
-  Random random(11);
+  constexpr std::uint64_t kSeed = 11;
+  Random random(kSeed);
   for (int trial = 0; trial < 12; ++trial) {
     BodyScene s;
     const double restitution = trial % 3 == 0 ? 1 : 0.4;
@@ -235,7 +237,8 @@ TEST(BodyContact, MomentumStaysWhateverHappens) {
 /// Old remembered distances and old ends of searches hide no contact: the near parts are those that
 /// a state without memory finds.
 TEST(BodyContact, RememberedDistancesHideNoContact) {
-  Random random(21);
+  constexpr std::uint64_t kSeed = 21;
+  Random random(kSeed);
   const Mesh ball = mesh_of(stimuli::icosphere(0.015, 2)), bar = box_mesh({0.06, 0.01, 0.01});
   std::size_t found = 0;
   for (int trial = 0; trial < 4; ++trial) {

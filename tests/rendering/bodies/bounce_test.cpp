@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <glm/geometric.hpp>
 
 #include "data/base/random.h"
@@ -145,7 +146,8 @@ TEST(Bounce, ElasticFrictionlessBouncesKeepEnergy) {
 /// Friction reverses sliding where a body strikes with its mass behind the point: Newton's law
 /// would add energy there.
 TEST(Bounce, FrictionAddsNoEnergy) {
-  Random random(9);
+  constexpr std::uint64_t kSeed = 9;
+  Random random(kSeed);
   int struck = 0;
   for (int trial = 0; trial < 200; ++trial) {
     BodyScene s;
@@ -257,7 +259,8 @@ TEST(Bounce, AFastBodyOnTheTipGainsNoEnergyAndGivesItsMomentum) {
 /// A still stylus comes between the balls of a turning dumbbell. When both meet it, from opposite
 /// sides, the ideal stylus is centimetres away although nobody has pressed it so far.
 TEST(Bounce, DumbbellsThatTurnOnAStylusGainLittleEnergy) {
-  Random random(105);
+  constexpr std::uint64_t kSeed = 105;
+  Random random(kSeed);
   const Mesh ball = mesh_of(stimuli::icosphere(0.02, 3));
   const Mesh bar = mesh_of(stimuli::cylinder(0.008, 0.06, 24));
   int touched = 0;

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdint>
 #include <vector>
 
 #include "data/base/random.h"
@@ -29,7 +30,8 @@ void fill_random(Random& random, std::size_t n, std::size_t rank, Complementarit
 }
 
 TEST(Complementarity, HoldsByDefinition) {
-  Random random(3);
+  constexpr std::uint64_t kSeed = 3;
+  Random random(kSeed);
   ComplementarityProblem p;
   for (int trial = 0; trial < 300; ++trial) {
     const std::size_t n = 1 + static_cast<std::size_t>(uniform(random, 0, 30));

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/gtc/quaternion.hpp>
@@ -167,7 +168,8 @@ TEST(MassProperties, OfAClosedSurface) {
 
 /// Convex parts of a mesh with rounded coordinates abut with steps and gaps.
 TEST(MassProperties, OfPartsOfARoundedFile) {
-  Random random(11);
+  constexpr std::uint64_t kSeed = 11;
+  Random random(kSeed);
   int cut = 0;
   for (int round = 0; round < 240; ++round) {
     stimuli::PolygonSoup soup = round % 3 == 0   ? stimuli::solids::random_blocks(random, 8).soup

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdint>
 #include <glm/geometric.hpp>
 #include <numbers>
 
@@ -121,7 +122,8 @@ TEST(UnionOracle, GroovesOf2To178Degrees) {
     for (const OracleTool& tool : {kPoint, stylus(0.12)}) {
       // The stylus upright in the middle of the groove, where it touches at its tip alone.
       const UnionOracle oracle(groove(opening), tool);
-      Random random(7);
+      constexpr std::uint64_t kSeed = 7;
+      Random random(kSeed);
       for (int i = 0; i < 40; ++i) {
         const Vec3 bottom{0.002 * (random.unit() - 0.5), 0.02 * random.unit(),
                           -0.003 * random.unit()};

@@ -161,7 +161,8 @@ class Simulate(CommandCase):
         self.simulate(whole, *people, "--jobs", 1)
         expected = self.csv_of(whole)
         self.assertEqual(expected.count(b"\n"), 1 + 8 * 24)
-        draw = random.Random(5)
+        seed = 5
+        draw = random.Random(seed)
         stopped = 0
         for number in range(100):
             broken = self.dir / f"broken{number}.db"

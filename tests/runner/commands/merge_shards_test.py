@@ -40,7 +40,8 @@ def make_shards(folder, shards, rows):
         db.execute("DELETE FROM points")
     db.execute("VACUUM")
     db.close()
-    draw = random.Random(5)
+    seed = 5
+    draw = random.Random(seed)
     figures = next(i for i, name in enumerate(names) if name.startswith("gain_"))
     insert = f"INSERT INTO points VALUES ({', '.join('?' * len(names))})"
     for shard in range(shards):

@@ -142,7 +142,8 @@ def shares(size, along, on_edge, contact):
 
 def coverage(points):
     """The share of the cube's surface within 5 mm of a point."""
-    draws = np.random.default_rng(5)
+    seed = 5
+    draws = np.random.default_rng(seed)
     places = draws.uniform(-EDGE / 2, EDGE / 2, (10000, 3))
     places[np.arange(10000), draws.integers(0, 3, 10000)] = draws.choice([-EDGE / 2, EDGE / 2], 10000)
     covered = np.zeros(10000, bool)

@@ -62,7 +62,8 @@ class SweepAnalyses(SweepCase):
         self.assertEqual((order["spearman"], order["status"]), (None, "undefined"))
 
     def test_sobol_indices_of_a_linear_model(self):
-        draw, rows = random.Random(2), []
+        seed = 2
+        draw, rows = random.Random(seed), []
         for _ in range(400):
             a, b = [draw.random() for _ in range(3)], [draw.random() for _ in range(3)]
             for x in (a, b, [b[0], a[1], a[2]], [a[0], b[1], a[2]], [a[0], a[1], b[2]]):

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdint>
 #include <glm/geometric.hpp>
 #include <random>
 #include <thread>
@@ -53,7 +54,8 @@ TEST(MouseStylus, FollowsWithoutJumpAndKeepsItsLength) {
 
 TEST(MouseStylus, EveryTargetGivesAFinitePose) {
   devices::MouseStylus device(kLength, 1000);
-  std::mt19937 random(7);  // NOLINT(cert-msc32-c,cert-msc51-cpp): any sequence will do
+  constexpr std::uint32_t kSeed = 7;
+  std::mt19937 random(kSeed);  // NOLINT(cert-msc32-c,cert-msc51-cpp): any sequence will do
   std::uniform_real_distribution<double> far(-10, 10);
   devices::StylusTarget hand = device.initial_target();
   for (int i = 0; i < 20000; ++i) {

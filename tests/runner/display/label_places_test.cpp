@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdint>
 #include <random>
 #include <vector>
 
@@ -48,7 +49,8 @@ TEST(LabelPlaces, AtTheBorderLabelsMoveInAndFarOutsideTheyAreHidden) {
 }
 
 TEST(LabelPlaces, LabelsNeverOverlapNorLeaveThePicture) {
-  std::mt19937 random(16);  // NOLINT(cert-msc32-c,cert-msc51-cpp): any sequence will do
+  constexpr std::uint32_t kSeed = 16;
+  std::mt19937 random(kSeed);  // NOLINT(cert-msc32-c,cert-msc51-cpp): any sequence will do
   std::uniform_real_distribution<float> any(-0.2F, 1.2F), width(10, 900);
   for (int scene = 0; scene < 300; ++scene) {
     std::vector<LabelBox> boxes(static_cast<std::size_t>(1 + scene % 40));

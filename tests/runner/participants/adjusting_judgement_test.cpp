@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cstdint>
 #include <string>
 
 #include "runner/participants/task_participant.h"
@@ -16,7 +17,7 @@ class Adjusting : public ::testing::Test {
     judge_.judgement().feel(felt, {{}, false, touched});
     return judge_.named(judge_.judgement().answer());
   }
-  void SetUp() override { judge_.judgement().begin(trial_of(), Random(1)); }
+  void SetUp() override { judge_.judgement().begin(trial_of(), Random(kSeedOfTrial)); }
 
   Judge judge_{R"("task": "adjust", "stimuli": ["ball"], "standard": "ball",
                   "level": {"path": "/stiffness_n_per_m"}, "min": 100, "max": 500, "turn": 10,
@@ -40,13 +41,13 @@ TEST_F(Adjusting, FeelsBothThenTurnsAsOftenAsNeeded) {
 TEST_F(Adjusting, EndsWhereItTurnsNoFarther) {
   next(kStandard);
   EXPECT_EQ(next(at(100)), "up");
-  judge_.judgement().begin(trial_of(), Random(1));
+  judge_.judgement().begin(trial_of(), Random(kSeedOfTrial));
   judge_.judgement().feel(kStandard, {900.0, true, true});
   judge_.judgement().feel(at(499), {499.0, true, true});
   EXPECT_EQ(judge_.named(judge_.judgement().answer()), "up");
   judge_.judgement().feel(at(500), {500.0, true, true});
   EXPECT_EQ(judge_.named(judge_.judgement().answer()), "done");
-  judge_.judgement().begin(trial_of(), Random(1));
+  judge_.judgement().begin(trial_of(), Random(kSeedOfTrial));
   judge_.judgement().feel(kStandard, {20.0, true, true});
   judge_.judgement().feel(at(101), {101.0, true, true});
   EXPECT_EQ(judge_.named(judge_.judgement().answer()), "down");
@@ -69,16 +70,16 @@ TEST_F(Adjusting, ReturnsToAnUntouchedInterval) {
 TEST_F(Adjusting, BeginsEachTrialAnew) {
   next(kStandard);
   EXPECT_EQ(next(at(150)), "up");
-  judge_.judgement().begin(trial_of(), Random(1));
+  judge_.judgement().begin(trial_of(), Random(kSeedOfTrial));
   EXPECT_EQ(judge_.judgement().turns(), 1);
   EXPECT_EQ(next(at(150)), "switch");
   next(kStandard);
-  judge_.judgement().begin(trial_of(), Random(1));
+  judge_.judgement().begin(trial_of(), Random(kSeedOfTrial));
   next(kStandard);
   EXPECT_EQ(next(at(400)), "done");
-  judge_.judgement().begin(trial_of(), Random(1));
+  judge_.judgement().begin(trial_of(), Random(kSeedOfTrial));
   EXPECT_EQ(next(kStandard), "switch");
-  judge_.judgement().begin(trial_of(), Random(1));
+  judge_.judgement().begin(trial_of(), Random(kSeedOfTrial));
   EXPECT_EQ(next(at(150)), "switch");
 }
 
@@ -90,7 +91,7 @@ TEST(AdjustingJudgement, AdjustsUntilTheyDifferByLessThanAStandardDeviation) {
                  "starts": [150])",
               settings);
   for (const double level : {341.0, 339.0}) {  // 400 less 15 %
-    judge.judgement().begin(trial_of(), Random(1));
+    judge.judgement().begin(trial_of(), Random(kSeedOfTrial));
     judge.judgement().feel(kStandard, {400.0, true, true});
     judge.judgement().feel(at(level), {level, true, true});
     EXPECT_EQ(judge.named(judge.judgement().answer()), level > 340 ? "done" : "up");

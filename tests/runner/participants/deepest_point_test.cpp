@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <vector>
 
 #include "data/base/random.h"
@@ -63,7 +64,8 @@ class DeepestPoint : public ::testing::TestWithParam<stimuli::ShapeKind> {
 
 TEST_P(DeepestPoint, DistancesAreExactToAMicrometre) {
   const ShapeHypotheses hypotheses({object_});
-  Random random(11);
+  constexpr std::uint64_t kSeed = 11;
+  Random random(kSeed);
   for (int n = 0; n < 200; ++n) {
     const Case c = random_case(random);
     const double s = 0.12 * random.unit();
@@ -80,7 +82,8 @@ TEST_P(DeepestPoint, DistancesAreExactToAMicrometre) {
 
 TEST_P(DeepestPoint, WithoutLengthItIsDistanceAndNormalOfTheTip) {
   const ShapeHypotheses hypotheses({object_});
-  Random random(12);
+  constexpr std::uint64_t kSeed = 12;
+  Random random(kSeed);
   int far_normals = 0;
   for (int n = 0; n < 200; ++n) {
     const Case c = random_case(random);
@@ -102,7 +105,8 @@ TEST_P(DeepestPoint, WithoutLengthItIsDistanceAndNormalOfTheTip) {
 
 TEST_P(DeepestPoint, MinimumOverTheStylusIsExactToThirtyMicrometres) {
   const ShapeHypotheses hypotheses({object_});
-  Random random(13);
+  constexpr std::uint64_t kSeed = 13;
+  Random random(kSeed);
   double worst = 0;
   int turned_normals = 0;
   int checked = 0;
@@ -134,7 +138,8 @@ TEST_P(DeepestPoint, MinimumOverTheStylusIsExactToThirtyMicrometres) {
 TEST_P(DeepestPoint, EndsOfTheStylusAreFound) {
   // The stylus points at the centre from outside, so its tip is deepest; reversed, its tail.
   const ShapeHypotheses hypotheses({object_});
-  Random random(14);
+  constexpr std::uint64_t kSeed = 14;
+  Random random(kSeed);
   for (int n = 0; n < 50; ++n) {
     const Vec3 out = random_direction(random);
     const Vec3 near = 0.06 * out;

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <glm/geometric.hpp>
 #include <limits>
 
@@ -28,7 +29,8 @@ Vec3 point_around(Random& random, const Vec3& middle, double reach) {
 
 TEST(DistanceField, OfAnLShapeIsExactToASpacing) {
   const DistanceField field(test::placed(stimuli::solids::prism(kEll, 0.03).soup));
-  Random random(1);
+  constexpr std::uint64_t kSeed = 1;
+  Random random(kSeed);
   double squares = 0, count = 0;
   for (int i = 0; i < 20000; ++i) {
     const Vec3 p = point_around(random, Vec3(0.03, 0.03, 0.015), 0.06);
@@ -54,7 +56,8 @@ TEST(DistanceField, ASeamIsNotASurface) {
     halves.push_back(
         test::placed(stimuli::box(Vec3(0.03 - at, 0.04, 0.04)), Vec3((at + 0.03) / 2, 0, 0))[0]);
     const DistanceField cut(halves);
-    Random random(2);
+    constexpr std::uint64_t kSeed = 2;
+    Random random(kSeed);
     for (int i = 0; i < 5000; ++i) {
       const Vec3 p = point_around(random, Vec3(0), 0.03);
       ASSERT_NEAR(test::distance_at(cut, p), test::distance_at(whole, p), 0.1 * whole.spacing())
@@ -85,7 +88,8 @@ TEST(DistanceField, ItsGradientIsTheNormal) {
   stimuli::ObjectSpec ball;
   ball.subdivisions = 3;
   const DistanceField field(felt_parts(ball));
-  Random random(3);
+  constexpr std::uint64_t kSeed = 3;
+  Random random(kSeed);
   for (int i = 0; i < 2000; ++i) {
     const Vec3 out = glm::normalize(Vec3(random.normal(), random.normal(), random.normal()));
     const Vec3 p = (0.026 + 0.008 * random.unit()) * out;
@@ -117,7 +121,8 @@ TEST(DistanceField, NoPlaceIsNearerThanItsReachSays) {
   box.pose.position = Vec3(0.02, 0.01, 0);
   const DistanceField field(felt_parts(box));
   EXPECT_NEAR(field.reach(), glm::length(Vec3(0.065, 0.02, 0.025)), 0.004);
-  Random random(6);
+  constexpr std::uint64_t kSeed = 6;
+  Random random(kSeed);
   for (int i = 0; i < 20000; ++i) {
     const Vec3 out = glm::normalize(Vec3(random.normal(), random.normal(), random.normal()));
     const double far = 0.3 * random.unit();
@@ -130,7 +135,8 @@ TEST(DistanceField, NoPlaceIsNearerThanThePlanesOfItsBoxSay) {
   const DistanceField::Box& box = field.box();
   EXPECT_NEAR(box.half[0], 0.03, 0.001);
   EXPECT_NEAR(box.half[2], 0.015, 0.001);
-  Random random(7);
+  constexpr std::uint64_t kSeed = 7;
+  Random random(kSeed);
   for (int i = 0; i < 50000; ++i) {
     const Vec3 p = point_around(random, Vec3(0.03, 0.03, 0.015), i % 2 == 0 ? 0.05 : 0.3);
     double beyond = -1;
@@ -171,7 +177,8 @@ struct Touch {
 TEST(SolidLine, HypothesesAreSearchedIndependently) {
   const ShapeHypotheses hypotheses({ell_of_boxes()});
   const ShapeHypotheses::Shape& shape = hypotheses.shapes()[0];
-  Random random(5);
+  constexpr std::uint64_t kSeed = 5;
+  Random random(kSeed);
   for (int trial = 0; trial < 200; ++trial) {
     const Touch touch(shape, random);
     const SolidLine line(hypotheses, shape, touch.first, touch.line);
@@ -210,7 +217,8 @@ TEST(SolidLine, HypothesesAreSearchedIndependently) {
 TEST(SolidLine, TheFirstHypothesesOfABlockCanBeSearchedAlone) {
   const ShapeHypotheses hypotheses({ell_of_boxes()});
   const ShapeHypotheses::Shape& shape = hypotheses.shapes()[0];
-  Random random(8);
+  constexpr std::uint64_t kSeed = 8;
+  Random random(kSeed);
   for (int count = 1; count <= ShapeHypotheses::kBlock; ++count) {
     const Touch touch(shape, random);
     const SolidLine line(hypotheses, shape, touch.first, touch.line);
@@ -277,7 +285,8 @@ TEST(SolidLine, TheObserverLeavesOutNothingThatCounts) {
   const ShapeHypotheses hypotheses({ell_of_boxes(), slab});
   const ObserverSettings settings;
   ShapeObserver observer(hypotheses, settings);
-  Random random(9);
+  constexpr std::uint64_t kSeed = 9;
+  Random random(kSeed);
   for (int trial = 0; trial < 80; ++trial) {
     const Vec3 along = glm::normalize(Vec3(random.normal(), random.normal(), random.normal()));
     Percept percept;
@@ -300,7 +309,8 @@ TEST(SolidLine, FindsTheDeepestPlaceOfAConcaveShape) {
   const ShapeHypotheses hypotheses({ell_of_boxes()});
   const ShapeHypotheses::Shape& shape = hypotheses.shapes()[0];
   ASSERT_TRUE(shape.field);
-  Random random(4);
+  constexpr std::uint64_t kSeed = 4;
+  Random random(kSeed);
   for (int trial = 0; trial < 60; ++trial) {
     const Touch touch(shape, random);
     const SolidLine to_shape(hypotheses, shape, touch.first, touch.line);

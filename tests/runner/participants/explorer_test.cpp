@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdint>
 #include <glm/geometric.hpp>
 
 #include "runner/participants/simulated.h"
@@ -30,13 +31,14 @@ bool same(const devices::HandTarget& a, const devices::HandTarget& b) {
 
 // Contact at one tick changes the motion exactly one reaction delay later.
 TEST(Explorer, ActsOnContactAfterTheReactionDelay) {
+  constexpr std::uint64_t kSeed = 5;
   for (const int ticks : {1, 2, 37, 150}) {
     SimulatedSettings settings = load_simulated_settings("");
     settings.motor.reaction_delay = ticks * kPeriod;
     Explorer touching(settings, kFromTip, kStiffness, kPeriod),
         free(settings, kFromTip, kStiffness, kPeriod);
-    devices::HandTarget target = touching.begin(Random(5));
-    ASSERT_TRUE(same(target, free.begin(Random(5))));
+    devices::HandTarget target = touching.begin(Random(kSeed));
+    ASSERT_TRUE(same(target, free.begin(Random(kSeed))));
     constexpr int kTouch = 20;
     for (int tick = 0; tick < kTouch + ticks; ++tick) {
       TouchState felt;
@@ -57,8 +59,10 @@ TouchState felt_below(const devices::HandTarget& target) {
 
 /// A hand that has slid for 0.1 s in contact and has known for one tick that contact was lost.
 struct AfterLossOfContact {
+  static constexpr std::uint64_t kSeed = 6;
+
   explicit AfterLossOfContact(const SimulatedSettings& settings)
-      : hand(settings, kFromTip, kStiffness, kPeriod), target(hand.begin(Random(6))) {
+      : hand(settings, kFromTip, kStiffness, kPeriod), target(hand.begin(Random(kSeed))) {
     for (int tick = 0; tick < 100; ++tick) target = step(hand, felt_below(target), held_at(target));
     slid = hand.heading();
     before = held_at(target).tip;
@@ -96,11 +100,12 @@ TEST(Explorer, InVersion2TurnsToTheCentreAfterALossOfContact) {
 }
 
 TEST(Explorer, TurnsToTheChosenHeadingInItsTime) {
+  constexpr std::uint64_t kSeed = 7;
   for (const double angle : {0.5, -2.0, 3.0, 0.0}) {
     SimulatedSettings settings = quick_hand(2);
     settings.heading.chosen = true;
     Explorer hand(settings, kFromTip, kStiffness, kPeriod);
-    devices::HandTarget target = hand.begin(Random(7));
+    devices::HandTarget target = hand.begin(Random(kSeed));
     int waited = 0;
     while (!hand.wants_heading()) {
       ASSERT_LT(++waited, 10) << "it slides from the second tick on";
@@ -125,7 +130,8 @@ TEST(Explorer, TurnsToTheChosenHeadingInItsTime) {
 
 TEST(Explorer, WantsNoHeadingWhileItWanders) {
   Explorer hand(quick_hand(2), kFromTip, kStiffness, kPeriod);
-  devices::HandTarget target = hand.begin(Random(7));
+  constexpr std::uint64_t kSeed = 7;
+  devices::HandTarget target = hand.begin(Random(kSeed));
   for (int tick = 0; tick < 1000; ++tick) {
     target = step(hand, felt_below(target), held_at(target));
     ASSERT_FALSE(hand.wants_heading());

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <glm/geometric.hpp>
 #include <numbers>
 #include <stdexcept>
@@ -166,7 +167,8 @@ TEST(HeadingChoice, AllocatesNothing) {
   const ShapeHypotheses hypotheses(four_shapes());
   ShapeObserver observer(hypotheses, by_movement());
   HeadingChoice choice(hypotheses, by_movement(), {});
-  Random random(4);
+  constexpr std::uint64_t kSeed = 4;
+  Random random(kSeed);
   for (const bool ray : {false, true}) {
     const SlidingStylus stylus{ray, {0, 0, 0.03}, {0, 0.05, 0.13}, {0, 0, 1}, {1, 0, 0}};
     const std::uint64_t before = bench::allocations();

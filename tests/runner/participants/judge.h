@@ -36,6 +36,9 @@ inline std::string compare(const std::string& more = "") {
   return R"("task": "compare", "standard": "ball", )" + constant("300, 500") + more;
 }
 
+/// Of the draws of a trial that a test begins itself.
+inline constexpr std::uint64_t kSeedOfTrial = 1;
+
 inline Trial trial_of(int stimulus = 0) {
   Trial trial;
   trial.task_block = 0;
@@ -62,7 +65,8 @@ class Judge {
 
   std::string answer(const std::vector<Interval>& intervals, const TaskJudgement::Felt& felt = {},
                      Trial trial = trial_of()) {
-    judgement_.begin(trial, Random(7, {++draw_}));
+    constexpr std::uint64_t kSeed = 7;
+    judgement_.begin(trial, Random(kSeed, {++draw_}));
     for (const Interval& interval : intervals) judgement_.feel(interval, felt);
     return named(judgement_.answer());
   }

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <numeric>
 #include <vector>
@@ -55,7 +56,8 @@ TEST(LaneMath, LogNormalCdfIsZeroFromTheStatedBound) {
 
 // Whatever the width of the processor's registers, each lane has the bits of a single float.
 TEST(Lanes, HaveTheBitsOfSingleFloats) {
-  Random random(1);
+  constexpr std::uint64_t kSeed = 1;
+  Random random(kSeed);
   std::vector<float> x(lane::kWidth), y(lane::kWidth), root(lane::kWidth), mixed(lane::kWidth);
   for (int trial = 0; trial < 200; ++trial) {
     for (float& value : x) value = static_cast<float>(random.unit());
@@ -73,7 +75,8 @@ TEST(Lanes, HaveTheBitsOfSingleFloats) {
 TEST(Lanes, LookUpNeighboursAnywhere) {
   std::vector<float> table(1000);
   std::iota(table.begin(), table.end(), 0.0F);
-  Random random(2);
+  constexpr std::uint64_t kSeed = 2;
+  Random random(kSeed);
   for (int trial = 0; trial < 200; ++trial) {
     lane::Ints at{};
     for (int i = 0; i < lane::kWidth; ++i)

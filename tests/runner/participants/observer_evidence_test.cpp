@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <stdexcept>
 #include <string>
@@ -47,7 +48,8 @@ TEST(ObserverEvidence, OfAContactGrowsWithMovementAndTurn) {
                      {0.003, 0.1, 1 - std::exp(-0.2)},
                      {std::numeric_limits<double>::infinity(), 0, 1}};
   for (const auto& c : cases) {
-    Random random(7);
+    constexpr std::uint64_t kSeed = 7;
+    Random random(kSeed);
     Percept percept = touch_of_a_cube(random);
     percept.moved = c.moved;
     percept.turned = c.turned;
@@ -66,7 +68,8 @@ TEST(ObserverEvidence, OfAContactGrowsWithMovementAndTurn) {
 TEST(ObserverEvidence, DoesNotGrowWithoutMovement) {
   const ShapeHypotheses hypotheses(four_shapes());
   ShapeObserver observer(hypotheses, by_movement()), once(hypotheses, by_movement());
-  Random random(8);
+  constexpr std::uint64_t kSeed = 8;
+  Random random(kSeed);
   Percept percept = touch_of_a_cube(random);
   once.update(percept);
   observer.update(percept);
@@ -96,7 +99,8 @@ TEST(ObserverEvidence, DoesNotFadeWithoutForgetting) {
   ShapeObserver observer(hypotheses, settings);
   settings.beta = 0.5;
   ShapeObserver one(hypotheses, settings);
-  Random random(9);
+  constexpr std::uint64_t kSeed = 9;
+  Random random(kSeed);
   const Percept percept = touch_of_a_cube(random);
   one.update(percept);
   observer.update(percept);
@@ -109,7 +113,8 @@ TEST(ObserverEvidence, DoesNotFadeWithoutForgetting) {
 TEST(ObserverEvidence, DrawsFollowThePosterior) {
   const ShapeHypotheses hypotheses(four_shapes());
   ShapeObserver observer(hypotheses, by_movement());
-  Random random(10);
+  constexpr std::uint64_t kSeed = 10;
+  Random random(kSeed);
   for (int percepts = 0; percepts < 6; ++percepts) {
     for (const int n : {1, 32, 1000}) {
       std::vector<int> drawn(static_cast<std::size_t>(n));
@@ -132,7 +137,8 @@ TEST(ObserverEvidence, DrawsFollowThePosterior) {
 TEST(ObserverEvidence, DrawsFollowThePosteriorWithinAShape) {
   const ShapeHypotheses hypotheses(four_shapes());
   ShapeObserver observer(hypotheses, by_movement());
-  Random random(11);
+  constexpr std::uint64_t kSeed = 11;
+  Random random(kSeed);
   const ShapeHypotheses::Shape& cone = hypotheses.shapes()[1];
   for (int i = 0; i < 40; ++i) {
     observer.update(test::touch(four_shapes()[1], Mat3(1), false, 0.001, 0.05, random));

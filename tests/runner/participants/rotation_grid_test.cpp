@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <glm/geometric.hpp>
 #include <numbers>
 
@@ -47,7 +48,8 @@ TEST(RotationGrid, EveryOrientationIsNearOneUpToSymmetry) {
                 0.05 * 9120 / static_cast<double>(group.size()) + 10);
     std::vector<Quat> turns;
     for (const Mat3& r : grid) turns.push_back(glm::quat_cast(r));
-    Random random(1);
+    constexpr std::uint64_t kSeed = 1;
+    Random random(kSeed);
     for (int i = 0; i < 100; ++i) {
       const Quat wanted = stimuli::uniform_rotation(random);
       double nearest = 180;

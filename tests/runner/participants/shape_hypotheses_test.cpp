@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <functional>
 #include <glm/geometric.hpp>
 #include <numbers>
@@ -88,7 +89,8 @@ TEST(ShapeHypotheses, NoOrientationIsFarFromTheGrid) {
   const std::vector<double> typical{0, 4.5, 5, 6.5};
   for (std::size_t k = 1; k < kKinds.size(); ++k) {
     const ShapeHypotheses hypotheses({spec(kKinds[k])});
-    Random random(3);
+    constexpr std::uint64_t kSeed = 3;
+    Random random(kSeed);
     double worst = 0;
     double sum = 0;
     constexpr int kDraws = 400;

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <glm/geometric.hpp>
 #include <numbers>
 #include <stdexcept>
@@ -127,7 +128,8 @@ TEST(ShapeObserver, StartsWithEqualShapes) {
 TEST(ShapeObserver, ForgetsBackToThePrior) {
   const ShapeHypotheses hypotheses(four_shapes());
   ShapeObserver observer(hypotheses);
-  Random random(5);
+  constexpr std::uint64_t kSeed = 5;
+  Random random(kSeed);
   for (int i = 0; i < 60; ++i) {
     observer.update(touch(four_shapes()[3], Mat3(1), true, 0, 0, random));
   }
@@ -140,7 +142,8 @@ TEST(ShapeObserver, ResetRestoresThePrior) {
   const ShapeHypotheses hypotheses(four_shapes());
   ShapeObserver observer(hypotheses);
   const ShapeObserver fresh(hypotheses);
-  Random random(5);
+  constexpr std::uint64_t kSeed = 5;
+  Random random(kSeed);
   observer.update(touch(four_shapes()[1], Mat3(1), false, 0, 0, random));
   EXPECT_NE(observer.probability(1), fresh.probability(1));
   observer.reset();
@@ -157,7 +160,8 @@ TEST(ShapeObserver, FreeSpaceAgreesWithTheFormulasFromNearToFar) {
   const ShapeHypotheses hypotheses(slender);
   ObserverSettings settings;
   settings.free_space_weight = 1;
-  Random random(16);
+  constexpr std::uint64_t kSeed = 16;
+  Random random(kSeed);
   double least = 1, most = 0;  // of the spheres' probabilities: both near and far are tested
   for (int n = 0; n < 80; ++n) {
     ShapeObserver observer(hypotheses, settings);
@@ -180,7 +184,8 @@ TEST(ShapeObserver, FreeSpaceAgreesWithTheFormulasFromNearToFar) {
 TEST(ShapeObserver, AgreesWithTheFormulasInDoublePrecision) {
   const ShapeHypotheses hypotheses(four_shapes());
   const ObserverSettings settings;
-  Random random(6);
+  constexpr std::uint64_t kSeed = 6;
+  Random random(kSeed);
   double worst = 0;
   for (int object = 0; object < 4; ++object) {
     ShapeObserver observer(hypotheses, settings);
@@ -210,7 +215,8 @@ TEST(ShapeObserver, AgreesWithTheFormulasInDoublePrecision) {
 /// Share of 20 objects of each shape that are named right after 60 percepts.
 double accuracy(bool ray, double place_noise, double direction_noise) {
   const ShapeHypotheses hypotheses(four_shapes());
-  Random random(7);
+  constexpr std::uint64_t kSeed = 7;
+  Random random(kSeed);
   int right = 0;
   for (int trial = 0; trial < 80; ++trial) {
     ShapeObserver observer(hypotheses);
@@ -239,7 +245,8 @@ TEST(ShapeObserver, DecidesAboveTheThreshold) {
   ObserverSettings settings;
   settings.threshold = 0.6;
   ShapeObserver observer(hypotheses, settings);
-  Random random(8);
+  constexpr std::uint64_t kSeed = 8;
+  Random random(kSeed);
   bool decided = false;
   for (int n = 0; n < 60; ++n) {
     observer.update(touch(four_shapes()[2], Mat3(1), false, 0, 0, random));
@@ -252,7 +259,8 @@ TEST(ShapeObserver, DecidesAboveTheThreshold) {
 TEST(ShapeObserver, FreeSpaceIsEvidenceAgainstShapesThere) {
   const ShapeHypotheses hypotheses(four_shapes());
   ShapeObserver observer(hypotheses);
-  Random random(9);
+  constexpr std::uint64_t kSeed = 9;
+  Random random(kSeed);
   // 4 mm inside the sphere, all round: a cone has room for that.
   for (int n = 0; n < 200; ++n) {
     Percept p;
@@ -293,7 +301,8 @@ TEST(ShapeObserver, ThreadsThatShareHypothesesAgreeToTheBit) {
   const ShapeHypotheses hypotheses(four_shapes());
   std::vector<ShapeObserver> observers(3, ShapeObserver(hypotheses));
   const auto watch = [](ShapeObserver& observer) {
-    Random random(10);
+    constexpr std::uint64_t kSeed = 10;
+    Random random(kSeed);
     for (int n = 0; n < 40; ++n) {
       observer.update(touch(four_shapes()[1], Mat3(1), n % 2 == 0, 0.002, 0.1, random));
     }
@@ -313,7 +322,8 @@ TEST(ShapeObserver, AStylusWithoutLengthIsAPoint) {
   const ShapeHypotheses hypotheses(four_shapes());
   ShapeObserver as_ray(hypotheses);
   ShapeObserver as_point(hypotheses);
-  Random random(11);
+  constexpr std::uint64_t kSeed = 11;
+  Random random(kSeed);
   Percept p = touch(four_shapes()[3], Mat3(1), false, 0.002, 0.1, random);
   as_point.update(p);
   p.ray = true;

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdint>
 #include <numbers>
 #include <string>
 #include <vector>
@@ -64,7 +65,7 @@ TEST(TaskJudgement, DifferentMeansMoreThanAStandardDeviation) {
   Judge measuring(compare(R"(, "answer": "same_different")"), sure);
   TaskJudgement& judgement = measuring.judgement();
   for (const double apart : {59.0, -59.0, 61.0, -61.0}) {  // with its noise already: sd 60
-    judgement.begin(trial_of(), Random(1));
+    judgement.begin(trial_of(), Random(kSeedOfTrial));
     judgement.feel(kStandard, {400, true, true});
     judgement.feel(at(300), {400 + apart, true, true});
     EXPECT_EQ(measuring.named(judgement.answer()), std::abs(apart) > 60 ? "different" : "same");
@@ -101,13 +102,13 @@ TEST(TaskJudgement, NumbersAreAPowerOfTheLevel) {
   Judge anchored(R"("task": "rate", "standard": "ball", "modulus": 30, "min": 1, "max": 40, )" +
                      constant("100, 900"),
                  settings);
-  free.judgement().begin(trial_of(), Random(1));
+  free.judgement().begin(trial_of(), Random(kSeedOfTrial));
   free.judgement().feel(at(900), {});
   EXPECT_DOUBLE_EQ(free.judgement().number(), 300);
   free.judgement().feel(at(400), {123.456, true, true});  // as the hand met it
   EXPECT_DOUBLE_EQ(free.judgement().number(), std::round(1000 * std::sqrt(123.456)) / 100);
   const auto rated = [&](double level) {
-    anchored.judgement().begin(trial_of(), Random(1));
+    anchored.judgement().begin(trial_of(), Random(kSeedOfTrial));
     anchored.judgement().feel(kStandard, {});
     anchored.judgement().feel(at(level), {});
     return anchored.judgement().number();
@@ -123,8 +124,9 @@ TEST(TaskJudgement, NumbersScatterLogNormally) {
   settings.number_sd = 0.2;
   Judge judge(R"("task": "rate", )" + constant("100, 900"), settings);
   double sum = 0, squares = 0;
+  constexpr std::uint64_t kSeed = 3;
   for (int k = 0; k < kDraws; ++k) {
-    judge.judgement().begin(trial_of(), Random(3, {static_cast<std::uint64_t>(k)}));
+    judge.judgement().begin(trial_of(), Random(kSeed, {static_cast<std::uint64_t>(k)}));
     judge.judgement().feel(at(400), {});
     const double log = std::log(judge.judgement().number() / (10 * std::pow(400, 0.8)));
     sum += log;
@@ -175,7 +177,7 @@ TEST(TaskJudgement, ConfidenceGrowsWithTheDifference) {
   settings.lapse = 0;
   Judge judge(compare(), settings);
   const auto confidence = [&](double apart) {  // the sd of a difference is 60
-    judge.judgement().begin(trial_of(), Random(1));
+    judge.judgement().begin(trial_of(), Random(kSeedOfTrial));
     judge.judgement().feel(kStandard, {400.0, true, true});
     judge.judgement().feel(at(500), {400 + apart, true, true});
     judge.judgement().answer();
@@ -223,8 +225,9 @@ TEST(TaskJudgement, NoisyMeasurementsGetNoFurtherNoise) {
   JudgementSettings settings;
   settings.lapse = 0;
   Judge judge(compare(), settings);
+  constexpr std::uint64_t kSeed = 2;
   for (std::uint64_t k = 0; k < 50; ++k) {
-    judge.judgement().begin(trial_of(), Random(2, {k}));
+    judge.judgement().begin(trial_of(), Random(kSeed, {k}));
     judge.judgement().feel(kStandard, {400.0, true, true});
     judge.judgement().feel(at(300), {400.001, true, true});
     EXPECT_EQ(judge.named(judge.judgement().answer()), "2");
@@ -264,8 +267,9 @@ TEST(TaskJudgement, WithAZeroStandardTheLargestLevelSetsTheNoise) {
       "j.json");
   TaskJudgement judgement(protocol, settings);
   int second = 0;
+  constexpr std::uint64_t kSeed = 5;
   for (int k = 0; k < kDraws; ++k) {
-    judgement.begin(trial_of(), Random(5, {static_cast<std::uint64_t>(k)}));
+    judgement.begin(trial_of(), Random(kSeed, {static_cast<std::uint64_t>(k)}));
     judgement.feel(kStandard, {});
     judgement.feel(at(0.2), {});
     second += judgement.answer();

@@ -35,13 +35,15 @@ def linear_labs(random, n):
     """Figures of labs that are the settings' logits, mixed, with normal noise, and figures that say nothing."""
     shares = random.random((n, 5))
     x = np.log(shares / (1 - shares))
-    mixing = np.random.default_rng(5).normal(size=(5, 8))
+    seed = 5
+    mixing = np.random.default_rng(seed).normal(size=(5, 8))
     return shares, np.column_stack([x @ mixing + random.normal(size=(n, 8)), random.normal(size=(n, 6))])
 
 
 def test_the_posterior_is_calibrated_and_follows_the_truth():
     module = importlib.import_module("recover_parameters")
-    random = np.random.default_rng(3)
+    seed = 3
+    random = np.random.default_rng(seed)
     inference = module.Inference(*linear_labs(random, 3000), keep=0.2)
     shares, figures = linear_labs(random, 600)
     means, ranks = module.calibrate(inference, shares, figures)
@@ -60,7 +62,8 @@ def test_the_prior_has_its_distribution_and_bounds():
     person = module.person(np.full(5, 0.5))
     assert person["motor"]["slide_speed_m_per_s"] == pytest.approx(np.sqrt(0.02 * 0.15))
     assert person["observer"]["threshold"] == pytest.approx((0.7 + 0.99) / 2)
-    random = np.random.default_rng(4)
+    seed = 4
+    random = np.random.default_rng(seed)
     inference = module.Inference(*linear_labs(random, 500), keep=0.2)
     draws, weights = inference.posterior(np.full(14, 50.0))
     assert ((draws >= 0) & (draws <= 1)).all()
@@ -69,7 +72,8 @@ def test_the_prior_has_its_distribution_and_bounds():
 
 def test_d_prime_is_that_of_normal_figures():
     module = importlib.import_module("choose_sizes")
-    random = np.random.default_rng(6)
+    seed = 6
+    random = np.random.default_rng(seed)
     is_three = np.arange(400) % 2 == 1
     noise = random.normal(size=(400, 6))
     nothing, error = module.separation(noise, is_three)

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdint>
 #include <functional>
 #include <glm/geometric.hpp>
 #include <limits>
@@ -49,7 +50,8 @@ TEST(Passivity, ASampledSpringGrowsOnlyWithoutTheController) {
 
 TEST(Passivity, NeverPushesAlongTheMotion) {
   PassivityController control({}, kTick);
-  Random random(7);
+  constexpr std::uint64_t kSeed = 7;
+  Random random(kSeed);
   const auto any = [&random] {
     return Vec3(random.unit() - 0.5, random.unit() - 0.5, random.unit() - 0.5);
   };

@@ -49,7 +49,8 @@ struct PathTick {
 
 /// A path in and out of both cubes and across them; periods jitter, some are long.
 std::vector<PathTick> rough_path(int ticks) {
-  Random random(23);
+  constexpr std::uint64_t kSeed = 23;
+  Random random(kSeed);
   std::vector<PathTick> path;
   for (int i = 0; i < ticks; ++i) {
     const double t = 0.001 * i;

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <cstdint>
 #include <cstdio>
 #include <cstdlib>
 #include <random>
@@ -70,7 +71,8 @@ Settings simulated(std::uint64_t seed) {
 /// two estimates whose difference has the model's noise, turned according to the estimates until
 /// both are "same".
 Settings expected() {
-  std::mt19937_64 source(1);
+  constexpr std::uint64_t kSeed = 1;
+  std::mt19937_64 source(kSeed);
   std::normal_distribution<double> normal(0, kWeber * kStandard / std::sqrt(2.0));
   std::vector<double> numbers;
   for (int i = 0; i < 40'000; ++i) {

@@ -6,6 +6,7 @@
 #include <array>
 #include <atomic>
 #include <cmath>
+#include <cstdint>
 #include <glm/geometric.hpp>
 #include <limits>
 #include <string>
@@ -62,7 +63,8 @@ SharpEdges edges_of(const stimuli::ObjectSpec& object) {
 }
 
 TEST(SharpEdges, MatchTheShapesFormulas) {
-  Random random(41);
+  constexpr std::uint64_t kSeed = 41;
+  Random random(kSeed);
   for (const auto shape : {stimuli::ShapeKind::sphere, stimuli::ShapeKind::cone,
                            stimuli::ShapeKind::cylinder, stimuli::ShapeKind::cube}) {
     stimuli::ObjectSpec object;
@@ -126,7 +128,8 @@ TEST(ContactLog, CountsEveryTickAsIfAllEdgesWereChecked) {
   cube.shape = stimuli::ShapeKind::cube;
   cube.edge = 0.04;
   const SharpEdges edges = edges_of(cube);
-  Random random(5);
+  constexpr std::uint64_t kSeed = 5;
+  Random random(kSeed);
   const Quat turned = glm::normalize(Quat(0.3, -0.2, 0.7, 0.4));
   ContactLog log;
   log.begin(edges, turned);

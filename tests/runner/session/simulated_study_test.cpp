@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
@@ -96,7 +97,8 @@ TEST_F(SimulatedStudy, IsTheSameHoweverOftenItIsStopped) {
   simulate(p, folder_ / "whole.db", 2);
   const auto whole = std::chrono::duration_cast<std::chrono::microseconds>(Clock::now() - began);
   const fs::path db = folder_ / "stopped.db";
-  Random random(11);
+  constexpr std::uint64_t kSeed = 11;
+  Random random(kSeed);
   int stops = 0;
   for (bool done = false; !done;) {
     ASSERT_LT(stops, 1000);

@@ -133,7 +133,8 @@ TEST(Cell, IsCutThroughItsCorners) {
 }
 
 TEST(Cell, StaysClosedHoweverOftenItIsCut) {
-  Random random(41);
+  constexpr std::uint64_t kSeed = 41;
+  Random random(kSeed);
   const auto vector = [&random] { return Vec3(random.normal(), random.normal(), random.normal()); };
   for (int round = 0; round < testing::rounds(30); ++round) {
     PlaneTable planes(kTolerance);

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdint>
 #include <fstream>
 #include <string>
 #include <vector>
@@ -24,7 +25,8 @@ ConvexMesh box_at(const Vec3& low, const Vec3& high, const Quat& turn = Quat(1, 
 }
 
 TEST(CommonVolume, OfBoxesThatOverlapAbutAndStandApart) {
-  Random random(3);
+  constexpr std::uint64_t kSeed = 3;
+  Random random(kSeed);
   for (int i = 0; i < 20; ++i) {
     const Quat turn = i == 0 ? Quat(1, 0, 0, 0) : uniform_rotation(random);
     const ConvexMesh one = box_at(Vec3(0), Vec3(0.02, 0.03, 0.04), turn);
@@ -45,7 +47,8 @@ TEST(CommonVolume, OfBoxesThatOverlapAbutAndStandApart) {
 }
 
 TEST(CommonVolume, OfSolidsInAnyOrientationIsThatOfSampledPoints) {
-  Random random(4);
+  constexpr std::uint64_t kSeed = 4;
+  Random random(kSeed);
   for (int i = 0; i < 30; ++i) {
     const Vec3 half(0.03, 0.02, 0.04);
     const ConvexMesh a = box_at(-half, half, uniform_rotation(random));

@@ -69,7 +69,8 @@ class Folders(Study):
         self.assertFalse((self.dir / "none").exists())
 
     def test_stopped_at_any_moment_nothing_or_all_is_there(self):
-        random.seed(5)
+        seed = 5
+        random.seed(seed)
         db = shutil.copy(self.sampled, self.dir / "kill.db")
         outcomes = set()
         for round in range(24):

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <glm/geometric.hpp>
 #include <vector>
 
@@ -62,7 +63,8 @@ class Press {
 };
 
 TEST(SegmentDistance, IsTheLeastOverAFineGrid) {
-  Random random(11);
+  constexpr std::uint64_t kSeed = 11;
+  Random random(kSeed);
   const auto place = [&] { return Vec3(random.unit(), random.unit(), random.unit()); };
   for (int n = 0; n < 200; ++n) {
     const Vec3 a = place(), b = place(), c = place();
@@ -231,7 +233,8 @@ TEST(SoftContact, ATickNeitherAllocatesNorGivesNaN) {
   const SoftObject object = slab(5000, 250, {.most = 16});
   SoftObjectState state = initial_state(object);
   const PlacedTool tool = one_segment(Vec3(0.06, 0.01, 0.0));
-  Random random(19);
+  constexpr std::uint64_t kSeed = 19;
+  Random random(kSeed);
   Vec3 tip(-0.03, 0, 0.03);
   const std::uint64_t before = runner::bench::allocations();
   for (int i = 0; i < 3000; ++i) {

@@ -69,7 +69,8 @@ TEST(SoftSolid, TheSurfaceIsClosedAndPointsOutwards) {
 }
 
 TEST(SoftSolid, TheGradientIsTheSlopeOfTheEnergy) {
-  Random random(3);
+  constexpr std::uint64_t kSeed = 3;
+  Random random(kSeed);
   for (const stimuli::SolidMesh& mesh :
        {soft_mesh(ShapeKind::sphere, 4), soft_mesh(ShapeKind::box, 3), one_tetrahedron()}) {
     const Solid solid(mesh, {.young = 30000, .poisson = 0.4});
@@ -100,7 +101,8 @@ TEST(SoftSolid, TheGradientIsTheSlopeOfTheEnergy) {
 TEST(SoftSolid, TheStiffnessIsTheSlopeOfTheGradientAtRest) {
   const stimuli::SolidMesh mesh = soft_mesh(ShapeKind::cylinder, 2);
   const Solid solid(mesh, {.young = 30000, .poisson = 0.4});
-  Random random(5);
+  constexpr std::uint64_t kSeed = 5;
+  Random random(kSeed);
   std::vector<Vec3> step, by_matrix(mesh.nodes.size(), Vec3(0));
   for (std::size_t i = 0; i < mesh.nodes.size(); ++i) step.push_back(random_step(random, 1));
   for (const Solid::Block& block : solid.stiffness()) {
@@ -123,7 +125,8 @@ TEST(SoftSolid, TheStiffnessIsTheSlopeOfTheGradientAtRest) {
 
 // Elements of any shape represent a uniform strain exactly: inner forces cancel.
 TEST(SoftSolid, PatchTest) {
-  Random random(7);
+  constexpr std::uint64_t kSeed = 7;
+  Random random(kSeed);
   stimuli::SolidMesh mesh = stimuli::mesh_of_box({0.03, 0.03, 0.03}, {4, 4, 4});
   const auto inside = [](const Vec3& p) {
     return std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}) < 0.0149;

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <cstdint>
 #include <fstream>
 #include <span>
 #include <string>
@@ -192,7 +193,8 @@ TEST(FalconImage, TruncatedAndCorruptedStreamsAreRefusedOrWellFormed) {
     EXPECT_FALSE(refusal({good.begin(), good.begin() + static_cast<std::ptrdiff_t>(size)}).empty())
         << size;
   }
-  Random random(3);
+  constexpr std::uint64_t kSeed = 3;
+  Random random(kSeed);
   for (int round = 0; round < 5000; ++round) {
     auto noise = good;
     noise[random.below(noise.size())] = static_cast<std::uint8_t>(random.next());

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <cstdint>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -126,7 +127,8 @@ TEST(FalconPackets, ALongPacketIsDropped) {
 }
 
 TEST(FalconPackets, RandomBytesNeverBreakTheStream) {
-  Random random(7);
+  constexpr std::uint64_t kSeed = 7;
+  Random random(kSeed);
   PacketStream stream;
   const std::string whole = text(encode(Reply{{1, -2, 3}, 0, 7}));
   // Bytes near the alphabet, so that many sequences resemble packets.

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <glm/geometric.hpp>
 #include <limits>
 #include <vector>
@@ -31,7 +32,8 @@ std::vector<PairedPoint> paired(const Pose& truth, int count, double noise, std:
 }
 
 TEST(StylusFromEnds, TheFitIsExactWithoutNoise) {
-  Random random(5);
+  constexpr std::uint64_t kSeed = 5;
+  Random random(kSeed);
   for (int round = 0; round < 200; ++round) {
     const Pose truth{{0.3, -0.2, 0.1 * round}, stimuli::uniform_rotation(random)};
     const RigidFit fit = fit_rigid(paired(truth, 8 + round % 5, 0, 100 + round));

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <glm/geometric.hpp>
 #include <random>
 
@@ -57,7 +58,8 @@ TEST(DrawnMeshTest, ALineMeetsASphereWhereItEntersIt) {
 }
 
 TEST(CameraTest, FittedPointsAreInThePictureAndFillIt) {
-  std::mt19937 generator(7);
+  constexpr std::uint32_t kSeed = 7;
+  std::mt19937 generator(kSeed);
   std::uniform_real_distribution<float> any(-1, 1);
   for (int k = 0; k < 200; ++k) {
     Camera camera;
