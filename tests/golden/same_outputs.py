@@ -79,7 +79,7 @@ def hidden(text, folder, program):
 
 
 def rows(database):
-    """All of a database but for the moments of exports, what is drawn by chance in withdrawals, and the places of attempts in
+    """All of a database but for the moments of exports, what is drawn by chance in withdrawals, and the places of rows in
     the chain of seals: the clock ends the batches in which a simulation's rows are sealed."""
     lines = []
     with contextlib.closing(sqlite3.connect(f"file:{database}?immutable=1", uri=True)) as opened:
@@ -89,7 +89,7 @@ def rows(database):
                 cursor = opened.execute(f'SELECT * FROM "{name}"')
                 kept = [i for i, (column, *_) in enumerate(cursor.description)
                         if (name, column) not in (("exports", "made_utc_ns"), ("tombstones", "code_hash"), ("tombstone_secrets", "secret"),
-                                             ("attempts", "link"), ("attempts", "seal"))]
+                                             ("attempts", "link"), ("attempts", "seal"), ("page_answers", "link"), ("page_answers", "seal"))]
                 lines += [repr([row[i] if not isinstance(row[i], bytes) else hashlib.sha256(row[i]).hexdigest() for i in kept])
                           for row in cursor]
     return "\n".join(lines)
