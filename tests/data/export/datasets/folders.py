@@ -95,8 +95,9 @@ class Folders(Study):
                 self.export(form, out, database=db)
                 self.assertEqual(list(self.dir.glob(".killed*")), [])
                 shutil.rmtree(out)
-            for path in self.dir.glob("killed.??????"):
-                path.unlink()
+            # Otherwise the next round may be interrupted before it removes them.
+            for path in [*self.dir.glob("killed.??????"), *self.dir.glob(".killed*")]:
+                shutil.rmtree(path) if path.is_dir() else path.unlink()
             (self.dir / "attempts.csv").unlink(missing_ok=True)
         self.assertGreater(len(outcomes), 1)
 
