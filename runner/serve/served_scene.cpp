@@ -254,13 +254,13 @@ void ServedScene::obey(std::uint64_t client, const Message& message) {
         out["response_time_s"] =
             static_cast<double>(at - out["zero_t_ns"].get<std::int64_t>()) * 1e-9;
         tell("answered", at, out);
-        return output_->reply(client, accepted(message.id, std::move(out)));
+        return output_->reply(client, accepted(message.id, out));
       }
       case MessageType::stop: {
         if (trial_ && !trial_->holds) drop_pending("stopped", "stopped before forces were on");
         ordered_json out = trial_ ? end_trial() : ordered_json::object();
         tell("stopped", clock_.now_ns(), {{"reason", message.text}});
-        return output_->reply(client, accepted(message.id, std::move(out)));
+        return output_->reply(client, accepted(message.id, out));
       }
       case MessageType::mark:
       case MessageType::note: {

@@ -254,6 +254,7 @@ std::vector<Rehearsal> PlannedStudies::rehearse(
         const analysis::NamedResults results =
             analysis::named_results(analysis::report_json(analysis), registration.alpha);
         std::vector<analysis::Verdict> verdicts;
+        verdicts.reserve(hypotheses.size());
         for (const analysis::Hypothesis& one : hypotheses)
           verdicts.push_back(analysis::judge(one, results).verdict);
         const std::lock_guard lock(mutex);
