@@ -469,12 +469,17 @@ void SurfaceTool::find_rest() {
   for (int round = 0; round < kRounds && !stuck_; ++round) {
     Vec3 goal;
     if (!find_goal(goal)) break;
-    // A free tool stops before a patch that its goal is less than a skin away from: on a patch, and
-    // on another's border, rounding would decide whether a later cast meets either.
-    const Vec3 way = goal - at_;
-    const double length = glm::length(way);
-    const double ahead = planes_.empty() && length > 0 ? 1 + skin_ / length : 1;
-    const Vec3 far_goal = ahead > 1 ? at_ + ahead * way : goal;
+    // A free tool stops before a patch that its goal is less than a skin away from. Exactly on it
+    // and on another's border, rounding would decide whether a later cast meets either.
+    Vec3 far_goal = goal;
+    double ahead = 1;
+    if (planes_.empty()) {
+      const double length = glm::length(goal - at_);
+      if (length > 0) {
+        ahead += skin_ / length;
+        far_goal += skin_ / length * (goal - at_);
+      }
+    }
     const PatchHit hit = cast(at_, far_goal);
     if (round == 0) first_hit_ = ahead * hit.time;
     if (hit.hit()) {
