@@ -38,7 +38,7 @@ TEST(LatinSquare, RepeatsAfterItsRows) {
   EXPECT_EQ(latin_square_row(3, 7), latin_square_row(3, 1));
 }
 
-TEST(LatinSquare, RefusesNonsense) {
+TEST(LatinSquare, RefusesASizeOrRowBelowItsRange) {
   EXPECT_THROW(latin_square_row(0, 1), std::invalid_argument);
   EXPECT_THROW(latin_square_row(2, 0), std::invalid_argument);
 }

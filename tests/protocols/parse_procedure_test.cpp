@@ -48,7 +48,7 @@ TEST(ParseProcedure, ReadsEveryExampleOfTheReadme) {
   EXPECT_EQ(count, 5);
 }
 
-TEST(ParseProcedure, Staircase) {
+TEST(ParseProcedure, ReadsAStaircaseWithItsDefaults) {
   const auto read = read_text(
       R"({"kind": "staircase", "start": 5, "min": 1, "max": 10, "steps": 0.5, "target": 0.75,
           "stop": {"reversals": 12}, "easier": "lower"})");

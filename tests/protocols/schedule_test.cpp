@@ -49,7 +49,7 @@ int longest_run(const std::vector<int>& stimuli) {
 }
 
 // A change here changes the meaning of every published seed.
-TEST(Schedule, GoldenHo2000) {
+TEST(Schedule, Ho2000NeverChanges) {
   std::string text;
   for (int participant = 1; participant <= 7; ++participant) {
     text += text_of(schedule(ho2000(), participant));

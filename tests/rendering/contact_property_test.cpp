@@ -38,7 +38,7 @@ class EveryTick : public ::testing::TestWithParam<const Renderer*> {
   }
 };
 
-TEST_P(EveryTick, SlidingSlowly) {
+TEST_P(EveryTick, IsExactWhenSlidingSlowly) {
   const bool side = GetParam()->side_contact();
   const PathCheck check =
       follow(1, 300, [side](Random& random, const stimuli::ConvexMesh& mesh, double length) {
@@ -48,7 +48,7 @@ TEST_P(EveryTick, SlidingSlowly) {
   EXPECT_GT(check.free, check.ticks / 50);
 }
 
-TEST_P(EveryTick, SlidingFastAndDeep) {
+TEST_P(EveryTick, IsExactWhenSlidingFastAndDeep) {
   const bool side = GetParam()->side_contact();
   const PathCheck check =
       follow(2, 300, [side](Random& random, const stimuli::ConvexMesh& mesh, double length) {
@@ -57,7 +57,7 @@ TEST_P(EveryTick, SlidingFastAndDeep) {
   EXPECT_GT(check.in_contact, check.ticks / 3);
 }
 
-TEST_P(EveryTick, Wandering) {
+TEST_P(EveryTick, IsExactWhenWandering) {
   const PathCheck check =
       follow(3, 600, [](Random& random, const stimuli::ConvexMesh& mesh, double length) {
         return testing::wandering_path(random, mesh, length, 400, 0.01);
@@ -66,7 +66,7 @@ TEST_P(EveryTick, Wandering) {
   EXPECT_GT(check.free, check.ticks / 50);
 }
 
-TEST_P(EveryTick, PassingFast) {
+TEST_P(EveryTick, IsExactWhenPassingFast) {
   const PathCheck check =
       follow(4, 600, [](Random& random, const stimuli::ConvexMesh& mesh, double length) {
         const double step = 0.02 * std::pow(1000, random.unit());
@@ -75,7 +75,7 @@ TEST_P(EveryTick, PassingFast) {
   EXPECT_GT(check.in_contact, check.ticks / 50);
 }
 
-TEST_P(EveryTick, Jumping) {
+TEST_P(EveryTick, IsExactWhenJumping) {
   const PathCheck check =
       follow(5, 600, [](Random& random, const stimuli::ConvexMesh& mesh, double length) {
         return testing::jumping_path(random, mesh, length, 200);
@@ -85,7 +85,7 @@ TEST_P(EveryTick, Jumping) {
 
 // A rim of n corners is a ring of n silhouette edges on about n facets: the longest path of a walk.
 // Jumps make it walk halfway around.
-TEST_P(EveryTick, JumpingOverRims) {
+TEST_P(EveryTick, IsExactWhenJumpingOverRims) {
   PathCheck check;
   for (std::uint64_t seed = 0; seed < 120; ++seed) {
     Random random(seed, {6});

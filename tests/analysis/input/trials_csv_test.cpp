@@ -213,7 +213,7 @@ TEST_F(TrialsCsv, EveryBadFieldIsNamed) {
                         "line 4, column response_time"}));
 }
 
-TEST_F(TrialsCsv, BadTimes) {
+TEST_F(TrialsCsv, RefusesBadTimes) {
   for (const char* time : {"", " 2", "2 ", "+2", "inf", "nan", "-0.1", "1e7", "1e999", "2s"}) {
     expect_fault(kHeader + "P1,1,1,1,ray,cone,cone,1," + time + "\n",
                  "line 2, column response_time", "a time in s");
@@ -234,7 +234,7 @@ TEST_F(TrialsCsv, MissingAndDoubleColumns) {
   EXPECT_NE(semicolons[0].expected.find("commas"), std::string::npos);
 }
 
-TEST_F(TrialsCsv, BrokenFiles) {
+TEST_F(TrialsCsv, RefusesBrokenFiles) {
   const std::string row = "P1,1,1,1,ray,cone,cone,1,2\n";
   expect_fault("", "file", "at least one trial");
   expect_fault(kHeader, "file", "at least one trial");

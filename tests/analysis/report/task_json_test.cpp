@@ -200,7 +200,7 @@ TEST(TaskJson, NumbersSettingsAnswersAndConfidence) {
     "ci95": [0.5625, 0.8125]})"));
 }
 
-TEST(TaskJson, GroupResults) {
+TEST(TaskJson, GroupResultsHaveEveryFigure) {
   TaskGroup group;
   group.task = "compare";
   group.block_name = "stiff";
@@ -228,7 +228,7 @@ TEST(TaskJson, GroupResults) {
   EXPECT_EQ(found["renderers"][0]["sd"], 0.125);
 }
 
-TEST(TaskJson, Comparisons) {
+TEST(TaskJson, ComparisonsHaveEveryFigure) {
   TaskComparison one;
   one.task = "compare";
   one.measure = "jnd";

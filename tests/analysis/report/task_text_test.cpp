@@ -134,7 +134,7 @@ TEST(TaskText, AnswersTheOtherWayRoundAreSaid) {
   EXPECT_FALSE(has("BELOW"));
 }
 
-TEST(TaskText, GroupResults) {
+TEST(TaskText, GroupResultsSayWhoWasLeftOut) {
   TaskGroup group;
   group.task = "compare";
   group.shape = "ball";
@@ -299,7 +299,7 @@ std::string text_of_comparison(const TaskComparison& one, bool of_renderers) {
   return text.substr(0, text.find("Intervals are"));
 }
 
-TEST(TaskText, Comparisons) {
+TEST(TaskText, ComparisonsSayDifferencesAndTests) {
   TaskComparison one;
   one.task = "compare";
   one.measure = "threshold";

@@ -185,18 +185,18 @@ void expect_by_definition(const DenseStudy& study) {
   }
 }
 
-TEST(MixedModelByDefinition, Balanced) {
+TEST(MixedModelByDefinition, ABalancedStudyIsFittedAsDefined) {
   expect_by_definition(dense_study(
       6, 3, [](auto...) { return 3; }, 1));
 }
 
-TEST(MixedModelByDefinition, UnbalancedWithGaps) {
+TEST(MixedModelByDefinition, AnUnbalancedStudyWithGapsIsFittedAsDefined) {
   expect_by_definition(dense_study(
       8, 3, [](std::size_t p, std::size_t r, std::size_t s) { return (p * p + 3 * r + 2 * s) % 4; },
       2));
 }
 
-TEST(MixedModelByDefinition, MoreShapesThanParticipants) {
+TEST(MixedModelByDefinition, MoreShapesThanParticipantsAreFittedAsDefined) {
   expect_by_definition(dense_study(
       9, 12, [](std::size_t p, std::size_t r, std::size_t s) { return (p + r + s * s) % 3; }, 3));
 }

@@ -70,7 +70,7 @@ TEST(Undefined, NoVarianceUpToRounding) {
   EXPECT_TRUE(t_test({-0.7, -0.7 - 1e-9}).t.has_value()) << "small, but variance";
 }
 
-TEST(Undefined, AllZero) {
+TEST(Undefined, WilcoxonOfZerosAlone) {
   const Wilcoxon ranks = wilcoxon({0, 1e-17, -1e-17});
   EXPECT_FALSE(ranks.undefined.empty());
   EXPECT_EQ(ranks.n_nonzero, 0U);

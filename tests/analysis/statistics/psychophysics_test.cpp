@@ -168,7 +168,7 @@ TEST(AdjustmentSettings, SpreadIsAboutTheMeanOfEachDirection) {
   EXPECT_LT(adjustments({{0, 0, 35, true}, {0, 0, 21, false}})[0].pse_ci95->low, -50);
 }
 
-TEST(Information, ClosedForms) {
+TEST(Information, AgreesWithClosedForms) {
   const InformationTransfer perfect = information_transfer({{10, 0}, {0, 10}});
   EXPECT_NEAR(*perfect.plain, 1, 1e-12);
   EXPECT_NEAR(perfect.stimulus_entropy, 1, 1e-12);

@@ -144,7 +144,7 @@ TEST_F(DamagedDatabase, DamagedBytesAnywhere) {
   }
 }
 
-TEST_F(DamagedDatabase, TruncatedAnywhere) {
+TEST_F(DamagedDatabase, ATruncatedFileIsRefusedAndLeftAlone) {
   constexpr std::uint32_t kSeed = 12;
   std::mt19937 random(kSeed);
   for (int round = 0; round < 60; ++round) {

@@ -30,7 +30,7 @@ TEST(ClockCheck, BehindTheNewestRecord) {
   EXPECT_TRUE(says({kNow, kNow + 7 * kYear, {}}, "7 years before"));
 }
 
-TEST(ClockCheck, YearsOff) {
+TEST(ClockCheck, AClockThatIsYearsOffIsReported) {
   EXPECT_TRUE(says({kNow, kNow - 10 * kYear, kNow}, "10 years after the newest record"));
   EXPECT_TRUE(says({kDay, {}, {}}, "before this program existed"));
   EXPECT_TRUE(says({kNow, {}, kNow + 2 * kYear}, "2 years before the protocol or the program"));

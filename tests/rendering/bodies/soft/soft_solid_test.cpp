@@ -124,7 +124,7 @@ TEST(SoftSolid, TheStiffnessIsTheSlopeOfTheGradientAtRest) {
 }
 
 // Elements of any shape represent a uniform strain exactly: inner forces cancel.
-TEST(SoftSolid, PatchTest) {
+TEST(SoftSolid, ElementsOfAnyShapeTakeAUniformStrain) {
   constexpr std::uint64_t kSeed = 7;
   Random random(kSeed);
   stimuli::SolidMesh mesh = stimuli::mesh_of_box({0.03, 0.03, 0.03}, {4, 4, 4});

@@ -21,7 +21,7 @@ std::vector<Packet> packets_in(PacketStream& stream, std::string_view bytes) {
   return found;
 }
 
-TEST(FalconPackets, KnownPackets) {
+TEST(FalconPackets, KnownCommandsAreEncoded) {
   Command command;
   command.green = true;
   EXPECT_EQ(text(encode(command)), "<AAAAAAAAAAAADA>");
