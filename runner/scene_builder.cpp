@@ -37,17 +37,8 @@ bool same_layer(const stimuli::Layer& a, const stimuli::Layer& b) {
 /// The mesh in the frame in which its own has this pose.
 std::shared_ptr<const stimuli::ConvexMesh> in_frame(const stimuli::ConvexMesh& mesh,
                                                     const Pose& pose) {
-  stimuli::PolygonSoup soup;
-  for (const Vec3& v : mesh.vertices())
-    soup.vertices.push_back(pose.orientation * v + pose.position);
-  for (std::uint32_t f = 0; f < mesh.facets().size(); ++f) {
-    const stimuli::Facet& facet = mesh.facets()[f];
-    auto& face = soup.faces.emplace_back();
-    for (std::uint32_t k = 0; k < facet.side_count; ++k) {
-      const stimuli::Edge& edge = mesh.edges()[mesh.sides()[facet.first_side + k].edge];
-      face.push_back(edge.left == f ? edge.v0 : edge.v1);
-    }
-  }
+  stimuli::PolygonSoup soup = mesh.polygons();
+  for (Vec3& v : soup.vertices) v = pose.orientation * v + pose.position;
   return std::make_shared<const stimuli::ConvexMesh>(soup);
 }
 

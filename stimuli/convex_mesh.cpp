@@ -648,6 +648,19 @@ class BallProgram {
 
 Ball largest_inscribed_ball(const ConvexMesh& mesh) { return BallProgram(mesh).solve(); }
 
+PolygonSoup ConvexMesh::polygons() const {
+  PolygonSoup soup;
+  soup.vertices.assign(vertices_.begin(), vertices_.end());
+  for (std::uint32_t f = 0; f < facets_.size(); ++f) {
+    auto& face = soup.faces.emplace_back();
+    for (std::uint32_t k = 0; k < facets_[f].side_count; ++k) {
+      const Edge& edge = edges_[sides_[facets_[f].first_side + k].edge];
+      face.push_back(edge.left == f ? edge.v0 : edge.v1);
+    }
+  }
+  return soup;
+}
+
 PolygonExtent::PolygonExtent(const Vec3& side)
     : along_(glm::normalize(side)), length_(glm::length(side)) {}
 

@@ -87,6 +87,7 @@ class ConvexMesh {
   const LargeArray<Facet>& facets() const { return facets_; }
   const LargeArray<Side>& sides() const { return sides_; }
   const LargeArray<Edge>& edges() const { return edges_; }
+  PolygonSoup polygons() const;  ///< its vertices and facets, in their order
 
   /// Edges around vertex v, counter-clockwise seen from outside:
   /// fan_edges()[fan_first()[v] .. fan_first()[v + 1]).

@@ -82,17 +82,7 @@ DrawnMesh triangles_of(const stimuli::ObjectSpec& object) {
 }
 
 void add_facets(const stimuli::ConvexMesh& mesh, const Pose& pose, DrawnMesh& out) {
-  stimuli::PolygonSoup soup;
-  soup.vertices.assign(mesh.vertices().begin(), mesh.vertices().end());
-  for (std::uint32_t f = 0; f < mesh.facets().size(); ++f) {
-    const stimuli::Facet& facet = mesh.facets()[f];
-    auto& face = soup.faces.emplace_back();
-    for (std::uint32_t k = 0; k < facet.side_count; ++k) {
-      const stimuli::Edge& edge = mesh.edges()[mesh.sides()[facet.first_side + k].edge];
-      face.push_back(edge.left == f ? edge.v0 : edge.v1);
-    }
-  }
-  add(soup, pose, out);
+  add(mesh.polygons(), pose, out);
 }
 
 void smooth(DrawnMesh& mesh) {
