@@ -316,6 +316,13 @@ std::string accepted(std::int64_t id, const ordered_json& more) {
   return out.dump(-1, ' ', false, json::error_handler_t::replace);
 }
 
+ordered_json remark(const Message& message) {
+  ordered_json out;
+  if (message.type == MessageType::mark) out["code"] = message.code;
+  out["text"] = message.text;
+  return out;
+}
+
 std::string refused(const std::optional<std::int64_t>& id, const std::vector<Refusal>& why) {
   constexpr std::size_t kMostFaults = 20;
   const auto shown = [](const Refusal& refusal) {

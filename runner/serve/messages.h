@@ -124,6 +124,8 @@ Message parse_message(const std::string& text);
 std::string accepted(std::int64_t id,
                      const nlohmann::ordered_json& more = nlohmann::ordered_json::object());
 std::string refused(const std::optional<std::int64_t>& id, const std::vector<Refusal>& why);
+/// What a mark or a note says: {"code":...,"text":...}, the code of a mark alone.
+nlohmann::ordered_json remark(const Message& message);
 /// {"event":name,"t_ns":t,...}
 std::string event(const std::string& name, std::int64_t t_ns,
                   const nlohmann::ordered_json& more = nlohmann::ordered_json::object());

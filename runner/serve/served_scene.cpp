@@ -266,9 +266,7 @@ void ServedScene::obey(std::uint64_t client, const Message& message) {
       case MessageType::note: {
         const std::int64_t now = clock_.now_ns();
         const bool mark = message.type == MessageType::mark;
-        ordered_json out;
-        if (mark) out["code"] = message.code;
-        out["text"] = message.text;
+        const ordered_json out = remark(message);
         tell(mark ? "mark" : "note", now, out);
         return output_->reply(client, accepted(message.id, {{"t_ns", now}}));
       }
