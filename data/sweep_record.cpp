@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "data/base/json_text.h"
+#include "data/stored_protocol.h"
 
 namespace palpate::data {
 namespace {
@@ -103,8 +104,6 @@ std::vector<std::string> differences(const SweepPlan& a, const SweepPlan& b) {
 
 std::vector<TaskCellColumns> task_columns(const SweepPlan& plan) {
   std::vector<TaskCellColumns> cells;
-  const auto protocol = json_or_discarded(plan.protocol);
-  if (!protocol.is_object() || protocol.value("version", 1) != 2) return cells;
   const auto add = [&](TaskCellColumns cell) {
     const std::string place =
         "_" + cell.block + (cell.stimulus.empty() ? "" : "_" + cell.stimulus) + "_" + cell.renderer;
@@ -114,13 +113,12 @@ std::vector<TaskCellColumns> task_columns(const SweepPlan& plan) {
     }
     cells.push_back(std::move(cell));
   };
-  for (const auto& block : protocol.at("blocks")) {
-    if (block.value("practice", false)) continue;
-    const std::string task = block.at("task"), name = block.at("name");
-    for (const auto& renderer : block.value("renderers", protocol.at("renderers"))) {
-      for (const auto& stimulus : block.at("stimuli"))
-        add({task, name, stimulus, renderer, measures_of(task), {}});
-      if (task == "identify") add({task, name, "", renderer, {"bits"}, {}});
+  for (const StoredBlock& block : read_stored_protocol(plan.protocol).blocks) {
+    if (block.practice) continue;
+    for (const std::string& renderer : block.renderers) {
+      for (const std::string& stimulus : block.stimuli)
+        add({block.task, block.name, stimulus, renderer, measures_of(block.task), {}});
+      if (block.task == "identify") add({block.task, block.name, "", renderer, {"bits"}, {}});
     }
   }
   return cells;

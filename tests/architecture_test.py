@@ -94,7 +94,7 @@ PUBLIC = {
                  "tasks/task_plan tasks/levels tasks/texts",
     "protocols/procedures": "procedure procedure_spec psychometric",
     "data/base": "checksum input_file json_text random text",
-    "data": "column_table record sweep_record",
+    "data": "column_table record stored_protocol sweep_record",
     "data/files": "atomic_file atomic_folder file_permissions text_sink output_check utc",
     "data/store": "export_log protocol_rows schema connection station_database store sweep_file "
                   "forget task_text",

@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include "analysis/input/stored_protocol.h"
 #include "analysis/text.h"
 #include "data/base/text.h"
 #include "data/store/store.h"
+#include "data/stored_protocol.h"
 
 namespace palpate::analysis {
 
@@ -35,7 +35,7 @@ void remember(const std::string& value, std::vector<std::string>& known) {
 }
 
 ProtocolText protocol_text(const data::ProtocolInfo& info) {
-  const StoredProtocol stored = read_stored_protocol(info.text);
+  const data::StoredProtocol stored = data::read_stored_protocol(info.text);
   return {info.name, info.sha256, info.text, stored.title, stored.seed};
 }
 

@@ -5,9 +5,9 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
-#include "analysis/input/stored_protocol.h"
 #include "data/base/json_text.h"
 #include "data/store/sweep_file.h"
+#include "data/stored_protocol.h"
 #include "protocols/parse.h"
 
 namespace palpate::analysis {
@@ -60,7 +60,7 @@ SweepTable read_sweep_table(const std::string& path) {
   table.seed = plan.seed;
   table.participants = plan.participants;
   table.program_version = plan.program_version;
-  const StoredProtocol protocol = read_stored_protocol(plan.protocol);
+  const data::StoredProtocol protocol = data::read_stored_protocol(plan.protocol);
   table.protocol_name = protocol.name;
   table.repetitions = protocol.repetitions;
   table.parameters = plan.parameters;

@@ -11,7 +11,6 @@
 #include <utility>
 
 #include "analysis/input/csv_reader.h"
-#include "analysis/input/stored_protocol.h"
 #include "analysis/input/study_record.h"
 #include "analysis/input/trials.h"
 #include "analysis/text.h"
@@ -20,6 +19,7 @@
 #include "data/files/text_sink.h"
 #include "data/store/store.h"
 #include "data/store/task_text.h"
+#include "data/stored_protocol.h"
 #include "protocols/parse.h"
 
 namespace palpate::analysis {
@@ -299,14 +299,6 @@ void note_once(const std::string& value, std::vector<std::string>& known) {
 
 }  // namespace
 
-bool has_protocol_of_version_2(const std::string& database) {
-  data::Store store = data::Store::open(database, data::Store::Mode::read_only);
-  const auto protocols = store.protocols();
-  return std::any_of(protocols.begin(), protocols.end(), [](const data::ProtocolInfo& protocol) {
-    return read_stored_protocol(protocol.text).version == 2;
-  });
-}
-
 TaskTrial task_trial_of(const std::string& participant, const data::TrialRecord& record) {
   TaskTrial trial;
   trial.participant = participant;
@@ -368,7 +360,7 @@ TaskTable read_task_trials_store(const std::string& path, const std::string& pro
       table.procedures[one.sha256] = protocols::procedures_of_blocks(one.text, path);
     const bool used = std::ranges::any_of(
         table.protocols, [&](const auto& known) { return known.second == one.sha256; });
-    if (used && table.title.empty()) table.title = read_stored_protocol(one.text).title;
+    if (used && table.title.empty()) table.title = data::read_stored_protocol(one.text).title;
   }
   table.provenance.protocol_name = listed(names);
   table.provenance.observer_sha256 = listed(observers);

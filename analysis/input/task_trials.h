@@ -55,8 +55,6 @@ TaskTable read_task_trials_csv(const std::string& path, const std::string& proto
 /// nullopt: there are none, or the source lacks their times or numbers.
 std::optional<TrialTable> identification_of(const TaskTable& table);
 
-/// Whether a database holds a protocol of version 2. \throws as data::Store::open.
-bool has_protocol_of_version_2(const std::string& database);
 /// Converts a stored completed trial.
 TaskTrial task_trial_of(const std::string& participant, const data::TrialRecord& record);
 /// Reads the completed trials of a database. \throws protocols::InputError: there are none; as

@@ -13,12 +13,12 @@
 #include <vector>
 
 #include "analysis/input/csv_reader.h"
-#include "analysis/input/stored_protocol.h"
 #include "analysis/input/study_record.h"
 #include "analysis/text.h"
 #include "data/files/text_sink.h"
 #include "data/store/store.h"
 #include "data/store/task_text.h"
+#include "data/stored_protocol.h"
 #include "protocols/parse.h"
 
 namespace palpate::analysis {
@@ -542,7 +542,8 @@ TrialTable read_trials_store(const std::string& path) {
   provenance.source = path;
   std::vector<std::string> listed, protocol_names, observers;
   for (const data::ProtocolInfo& protocol : store.protocols()) {
-    for (const std::string& name : read_stored_protocol(protocol.text).stimuli) note(name, listed);
+    for (const std::string& name : data::read_stored_protocol(protocol.text).stimuli)
+      note(name, listed);
   }
   TrialTableBuilder builder;
   const data::TorqueNotes notes(store);

@@ -4,6 +4,7 @@
 #include <regex>
 
 #include "data/files/utc.h"
+#include "data/stored_protocol.h"
 
 namespace palpate::data {
 namespace {
@@ -21,7 +22,7 @@ std::int64_t difference(std::int64_t a, std::int64_t b) {
 }  // namespace
 
 ExportClock::ExportClock(Store& store, Times times)
-    : times_(times), tasks_(store.has_tasks()), torque_(store) {
+    : times_(times), tasks_(have_blocks(store.protocols())), torque_(store) {
   if (relative()) firsts_ = store.first_onsets();
 }
 

@@ -18,7 +18,7 @@ class ExportClock {
   ExportClock(Store& store, Times times);
   ExportClock() : times_(Times::absolute) {}
 
-  /// Whether rows of trials have the columns of tasks: the database has a study of version 2.
+  /// Whether rows of trials have the columns of tasks: a protocol of the database has blocks.
   bool tasks() const { return tasks_; }
   /// Rows of trials have the column torque_driven if any run left torque out.
   const TorqueNotes& torque() const { return torque_; }

@@ -59,17 +59,6 @@ std::vector<StoredPageAnswer> Store::page_answers() {
   });
 }
 
-bool Store::has_tasks() {
-  return guarded(impl_->path, [&] {
-    if (impl_->version < kPagesSince) return false;
-    // One attempt per run suffices: a run has one protocol.
-    SQLite::Statement find(*impl_->db,
-                           "SELECT 1 FROM runs r WHERE (SELECT task FROM attempts a WHERE a.run_id "
-                           "= r.id LIMIT 1) IS NOT NULL LIMIT 1");
-    return find.executeStep();
-  });
-}
-
 std::vector<std::string> Store::answered_pages(const Participant& participant, int session) {
   return guarded(impl_->path, [&] {
     std::vector<std::string> pages;

@@ -201,8 +201,6 @@ class Store {
   /// The files that a protocol names, by name.
   std::vector<ProtocolFile> files(const std::string& protocol_sha256);
   std::vector<Participant> participants(const std::string& protocol_sha256);  ///< by number
-  /// Whether a trial of version 2 of protocols, with a task, is on record.
-  bool has_tasks();
   std::vector<std::string> codes();  ///< of all participants, in the order of insertion
   std::vector<StoredRun> runs();     ///< by protocol, participant number, session, start
   std::vector<StoredNote> notes();   ///< in the same order

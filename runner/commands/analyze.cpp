@@ -19,6 +19,7 @@
 #include "analysis/statistics/task_analysis.h"
 #include "data/base/text.h"
 #include "data/store/store.h"
+#include "data/stored_protocol.h"
 #include "runner/commands/movement/movement_study.h"
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/outputs.h"
@@ -124,8 +125,8 @@ void analyze_tasks_of(const std::string& database, const std::string& csv,
 /// Whether the data are of tasks; the later reader reports unreadable data.
 bool is_of_tasks(const std::string& database, const std::string& csv) {
   try {
-    return csv.empty() ? analysis::has_protocol_of_version_2(database)
-                       : analysis::has_task_column(csv);
+    if (!csv.empty()) return analysis::has_task_column(csv);
+    return data::have_blocks(data::Store::open(database, data::Store::Mode::read_only).protocols());
   } catch (const std::runtime_error&) {
     return false;
   }

@@ -1,0 +1,71 @@
+#include "data/stored_protocol.h"
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "data/base/json_text.h"
+
+namespace palpate::data {
+namespace {
+
+void read_text(const nlohmann::json& from, const char* key, std::string& to) {
+  if (!from.is_object()) return;
+  if (const auto found = from.find(key); found != from.end() && found->is_string()) to = *found;
+}
+
+const nlohmann::json& list_of(const nlohmann::json& from, const char* key) {
+  static const nlohmann::json kNone = nlohmann::json::array();
+  if (!from.is_object()) return kNone;
+  const auto found = from.find(key);
+  return found != from.end() && found->is_array() ? *found : kNone;
+}
+
+void read_texts(const nlohmann::json& from, const char* key, std::vector<std::string>& to) {
+  for (const auto& one : list_of(from, key)) {
+    if (one.is_string()) to.push_back(one);
+  }
+}
+
+StoredBlock read_block(const nlohmann::json& json) {
+  StoredBlock block;
+  read_text(json, "name", block.name);
+  read_text(json, "task", block.task);
+  block.practice = json.is_object() && json.contains("practice") && json["practice"] == true;
+  read_texts(json, "renderers", block.renderers);
+  read_texts(json, "stimuli", block.stimuli);
+  return block;
+}
+
+}  // namespace
+
+StoredProtocol read_stored_protocol(const std::string& text) {
+  StoredProtocol out;
+  const auto json = json_or_discarded(text);
+  if (!json.is_object()) return out;
+  read_text(json, "name", out.name);
+  read_text(json, "title", out.title);
+  if (const auto seed = json.find("seed"); seed != json.end() && seed->is_number_integer())
+    out.seed = seed->dump();
+  if (const auto n = json.find("repetitions"); n != json.end() && n->is_number())
+    out.repetitions = *n;
+  for (const auto& stimulus : list_of(json, "stimuli")) {
+    std::string name;
+    read_text(stimulus, "name", name);
+    if (!name.empty()) out.stimuli.push_back(name);
+  }
+  std::vector<std::string> renderers;
+  read_texts(json, "renderers", renderers);
+  for (const auto& one : list_of(json, "blocks")) {
+    StoredBlock& block = out.blocks.emplace_back(read_block(one));
+    if (block.renderers.empty()) block.renderers = renderers;
+  }
+  return out;
+}
+
+bool have_blocks(const std::vector<ProtocolInfo>& protocols) {
+  return std::ranges::any_of(protocols, [](const ProtocolInfo& protocol) {
+    return !read_stored_protocol(protocol.text).blocks.empty();
+  });
+}
+
+}  // namespace palpate::data

@@ -1,0 +1,32 @@
+#pragma once
+// What tables and analyses read of a protocol's stored text. Not validated again: it was valid when
+// stored, and its mesh files may be missing now. What the text does not have, or has as another
+// type, keeps its default.
+
+#include <string>
+#include <vector>
+
+#include "data/record.h"
+
+namespace palpate::data {
+
+struct StoredBlock {
+  std::string name, task;
+  bool practice = false;
+  std::vector<std::string> renderers, stimuli;  ///< names, in the block's order
+};
+
+struct StoredProtocol {
+  std::string name, title;           ///< "": none
+  std::string seed;                  ///< of the trial orders, as written; "": none
+  std::vector<std::string> stimuli;  ///< names, in the protocol's order
+  int repetitions = 0;               ///< of a protocol without blocks
+  std::vector<StoredBlock> blocks;   ///< empty: version 1
+};
+
+StoredProtocol read_stored_protocol(const std::string& text);
+
+/// Whether any of them has blocks of tasks.
+bool have_blocks(const std::vector<ProtocolInfo>& protocols);
+
+}  // namespace palpate::data
