@@ -19,7 +19,7 @@ std::optional<RunEnd> parse_run_end(std::string_view text) {
 }
 
 std::vector<IntervalRecord> intervals_of(const TrialRecord& record) {
-  if (record.task) return record.task->intervals;
+  if (!record.task.intervals.empty()) return record.task.intervals;
   return {
       {record.shape, record.renderer, std::nullopt, false, record.onset_ns, record.response_ns}};
 }
@@ -37,8 +37,7 @@ std::optional<BodyRecord> body_of(const TrialRecord& record, const SampleRecord&
 }
 
 bool has_right_answer(const TrialRecord& record) {
-  if (!record.task) return true;
-  const TaskRecord& task = *record.task;
+  const TaskRecord& task = record.task;
   if (task.task == "rate" || task.task == "adjust") return false;
   const bool which = record.response == "1" || record.response == "2";
   return !(task.task == "compare" && which && task.intervals.size() == 2 && task.level &&

@@ -37,7 +37,7 @@ struct SampleRecord {
   std::uint32_t faults = 0;  ///< fault bits of the tick
 };
 
-/// One presentation within a trial of version 2 of protocols.
+/// One presentation within a trial of a block of tasks.
 struct IntervalRecord {
   std::string stimulus;  ///< "": nothing was shown
   std::string renderer;
@@ -46,22 +46,26 @@ struct IntervalRecord {
   std::int64_t onset_ns = 0, end_ns = 0;  ///< forces on, forces off; session clock; 0: not yet
 };
 
-/// Further values of a trial of version 2. Onset, response time and contact are those of the last
-/// interval felt.
+/// What a trial asks. Onset, response time and contact of its record are those of the last interval
+/// felt.
 struct TaskRecord {
-  std::string task;  ///< "identify", "compare", "detect", "rate", "adjust", "external"
-  std::string block_name;
+  /// "identify", "compare", "detect", "rate", "adjust", "external"
+  std::string task = "identify";
+  std::string block_name;                ///< "": the protocol has no blocks (version 1)
   int track = 1;                         ///< stimulus, renderer and procedure
   std::optional<double> level;           ///< level of the trial; adjust: start value
   std::optional<double> standard_level;  ///< of the standard, if it has one
   bool catch_trial = false;
-  std::vector<IntervalRecord> intervals;  ///< in order; adjust: one for each stimulus felt
+  /// In order; adjust: one for each stimulus felt. Empty: one, without a level (intervals_of).
+  std::vector<IntervalRecord> intervals;
   /// The outcome that procedures count: the comparison was chosen, "yes", "different", the right
   /// stimulus.
   bool success = false;
   std::optional<double> number;  ///< rate: as answered; adjust: the level that was set
   std::optional<double> confidence;
   std::optional<std::int64_t> confidence_ns;  ///< session clock
+
+  bool of_block() const { return !block_name.empty(); }
 };
 
 /// An answer to a question of a page, or the consent given. Personal data: exported on request
@@ -97,21 +101,20 @@ struct TrialRecord {
   /// and s with contact near an edge. None: recorded by a version without them; edge_dwell also if
   /// the stimulus has too many edges.
   std::optional<double> contact_share, edge_dwell;
-  std::vector<SampleRecord> samples;              ///< empty unless recorded and requested
-  std::optional<TaskRecord> task = std::nullopt;  ///< none: version 1
+  std::vector<SampleRecord> samples;  ///< empty unless recorded and requested
+  TaskRecord task = {};               ///< stored if it belongs to a block
   /// One for each sample; empty: nothing moves in any of them.
   std::vector<BodyRecord> bodies = {};
 };
 
-/// What was presented, in order; a trial of version 1 has one interval, without a level.
+/// What was presented, in order.
 std::vector<IntervalRecord> intervals_of(const TrialRecord& record);
 
 /// State of the stimulus after the tick; none: it did not move, or there was none.
 /// \param sample  an element of record.samples
 std::optional<BodyRecord> body_of(const TrialRecord& record, const SampleRecord& sample);
 
-/// First tick with forces on in the first interval felt, session clock; version 1: the trial's
-/// onset.
+/// First tick with forces on in the first interval felt, session clock.
 std::int64_t first_onset_ns(const TrialRecord& record);
 
 /// Whether an answer to the trial can be right or wrong. False for a number, a level that was set,

@@ -248,13 +248,29 @@ long long main_trials(const Protocol& protocol) {
          static_cast<long long>(protocol.stimuli.size()) * protocol.repetitions;
 }
 
+const TaskBlock* block_of(const Protocol& protocol, const Trial& trial) {
+  if (trial.task_block < 0) return nullptr;
+  return &protocol.blocks[static_cast<std::size_t>(trial.task_block)];
+}
+
+TaskBlock identification_block(const Protocol& protocol) {
+  TaskBlock block;
+  block.time_out = protocol.response.time_out;
+  block.feedback = protocol.response.feedback;
+  for (const StimulusSpec& stimulus : protocol.stimuli)
+    block.answers.push_back({"", stimulus.name, ""});
+  return block;
+}
+
 std::vector<Trial> practice_round(const Protocol& protocol, int participant_number,
                                   RendererKind renderer, int round) {
   if (participant_number < 1) throw std::invalid_argument("participants are numbered from 1");
   if (round < 1) throw std::invalid_argument("rounds of practice are numbered from 1");
   const bool mixed = protocol.renderer_order == RendererOrder::interleaved;
-  return practice_trials(protocol, participant_number, mixed ? protocol.renderers : Group{renderer},
-                         round);
+  std::vector<Trial> trials = practice_trials(protocol, participant_number,
+                                              mixed ? protocol.renderers : Group{renderer}, round);
+  for (Trial& trial : trials) trial.intervals = {{trial.stimulus, trial.renderer}};
+  return trials;
 }
 
 std::vector<Trial> schedule(const Protocol& protocol, int participant_number) {
@@ -271,6 +287,7 @@ std::vector<Trial> schedule(const Protocol& protocol, int participant_number) {
       next.session = session;
       next.block = block;
       next.trial = ++trial;
+      next.intervals = {{next.stimulus, next.renderer}};
       trials.push_back(next);
     }
   };

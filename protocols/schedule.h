@@ -19,7 +19,7 @@
 
 namespace palpate::protocols {
 
-/// One presentation within a trial of version 2.
+/// One presentation within a trial.
 struct Interval {
   int stimulus = 0;  ///< index into Protocol::stimuli; -1: nothing
   RendererKind renderer = RendererKind::point;
@@ -34,13 +34,19 @@ struct Trial {
   int stimulus = 0;  ///< index into Protocol::stimuli
   Quat orientation{1, 0, 0, 0};
   bool practice = false;  ///< practice or warm-up: excluded from analysis
-  // Version 2; stimulus and renderer are then those of the judged interval.
+  // Stimulus and renderer are those of the judged interval.
   int task_block = -1;                         ///< index into Protocol::blocks; -1: version 1
-  int track = 0;                               ///< 1, 2, ...: stimulus, renderer and procedure
+  int track = 1;                               ///< 1, 2, ...: stimulus, renderer and procedure
   std::optional<double> level = std::nullopt;  ///< adjust: the starting level
   bool catch_trial = false;
   std::vector<Interval> intervals = {};  ///< in order of presentation
 };
+
+/// The block of tasks of a trial; nullptr: the protocol has none (version 1).
+const TaskBlock* block_of(const Protocol& protocol, const Trial& trial);
+
+/// What each trial of a protocol of version 1 asks: to identify one of all stimuli, in their order.
+TaskBlock identification_block(const Protocol& protocol);
 
 /// The limits on the order of trials cannot be satisfied; what() says why and what can be changed.
 class ScheduleError : public std::runtime_error {

@@ -302,23 +302,20 @@ void note_once(const std::string& value, std::vector<std::string>& known) {
 TaskTrial task_trial_of(const std::string& participant, const data::TrialRecord& record) {
   TaskTrial trial;
   trial.participant = participant;
-  trial.task = "identify";  // of a study of version 1
   trial.renderer = record.renderer;
   trial.shape = record.shape;
   trial.response = record.response;
   if (data::has_right_answer(record)) trial.correct = record.correct;
-  if (record.task) {
-    trial.task = record.task->task;
-    trial.block_name = record.task->block_name;
-    trial.track = std::to_string(record.task->track);
-    trial.level = record.task->level;
-    trial.standard_level = record.task->standard_level;
-    trial.number = record.task->number;
-    trial.confidence = record.task->confidence;
-    trial.catch_trial = record.task->catch_trial;
-    trial.success = record.task->success;
-    trial.intervals = static_cast<int>(record.task->intervals.size());
-  }
+  trial.task = record.task.task;
+  trial.block_name = record.task.block_name;
+  trial.track = std::to_string(record.task.track);
+  trial.level = record.task.level;
+  trial.standard_level = record.task.standard_level;
+  trial.number = record.task.number;
+  trial.confidence = record.task.confidence;
+  trial.catch_trial = record.task.catch_trial;
+  trial.success = record.task.success;
+  trial.intervals = static_cast<int>(record.task.intervals.size());
   trial.answered = !record.timed_out && (!trial.response.empty() || trial.number);
   trial.session = record.session;
   trial.block = record.block;

@@ -192,14 +192,14 @@ void MotionEvents::add(const StoredTrial& trial, std::int64_t slot) {
   event.correct = correct_of(record);
   event.orientation_wxyz = record.orientation_wxyz;
   events_.push_back(event);
-  if (!record.task) return;
+  if (!record.task.of_block()) return;
   const std::int64_t begin = first_onset_ns(record);
   const auto seconds = [](std::int64_t from_ns, std::int64_t to_ns) {
     return (static_cast<double>(to_ns) - static_cast<double>(from_ns)) / 1e9;
   };
   event.response.clear();
   event.correct.reset();
-  for (const IntervalRecord& interval : record.task->intervals) {
+  for (const IntervalRecord& interval : record.task.intervals) {
     ++event.interval;
     if (interval.onset_ns == 0) continue;  // never shown
     event.since = seconds(begin, interval.onset_ns);
@@ -427,7 +427,7 @@ void BidsRecording::add(const StoredTrial& trial, const std::string& path) {
                              {"renderer", guarded_text(record.renderer)},
                              {"shape", guarded_text(record.shape)},
                              {"orientation_wxyz", record.orientation_wxyz}});
-  if (record.task) about["intervals"] = intervals_json(*record.task);
+  if (record.task.of_block()) about["intervals"] = intervals_json(record.task);
   if (settings_.motion) events_.add(trial, onset);
 }
 

@@ -339,8 +339,8 @@ void add_to_list(std::string& list, std::optional<double> value, bool first) {
 }  // namespace
 
 TaskValues::TaskValues(const TrialRecord& record) {
-  if (!record.task) return;
-  const TaskRecord& from = *record.task;
+  const TaskRecord& from = record.task;
+  if (!from.of_block()) return;
   task = from.task;
   block_name = from.block_name;
   track = from.track;

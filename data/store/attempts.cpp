@@ -621,7 +621,7 @@ int insert_attempt(SQLite::Database& db, SQLite::Statement& insert, const Run& r
   bind << run.session_id << run.id << plan.trial << attempt << plan.block << plan.renderer
        << plan.shape << plan.practice;
   for (const double q : plan.orientation_wxyz) bind << q;
-  bind << began_ns << (plan.task ? std::optional(task_text(*plan.task)) : std::nullopt);
+  bind << began_ns << task_text(plan.task);
   insert.exec();
   return attempt;
 }
@@ -656,7 +656,7 @@ void complete(SQLite::Database& db, SQLite::Statement& update, std::int64_t id,
   bind << (count > 0
                ? std::optional(checksum_of_samples(packing, count, packed.data(), packed.size()))
                : std::nullopt)
-       << (record.task ? std::optional(task_text(*record.task)) : std::nullopt) << id;
+       << task_text(record.task) << id;
   update.exec();
   if (count == 0) return;
   SQLite::Statement insert(

@@ -167,7 +167,7 @@ const char* task_column(int version) { return version < 5 ? "NULL, " : "a.task, 
 void read_task(RowReader& row, TrialRecord& record) {
   std::optional<std::string> text;
   row >> text;
-  record.task.reset();
+  record.task = {};
   if (!text) return;
   try {
     record.task = parse_task_text(*text);
@@ -287,7 +287,9 @@ namespace {
 
 void validate_task(Validator& validator, const TaskRecord& task) {
   validator.present("task", task.task);
-  validator.present("block_name", task.block_name);
+  validator.text("block_name", task.block_name);
+  validator.expect(task.of_block() || task.task == TaskRecord().task,
+                   "a task of no block must be identification");
   validator.positive("track", task.track);
   for (const auto& value : {task.level, task.standard_level, task.number, task.confidence}) {
     if (value) validator.finite("a number of the task", *value);
@@ -317,7 +319,7 @@ void validate_outcome(Validator& validator, const TrialRecord& record) {
     most << column.name << " must be at most " << column.most;
     validator.expect(!(*amount > column.most), most.str());
   });
-  if (record.task) validate_task(validator, *record.task);
+  validate_task(validator, record.task);
   validator.expect(record.ticks <= kMost && record.missed_ticks <= kMost, "ticks must fit 63 bits");
   validator.expect(!record.timed_out || (record.response.empty() && !record.correct),
                    "a time-out has no response and is not correct");

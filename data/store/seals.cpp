@@ -302,7 +302,7 @@ void put_attempt(SealedValues& out, const AttemptSealed& attempt, const TrialRec
   }
   out << attempt.samples;
   put_measured(out, record, 4);
-  if (record.task) out << task_text(*record.task);
+  if (const auto task = task_text(record.task)) out << *task;
   for (int version = 5; version <= kSchemaVersion; ++version) put_measured(out, record, version);
 }
 

@@ -43,7 +43,8 @@ IntervalRecord interval_of(const Json& in) {
 
 }  // namespace
 
-std::string task_text(const TaskRecord& task) {
+std::optional<std::string> task_text(const TaskRecord& task) {
+  if (!task.of_block()) return std::nullopt;
   Json out = {{"task", task.task}, {"block_name", task.block_name}, {"track", task.track}};
   put_if(out, "level", task.level);
   put_if(out, "standard_level", task.standard_level);
@@ -65,6 +66,7 @@ TaskRecord parse_task_text(const std::string& text) {
     TaskRecord task;
     task.task = in.at("task").get<std::string>();
     task.block_name = in.at("block_name").get<std::string>();
+    if (!task.of_block()) throw std::invalid_argument("its task is damaged: it names no block");
     task.track = in.at("track").get<int>();
     take_if(in, "level", task.level);
     take_if(in, "standard_level", task.standard_level);
@@ -104,13 +106,11 @@ bool TorqueNotes::left_out(const Participant& participant, const RunInfo& run) c
 }
 
 std::optional<bool> TorqueNotes::driven(const StoredTrial& trial) const {
-  bool given = gives_torque(trial.record.renderer);
-  if (trial.record.task) {
-    given = given ||
-            std::ranges::any_of(trial.record.task->intervals, [](const IntervalRecord& interval) {
-              return gives_torque(interval.renderer);
-            });
-  }
+  const bool given =
+      gives_torque(trial.record.renderer) ||
+      std::ranges::any_of(trial.record.task.intervals, [](const IntervalRecord& interval) {
+        return gives_torque(interval.renderer);
+      });
   if (!given) return std::nullopt;
   return !left_out(trial.participant, trial.run);
 }

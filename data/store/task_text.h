@@ -1,6 +1,6 @@
 #pragma once
 // Internal to data/store: a trial's task in the database, one line of JSON. Keys without a value
-// are left out.
+// are left out. A trial of no block stores none.
 
 #include <cstdint>
 #include <optional>
@@ -13,7 +13,7 @@
 
 namespace palpate::data {
 
-std::string task_text(const TaskRecord& task);
+std::optional<std::string> task_text(const TaskRecord& task);
 /// The inverse. \throws std::invalid_argument: damaged
 TaskRecord parse_task_text(const std::string& text);
 

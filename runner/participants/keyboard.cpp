@@ -168,7 +168,7 @@ void KeyboardRespondent::feedback(bool correct) {
 }
 
 void KeyboardRespondent::begin_trial(const protocols::Trial& trial) {
-  task_block_ = trial.task_block;
+  block_ = protocols::block_of(protocol_, trial);
   display::Page page;
   page.kind = display::Page::Kind::neutral;
   page.keys = keys_;
@@ -195,14 +195,14 @@ void KeyboardRespondent::show_cue(const servo::Sample& sample) {
   page_.go = cue == Cue::go;
   page_.text = cue == Cue::go ? texts.go : cue == Cue::ready ? texts.ready : texts.move_away;
   if (cue == Cue::ready) attendant_.sound(SoundCue::ready);
-  if (task() != nullptr) {
+  if (block_ != nullptr) {
     if (cue == Cue::go) page_.text = interval_text();
-    const bool types = cue == Cue::go && view_.answers && task()->answers.empty();
+    const bool types = cue == Cue::go && view_.answers && block_->answers.empty();
     page_.typing = types ? display::Page::Typing::number : display::Page::Typing::none;
-    least_ = task()->least;
-    most_ = task()->most;
+    least_ = block_->least;
+    most_ = block_->most;
     page_.wheel =
-        cue == Cue::go && task()->task == protocols::TaskKind::adjust && by_ == AnswerBy::keys;
+        cue == Cue::go && block_->task == protocols::TaskKind::adjust && by_ == AnswerBy::keys;
   }
   screen_.show(page_);
 }
@@ -219,7 +219,7 @@ void KeyboardRespondent::listen(const servo::Sample& sample) {
   const std::vector<display::KeyPress> presses = take_keys();
   for (std::size_t i = 0; i < presses.size(); ++i) {
     const display::KeyPress& press = presses[i];
-    if (task() != nullptr) {
+    if (block_ != nullptr) {
       if (listen_to_task(press)) continue;
       spoken_.assign(presses.begin() + static_cast<std::ptrdiff_t>(i), presses.end());
       break;
@@ -236,7 +236,7 @@ void KeyboardRespondent::listen(const servo::Sample& sample) {
   const unsigned pressed = sample.buttons & ~static_cast<unsigned>(buttons_);
   buttons_ = sample.buttons;
   if (by_ != AnswerBy::buttons || pending_ || onset_ns_ == 0) return;
-  if (task() != nullptr) {
+  if (block_ != nullptr) {
     listen_to_buttons(pressed, sample.time_ns);
     return;
   }
@@ -317,10 +317,6 @@ bool is_turn(const protocols::TaskBlock& block, const Answer& answer) {
 
 }  // namespace
 
-const protocols::TaskBlock* KeyboardRespondent::task() const {
-  return task_block_ < 0 ? nullptr : &protocol_.blocks[static_cast<std::size_t>(task_block_)];
-}
-
 void KeyboardRespondent::begin_interval(const protocols::Trial&, const IntervalView& view) {
   view_ = view;
   onset_ns_ = 0;
@@ -329,7 +325,7 @@ void KeyboardRespondent::begin_interval(const protocols::Trial&, const IntervalV
   if (view.continues) return;  // the page stays, and no key press is lost
   keys_.clear();
   if (view.answers) {
-    for (const protocols::TaskAnswer& answer : task()->answers) {
+    for (const protocols::TaskAnswer& answer : block_->answers) {
       const std::string button = "button " + std::to_string(keys_.size() + 1);
       keys_.emplace_back(by_ == AnswerBy::buttons ? button : answer.key, answer.label);
     }
@@ -352,7 +348,7 @@ std::string KeyboardRespondent::interval_text() const {
   if (view_.intervals > 1 && view_.felt)
     text = std::to_string(view_.interval) + " / " + std::to_string(view_.intervals) + "\n";
   if (!view_.answers) return text + texts.next_interval;
-  const protocols::TaskBlock& asked = *task();
+  const protocols::TaskBlock& asked = *block_;
   text += asked.question.empty() ? texts.answer_now : asked.question;
   if (asked.answers.empty()) text += "\n" + texts.type_number;
   return text;
@@ -364,7 +360,7 @@ bool KeyboardRespondent::listen_to_task(const display::KeyPress& press) {
     reply();
     return true;
   }
-  const bool turning = pending_ && is_turn(*task(), *pending_);
+  const bool turning = pending_ && is_turn(*block_, *pending_);
   if (pending_ && !turning) return true;
   const std::optional<Answer> meant = meaning_in_interval(press.key);
   if (!meant) return true;
@@ -416,7 +412,7 @@ void KeyboardRespondent::refuse_number(std::optional<double> least, std::optiona
 }
 
 std::optional<Answer> KeyboardRespondent::typed_answer(const std::string& key) {
-  const protocols::TaskBlock& asked = *task();
+  const protocols::TaskBlock& asked = *block_;
   if (key != "enter") {
     if (!type(key)) reply();
     return std::nullopt;
@@ -439,7 +435,7 @@ std::optional<Answer> KeyboardRespondent::meaning_in_interval(const std::string&
     reply();
     return std::nullopt;
   }
-  const protocols::TaskBlock& asked = *task();
+  const protocols::TaskBlock& asked = *block_;
   if (asked.answers.empty()) return typed_answer(key);
   const bool adjusts = asked.task == TaskKind::adjust;
   const char* const wheel = key == "wheel up" ? "up" : key == "wheel down" ? "down" : "";
@@ -460,11 +456,11 @@ void KeyboardRespondent::listen_to_buttons(unsigned pressed, std::int64_t time_n
   Answer answer;
   answer.time_ns = time_ns;
   answer.continues = !view_.answers;
-  const std::size_t count = view_.answers ? task()->answers.size() : 8;
+  const std::size_t count = view_.answers ? block_->answers.size() : 8;
   for (std::size_t i = 0; i < count && i < 8; ++i) {
     if ((pressed >> i & 1U) == 0) continue;
     answer.stimulus = static_cast<int>(i);
-    if (view_.answers && view_.interval == 2 && is_turn(*task(), answer)) return reply();
+    if (view_.answers && view_.interval == 2 && is_turn(*block_, answer)) return reply();
     pending_ = answer;
     return;
   }

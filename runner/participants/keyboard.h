@@ -80,7 +80,6 @@ class KeyboardRespondent final : public Respondent {
   std::optional<int> meaning(const std::string& key) const;
   // Version 2
   using Keys = std::vector<std::pair<std::string, std::string>>;
-  const protocols::TaskBlock* task() const;  ///< of the current trial; nullptr: version 1
   std::string interval_text() const;
   /// \return the answer, if the key ends the interval
   std::optional<Answer> meaning_in_interval(const std::string& key);
@@ -115,7 +114,7 @@ class KeyboardRespondent final : public Respondent {
   std::int64_t onset_ns_ = 0;      ///< of the trial; 0: not yet
   std::uint8_t buttons_ = 0xFF;    ///< down at the last tick
   std::optional<Answer> pending_;  ///< given; waits until the servo's samples reach its time
-  int task_block_ = -1;            ///< of the trial; -1: version 1
+  const protocols::TaskBlock* block_ = nullptr;  ///< of the trial; may be null
   IntervalView view_;
   bool early_ = false;  ///< a trial or interval is prepared but cannot be answered yet
   std::optional<double> least_, most_;     ///< range of the number being typed

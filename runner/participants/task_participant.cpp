@@ -82,7 +82,7 @@ bool differ_in_stiffness(const protocols::Protocol& protocol, const protocols::T
 }
 
 void LevelPercept::begin(const protocols::Trial& trial, const protocols::Interval& interval) {
-  const auto& block = protocol_.blocks[static_cast<std::size_t>(trial.task_block)];
+  const auto& block = *protocols::block_of(protocol_, trial);
   orientation_ = trial.orientation;
   stiffness_sum_ = squares_ = products_ = 0;
   contact_ticks_ = 0;
@@ -153,9 +153,7 @@ void TaskJudgement::begin(const protocols::Trial& trial, const Random& random) {
   evidence_ = 0;
 }
 
-const TaskBlock& TaskJudgement::block() const {
-  return protocol_.blocks[static_cast<std::size_t>(trial_.task_block)];
-}
+const TaskBlock& TaskJudgement::block() const { return *protocols::block_of(protocol_, trial_); }
 
 double TaskJudgement::level_of(const protocols::Interval& interval) const {
   if (interval.level) return *interval.level;
@@ -375,7 +373,7 @@ TaskParticipant::TaskParticipant(const SimulatedSettings& own, const ShapeHypoth
 }
 
 const protocols::TaskBlock& TaskParticipant::block() const {
-  return protocol_.blocks[static_cast<std::size_t>(trial_.task_block)];
+  return *protocols::block_of(protocol_, trial_);
 }
 
 void TaskParticipant::begin_trial(const protocols::Trial& trial) {

@@ -31,7 +31,7 @@ ordered_json short_json(const data::TrialRecord& record) {
                       {"stimulus", record.shape},     {"renderer", record.renderer},
                       {"response", record.response},  {"correct", record.correct},
                       {"timed_out", record.timed_out}};
-  if (record.task && record.task->level) out["level"] = *record.task->level;
+  if (record.task.level) out["level"] = *record.task.level;
   return out;
 }
 
@@ -87,14 +87,8 @@ std::string ServedSession::picture() const {
 void ServedSession::draw(const protocols::Trial& trial) {
   std::vector<stimuli::ObjectSpec> objects;
   const protocols::Protocol& protocol = parts_.station.protocol;
-  if (trial.task_block >= 0) {
-    for (const protocols::Interval& interval : trial.intervals) {
-      if (interval.stimulus >= 0)
-        objects.push_back(session::shown_object(protocol, trial, interval));
-    }
-  } else {
-    objects.push_back(protocol.stimuli[static_cast<std::size_t>(trial.stimulus)].object);
-    objects.back().pose = stimuli::compose({Vec3(0), trial.orientation}, objects.back().pose);
+  for (const protocols::Interval& interval : trial.intervals) {
+    if (interval.stimulus >= 0) objects.push_back(session::shown_object(protocol, trial, interval));
   }
   std::string picture = parts_.picture(objects);
   const std::lock_guard lock(mutex_);
@@ -110,33 +104,24 @@ void ServedSession::refuse(const std::optional<Asked>& asked, const std::string&
   if (asked) output_->reply(asked->client, refused(asked->message.id, {{code, why, ""}}));
 }
 
-const TaskBlock* ServedSession::block_of(const protocols::Trial& trial) const {
-  if (trial.task_block < 0) return nullptr;
-  return &parts_.station.protocol.blocks[static_cast<std::size_t>(trial.task_block)];
-}
-
 /// The next trial; null after the last.
 ordered_json ServedSession::next_trial() const {
   if (session_.plan().finished()) return {};
   const protocols::Trial& trial = session_.plan().next();
-  const TaskBlock* const block = block_of(trial);
+  const TaskBlock& block = session_.task_of(trial);
   ordered_json out = {{"trial", trial.trial}, {"block", trial.block}, {"practice", trial.practice}};
   const auto& stimuli = parts_.station.protocol.stimuli;
   const auto name = [&](int i) { return stimuli[static_cast<std::size_t>(i)].name; };
-  if (block != nullptr) {
-    out["task"] = to_string(block->task);
-    out["block_name"] = block->name;
+  if (trial.task_block >= 0) {
+    out["task"] = to_string(block.task);
+    out["block_name"] = block.name;
   }
   out["answers"] = ordered_json::array();
-  if (block == nullptr) {
-    for (const protocols::StimulusSpec& one : stimuli) out["answers"].push_back(one.name);
-  } else {
-    for (const protocols::TaskAnswer& one : block->answers) out["answers"].push_back(one.name);
-  }
-  if (block != nullptr && block->task == TaskKind::external) {
+  for (const protocols::TaskAnswer& one : block.answers) out["answers"].push_back(one.name);
+  if (block.task == TaskKind::external) {
     out["stimuli"] = ordered_json::array();
-    for (const int i : block->stimuli) out["stimuli"].push_back(name(i));
-    if (block->level) out["level_range"] = {*block->least, *block->most};
+    for (const int i : block.stimuli) out["stimuli"].push_back(name(i));
+    if (block.level) out["level_range"] = {*block.least, *block.most};
     return out;
   }
   const Quat& q = trial.orientation;
@@ -283,9 +268,7 @@ void ServedSession::obey(const Asked& asked) {
     case MessageType::note: {
       const std::int64_t now = clock_.now_ns();
       const bool mark = message.type == MessageType::mark;
-      ordered_json out;
-      if (mark) out["code"] = message.code;
-      out["text"] = message.text;
+      const ordered_json out = remark(message);
       try {
         parts_.record.note(now, mark ? ordered_json{{"mark", out}}.dump() : message.text);
       } catch (const data::StoreRefused& error) {
@@ -322,8 +305,8 @@ std::optional<protocols::TrialChoice> ServedSession::choice_of(const Message& me
     throw refused_as("/trial", std::to_string(next.trial) + ", the trial that is due");
   const auto& stimuli = parts_.station.protocol.stimuli;
   const auto named = [&](int i) { return stimuli[static_cast<std::size_t>(i)].name; };
-  const TaskBlock* const block = block_of(next);
-  if (block == nullptr || block->task != TaskKind::external) {
+  const TaskBlock& block = session_.task_of(next);
+  if (block.task != TaskKind::external) {
     if (!message.stimulus.empty() && message.stimulus != named(next.stimulus))
       throw refused_as("/stimulus", named(next.stimulus) + ", as the protocol has it");
     if (!message.renderer.empty() && message.renderer != protocols::to_string(next.renderer))
@@ -336,20 +319,20 @@ std::optional<protocols::TrialChoice> ServedSession::choice_of(const Message& me
   }
   protocols::TrialChoice choice;
   const auto wanted =
-      std::ranges::find_if(block->stimuli, [&](int i) { return named(i) == message.stimulus; });
-  if (wanted == block->stimuli.end() && (!message.stimulus.empty() || block->stimuli.size() > 1))
+      std::ranges::find_if(block.stimuli, [&](int i) { return named(i) == message.stimulus; });
+  if (wanted == block.stimuli.end() && (!message.stimulus.empty() || block.stimuli.size() > 1))
     throw refused_as("/stimulus", "a stimulus of the block");
-  choice.stimulus = wanted == block->stimuli.end() ? block->stimuli.front() : *wanted;
-  const auto renderer = std::ranges::find_if(block->renderers, [&](protocols::RendererKind kind) {
+  choice.stimulus = wanted == block.stimuli.end() ? block.stimuli.front() : *wanted;
+  const auto renderer = std::ranges::find_if(block.renderers, [&](protocols::RendererKind kind) {
     return protocols::to_string(kind) == message.renderer;
   });
-  if (renderer == block->renderers.end() &&
-      (!message.renderer.empty() || block->renderers.size() > 1))
+  if (renderer == block.renderers.end() &&
+      (!message.renderer.empty() || block.renderers.size() > 1))
     throw refused_as("/renderer", "a renderer of the block");
-  choice.renderer = renderer == block->renderers.end() ? block->renderers.front() : *renderer;
-  if (block->level.has_value() != message.level.has_value())
-    throw refused_as("/level", block->level ? "a level" : "none: the block has no level");
-  if (message.level && !(*message.level >= *block->least && *message.level <= *block->most))
+  choice.renderer = renderer == block.renderers.end() ? block.renderers.front() : *renderer;
+  if (block.level.has_value() != message.level.has_value())
+    throw refused_as("/level", block.level ? "a level" : "none: the block has no level");
+  if (message.level && !(*message.level >= *block.least && *message.level <= *block.most))
     throw refused_as("/level", "a level from min to max of the block");
   choice.level = message.level;
   choice.orientation = message.orientation;
@@ -357,34 +340,28 @@ std::optional<protocols::TrialChoice> ServedSession::choice_of(const Message& me
 }
 
 participants::Answer ServedSession::answer_of(const Message& message) const {
-  const TaskBlock* const block = block_of(trial_);
+  const TaskBlock& block = session_.task_of(trial_);
   participants::Answer out;
-  if (message.correct && (block == nullptr || block->task != TaskKind::external))
+  if (message.correct && block.task != TaskKind::external)
     throw MessageRefused("bad-answer", "expected none: palpate judges the answer", "/correct");
   out.correct = message.correct;
-  if (block != nullptr && block->answers.empty()) {  // the answer is a number
+  if (block.answers.empty()) {  // the answer is a number
     const char* const end = message.text.data() + message.text.size();
     const auto [rest, error] = std::from_chars(message.text.data(), end, out.number);
-    const bool within = !(block->least && out.number < *block->least) &&
-                        !(block->most && out.number > *block->most);
+    const bool within =
+        !(block.least && out.number < *block.least) && !(block.most && out.number > *block.most);
     if (error != std::errc() || rest != end || !std::isfinite(out.number) || !within)
       throw MessageRefused("bad-answer", "expected a number within the block's range", "/response");
     return out;
   }
-  std::vector<std::string> names;
-  if (block == nullptr) {
-    for (const protocols::StimulusSpec& one : parts_.station.protocol.stimuli)
-      names.push_back(one.name);
-  } else {
-    for (const protocols::TaskAnswer& one : block->answers) names.push_back(one.name);
-  }
-  const auto found = std::ranges::find(names, message.text);
-  if (found == names.end()) {
+  const auto found = std::ranges::find(block.answers, message.text, &protocols::TaskAnswer::name);
+  if (found == block.answers.end()) {
     std::string words;
-    for (const std::string& name : names) words += (words.empty() ? "" : ", ") + name;
+    for (const protocols::TaskAnswer& one : block.answers)
+      words += (words.empty() ? "" : ", ") + one.name;
     throw MessageRefused("bad-answer", "expected one of " + words, "/response");
   }
-  out.stimulus = static_cast<int>(found - names.begin());
+  out.stimulus = static_cast<int>(found - block.answers.begin());
   return out;
 }
 

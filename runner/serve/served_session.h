@@ -100,7 +100,6 @@ class ServedSession final : public participants::Respondent, public session::Ses
   std::optional<protocols::TrialChoice> choice_of(const Message& message,
                                                   const protocols::Trial& next) const;
   participants::Answer answer_of(const Message& message) const;
-  const protocols::TaskBlock* block_of(const protocols::Trial& trial) const;
   nlohmann::ordered_json next_trial() const;
   void keep_state();
   void keep_under_way() noexcept { under_way_.store(start_.has_value() || in_trial_); }

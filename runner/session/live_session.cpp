@@ -118,7 +118,7 @@ void SessionMonitor::count(const data::TrialRecord& record) {
 
 void SessionMonitor::interval(const protocols::Trial& trial,
                               const participants::IntervalView& view) {
-  const auto& block = station_.protocol.blocks[static_cast<std::size_t>(trial.task_block)];
+  const auto& block = *protocols::block_of(station_.protocol, trial);
   turned_ = view.continues;
   feeling_ = feeling_ && view.continues;
   state_.task = to_string(block.task);
@@ -206,23 +206,22 @@ void SessionMonitor::cut_off(const std::string& reason) {
 
 /// For the experimenter; the record has every digit of an adjusted level.
 std::string SessionMonitor::answer_in_words(const data::TrialRecord& record) const {
-  if (!record.task || !record.task->number ||
-      record.task->task != to_string(protocols::TaskKind::adjust))
+  if (!record.task.number || record.task.task != to_string(protocols::TaskKind::adjust))
     return record.response;
   const auto& blocks = station_.protocol.blocks;
   const auto block = std::find_if(
       blocks.begin(), blocks.end(),
-      [&](const protocols::TaskBlock& one) { return one.name == record.task->block_name; });
+      [&](const protocols::TaskBlock& one) { return one.name == record.task.block_name; });
   return block == blocks.end() ? record.response
-                               : protocols::level_in_words(*block, *record.task->number);
+                               : protocols::level_in_words(*block, *record.task.number);
 }
 
 void SessionMonitor::recorded(const data::TrialRecord& record) {
   state_.answer = record.timed_out ? "none in time" : answer_in_words(record);
   if (!record.timed_out && data::has_right_answer(record))
     state_.answer += record.correct ? ", right" : ", wrong";
-  if (record.task && record.task->confidence)
-    state_.answer += "; sure: " + protocols::level_text(*record.task->confidence);
+  if (record.task.confidence)
+    state_.answer += "; sure: " + protocols::level_text(*record.task.confidence);
   count(record);
   state_.times.push_back(record.response_time);
   const double took = static_cast<double>(station_.clock.now_ns() - trial_began_ns_) / kSecond_ns;
@@ -233,8 +232,7 @@ void SessionMonitor::recorded(const data::TrialRecord& record) {
     say("trial " + std::to_string(record.trial) + " missed " + std::to_string(record.missed_ticks) +
         " ticks, up to " + milliseconds(record.longest_period_ns) +
         " apart (recorded): the computer was busy");
-  const bool nothing_there = record.task && record.task->catch_trial;
-  if (!record.response.empty() && !touched_ && !nothing_there) {
+  if (!record.response.empty() && !touched_ && !record.task.catch_trial) {
     say("trial " + std::to_string(record.trial) + " was answered before the first contact");
   }
 }

@@ -229,13 +229,12 @@ protocols::Trial trial_of(const protocols::Protocol& protocol, const data::Trial
   const auto& q = recorded.orientation_wxyz;
   trial.orientation = Quat(q[0], q[1], q[2], q[3]);
   trial.stimulus = stimulus_named(protocol, recorded.shape);
-  if (!recorded.task) return trial;
+  if (!recorded.task.of_block()) return trial;
   for (std::size_t i = 0; i < protocol.blocks.size(); ++i) {
-    if (protocol.blocks[i].name == recorded.task->block_name)
-      trial.task_block = static_cast<int>(i);
+    if (protocol.blocks[i].name == recorded.task.block_name) trial.task_block = static_cast<int>(i);
   }
   if (trial.task_block < 0)
-    throw std::invalid_argument("the protocol has no block named " + recorded.task->block_name);
+    throw std::invalid_argument("the protocol has no block named " + recorded.task.block_name);
   return trial;
 }
 
@@ -253,7 +252,7 @@ std::vector<ShownInterval> scenes_of(const protocols::Protocol& protocol,
                                      const data::TrialRecord& recorded, bool other) {
   const protocols::Trial trial = trial_of(protocol, recorded);
   std::vector<ShownInterval> shown;
-  LevelScenes scenes(protocol);
+  SessionScenes scenes(protocol);
   for (const data::IntervalRecord& interval : data::intervals_of(recorded)) {
     const protocols::Interval one = interval_of(protocol, interval, other);
     shown.push_back({one.renderer, scenes.scene(trial, one)});
@@ -300,7 +299,7 @@ void replay_shown(const protocols::Protocol& protocol, const data::TrialRecord& 
                                            const ReplayedSample&)>& visit) {
   const auto intervals = samples_of_intervals(recorded);
   // An interval whose time was over before it began has no samples.
-  const std::size_t least = shown.size() - (recorded.task && recorded.timed_out ? 1 : 0);
+  const std::size_t least = shown.size() - (recorded.timed_out ? 1 : 0);
   if (intervals.size() > shown.size() || intervals.size() < least)
     throw std::invalid_argument("samples of " + std::to_string(shown.size()) +
                                 " intervals are expected, found " +

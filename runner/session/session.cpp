@@ -166,8 +166,6 @@ void SessionNoise::cue(participants::SoundCue cue) {
     station_.noise->tone(sound::Tone::wrong);
 }
 
-// The methods of Session for version 2: trials of several intervals, pages.
-
 namespace {
 
 using protocols::PageItem;
@@ -210,12 +208,13 @@ std::vector<participants::ReadScreen> screens_of(
 }  // namespace
 
 const protocols::TaskBlock& Session::task_of(const protocols::Trial& trial) const {
-  return station_.protocol.blocks[static_cast<std::size_t>(trial.task_block)];
+  const protocols::TaskBlock* const block = block_of(station_.protocol, trial);
+  return block == nullptr ? identification_ : *block;
 }
 
 void Session::plan_task(const protocols::Trial& trial, data::TrialRecord& record) const {
   const protocols::TaskBlock& block = task_of(trial);
-  data::TaskRecord& task = record.task.emplace();
+  data::TaskRecord& task = record.task;
   task.task = to_string(block.task);
   task.block_name = block.name;
   task.track = trial.track;
@@ -227,23 +226,26 @@ void Session::plan_task(const protocols::Trial& trial, data::TrialRecord& record
 
 void Session::prepare_interval(const protocols::Trial& trial, const protocols::Interval& interval,
                                const servo::HomeZone& home) {
-  contact_.begin(scenes_->edges(trial, interval), trial.orientation);
+  contact_.begin(scenes_.edges(trial, interval), trial.orientation);
   record_.first_contact_time.reset();
-  data::IntervalRecord& record = record_.task->intervals.emplace_back();
+  data::IntervalRecord& record = record_.task.intervals.emplace_back();
   if (interval.stimulus >= 0)
     record.stimulus = station_.protocol.stimuli[static_cast<std::size_t>(interval.stimulus)].name;
   record.renderer = protocols::to_string(interval.renderer);
   record.level = interval.level;
   record.standard = interval.standard;
-  station_.servo.prepare(scenes_->scene(trial, interval), renderer_for(interval.renderer), home);
+  station_.servo.prepare(scenes_.scene(trial, interval), renderer_for(interval.renderer), home);
 }
 
-servo::HomeZone Session::task_home(double rest) const {
-  return {least_reach_ + station_.protocol.home.margin,
-          std::max(rest, station_.protocol.home.rest)};
+servo::HomeZone Session::home_of(const protocols::Interval& interval, double rest) const {
+  const double reach = interval.stimulus < 0
+                           ? least_reach_
+                           : std::max(station_.library.reach(interval.stimulus), least_reach_);
+  return {reach + station_.protocol.home.margin, std::max(rest, station_.protocol.home.rest)};
 }
 
 void Session::tell_interval(const protocols::Trial& trial, const participants::IntervalView& view) {
+  if (trial.task_block < 0) return;
   if (events_ != nullptr) events_->interval(trial, view);
   participant_.begin_interval(trial, view);
 }
@@ -272,7 +274,7 @@ std::optional<participants::Answer> Session::wait_in_interval(
 
 void Session::end_interval() {
   add_quality(station_.servo.stop());
-  data::IntervalRecord& interval = record_.task->intervals.back();
+  data::IntervalRecord& interval = record_.task.intervals.back();
   interval.onset_ns = record_.onset_ns;
   interval.end_ns = record_.response_ns;
 }
@@ -289,7 +291,7 @@ std::optional<participants::Answer> Session::show_intervals(const protocols::Tri
       const protocols::Interval& interval = trial.intervals[static_cast<std::size_t>(i)];
       const participants::IntervalView view{i + 1, count, i + 1 == count, true, &interval};
       tell_interval(trial, view);
-      prepare_interval(trial, interval, task_home(i > 0 ? block.inter_interval : 0));
+      prepare_interval(trial, interval, home_of(interval, i > 0 ? block.inter_interval : 0));
       const std::optional<double> limit =
           view.answers && !block.interval_limit ? block.time_out : block.interval_limit;
       answer = wait_in_interval(view, limit, servo);
@@ -311,7 +313,7 @@ std::optional<participants::Answer> Session::ask_without_forces(const protocols:
   const participants::IntervalView view{count, count, true, false, nullptr};
   tell_interval(trial, view);
   const protocols::Interval nothing{-1, trial.renderer};
-  station_.servo.prepare(scenes_->scene(trial, nothing), renderer_for(trial.renderer), {0, 0});
+  station_.servo.prepare(scenes_.scene(trial, nothing), renderer_for(trial.renderer), {0, 0});
   const auto answer = wait_in_interval(view, task_of(trial).time_out, servo);
   station_.servo.stop();
   return answer;
@@ -325,7 +327,7 @@ std::optional<participants::Answer> Session::adjust(const protocols::Trial& tria
   const protocols::TaskBlock& block = task_of(trial);
   protocols::Interval own = trial.intervals[0];
   bool standard = false, turned = false;
-  servo::HomeZone home = task_home(0);
+  servo::HomeZone home = home_of(own, 0);
   std::int64_t first_onset_ns = 0;
   while (true) {
     const protocols::Interval& shown = standard ? trial.intervals[1] : own;
@@ -348,7 +350,7 @@ std::optional<participants::Answer> Session::adjust(const protocols::Trial& tria
       return answer;
     }
     turned = act != "switch";
-    home = turned ? servo::HomeZone{0, 0} : task_home(0);
+    home = turned ? servo::HomeZone{0, 0} : home_of(own, 0);
     if (!turned) {
       standard = !standard;
     } else if (!standard) {
@@ -363,22 +365,20 @@ void Session::ask_confidence(const protocols::ConfidenceSpec& asked) {
   const std::optional<participants::Answer> step = participant_.confidence(asked);
   if (events_ != nullptr) events_->asking(false);
   if (!step) return;
-  record_.task->confidence = asked.scale.at(static_cast<std::size_t>(step->stimulus)).number;
-  record_.task->confidence_ns = step->time_ns;
+  record_.task.confidence = asked.scale.at(static_cast<std::size_t>(step->stimulus)).number;
+  record_.task.confidence_ns = step->time_ns;
 }
 
-void Session::take_task_answer(const protocols::Trial& trial,
-                               const std::optional<participants::Answer>& answer) {
-  if (!answer) return;
+void Session::judge(const protocols::Trial& trial, const participants::Answer& answer) {
   const protocols::TaskBlock& block = task_of(trial);
-  data::TaskRecord& task = *record_.task;
+  data::TaskRecord& task = record_.task;
   switch (block.task) {
     case TaskKind::identify:
-      record_.response = chosen(block, *answer).name;
+      record_.response = chosen(block, answer).name;
       record_.correct = task.success = record_.response == record_.shape;
       break;
     case TaskKind::compare:
-      record_.response = chosen(block, *answer).name;
+      record_.response = chosen(block, answer).name;
       if (block.same_different) {
         task.success = record_.response == "different";
         record_.correct = task.success != trial.catch_trial;
@@ -392,20 +392,20 @@ void Session::take_task_answer(const protocols::Trial& trial,
       }
       break;
     case TaskKind::detect:
-      record_.response = chosen(block, *answer).name;
+      record_.response = chosen(block, answer).name;
       task.success = record_.response == "yes";
       record_.correct = task.success != trial.catch_trial;
       break;
     case TaskKind::external:
-      record_.response = chosen(block, *answer).name;
-      record_.correct = task.success = answer->correct.value_or(record_.response == record_.shape);
+      record_.response = chosen(block, answer).name;
+      record_.correct = task.success = answer.correct.value_or(record_.response == record_.shape);
       break;
     case TaskKind::rate:
-      task.number = block.answers.empty() ? answer->number : chosen(block, *answer).number;
+      task.number = block.answers.empty() ? answer.number : chosen(block, answer).number;
       record_.response = protocols::level_text(*task.number);
       break;
     case TaskKind::adjust:
-      task.number = answer->number;
+      task.number = answer.number;
       record_.response = protocols::level_text(*task.number);
       break;
   }
@@ -415,7 +415,7 @@ void Session::take_task_answer(const protocols::Trial& trial,
 /// which is recorded.
 void Session::ask_level() {
   const protocols::Trial& trial = station_.plan.next();
-  if (station_.advisor == nullptr || !trial.level || trial.task_block < 0) return;
+  if (station_.advisor == nullptr || !trial.level) return;
   if (!protocols::is_adaptive(task_of(trial)) || asked_trial_ == trial.trial) return;
   asked_trial_ = trial.trial;
   if (const std::optional<double> level = station_.advisor->ask(trial)) {
@@ -432,8 +432,7 @@ void Session::ask_level() {
 }
 
 void Session::tell_level() {
-  if (station_.advisor != nullptr && record_.task &&
-      protocols::is_adaptive(task_of(station_.plan.next())))
+  if (station_.advisor != nullptr && protocols::is_adaptive(task_of(station_.plan.next())))
     station_.advisor->tell(record_);
 }
 
@@ -527,9 +526,13 @@ std::string trip_reason(std::uint32_t faults, servo::DeviceTrouble trouble) {
 
 Session::Session(const Station& station, participants::Respondent& participant,
                  SessionEvents* events, double least_reach)
-    : station_(station), participant_(participant), events_(events), least_reach_(least_reach) {
+    : station_(station),
+      participant_(participant),
+      events_(events),
+      least_reach_(least_reach),
+      identification_(identification_block(station.protocol)),
+      scenes_(station.protocol, &station.library) {
   if (station.protocol.blocks.empty()) return;
-  scenes_ = std::make_unique<LevelScenes>(station.protocol);
   least_reach_ = std::max(least_reach, largest_reach(station));  // the same for every level
 }
 
@@ -597,10 +600,7 @@ void Session::step() {
 
 void Session::tell_feedback() {
   const bool feedback =
-      record_.task
-          ? station_.protocol.blocks[static_cast<std::size_t>(station_.plan.next().task_block)]
-                .feedback
-          : record_.practice || station_.protocol.response.feedback;
+      task_of(station_.plan.next()).feedback || (record_.practice && !record_.task.of_block());
   station_.plan.answered(
       outcome_of(record_));  // first: a participant who leaves during the feedback has answered
   if (feedback && data::has_right_answer(record_)) participant_.feedback(record_.correct);
@@ -616,7 +616,7 @@ data::TrialRecord Session::planned_record(const protocols::Trial& trial) const {
   record.practice = trial.practice;
   const Quat& q = trial.orientation;
   record.orientation_wxyz = {q.w, q.x, q.y, q.z};
-  if (trial.task_block >= 0) plan_task(trial, record);
+  plan_task(trial, record);
   return record;
 }
 
@@ -637,19 +637,6 @@ void Session::cut_off(const std::string& reason) {
   station_.log.cut_off(reason);
 }
 
-std::optional<participants::Answer> Session::show_stimulus(const protocols::Trial& trial,
-                                                           ServoState& servo) {
-  contact_.begin(station_.library.edges(trial.stimulus), trial.orientation);
-  const servo::HomeZone home{std::max(station_.library.reach(trial.stimulus), least_reach_) +
-                                 station_.protocol.home.margin,
-                             station_.protocol.home.rest};
-  station_.servo.prepare(station_.library.scene(trial), renderer_for(trial.renderer), home);
-  const auto answer = wait_in_interval({}, station_.protocol.response.time_out, servo);
-  record_.timed_out = !answer && !servo.tripped();
-  add_quality(station_.servo.stop());
-  return answer;
-}
-
 bool Session::run_trial() {
   ask_level();
   if (const auto choice = participant_.choose(station_.plan.next())) station_.plan.choose(*choice);
@@ -662,7 +649,7 @@ bool Session::run_trial() {
   ServoState servo;
   try {
     participant_.begin_trial(trial);
-    answer = record_.task ? show_intervals(trial, servo) : show_stimulus(trial, servo);
+    answer = show_intervals(trial, servo);
   } catch (const participants::TrialCutOff& again) {
     station_.servo.stop();
     cut_off(again.what());
@@ -703,19 +690,13 @@ void Session::add_quality(const servo::ServoQuality& quality) {
 
 void Session::take_answer(const protocols::Trial& trial,
                           const std::optional<participants::Answer>& answer) {
-  record_.response_time =
-      record_.task ? task_of(trial).time_out : station_.protocol.response.time_out;
+  record_.response_time = task_of(trial).time_out;
   if (answer) {
     record_.response_ns = answer->time_ns;
     record_.response_time =
         static_cast<double>(record_.response_ns - record_.onset_ns) / kPerSecond_ns;
   }
-  if (record_.task) {
-    take_task_answer(trial, answer);
-  } else if (answer) {
-    record_.response = station_.protocol.stimuli[static_cast<std::size_t>(answer->stimulus)].name;
-    record_.correct = answer->stimulus == trial.stimulus;
-  }
+  if (answer) judge(trial, *answer);
   // The answer may precede the last tick read.
   if (record_.first_contact_time && *record_.first_contact_time > record_.response_time)
     record_.first_contact_time.reset();

@@ -151,13 +151,13 @@ class SessionEvents {
       const data::TrialRecord& record) = 0;  ///< not on record yet; also a time-out
   virtual void cut_off(const std::string& reason) = 0;
   virtual void recorded(const data::TrialRecord& record) = 0;
-  /// Version 2: an interval of the trial is about to begin.
+  /// An interval of the trial, which belongs to a block, is about to begin.
   virtual void interval(const protocols::Trial& /*trial*/,
                         const participants::IntervalView& /*view*/) {}
-  /// Version 2: a page is shown, or one of its questions: its number, from 1, and their count; 0:
+  /// A page is shown, or one of its questions: its number, from 1, and their count; 0:
   /// the text. Empty names: the page is over.
   virtual void page(const PageView& /*view*/) {}
-  /// Version 2: the question for confidence begins (forces off) or ends.
+  /// The question for confidence begins (forces off) or ends.
   virtual void asking(bool /*now*/) {}
 };
 
@@ -182,6 +182,8 @@ class Session {
 
   State state() const { return state_; }
   const SessionPlan& plan() const { return station_.plan; }
+  /// What a trial asks.
+  const protocols::TaskBlock& task_of(const protocols::Trial& trial) const;
   /// Whether a page after the last trial still needs answers.
   bool has_open_pages() const;
   /// Does the work of the current state and moves on. Between two calls every event is on record:
@@ -200,9 +202,6 @@ class Session {
     servo::DeviceTrouble trouble = servo::DeviceTrouble::none;
     bool tripped() const;
   };
-  std::optional<participants::Answer> show_stimulus(const protocols::Trial& trial,
-                                                    ServoState& servo);
-  // Version 2 (session.cpp)
   void plan_task(const protocols::Trial& trial, data::TrialRecord& record) const;
   std::optional<participants::Answer> show_intervals(const protocols::Trial& trial,
                                                      ServoState& servo);
@@ -211,14 +210,13 @@ class Session {
                                                          ServoState& servo);
   void prepare_interval(const protocols::Trial& trial, const protocols::Interval& interval,
                         const servo::HomeZone& home);
-  servo::HomeZone task_home(double rest) const;
+  servo::HomeZone home_of(const protocols::Interval& interval, double rest) const;
   std::optional<participants::Answer> wait_in_interval(const participants::IntervalView& view,
                                                        std::optional<double> limit,
                                                        ServoState& servo);
   void end_interval();
   void tell_interval(const protocols::Trial& trial, const participants::IntervalView& view);
-  void take_task_answer(const protocols::Trial& trial,
-                        const std::optional<participants::Answer>& answer);
+  void judge(const protocols::Trial& trial, const participants::Answer& answer);
   void ask_confidence(const protocols::ConfidenceSpec& asked);
   void begin_task_block();
   void ask_level();
@@ -228,7 +226,6 @@ class Session {
   void show_pages(protocols::PageSpec::When when, const std::string& block = "");
   void show_page(const protocols::PageSpec& page);
   void tell_page(const PageView& view);
-  const protocols::TaskBlock& task_of(const protocols::Trial& trial) const;
   void cut_off(const std::string& reason);
   void rest_between_blocks();
   void rest();
@@ -247,8 +244,9 @@ class Session {
   data::TrialRecord record_;             ///< of the trial under way
   ContactLog contact_;                   ///< likewise
   servo::ServoQuality quality_;          ///< likewise, of its intervals so far
-  std::unique_ptr<LevelScenes> scenes_;  ///< of blocks of tasks
-  int asked_trial_ = 0;                  ///< the last trial for which an advisor was asked
+  protocols::TaskBlock identification_;  ///< of each trial without a block
+  SessionScenes scenes_;
+  int asked_trial_ = 0;  ///< the last trial for which an advisor was asked
 };
 
 }  // namespace palpate::runner::session

@@ -321,11 +321,9 @@ class Recorder {
       store_.record_simulated(run, records);
       SessionPlan& plan = plans_[index];
       for (const data::TrialRecord& record : records) {
-        if (record.task) {
-          StudyProgress::Answers& answers = progress.by_block[record.task->block_name];
-          ++answers.trials;
-          if (record.timed_out) ++answers.unanswered;
-        }
+        StudyProgress::Answers& answers = progress.by_block[record.task.block_name];
+        ++answers.trials;
+        if (record.timed_out) ++answers.unanswered;
         const std::size_t size = plan.size();
         plan.answered(outcome_of(record));
         // Fewer trials if a procedure has ended early.

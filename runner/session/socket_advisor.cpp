@@ -32,7 +32,7 @@ std::string line_of(const AdvisorJson& message) {
 }
 
 AdvisorJson json_of(const data::TrialRecord& record) {
-  const data::TaskRecord& task = *record.task;
+  const data::TaskRecord& task = record.task;
   return {{"trial", record.trial},
           {"block", task.block_name},
           {"track", task.track},
@@ -81,7 +81,6 @@ SocketAdvisor::SocketAdvisor(const protocols::Protocol& protocol, Settings setti
                              const std::vector<data::TrialRecord>& history)
     : protocol_(protocol), settings_(std::move(settings)) {
   for (const data::TrialRecord& record : history) {
-    if (!record.task) continue;
     history_ += (history_.empty() ? "" : ",") + json_of(record).dump();
   }
   if (!connect()) throw std::invalid_argument(settings_.path + ": " + trouble_);
@@ -187,7 +186,7 @@ std::optional<double> SocketAdvisor::level_in(const std::string& line,
     trouble_ = "expected the answer to trial " + std::to_string(next.trial) + found;
     return std::nullopt;
   }
-  const auto& block = protocol_.blocks[static_cast<std::size_t>(next.task_block)];
+  const auto& block = *protocols::block_of(protocol_, next);
   const std::vector<double> levels = protocols::levels_of(block);
   const auto level = message.value("level", nlohmann::json());
   const double value = level.is_number() ? level.get<double>() : NAN;
@@ -200,7 +199,7 @@ std::optional<double> SocketAdvisor::level_in(const std::string& line,
 std::optional<double> SocketAdvisor::ask(const protocols::Trial& next) {
   trouble_.clear();
   if (socket_ < 0 && !connect()) return std::nullopt;
-  const auto& block = protocol_.blocks[static_cast<std::size_t>(next.task_block)];
+  const auto& block = *protocols::block_of(protocol_, next);
   const std::vector<double> levels = protocols::levels_of(block);
   const auto until = steady_clock::now() + std::chrono::duration_cast<steady_clock::duration>(
                                                std::chrono::duration<double>(settings_.time_out));

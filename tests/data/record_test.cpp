@@ -13,20 +13,19 @@ TrialRecord record_of(const std::string& task) {
   TrialRecord record;
   record.onset_ns = 70;
   record.response = "1";
-  record.task.emplace();
-  record.task->task = task;
+  record.task.task = task;
   return record;
 }
 
 TEST(Record, BeginsWithTheFirstIntervalThatWasFelt) {
   TrialRecord record = record_of("compare");
   EXPECT_EQ(first_onset_ns(record), 70) << "no interval was felt";
-  record.task->intervals.resize(3);
+  record.task.intervals.resize(3);
   EXPECT_EQ(first_onset_ns(record), 70);
-  record.task->intervals[1].onset_ns = 20;
-  record.task->intervals[2].onset_ns = 50;
+  record.task.intervals[1].onset_ns = 20;
+  record.task.intervals[2].onset_ns = 50;
   EXPECT_EQ(first_onset_ns(record), 20);
-  record.task.reset();
+  record.task = {};
   EXPECT_EQ(first_onset_ns(record), 70) << "of version 1";
 }
 
@@ -38,19 +37,19 @@ TEST(Record, NumbersSettingsAndTiesHaveNoRightAnswer) {
     EXPECT_FALSE(has_right_answer(record_of(task))) << task;
   // A comparison of two equally stiff stimuli.
   TrialRecord alike = record_of("compare");
-  alike.task->intervals.resize(2);
-  alike.task->level = alike.task->standard_level = 400;
+  alike.task.intervals.resize(2);
+  alike.task.level = alike.task.standard_level = 400;
   EXPECT_FALSE(has_right_answer(alike));
   alike.response = "2";
   EXPECT_FALSE(has_right_answer(alike));
   alike.response = "same";
   EXPECT_TRUE(has_right_answer(alike)) << "that is the right one";
   alike.response = "1";
-  alike.task->standard_level = 401;
+  alike.task.standard_level = 401;
   EXPECT_TRUE(has_right_answer(alike));
-  alike.task->standard_level.reset();
+  alike.task.standard_level.reset();
   EXPECT_TRUE(has_right_answer(alike));
-  alike.task->level.reset();
+  alike.task.level.reset();
   EXPECT_TRUE(has_right_answer(alike)) << "no level was set for either";
 }
 

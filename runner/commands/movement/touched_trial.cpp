@@ -222,7 +222,7 @@ std::string read_movement(const TouchedStimuli& stimuli, const data::StoredTrial
                           analysis::MovementTrial& trial) {
   const data::TrialRecord& record = stored.record;
   const int stimulus = stimuli.stimulus(record.shape);
-  if (record.task) return "a trial of several intervals";
+  if (record.task.of_block()) return "a trial of several intervals";
   if (stimulus < 0) return "the protocol has no such stimulus";
   if (record.samples.empty()) return "no samples";
 
@@ -312,7 +312,7 @@ std::vector<std::optional<data::TickContact>> contacts_of(const TouchedStimuli& 
     }
   };
   try {
-    if (record.task)
+    if (record.task.of_block())
       session::replay(stimuli.protocol(), record, false, visit);
     else
       session::replay(stimuli.protocol(), stimuli.library(), record, visit);

@@ -28,7 +28,7 @@ struct ListedTrial {
 };
 
 ListedTrial listed(const protocols::Protocol& protocol, const protocols::Trial& trial) {
-  const auto& block = protocol.blocks[static_cast<std::size_t>(trial.task_block)];
+  const auto& block = *protocols::block_of(protocol, trial);
   return {trial,
           block,
           protocol.stimuli[static_cast<std::size_t>(trial.stimulus)].name,
@@ -218,7 +218,7 @@ std::vector<protocols::Trial> example_trials(const protocols::Protocol& protocol
     protocols::TaskPlan plan(protocol, participant, session);
     while (!plan.finished()) {
       const protocols::Trial& trial = plan.next();
-      const auto& block = protocol.blocks[static_cast<std::size_t>(trial.task_block)];
+      const auto& block = *protocols::block_of(protocol, trial);
       const bool success = succeeds(protocol, block, trial, random);
       trials.push_back(trial);
       plan.answered({success, success, true});

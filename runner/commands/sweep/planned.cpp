@@ -366,19 +366,19 @@ std::optional<data::SweepRow> run_point(const Sweep& sweep, std::int64_t point,
     const participants::SimulatedSettings settings =
         participants::read_simulated_settings(study.settings.dump());
     session::limit_for_simulation(protocol, settings);
+    const bool has_blocks = !protocol.blocks.empty();
     TrialCollection trials(sweep.plan);
     analysis::TaskTable tasks;
     const bool done = session::simulate_in_memory(
         protocol, settings, sweep.plan.participants, study.seed, stop,
         [&](int participant, const data::TrialRecord& record, std::uint64_t contact_ticks) {
-          if (!record.task) return trials.add(participant, record, contact_ticks);
+          if (!has_blocks) return trials.add(participant, record, contact_ticks);
           if (!record.practice)
             tasks.trials.push_back(
                 analysis::task_trial_of(session::simulated_code(participant), record));
         });
     if (!done) return std::nullopt;
-    row.figures =
-        protocol.version == 2 ? task_figures_of(sweep.plan, std::move(tasks)) : trials.figures();
+    row.figures = has_blocks ? task_figures_of(sweep.plan, std::move(tasks)) : trials.figures();
   } catch (const std::exception& error) {
     row.reason = reason_of(error);
     row.figures.assign(data::figure_columns(sweep.plan).size(), std::nullopt);

@@ -408,8 +408,8 @@ class PageBuilder {
     WholeNumbers numbers;
     for (const auto& [name, values] : ticks.columns) numbers.add(name, values, steps_of(name));
     std::string title = one.name;
-    if (record.task)
-      title += other ? ", the other renderer" : ": " + record.task->task;
+    if (record.task.of_block())
+      title += other ? ", the other renderer" : ": " + record.task.task;
     else
       title += ": " + printable(record.shape) + ", " + renderer_words(record.renderer, other);
     Json show = {{"title", title},

@@ -33,12 +33,12 @@ TaskRecord a_task() {
 TrialRecord a_compared_trial(int trial) {
   TrialRecord record = a_record(trial);
   record.task = a_task();
-  record.task->intervals = {{"ball", "ray", std::nullopt, true, 11, 22},
-                            {"", "point", 5e-324, false, 33, 44}};
-  record.task->success = true;
-  record.task->number = -0.75;
-  record.task->confidence = 3;
-  record.task->confidence_ns = 9'007'199'254'740'993;  // not representable as a double
+  record.task.intervals = {{"ball", "ray", std::nullopt, true, 11, 22},
+                           {"", "point", 5e-324, false, 33, 44}};
+  record.task.success = true;
+  record.task.number = -0.75;
+  record.task.confidence = 3;
+  record.task.confidence_ns = 9'007'199'254'740'993;  // not representable as a double
   return record;
 }
 
@@ -105,8 +105,8 @@ TEST(Tasks, AreKeptToTheBit) {
   const std::vector<TrialRecord> trials = trials_of(folder / "a.db");
   ASSERT_EQ(trials.size(), 2U);
   for (const TrialRecord& trial : trials) {
-    ASSERT_TRUE(trial.task.has_value());
-    expect_same(*trial.task, *a_compared_trial(1).task);
+    ASSERT_TRUE(trial.task.of_block());
+    expect_same(trial.task, a_compared_trial(1).task);
   }
 }
 
@@ -121,10 +121,27 @@ TEST(Tasks, OfACutOffAttemptNameTheStimulus) {
   int seen = 0;
   store.for_each_cut_off([&](const StoredTrial& attempt) {
     ++seen;
-    ASSERT_TRUE(attempt.record.task.has_value());
-    expect_same(*attempt.record.task, a_task());
+    ASSERT_TRUE(attempt.record.task.of_block());
+    expect_same(attempt.record.task, a_task());
   });
   EXPECT_EQ(seen, 1);
+}
+
+TEST(Tasks, OfNoBlockAreIdentificationAndStoreNothing) {
+  const TemporaryFolder folder;
+  Store store = Store::open(folder / "a.db", Store::Mode::write_or_create);
+  const auto run = store.begin_run(store.enrol(a_protocol(), "P1"), a_run());
+  store.begin_attempt(run, a_plan(1), 1);
+  store.finish_attempt(run, a_record(1));
+  SQLite::Database db(folder / "a.db");
+  EXPECT_EQ(db.execAndGet("SELECT count(*) FROM attempts WHERE task IS NULL").getInt(), 1);
+  store.for_each_trial(
+      [](const StoredTrial& trial) { expect_same(trial.record.task, TaskRecord{}); });
+
+  TrialRecord other = a_record(2);
+  other.task.task = "compare";
+  store.begin_attempt(run, a_plan(2), 2);
+  EXPECT_THROW(store.finish_attempt(run, other), StoreRefused) << "which block asked it?";
 }
 
 TEST(Tasks, ThatWereChangedDoNotMatchTheirSeal) {

@@ -56,7 +56,7 @@ Settings simulated(std::uint64_t seed) {
   std::vector<double> numbers;
   data::Store store = data::Store::open(file, data::Store::Mode::read_only);
   store.for_each_trial([&](const data::StoredTrial& trial) {
-    if (trial.record.task->number) numbers.push_back(*trial.record.task->number);
+    if (trial.record.task.number) numbers.push_back(*trial.record.task.number);
     found.unanswered += trial.record.timed_out ? 1 : 0;
   });
   EXPECT_EQ(progress.by_block["equal"].trials, kParticipants * kEach);

@@ -87,12 +87,12 @@ class LiveTaskButtons : public LiveSessions {
     ASSERT_EQ(trials.size(), 3U);
     for (int i : {0, 1}) {
       EXPECT_EQ(trials[i].response, "2");
-      ASSERT_TRUE(trials[i].task->confidence.has_value());
-      EXPECT_EQ(*trials[i].task->confidence, 5);
-      EXPECT_GE(trials[i].task->confidence_ns, trials[i].onset_ns);
+      ASSERT_TRUE(trials[i].task.confidence.has_value());
+      EXPECT_EQ(*trials[i].task.confidence, 5);
+      EXPECT_GE(trials[i].task.confidence_ns, trials[i].onset_ns);
     }
     EXPECT_EQ(trials[2].response, "yes");
-    EXPECT_FALSE(trials[2].task->confidence.has_value());
+    EXPECT_FALSE(trials[2].task.confidence.has_value());
   }
 
   std::atomic<int> button_{1}, since_page_{0};

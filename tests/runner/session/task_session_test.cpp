@@ -92,8 +92,8 @@ TEST_F(TaskSession, RecordsEveryIntervalOfAComparison) {
   simulate(parsed_study(with_blocks(kCompare)), path("a.db"));
   int compared = 0, detected = 0, catches = 0;
   for (const data::TrialRecord& trial : trials_of(path("a.db"))) {
-    ASSERT_TRUE(trial.task.has_value());
-    const data::TaskRecord& task = *trial.task;
+    ASSERT_TRUE(trial.task.of_block());
+    const data::TaskRecord& task = trial.task;
     EXPECT_FALSE(trial.response.empty());
     std::int64_t before = 0;
     for (const data::IntervalRecord& interval : task.intervals) {
@@ -190,7 +190,7 @@ TEST_F(TaskSession, RatesAndAdjusts) {
            path("a.db"));
   double soft = 0, hard = 0;
   for (const data::TrialRecord& trial : trials_of(path("a.db"))) {
-    const data::TaskRecord& task = *trial.task;
+    const data::TaskRecord& task = trial.task;
     ASSERT_TRUE(task.number.has_value()) << task.block_name;
     if (task.block_name == "number") (*task.level < 200 ? soft : hard) += *task.number;
     if (task.block_name == "scale") {
@@ -249,8 +249,8 @@ TEST_F(TaskSession, IdentifiesAsInVersion1) {
     EXPECT_EQ(found[i].max_force, expected[i].max_force);
     EXPECT_EQ(found[i].first_contact_time, expected[i].first_contact_time);
     EXPECT_EQ(found[i].contact_share, expected[i].contact_share);
-    ASSERT_TRUE(found[i].task.has_value());
-    EXPECT_EQ(found[i].task->success, found[i].correct);
+    ASSERT_TRUE(found[i].task.of_block());
+    EXPECT_EQ(found[i].task.success, found[i].correct);
   }
 }
 
@@ -319,7 +319,7 @@ TEST_F(TaskSession, RepeatsItsTrialsToTheBit) {
         const ReplayComparison again = compare_with_record(protocol, stored.record, true);
         EXPECT_EQ(again.equal_ticks, stored.record.samples.size());
         EXPECT_EQ(again.ticks.size(), stored.record.samples.size());
-        ASSERT_EQ(again.intervals.size(), stored.record.task->intervals.size());
+        ASSERT_EQ(again.intervals.size(), stored.record.task.intervals.size());
         std::uint64_t ticks = 0;
         for (const ReplayedInterval& one : again.intervals) {
           EXPECT_GT(one.ticks, 100U);
@@ -327,7 +327,7 @@ TEST_F(TaskSession, RepeatsItsTrialsToTheBit) {
         }
         EXPECT_EQ(ticks, stored.record.ticks);
         intervals += static_cast<int>(again.intervals.size());
-        const bool empty = stored.record.task->catch_trial;
+        const bool empty = stored.record.task.catch_trial;
         EXPECT_EQ(again.recorded.max_force > 0, !empty);
         differences += again.rms_difference;
       },
