@@ -2,85 +2,68 @@
 
 Usage: same_outputs.py BEFORE AFTER [--only WORD] [--keep FOLDER]
 
-Runs the same commands with both programs, each in a folder of its own, and compares status, standard output, messages
-and every file byte for byte: study databases, exports, analyses, reports, figures, schedules, forces along the recorded
-paths. Two runs of one program must be equal, too (`same_outputs.py P P`). Takes some minutes.
+Runs the commands of golden_commands.py with both programs, each line in a folder of its own, and compares status,
+standard output, messages and every file byte for byte, but what HIDDEN, NOT_COMPARED and LIVE name. Two runs of one program
+must be equal, too (`same_outputs.py P P`). Takes some minutes.
 """
 
 import argparse
 import concurrent.futures
 import contextlib
+import csv
 import hashlib
+import io
 import os
 import pathlib
 import re
 import sqlite3
-import subprocess
 import sys
 import tempfile
+import typing
 
-SOURCE = pathlib.Path(__file__).resolve().parents[2]
-PROTOCOLS = sorted(path.name for path in (SOURCE / "protocols").glob("*.json")
-                   if ".schema." not in path.name and ".texts." not in path.name)
-SCENES = sorted(path.stem for path in (SOURCE / "protocols/scenes").glob("*.csv"))
-TASKS = [name for name in PROTOCOLS if name.startswith(("stiffness", "size", "roughness"))]
+from golden_commands import all_lines, not_run, options_by_command
+from golden_steps import Place
 
-
-def commands(words):
-    """Lines of commands that build on each other; a line of its own runs beside the others."""
-    yield [["--help"], ["--version"], ["nonsense"]] + [["help", word] for word in words]
-    for name in PROTOCOLS:
-        yield [["validate", f"protocols/{name}"], ["schedule", f"protocols/{name}", "--participant", "3"]]
-    for scene in SCENES:
-        renderers = ["ray"] if scene.startswith(("fig3b", "fig17")) else ["ray", "point"]
-        yield [["render", "--scene", f"protocols/scenes/{scene}.json", "--renderer", renderer, "--trajectory",
-                f"protocols/scenes/{scene}.csv", "--out", f"{scene}-{renderer}.csv"] for renderer in renderers]
-    yield [["simulate", "protocols/quick.json", "--db", "quick.db", "--participants", "6", "--jobs", "1"], *after("quick.db"),
-           ["plan", "--db", "quick.db", "--effect", "cone=22,cube=11", "--studies", "200", "--trials", "3,20", "--json", "plan.json",
-            "--figure", "power.svg"],
-           ["forget", "--db", "quick.db", "--participant", "S002", "--yes"], ["export", "--db", "quick.db", "--format", "csv", "--out", "rest.csv"]]
-    for version in ("1", "2"):
-        yield [["simulate", "protocols/quick.json", "--db", f"v{version}.db", "--participants", "2", "--jobs", "1", "--participant-version", version],
-               *after(f"v{version}.db")]
-    for name in TASKS + ["concave.json", "layered.json", "floating.json", "ho2000-interleaved.json"]:
-        yield [["simulate", f"protocols/{name}", "--db", "study.db", "--participants", "2", "--jobs", "1"], *after("study.db")]
-    yield [["simulate", "protocols/floating.json", "--db", "kept.db", "--participants", "1", "--jobs", "1"],
-           ["replay", "--db", "kept.db", "--trial", "S001/1/3", "--out", "replayed.csv"]]
-    yield [["simulate", "protocols/quick.json", "--db", f"part{part}.db", "--participants", "4", "--jobs", "1", "--shard", f"{part}/2"]
-           for part in (1, 2)] + [["merge", "--out", "whole.db", "part1.db", "part2.db"], *after("whole.db")]
-    yield [["simulate", "protocols/floating.json", "--db", "moved.db", "--participants", "2", "--jobs", "1"],
-           ["analyze", "--db", "moved.db", "--movement", "--json", "movement.json", "--report", "movement.html"],
-           ["export", "--db", "moved.db", "--format", "csv", "--out", "moved.csv"],
-           ["analyze", "--csv", "moved.csv", "--json", "table.json"],
-           ["replay", "--db", "moved.db", "--trial", "S001/1/1", "--compare", "--out", "both.csv"],
-           ["watch", "--db", "moved.db", "--trial", "S001/1/1", "--compare", "--out", "trial.html"]]
-    yield [["sweep", "protocols/quick.json", "--space", "protocols/spaces/small.json", "--points", "4", "--participants", "2",
-            "--repetitions", "1", "--jobs", "1", "--db", "small.sweep"],
-           ["analyze", "--sweep", "small.sweep", "--json", "sweep.json", "--report", "sweep.html"],
-           ["export", "--db", "small.sweep", "--format", "csv", "--out", "sweep.csv"]]
-    yield [["explore", "protocols/scenes/fig13-two-objects.json", "--trajectory", "protocols/scenes/fig13-two-objects.csv",
-            "--frames", "frame", "--every", "200ms"],
-           ["accuracy", "--search", "20000", "--seed", "77"]]
-    yield [["plan", "--jnd-effect", "20", "--studies", "100", "--participants", "6-12"],
-           ["plan", "--gain-sd", "0.15", "--residual-sd", "0.5", "--effect", "cone=15", "--studies", "200", "--trials", "20"]]
+COSTS = "ns_per_tick|ns_per_step|us_per_step|paper_test_ns|exact_test_ns"
+OF_REPLIES = "t_ns|zero_t_ns|t_received_ns|t_sent_ns|first_contact_s|response_time_s|ticks|missed_ticks|max_force_n|faults"
+DATED = r"(registration\.(json|md)|check\.(json|html)|SHA256SUMS|ro-crate-metadata\.json)"
+HIDDEN = (
+    (r"\d{4}-\d\d-\d\d(T\d\d:\d\d(:\d\d(\.\d+)?)?Z?| \d\d:\d\d UTC)?|today \d\d:\d\d|at \d\d:\d\d:\d\d UTC", "DATE"),
+    (rf'[0-9a-f]{{64}}(?=  (\S*/)?{DATED}\n)|(?<="sha256_when_made": ")[0-9a-f]{{64}}', "SUM"),
+    (rf'("name": "(\S*/)?{DATED}"[^{{}}]*"sha256": ")[0-9a-f]{{64}}', r"\1SUM"),
+    (r"[\d.]+ simulated s in [\d.]+ s, [\d.]+ simulated seconds per second", "PACE"),
+    (r"\b[\d.]+ (us|ms|s|min|simulated seconds per second)\b", "TIME"),
+    (r"every other method takes at least [\d.]+ times", "COSTS"),
+    (rf'"({COSTS})": [\d.e+]+|"eleven_us": {{[^}}]*}}', "COSTS"),
+    (r'"(submitted_s|onset_ns|end_ns|confidence_ns)": ?\d+', "MOMENT"),
+    (r"127\.0\.0\.1:\d{5}", "ADDRESS"),
+    (r'(?<=")[0-9a-f]{32}(?=")|(?<=#)[0-9a-f]{32}', "TOKEN"),
+    # The simulated hand moves at its own time: where it is when a trial begins or ends.
+    (r"(Take the stylus away from the middle\.\n|Ready: hold it still\.\n)+", "HOME\n"),
+    (r"\* trial \d+ was answered before the first contact\n|, \d+ ticks missed|started inside, ", ""),
+    (rf'^ "({OF_REPLIES})": ("[^"]*"|[^,\s]+)', r'"\1": MEASURED'),
+    (r"servo: \d+ ticks in .*|palpate serve ends: \d+ ticks.*|{\"servo\":{.*}", "TICKS"))
+# Moments; what is drawn by chance in withdrawals; the places of rows in the chain of seals: the clock ends the batches in which
+# a simulation's rows are sealed.
+NOT_COMPARED = {("exports", "made_utc_ns"), ("tombstones", "code_hash"), ("tombstone_secrets", "secret"),
+                ("attempts", "link"), ("attempts", "seal"), ("page_answers", "link"), ("page_answers", "seal")}
+# Columns of tables and exports of sessions that a hand made at its time.
+LIVE = set("seal end_seal consent_utc_ns started_utc_ns started_ns ended_ns at_ns began_ns onset_ns response_ns onset_utc response_time ticks"
+           " first_contact_time contact_share edge_dwell before_contact started_inside faults missed_ticks max_force longest_period_ns"
+           " longest_period samples_sha256 data count interval_onsets interval_ends confidence_delay start_tip_x start_tip_y start_tip_z"
+           " start_tail_x start_tail_y start_tail_z".split())
 
 
-def after(database):
-    yield ["analyze", "--db", database, "--json", database + ".json", "--report", database + ".html", "--figures", database + ".figures"]
-    for format_ in ("csv", "bids", "psych-ds"):
-        yield ["export", "--db", database, "--format", format_, "--out", f"{database}.{format_}"]
+def hidden(text, place, timed=False):
+    """Without what may differ between two runs: folders, days, how long it took. `timed`: without numbers."""
+    text = text.replace(str(place.folder), "FOLDER").replace(str(place.program), "PALPATE")
+    for pattern, name in HIDDEN:
+        text = re.sub(pattern, name, text, flags=re.M)
+    return re.sub(r"[ \t]+", " ", re.sub(r"[-+]?\b\d[\d.]*(e[-+]?\d+)?", "N", text)) if timed else text
 
 
-def hidden(text, folder, program):
-    """Without what may differ between two runs: folders, days, how long it took."""
-    text = text.replace(str(folder), "FOLDER").replace(str(program), "PALPATE")
-    text = re.sub(r"\d{4}-\d\d-\d\d(T\d\d:\d\d(:\d\d(\.\d+)?)?Z?)?", "DATE", text)
-    return re.sub(r"\b[\d.]+ (us|ms|s|min|simulated seconds per second)\b", "TIME", text)
-
-
-def rows(database):
-    """All of a database but for the moments of exports, what is drawn by chance in withdrawals, and the places of rows in
-    the chain of seals: the clock ends the batches in which a simulation's rows are sealed."""
+def rows(database, live):
+    """All of a database but columns that differ between two runs."""
     lines = []
     with contextlib.closing(sqlite3.connect(f"file:{database}?immutable=1", uri=True)) as opened:
         for kind, name, sql in opened.execute("SELECT type, name, sql FROM sqlite_master ORDER BY type, name").fetchall():
@@ -88,34 +71,49 @@ def rows(database):
             if kind == "table":
                 cursor = opened.execute(f'SELECT * FROM "{name}"')
                 kept = [i for i, (column, *_) in enumerate(cursor.description)
-                        if (name, column) not in (("exports", "made_utc_ns"), ("tombstones", "code_hash"), ("tombstone_secrets", "secret"),
-                                             ("attempts", "link"), ("attempts", "seal"), ("page_answers", "link"), ("page_answers", "seal"))]
-                lines += [repr([row[i] if not isinstance(row[i], bytes) else hashlib.sha256(row[i]).hexdigest() for i in kept])
+                        if (name, column) not in NOT_COMPARED and not (live and column in LIVE)]
+                lines += [name + repr([row[i] if not isinstance(row[i], bytes) else hashlib.sha256(row[i]).hexdigest() for i in kept])
                           for row in cursor]
     return "\n".join(lines)
 
 
-def files(folder):
-    for path in sorted(folder.rglob("*")):
-        if path.is_file() and not path.is_symlink():
-            content = path.read_bytes()
-            yield str(path.relative_to(folder)), rows(path).encode() if content.startswith(b"SQLite format 3") else content
+def without_live_columns(text):
+    table = csv.DictReader(io.StringIO(text))
+    return "\n".join(str({name: value for name, value in row.items() if name not in LIVE}) for row in table)
+
+
+class Output(typing.NamedTuple):
+    text: str
+    place: Place
+    timed: bool = False
+    failed: bool = False
+
+    def hidden(self):
+        return hidden(self.text, self.place, self.timed)
+
+
+def written(path, place):
+    found = path.read_bytes()
+    if found.startswith(b"SQLite format 3"):
+        return Output(rows(path, path.name.startswith("live")), place)
+    try:
+        text = found.decode()
+    except UnicodeDecodeError:
+        return Output(hashlib.sha256(found).hexdigest(), place)
+    live = ".live." in path.name or path.name == "attempts.csv"
+    return Output(without_live_columns(text) if live else text, place, ".timed." in path.name)
 
 
 def said_and_written(program, line, folder):
-    folder.mkdir(parents=True)
-    (folder / "protocols").symlink_to(SOURCE / "protocols")
-    out = {}
-    for number, words in enumerate(line):
-        done = subprocess.run([program, *words], cwd=folder, capture_output=True, text=True, errors="replace",
-                              env=dict(os.environ, TZ="UTC", LC_ALL="C.UTF-8", COLUMNS="80"))
-        name = f"{number} palpate {' '.join(words)}"
-        out[name] = f"{done.returncode}\n{hidden(done.stdout, folder, program)}\n{hidden(done.stderr, folder, program)}"
-    for name, content in files(folder):
-        try:
-            out[name] = hidden(content.decode(), folder, program)
-        except UnicodeDecodeError:
-            out[name] = hashlib.sha256(content).hexdigest()
+    """Outputs by their names."""
+    place, out = Place(program, folder), {}
+    place.make()
+    for number, step in enumerate(line):
+        said = step.run(place)
+        out[f"{number} {' '.join(step.words)[:150]}"] = Output(said, place, step.timed, not said.startswith(f"{step.status}\n"))
+    for path in sorted(folder.rglob("*")):
+        if path.is_file() and not path.is_symlink():
+            out[str(path.relative_to(folder))] = written(path, place)
     return out
 
 
@@ -126,6 +124,29 @@ def first_difference(before, after_):
     return "one is longer"
 
 
+def compare(name, before, after):
+    """\return whether they differ, whether one of them failed; says so."""
+    failed = any(side and side.failed for side in (before, after))
+    if failed:
+        print(f"{name}: does not end as it should:\n    {(before or after).text[:1000]}", flush=True)
+    if not before or not after:
+        print(f"{name}: one of them only", flush=True)
+        return True, failed
+    if before.text == after.text or (texts := (before.hidden(), after.hidden()))[0] == texts[1]:
+        return False, failed
+    print(f"{name}: {first_difference(*texts)}", flush=True)
+    return True, failed
+
+
+def run_both(programs, lines, root):
+    """Yields the outputs of each line, before and after."""
+    with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
+        pairs = [[pool.submit(said_and_written, program, line, root / side / str(number))
+                  for side, program in zip(("before", "after"), programs)] for number, line in enumerate(lines)]
+        for number, pair in enumerate(pairs):
+            yield number, *(run.result() for run in pair)
+
+
 def main():
     options = argparse.ArgumentParser()
     options.add_argument("before")
@@ -134,27 +155,20 @@ def main():
     options.add_argument("--keep", help="a new folder for what they write")
     options = options.parse_args()
     programs = [pathlib.Path(program).resolve() for program in (options.before, options.after)]
-    said = subprocess.run([programs[0], "--help"], capture_output=True, text=True).stdout
-    words = re.findall(r"^  ([a-z]+)  +\S", said, re.MULTILINE)
-    lines = [line for line in map(list, commands(words)) if options.only in str(line)]
+    known = options_by_command(programs[1])
+    lines = list(all_lines(known))
+    missing = not_run(known, lines)
+    for sentence in missing:
+        print(sentence)
     compared = different = failed = 0
-    with tempfile.TemporaryDirectory() as scratch, concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
-        root = pathlib.Path(options.keep or scratch)
-        pairs = [[pool.submit(said_and_written, program, line, root / side / str(number))
-                  for side, program in zip(("before", "after"), programs)] for number, line in enumerate(lines)]
-        for number, (before, after_) in enumerate([run.result() for run in pair] for pair in pairs):
-            for name in sorted(before.keys() | after_.keys()):
-                compared += 1
-                if " palpate " in name and not name.endswith(" nonsense") and not before.get(name, "0\n").startswith("0\n"):
-                    failed += 1
-                    print(f"{number}/{name}: shows nothing, as it fails:\n    {before[name][:200]}", flush=True)
-                if before.get(name) == after_.get(name):
-                    continue
-                different += 1
-                print(f"{number}/{name}: " + ("one of them only" if name not in before or name not in after_ else
-                                              first_difference(before[name], after_[name])), flush=True)
-    print(f"{compared} outputs compared, {different} differ, {failed} commands fail")
-    return different + failed > 0
+    with tempfile.TemporaryDirectory() as scratch:
+        chosen = [line for line in lines if any(options.only in " ".join(step.words) for step in line)]
+        for number, before, after in run_both(programs, chosen, pathlib.Path(options.keep or scratch)):
+            for name in sorted(before.keys() | after.keys()):
+                differ, fails = compare(f"{number}/{name}", before.get(name), after.get(name))
+                compared, different, failed = compared + 1, different + differ, failed + fails
+    print(f"{compared} outputs compared, {different} differ, {failed} commands fail, {len(missing)} are not run")
+    return different + failed + len(missing) > 0
 
 
 if __name__ == "__main__":

@@ -27,7 +27,7 @@ def end_if_it_hangs(test, seconds=120):
 class Terminal:
     """Starts `command` with its own terminal. Its output accumulates in `text`."""
 
-    def __init__(self, command, patience=60, columns=0):
+    def __init__(self, command, patience=60, columns=0, **where):
         self.patience = patience
         self.text = ""
         self.read_to = 0  # of text, by wait_for
@@ -35,7 +35,7 @@ class Terminal:
         if columns:
             fcntl.ioctl(slave, termios.TIOCSWINSZ, struct.pack("HHHH", 24, columns, 0, 0))
         self.process = subprocess.Popen(list(map(str, command)), stdin=slave, stdout=slave, stderr=slave,
-                                        start_new_session=True)
+                                        start_new_session=True, **where)
         os.close(slave)
 
     def __enter__(self):
