@@ -230,8 +230,8 @@ void SessionMonitor::recorded(const data::TrialRecord& record) {
   // A device with motors would have cut the trial off.
   if ((record.faults & servo::servo_fault::kMissedTicks) != 0)
     say("trial " + std::to_string(record.trial) + " missed " + std::to_string(record.missed_ticks) +
-        " ticks, up to " + milliseconds(record.longest_period_ns) +
-        " apart (recorded): the computer was busy");
+        (record.missed_ticks == 1 ? " tick, up to " : " ticks, up to ") +
+        milliseconds(record.longest_period_ns) + " apart (recorded): the computer was busy");
   if (!record.response.empty() && !touched_ && !record.task.catch_trial) {
     say("trial " + std::to_string(record.trial) + " was answered before the first contact");
   }
@@ -323,13 +323,13 @@ void LiveSession::take_last_commands(Outcome& outcome) {
 void LiveSession::before_step() {
   const Session::State now = session_.state();
   if (now == Session::State::response) return;  // a shown trial is recorded
+  respondent_.set_progress(session_.plan().done(), session_.plan().size());
   attend();
   stop_if_due();
   const auto& longest = station_.protocol.sessions.max_minutes;
   if (longest && monitor_.elapsed() > *longest * 60)
     throw EndOfSession(data::RunEnd::paused,
                        "the session has lasted as long as the protocol allows");
-  respondent_.set_progress(session_.plan().done(), session_.plan().size());
   if (now != Session::State::trial) noise_.stop();  // a page to read, and perhaps to discuss
   bool ready = false;
   while (!ready) {

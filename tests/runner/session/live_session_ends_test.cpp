@@ -117,6 +117,17 @@ TEST_F(LiveSessions, AStopCanBeCancelledAndTheEndReportsIt) {
   EXPECT_EQ(screen_.texts.back(), "") << "it was not the last object";
 }
 
+TEST_F(LiveSessions, TheLastPageAfterAStopCountsEveryRecordedTrial) {
+  FakeDevice device([](int) { return at(0.1); });
+  screen_.takes_ns = 80'000'000;
+  console_.in_state = {"trial", {display::ConsoleCommand::Kind::stop_after_trial, "", 0}};
+  const LiveSession::Outcome outcome = run(device);
+  EXPECT_EQ(outcome.end, data::RunEnd::paused);
+  ASSERT_EQ(outcome.recorded, 1u);
+  EXPECT_EQ(screen_.pages.back().done, 1);
+  EXPECT_EQ(screen_.pages.back().trials, 2);
+}
+
 TEST_F(LiveSessions, AStopIsObeyedWhileTheSessionWaits) {
   FakeDevice device([](int tick) { return at(0.1, tick > 30); });  // lost for good
   screen_.answers = false;
