@@ -494,6 +494,16 @@ bool open_and_test(const devices::DeviceKind& kind, const servo::DeviceConfig& c
   return passed;
 }
 
+/// For a place that is indented by four spaces.
+std::string indented(const std::string& text) {
+  std::string out;
+  for (const char c : printable_lines(text)) {
+    out += c;
+    if (c == '\n') out += "    ";
+  }
+  return out;
+}
+
 /// Prints the connected devices of a kind. \return false if one that is connected does not work
 bool list_kind(const devices::DeviceKind& kind, const servo::DeviceConfig& config, bool named,
                Json& rows) {
@@ -510,7 +520,7 @@ bool list_kind(const devices::DeviceKind& kind, const servo::DeviceConfig& confi
       if (!found.serial.empty())
         std::printf("    connected: %s\n", printable(found.serial).c_str());
       if (!found.trouble.empty())
-        std::printf("    cannot be used: %s\n", printable(found.trouble).c_str());
+        std::printf("    cannot be used: %s\n", indented(found.trouble).c_str());
     }
     if (connected.empty()) std::printf("    none connected\n");
     if (kind.has_force_feedback && !named) {
@@ -522,7 +532,7 @@ bool list_kind(const devices::DeviceKind& kind, const servo::DeviceConfig& confi
     }
   } catch (const std::runtime_error& error) {
     row["trouble"] = error.what();
-    std::printf("    %s\n", printable(error.what()).c_str());
+    std::printf("    %s\n", indented(error.what()).c_str());
     good = !named;
   }
   rows.push_back(std::move(row));

@@ -145,7 +145,8 @@ class Timing(unittest.TestCase):
         broken = self.folder / "anna" / "broken.so"
         broken.write_text("no library")
         other = self.folder / "other.json"
-        self.palpate("devices", "--device", "forcedimension", "--library", broken, "--report", other, status=1)
+        said = self.palpate("devices", "--device", "forcedimension", "--library", broken, "--report", other, status=1)
+        self.assertRegex(said, r"Tried:\n +\S*broken\.so")
         self.assertIn("broken.so", other.read_text())
         self.assertNotIn("anna", other.read_text())
 
