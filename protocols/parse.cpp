@@ -115,9 +115,10 @@ std::string list(const std::vector<Fault>& faults) {
   for (const Fault& fault : faults) {
     text += (text.empty() ? "" : "\n") + printable(fault.file);
     // A location that is a line says it itself.
-    if (fault.line > 0 && fault.location.front() == '/')
+    if (fault.line > 0 && fault.location.starts_with('/'))
       (text += ':') += std::to_string(fault.line);
-    text += ": " + printable(fault.location) + ": " + printable(fault.expected);
+    if (!fault.location.empty()) text += ": " + printable(fault.location);
+    text += ": " + printable(fault.expected);
   }
   return text;
 }

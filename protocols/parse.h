@@ -13,7 +13,8 @@ namespace palpate::protocols {
 /// One fault of an input file.
 struct Fault {
   std::string file;
-  std::string location;  ///< JSON pointer, or "line L, column C" where the text is not JSON
+  /// JSON pointer, or "line L, column C" where the text is not JSON; "": the file as a whole
+  std::string location;
   std::string expected;  ///< expected and found value
   int line = 0;          ///< of the text, from 1; 0: unknown
 };

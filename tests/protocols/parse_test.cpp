@@ -247,6 +247,11 @@ TEST(Parse, ReadsASceneWithToolReachAndLayers) {
   EXPECT_EQ(scene.reach->point, Vec3(0, 0.1, 0));
 }
 
+TEST(Parse, AFaultOfAWholeFileHasNoPlace) {
+  EXPECT_STREQ(InputError({{"none", "", "expected a firmware file"}}).what(),
+               "none: expected a firmware file");
+}
+
 TEST(Parse, SaysWhereAndWhat) {
   std::string text = text_of(kFolder + "good/minimal.json");
   text.replace(text.find("radius_m"), 8, "raduis_m");
