@@ -266,7 +266,9 @@ std::string status(const ConsoleState& state) {
   }
   if (state.remaining > 60)
     text += ", " + std::to_string(static_cast<int>(state.remaining / 60)) + " min left";
-  if (state.missed_ticks > 0) text += ", " + std::to_string(state.missed_ticks) + " ticks missed";
+  if (state.missed_ticks > 0)
+    text += ", " + std::to_string(state.missed_ticks) +
+            (state.missed_ticks == 1 ? " tick missed" : " ticks missed");
   if (!state.held_by.empty()) text += ": " + printable(state.held_by);
   return text + "]\n";
 }
