@@ -13,70 +13,6 @@
 
 namespace palpate::runner::participants::lane {
 
-inline float max(float a, float b) { return a > b ? a : b; }
-inline float min(float a, float b) { return a < b ? a : b; }
-inline float clamp(float x, float low, float high) { return min(max(x, low), high); }
-inline float positive(float x) { return x > 0.0f ? x : 0.0f; }
-inline float sign(float x) { return x < 0.0f ? -1.0f : 1.0f; }
-
-/// e^x for x <= 88. Relative error below 3e-7; clamped to e^-87 below x = -87.
-inline float exp(float x) {
-  x = x > -87.0f ? x : -87.0f;
-  // Adding 1.5 * 2^23 rounds to an integer and leaves it in the low bits of the mantissa.
-  constexpr float kRounder = 12582912.0f;
-  const float shifted = x * 1.44269504f + kRounder;
-  const float n = shifted - kRounder;
-  // ln 2 in two parts: the first has few enough bits that n times it is exact.
-  const float r = (x - n * 0.693359375f) + n * 2.12194440e-4f;
-  // Taylor, |r| <= ln(2) / 2: the first term left out is r^7 / 5040 < 1.2e-7.
-  const float p =
-      1.0f +
-      r * (1.0f +
-           r * (1.0f / 2 + r * (1.0f / 6 + r * (1.0f / 24 + r * (1.0f / 120 + r * (1.0f / 720))))));
-  const std::uint32_t exponent =
-      (std::bit_cast<std::uint32_t>(shifted) - std::bit_cast<std::uint32_t>(kRounder) + 127u)
-      << 23u;
-  return p * std::bit_cast<float>(exponent);
-}
-
-/// ln x for positive normal x. Absolute error below 2e-7 + 1.2e-7 |ln x|.
-inline float log(float x) {
-  // x = m 2^n with m in [sqrt(1/2), sqrt(2)).
-  constexpr std::uint32_t kRootHalf = 0x3f3504f3;
-  const auto bits = std::bit_cast<std::uint32_t>(x);
-  const auto n = static_cast<std::int32_t>(bits - kRootHalf) >> 23;
-  const float m = std::bit_cast<float>(bits - (static_cast<std::uint32_t>(n) << 23u));
-  // ln m = 2 artanh f; the first term left out is 2 f^9 / 9 < 3e-8.
-  const float f = (m - 1.0f) / (m + 1.0f);
-  const float g = f * f;
-  const float series = 1.0f + g * (1.0f / 3 + g * (1.0f / 5 + g * (1.0f / 7)));
-  return static_cast<float>(n) * 0.693147181f + 2.0f * f * series;
-}
-
-/// From here on ln Phi(x) is exactly zero.
-inline constexpr float kLogNormalCdfIsZero = 6.0f;
-
-/// ln Phi(x), Phi the standard normal distribution function.
-/// Absolute error below 5e-6 for x > -5, relative error below 1e-6 beyond.
-inline float log_normal_cdf(float x) {
-  // erfc(a) = t exp(-a^2 + h(t)) with t = 1 / (1 + a/2), a >= 0; h is smooth on all of [0, 1].
-  // Coefficients: our own Chebyshev interpolation of h in y = 2 t - 1, degree 7, error 3e-6.
-  const float a = std::fabs(x) * 0.707106781f;
-  const float t = 1.0f / (1.0f + 0.5f * a);
-  const float y = 2.0f * t - 1.0f;
-  float h = -0.001297829f;
-  h = h * y + 0.00136074639f;
-  h = h * y + 0.00814063271f;
-  h = h * y - 0.00961388235f;
-  h = h * y - 0.0467184495f;
-  h = h * y + 0.047291129f;
-  h = h * y + 0.672630484f;
-  h = h * y - 0.671792452f;
-  const float lower = lane::log(0.5f * t) + h - a * a;  // ln Phi(-|x|)
-  const float upper = lane::log(1.0f - lane::exp(lower));
-  return x < 0.0f ? lower : upper;
-}
-
 // As many floats as a register holds, for loops that compilers do not vectorise by themselves. Each
 // lane has the operations of a single float, so results are the same to the bit at every width.
 
@@ -99,10 +35,83 @@ inline Floats load(const float* from) {
 inline void store(const Floats& from, float* to) { std::memcpy(to, &from, sizeof from); }
 inline Floats all(float value) { return value - Floats{}; }
 
+inline float max(float a, float b) { return a > b ? a : b; }
+inline float min(float a, float b) { return a < b ? a : b; }
+inline float clamp(float x, float low, float high) { return min(max(x, low), high); }
+inline float positive(float x) { return x > 0.0f ? x : 0.0f; }
+inline float sign(float x) { return x < 0.0f ? -1.0f : 1.0f; }
+inline float abs(float x) { return std::fabs(x); }
+
 inline Floats max(const Floats& a, const Floats& b) { return a > b ? a : b; }
 inline Floats min(const Floats& a, const Floats& b) { return a < b ? a : b; }
 inline Floats abs(const Floats& x) { return max(x, -x); }
 inline Floats mix(const Floats& a, const Floats& b, const Floats& t) { return a + t * (b - a); }
+
+// The bits of floats, and the whole numbers of some bits as floats.
+inline std::int32_t bits(float x) { return std::bit_cast<std::int32_t>(x); }
+inline Ints bits(const Floats& x) { return reinterpret_cast<Ints>(x); }
+inline float of_bits(std::int32_t x) { return std::bit_cast<float>(x); }
+inline Floats of_bits(const Ints& x) { return reinterpret_cast<Floats>(x); }
+inline float to_floats(std::int32_t x) { return static_cast<float>(x); }
+inline Floats to_floats(const Ints& x) { return __builtin_convertvector(x, Floats); }
+
+// Of one float, or of each lane.
+
+/// e^x for x <= 88. Relative error below 3e-7; clamped to e^-87 below x = -87.
+template <class T>
+inline T exp(T x) {
+  x = max(x, T{} - 87.0f);
+  // Adding 1.5 * 2^23 rounds to an integer and leaves it in the low bits of the mantissa.
+  constexpr float kRounder = 12582912.0f;
+  const T shifted = x * 1.44269504f + kRounder;
+  const T n = shifted - kRounder;
+  // ln 2 in two parts: the first has few enough bits that n times it is exact.
+  const T r = (x - n * 0.693359375f) + n * 2.12194440e-4f;
+  // Taylor, |r| <= ln(2) / 2: the first term left out is r^7 / 5040 < 1.2e-7.
+  const T p =
+      1.0f +
+      r * (1.0f +
+           r * (1.0f / 2 + r * (1.0f / 6 + r * (1.0f / 24 + r * (1.0f / 120 + r * (1.0f / 720))))));
+  return p * of_bits((bits(shifted) - std::bit_cast<std::int32_t>(kRounder) + 127) << 23);
+}
+
+/// ln x for positive normal x. Absolute error below 2e-7 + 1.2e-7 |ln x|.
+template <class T>
+inline T log(T x) {
+  // x = m 2^n with m in [sqrt(1/2), sqrt(2)).
+  constexpr std::int32_t kRootHalf = 0x3f3504f3;
+  const auto n = (bits(x) - kRootHalf) >> 23;
+  const T m = of_bits(bits(x) - (n << 23));
+  // ln m = 2 artanh f; the first term left out is 2 f^9 / 9 < 3e-8.
+  const T f = (m - 1.0f) / (m + 1.0f);
+  const T g = f * f;
+  const T series = 1.0f + g * (1.0f / 3 + g * (1.0f / 5 + g * (1.0f / 7)));
+  return to_floats(n) * 0.693147181f + 2.0f * f * series;
+}
+
+/// From here on ln Phi(x) is exactly zero.
+inline constexpr float kLogNormalCdfIsZero = 6.0f;
+
+/// ln Phi(x), Phi the standard normal distribution function.
+/// Absolute error below 5e-6 for x > -5, relative error below 1e-6 beyond.
+template <class T>
+inline T log_normal_cdf(T x) {
+  // erfc(a) = t exp(-a^2 + h(t)) with t = 1 / (1 + a/2), a >= 0; h is smooth on all of [0, 1].
+  // Coefficients: our own Chebyshev interpolation of h in y = 2 t - 1, degree 7, error 3e-6.
+  const T a = lane::abs(x) * 0.707106781f;
+  const T t = 1.0f / (1.0f + 0.5f * a);
+  const T y = 2.0f * t - 1.0f;
+  T h = -0.001297829f * y + 0.00136074639f;
+  h = h * y + 0.00814063271f;
+  h = h * y - 0.00961388235f;
+  h = h * y - 0.0467184495f;
+  h = h * y + 0.047291129f;
+  h = h * y + 0.672630484f;
+  h = h * y - 0.671792452f;
+  const T lower = lane::log(0.5f * t) + h - a * a;  // ln Phi(-|x|)
+  const T upper = lane::log(1.0f - lane::exp(lower));
+  return x < 0.0f ? lower : upper;
+}
 
 inline Floats sqrt(const Floats& x) {
   Floats out;
@@ -131,6 +140,31 @@ inline bool any(const Ints& flags) {
   for (int i = 0; i < kWidth; ++i) either |= flags[i];
   return either != 0;
 #endif
+}
+
+/// Whether every lane of x[a] is at least 0 and less than end[a], for a = 0, 1, 2.
+inline bool all_within(const Floats* x, const float* end) {
+#if defined(__AVX512F__)
+  // As whole numbers without sign, positive floats keep their order, and those with a sign come
+  // after all of them: -0 is taken for outside, which changes no distance.
+  __mmask16 within = 0xffff;
+  for (int a = 0; a < 3; ++a) {
+    within = _mm512_mask_cmplt_epu32_mask(within, reinterpret_cast<__m512i>(x[a]),
+                                          _mm512_castps_si512(_mm512_set1_ps(end[a])));
+  }
+  return within == 0xffff;
+#else
+  Ints outside{};
+  for (int a = 0; a < 3; ++a) outside |= (x[a] < 0.0f) | (x[a] >= end[a]);
+  return !any(outside);
+#endif
+}
+
+/// Flags of the first `count` lanes, of all if there are fewer.
+inline Ints first_lanes(int count) {
+  Ints lane;
+  for (int i = 0; i < kWidth; ++i) lane[i] = i;
+  return lane < count;
 }
 
 /// Stores the flagged lanes side by side. \return their number. \param to  has room for all lanes

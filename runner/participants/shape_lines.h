@@ -470,93 +470,95 @@ class BoxCrossing {
     for (int a = 0; a < 3; ++a) {
       const lane::Floats along = lines.along[a], off = lines.start[a] - box.middle[a];
       per_[a] = 1.0F / lane::max(lane::abs(along), lane::all(1e-9F));
-      middle_[a] = (along < 0.0F ? off : -off) * per_[a];
-      half_[a] = box.half[a] * per_[a];
+      const lane::Floats middle = (along < 0.0F ? off : -off) * per_[a],
+                         half = box.half[a] * per_[a];
+      begin_[a] = middle - half;
+      end_[a] = middle + half;
     }
   }
   /// m from the start of each line
   lane::Floats begin(const lane::Floats& grown) const {
-    const auto of = [&](int a) { return middle_[a] - (half_[a] + grown * per_[a]); };
+    const auto of = [&](int a) { return begin_[a] - grown * per_[a]; };
     return lane::max(lane::max(of(0), of(1)), of(2));
   }
   lane::Floats end(const lane::Floats& grown) const {
-    const auto of = [&](int a) { return middle_[a] + (half_[a] + grown * per_[a]); };
+    const auto of = [&](int a) { return end_[a] + grown * per_[a]; };
     return lane::min(lane::min(of(0), of(1)), of(2));
   }
 
  private:
-  lane::Floats per_[3], middle_[3], half_[3];
+  lane::Floats per_[3], begin_[3], end_[3];
 };
 
 /// A solid that is not convex may have several local minima along a line. Samples it in at most
 /// `kPlaces` steps, fewer where the distance (its slope is at most 1) rules out a new minimum, and
 /// only as far as the box allows one; then refines around the least sample. Finds the minimum
-/// within 0.5 mm. Groups of lines advance together, because a single one would wait for the grid's
-/// memory at each step. Writes the places (m from the start) and distances of kGroups groups.
-template <int kGroups, class Rows>
-void search_groups(const DistanceField& field, const Rows& rows, int first, float length,
-                   float* best_out, float* least_out) {
+/// within 0.5 mm. Groups of lines, a register's lanes each, take turns, because a single one would
+/// wait for the grid's memory at each step.
+/// \param best  places of the first `count` lines, m from the start; \param least  distances there.
+/// Both have as much room as the rows.
+template <int kRoom>
+void search_lines(const DistanceField& field, const LineRows<kRoom>& rows, int count, float length,
+                  float* best, float* least) {
   using lane::Floats;
   constexpr int kPlaces = 16, kHalvings = 5;
+  constexpr int kMostGroups = (kRoom + lane::kWidth - 1) / lane::kWidth;
   const Floats step = lane::all(length / kPlaces), whole = lane::all(length),
                end = lane::all(length + 0.5F * (length / kPlaces));
-  LanesOfLines lines[kGroups];
-  BoxCrossing crossings[kGroups];
-  Floats best[kGroups], least[kGroups], next[kGroups];
-  const auto unfinished = [&](int g) {
-    return (next[g] < end) & (lane::min(next[g], whole) <= crossings[g].end(least[g]));
+  const int groups = (count + lane::kWidth - 1) / lane::kWidth;
+  BoxCrossing crossings[kMostGroups];
+  Floats next[kMostGroups];
+  lane::Ints going[kMostGroups];
+  int active[kMostGroups];
+  int left = 0;
+  // Counts the group as active again if one of its lines has a place to be looked at.
+  const auto go_on = [&](int g, const Floats& farther, const Floats& so_far) {
+    next[g] = farther;
+    going[g] = (farther < end) & (lane::min(farther, whole) <= crossings[g].end(so_far));
+    active[left] = g;
+    left += lane::any(going[g]) ? 1 : 0;
   };
-  lane::Ints going{};
-  for (int g = 0; g < kGroups; ++g) {
-    lines[g] = LanesOfLines(field, rows, first + g * lane::kWidth);
-    crossings[g] = BoxCrossing(lines[g]);
-    best[g] = Floats{};
-    least[g] = lines[g].distances(best[g]);
-    next[g] = step;
-    going |= unfinished(g);
+  for (int g = 0; g < groups; ++g) {
+    const int first = g * lane::kWidth;
+    const LanesOfLines lines(field, rows, first);
+    crossings[g] = BoxCrossing(lines);
+    const Floats d = lines.distances(Floats{});
+    lane::store(Floats{}, best + first);
+    lane::store(d, least + first);
+    go_on(g, step, d);
   }
-  while (lane::any(going)) {
-    going = lane::Ints{};
-    for (int g = 0; g < kGroups; ++g) {
-      const Floats place = lane::min(next[g], whole);
-      const Floats d = lines[g].distances(place);
-      const lane::Ints closer = (next[g] < end) & (d < least[g]);
-      least[g] = closer ? d : least[g];
-      best[g] = closer ? place : best[g];
-      next[g] += lane::max(step, d - least[g]);
-      going |= unfinished(g);
+  while (left > 0) {
+    const int turns = std::exchange(left, 0);
+    for (int turn = 0; turn < turns; ++turn) {
+      const int g = active[turn], first = g * lane::kWidth;
+      const Floats best_so_far = lane::load(best + first), so_far = lane::load(least + first);
+      // A line that has ended would leave the grid, which takes longer to look at.
+      const Floats place = going[g] ? lane::min(next[g], whole) : best_so_far;
+      const Floats d = LanesOfLines(field, rows, first).distances(place);
+      const lane::Ints closer = d < so_far;
+      const Floats now = closer ? d : so_far;
+      lane::store(now, least + first);
+      lane::store(closer ? place : best_so_far, best + first);
+      go_on(g, next[g] + lane::max(step, d - now), now);
     }
   }
   Floats reach = 0.5F * step;
   for (int k = 0; k < kHalvings; ++k, reach *= 0.5F) {
-    for (int g = 0; g < kGroups; ++g) {
-      const Floats before = lane::max(best[g] - reach, Floats{});
-      const Floats after = lane::min(best[g] + reach, whole);
-      const Floats b = lines[g].distances(after);
+    for (int g = 0; g < groups; ++g) {
+      const int first = g * lane::kWidth;
+      const LanesOfLines lines(field, rows, first);
+      const Floats middle = lane::load(best + first), so_far = lane::load(least + first);
+      const Floats before = lane::max(middle - reach, Floats{});
+      const Floats after = lane::min(middle + reach, whole);
+      const Floats b = lines.distances(after);
       // There is nothing before the start.
-      const Floats a = lane::any(best[g] > 0.0F) ? lines[g].distances(before) : least[g];
-      const lane::Ints back = (a < least[g]) & (a <= b);
-      const lane::Ints on = ~back & (b < least[g]);
-      least[g] = back ? a : on ? b : least[g];
-      best[g] = back ? before : on ? after : best[g];
+      const Floats a = lane::any(middle > 0.0F) ? lines.distances(before) : so_far;
+      const lane::Ints back = (a < so_far) & (a <= b);
+      const lane::Ints on = ~back & (b < so_far);
+      lane::store(back ? a : on ? b : so_far, least + first);
+      lane::store(back ? before : on ? after : middle, best + first);
     }
   }
-  for (int g = 0; g < kGroups; ++g) {
-    const int at = g * lane::kWidth;
-    lane::store(best[g], best_out + at);
-    lane::store(least[g], least_out + at);
-  }
-}
-
-/// The first `count` lines. \param best, least  have room for a block
-template <class Rows>
-void search_lines(const DistanceField& field, const Rows& rows, int count, float length,
-                  float* best, float* least) {
-  constexpr int kGroups = 2;
-  int first = 0;
-  for (; first + lane::kWidth < count; first += kGroups * lane::kWidth)
-    search_groups<kGroups>(field, rows, first, length, best + first, least + first);
-  if (first < count) search_groups<1>(field, rows, first, length, best + first, least + first);
 }
 
 inline FloatVec unit(const FloatVec& v) {
@@ -577,35 +579,25 @@ inline LanesOfVectors unit(const LanesOfVectors& v) {
   return {v.x * scale, v.y * scale, v.z * scale};
 }
 
-/// The distance, normal and cosine at the place along[i] of the first `count` lines.
-template <class Rows>
-void find_normals(const DistanceField& field, const Rows& rows, int count, float length,
-                  Deepest& out) {
-  for (int i = 0; i < count; i += lane::kWidth) {
-    const lane::Floats place = lane::load(out.along + i);
-    const LanesOfLines lines(field, rows, i);
-    const DistanceField::Values there = lines.values(place);
-    const LanesOfVectors normal = unit(LanesOfVectors{there.slope_x, there.slope_y, there.slope_z});
-    LanesOfVectors n = normal;
-    if (length > 0) {
-      // Between the ends, a contact's normal is perpendicular to the line.
-      const LanesOfVectors u{lines.along[0], lines.along[1], lines.along[2]};
-      const lane::Floats climb = dot(normal, u);
-      const LanesOfVectors across = unit(
-          LanesOfVectors{normal.x - climb * u.x, normal.y - climb * u.y, normal.z - climb * u.z});
-      const lane::Ints between = (place > 0.0F) & (place < length);
-      n = {between ? across.x : normal.x, between ? across.y : normal.y,
-           between ? across.z : normal.z};
-    }
-    const LanesOfVectors direction{lane::load(rows.direction[0] + i),
-                                   lane::load(rows.direction[1] + i),
-                                   lane::load(rows.direction[2] + i)};
-    lane::store(there.distance, out.distance + i);
-    lane::store(dot(n, direction), out.cosine + i);
-    lane::store(n.x, out.x + i);
-    lane::store(n.y, out.y + i);
-    lane::store(n.z, out.z + i);
-  }
+/// Distance and outward normal at some places of lines, m from the start.
+struct LanesOfSurface {
+  lane::Floats distance;
+  LanesOfVectors normal;
+};
+inline LanesOfSurface surface_at(const LanesOfLines& lines, const lane::Floats& place,
+                                 float length) {
+  const DistanceField::Values there = lines.values(place);
+  const LanesOfVectors normal = unit(LanesOfVectors{there.slope_x, there.slope_y, there.slope_z});
+  if (length <= 0) return {there.distance, normal};
+  // Between the ends, a contact's normal is perpendicular to the line.
+  const LanesOfVectors u{lines.along[0], lines.along[1], lines.along[2]};
+  const lane::Floats climb = dot(normal, u);
+  const LanesOfVectors across =
+      unit(LanesOfVectors{normal.x - climb * u.x, normal.y - climb * u.y, normal.z - climb * u.z});
+  const lane::Ints between = (place > 0.0F) & (place < length);
+  return {there.distance,
+          {between ? across.x : normal.x, between ? across.y : normal.y,
+           between ? across.z : normal.z}};
 }
 
 /// One block of hypotheses. Has the functions of the other classes of this file.
@@ -631,16 +623,31 @@ class SolidLine : public RotatedLine {
   const DistanceField* field_;
 };
 
+/// At the place along[i] of the first `count` lines.
+inline void find_surface(const SolidLine& shape, float length, Deepest& out, int count) {
+  for (int i = 0; i < count; i += lane::kWidth) {
+    const LanesOfSurface there =
+        surface_at(LanesOfLines(shape.field(), shape.rows(), i), lane::load(out.along + i), length);
+    const auto& [x, y, z] = shape.rows().direction;
+    const LanesOfVectors direction{lane::load(x + i), lane::load(y + i), lane::load(z + i)};
+    lane::store(there.distance, out.distance + i);
+    lane::store(dot(there.normal, direction), out.cosine + i);
+    lane::store(there.normal.x, out.x + i);
+    lane::store(there.normal.y, out.y + i);
+    lane::store(there.normal.z, out.z + i);
+  }
+}
+
 inline void find_along_line(const SolidLine& shape, float length, Deepest& out,
                             int count = ShapeHypotheses::kBlock) {
   float least[ShapeHypotheses::kBlock];
   search_lines(shape.field(), shape.rows(), count, length, out.along, least);
-  find_normals(shape.field(), shape.rows(), count, length, out);
+  find_surface(shape, length, out, count);
 }
 
 inline void find_at_tip(const SolidLine& shape, Deepest& out, int count = ShapeHypotheses::kBlock) {
   std::fill_n(out.along, ShapeHypotheses::kBlock, 0.0F);
-  find_normals(shape.field(), shape.rows(), count, 0, out);
+  find_surface(shape, 0, out, count);
 }
 
 // The class of lines for each stimulus.

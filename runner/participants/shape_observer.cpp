@@ -44,6 +44,7 @@ struct Query {
   int positions = 0;              // 0: no torque cue
   float position[kMaxPositions];  // m from the tip
   float fit[kMaxPositions];       // likelihood of `along` at that position
+  float most_fit[kMaxPositions];  // there and at later positions
   float inverse_scale = 0;        // of the soft minimum, 1/m
   float torque_floor = 0;
   float torque_needed = 0;  // a log likelihood below it stays below the floor
@@ -170,6 +171,9 @@ Query make_query(const Percept& percept, const ObserverSettings& settings) {
       query.position[k] = static_cast<float>(position);
       query.fit[k] = lane::exp(static_cast<float>(-0.5 * error * error));
     }
+    float most = 0;
+    for (int k = query.positions; k-- > 0;)
+      query.most_fit[k] = most = lane::max(most, query.fit[k]);
   }
   return query;
 }
@@ -224,122 +228,185 @@ float bounding_radius(const ShapeHypotheses::Shape& shape) {
 }
 
 /// The likelihoods of hypotheses of one solid without a formula. A look into its grid is costly, so
-/// hypotheses that need one are collected until they fill the registers.
+/// hypotheses that need one are collected, to fill the registers.
 class SolidLikelihoods {
  public:
   /// \param log_likelihood  of every hypothesis
-  SolidLikelihoods(const DistanceField& field, const Query& query, float* log_likelihood)
-      : field_(field), query_(query), log_likelihood_(log_likelihood) {}
+  SolidLikelihoods(const ShapeHypotheses& hypotheses, const DistanceField& field,
+                   const Query& query, float* log_likelihood)
+      : hypotheses_(hypotheses), field_(field), query_(query), log_likelihood_(log_likelihood) {}
 
-  /// \param which  the hypotheses of the block's lines
-  void add(const SolidLine& block, const int* which) {
-    for (int first = 0; first < kBlock; first += lane::kWidth) {
-      const BoxCrossing crossing(LanesOfLines(field_, block.rows(), first));
-      const lane::Floats far = lane::all(query_.far);
-      const lane::Floats from = lane::max(crossing.begin(far), lane::Floats{}),
-                         to = lane::min(crossing.end(far), lane::all(query_.line.length));
-      const auto put = [&](const auto& row, auto* waiting) {
-        return lane::store_flagged(lane::load(row + first), from <= to, waiting + lines_.count);
+  /// Hypotheses `first` and following of the nearby order, as many as there are lanes.
+  void add(int first) {
+    const auto in_solid = [&](int a, const FloatVec& v) {
+      const auto component = [&](int c) {
+        return lane::load(hypotheses_.nearby_component(a, c) + first);
       };
-      for (int a = 0; a < 3; ++a) {
-        put(block.rows().start[a], lines_.rows.start[a]);
-        put(block.rows().along[a], lines_.rows.along[a]);
-        put(block.rows().direction[a], lines_.rows.direction[a]);
-      }
-      lane::Ints indices;
-      std::memcpy(&indices, which + first, sizeof indices);
-      lines_.count += lane::store_flagged(indices, from <= to, lines_.which + lines_.count);
-      if (lines_.count >= kBlock) {
-        find(kBlock);
-        lines_.drop_block();
-      }
+      return component(0) * v.x + component(1) * v.y + component(2) * v.z;
+    };
+    LanesOfLines line;
+    line.field = &field_;
+    for (int a = 0; a < 3; ++a) {
+      line.start[a] = in_solid(a, query_.line.start);
+      line.along[a] = in_solid(a, query_.line.along);
+    }
+    const lane::Ints near = near_lines(line);
+    if (!lane::any(near)) return;
+    const auto put = [&](const auto& row, auto* waiting) {
+      return lane::store_flagged(row, near, waiting + lines_.count);
+    };
+    for (int a = 0; a < 3; ++a) {
+      put(line.start[a], lines_.rows.start[a]);
+      put(line.along[a], lines_.rows.along[a]);
+      if (query_.contact) put(in_solid(a, query_.line.direction), lines_.rows.direction[a]);
+    }
+    lane::Ints which;
+    std::memcpy(&which, hypotheses_.nearby_order() + first, sizeof which);
+    lines_.count += put(which, lines_.which);
+    if (lines_.count >= kBatch) {
+      find(kBatch);
+      lines_.drop_batch();
     }
   }
   void finish() {
+    lines_.add_zeros();
     find(lines_.count);
-    if (torque_.count > 0) add_torque(torque_.count);
+    torque_.add_zeros();
+    add_torque(torque_.count);
   }
 
  private:
-  /// Lines of several blocks, at most one block and what fills it.
+  static constexpr int kBatch = 128;  // lines, a multiple of all numbers of lanes
+  /// Less than a batch, the next one, and the lanes that are stored with its last lines. What is
+  /// not filled has no value.
   struct Waiting {
-    static constexpr int kRoom = 2 * kBlock;
+    static constexpr int kRoom = 2 * kBatch + lane::kWidth;
     int count = 0;
-    int which[kRoom] = {};
-    LineRows<kRoom> rows{};
-    float distance[kRoom] = {}, log_likelihood[kRoom] = {};  // for the torque cue
+    int which[kRoom];
+    LineRows<kRoom> rows;
+    float distance[kRoom], log_likelihood[kRoom];  // for the torque cue
 
-    void drop_block() {
-      const auto drop = [](auto* row) { std::copy_n(row + kBlock, kBlock, row); };
-      drop(which);
+    void drop_batch() {
+      for_each_row([&](auto* row) { std::copy_n(row + kBatch, count - kBatch, row); });
+      count -= kBatch;
+    }
+    /// So that the lanes after the last line have values.
+    void add_zeros() {
+      for_each_row([&](auto* row) { std::fill_n(row + count, lane::kWidth, 0); });
+    }
+
+   private:
+    template <class Visit>
+    void for_each_row(const Visit& visit) {
+      visit(which);
       for (int a = 0; a < 3; ++a) {
-        drop(rows.start[a]);
-        drop(rows.along[a]);
-        drop(rows.direction[a]);
+        visit(rows.start[a]);
+        visit(rows.along[a]);
+        visit(rows.direction[a]);
       }
-      drop(distance);
-      drop(log_likelihood);
-      count -= kBlock;
+      visit(distance);
+      visit(log_likelihood);
     }
   };
 
-  void find(int count) {
+  /// Lines that come so near the solid that their likelihood depends on the distance.
+  lane::Ints near_lines(const LanesOfLines& line) const {
     if (query_.ray) {
-      search_lines(field_, lines_.rows, count, query_.line.length, deepest_.along,
-                   deepest_.distance);
-    } else if (!query_.contact) {
-      for (int i = 0; i < count; i += lane::kWidth) {
-        lane::store(LanesOfLines(field_, lines_.rows, i).distances(lane::Floats{}),
-                    deepest_.distance + i);
-      }
+      const BoxCrossing crossing(line);
+      const lane::Floats far = lane::all(query_.far);
+      return lane::max(crossing.begin(far), lane::Floats{}) <=
+             lane::min(crossing.end(far), lane::all(query_.line.length));
     }
-    if (query_.contact) find_normals(field_, lines_.rows, count, query_.line.length, deepest_);
-    float found[kBlock];
-    find_log_likelihoods(deepest_, query_, found);
+    const DistanceField::Box& box = field_.box();
+    const auto beyond = [&](int a) {
+      return lane::abs(line.start[a] - box.middle[a]) - box.half[a];
+    };
+    return lane::max(lane::max(beyond(0), beyond(1)), beyond(2)) <= query_.far;
+  }
+
+  void find(int count) {
+    float along[Waiting::kRoom], least[Waiting::kRoom];
+    if (query_.ray) search_lines(field_, lines_.rows, count, query_.line.length, along, least);
+    float found[Waiting::kRoom];
+    for (int i = 0; i < count; i += lane::kWidth) {
+      const LanesOfLines lines(field_, lines_.rows, i);
+      lane::Floats distance, log_likelihood;
+      if (query_.contact) {
+        const lane::Floats place = query_.ray ? lane::load(along + i) : lane::Floats{};
+        const LanesOfSurface there = surface_at(lines, place, query_.line.length);
+        const auto& [x, y, z] = lines_.rows.direction;
+        const LanesOfVectors direction{lane::load(x + i), lane::load(y + i), lane::load(z + i)};
+        distance = there.distance;
+        log_likelihood = query_.direction_precision * (dot(there.normal, direction) - 1.0f) -
+                         distance * distance * query_.half_precision;
+      } else {
+        distance = query_.ray ? lane::load(least + i) : lines.distances(lane::Floats{});
+        log_likelihood =
+            query_.free_space_weight * lane::log_normal_cdf(distance * query_.inverse_sd);
+      }
+      lane::store(log_likelihood, found + i);
+      if (query_.positions > 0) wait_for_torque(i, count, distance, log_likelihood);
+    }
     for (int i = 0; i < count; ++i) log_likelihood_[lines_.which[i]] = found[i];
-    if (query_.positions == 0) return;
-    for (int i = 0; i < count; ++i) {
-      if (!(found[i] > query_.torque_needed)) continue;
-      const int to = torque_.count++;
-      for (int a = 0; a < 3; ++a) {
-        torque_.rows.start[a][to] = lines_.rows.start[a][i];
-        torque_.rows.along[a][to] = lines_.rows.along[a][i];
-      }
-      torque_.which[to] = lines_.which[i];
-      torque_.distance[to] = deepest_.distance[i];
-      torque_.log_likelihood[to] = found[i];
+    if (torque_.count >= kBatch) {
+      add_torque(kBatch);
+      torque_.drop_batch();
     }
-    if (torque_.count >= kBlock) {
-      add_torque(kBlock);
-      torque_.drop_block();
+  }
+
+  /// Those that the torque can leave above the floor.
+  void wait_for_torque(int first, int count, const lane::Floats& distance,
+                       const lane::Floats& log_likelihood) {
+    const lane::Ints needed =
+        (log_likelihood > query_.torque_needed) & lane::first_lanes(count - first);
+    const auto put = [&](const auto& row, auto* waiting) {
+      return lane::store_flagged(row, needed, waiting + torque_.count);
+    };
+    for (int a = 0; a < 3; ++a) {
+      put(lane::load(lines_.rows.start[a] + first), torque_.rows.start[a]);
+      put(lane::load(lines_.rows.along[a] + first), torque_.rows.along[a]);
     }
+    lane::Ints which;
+    std::memcpy(&which, lines_.which + first, sizeof which);
+    put(which, torque_.which);
+    put(distance, torque_.distance);
+    torque_.count += put(log_likelihood, torque_.log_likelihood);
   }
 
   void add_torque(int count) {
-    float least[kBlock], weights[kBlock] = {}, fits[kBlock] = {}, distance[kBlock] = {};
-    std::copy_n(torque_.distance, kBlock, least);
-    for (int k = 0; k < query_.positions; ++k) {
-      const float fit = query_.fit[k];
-      for (int i = 0; i < count; i += lane::kWidth) {
-        const LanesOfLines lines(field_, torque_.rows, i);
-        lane::store(lines.distances(lane::all(query_.position[k])), distance + i);
+    for (int i = 0; i < count; i += lane::kWidth) {
+      const LanesOfLines lines(field_, torque_.rows, i);
+      const lane::Floats least = lane::load(torque_.distance + i);
+      const lane::Floats far_off =
+          BoxCrossing(lines).end(least + kFarHeights / query_.inverse_scale);
+      lane::Floats weights{}, fits{};
+      for (int k = 0; k < query_.positions; ++k) {
+        // Places far off the solid come last. A summand of less than half a unit in the last place
+        // changes nothing.
+        constexpr float kUnit = 0x1p-26F;
+        const lane::Ints needed = (query_.position[k] <= far_off) |
+                                  (kFarWeight >= weights * kUnit) |
+                                  (kFarWeight * query_.most_fit[k] >= fits * kUnit);
+        if (!lane::any(needed)) break;
+        const lane::Floats distance = lines.distances(lane::all(query_.position[k]));
+        const lane::Floats weight = lane::exp(-(distance - least) * query_.inverse_scale);
+        weights += weight;
+        fits += weight * query_.fit[k];
       }
-      for (int i = 0; i < kBlock; ++i) {
-        const float weight = lane::exp(-(distance[i] - least[i]) * query_.inverse_scale);
-        weights[i] += weight;
-        fits[i] += weight * fit;
-      }
+      const lane::Floats cue = lane::log(fits / weights + query_.torque_floor);
+      lane::store(lane::load(torque_.log_likelihood + i) + cue, torque_.log_likelihood + i);
     }
-    for (int i = 0; i < kBlock; ++i)
-      fits[i] = lane::log(fits[i] / weights[i] + query_.torque_floor);
-    for (int i = 0; i < count; ++i)
-      log_likelihood_[torque_.which[i]] = torque_.log_likelihood[i] + fits[i];
+    for (int i = 0; i < count; ++i) log_likelihood_[torque_.which[i]] = torque_.log_likelihood[i];
   }
 
+  // A place that is farther from the solid than the nearest one by this many scales of the soft
+  // minimum has a smaller weight than this.
+  static constexpr float kFarHeights = 24, kFarWeight = 3.8e-11F;  // e^-24 = 3.775e-11
+
+  const ShapeHypotheses& hypotheses_;
   const DistanceField& field_;
   const Query& query_;
   float* log_likelihood_;
-  Deepest deepest_{};
   Waiting lines_;   // to be searched
   Waiting torque_;  // that the torque can leave above the floor
 };
@@ -378,11 +445,9 @@ void update_shape(const ShapeHypotheses& hypotheses, const ShapeHypotheses::Shap
   if constexpr (std::is_same_v<ShapeLine, SolidLine>) {
     const int blocks = (shape.count + kBlock - 1) / kBlock;
     std::fill_n(all_log_likelihoods + shape.first, blocks * kBlock, query.of_far);
-    SolidLikelihoods likelihoods(*shape.field, query, all_log_likelihoods);
-    for (int first = shape.first; first < end; first += kBlock) {
-      likelihoods.add(SolidLine(hypotheses, shape, first, query.line),
-                      hypotheses.nearby_order() + first);
-    }
+    SolidLikelihoods likelihoods(hypotheses, *shape.field, query, all_log_likelihoods);
+    for (int first = shape.first; first < shape.first + blocks * kBlock; first += lane::kWidth)
+      likelihoods.add(first);
     likelihoods.finish();
     for (int first = shape.first; first < end; first += kBlock)
       add(first, all_log_likelihoods + first);
@@ -425,7 +490,11 @@ void ShapeObserver::reset() {
 
 void ShapeObserver::update(const Percept& percept) {
   const Query query = make_query(percept, settings_);
-  for (const ShapeHypotheses::Shape& shape : hypotheses_->shapes()) {
+  // Back and forth: the fields together exceed the cache, and the last one is still in it.
+  const std::size_t shapes = hypotheses_->shapes().size();
+  backwards_ = !backwards_;
+  for (std::size_t s = 0; s < shapes; ++s) {
+    const ShapeHypotheses::Shape& shape = hypotheses_->shapes()[backwards_ ? shapes - 1 - s : s];
     visit_line_class(shape, [&]<class ShapeLine>(std::type_identity<ShapeLine>) {
       update_shape<ShapeLine>(*hypotheses_, shape, query, settings_, log_posterior_.data(),
                               log_likelihood_.data());

@@ -103,6 +103,7 @@ class ShapeObserver {
   std::vector<double> probabilities_;
   std::vector<double> masses_;  // of the hypotheses of each shape up to this one; for draws
   int best_ = 0;
+  bool backwards_ = false;  // order of the shapes in an update
 };
 
 }  // namespace palpate::runner::participants

@@ -72,6 +72,43 @@ TEST(Lanes, HaveTheBitsOfSingleFloats) {
   }
 }
 
+TEST(Lanes, HaveTheFunctionsOfASingleFloat) {
+  constexpr std::uint64_t kSeed = 3;
+  Random random(kSeed);
+  for (int trial = 0; trial < 2000; ++trial) {
+    lane::Floats x{};
+    for (int i = 0; i < lane::kWidth; ++i) x[i] = static_cast<float>(20 * random.unit() - 12);
+    const lane::Floats exp = lane::exp(8.0f * x), log = lane::log(lane::abs(x) + 1e-6f),
+                       cdf = lane::log_normal_cdf(x);
+    for (int i = 0; i < lane::kWidth; ++i) {
+      ASSERT_EQ(exp[i], lane::exp(8.0f * x[i]));
+      ASSERT_EQ(log[i], lane::log(std::abs(x[i]) + 1e-6f));
+      ASSERT_EQ(cdf[i], lane::log_normal_cdf(x[i]));
+    }
+  }
+}
+
+TEST(Lanes, AreWithinOnlyIfAllAre) {
+  const float end[3] = {1, 2, 3};
+  for (int axis = 0; axis < 3; ++axis) {
+    for (int i = 0; i < lane::kWidth; ++i) {
+      lane::Floats x[3] = {lane::all(0), lane::all(1.5f), lane::all(2.999f)};
+      ASSERT_TRUE(lane::all_within(x, end));
+      for (const float out : {-1e-9f, -5.0f, end[axis], 1e9f}) {
+        x[axis][i] = out;
+        ASSERT_FALSE(lane::all_within(x, end)) << axis << ' ' << i << ' ' << out;
+      }
+    }
+  }
+}
+
+TEST(Lanes, CountTheFirst) {
+  for (int count = -1; count <= lane::kWidth + 1; ++count) {
+    const lane::Ints flags = lane::first_lanes(count);
+    for (int i = 0; i < lane::kWidth; ++i) ASSERT_EQ(flags[i], i < count ? -1 : 0);
+  }
+}
+
 TEST(Lanes, LookUpNeighboursAnywhere) {
   std::vector<float> table(1000);
   std::iota(table.begin(), table.end(), 0.0F);
