@@ -58,6 +58,7 @@ const char* task_column(int version);
 void read_task(RowReader& row, TrialRecord& record);
 
 std::string outcome_columns(int version);  ///< of the schema
+/// After read_task.
 void read_outcome(RowReader& row, TrialRecord& record);
 
 /// p: page_answers. Read by operator>>.

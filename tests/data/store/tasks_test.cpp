@@ -132,11 +132,13 @@ TEST(Tasks, OfNoBlockAreIdentificationAndStoreNothing) {
   Store store = Store::open(folder / "a.db", Store::Mode::write_or_create);
   const auto run = store.begin_run(store.enrol(a_protocol(), "P1"), a_run());
   store.begin_attempt(run, a_plan(1), 1);
-  store.finish_attempt(run, a_record(1));
+  TrialRecord right = a_record(1);
+  right.correct = right.task.success = true;
+  store.finish_attempt(run, right);
   SQLite::Database db(folder / "a.db");
   EXPECT_EQ(db.execAndGet("SELECT count(*) FROM attempts WHERE task IS NULL").getInt(), 1);
   store.for_each_trial(
-      [](const StoredTrial& trial) { expect_same(trial.record.task, TaskRecord{}); });
+      [&](const StoredTrial& trial) { expect_same(trial.record.task, right.task); });
 
   TrialRecord other = a_record(2);
   other.task.task = "compare";

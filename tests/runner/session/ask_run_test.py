@@ -9,6 +9,7 @@ import sys
 import time
 import unittest
 
+import task_case
 from task_case import Task
 
 TRIALS = 5  # of the block of stairs, 50 to 100 N/m
@@ -101,6 +102,22 @@ class Ask(Task):
         self.assertEqual([(one["trial"], one["level"]) for one in begin["history"]], [(1, 61.5), (2, 62.5)])
         self.assertEqual([one["trial"] for one in messages() if one["type"] == "ask"], [3, 4, 5])
         self.assertEqual(self.noted(self.db), [])
+
+    def test_trials_of_no_block_are_not_told(self):
+        protocol = self.dir / "protocol.json"
+        protocol.write_text(json.dumps({**task_case.PROTOCOL, "version": 1, "repetitions": 2,
+                                        "response": {"keys": {"1": "ball", "2": "box"}}}))
+        for kill in (True, False):
+            _, place, messages = self.asker()
+            with task_case.Terminal([task_case.PALPATE, "run", protocol, "--db", self.db, "--participant", "P01", "--device",
+                                     "simulated", "--no-window", "--ask", place,
+                                     *(["--new-participant"] if kill else [])]) as terminal:
+                while (came := terminal.wait_for("1 ball   2 box", task_case.GO_ON, "[fault, ", " on record; ")) != " on record; ":
+                    if kill and came.startswith("1 ball") and self.sql("SELECT 1 FROM attempts WHERE state = 'completed'"):
+                        break
+                    terminal.type({task_case.GO_ON: " ", "[fault, ": ":clear\n:go\n"}.get(came, "1"))
+            begin, = messages()
+            self.assertEqual(begin["history"], [])
 
 
 if __name__ == "__main__":
