@@ -617,7 +617,8 @@ class BidsWriter : public DatasetWriter {
   int run_ = 0;  // of BIDS, within the session; 0: it has no servo samples
   Table table_;
   std::optional<BidsRecording> recording_;
-  std::string scans_;                    // rows of the session
+  // Rows by scans_stem_; the participants of several protocols may share a session's files.
+  std::map<std::string, std::string> scans_;
   std::optional<DerivedTable> derived_;  // of the session
   DelimitedRow row_{DelimitedFormat::tsv};
 };
@@ -653,8 +654,6 @@ void BidsWriter::begin_session(const StoredTrial& trial) {
 void BidsWriter::end_session() {
   if (derived_) derived_->close();
   derived_.reset();
-  if (!scans_.empty()) write(scans_stem_ + "_scans.tsv", "filename\tacq_time\n" + scans_);
-  scans_.clear();
 }
 
 void BidsWriter::add(const StoredTrial& trial) {
@@ -722,8 +721,8 @@ void BidsWriter::write_recording() {
   write(events + ".tsv", recording_->motion_events());
   write(events + ".json", json_text(MotionEvents::description(table_.study->facts)));
   const std::string name = recording_name();
-  scans_ += name.substr(name.find("/motion/") + 1) + "\t" +
-            clock_.utc(table_.person, recording_->first_row_ns()) + "\n";
+  scans_[scans_stem_] += name.substr(name.find("/motion/") + 1) + "\t" +
+                         clock_.utc(table_.person, recording_->first_row_ns()) + "\n";
 }
 
 void BidsWriter::write_table() {
@@ -810,6 +809,7 @@ void BidsWriter::describe_derivatives(bool simulated) {
 
 void BidsWriter::describe_dataset(bool simulated) {
   end_session();
+  for (const auto& [stem, rows] : scans_) write(stem + "_scans.tsv", "filename\tacq_time\n" + rows);
   describe_derivatives(simulated);
   describe_participants();
   for (const auto& [sha256, study] : labels_) {

@@ -43,5 +43,24 @@ TEST(Bids, TellsPeopleFromSimulatedParticipantsAndFromBoth) {
   EXPECT_TRUE(result.simulated);
 }
 
+TEST(Bids, ListsTheMotionOfASessionOfTwoProtocolsInOneTable) {
+  const TemporaryFolder folder;
+  Store store = Store::open(folder / "s.db", Store::Mode::write_or_create);
+  for (const char protocol : {'a', 'b'}) {
+    for (const char* code : {"P1", "P2"}) record_a_trial(store, protocol, code, false);
+  }
+  export_bids(store, folder / "bids", {.motion = true});
+  for (const char* code : {"P1", "P2"}) {
+    const std::string session = std::string("sub-") + code + "_ses-1";
+    const std::string table = contents_of(
+        folder / ("bids/sub-" + std::string(code) + "/ses-1/" + session + "_scans.tsv"));
+    std::size_t recordings = 0;
+    for (std::size_t at = 0; (at = table.find("\nmotion/" + session, at)) != std::string::npos;
+         ++at)
+      ++recordings;
+    EXPECT_EQ(recordings, 2U) << table;
+  }
+}
+
 }  // namespace
 }  // namespace palpate::data
