@@ -55,6 +55,19 @@ TEST_F(Forgetting, ExportsAreRecordedWithoutTheFoldersOfTheComputer) {
   EXPECT_EQ(exports[3].path, "last.csv");
 }
 
+TEST_F(Forgetting, ExportsOfACopyThatHasNoWriteAheadLogAreRecorded) {
+  const std::string copy = folder_ / "copy.db";
+  open();
+  SQLite::Database(path_, SQLite::OPEN_READWRITE).exec("VACUUM INTO '" + copy + "'");
+  {
+    Store exported = Store::open(copy, Store::Mode::read_only);
+    const auto people = exported.participants(a_protocol().sha256);
+    log_export(copy, {folder_ / "all.csv", "csv", 1}, {people[0].id});
+  }
+  Store store = Store::open(copy, Store::Mode::read_only);
+  EXPECT_EQ(store.participant_summary(kGone).exports.size(), 1u);
+}
+
 TEST_F(Forgetting, AnExportMadeMeanwhileIsRefused) {
   Store store = open();
   const auto people = store.participants(a_protocol().sha256);
