@@ -364,9 +364,12 @@ std::string sweep_text(const SweepAnalysis& analysis) {
       (table.protocol_name.empty() ? "a protocol" : table.protocol_name) + ", " +
       counted(table.rows(), "point", "points") + " (" + table.design + ", seed " +
       std::to_string(table.seed) + "), " +
-      counted(static_cast<std::size_t>(table.participants), "participant", "participants") +
-      " and " + counted(static_cast<std::size_t>(table.repetitions), "repetition", "repetitions") +
-      " each\n\n";
+      counted(static_cast<std::size_t>(table.participants), "participant", "participants");
+  if (table.repetitions > 0)  // of a protocol without blocks
+    out += " and " +
+           counted(static_cast<std::size_t>(table.repetitions), "repetition", "repetitions") +
+           " each";
+  out += "\n\n";
   out += paragraph_text(sweep_answer(analysis) + ".");
   if (analysis.pattern) {
     const PatternShare& pattern = *analysis.pattern;

@@ -75,10 +75,12 @@ std::string list(const std::vector<std::string>& words) {
   return text;
 }
 
-std::string minutes(double seconds) {
+std::string time_in_words(double seconds) {
   std::ostringstream out;
   out << std::fixed << std::setprecision(0);
-  if (seconds < 5400) {
+  if (seconds < 60) {
+    out << seconds << " s";
+  } else if (seconds < 5400) {
     out << seconds / 60 << " min";
   } else {
     out << std::setprecision(1) << seconds / 3600 << " h";
@@ -135,7 +137,8 @@ void print_summary(const protocols::Protocol& protocol, std::ostream& out) {
     renderers.emplace_back(protocols::to_string(kind));
   for (const protocols::StimulusSpec& stimulus : protocol.stimuli) stimuli.push_back(stimulus.name);
   constexpr std::array kOrders = {"in this order", "counterbalanced", "interleaved"};
-  const double rest = protocol.home.rest;
+  const double rest = protocol.home.rest, time_out = protocol.response.time_out;
+  const double trial = std::min(kTypicalTrial, time_out);
   const auto n = static_cast<double>(trials.size());
 
   out << protocol.name << (protocol.title.empty() ? "" : ": " + printable(protocol.title)) << "\n"
@@ -147,8 +150,9 @@ void print_summary(const protocols::Protocol& protocol, std::ostream& out) {
       << trials.size() - static_cast<std::size_t>(counted) << " of practice and warm-up besides\n"
       << "  blocks      " << trials.back().block << ", in " << sessions
       << (sessions == 1 ? " session\n" : " sessions\n") << "  duration    about "
-      << minutes(n * (kTypicalTrial + rest)) << " at " << kTypicalTrial << " s a trial, at most "
-      << minutes(n * (protocol.response.time_out + rest)) << "; breaks besides\n"
+      << time_in_words(n * (trial + rest)) << " at " << trial << " s a trial, at most "
+      << time_in_words(n * (time_out + rest)) << "; breaks"
+      << (protocol.practice.criterion ? " and further rounds of practice besides\n" : " besides\n")
       << masking(protocol) << "  seed        " << protocol.seed << "\n"
       << "  sha256      " << protocol.sha256 << "\n";
 }

@@ -103,6 +103,24 @@ class Schedules(unittest.TestCase):
             self.assertEqual([[float(row[k]) for k in TURN] for row in own], [[float(row[k]) for k in TURN] for row in rows])
 
 
+class Durations(unittest.TestCase):
+    def said(self, time_out_s=60, **changes):
+        with tempfile.TemporaryDirectory() as folder:
+            path = pathlib.Path(folder) / "p.json"
+            protocol = json.loads((PROTOCOLS / "quick.json").read_text()) | changes  # 24 trials, each after 0.5 s of rest
+            protocol["response"]["time_out_s"] = time_out_s
+            path.write_text(json.dumps(protocol))
+            return re.search("duration +(.*)", palpate("validate", path))[1]
+
+    def test_no_trial_lasts_longer_than_its_limit(self):
+        self.assertEqual(self.said(), "about 4 min at 10 s a trial, at most 24 min; breaks besides")
+        self.assertEqual(self.said(time_out_s=1.5), "about 48 s at 1.5 s a trial, at most 48 s; breaks besides")
+
+    def test_practice_until_a_criterion_comes_besides(self):
+        self.assertEqual(self.said(practice={"repetitions": 1, "criterion": 0.9}),
+                         "about 6 min at 10 s a trial, at most 32 min; breaks and further rounds of practice besides")
+
+
 class Explained(unittest.TestCase):
     def explained(self, scene, renderer):
         with tempfile.TemporaryDirectory() as folder:

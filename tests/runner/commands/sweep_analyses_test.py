@@ -6,7 +6,7 @@ import sqlite3
 import unittest
 import xml.etree.ElementTree as xml
 
-from sweep_case import SweepCase
+from sweep_case import PROTOCOL, SPACE, SweepCase
 from sweep_seals import reseal
 
 
@@ -92,6 +92,15 @@ class SweepAnalyses(SweepCase):
         for path in (self.folder / "f").iterdir():
             xml.parse(path)
         self.assertIn("exist", self.palpate("analyze", "--sweep", "a.sweep", "--report", "r.html", status=2))
+
+    def test_blocks_have_no_repetitions_in_common(self):
+        ball = PROTOCOL["stimuli"][0]
+        self.write("p.json", {"version": 2, "name": "blocks", "renderers": ["point"], "stimuli": [ball],
+                              "blocks": [{"name": "hard", "task": "rate", "stimuli": ["ball"], "repetitions": 1, "min": 0, "max": 10}]})
+        self.write("s.json", {"version": 1, "parameters": SPACE["parameters"][:1]})
+        self.palpate("sweep", "p.json", "--space", "s.json", "--points", 2, "--participants", 2, "--db", "a.sweep")
+        said = self.palpate("analyze", "--sweep", "a.sweep")
+        self.assertIn("a sweep of blocks, 2 points (lhs, seed 1), 2 participants\n", said)
 
     def test_wrong_usage_of_analyze(self):
         self.made("a.sweep", "lhs", [(1, 1, 1, 1)])
