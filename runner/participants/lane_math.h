@@ -154,9 +154,9 @@ inline bool all_within(const Floats* x, const float* end) {
   }
   return within == 0xffff;
 #else
-  Ints outside{};
-  for (int a = 0; a < 3; ++a) outside |= (x[a] < 0.0f) | (x[a] >= end[a]);
-  return !any(outside);
+  Ints within = ~Ints{};  // NaN is outside
+  for (int a = 0; a < 3; ++a) within &= (x[a] >= 0.0f) & (x[a] < end[a]);
+  return !any(~within);
 #endif
 }
 

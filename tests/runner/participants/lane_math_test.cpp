@@ -94,7 +94,7 @@ TEST(Lanes, AreWithinOnlyIfAllAre) {
     for (int i = 0; i < lane::kWidth; ++i) {
       lane::Floats x[3] = {lane::all(0), lane::all(1.5f), lane::all(2.999f)};
       ASSERT_TRUE(lane::all_within(x, end));
-      for (const float out : {-1e-9f, -5.0f, end[axis], 1e9f}) {
+      for (const float out : {-1e-9f, -5.0f, end[axis], 1e9f, std::nanf("")}) {
         x[axis][i] = out;
         ASSERT_FALSE(lane::all_within(x, end)) << axis << ' ' << i << ' ' << out;
       }
