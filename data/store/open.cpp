@@ -129,13 +129,13 @@ bool may_write(const std::string& file) {
 }
 
 /// With write permission, a reader opens read-write and sets query_only: the last connection to
-/// close a WAL database removes its -wal and -shm, which a read-only connection cannot. A copy made
-/// by VACUUM INTO or .recover has no log; without one an export could not be recorded as long as
-/// its reader is open. On a read-only disk a file without a -wal is opened as immutable.
-void open_for_reading(std::optional<SQLite::Database>& db, const std::string& file) {
+/// close a WAL database removes its -wal and -shm, which a read-only connection cannot. On a
+/// read-only disk a file without a -wal is opened as immutable.
+void open_for_reading(std::optional<SQLite::Database>& db, const std::string& file,
+                      bool for_export) {
   if (may_write(file)) {
     db.emplace(file, kOpenWrite, kBusyTimeoutMs);
-    db->tryExec("PRAGMA journal_mode = WAL");
+    if (for_export) db->tryExec("PRAGMA journal_mode = WAL");
     db->exec("PRAGMA query_only = ON");
   } else if (std::filesystem::exists(file + "-wal")) {
     db.emplace(file, kOpenRead, kBusyTimeoutMs);
@@ -193,7 +193,7 @@ void Store::Impl::connect() {
   if (writes()) {
     db.emplace(file, kOpenWrite, kBusyTimeoutMs);
   } else {
-    open_for_reading(db, file);
+    open_for_reading(db, file, mode == Mode::read_for_export);
   }
   db->exec("PRAGMA trusted_schema = OFF; PRAGMA cell_size_check = ON");
   if (!writes()) db->exec("BEGIN");  // one snapshot for as long as the store is open

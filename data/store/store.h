@@ -114,6 +114,9 @@ class Store {
     write_or_create,
     /// Any number of readers, also beside a writer: a snapshot of the committed state.
     read_only,
+    /// The same for an export, which is recorded while its reader is open: turns on the write-ahead
+    /// log that a copy by VACUUM INTO or .recover lacks.
+    read_for_export,
   };
 
   /// \throws StoreRefused: not a palpate database, of a newer version, truncated, damaged, missing

@@ -215,7 +215,7 @@ Request request_of(const po::variables_map& values, const std::string& usage) {
 data::ExportResult write_export(const Request& request) {
   data::ExportSettings settings = export_settings();
   if (!request.about.empty()) settings.about = read_about_file(request.about);
-  data::Store store = data::Store::open(request.database, data::Store::Mode::read_only);
+  data::Store store = data::Store::open(request.database, data::Store::Mode::read_for_export);
   warn_of_exposure(request.database);
   settings.force = request.force;
   settings.pages = request.pages;

@@ -467,7 +467,7 @@ int make_bundle(const BundleOptions& options) {
   const Registration registered = read_registration(options.registration);
   require_replaceable_folder(options.out, options.force, kCrate);
   const StudyCheck check = check_study(registered, options.registration, options.database, {});
-  data::Store store = data::Store::open(options.database, data::Store::Mode::read_only);
+  data::Store store = data::Store::open(options.database, data::Store::Mode::read_for_export);
   warn_of_exposure(options.database);
   data::AtomicFolder draft(options.out);
   put_data(options, store, about, draft);

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "data/base/input_file.h"
 #include "tests/data/store/forget_fixture.h"
 
 namespace palpate::data {
@@ -59,8 +60,11 @@ TEST_F(Forgetting, ExportsOfACopyThatHasNoWriteAheadLogAreRecorded) {
   const std::string copy = folder_ / "copy.db";
   open();
   SQLite::Database(path_, SQLite::OPEN_READWRITE).exec("VACUUM INTO '" + copy + "'");
+  const std::string as_copied = read_whole(copy, 10 << 20);
+  Store::open(copy, Store::Mode::read_only).codes();
+  EXPECT_EQ(read_whole(copy, 10 << 20), as_copied) << "reading changes nothing";
   {
-    Store exported = Store::open(copy, Store::Mode::read_only);
+    Store exported = Store::open(copy, Store::Mode::read_for_export);
     const auto people = exported.participants(a_protocol().sha256);
     log_export(copy, {folder_ / "all.csv", "csv", 1}, {people[0].id});
   }
