@@ -307,7 +307,8 @@ Table reasons_table(const SweepAnalysis& analysis) {
 }  // namespace
 
 std::vector<Table> sweep_tables(const SweepAnalysis& analysis) {
-  std::vector<Table> out{gains_table(analysis)};
+  std::vector<Table> out;
+  if (!analysis.table.shapes.empty()) out.push_back(gains_table(analysis));
   for (const Drivers& drivers : analysis.drivers) out.push_back(drivers_table(analysis, drivers));
   if (!analysis.table.reasons.empty()) out.push_back(reasons_table(analysis));
   return out;

@@ -101,6 +101,7 @@ class SweepAnalyses(SweepCase):
         self.palpate("sweep", "p.json", "--space", "s.json", "--points", 2, "--participants", 2, "--db", "a.sweep")
         said = self.palpate("analyze", "--sweep", "a.sweep")
         self.assertIn("a sweep of blocks, 2 points (lhs, seed 1), 2 participants\n", said)
+        self.assertNotIn("Less time with", said)
 
     def test_wrong_usage_of_analyze(self):
         self.made("a.sweep", "lhs", [(1, 1, 1, 1)])
