@@ -89,12 +89,17 @@ void require_one_protocol(const analysis::TaskTable& table, const std::string& w
   std::string names;
   bool one_name = true;
   for (const auto& [name, sha256] : table.protocols) {
-    names += (names.empty() ? "" : ", ") + printable(name) + " (" + sha256.substr(0, 12) + ")";
+    // A table may have checksums alone.
+    const std::string sum = sha256.substr(0, 12);
+    names +=
+        (names.empty() ? "" : ", ") + (name.empty() ? sum : printable(name) + " (" + sum + ")");
     one_name &= name == table.protocols.front().first;
   }
   if (one_name && !wanted.empty()) return;  // one name, as requested
   throw UsageError(printable(table.source) + ": has trials of several protocols (" + names +
-                   "); say which with --protocol NAME, or with the begin of its checksum");
+                   "); say which with --protocol " +
+                   (table.protocols.front().first.empty() ? "" : "NAME, or with ") +
+                   "the begin of its checksum");
 }
 
 /// Analyses a study of version 2, or its export.

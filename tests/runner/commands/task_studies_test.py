@@ -51,6 +51,16 @@ class TaskStudies(CommandCase):
                     self.palpate("export", "--db", db, "--format", kind, "--out", folder, "--force")
                 self.check_repeated(name, db, text)
 
+    def test_a_table_of_several_protocols_is_told_apart_by_their_checksums(self):
+        db = self.simulated(PROTOCOLS / "roughness-magnitude.json", "both", participants=1)
+        self.simulated(PROTOCOLS / "stiffness-2afc.json", "both", participants=1)
+        sums = sorted({row["protocol_sha256"][:12] for row in self.exported(db)[1]})
+        said = self.palpate("analyze", "--csv", self.dir / "both.csv", status=2).stderr
+        listed = said[said.index("(") + 1:said.index(")")]
+        self.assertEqual(sorted(listed.split(", ")), sums)
+        self.assertIn("--protocol the begin of its checksum", said)
+        self.palpate("analyze", "--csv", self.dir / "both.csv", "--protocol", sums[0])
+
     def check_analysis_of_the_export(self, name, cells):
         """It gives the same cells as that of the database; only the database has the procedures and their scale."""
         scales = set()
