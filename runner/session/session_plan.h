@@ -49,7 +49,7 @@ stimuli::ObjectSpec shown_object(const protocols::Protocol& protocol, const prot
                                  const protocols::Interval& interval);
 
 /// The trials of a session of a protocol without blocks, with further rounds of practice until its
-/// criterion is met. The members are those of protocols::TaskPlan.
+/// criterion is met. The members are named as those of protocols::TaskPlan.
 class IdentificationPlan {
  public:
   /// \param protocol  must outlive it
@@ -61,8 +61,6 @@ class IdentificationPlan {
   std::size_t size() const { return trials_.size(); }  ///< as far as known now
   int last_block() const { return trials_.empty() ? 0 : trials_.back().block; }
   bool block_begins() const { return next_ == 0 || next().block != trials_[next_ - 1].block; }
-  void propose(double /*level*/) {}
-  void choose(const protocols::TrialChoice& /*choice*/) {}
   void answered(const protocols::TrialOutcome& outcome);
 
  private:
@@ -112,13 +110,11 @@ class SessionPlan {
   std::size_t done_in_block() const { return done_in_block_; }  ///< of the next trial
   /// Whether the trial before the next one was practice, of this session.
   bool after_practice() const { return after_practice_; }
-  /// Sets another level for the next trial, of an adaptive block.
-  void propose(double level) {
-    std::visit([level](auto& plan) { plan.propose(level); }, plan_);
-  }
-  /// An external program chooses the next trial, of an external block.
+  /// Sets another level for the next trial. \pre it belongs to an adaptive block
+  void propose(double level) { std::get<protocols::TaskPlan>(plan_).propose(level); }
+  /// An external program chooses the next trial. \pre it belongs to an external block
   void choose(const protocols::TrialChoice& choice) {
-    std::visit([&choice](auto& plan) { plan.choose(choice); }, plan_);
+    std::get<protocols::TaskPlan>(plan_).choose(choice);
   }
   /// The next trial has been answered.
   void answered(const protocols::TrialOutcome& outcome);
