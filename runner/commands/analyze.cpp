@@ -97,9 +97,9 @@ void require_one_protocol(const analysis::TaskTable& table, const std::string& w
   }
   if (one_name && !wanted.empty()) return;  // one name, as requested
   throw UsageError(printable(table.source) + ": has trials of several protocols (" + names +
-                   "); say which with --protocol " +
-                   (table.protocols.front().first.empty() ? "" : "NAME, or with ") +
-                   "the begin of its checksum");
+                   "); say which with --protocol and " +
+                   (table.protocols.front().first.empty() ? "" : "its name or ") +
+                   "the beginning of its checksum");
 }
 
 /// Analyses a study of version 2, or its export.

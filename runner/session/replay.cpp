@@ -113,7 +113,7 @@ data::StoredTrial find_trial(data::Store& store, const data::TrialName& name,
     if (found) {
       throw data::StoreRefused(
           "--trial " + to_string(name) + ": there is one in each of several protocols (" +
-          protocols + "); say which with --protocol NAME, or with the begin of its checksum");
+          protocols + "); say which with --protocol and its name or the beginning of its checksum");
     }
     found = std::move(trial);
   }

@@ -58,7 +58,7 @@ class TaskStudies(CommandCase):
         said = self.palpate("analyze", "--csv", self.dir / "both.csv", status=2).stderr
         listed = said[said.index("(") + 1:said.index(")")]
         self.assertEqual(sorted(listed.split(", ")), sums)
-        self.assertIn("--protocol the begin of its checksum", said)
+        self.assertIn("--protocol and the beginning of its checksum", said)
         self.palpate("analyze", "--csv", self.dir / "both.csv", "--protocol", sums[0])
 
     def check_analysis_of_the_export(self, name, cells):
