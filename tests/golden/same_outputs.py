@@ -48,10 +48,11 @@ HIDDEN = (
 NOT_COMPARED = {("exports", "made_utc_ns"), ("tombstones", "code_hash"), ("tombstone_secrets", "secret"),
                 ("attempts", "link"), ("attempts", "seal"), ("page_answers", "link"), ("page_answers", "seal")}
 # Columns of tables and exports of sessions that a hand made at its time.
-LIVE = set("link seal end_link end_seal consent_utc_ns started_utc_ns started_ns ended_ns at_ns began_ns onset_ns response_ns onset_utc response_time ticks"
-           " first_contact_time contact_share edge_dwell before_contact started_inside faults missed_ticks max_force longest_period_ns"
-           " longest_period samples_sha256 data count interval_onsets interval_ends confidence_delay start_tip_x start_tip_y start_tip_z"
-           " start_tail_x start_tail_y start_tail_z".split())
+LIVE = set("link seal end_link end_seal consent_utc_ns started_utc_ns started_ns ended_ns at_ns began_ns onset_ns"
+           " response_ns onset_utc response_time ticks first_contact_time contact_share edge_dwell before_contact"
+           " started_inside faults missed_ticks max_force longest_period_ns longest_period samples_sha256 data count"
+           " interval_onsets interval_ends confidence_delay start_tip_x start_tip_y start_tip_z start_tail_x start_tail_y"
+           " start_tail_z".split())
 
 
 def hidden(text, place, timed=False):
