@@ -32,7 +32,7 @@ HIDDEN = (
     (rf'[0-9a-f]{{64}}(?=  (\S*/)?{DATED}\n)|(?<="sha256_when_made": ")[0-9a-f]{{64}}', "SUM"),
     (rf'("name": "(\S*/)?{DATED}"[^{{}}]*"sha256": ")[0-9a-f]{{64}}', r"\1SUM"),
     (r"[\d.]+ simulated s in [\d.]+ s, [\d.]+ simulated seconds per second", "PACE"),
-    (r"\b[\d.]+ (us|ms|s|min|simulated seconds per second)\b", "TIME"),
+    (r"\b[\d.]+(e[-+]?\d+)? (us|ms|s|min|simulated seconds per second)\b", "TIME"),
     (r"every other method takes at least [\d.]+ times", "COSTS"),
     (rf'"({COSTS})": [\d.e+]+|"eleven_us": {{[^}}]*}}', "COSTS"),
     (r'"(submitted_s|onset_ns|end_ns|confidence_ns)": ?\d+', "MOMENT"),
