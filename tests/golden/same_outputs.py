@@ -33,6 +33,7 @@ HIDDEN = (
     (rf'("name": "(\S*/)?{DATED}"[^{{}}]*"sha256": ")[0-9a-f]{{64}}', r"\1SUM"),
     (r"[\d.]+ simulated s in [\d.]+ s, [\d.]+ simulated seconds per second", "PACE"),
     (r"\b[\d.]+(e[-+]?\d+)? (us|ms|s|min|simulated seconds per second)\b", "TIME"),
+    (r'("verdict": )"(fit|fit_with_losses|unfit)"', r"\1VERDICT"),
     (r"every other method takes at least [\d.]+ times", "COSTS"),
     (rf'"({COSTS})": [\d.e+]+|"eleven_us": {{[^}}]*}}', "COSTS"),
     (r'"(submitted_s|onset_ns|end_ns|confidence_ns)": ?\d+', "MOMENT"),
@@ -40,7 +41,7 @@ HIDDEN = (
     (r'(?<=")[0-9a-f]{32}(?=")|(?<=#)[0-9a-f]{32}', "TOKEN"),
     # The simulated hand moves at its own time: where it is when a trial begins or ends.
     (r"(Take the stylus away from the middle\.\n|Ready: hold it still\.\n)+", "HOME\n"),
-    (r"\* trial \d+ was answered before the first contact\n|, \d+ ticks missed|started inside, ", ""),
+    (r"\* trial \d+ was answered before the first contact\n|, \d+ ticks? missed|started inside, ", ""),
     (rf'^ "({OF_REPLIES})": ("[^"]*"|[^,\s]+)', r'"\1": MEASURED'),
     (r"servo: \d+ ticks in .*|palpate serve ends: \d+ ticks.*|{\"servo\":{.*}", "TICKS"))
 # Moments; what is drawn by chance in withdrawals; the places of rows in the chain of seals: the clock ends the batches in which
