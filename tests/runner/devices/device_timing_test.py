@@ -141,14 +141,18 @@ class Timing(unittest.TestCase):
             self.assertNotIn(private, text)
         self.assertIn("exists", self.palpate(*options, "--force", status=2))
         self.assertEqual(out.read_text(), text)
-        # A library that cannot be loaded is named without its folder.
+
+    def test_a_library_that_cannot_be_loaded_is_named_in_lines_of_its_own_and_reported_without_its_folder(self):
         broken = self.folder / "anna" / "broken.so"
+        broken.parent.mkdir()
         broken.write_text("no library")
-        other = self.folder / "other.json"
-        said = self.palpate("devices", "--device", "forcedimension", "--library", broken, "--report", other, status=1)
-        self.assertRegex(said, r"Tried:\n +\S*broken\.so")
-        self.assertIn("broken.so", other.read_text())
-        self.assertNotIn("anna", other.read_text())
+        out = self.folder / "found.json"
+        options = ("devices", "--device", "forcedimension", "--library", broken, "--report", out)
+        done = subprocess.run([PALPATE, *map(str, options)], capture_output=True, text=True, timeout=PATIENCE)
+        self.assertEqual(done.returncode, 1, done.stderr + done.stdout)
+        self.assertRegex(done.stdout, r"Tried:\n +\S*broken\.so")
+        self.assertIn("broken.so", out.read_text())
+        self.assertNotIn("anna", out.read_text())
 
 
 if __name__ == "__main__":
