@@ -350,20 +350,30 @@ bool SurfaceTool::is_step(const PatchPlane& plane, double under) const {
   });
 }
 
-/// Looks for a patch that the tool enters when the skin is removed; sets its plane.
+/// Looks for a patch that the tool enters when the skin is removed; sets its plane, or step_.
 bool SurfaceTool::in_the_way_at_rest(SurfacePlane& out) {
   double deepest = in_valley() ? kSides * glm::length(at_) : kInTheWay * tolerance_;
+  double in_step = 0;
   bool found = false;
+  in_step_ = false;
   const auto look = [&](const SurfacePatch& patch, const PatchPlane& plane) {
     const double under = plane.depth - glm::dot(plane.normal, exact_);
     if (!(under > deepest || (found && under == deepest && patch.segment == out.patch.segment &&
                               patch.triangle() < out.patch.triangle())) ||
         plane.depth - glm::dot(plane.normal, at_) > tolerance_)
       return;
-    if (holds(patch) || is_step(plane, under)) return;
+    if (holds(patch)) return;
+    const bool step = is_step(plane, under);
+    if (step && !(under > in_step)) return;
     PatchHit hit;
     cast_on_patch(surface_, patch, plane, turned_, at_, exact_, tolerance_, 0, hit);
     if (!hit.hit()) return;
+    if (step) {
+      in_step = under;
+      in_step_ = true;
+      step_ = {patch, plane.normal, plane.depth, 0, false, true};
+      return;
+    }
     deepest = under;
     found = true;
     out = {patch, plane.normal, plane.depth};
@@ -452,6 +462,24 @@ bool SurfaceTool::rests() {
     if (glm::dot(moved, moved) > far * far) return false;
   }
   return false;
+}
+
+/// Moves the place of rest out of steps of rounding. They do not hold the tool at later ticks.
+void SurfaceTool::leave_steps() {
+  const PlanesOf<SurfacePlane> held = planes_;
+  const Vec3 rest = exact_;
+  const double far = kSamePlace * skin_;
+  for (int i = 0; i < kMostInTheWay && in_step_; ++i) {
+    if (planes_.full()) break;
+    planes_.add(step_);
+    if (!find_exact_place()) break;
+    const Vec3 moved = exact_ - rest;
+    SurfacePlane in_the_way;
+    if (glm::dot(moved, moved) > far * far || in_the_way_at_rest(in_the_way)) break;
+    if (!in_step_) return;
+  }
+  planes_ = held;
+  exact_ = rest;
 }
 
 /// Moves the ideal tool as near to the virtual one as the surface allows.

@@ -18,6 +18,7 @@ struct SurfacePlane {
   double depth = 0;       ///< m, of the virtual tool below it: dot(normal, y) >= depth outside
   double multiplier = 0;  ///< m, of the normal in the way from the virtual to the ideal tool
   bool stays = false;     ///< released and hit again at one place: rounding, keep it there
+  bool step = false;      ///< the side of a step of rounding, for this tick alone
 };
 
 class SurfaceTool {
@@ -81,6 +82,7 @@ class SurfaceTool {
   bool in_valley() const;
   bool is_step(const PatchPlane& plane, double under) const;
   bool in_the_way_at_rest(SurfacePlane& plane);
+  void leave_steps();
   void take_plane(const SurfacePlane& plane);
   void let_go_of_idle_planes();
   bool let_go_of_slid_planes(const Vec3& at, double slack);
@@ -110,6 +112,8 @@ class SurfaceTool {
   Vec3 at_;           ///< from the virtual to the ideal tool, one skin off its contacts
   Vec3 exact_;        ///< the same without the skin, at rest
   PlanesOf<SurfacePlane> planes_;
+  bool in_step_ = false;  ///< at exact_ it is in the side of a step of rounding:
+  SurfacePlane step_;     ///< the one that it is deepest in
   struct Parted {
     SurfacePatch patch;
     Vec3 at;

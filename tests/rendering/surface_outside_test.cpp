@@ -175,19 +175,35 @@ PolygonSoup rounded_cube_of_eight_cells(Random& random) {
   return soup;
 }
 
-enum class Written { single_precision, eight_decimals };
+/// Blocks of different sizes on each other.
+PolygonSoup abutting_blocks(Random& random) {
+  PolygonSoup soup;
+  double top = 0;
+  for (int i = 0; i < 3; ++i) {
+    const Vec3 size(uniform(random, 0.01, 0.03), uniform(random, 0.01, 0.03),
+                    uniform(random, 0.005, 0.02));
+    const Vec3 aside(uniform(random, 0, 0.005), uniform(random, 0, 0.005), top + 0.5 * size.z);
+    append(soup, testing::placed(stimuli::box(size), Quat(1, 0, 0, 0), 1, aside));
+    top += size.z;
+  }
+  return soup;
+}
+
+enum class Written { single_precision, six_decimals, eight_decimals };
 
 /// Rounds coordinates as a file does.
 PolygonSoup as_written(PolygonSoup soup, Written how) {
   const bool single = how == Written::single_precision;
+  const double unit = how == Written::six_decimals ? 1e-6 : 1e-8;
   double largest = 0;
   for (Vec3& v : soup.vertices) {
     for (int k = 0; k < 3; ++k) {
-      v[k] = single ? static_cast<double>(static_cast<float>(v[k])) : std::round(v[k] * 1e8) / 1e8;
+      v[k] =
+          single ? static_cast<double>(static_cast<float>(v[k])) : std::round(v[k] / unit) * unit;
       largest = std::max(largest, std::abs(v[k]));
     }
   }
-  soup.coordinate_error = single ? largest * 0x1p-24 : 0.5e-8;
+  soup.coordinate_error = single ? largest * 0x1p-24 : 0.5 * unit;
   return soup;
 }
 
@@ -296,9 +312,8 @@ void SurfaceOutside::touch(const Segments& segments, std::uint64_t seed) {
   spring.stiffness = kStiffness;
   const std::vector<SurfaceShell> shells = {{mesh, Pose{}, spring}};
   const auto surface = std::make_shared<const Surface>(shells);
-  // Ideal tools keep this distance from their contacts (rendering/README.md, closed surfaces), so
-  // places that are nearer to the outside are not judged.
-  const double skin = std::max(1e-9 * oracle.size(), 1.5 * surface->seam());
+  const double rounding = 1e-9 * oracle.size();  // m; places nearer to the outside are not judged
+  const double farther = 2e-6 + 4 * surface->seam();
   const auto inside = [&](const Pose& at, double depth) {
     return std::any_of(segments.begin(), segments.end(), [&](const auto& s) {
       return oracle.holds({at.position + at.orientation * s[0], at.orientation * (s[1] - s[0])},
@@ -341,17 +356,18 @@ void SurfaceOutside::touch(const Segments& segments, std::uint64_t seed) {
     start = (r.faults & render_fault::kReleased) != 0;  // it may pass through now
     if (start) continue;
     const Pose ideal = pose_of(r.ideal, bent ? r.ideal_side : side);
-    ASSERT_FALSE(inside(ideal, skin)) << "tick " << tick;
+    ASSERT_FALSE(inside(ideal, rounding)) << "tick " << tick;
     if (r.contacts == 0) continue;
     ++contacts;
     if (r.contacts > 1 || contacts % 50 != 0) continue;
-    // The judge must notice a tool that is 2 um farther in. At a sharp edge the way of the force
-    // may lead out again, so ways beside it are tried.
+    // The judge must notice a tool that is 2 um farther in, beyond cracks of rounding. At a sharp
+    // edge the way of the force may lead out again, so ways beside it are tried.
     ++shifted;
     bool is_noticed = false;
     for (int k = 0; k < 100 && !is_noticed; ++k) {
       const Vec3 in = -glm::normalize(r.force) + 0.01 * k * random_direction(random);
-      is_noticed = inside({ideal.position + 2e-6 * glm::normalize(in), ideal.orientation}, skin);
+      is_noticed =
+          inside({ideal.position + farther * glm::normalize(in), ideal.orientation}, rounding);
     }
     noticed += is_noticed ? 1 : 0;
   }
@@ -486,6 +502,7 @@ INSTANTIATE_TEST_SUITE_P(
         Kind{"NoiseWithSlivers", noise_with_slivers, true, Written::single_precision},
         Kind{"LatticeOfStruts", lattice_of_struts, false, Written::eight_decimals},
         Kind{"MountingPlate", mounting_plate, true, Written::eight_decimals},
+        Kind{"AbuttingBlocks", abutting_blocks, true, Written::six_decimals},
         Kind{"EightCells", rounded_cube_of_eight_cells, true, Written::eight_decimals}),
     [](const auto& kind) { return std::string(kind.param.name); });
 
