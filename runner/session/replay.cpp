@@ -229,11 +229,10 @@ protocols::Trial trial_of(const protocols::Protocol& protocol, const data::Trial
   const auto& q = recorded.orientation_wxyz;
   trial.orientation = Quat(q[0], q[1], q[2], q[3]);
   trial.stimulus = stimulus_named(protocol, recorded.shape);
-  if (!recorded.task.of_block()) return trial;
   for (std::size_t i = 0; i < protocol.blocks.size(); ++i) {
     if (protocol.blocks[i].name == recorded.task.block_name) trial.task_block = static_cast<int>(i);
   }
-  if (trial.task_block < 0)
+  if (recorded.task.of_block() && trial.task_block < 0)
     throw std::invalid_argument("the protocol has no block named " + recorded.task.block_name);
   return trial;
 }
@@ -249,10 +248,11 @@ protocols::Interval interval_of(const protocols::Protocol& protocol,
 }
 
 std::vector<ShownInterval> scenes_of(const protocols::Protocol& protocol,
-                                     const data::TrialRecord& recorded, bool other) {
+                                     const data::TrialRecord& recorded, bool other,
+                                     const StimulusLibrary* library) {
   const protocols::Trial trial = trial_of(protocol, recorded);
   std::vector<ShownInterval> shown;
-  SessionScenes scenes(protocol);
+  SessionScenes scenes(protocol, library);
   for (const data::IntervalRecord& interval : data::intervals_of(recorded)) {
     const protocols::Interval one = interval_of(protocol, interval, other);
     shown.push_back({one.renderer, scenes.scene(trial, one)});
@@ -291,12 +291,11 @@ std::vector<std::optional<stimuli::ObjectSpec>> shown_objects(const protocols::P
   return shown;
 }
 
-namespace {
-
-void replay_shown(const protocols::Protocol& protocol, const data::TrialRecord& recorded,
-                  const std::vector<ShownInterval>& shown,
-                  const std::function<void(std::size_t, const data::SampleRecord&,
-                                           const ReplayedSample&)>& visit) {
+void replay(
+    const protocols::Protocol& protocol, const data::TrialRecord& recorded, bool other,
+    const std::function<void(std::size_t, const data::SampleRecord&, const ReplayedSample&)>& visit,
+    const StimulusLibrary* library) {
+  const std::vector<ShownInterval> shown = scenes_of(protocol, recorded, other, library);
   const auto intervals = samples_of_intervals(recorded);
   // An interval whose time was over before it began has no samples.
   const std::size_t least = shown.size() - (recorded.timed_out ? 1 : 0);
@@ -324,23 +323,6 @@ void replay_shown(const protocols::Protocol& protocol, const data::TrialRecord& 
     }
     servo.stop();
   }
-}
-
-}  // namespace
-
-void replay(const protocols::Protocol& protocol, const data::TrialRecord& recorded, bool other,
-            const std::function<void(std::size_t, const data::SampleRecord&,
-                                     const ReplayedSample&)>& visit) {
-  replay_shown(protocol, recorded, scenes_of(protocol, recorded, other), visit);
-}
-
-void replay(const protocols::Protocol& protocol, const StimulusLibrary& library,
-            const data::TrialRecord& recorded,
-            const std::function<void(std::size_t, const data::SampleRecord&,
-                                     const ReplayedSample&)>& visit) {
-  protocols::Trial trial = trial_of(protocol, recorded);
-  trial.renderer = kind_of(recorded.renderer, false);
-  replay_shown(protocol, recorded, {{trial.renderer, library.scene(trial)}}, visit);
 }
 
 bool equals_record(const data::TrialRecord& recorded, const data::SampleRecord& tick,

@@ -97,18 +97,12 @@ struct ReplayedSample : servo::Sample {
 /// \param other     false: the recorded renderer, which reproduces the recorded forces to the bit;
 /// true: the other renderer, along the same path
 /// \param visit     gets the interval's number from 0, each recorded tick and its new result
+/// \param library   of the protocol, built once for many trials; null: builds what it needs
 /// \throws std::invalid_argument where protocol and record do not agree
-void replay(const protocols::Protocol& protocol, const data::TrialRecord& recorded, bool other,
-            const std::function<void(std::size_t, const data::SampleRecord&,
-                                     const ReplayedSample&)>& visit);
-
-/// Replays a trial of version 1 by its own renderer, as above, with stimuli built once for many
-/// trials.
-/// \param library  of the protocol
-void replay(const protocols::Protocol& protocol, const StimulusLibrary& library,
-            const data::TrialRecord& recorded,
-            const std::function<void(std::size_t, const data::SampleRecord&,
-                                     const ReplayedSample&)>& visit);
+void replay(
+    const protocols::Protocol& protocol, const data::TrialRecord& recorded, bool other,
+    const std::function<void(std::size_t, const data::SampleRecord&, const ReplayedSample&)>& visit,
+    const StimulusLibrary* library = nullptr);
 
 /// Whether a tick's rendering equals the record, bit by bit (except a zero's sign, which the store
 /// does not keep): force, torque, depth, contacts, type of the deepest, the renderer's fault bits;

@@ -222,7 +222,7 @@ std::string read_movement(const TouchedStimuli& stimuli, const data::StoredTrial
                           analysis::MovementTrial& trial) {
   const data::TrialRecord& record = stored.record;
   const int stimulus = stimuli.stimulus(record.shape);
-  if (record.task.of_block()) return "a trial of several intervals";
+  if (record.task.of_block()) return "a trial of a block of tasks";
   if (stimulus < 0) return "the protocol has no such stimulus";
   if (record.samples.empty()) return "no samples";
 
@@ -240,7 +240,7 @@ std::string read_movement(const TouchedStimuli& stimuli, const data::StoredTrial
     std::int64_t last_slot = 0;
     TouchedTick last;
     session::replay(
-        stimuli.protocol(), stimuli.library(), record,
+        stimuli.protocol(), record, false,
         [&](std::size_t, const data::SampleRecord& recorded, const session::ReplayedSample& again) {
           equal &= session::equals_record(record, recorded, again);
           const rendering::Rendering& shown = again.rendering;
@@ -273,7 +273,8 @@ std::string read_movement(const TouchedStimuli& stimuli, const data::StoredTrial
           put(trial, tick, has_edges);
           last_slot = slot;
           last = tick;
-        });
+        },
+        &stimuli.library());
   } catch (const data::StoreRefused&) {
     return "ticks are out of order or times cannot be";
   } catch (const std::invalid_argument& error) {
@@ -312,10 +313,7 @@ std::vector<std::optional<data::TickContact>> contacts_of(const TouchedStimuli& 
     }
   };
   try {
-    if (record.task.of_block())
-      session::replay(stimuli.protocol(), record, false, visit);
-    else
-      session::replay(stimuli.protocol(), stimuli.library(), record, visit);
+    session::replay(stimuli.protocol(), record, false, visit, &stimuli.library());
   } catch (const std::invalid_argument&) {
     equal = false;
   }
