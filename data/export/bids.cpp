@@ -492,7 +492,7 @@ constexpr const char* kBidsVersion = "1.9.0";
 
 /// The columns of trials.csv without participant_id, which is in the file name.
 std::span<const Column> beh_columns(const ExportClock& clock) {
-  return trial_columns(clock.times(), clock.tasks(), clock.torque().any()).subspan(1);
+  return trial_columns(clock).subspan(1);
 }
 
 const Column kOnset{

@@ -93,7 +93,7 @@ std::int64_t write_trials(Store& store, TextSink& out, const ExportClock& clock,
                           ExportedParticipants& participants, ProgressCounter& counter) {
   std::int64_t rows = 0;
   DelimitedRow row(DelimitedFormat::csv);
-  row << trial_columns(clock.times(), clock.tasks(), clock.torque().any());
+  row << trial_columns(clock);
   out.write(row.end());
   store.for_each_trial([&](const StoredTrial& trial) {
     put_trial(row, trial, clock);
@@ -137,7 +137,7 @@ ExportResult export_csv(Store& store, const std::string& path, const ExportSetti
   if (!paths.codebook.empty()) {
     write_file(paths.codebook, [&](TextSink& sink) {
       write_codebook(sink, all_facts(label_protocols(store, settings)), settings,
-                     trial_columns(settings.times, clock.tasks(), clock.torque().any()));
+                     trial_columns(clock));
     });
   }
   result.simulated = participants.any_simulated();

@@ -293,13 +293,15 @@ std::vector<Column> made_relative(std::vector<Column> columns) {
 
 }  // namespace
 
-std::span<const Column> trial_columns(Times times, bool tasks, bool torque) {
+std::span<const Column> trial_columns(const ExportClock& clock) {
   using Tables = std::array<std::vector<Column>, 4>;  // with torque 1, with tasks 2
   static const std::vector<Column> identified = make_trials(), asked = with_tasks(identified);
   static const Tables absolute = {identified, with_torque(identified), asked, with_torque(asked)};
   static const Tables relative = {made_relative(absolute[0]), made_relative(absolute[1]),
                                   made_relative(absolute[2]), made_relative(absolute[3])};
-  return (times == Times::absolute ? absolute : relative)[(tasks ? 2U : 0U) + (torque ? 1U : 0U)];
+  return (clock.relative()
+              ? relative
+              : absolute)[(clock.tasks() ? 2U : 0U) + (clock.torque().any() ? 1U : 0U)];
 }
 
 std::span<const Column> attempt_columns(Times times) {
@@ -532,7 +534,7 @@ namespace {
 
 std::vector<std::string> names() {
   std::vector<std::string> out;
-  for (const Column& column : trial_columns(Times::absolute)) out.emplace_back(column.name);
+  for (const Column& column : trial_columns(ExportClock())) out.emplace_back(column.name);
   return out;
 }
 

@@ -37,10 +37,9 @@ struct Column {
   enum class Names { none, stimuli, blocks, answers } names = Names::none;
 };
 
-/// Columns of trials.csv, in order. \param tasks adds the columns of tasks, for a protocol of
-/// version 2. \param torque adds torque_driven, for a run with torque left out. Relative times add
-/// the column elapsed.
-std::span<const Column> trial_columns(Times times, bool tasks = false, bool torque = false);
+/// Columns of trials.csv, in order, as an export has them. Blocks of tasks, runs with torque left
+/// out and relative times add some.
+std::span<const Column> trial_columns(const ExportClock& clock);
 std::span<const Column> attempt_columns(Times times);  ///< of attempts.csv, likewise
 std::span<const Column> sample_columns();              ///< of a servo tick, in order
 /// After them, if a stimulus of the protocol moves: its state after the tick.

@@ -112,9 +112,9 @@ void PsychDsWriter::add(const StoredTrial& trial) {
     end_table();
     participant_ = trial.participant.id;
     table_.emplace(folder_.prepare(stem + "_data.csv"));
-    row_ << trial_columns(settings_.times, clock_.tasks(), clock_.torque().any());
+    row_ << trial_columns(clock_);
     table_->write(row_.end());
-    use(trial_columns(settings_.times, clock_.tasks(), clock_.torque().any()));
+    use(trial_columns(clock_));
     if (settings_.derived) {
       derived_.emplace(
           folder_.prepare(stem + "_description-" + settings_.derived->name + "_data.csv"),
@@ -190,7 +190,7 @@ Json PsychDsWriter::variables() const {
       all.push_back(describe_variable(column, facts, settings_.fault_bits));
     }
   };
-  add(trial_columns(settings_.times, clock_.tasks(), clock_.torque().any()));
+  add(trial_columns(clock_));
   add(attempt_columns(settings_.times));
   add({&interval_column(), 1});
   add({&kTimeOfTick, 1});
