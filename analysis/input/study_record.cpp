@@ -2,7 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <set>
+#include <string>
 
+#include "analysis/input/trials.h"
 #include "analysis/text.h"
 #include "data/base/text.h"
 #include "data/store/store.h"
@@ -57,23 +61,27 @@ void add_trial(const data::TrialRecord& record, ServoQuality& servo) {
 
 }  // namespace
 
-StudyRecord read_study_record(const std::string& database) {
+StudyRecord read_study_record(const std::string& database, const std::string& protocol) {
   data::Store store = data::Store::open(database, data::Store::Mode::read_only);
   StudyRecord record;
-  for (const data::ProtocolInfo& protocol : store.protocols()) {
-    record.protocols.push_back(protocol_text(protocol));
-    for (const data::Participant& participant : store.participants(protocol.sha256)) {
+  std::set<std::string, std::less<>> wanted;  // checksums
+  for (const data::ProtocolInfo& one : store.protocols()) {
+    if (!is_protocol(protocol, one.name, one.sha256)) continue;
+    wanted.insert(one.sha256);
+    record.protocols.push_back(protocol_text(one));
+    for (const data::Participant& participant : store.participants(one.sha256)) {
       if (participant.seed)
         record.seeds.push_back(participant.code + ": " + std::to_string(*participant.seed));
     }
   }
   for (const data::StoredRun& run : store.runs()) {
+    if (!wanted.contains(run.protocol_sha256)) continue;
     remember(run.info.device, record.devices);
     remember(run.info.build, record.builds);
     remember(run.info.response_device, record.response_devices);
   }
   store.for_each_trial([&](const data::StoredTrial& trial) {
-    if (trial.record.practice) return;
+    if (trial.record.practice || !wanted.contains(trial.protocol_sha256)) return;
     auto servo = std::ranges::find(record.servo, trial.record.renderer, &ServoQuality::renderer);
     if (servo == record.servo.end()) {
       record.servo.emplace_back().renderer = trial.record.renderer;
@@ -82,7 +90,9 @@ StudyRecord read_study_record(const std::string& database) {
     add_trial(trial.record, *servo);
   });
   std::ranges::sort(record.servo, {}, &ServoQuality::renderer);
-  record.n_cut_off = static_cast<std::size_t>(store.counts().cut_off);
+  store.for_each_cut_off([&](const data::StoredTrial& attempt) {
+    record.n_cut_off += wanted.contains(attempt.protocol_sha256) ? 1 : 0;
+  });
   return record;
 }
 

@@ -65,7 +65,8 @@ struct StudyRecord {
   std::string check_page;  ///< file name of the page beside the report
 };
 
-/// \param database path \throws as data::Store::open
-StudyRecord read_study_record(const std::string& database);
+/// \param database path \param protocol  the one that is wanted (is_protocol)
+/// \throws as data::Store::open
+StudyRecord read_study_record(const std::string& database, const std::string& protocol = "");
 
 }  // namespace palpate::analysis

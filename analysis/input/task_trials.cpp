@@ -186,12 +186,6 @@ TaskTrial read_trial(TaskRow& row) {
 
 }  // namespace
 
-bool is_protocol(const std::string& wanted, const std::string& name, const std::string& sha256) {
-  constexpr std::size_t kDigits = 6;
-  return wanted.empty() || wanted == name ||
-         (wanted.size() >= kDigits && sha256.compare(0, wanted.size(), wanted) == 0);
-}
-
 bool has_task_column(const std::string& path) {
   CsvReader reader(path);
   return read_header(reader).count("task") > 0;

@@ -61,7 +61,4 @@ TaskTrial task_trial_of(const std::string& participant, const data::TrialRecord&
 /// data::Store::open. \param protocol as above
 TaskTable read_task_trials_store(const std::string& path, const std::string& protocol = "");
 
-/// Whether a protocol has this name, or a SHA-256 that begins with it.
-bool is_protocol(const std::string& wanted, const std::string& name, const std::string& sha256);
-
 }  // namespace palpate::analysis

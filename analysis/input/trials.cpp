@@ -536,19 +536,26 @@ void note(const std::string& value, std::vector<std::string>& known) {
 
 }  // namespace
 
-TrialTable read_trials_store(const std::string& path) {
+bool is_protocol(const std::string& wanted, const std::string& name, const std::string& sha256) {
+  constexpr std::size_t kDigits = 6;
+  return wanted.empty() || wanted == name ||
+         (wanted.size() >= kDigits && sha256.compare(0, wanted.size(), wanted) == 0);
+}
+
+TrialTable read_trials_store(const std::string& path, const std::string& protocol) {
   data::Store store = data::Store::open(path, data::Store::Mode::read_only);
   Provenance provenance;
   provenance.source = path;
   std::vector<std::string> listed, protocol_names, observers;
-  for (const data::ProtocolInfo& protocol : store.protocols()) {
-    for (const std::string& name : data::read_stored_protocol(protocol.text).stimuli)
-      note(name, listed);
+  for (const data::ProtocolInfo& one : store.protocols()) {
+    if (!is_protocol(protocol, one.name, one.sha256)) continue;
+    for (const std::string& name : data::read_stored_protocol(one.text).stimuli) note(name, listed);
   }
   TrialTableBuilder builder;
   const data::TorqueNotes notes(store);
   TorqueCounts torque;
   store.for_each_trial([&](const data::StoredTrial& trial) {
+    if (!is_protocol(protocol, trial.protocol_name, trial.protocol_sha256)) return;
     const data::TrialRecord& record = trial.record;
     if (record.renderer != "point" && record.renderer != "ray") {
       throw protocols::InputError({{path, "participant " + trial.participant.code,
@@ -582,12 +589,22 @@ TrialTable read_trials_store(const std::string& path) {
   };
   provenance.protocol_name = join(protocol_names);
   provenance.observer_sha256 = join(observers);
+  const bool several = provenance.protocol_sha256.size() > 1;
   try {
-    TrialTable table = builder.finish(std::move(provenance), listed);
+    TrialTable table = builder.finish(Provenance(provenance), listed);
     torque.warn(table.warnings);
+    if (several)
+      table.warnings.push_back("trials of several protocols (" + provenance.protocol_name +
+                               ") are analysed together; --protocol chooses one");
     return table;
   } catch (const std::runtime_error& error) {
-    throw protocols::InputError({{path, "trials", error.what()}});
+    std::string fault = error.what();
+    if (protocol_names.empty() && !protocol.empty())
+      fault += " of the protocol " + printable(protocol);
+    if (several)
+      fault += "; they are of several protocols (" + provenance.protocol_name +
+               "): say which with --protocol and its name or the beginning of its checksum";
+    throw protocols::InputError({{path, "trials", fault}});
   }
 }
 

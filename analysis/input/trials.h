@@ -89,9 +89,13 @@ struct TrialTable {
 /// their number).
 TrialTable read_trials_csv(const std::string& path);
 
-/// Reads the completed trials of a database. \throws protocols::InputError if there are none, and
-/// what data::Store::open throws.
-TrialTable read_trials_store(const std::string& path);
+/// Whether `wanted` is the protocol's name, or at least six digits that its SHA-256 begins with.
+/// Empty: any protocol is wanted.
+bool is_protocol(const std::string& wanted, const std::string& name, const std::string& sha256);
+
+/// Reads the completed trials of a database. \param protocol  the one that is wanted
+/// \throws protocols::InputError if there are none, and what data::Store::open throws.
+TrialTable read_trials_store(const std::string& path, const std::string& protocol = "");
 
 /// Number of faults listed; further ones are counted.
 constexpr std::size_t kMaxFaults = 50;

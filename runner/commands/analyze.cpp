@@ -128,10 +128,15 @@ void analyze_tasks_of(const std::string& database, const std::string& csv,
 }
 
 /// Whether the data are of tasks; the later reader reports unreadable data.
-bool is_of_tasks(const std::string& database, const std::string& csv) {
+bool is_of_tasks(const std::string& database, const std::string& csv, const std::string& protocol) {
   try {
-    if (!csv.empty()) return analysis::has_task_column(csv);
-    return data::have_blocks(data::Store::open(database, data::Store::Mode::read_only).protocols());
+    if (!csv.empty()) return !protocol.empty() || analysis::has_task_column(csv);
+    std::vector<data::ProtocolInfo> wanted =
+        data::Store::open(database, data::Store::Mode::read_only).protocols();
+    std::erase_if(wanted, [&](const data::ProtocolInfo& one) {
+      return !analysis::is_protocol(protocol, one.name, one.sha256);
+    });
+    return data::have_blocks(wanted);
   } catch (const std::runtime_error&) {
     return false;
   }
@@ -149,10 +154,7 @@ void check_movement(const boost::program_options::variables_map& values, double 
   }
   if (!values.count("db"))
     throw UsageError("--movement: needs the samples of a database; give --db FILE");
-  for (const char* option : {"protocol", "scale"}) {
-    if (values.count(option))
-      throw UsageError("--" + std::string(option) + ": does not go with --movement");
-  }
+  if (values.count("scale")) throw UsageError("--scale: does not go with --movement");
   if (!values["function"].defaulted() || !values["too-fast-s"].defaulted())
     throw UsageError("--function, --too-fast-s: do not go with --movement");
   if (!(cutoff > 0) || !std::isfinite(cutoff))
@@ -188,8 +190,9 @@ int analyze_command(const std::vector<std::string>& args) {
       "palpate analyze (--db FILE | --csv FILE | --sweep FILE [--pattern EXPR]) [--protocol NAME]\n"
       "       [--function logistic|normal|weibull] [--scale linear|log]\n"
       "       [--json FILE] [--report FILE.html] [--figures DIR] [--force]\n"
-      "palpate analyze --db FILE --movement [--movement-csv FILE] [--cutoff-hz F] [--jobs J]\n"
-      "       [--meshes DIR] [--json FILE] [--report FILE.html] [--figures DIR] [--force]";
+      "palpate analyze --db FILE --movement [--protocol NAME] [--movement-csv FILE]\n"
+      "       [--cutoff-hz F] [--jobs J] [--meshes DIR] [--json FILE] [--report FILE.html]\n"
+      "       [--figures DIR] [--force]";
   line.summary =
       "Compares response times with the ray and the point renderer: percent reduction for each\n"
       "shape with intervals and tests, accuracy, learning and exclusions. In data with other\n"
@@ -257,6 +260,7 @@ int analyze_command(const std::vector<std::string>& args) {
   if (values->count("sweep")) {
     if (!(*values)["function"].defaulted() || values->count("scale"))
       throw UsageError("--function, --scale: a sweep's points have their figures already");
+    if (values->count("protocol")) throw UsageError("--protocol: a sweep is of one protocol");
     const std::string text = analyze_sweep_file(sweep, pattern, outputs);
     outputs.write();
     std::cout << text;
@@ -264,10 +268,11 @@ int analyze_command(const std::vector<std::string>& args) {
   }
   if (values->count("movement")) {
     movement.database = database;
+    movement.protocol = protocol;
     analyze_movement_of(movement, outputs);
     return 0;
   }
-  if (is_of_tasks(database, csv) || !protocol.empty()) {
+  if (is_of_tasks(database, csv, protocol)) {
     analyze_tasks_of(database, csv, protocol, settings, functions, outputs);
     return 0;
   }
@@ -275,10 +280,10 @@ int analyze_command(const std::vector<std::string>& args) {
   if (!(*values)["function"].defaulted() || values->count("scale"))
     throw UsageError("--function, --scale: there are no tasks with psychometric functions");
   const analysis::Analysis analysis =
-      analysis::analyze(read_study_trials(database, csv), settings, PALPATE_VERSION);
+      analysis::analyze(read_study_trials(database, csv, protocol), settings, PALPATE_VERSION);
   analysis::StudyRecord record;
   if (!database.empty() && (values->count("report") || values->count("figures"))) {
-    record = analysis::read_study_record(database);
+    record = analysis::read_study_record(database, protocol);
   }
   put(outputs, analysis, record);
   outputs.write();

@@ -73,6 +73,30 @@ class Analyze(unittest.TestCase):
                 (self.dir / "a.html").read_text("utf-8"),
                 (self.dir / "figures" / "figure15.svg").read_text("utf-8"))
 
+    def test_of_several_protocols_in_a_database_one_can_be_chosen(self):
+        quick = json.loads((FIXTURES.parents[2] / "protocols" / "quick.json").read_text())
+        database = self.dir / "two.db"
+        for name, repetitions in (("first", 2), ("second", 3)):
+            protocol = self.dir / f"{name}.json"
+            protocol.write_text(json.dumps({**quick, "name": name, "repetitions": repetitions, "samples": True,
+                                            "blocks_per_renderer": 1}))
+            subprocess.run([PALPATE, "simulate", protocol, "--db", database, "--participants", "2"], check=True,
+                           capture_output=True)
+        report = self.dir / "a.json"
+        for options in ((), ("--movement",)):
+            for name, repetitions in (("first", 2), ("second", 3)):
+                done = self.run_palpate("--db", database, *options, "--protocol", name, "--json", report, "--force")
+                self.assertEqual(done.returncode, 0, done.stderr)
+                # Participants, renderers, shapes, repetitions.
+                found = json.loads(report.read_text())
+                self.assertEqual(found.get("counts", found)["n_trials"], 2 * 2 * 4 * repetitions)
+        together = self.run_palpate("--db", database)
+        self.assertIn("first, second", together.stdout + together.stderr)
+        self.assertIn("--protocol", together.stdout + together.stderr)
+        none = self.run_palpate("--db", database, "--protocol", "third")
+        self.assertEqual(none.returncode, 2)
+        self.assertIn("third", none.stderr)
+
     def test_names_are_text_not_markup(self):
         who = ["<script>alert(1)</script>", "b&\"'<img src=x onerror=alert(1)>", "]]>", "c" * 200]
         csv = self.hostile(who, ["cone", "</svg><script>", "a&b"])

@@ -63,15 +63,19 @@ class StudyReader {
     data::Store store = data::Store::open(request_.database, data::Store::Mode::read_only);
     std::size_t index = 0;
     bool mine = false;
+    const auto is_row = [&](const data::StoredTrial& trial) {
+      return !trial.record.practice &&
+             analysis::is_protocol(request_.protocol, trial.protocol_name, trial.protocol_sha256);
+    };
     const auto take = [&](const data::StoredTrial& trial) {
-      if (trial.record.practice || has_failed_) return mine = false;
+      if (!is_row(trial) || has_failed_) return mine = false;
       if (index >= taken_.size()) {
         throw UsageError(request_.database + ": trials were added while they were read; try again");
       }
       return mine = !taken_[index].exchange(true);
     };
     const auto visit = [&](const data::StoredTrial& trial) {
-      if (trial.record.practice) return;
+      if (!is_row(trial)) return;
       const std::size_t at = index++;
       if (!mine) return;
       const data::TrialRecord& record = trial.record;
@@ -180,7 +184,7 @@ void require_samples(const MovementStudy& study, const std::string& database) {
 
 MovementStudy measure_study(const MovementRequest& request) {
   MovementStudy study;
-  study.table.trials = read_study_trials(request.database, "");
+  study.table.trials = read_study_trials(request.database, "", request.protocol);
   study.table.settings = request.settings;
   CsvText csv(columns(), "\n");
   StudyStimuli stimuli(request.mesh_folder);

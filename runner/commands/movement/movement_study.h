@@ -15,6 +15,7 @@ namespace palpate::runner::commands {
 
 struct MovementRequest {
   std::string database, mesh_folder;
+  std::string protocol;  ///< the one that is wanted (analysis::is_protocol)
   int jobs = 1;
   analysis::MovementSettings settings;
   bool pictures = false;  ///< for figures as well

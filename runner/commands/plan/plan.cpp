@@ -159,6 +159,8 @@ void add_plan_options(CommandLine& line, PlanOptions& options) {
   auto add = line.options.add_options();
   add("db", po::value(&options.database)->value_name("FILE"), "a pilot's database");
   add("csv", po::value(&options.csv)->value_name("FILE"), "a pilot's trials as CSV");
+  add("protocol", po::value(&options.protocol)->value_name("NAME"),
+      "which of a database's protocols: its name, or the beginning of its SHA-256");
   add("effect", po::value(&options.effect)->value_name("SHAPE=PERCENT,..."),
       "wanted reductions of time with the ray (of a pilot of other renderers: with its second "
       "renderer), or one number for all shapes; default for ray: the paper's, cone=22,cube=11, or "
@@ -209,8 +211,8 @@ analysis::Pilot starting_point(const PlanOptions& options, const po::variables_m
     return pilot;
   }
   const std::string& source = options.csv.empty() ? options.database : options.csv;
-  pilot = analysis::read_pilot(
-      analysis::analyze(read_study_trials(options.database, options.csv), {}, PALPATE_VERSION));
+  pilot = analysis::read_pilot(analysis::analyze(
+      read_study_trials(options.database, options.csv, options.protocol), {}, PALPATE_VERSION));
   if (!pilot.undefined.empty()) {
     throw UsageError(
         source + ": expected a pilot that the mixed model can be fitted to: " + pilot.undefined);
@@ -433,7 +435,8 @@ void read_known(const std::string& file, const analysis::StudyModel& model,
 int plan_command(const std::vector<std::string>& args) {
   CommandLine line;
   line.usage =
-      R"(palpate plan (--db FILE | --csv FILE | --gain-sd SD --residual-sd SD) [--effect SHAPE=PERCENT,...]
+      R"(palpate plan (--db FILE [--protocol NAME] | --csv FILE | --gain-sd SD --residual-sd SD)
+           [--effect SHAPE=PERCENT,...]
        palpate plan --jnd-effect PERCENT [--weber W]
        palpate plan --coverage [--studies N] [--seed S])";
   line.summary =
@@ -464,6 +467,8 @@ int plan_command(const std::vector<std::string>& args) {
     throw UsageError("expected one of --db FILE and --csv FILE\nUsage: " + line.usage +
                      "\nMore: add --help");
   }
+  if (values->count("protocol") && !values->count("db"))
+    throw UsageError("--protocol: is one of a database; give --db FILE");
   Outputs outputs(*values, {"json", "figure"}, {"db", "csv"});
   if (values->count("coverage")) {
     print_coverage(options, *values, outputs);

@@ -13,8 +13,8 @@
 namespace palpate::runner::commands {
 
 struct PlanOptions {
-  std::string database, csv, effect, participants = "2-100", trials = "10,20,40,76", goal = "all",
-                                     test = "paired", json, figure;
+  std::string database, csv, protocol, effect, participants = "2-100", trials = "10,20,40,76",
+                                               goal = "all", test = "paired", json, figure;
   double gain_sd = 0, shape_gain_sd = 0, intercept_sd = 0.3, correlation = 0, residual_sd = 0,
          share_used = 1, power = 0.8, alpha = 0.05;
   std::string studies, jobs;

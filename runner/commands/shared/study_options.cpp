@@ -14,10 +14,11 @@
 
 namespace palpate::runner::commands {
 
-analysis::TrialTable read_study_trials(const std::string& database, const std::string& csv) {
+analysis::TrialTable read_study_trials(const std::string& database, const std::string& csv,
+                                       const std::string& protocol) {
   if (!csv.empty()) return analysis::read_trials_csv(csv);
   try {
-    return analysis::read_trials_store(database);
+    return analysis::read_trials_store(database, protocol);
   } catch (const data::StoreRefused& error) {
     throw UsageError(error.what());  // the named file is bad input: status 2
   }

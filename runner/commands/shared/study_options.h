@@ -15,8 +15,10 @@
 namespace palpate::runner::commands {
 
 /// The trials of a study: from the CSV file if given, else from the database.
+/// \param protocol  of the database's protocols, the one that is wanted (analysis::is_protocol)
 /// \throws UsageError, InputError: the file is not a study's
-analysis::TrialTable read_study_trials(const std::string& database, const std::string& csv);
+analysis::TrialTable read_study_trials(const std::string& database, const std::string& csv,
+                                       const std::string& protocol = "");
 
 /// The options that determine the data of a simulated study.
 struct StudyOptions {

@@ -381,7 +381,7 @@ class Movement(CommandCase):
 
     def test_incompatible_options_are_refused(self):
         db = self.study(participants=1)
-        for args, why in [(["--movement", "--protocol", "x"], "--protocol"),
+        for args, why in [(["--movement", "--scale", "log"], "--scale"),
                           (["--movement", "--cutoff-hz", "0"], "--cutoff-hz"),
                           (["--movement", "--cutoff-hz", "nan"], "--cutoff-hz"),
                           (["--movement", "--jobs", "0"], "--jobs"),
