@@ -157,7 +157,9 @@ void Outputs::put_into_folder(const std::string& name, std::string text) {
 void Outputs::write() {
   std::error_code error;
   const bool made = !folder_.empty() && fs::create_directories(folder_, error);
-  if (error) throw std::runtime_error(folder_ + ": " + error.message());
+  if (error)
+    throw std::runtime_error(folder_ + ": cannot be made (" + error.message() +
+                             "); check the permissions of the folder above");
   try {
     check();  // files may have changed in the meantime
     std::deque<data::AtomicFile> drafts;
