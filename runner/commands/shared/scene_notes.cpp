@@ -67,9 +67,10 @@ std::vector<std::string> mesh_notes(const stimuli::ObjectSpec& object, SceneBuil
       size.x, size.y, size.z, mesh.faces);
   std::string note = printable(object.file_name) + ": " + text;
   if (largest > kBeyondHands) {
-    note +=
-        "; larger than a metre: expected coordinates in metres; for a file in millimetres give "
-        "\"scale\": 0.001 beside \"file\"";
+    note += object.file_name.ends_with(".3mf")
+                ? "; larger than a metre: check the unit in the file"
+                : "; larger than a metre: expected coordinates in metres; for a file in "
+                  "millimetres give \"scale\": 0.001 beside \"file\"";
   } else if (largest < kBelowTouch) {
     note += "; smaller than a tenth of a millimetre: expected coordinates in metres";
   }
