@@ -221,7 +221,7 @@ void validate_scene(const std::string& text, const std::string& path, std::ostre
     out << "  note        " << note << "\n";
   for (std::size_t i = 0; i < spec.objects.size(); ++i)
     print_overlaps(spec.objects[i], "/objects/" + std::to_string(i), builder, out);
-  out << "  touch it    palpate explore " << printable(path) << "\n";
+  out << "  touch it    palpate explore " << printable(shell_quoted(path)) << "\n";
 }
 
 }  // namespace

@@ -89,13 +89,6 @@ Output run(const std::string& command) {
 }
 
 // Slurm through its own commands, sbatch and squeue, without a library: works with any version.
-/// Quotes a word for a shell's command line.
-std::string shell_quoted(const std::string& text) {
-  std::string out = "'";
-  for (const char c : text) out += c == '\'' ? std::string("'\\''") : std::string(1, c);
-  return out + "'";
-}
-
 /// "1-64", "3,7,9-12": ascending numbers as --array takes them.
 std::string array_text(const std::vector<std::int64_t>& tasks) {
   std::string out;

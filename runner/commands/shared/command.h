@@ -35,6 +35,9 @@ std::string given_or_asked(const std::string& given, const std::string& what);
 /// "P01", "P01 and P02", "P01, P02 and P03"
 std::string join_names(const std::vector<std::string>& names);
 
+/// A word of a shell's command line, in quotes if it needs them.
+std::string shell_quoted(const std::string& text);
+
 /// The trial named by an option, "P03/1/12". \throws UsageError
 data::TrialName parse_trial_name(const std::string& text);
 
