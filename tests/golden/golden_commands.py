@@ -111,7 +111,7 @@ def study_lines():
            *steps("analyze --db study.db --too-fast-s 1.5 --protocol quick --json slow.json",
                   "plan --db study.db --effect cone=22,cube=11 --studies 200 --trials 3,20 --json plan.json --figure power.svg --jobs 1",
                   "plan --db study.db --effect cone=22,cube=11 --studies 200 --trials 3,20,30 --reuse plan.json --json plan2.json",
-                  "plan --db study.db --effect 30 --test model --studies 100 --participants 4-12 --trials 3 --goal any --power 0.7 --alpha 0.1",
+                  "plan --db study.db --effect 30 --test model --studies 100 --participants 4-12 --trials 3 --goal any --power 0.7 --alpha 0.1 --protocol quick",
                   "export --db study.db --format csv --out relative.csv --times relative --codebook codebook.csv",
                   "plan --csv relative.csv --studies 100 --trials 3 --participants 4-40 --seed 3 --json plan3.json",
                   "plan --csv relative.csv --studies 100 --trials 3 --participants 4-40 --seed 3 --json plan3.json --force")]
@@ -139,6 +139,7 @@ def data_lines():
                   "analyze --db moved.db --movement --movement-csv movement.csv --json movement.json --report movement.html --figures figures"
                   " --meshes . --jobs 1 --cutoff-hz 10",
                   "analyze --db moved.db --movement --movement-csv movement.csv --force",
+                  "analyze --db moved.db --movement --protocol quick",
                   "export --db moved.db --format csv --out moved.csv", "analyze --csv moved.csv --json table.json",
                   "export --db moved.db --format bids --motion --contacts --movement --meshes . --about about.json --out bids --pages",
                   "export --db moved.db --format psych-ds --contacts --movement --out psych-ds",
