@@ -355,48 +355,18 @@ void SurfaceTool::add_contacts() {
   if (planes_.empty() && !stuck_) shift = at_;
   memory_.shift = placed_.world_vector(shift);
   if (stuck_) tick_.faults |= render_fault::kContactCapped;  // it keeps its place
-  const double length = glm::length(shift);
-  const SurfacePlane* most = planes_.most_loaded();
-  if (stuck_ || (most != nullptr && most->multiplier > kMostLeverage * length)) {
-    if (most == nullptr || !(length > 0)) return;
-    SurfacePlane held = *most;
-    held.normal = shift / length;
-    held.multiplier = length;
-    add_contact(held, shift);
-    return;
-  }
-  for (const SurfacePlane& plane : planes_.all()) {
-    if (plane.multiplier > 0) add_contact(plane, shift);
-  }
+  planes_.for_each_contact(shift, stuck_,
+                           [&](const SurfacePlane& plane) { add_contact(plane, shift); });
 }
 
 /// Stores the state for the next tick.
 void SurfaceTool::remember(std::size_t first_contact) {
-  // Usually the tool has taken the whole turn.
-  const bool behind = pose_.d != tick_.tool.d || pose_.frame != tick_.tool.frame;
-  const double angle = behind ? angle_between(carried_, pose_, tick_.tool) : 0;
-  memory_.touching = !planes_.empty() || stuck_ || angle > 0 || at_ != Vec3(0);
-  memory_.ideal = pose_;
-  memory_.ideal.tip = tick_.tool.tip + placed_.world_vector(at_);
-  memory_.lag = angle;
-  if (angle > all_.most_lag) {
-    all_.most_lag = angle;
-    all_.most_behind = group_;
-  }
-  all_.exceptions |= angle > kMostLag;
-  all_.reach = std::max(all_.reach, glm::length(at_) + angle * tool_size());
-  // The mean contact place: the tool turns about it at the next tick.
-  Vec3 grasp(0);
-  double weight = 0;
+  remember_ideal_tool(tick_, group_, pose_, placed_.world_vector(at_), !planes_.empty() || stuck_,
+                      first_contact);
   const PartGroup& group = tick_.scene.groups()[group_];
   for (SurfaceState::Rubbed& slot : own_.rubbed) slot.used = false;
   for (std::size_t i = first_contact; i < all_.contacts.size(); ++i) {
     PlacedContact& c = all_.contacts[i];
-    const double share = c.loaded.normal_displacement;
-    weight += share;
-    grasp += share * (carried_ != nullptr
-                          ? glm::transpose(pose_.frame) * (c.place - c.shift - tick_.tool.tip)
-                          : Vec3(0, 0, c.loaded.probe_fraction));
     // Continue the friction of the segment's last contact with the most similar normal.
     std::size_t best = 0;
     double most = -HUGE_VAL;
@@ -413,7 +383,6 @@ void SurfaceTool::remember(std::size_t first_contact) {
     own_.rubbed[best] = {c.loaded.contact.normal, static_cast<std::uint32_t>(c.segment), true};
     c.pair = group.first_pair + static_cast<std::uint32_t>(best);
   }
-  if (weight > 0) memory_.grasp = grasp / weight;
 }
 
 }  // namespace palpate::rendering

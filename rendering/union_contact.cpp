@@ -79,7 +79,6 @@ class IdealTool {
                          LoadedContact& c);
   void remember(std::size_t first_contact);
   void remember_planes();
-  void remember_grasp(std::size_t first_contact);
 
   UnionTick& tick_;
   UnionMemory& all_;
@@ -166,19 +165,7 @@ void IdealTool::add_contacts() {
   Vec3& shift = memory_.shift;
   shift = stuck_ ? at_ : exact_;
   if (stuck_) tick_.faults |= render_fault::kContactCapped;  // it stays where it is
-  const double length = glm::length(shift);
-  const Plane* most = planes_.most_loaded();
-  if (stuck_ || (most != nullptr && most->multiplier > kMostLeverage * length)) {
-    if (most == nullptr || !(length > 0)) return;
-    Plane held = *most;
-    held.normal = shift / length;
-    held.multiplier = length;
-    add_contact(held, shift);
-    return;
-  }
-  for (const Plane& plane : planes_.all()) {
-    if (plane.multiplier > 0) add_contact(plane, shift);
-  }
+  planes_.for_each_contact(shift, stuck_, [&](const Plane& plane) { add_contact(plane, shift); });
 }
 
 /// Remembers the planes that separate the pairs that do not hold the tool.
@@ -200,39 +187,10 @@ void IdealTool::remember_planes() {
   }
 }
 
-/// Remembers the mean contact place, about which the tool turns at the next tick.
-void IdealTool::remember_grasp(std::size_t first_contact) {
-  Vec3 grasp(0);
-  double weight = 0;
-  for (std::size_t i = first_contact; i < all_.contacts.size(); ++i) {
-    const PlacedContact& c = all_.contacts[i];
-    const double share = c.loaded.normal_displacement;
-    weight += share;
-    grasp += share * (carried_ != nullptr
-                          ? glm::transpose(pose_.frame) * (c.place - c.shift - tick_.tool.tip)
-                          : Vec3(0, 0, c.loaded.probe_fraction));
-  }
-  if (weight > 0) memory_.grasp = grasp / weight;
-}
-
 /// Remembers the state that the next tick needs.
 void IdealTool::remember(std::size_t first_contact) {
   remember_planes();
-  // Usually the ideal tool has taken the whole turn.
-  const bool behind = pose_.d != tick_.tool.d || pose_.frame != tick_.tool.frame;
-  const double angle = behind ? angle_between(carried_, pose_, tick_.tool) : 0;
-  memory_.touching = !planes_.empty() || stuck_ || angle > 0 || at_ != Vec3(0);
-  memory_.ideal = pose_;
-  memory_.ideal.tip = tick_.tool.tip + at_;
-  memory_.lag = angle;
-  if (angle > all_.most_lag) {
-    all_.most_lag = angle;
-    all_.most_behind = index_;
-  }
-  all_.exceptions |= angle > kMostLag;
-  const double size = carried_ != nullptr ? tick_.scene.tool_reach() : glm::length(pose_.d);
-  all_.reach = std::max(all_.reach, glm::length(at_) + angle * size);
-  remember_grasp(first_contact);
+  remember_ideal_tool(tick_, index_, pose_, at_, !planes_.empty() || stuck_, first_contact);
 }
 
 using Kind = ContactFeature::Kind;
@@ -735,6 +693,38 @@ void IdealTool::follow() {
   const std::size_t first_contact = all_.contacts.size();
   add_contacts();
   remember(first_contact);
+}
+
+void remember_ideal_tool(UnionTick& tick, std::uint32_t group, const ToolPose& pose,
+                         const Vec3& shift, bool held, std::size_t first_contact) {
+  UnionMemory& all = tick.state.unions;
+  GroupState& memory = all.groups[group];
+  const Tool* const carried = tick.sides ? tick.scene.tool() : nullptr;
+  // Usually the ideal tool has taken the whole turn.
+  const bool behind = pose.d != tick.tool.d || pose.frame != tick.tool.frame;
+  const double angle = behind ? angle_between(carried, pose, tick.tool) : 0;
+  memory.touching = held || angle > 0 || shift != Vec3(0);
+  memory.ideal = pose;
+  memory.ideal.tip = tick.tool.tip + shift;
+  memory.lag = angle;
+  if (angle > all.most_lag) {
+    all.most_lag = angle;
+    all.most_behind = group;
+  }
+  all.exceptions |= angle > kMostLag;
+  const double size = carried != nullptr ? tick.scene.tool_reach() : glm::length(pose.d);
+  all.reach = std::max(all.reach, glm::length(shift) + angle * size);
+  Vec3 grasp(0);
+  double weight = 0;
+  for (std::size_t i = first_contact; i < all.contacts.size(); ++i) {
+    const PlacedContact& c = all.contacts[i];
+    const double share = c.loaded.normal_displacement;
+    weight += share;
+    grasp += share * (carried != nullptr
+                          ? glm::transpose(pose.frame) * (c.place - c.shift - tick.tool.tip)
+                          : Vec3(0, 0, c.loaded.probe_fraction));
+  }
+  if (weight > 0) memory.grasp = grasp / weight;
 }
 
 void follow_ideal_tool(UnionTick& tick, std::uint32_t group) { IdealTool(tick, group).follow(); }

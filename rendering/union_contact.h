@@ -14,6 +14,7 @@
 //
 // World frame, SI units. Nothing here throws, allocates, locks or does I/O.
 
+#include <cstddef>
 #include <cstdint>
 
 #include "rendering/renderer.h"
@@ -52,6 +53,15 @@ Vec3 tail_force(const Vec3& torque, double along, const Vec3& d);
 /// Follows the ideal tool of one group and appends its contacts, with spring forces, to
 /// state.unions.contacts.
 void follow_ideal_tool(UnionTick& tick, std::uint32_t group);
+
+/// Remembers an ideal tool for the next tick: its pose, how far its turn lags behind, and the mean
+/// place of its contacts, about which it turns then.
+/// \param pose   its orientation
+/// \param shift  m, from the virtual tool
+/// \param held   by a plane
+/// \param first_contact  index of its first one in state.unions.contacts
+void remember_ideal_tool(UnionTick& tick, std::uint32_t group, const ToolPose& pose,
+                         const Vec3& shift, bool held, std::size_t first_contact);
 
 /// Whether the virtual tool is inside of a part of the group.
 bool inside_group(UnionTick& tick, std::uint32_t group);

@@ -140,6 +140,25 @@ class PlanesOf {
     }
     return most;
   }
+  /// Calls add(plane) for the planes that a tool at rest touches. One that is stuck, or clamped
+  /// between planes that hold each other more than it, touches one plane across its way.
+  /// \param shift  m, from the virtual to the ideal tool
+  template <class Add>
+  void for_each_contact(const Vec3& shift, bool stuck, const Add& add) const {
+    const double length = glm::length(shift);
+    const Held* const most = most_loaded();
+    if (stuck || (most != nullptr && most->multiplier > kMostLeverage * length)) {
+      if (most == nullptr || !(length > 0)) return;
+      Held across = *most;
+      across.normal = shift / length;
+      across.multiplier = length;
+      add(across);
+      return;
+    }
+    for (const Held& plane : all()) {
+      if (plane.multiplier > 0) add(plane);
+    }
+  }
   bool full() const { return count_ == planes_.size(); }
   bool empty() const { return count_ == 0; }
   void clear() { count_ = 0; }
