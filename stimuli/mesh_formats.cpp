@@ -466,7 +466,10 @@ PolygonSoup read_binary(std::string_view bytes, FileFaults& faults) {
 
 class AsciiReader {
  public:
-  AsciiReader(std::string_view text, FileFaults& faults) : text_(text), faults_(faults) {}
+  AsciiReader(std::string_view text, FileFaults& faults)
+      : text_(text),
+        faults_(faults),
+        line_end_(text.find('\n') == std::string_view::npos ? '\r' : '\n') {}
 
   PolygonSoup read() {
     advance();
@@ -494,7 +497,7 @@ class AsciiReader {
  private:
   void advance() {
     while (at_ < text_.size() && static_cast<unsigned char>(text_[at_]) <= ' ') {
-      if (text_[at_++] == '\n') ++line_;
+      if (text_[at_++] == line_end_) ++line_;
     }
     const std::size_t begin = at_;
     while (at_ < text_.size() && static_cast<unsigned char>(text_[at_]) > ' ') ++at_;
@@ -502,7 +505,7 @@ class AsciiReader {
   }
 
   void skip_line() {
-    while (at_ < text_.size() && text_[at_] != '\n') ++at_;
+    while (at_ < text_.size() && text_[at_] != line_end_) ++at_;
   }
 
   void skip_facet() {
@@ -567,6 +570,7 @@ class AsciiReader {
 
   std::string_view text_, word_;
   FileFaults& faults_;
+  char line_end_;  // some old programs end lines with carriage returns alone
   std::size_t at_ = 0, line_ = 1;
   bool inside_ = false;
   PolygonSoup soup_;

@@ -222,6 +222,16 @@ TEST_F(MeshFile, AnyLineEndingOfAnObjIsRead) {
   }
 }
 
+TEST_F(MeshFile, AnyLineEndingOfAnStlIsRead) {
+  const std::string stl = as_ascii_stl(triangulated(cube(0.06)));
+  for (const std::string end : {"\n", "\r\n", "\r"}) {
+    std::string text;
+    for (const char c : stl) text += c == '\n' ? end : std::string(1, c);
+    EXPECT_EQ(facets_of(read("a.stl", text)), 6U);
+    expect_fault("a.stl", "solid s" + end + "facet" + end + "x", ": line 3: expected normal");
+  }
+}
+
 TEST_F(MeshFile, AByteOrderMarkHidesNothing) {
   const std::string mark = "\xEF\xBB\xBF";
   const std::string obj =
