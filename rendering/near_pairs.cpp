@@ -507,8 +507,11 @@ bool NearPairs::virtual_inside() {
   collect(tick_.tool, all_.now, 0, 0);
   orient(all_.now);
   for (NearPair& near : all_.near) {
-    const WalkResult at = locate(mesh_of(near), state_of(near).feature, near.true_tip, near.true_d);
-    state_of(near).feature = at.feature.kind != Kind::none ? at.feature : at.separating_feature;
+    PairState& state = state_of(near);
+    const WalkResult at = locate(mesh_of(near), state.feature, near.true_tip, near.true_d);
+    // What carries the ideal tool stays, wherever the virtual tool is.
+    if (!state.carries)
+      state.feature = at.feature.kind != Kind::none ? at.feature : at.separating_feature;
     if (at.feature.kind != Kind::none && at.depth > part_of(near).tolerance) return true;
   }
   return false;

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <glm/common.hpp>
+
 #include "rendering/union_contact.h"
 #include "tests/shared/union_scenes.h"
 
@@ -132,6 +134,42 @@ TEST_P(Layers, ABrokenLayerHoldsNothing) {
   for (double depth = -0.002; depth < 0.0015; depth += 1e-5)
     r = ray_renderer().tick(scene, state, at_depth(depth), kTick);
   EXPECT_NEAR(r.force.z, 500 * 0.0005, 6e-3);
+}
+
+/// A floor and a wall on its left, side by side, with a layer 1 mm deep that breaks at 0.1 N or
+/// none.
+std::vector<SceneObject> corner(bool has_layer) {
+  std::vector<SceneObject> parts;
+  const auto add = [&](const Vec3& low, const Vec3& high) {
+    const auto surface = testing::mesh_of(box_soup(low, high));
+    parts.push_back(testing::placed_object(surface, {}, 800, 0));
+    if (!has_layer) return;
+    const auto layer = testing::mesh_of(box_soup(low + Vec3(0.001), high - Vec3(0.001)));
+    parts.push_back(testing::placed_object(layer, {}, 500, 0));
+    parts.back().layer = 1;
+    parts.back().break_force = 0.1;
+  };
+  add({0, -0.03, -0.015}, {0.03, 0.03, 0});
+  add({-0.015, -0.03, -0.015}, {0, 0.03, 0.03});
+  return parts;
+}
+
+TEST(PartsOfALayer, ABrokenOneDoesNotMoveTheIdealToolOfTheSurface) {
+  const Scene surface(corner(false)), layered(corner(true));
+  RenderState alone = surface.initial_state(), beside = layered.initial_state();
+  const auto difference = [&](const Vec3& tip, const Vec3& d) {
+    const LineProbe probe{tip, tip + d};
+    const Rendering expected = ray_renderer().tick(surface, alone, probe, kTick);
+    const Rendering found = ray_renderer().tick(layered, beside, probe, kTick);
+    return glm::length(found.force - expected.force);
+  };
+  const Vec3 above(0.015, 0.023, 0.01), deep(0.015, 0.023, -0.008), end(-0.013, 0.027, -0.02);
+  const Vec3 d(-0.02, 0.07, 0.05), last_d(-0.02, 0.04, 0.07);
+  for (int i = 0; i < 50; ++i) difference(glm::mix(above, deep, i / 50.0), d);
+  for (int i = 0; i < 25; ++i) difference(deep, d);  // the layer's force fades
+  for (int i = 0; i <= 100; ++i)
+    ASSERT_LE(difference(glm::mix(deep, end, i / 100.0), glm::mix(d, last_d, i / 100.0)), 1e-9)
+        << i;
 }
 
 /// A slab that breaks at 1 N on a block that does not break, both of one layer.
