@@ -236,6 +236,10 @@ bool IdealTool::next_hit(const Vec3& goal, std::uint32_t& hit, PairCast& first) 
              pairs_.part_of(near).shrink * pairs_.part_of(near).local_vector(way));
     pairs_.state_of(near).feature = found.feature;
     if (!found.hit || !(found.time < first.time)) continue;
+    // The tool is inside within rounding, and the way leads out. A plane would hold nothing; where
+    // there is no room for it, others that hold nothing would make room and be hit again.
+    if (planes_.full() && found.time == 0 && glm::dot(plane_of(i, found.feature).normal, way) > 0)
+      continue;
     first = found;
     hit = i;
   }

@@ -55,6 +55,42 @@ TEST(ToolForces, AreSplitOnTwoDevicesAndTurnTheHand) {
   EXPECT_GT(off_axis, 100);
 }
 
+// A joint of a tool may meet more parts at once than planes can hold it.
+TEST(ToolForces, AToolThatTurnsOntoManyFacesInOnePlaneMovesOn) {
+  constexpr std::uint64_t kSeed = 13;
+  Random random(kSeed);
+  std::vector<SceneObject> parts;
+  for (int i = 0; i < 6; ++i) {
+    const double wide = 0.1 + 0.002 * i;
+    parts.push_back(testing::placed_object(
+        testing::box(Vec3(-wide, -0.1, -0.01 - 0.003 * i), Vec3(0.1, wide, 0)), {}, 800, 0));
+  }
+  const Tool tool{{{Vec3(0), {0, 0, 0.12}},
+                   {Vec3(0), {0.02, 0.003, -0.006}},
+                   {{0.02, 0.003, -0.006}, {0.03, 0.003, 0.016}}}};
+  const Scene alone({parts[0]}, true, tool), beside(parts, true, tool);
+  for (int i = 0; i < 100; ++i) {
+    RenderState of_alone = alone.initial_state(), of_beside = beside.initial_state();
+    const auto between = [&](double low, double high) {
+      return low + (high - low) * random.unit();
+    };
+    const Vec3 start(between(-0.02, 0), between(-0.01, 0.01), 0.012);
+    const Vec3 d(between(-0.2, 0.2), between(-0.2, 0.2), 1);
+    const Vec3 turn(between(-0.03, 0.03), between(-0.03, 0.03), 0);
+    for (int k = 0; k < 40; ++k) {
+      const Vec3 tip = start + static_cast<double>(k) * Vec3(1e-4, 1e-4, -4e-4);
+      const LineProbe probe{tip, tip + 0.12 * glm::normalize(d + (k / 20.0) * turn)};
+      const Rendering expected = ray_renderer().tick(alone, of_alone, probe, kTick);
+      const Rendering r = ray_renderer().tick(beside, of_beside, probe, kTick);
+      ASSERT_EQ(r.faults, 0U) << i << " " << k;
+      if (k == 39) {
+        ASSERT_GT(expected.force.z, 1) << i;
+        ASSERT_LE(glm::length(r.force - expected.force), 1e-9) << i;
+      }
+    }
+  }
+}
+
 // One segment from tip to tail is the plain stylus, and so are its pieces.
 TEST(ToolForces, AToolThatIsTheStylusFeelsAsTheStylus) {
   constexpr std::uint64_t kSeed = 12;
