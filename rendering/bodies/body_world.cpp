@@ -152,7 +152,7 @@ void move_all(const BodyWorld& world, BodyWorldState& state, double duration) {
     if (contacts.bounce(left, duration)) contacts.find(left);
     const double next = event < kMostEvents ? contacts.time_to_next(left) : left;
     // Impulses act on the velocities at the end of the step; bodies without impulses move freely.
-    contacts.hold_apart(next, {}, {});
+    contacts.hold_apart(next, {});
     for (std::size_t i = 0; i < world.bodies.size(); ++i) {
       if (state.sleep[i].asleep) continue;
       const MovingBody& body = world.bodies[i];
@@ -183,7 +183,7 @@ void step_pressed(const BodyWorld& world, BodyWorldState& state, std::span<const
   double deepest = 0;  // no spring pushes farther
   for (const PressingSpring& spring : springs) deepest = std::max(deepest, spring.depth);
   contacts.find(duration, deepest, chosen);
-  contacts.hold_apart(duration, springs, chosen);
+  contacts.hold_apart(duration, springs);
   for (std::size_t i = 0; i < world.bodies.size(); ++i) {
     if (!chosen[i]) continue;
     accelerate(world, world.bodies[i], duration, state.motion[i]);
@@ -503,8 +503,7 @@ bool BodyContacts::bounce(double left, double step) {
   return bounced;
 }
 
-void BodyContacts::hold_apart(double step, std::span<PressingSpring> springs,
-                              std::span<const char> chosen) {
+void BodyContacts::hold_apart(double step, std::span<PressingSpring> springs) {
   std::fill(state_.push.begin(), state_.push.end(), Vec3(0));
   std::fill(state_.twist.begin(), state_.twist.end(), Vec3(0));
   std::fill(state_.pushed.begin(), state_.pushed.end(), 0);
@@ -512,7 +511,7 @@ void BodyContacts::hold_apart(double step, std::span<PressingSpring> springs,
   set_velocities(step);
   find_islands();
   for (std::uint32_t island = 0; island < state_.island.size(); ++island) {
-    if (state_.island[island] != island || (!chosen.empty() && !chosen[island])) continue;
+    if (state_.island[island] != island) continue;
     bool closing = false;
     for (const BodyContact& contact : state_.contacts) {
       if (state_.island[contact.a] == island && !state_.near_parts[contact.parts].apart)

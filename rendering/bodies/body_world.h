@@ -267,8 +267,7 @@ class BodyContacts {
   /// Groups of bodies without a meeting by time_to_next move freely. Sets state.push, twist and
   /// pushed.
   /// \param springs  springs that press
-  /// \param chosen   bodies; empty: all
-  void hold_apart(double step, std::span<PressingSpring> springs, std::span<const char> chosen);
+  void hold_apart(double step, std::span<PressingSpring> springs);
 
   /// Adds those impulses to one body.
   void add_impulses(std::size_t body);

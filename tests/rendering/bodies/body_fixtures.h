@@ -27,7 +27,7 @@ inline Mesh box_mesh(const Vec3& size) { return mesh_of(stimuli::box(size)); }
 class BodyScene {
  public:
   Vec3 gravity{0, 0, 0};
-  double stiffness = 1000;
+  double stiffness = 1000, damping = 0;
   bool sleeps = true;
 
   void stands(const Mesh& mesh, const Pose& pose) { add(mesh, pose, next_++); }
@@ -56,6 +56,7 @@ class BodyScene {
     part.pose = pose;
     part.object = object;
     part.material.stiffness = stiffness;
+    part.material.damping = damping;
     parts_.push_back(part);
   }
   std::vector<SceneObject> parts_;

@@ -174,6 +174,30 @@ TEST(MovingScene, ScenesBeyondALimitAreRefusedWithTheLimit) {
   }
 }
 
+/// A damped cube is pushed along beside another one that nothing touches, named before or after it.
+TEST(MovingScene, ABodyBesideThePressedOneTakesNoForceAway) {
+  for (const double speed : {0.1, 1.0}) {  // m/s; the faster one takes steps within a tick
+    std::array<std::vector<double>, 2> forces;
+    for (const std::size_t order : {0U, 1U}) {
+      BodyScene s;
+      s.damping = 1;
+      for (const std::size_t i : {order, 1 - order}) {
+        const double y = i == 0 ? 0 : 0.0505;
+        s.moves(box_mesh(Vec3(0.05)), {{-0.025, y, 0}, {1, 0, 0, 0}}, 0.2);
+      }
+      const Scene scene = s.scene();
+      RenderState state = scene.initial_state();
+      for (int i = 0; i < 20; ++i) {
+        const LineProbe probe = pointing({0.0005 - speed * 1e-3 * i, 0, 0});
+        forces[order].push_back(ray_renderer().tick(scene, state, probe, i > 0 ? 1e-3 : 0).force.x);
+      }
+    }
+    EXPECT_GT(forces[0].back(), 0.1) << speed;
+    for (std::size_t i = 0; i < forces[0].size(); ++i)
+      EXPECT_NEAR(forces[0][i], forces[1][i], 1e-9) << speed << " " << i;
+  }
+}
+
 TEST(MovingScene, ACopiedStateContinuesTheSame) {
   BodyScene s;
   s.gravity = {0, 0, -9.81};
