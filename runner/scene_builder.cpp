@@ -440,6 +440,7 @@ rendering::Scene SceneBuilder::build(const std::vector<stimuli::ObjectSpec>& obj
   std::vector<rendering::SceneObject> parts, shown, solids;
   std::vector<rendering::SceneSurface> surfaces;
   std::vector<std::shared_ptr<const rendering::SoftObject>> soft;
+  std::vector<std::string> faults;
   for (std::size_t i = 0; i < objects.size(); ++i) {
     try {
       const int object = static_cast<int>(i);
@@ -457,13 +458,12 @@ rendering::Scene SceneBuilder::build(const std::vector<stimuli::ObjectSpec>& obj
     } catch (const stimuli::MeshError& error) {
       std::string where = "/objects/" + std::to_string(i);
       if (!objects[i].file.empty()) where += " (" + objects[i].file + ")";
-      std::vector<std::string> faults;
       for (const auto& fault : error.faults()) {
         faults.push_back(where + (fault.starts_with('/') ? "" : ": ") + fault);
       }
-      throw stimuli::MeshError(std::move(faults));
     }
   }
+  if (!faults.empty()) throw stimuli::MeshError(std::move(faults));
   try {
     rendering::Scene others =
         rendering::moving_scene(std::move(parts), moving_of(objects), gravity, side_contact, tool,

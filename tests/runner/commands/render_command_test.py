@@ -210,9 +210,11 @@ class Render(CommandCase):
         for place in ("/objects/0/edge_m", "/objects/0/colour", "/objects/1/shape"):
             self.assertIn(place, done.stderr)
         self.file("open.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\n")
-        scene = self.file("scene.json", '{"objects": [{"shape": "cube", "edge_m": 1}, {"shape": "mesh", "file": "open.obj"}]}')
+        self.file("empty.stl", "")
+        scene = self.file("scene.json", '{"objects": [{"shape": "cube", "edge_m": 1}, {"shape": "mesh", "file": "open.obj"},'
+                          ' {"shape": "mesh", "file": "empty.stl"}]}')
         done = self.palpate("render", "--scene", scene, "--renderer", "ray", "--trajectory", good, "--out", out, status=2)
-        for word in ("scene.json: /objects/1", "open.obj", "open"):
+        for word in ("scene.json: /objects/1", "open.obj", "open", "scene.json: /objects/2", "empty.stl"):
             self.assertIn(word, done.stderr)
         scene = self.file("scene.json", self.CUBE)
         for text, place in (("t,x\n", "line 1"), (self.HEADER, "row"), (self.HEADER + "0,0,0,1,0,0\n1,a\n", "line 3"),
