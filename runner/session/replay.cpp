@@ -68,11 +68,14 @@ bool is_named(const data::StoredTrial& trial, const std::string& protocol) {
 }
 
 /// Names the trials on record in place of a missing one: "; of P03 there are 1/1 to 1/304".
-std::string what_there_is(data::Store& store, const data::TrialName& name) {
+/// \param protocol  the one that is wanted
+std::string what_there_is(data::Store& store, const data::TrialName& name,
+                          const std::string& protocol) {
   constexpr std::size_t kMostNamed = 8;
   std::map<int, std::pair<int, int>> trials;  // the first and the last of each session
   std::set<std::string> codes;
   store.for_each_trial([&](const data::StoredTrial& trial) {
+    if (!is_named(trial, protocol)) return;
     codes.insert(trial.participant.code);
     if (trial.participant.code != name.code) return;
     const int number = trial.record.trial;
@@ -123,7 +126,7 @@ data::StoredTrial find_trial(data::Store& store, const data::TrialName& name,
         place + (cut_off
                      ? " was cut off before an answer: nothing of it was kept to replay"
                      : " is not on record" + (protocol.empty() ? "" : " in protocol " + protocol) +
-                           what_there_is(store, name)));
+                           what_there_is(store, name, protocol)));
   }
   if (found->record.samples.empty()) {
     throw data::StoreRefused(place +

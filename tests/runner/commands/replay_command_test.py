@@ -213,6 +213,8 @@ class Replay(CommandCase):
             done = self.palpate("replay", "--db", args[0], "--trial", args[1], status=2)
             self.assertIn(message, done.stderr)
             self.assertEqual(done.stdout, "")
+        done = self.palpate("replay", "--db", db, "--trial", trials[0][0], "--protocol", "other", status=2)
+        self.assertIn("is not on record in protocol other; it has no finished trial", done.stderr)
         kept = self.dir / "kept.csv"
         kept.write_text("mine")
         self.palpate("replay", "--db", db, "--trial", trials[0][0], "--out", kept, status=2)
