@@ -50,7 +50,7 @@ Table group_table(const TaskAnalysis& analysis, const std::string& label) {
       "Means are geometric if all values are positive and have a true zero, except for exponents; "
       "t "
       "intervals from two participants on. Left out: functions without a threshold among the "
-      "levels shown, or with reversed answers."};
+      "levels shown, with a slope too steep for them, or with reversed answers."};
   return table;
 }
 
@@ -676,7 +676,8 @@ std::string comparison_text(const TaskComparison& one, bool of_renderers) {
   if (!one.comparison.undefined.empty()) text += "  " + one.comparison.undefined + "\n";
   if (one.n_undetermined > 0)
     text += "  " + counted(one.n_undetermined, "function", "functions") +
-            " left out: no threshold among the levels shown, or reversed answers\n";
+            " left out: no threshold among the levels shown, a slope too steep for them, or "
+            "reversed answers\n";
   for (const ConditionDifference& difference : one.comparison.differences) {
     const auto shown = [&](double value) {
       return short_number(one.logarithms ? std::exp(value) : value);

@@ -194,23 +194,28 @@ Figures pses(const TaskCell& cell) {
   return of_functions(cell, [](const ParticipantFunction& one) { return one.figures.pse; });
 }
 
-Figures jnds(const TaskCell& cell) {
+/// A function with the steepest slope has no JND: it is left out and counted.
+Figures figures_of_slopes(
+    const TaskCell& cell,
+    const std::function<std::optional<double>(const ParticipantFunction&)>& value) {
+  std::size_t too_steep = 0;
   Figures figures = of_functions(cell, [&](const ParticipantFunction& one) {
-    // A function with the steepest slope has no JND.
-    const bool none = one.fit.slope_at_bound && !cell.forced_choice;
-    return none ? std::nullopt : one.figures.jnd;
+    const bool none = one.fit.slope_at_bound && !cell.forced_choice && value(one);
+    too_steep += none ? 1 : 0;
+    return none ? std::nullopt : value(one);
   });
-  figures.ratios = true;  // distances
+  figures.n_undetermined += too_steep;
+  figures.ratios = true;
   return figures;
 }
 
+Figures jnds(const TaskCell& cell) {
+  return figures_of_slopes(cell, [](const ParticipantFunction& one) { return one.figures.jnd; });
+}
+
 Figures weber_fractions(const TaskCell& cell) {
-  Figures figures = of_functions(cell, [&](const ParticipantFunction& one) {
-    const bool none = one.fit.slope_at_bound && !cell.forced_choice;
-    return none ? std::nullopt : one.figures.weber_fraction;
-  });
-  figures.ratios = true;
-  return figures;
+  return figures_of_slopes(
+      cell, [](const ParticipantFunction& one) { return one.figures.weber_fraction; });
 }
 
 Figures exponents(const TaskCell& cell) {

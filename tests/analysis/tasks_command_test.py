@@ -85,6 +85,22 @@ class Tasks(TaskStudy):
         self.assertLess(one["differences"][0]["n_pairs"], PEOPLE)
         self.assertLess(abs(one["differences"][0]["mean"]), 1)
 
+    def test_a_jnd_too_small_for_the_levels_is_counted(self):
+        rows = rows_of_a_study(3)
+        for row in rows:
+            if row["task"] == "compare" and row["participant_id"] == "T2":  # knows at once
+                row["success"] = int(row["level"] > 520)
+        found = self.found(rows)
+        functions = {one["participant_id"]: one["fit"] for cell in found["cells"]
+                     if (cell["task"], cell["renderer"]) == ("compare", "point") for one in cell["psychometric_functions"]}
+        self.assertTrue(functions["T2"]["slope_at_bound"])
+        for group in found["group_results"]:
+            if (group["task"], group["measure"]) in (("compare", "jnd"), ("compare", "weber_fraction")):
+                for one in group["renderers"]:
+                    self.assertEqual((one["n_participants"], one["n_undetermined"]), (5, 1), group["measure"])
+        jnd, = [one for one in found["renderer_comparisons"] if (one["task"], one["measure"]) == ("compare", "jnd")]
+        self.assertEqual((jnd["n_undetermined"], jnd["differences"][0]["n_pairs"]), (2, 5))
+
     def test_without_success_it_follows_from_the_answer_or_is_asked_for(self):
         rows = rows_of_a_study(1)
         with_column = self.found(rows)["cells"]

@@ -331,7 +331,8 @@ TEST(TaskText, ComparisonsSayDifferencesAndTests) {
   one.comparison.differences[0].t_test.log_ratio_ci95 = Interval{std::log(0.25), std::log(4)};
   EXPECT_EQ(text_of_comparison(one, false),
             "JNDs by block and stimulus, detect, ray (ratios)\n"
-            "  2 functions left out: no threshold among the levels shown, or reversed answers\n"
+            "  2 functions left out: no threshold among the levels shown, a slope too steep for "
+            "them, or reversed answers\n"
             ""
             "  b, ball / a, ball: 0.5 [0.25, 4], p 0.500; mixed model 2 (1 pair)\n\n");
 
@@ -342,7 +343,8 @@ TEST(TaskText, ComparisonsSayDifferencesAndTests) {
   EXPECT_EQ(text_of_comparison(one, false),
             "PSEs by block and stimulus, detect, ray (ratios)\n"
             "  nothing to compare\n"
-            "  1 function left out: no threshold among the levels shown, or reversed answers\n"
+            "  1 function left out: no threshold among the levels shown, a slope too steep for "
+            "them, or reversed answers\n"
             "\n");
   one.measure = "exponent";
   EXPECT_EQ(text_of_comparison(one, false).substr(0, 10), "Exponents ");
