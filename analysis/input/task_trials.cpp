@@ -186,9 +186,19 @@ TaskTrial read_trial(TaskRow& row) {
 
 }  // namespace
 
-bool has_task_column(const std::string& path) {
+bool has_task_trials(const std::string& path, const std::string& protocol) {
   CsvReader reader(path);
-  return read_header(reader).count("task") > 0;
+  const Columns columns = read_header(reader);
+  if (!columns.contains("task")) return false;
+  std::vector<protocols::Fault> faults;
+  bool has_others = false;
+  while (reader.next()) {
+    const TaskRow row(path, columns, reader, faults);
+    if (!is_protocol(protocol, row.value("protocol_name"), row.value("protocol_sha256"))) continue;
+    if (!row.value("task").empty()) return true;
+    has_others = true;
+  }
+  return !has_others;
 }
 
 TaskTable read_task_trials_csv(const std::string& path, const std::string& protocol) {
@@ -267,6 +277,7 @@ std::optional<TrialTable> identification_of(const TaskTable& table) {
     raw.timed_out = trial.timed_out;
     raw.simulated = trial.simulated;
     raw.response_time = trial.response_time.value_or(kNoTime);
+    raw.protocol = trial.protocol_sha256;
     builder.add(raw);
     ++n;
   }

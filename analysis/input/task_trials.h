@@ -42,8 +42,9 @@ struct TaskTable {
   std::map<std::string, std::map<std::string, protocols::BlockProcedures>> procedures;
 };
 
-/// Whether a CSV file has a column "task" (an export of a study of version 2).
-bool has_task_column(const std::string& path);
+/// Whether the rows of a CSV file are of tasks: an export of a study of version 2, which may have
+/// rows of version 1. \param protocol  the one that is wanted (is_protocol)
+bool has_task_trials(const std::string& path, const std::string& protocol = "");
 
 /// Reads an export of trials. Needs participant_id, task, renderer and shape; level,
 /// standard_level, success, number, confidence, ... are optional. \param protocol  name of the

@@ -92,7 +92,7 @@ void TrialTableBuilder::add(const RawTrial& raw) {
   n_contradicting_ += raw.correct != (raw.response == raw.shape) && !raw.timed_out;
   n_late_answers_ += raw.timed_out && (raw.correct || !raw.response.empty());
   keys_.push_back({row.participant, raw.session, raw.block, raw.trial,
-                   static_cast<std::uint32_t>(rows_.size())});
+                   protocols_.number(raw.protocol), static_cast<std::uint32_t>(rows_.size())});
   rows_.push_back(row);
   if (raw.line > 0) lines_.push_back(static_cast<std::uint32_t>(raw.line));
 }
@@ -133,7 +133,7 @@ void TrialTableBuilder::check_repeated_trials(TrialTable& table) {
   for (std::size_t i = 1; i < keys_.size(); ++i) {
     const TrialKey &a = keys_[i - 1], &b = keys_[i];
     if (a.participant != b.participant || a.session != b.session || a.block != b.block ||
-        a.trial != b.trial) {
+        a.trial != b.trial || a.protocol != b.protocol) {
       continue;
     }
     repeated.emplace_back(a.row, b.row);
@@ -298,7 +298,8 @@ class Faults {
 /// Parses one file into a TrialTable.
 class CsvTrials {
  public:
-  explicit CsvTrials(const std::string& path) : path_(path), faults_(path) {}
+  CsvTrials(const std::string& path, const std::string& protocol)
+      : path_(path), protocol_(protocol), faults_(path) {}
 
   TrialTable read() {
     std::optional<CsvReader> reader;
@@ -355,6 +356,8 @@ class CsvTrials {
                                       hint_for(kColumns[i], alike));
       }
     }
+    if (!protocol_.empty() && at_[protocol_sha256] == kAbsent)
+      faults_.add(line(reader), "expected a column 'protocol_sha256', as --protocol is given");
   }
 
   std::string_view field(Column column) const { return (*fields_)[at_[column]]; }
@@ -430,6 +433,7 @@ class CsvTrials {
     }
     reader_ = &reader;
     fields_ = &reader.fields();
+    if (!protocol_.empty() && !is_protocol(protocol_, "", field(protocol_sha256))) return;
     ok_ = true;
     RawTrial raw;
     raw.participant = name(participant_id, names_);
@@ -457,6 +461,7 @@ class CsvTrials {
     stimuli_.number(raw.shape);
     if (!raw.response.empty()) stimuli_.number(raw.response);
     if (!within_limits()) return;
+    if (at_[protocol_sha256] != kAbsent) raw.protocol = field(protocol_sha256);
     if (at_[protocol_sha256] != kAbsent) remember(field(protocol_sha256), protocols_);
     if (at_[program_version] != kAbsent) remember(field(program_version), versions_);
     if (faults_.count() == 0) builder_.add(raw);
@@ -502,13 +507,16 @@ class CsvTrials {
       torque_.warn(table.warnings);
       return table;
     } catch (const std::runtime_error& error) {
-      faults_.add("file", error.what());
+      faults_.add("file", protocols_.empty() && !protocol_.empty()
+                              ? "expected trials of the protocol " + printable(protocol_) +
+                                    "; a table has the checksums of protocols, not their names"
+                              : error.what());
     }
     faults_.throw_if_any();
     return {};
   }
 
-  std::string path_;
+  std::string path_, protocol_;
   Faults faults_;
   const CsvReader* reader_ = nullptr;
   const std::vector<std::string_view>* fields_ = nullptr;
@@ -524,7 +532,9 @@ class CsvTrials {
 
 }  // namespace
 
-TrialTable read_trials_csv(const std::string& path) { return CsvTrials(path).read(); }
+TrialTable read_trials_csv(const std::string& path, const std::string& protocol) {
+  return CsvTrials(path, protocol).read();
+}
 
 namespace {
 
@@ -536,10 +546,21 @@ void note(const std::string& value, std::vector<std::string>& known) {
 
 }  // namespace
 
-bool is_protocol(const std::string& wanted, const std::string& name, const std::string& sha256) {
+std::string pooled_protocols(const Provenance& provenance) {
+  constexpr std::size_t kDigits = 12;
+  std::string names = provenance.protocol_name;
+  if (names.empty()) {
+    for (const std::string& sha256 : provenance.protocol_sha256)
+      names += (names.empty() ? "" : ", ") + sha256.substr(0, kDigits);
+  }
+  return "Trials of " + std::to_string(provenance.protocol_sha256.size()) +
+         " different protocols (" + names + ") are pooled; --protocol chooses one.";
+}
+
+bool is_protocol(std::string_view wanted, std::string_view name, std::string_view sha256) {
   constexpr std::size_t kDigits = 6;
   return wanted.empty() || wanted == name ||
-         (wanted.size() >= kDigits && sha256.compare(0, wanted.size(), wanted) == 0);
+         (wanted.size() >= kDigits && sha256.starts_with(wanted));
 }
 
 TrialTable read_trials_store(const std::string& path, const std::string& protocol) {
@@ -575,6 +596,7 @@ TrialTable read_trials_store(const std::string& path, const std::string& protoco
     raw.timed_out = record.timed_out;
     raw.simulated = trial.participant.simulated;
     raw.response_time = record.response_time;
+    raw.protocol = trial.protocol_sha256;
     builder.add(raw);
     if (!record.practice) torque.add(record.renderer, notes.driven(trial));
     note(trial.protocol_name, protocol_names);
@@ -589,21 +611,14 @@ TrialTable read_trials_store(const std::string& path, const std::string& protoco
   };
   provenance.protocol_name = join(protocol_names);
   provenance.observer_sha256 = join(observers);
-  const bool several = provenance.protocol_sha256.size() > 1;
   try {
-    TrialTable table = builder.finish(Provenance(provenance), listed);
+    TrialTable table = builder.finish(std::move(provenance), listed);
     torque.warn(table.warnings);
-    if (several)
-      table.warnings.push_back("trials of several protocols (" + provenance.protocol_name +
-                               ") are analysed together; --protocol chooses one");
     return table;
   } catch (const std::runtime_error& error) {
     std::string fault = error.what();
     if (protocol_names.empty() && !protocol.empty())
       fault += " of the protocol " + printable(protocol);
-    if (several)
-      fault += "; they are of several protocols (" + provenance.protocol_name +
-               "): say which with --protocol and its name or the beginning of its checksum";
     throw protocols::InputError({{path, "trials", fault}});
   }
 }

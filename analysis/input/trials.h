@@ -85,13 +85,17 @@ struct TrialTable {
 
 /// Reads trials from CSV: the first nine trial columns of data/export/delimited_row.cpp in any
 /// order, and `practice`, `timed_out`, `simulated`, `protocol_sha256` and `program_version` if
-/// present; others are ignored. \throws protocols::InputError with every fault (beyond kMaxFaults
-/// their number).
-TrialTable read_trials_csv(const std::string& path);
+/// present; others are ignored. \param protocol  at least six digits that the SHA-256 of the wanted
+/// one begins with; "": all \throws protocols::InputError with every fault (beyond kMaxFaults their
+/// number).
+TrialTable read_trials_csv(const std::string& path, const std::string& protocol = "");
+
+/// A warning: "Trials of 2 different protocols (a, b) are pooled; --protocol chooses one."
+std::string pooled_protocols(const Provenance& provenance);
 
 /// Whether `wanted` is the protocol's name, or at least six digits that its SHA-256 begins with.
 /// Empty: any protocol is wanted.
-bool is_protocol(const std::string& wanted, const std::string& name, const std::string& sha256);
+bool is_protocol(std::string_view wanted, std::string_view name, std::string_view sha256);
 
 /// Reads the completed trials of a database. \param protocol  the one that is wanted
 /// \throws protocols::InputError if there are none, and what data::Store::open throws.
@@ -124,6 +128,7 @@ inline constexpr double kNoTime = std::numeric_limits<double>::quiet_NaN();
 /// A row of a source, practice included; see data/README.md for the columns.
 struct RawTrial {
   std::string_view participant, renderer, shape, response;
+  std::string_view protocol{};  ///< its SHA-256; "": unknown
   int session = 1, block = 1, trial = 1;
   bool correct = false, practice = false, timed_out = false, simulated = false;
   double response_time = 0;  ///< s; kNoTime only for a time-out
@@ -144,10 +149,11 @@ class TrialTableBuilder {
   struct TrialKey {
     std::uint32_t participant;
     std::int32_t session, block, trial;
-    std::uint32_t row;
+    std::uint32_t protocol, row;
     bool operator<(const TrialKey& other) const {
-      return std::tie(participant, session, block, trial, row) <
-             std::tie(other.participant, other.session, other.block, other.trial, other.row);
+      return std::tie(participant, session, block, trial, protocol, row) <
+             std::tie(other.participant, other.session, other.block, other.trial, other.protocol,
+                      other.row);
     }
   };
   /// Sorts keys_ and sets TrialRow::position and exposure.
@@ -158,7 +164,7 @@ class TrialTableBuilder {
   /// Replaces kNoTime by the largest known limit, else by the longest time of all trials.
   void fill_times(TrialTable& table);
 
-  Interner participants_, renderers_, stimuli_;
+  Interner participants_, renderers_, stimuli_, protocols_;
   /// By number of the stimulus: order of first presentation from 1; 0: only answered, never shown.
   std::vector<std::uint32_t> shown_;
   std::uint32_t n_shown_ = 0;

@@ -216,6 +216,17 @@ MovementAnalysis analyze_movement(MovementTable table, const std::string& progra
   return analysis;
 }
 
+namespace {
+
+std::vector<std::string> movement_warnings(const TrialTable& trials) {
+  std::vector<std::string> warnings = trials.warnings;
+  if (trials.provenance.protocol_sha256.size() > 1)
+    warnings.push_back(pooled_protocols(trials.provenance));
+  return warnings;
+}
+
+}  // namespace
+
 std::string movement_text(const MovementAnalysis& analysis) {
   const TrialTable& trials = analysis.table.trials;
   std::string out;
@@ -228,6 +239,8 @@ std::string movement_text(const MovementAnalysis& analysis) {
                         std::to_string(trials.rows.size()) + ".");
   for (const auto& [reason, count] : analysis.table.missing)
     out += paragraph_text("Missing: " + counted(count, "trial", "trials") + ": " + reason + ".");
+  for (const std::string& warning : movement_warnings(trials))
+    out += paragraph_text("Warning: " + printable(warning, 4000));
   for (std::size_t c = 0; c < analysis.measures.front().comparisons.size(); ++c)
     out += "\n" + table_text(measures_table(analysis, c));
   if (!analysis.gains.empty()) out += "\n" + table_text(gains_table(analysis));
@@ -252,6 +265,7 @@ std::string movement_html(const MovementAnalysis& analysis, const MovementPictur
   for (const auto& [reason, count] : analysis.table.missing)
     reasons.push_back("Missing: " + counted(count, "trial", "trials") + ": " + reason + ".");
   put_list(page.below_title(), reasons);
+  put_list(page.below_title(), movement_warnings(trials));
   for (const Figure& figure : movement_figures(analysis.table, pictures)) {
     std::string link = figure.id.substr(figure.id.find('-') + 1);  // "paths"
     link.front() = static_cast<char>(std::toupper(link.front()));
@@ -323,6 +337,7 @@ std::string movement_json(const MovementAnalysis& analysis) {
                 {"coverage_reach_m", TouchedSurface::kReach},
                 {"parts", TouchedSurface::kParts}}},
               {"protocol_sha256", trials.provenance.protocol_sha256},
+              {"warnings", movement_warnings(trials)},
               {"n_trials", trials.rows.size()}};
   out["missing"] = Json::object();
   for (const auto& [reason, count] : analysis.table.missing) out["missing"][reason] = count;

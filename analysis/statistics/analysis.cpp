@@ -509,11 +509,8 @@ Analysis analyze(TrialTable table, const AnalysisSettings& settings,
     out.warnings.push_back(
         "Human and simulated participants are pooled: no conclusion about humans.");
   }
-  if (out.table.provenance.protocol_sha256.size() > 1) {
-    out.warnings.push_back("Trials of " +
-                           std::to_string(out.table.provenance.protocol_sha256.size()) +
-                           " different protocols are pooled.");
-  }
+  if (out.table.provenance.protocol_sha256.size() > 1)
+    out.warnings.push_back(pooled_protocols(out.table.provenance));
   warn_of_times(out);
   warn_of_exclusions(out);
   if (out.time_outs.any) warn_of_time_outs(out);

@@ -10,7 +10,6 @@
 #include "analysis/figures/figures.h"
 #include "analysis/figures/svg.h"
 #include "analysis/input/study_record.h"
-#include "analysis/input/task_trials.h"
 #include "analysis/input/trials.h"
 #include "analysis/movement/comparison.h"
 #include "analysis/movement/pictures.h"
@@ -18,8 +17,6 @@
 #include "analysis/statistics/analysis.h"
 #include "analysis/statistics/task_analysis.h"
 #include "data/base/text.h"
-#include "data/store/store.h"
-#include "data/stored_protocol.h"
 #include "runner/commands/movement/movement_study.h"
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/outputs.h"
@@ -82,35 +79,12 @@ analysis::FunctionSettings function_settings(const boost::program_options::varia
   return settings;
 }
 
-/// Refuses several protocols: blocks of the same name in two protocols are different. \throws
-/// UsageError
-void require_one_protocol(const analysis::TaskTable& table, const std::string& wanted) {
-  if (table.protocols.size() < 2) return;
-  std::string names;
-  bool one_name = true;
-  for (const auto& [name, sha256] : table.protocols) {
-    // A table may have checksums alone.
-    const std::string sum = sha256.substr(0, 12);
-    names +=
-        (names.empty() ? "" : ", ") + (name.empty() ? sum : printable(name) + " (" + sum + ")");
-    one_name &= name == table.protocols.front().first;
-  }
-  if (one_name && !wanted.empty()) return;  // one name, as requested
-  throw UsageError(printable(table.source) + ": has trials of several protocols (" + names +
-                   "); say which with --protocol and " +
-                   (table.protocols.front().first.empty() ? "" : "its name or ") +
-                   "the beginning of its checksum");
-}
-
 /// Analyses a study of version 2, or its export.
 void analyze_tasks_of(const std::string& database, const std::string& csv,
                       const std::string& protocol, const analysis::AnalysisSettings& settings,
                       const analysis::FunctionSettings& functions, Outputs& outputs) {
-  analysis::TaskTable table = csv.empty() ? analysis::read_task_trials_store(database, protocol)
-                                          : analysis::read_task_trials_csv(csv, protocol);
-  require_one_protocol(table, protocol);
-  const analysis::TaskAnalysis found =
-      analysis::analyze_tasks(std::move(table), functions, settings, PALPATE_VERSION);
+  const analysis::TaskAnalysis found = analysis::analyze_tasks(
+      read_study_tasks(database, csv, protocol), functions, settings, PALPATE_VERSION);
   if (outputs.wanted("json")) outputs.put("json", task_report_json(found, PALPATE_VERSION));
   if (outputs.wanted("report")) outputs.put("report", task_report_html(found, PALPATE_VERSION));
   if (outputs.wanted("figures")) {
@@ -125,21 +99,6 @@ void analyze_tasks_of(const std::string& database, const std::string& csv,
   }
   outputs.write();
   std::cout << task_report_text(found);
-}
-
-/// Whether the data are of tasks; the later reader reports unreadable data.
-bool is_of_tasks(const std::string& database, const std::string& csv, const std::string& protocol) {
-  try {
-    if (!csv.empty()) return !protocol.empty() || analysis::has_task_column(csv);
-    std::vector<data::ProtocolInfo> wanted =
-        data::Store::open(database, data::Store::Mode::read_only).protocols();
-    std::erase_if(wanted, [&](const data::ProtocolInfo& one) {
-      return !analysis::is_protocol(protocol, one.name, one.sha256);
-    });
-    return data::have_blocks(wanted);
-  } catch (const std::runtime_error&) {
-    return false;
-  }
 }
 
 /// Checks the options of --movement and those that exclude it.

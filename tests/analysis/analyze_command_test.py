@@ -93,9 +93,38 @@ class Analyze(unittest.TestCase):
         together = self.run_palpate("--db", database)
         self.assertIn("first, second", together.stdout + together.stderr)
         self.assertIn("--protocol", together.stdout + together.stderr)
+        self.assertNotIn("repeat the participant", together.stdout)
+        moved = self.run_palpate("--db", database, "--movement", "--json", report, "--force")
+        self.assertIn("(first, second) are pooled", " ".join(moved.stdout.split()))
+        self.assertEqual(len(json.loads(report.read_text())["warnings"]), 1)
         none = self.run_palpate("--db", database, "--protocol", "third")
         self.assertEqual(none.returncode, 2)
         self.assertIn("third", none.stderr)
+
+    def test_a_table_of_several_protocols_gives_the_numbers_of_its_database(self):
+        protocols = FIXTURES.parents[2] / "protocols"
+        quick = json.loads((protocols / "quick.json").read_text())
+        (self.dir / "other.json").write_text(json.dumps({**quick, "name": "other", "repetitions": 1}))
+        database, table = self.dir / "several.db", self.dir / "several.csv"
+        for protocol in (protocols / "quick.json", self.dir / "other.json", protocols / "roughness-magnitude.json"):
+            subprocess.run([PALPATE, "simulate", protocol, "--db", database, "--participants", "2"], check=True,
+                           capture_output=True)
+        subprocess.run([PALPATE, "export", "--db", database, "--format", "csv", "--out", table], check=True,
+                       capture_output=True)
+        for name in ("quick", "other"):
+            found = []
+            for source in ("--db", database), ("--csv", table):
+                wanted = name if not found else found[0]["protocol"]["sha256"][:12]
+                done = self.run_palpate(*source, "--protocol", wanted, "--json", self.dir / "a.json", "--force")
+                self.assertEqual((done.returncode, done.stderr), (0, ""))
+                found.append(json.loads((self.dir / "a.json").read_text()))
+            self.assertEqual(found[0]["protocol"]["sha256"], found[1]["protocol"]["sha256"])
+            for origin in "source", "protocol", "observer_sha256":
+                for one in found:
+                    del one[origin]
+            self.assertEqual(*found)
+        done = self.run_palpate("--csv", table, "--protocol", "quick")
+        self.assertEqual(done.returncode, 2)
 
     def test_names_are_text_not_markup(self):
         who = ["<script>alert(1)</script>", "b&\"'<img src=x onerror=alert(1)>", "]]>", "c" * 200]

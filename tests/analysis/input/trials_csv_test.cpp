@@ -283,6 +283,24 @@ TEST_F(TrialsCsv, TheSameRowsTwiceAreRefusedARepeatedPlaceIsWarnedOf) {
   expect_fault(kHeader + row + late + late, "file", "(lines 3 and 4)");
 }
 
+TEST_F(TrialsCsv, TwoProtocolsMayHaveTheSamePlaceAndOneCanBeChosen) {
+  const std::string row = "P1,1,1,1,ray,cone,,0,60,";
+  const std::string text = kHeader.substr(0, kHeader.size() - 1) + ",protocol_sha256\n" + row +
+                           "aaaaaa11\n" + row + "bbbbbb22\nP1,1,1,2,ray,cube,cube,1,2,bbbbbb22\n";
+  const TrialTable both = read(text);
+  EXPECT_EQ(both.rows.size(), 3U);
+  EXPECT_EQ(both.warnings, std::vector<std::string>());
+  EXPECT_EQ(pooled_protocols(both.provenance),
+            "Trials of 2 different protocols (aaaaaa11, bbbbbb22) are pooled; --protocol chooses "
+            "one.");
+  const TrialTable one = read_trials_csv(path_, "bbbbbb");
+  EXPECT_EQ(one.rows.size(), 2U);
+  EXPECT_EQ(one.provenance.protocol_sha256, (std::vector<std::string>{"bbbbbb22"}));
+  EXPECT_THROW(read_trials_csv(path_, "cccccc"), protocols::InputError);
+  read(kHeader + "P1,1,1,1,ray,cone,cone,1,2\n");
+  EXPECT_THROW(read_trials_csv(path_, "aaaaaa"), protocols::InputError);
+}
+
 // Ten are named, of more how many they are.
 TEST_F(TrialsCsv, NamesTenRowsThatRepeatOthersAndCountsTheRest) {
   for (const int repeats : {1, 9, 10, 11, 13}) {
