@@ -1,10 +1,12 @@
 #include "analysis/input/task_trials.h"
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <cmath>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <stdexcept>
 #include <string_view>
 #include <tuple>
@@ -34,15 +36,26 @@ const std::vector<std::string_view> kTaskColumns{
     "block_name",      "track",         "practice",        "timed_out",
     "simulated",       "session",       "block",           "trial",
     "response_time",   "protocol_name", "protocol_sha256", "comparison_interval",
-    "interval_onsets", "torque_driven"};
+    "interval_onsets", "torque_driven", "program_version"};
 const char* const kTasks[] = {"identify", "compare", "detect", "rate", "adjust", "external"};
 
-Columns read_header(CsvReader& reader) {
+/// \param twice  receives the names of known columns that come again; nullptr: they do not matter
+Columns read_header(CsvReader& reader, std::vector<std::string>* twice = nullptr) {
   Columns columns;
   if (!reader.next()) return columns;
-  for (std::size_t i = 0; i < reader.fields().size(); ++i)
-    columns.emplace(std::string(reader.fields()[i]), i);
+  for (std::size_t i = 0; i < reader.fields().size(); ++i) {
+    const std::string name(reader.fields()[i]);
+    const bool is_new = columns.emplace(name, i).second;
+    if (!is_new && twice != nullptr && std::ranges::find(kTaskColumns, name) != kTaskColumns.end())
+      twice->push_back(name);
+  }
   return columns;
+}
+
+/// Missing values as R, pandas, BIDS and spreadsheets write them; a name may be NA.
+bool is_missing(std::string_view text) {
+  constexpr std::array<std::string_view, 6> kNothing{"", "NA", "n/a", "N/A", "NaN", "nan"};
+  return std::ranges::find(kNothing, text) != kNothing.end();
 }
 
 /// One record by column names, faults with their line.
@@ -57,11 +70,10 @@ class TaskRow {
     if (place == columns_.end() || place->second >= reader_.fields().size()) return {};
     return data::unguarded(reader_.fields()[place->second]);
   }
-  /// "" also for missing values as other programs write them; a name may be NA.
+  /// "" also for missing values as other programs write them.
   std::string_view value(std::string_view column) const {
     const std::string_view field = text(column);
-    return field == "NA" || field == "n/a" || field == "nan" || field == "NaN" ? std::string_view()
-                                                                               : field;
+    return is_missing(field) ? std::string_view() : field;
   }
   /// A hint for a missing column, if another resembles it.
   std::string hint(std::string_view column) const {
@@ -147,6 +159,16 @@ int intervals_of(const TaskRow& row) {
   return static_cast<int>(std::count(onsets.begin(), onsets.end(), ';')) + 1;
 }
 
+void note_once(const std::string& value, std::vector<std::string>& known) {
+  if (!value.empty() && std::find(known.begin(), known.end(), value) == known.end())
+    known.push_back(value);
+}
+
+/// For values that are displayed only: at most eight, made printable.
+void note_shown(std::string_view value, std::vector<std::string>& known) {
+  if (known.size() < 8) note_once(printable(value, 80), known);
+}
+
 TaskTrial read_trial(TaskRow& row) {
   TaskTrial trial;
   trial.participant = row.text("participant_id");
@@ -201,13 +223,55 @@ bool has_task_trials(const std::string& path, const std::string& protocol) {
   return !has_others;
 }
 
+namespace {
+
+/// Puts the trials of each track in their order, in the places that they have.
+void order_trials(std::vector<TaskTrial>& trials) {
+  using Track =
+      std::tuple<std::string, std::string, std::string, std::string, std::string, std::string>;
+  std::map<Track, std::vector<std::size_t>> places;
+  for (std::size_t i = 0; i < trials.size(); ++i) {
+    const TaskTrial& one = trials[i];
+    places[{one.participant, one.task, one.block_name, one.renderer, one.shape, one.track}]
+        .push_back(i);
+  }
+  const auto number = [](const TaskTrial& one) {
+    return std::tuple(one.session, one.block, one.trial);
+  };
+  for (const auto& [track, own] : places) {
+    std::vector<TaskTrial> ordered;
+    ordered.reserve(own.size());
+    for (const std::size_t i : own) ordered.push_back(std::move(trials[i]));
+    std::ranges::stable_sort(ordered, {}, number);
+    for (std::size_t i = 0; i < own.size(); ++i) trials[own[i]] = std::move(ordered[i]);
+  }
+}
+
+/// "NA" is no answer unless a stimulus has that name.
+void drop_missing_answers(std::vector<TaskTrial>& trials) {
+  std::set<std::string> shapes;
+  for (const TaskTrial& trial : trials) shapes.insert(trial.shape);
+  for (TaskTrial& trial : trials) {
+    if (trial.task != "identify" || !is_missing(trial.response) || shapes.contains(trial.response))
+      continue;
+    trial.response.clear();
+    trial.answered = false;
+  }
+}
+
+}  // namespace
+
 TaskTable read_task_trials_csv(const std::string& path, const std::string& protocol) {
   TaskTable table;
   table.source = table.provenance.source = path;
   std::vector<protocols::Fault> faults;
   CsvReader reader(path);
-  const Columns columns = read_header(reader);
-  std::vector<std::string> found;
+  std::vector<std::string> found, twice;
+  const Columns columns = read_header(reader, &twice);
+  const std::size_t n_fields = reader.fields().size();
+  faults.reserve(twice.size());
+  for (const std::string& name : twice)
+    faults.push_back({path, "line 1", "expected each column once; " + name + " comes again"});
   for (const auto& [name, place] : columns) found.push_back(name);
   const std::vector<AlikeColumn> alike = alike_columns(found, kTaskColumns);
   for (const char* needed : {"participant_id", "task", "renderer", "shape", "response"}) {
@@ -226,6 +290,13 @@ TaskTable read_task_trials_csv(const std::string& path, const std::string& proto
       faults.push_back({path, "line " + std::to_string(reader.line()), reader.fault()});
       continue;
     }
+    if (reader.fields().size() != n_fields) {
+      faults.push_back({path, "line " + std::to_string(reader.line()),
+                        "expected " + std::to_string(n_fields) +
+                            " fields, as in the header; found " +
+                            std::to_string(reader.fields().size())});
+      continue;
+    }
     const std::pair named(std::string(row.value("protocol_name")),
                           std::string(row.value("protocol_sha256")));
     if (!is_protocol(protocol, named.first, named.second)) continue;
@@ -238,6 +309,8 @@ TaskTable read_task_trials_csv(const std::string& path, const std::string& proto
     table.trials.push_back(read_trial(row));
     TaskTrial& trial = table.trials.back();
     trial.simulated = simulated;
+    note_shown(trial.protocol_sha256, table.provenance.protocol_sha256);
+    note_shown(row.value("program_version"), table.provenance.program_versions);
     if (!row.value("torque_driven").empty()) torque.add(trial.renderer, row.yes("torque_driven"));
     if (std::find(table.protocols.begin(), table.protocols.end(), named) == table.protocols.end())
       table.protocols.push_back(named);
@@ -255,6 +328,8 @@ TaskTable read_task_trials_csv(const std::string& path, const std::string& proto
                       "expected at least one trial that is not practice" +
                           (protocol.empty() ? "" : " of the protocol " + protocol)});
   if (!faults.empty()) throw protocols::InputError(std::move(faults));
+  if (numbered) order_trials(table.trials);
+  drop_missing_answers(table.trials);
   torque.warn(table.warnings);
   return table;
 }
@@ -295,11 +370,6 @@ std::string listed(const std::vector<std::string>& parts) {
   std::string all;
   for (const std::string& part : parts) all += (all.empty() ? "" : ", ") + part;
   return all;
-}
-
-void note_once(const std::string& value, std::vector<std::string>& known) {
-  if (!value.empty() && std::find(known.begin(), known.end(), value) == known.end())
-    known.push_back(value);
 }
 
 }  // namespace
