@@ -88,6 +88,16 @@ class Plan(unittest.TestCase):
         self.assertEqual(more.returncode, 0)
         self.assertEqual(json.loads(out.read_text("utf-8"))["model"]["gain_sd"], 0.5)
 
+    def test_a_pilot_of_tasks_is_no_pilot_of_times(self):
+        pilot, table = self.dir / "tasks.db", self.dir / "tasks.csv"
+        protocol = FIXTURES.parents[2] / "protocols" / "size-questplus.json"
+        subprocess.run([PALPATE, "simulate", protocol, "--db", pilot, "--participants", "2"], check=True,
+                       capture_output=True)
+        subprocess.run([PALPATE, "export", "--db", pilot, "--format", "csv", "--out", table], check=True,
+                       capture_output=True)
+        self.refused("--jnd-effect", "--db", pilot, *QUICK)
+        self.refused("--jnd-effect", "--csv", table, *QUICK)
+
     def test_simulated_pilots_are_named(self):
         figure, out = self.dir / "power.svg", self.dir / "plan.json"
         done = self.run_palpate("--csv", FIXTURES / "full.csv", *QUICK, "--figure", figure,

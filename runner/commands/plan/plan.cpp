@@ -9,6 +9,7 @@
 #include <stdexcept>
 #include <string>
 #include <thread>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -160,7 +161,7 @@ void add_plan_options(CommandLine& line, PlanOptions& options) {
   add("db", po::value(&options.database)->value_name("FILE"), "a pilot's database");
   add("csv", po::value(&options.csv)->value_name("FILE"), "a pilot's trials as CSV");
   add("protocol", po::value(&options.protocol)->value_name("NAME"),
-      "which of a database's protocols: its name, or the beginning of its SHA-256");
+      "which of a pilot's protocols: its name, or the beginning of its SHA-256");
   add("effect", po::value(&options.effect)->value_name("SHAPE=PERCENT,..."),
       "wanted reductions of time with the ray (of a pilot of other renderers: with its second "
       "renderer), or one number for all shapes; default for ray: the paper's, cone=22,cube=11, or "
@@ -194,6 +195,17 @@ void add_plan_options(CommandLine& line, PlanOptions& options) {
   add("seed", po::value(&options.seed)->default_value(2000)->value_name("S"), "of the simulation");
 }
 
+/// The times of a pilot, which may be of a protocol with tasks. \throws UsageError
+analysis::TrialTable pilot_trials(const PlanOptions& options) {
+  const auto& [database, csv, protocol] = std::tie(options.database, options.csv, options.protocol);
+  if (!is_of_tasks(database, csv, protocol)) return read_study_trials(database, csv, protocol);
+  const analysis::TaskTable tasks = read_study_tasks(database, csv, protocol);
+  if (auto times = analysis::identification_of(tasks)) return std::move(*times);
+  throw UsageError(printable(tasks.source) +
+                   ": expected a pilot in which stimuli are identified; plan --jnd-effect is for "
+                   "thresholds and needs no pilot");
+}
+
 analysis::Pilot starting_point(const PlanOptions& options, const po::variables_map& values) {
   analysis::Pilot pilot;
   if (options.database.empty() && options.csv.empty()) {
@@ -211,8 +223,8 @@ analysis::Pilot starting_point(const PlanOptions& options, const po::variables_m
     return pilot;
   }
   const std::string& source = options.csv.empty() ? options.database : options.csv;
-  pilot = analysis::read_pilot(analysis::analyze(
-      read_study_trials(options.database, options.csv, options.protocol), {}, PALPATE_VERSION));
+  const analysis::Analysis analysis = analysis::analyze(pilot_trials(options), {}, PALPATE_VERSION);
+  pilot = analysis::read_pilot(analysis);
   if (!pilot.undefined.empty()) {
     throw UsageError(
         source + ": expected a pilot that the mixed model can be fitted to: " + pilot.undefined);
@@ -220,6 +232,8 @@ analysis::Pilot starting_point(const PlanOptions& options, const po::variables_m
   pilot.notes.insert(pilot.notes.begin(),
                      "Standard deviations and proportion of used trials are from " +
                          printable(source, 200) + "; the effects to find are not.");
+  if (const analysis::Provenance& from = analysis.table.provenance; from.protocol_sha256.size() > 1)
+    pilot.notes.push_back(pooled_protocols(from));
   return pilot;
 }
 
@@ -435,7 +449,7 @@ void read_known(const std::string& file, const analysis::StudyModel& model,
 int plan_command(const std::vector<std::string>& args) {
   CommandLine line;
   line.usage =
-      R"(palpate plan (--db FILE [--protocol NAME] | --csv FILE | --gain-sd SD --residual-sd SD)
+      R"(palpate plan ((--db FILE | --csv FILE) [--protocol NAME] | --gain-sd SD --residual-sd SD)
            [--effect SHAPE=PERCENT,...]
        palpate plan --jnd-effect PERCENT [--weber W]
        palpate plan --coverage [--studies N] [--seed S])";
@@ -467,8 +481,8 @@ int plan_command(const std::vector<std::string>& args) {
     throw UsageError("expected one of --db FILE and --csv FILE\nUsage: " + line.usage +
                      "\nMore: add --help");
   }
-  if (values->count("protocol") && !values->count("db"))
-    throw UsageError("--protocol: is one of a database; give --db FILE");
+  if (values->count("protocol") && !values->count("db") && !values->count("csv"))
+    throw UsageError("--protocol: is one of a pilot; give --db FILE or --csv FILE");
   Outputs outputs(*values, {"json", "figure"}, {"db", "csv"});
   if (values->count("coverage")) {
     print_coverage(options, *values, outputs);
