@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numeric>
 #include <optional>
+#include <set>
 #include <stdexcept>
 #include <string>
 #include <tuple>
@@ -298,8 +299,21 @@ class Faults {
 /// Parses one file into a TrialTable.
 class CsvTrials {
  public:
-  CsvTrials(const std::string& path, const std::string& protocol)
-      : path_(path), protocol_(protocol), faults_(path) {}
+  /// \param stimuli  names that are answers although they look like missing values
+  CsvTrials(const std::string& path, const std::string& protocol,
+            const std::set<std::string>& stimuli = {})
+      : path_(path), protocol_(protocol), faults_(path) {
+    for (const std::string& name : stimuli) stimuli_.number(name);
+  }
+
+  /// Stimuli such as "NA" that were answers in rows before the first that showed them.
+  std::set<std::string> misread_answers() const {
+    std::set<std::string> names;
+    for (const std::string& name : not_answers_) {
+      if (stimuli_.contains(name)) names.insert(name);
+    }
+    return names;
+  }
 
   TrialTable read() {
     std::optional<CsvReader> reader;
@@ -442,8 +456,11 @@ class CsvTrials {
     raw.trial = number(trial);
     raw.renderer = name(renderer, renderers_);
     raw.shape = name(shape, stimuli_);
-    if (!missing(field(response)) || stimuli_.contains(field(response)))
+    const std::string_view answer = field(response);
+    if (!missing(answer) || answer == field(shape) || stimuli_.contains(answer))
       raw.response = name(response, stimuli_);
+    else if (!answer.empty())
+      not_answers_.emplace(answer);
     raw.timed_out = at_[timed_out] == kAbsent ? raw.response.empty() : truth(timed_out);
     // Time and correctness of a time-out may be missing.
     raw.correct = !(raw.timed_out && missing(field(correct))) && truth(correct);
@@ -526,6 +543,7 @@ class CsvTrials {
   /// Names in valid rows, practice included; each is checked once.
   Interner names_, renderers_, stimuli_;
   std::vector<std::string> protocols_, versions_, warnings_;
+  std::set<std::string> not_answers_;  ///< texts of answers that were read as missing
   TrialTableBuilder builder_;
   TorqueCounts torque_;
 };
@@ -533,7 +551,10 @@ class CsvTrials {
 }  // namespace
 
 TrialTable read_trials_csv(const std::string& path, const std::string& protocol) {
-  return CsvTrials(path, protocol).read();
+  CsvTrials trials(path, protocol);
+  TrialTable table = trials.read();
+  const std::set<std::string> misread = trials.misread_answers();
+  return misread.empty() ? std::move(table) : CsvTrials(path, protocol, misread).read();
 }
 
 namespace {

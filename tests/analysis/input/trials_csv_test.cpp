@@ -301,6 +301,19 @@ TEST_F(TrialsCsv, TwoProtocolsMayHaveTheSamePlaceAndOneCanBeChosen) {
   EXPECT_THROW(read_trials_csv(path_, "aaaaaa"), protocols::InputError);
 }
 
+TEST_F(TrialsCsv, AStimulusMayHaveTheNameOfAMissingValue) {
+  const std::string header = kHeader.substr(0, kHeader.size() - 1) + ",timed_out\n";
+  const TrialTable table = read(header +
+                                "P1,1,1,1,ray,cone,NA,0,2,0\n"
+                                "P1,1,1,2,ray,NA,NA,1,2,0\n"
+                                "P1,1,1,3,ray,NA,nan,0,2,1\n");
+  ASSERT_EQ(table.shapes, (std::vector<std::string>{"cone", "NA"}));
+  EXPECT_EQ(table.rows[0].answer, 1);
+  EXPECT_EQ(table.rows[1].answer, 1);
+  EXPECT_EQ(table.rows[2].answer, -1);
+  EXPECT_EQ(table.warnings, std::vector<std::string>());
+}
+
 // Ten are named, of more how many they are.
 TEST_F(TrialsCsv, NamesTenRowsThatRepeatOthersAndCountsTheRest) {
   for (const int repeats : {1, 9, 10, 11, 13}) {
