@@ -567,6 +567,21 @@ void note(const std::string& value, std::vector<std::string>& known) {
 
 }  // namespace
 
+void order_shapes(TrialTable& table, const std::vector<std::string>& order) {
+  if (!std::ranges::is_permutation(order, table.shapes)) return;
+  std::vector<std::size_t> place(table.shapes.size());
+  for (std::size_t i = 0; i < place.size(); ++i) {
+    place[i] = static_cast<std::size_t>(std::ranges::find(order, table.shapes[i]) - order.begin());
+  }
+  for (TrialRow& row : table.rows) {
+    row.shape = static_cast<std::uint16_t>(place[row.shape]);
+    if (row.answer >= 0 && static_cast<std::size_t>(row.answer) < place.size())
+      row.answer = static_cast<std::int32_t>(place[static_cast<std::size_t>(row.answer)]);
+  }
+  table.shapes = order;
+  std::ranges::copy(order, table.answers.begin());
+}
+
 std::string pooled_protocols(const Provenance& provenance) {
   constexpr std::size_t kDigits = 12;
   std::string names = provenance.protocol_name;

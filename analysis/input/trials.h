@@ -90,6 +90,10 @@ struct TrialTable {
 /// number).
 TrialTable read_trials_csv(const std::string& path, const std::string& protocol = "");
 
+/// Puts the shapes into this order; does nothing if it has other names. A table from CSV has them
+/// in another order than one from a database, which knows the protocol's.
+void order_shapes(TrialTable& table, const std::vector<std::string>& order);
+
 /// A warning: "Trials of 2 different protocols (a, b) are pooled; --protocol chooses one."
 std::string pooled_protocols(const Provenance& provenance);
 

@@ -10,6 +10,7 @@
 #include "analysis/report/report.h"
 #include "analysis/statistics/analysis.h"
 #include "analysis/text.h"
+#include "data/base/json_text.h"
 #include "data/base/text.h"
 #include "data/files/utc.h"
 #include "data/store/task_text.h"
@@ -400,15 +401,26 @@ CheckPoint of_torque(const Registration& registered, const StudyData& study) {
                   all ? std::vector<std::string>() : sessions);
 }
 
+/// In the order of the reported analysis, on which bootstrap, reference level and rounding depend.
+std::vector<std::string> shapes_of(const std::string& analysis_json) {
+  std::vector<std::string> shapes;
+  const nlohmann::ordered_json json = read_ordered_json(analysis_json);
+  const auto accuracy = json.find("accuracy");
+  if (accuracy == json.end() || !accuracy->is_object() || accuracy->empty()) return shapes;
+  for (const auto& [shape, figures] : accuracy->begin()->items()) shapes.push_back(shape);
+  return shapes;
+}
+
 /// Compares the numbers of an analysis as reported with those of the registered analysis.
-CheckPoint of_reported(const analysis::TrialTable& table, const ReportedAnalysis& reported,
+CheckPoint of_reported(analysis::TrialTable table, const ReportedAnalysis& reported,
                        double too_fast) {
   CheckPoint out{"analysis", "Reported numbers", Finding::as_registered,
                  "Every number of the reported analysis is that of these data."};
   analysis::AnalysisSettings settings;
   settings.too_fast = too_fast;
+  analysis::order_shapes(table, shapes_of(reported.json));
   const analysis::NamedResults ours = analysis::named_results(
-      analysis::report_json(analysis::analyze(table, settings, PALPATE_VERSION)), 0);
+      analysis::report_json(analysis::analyze(std::move(table), settings, PALPATE_VERSION)), 0);
   const analysis::NamedResults theirs = analysis::named_results(reported.json, 0);
   const auto text = [](const analysis::NamedResults& of, const std::string& name) {
     const auto found = of.find(name);
@@ -418,7 +430,13 @@ CheckPoint of_reported(const analysis::TrialTable& table, const ReportedAnalysis
   };
   analysis::NamedResults both = ours;
   both.insert(theirs.begin(), theirs.end());
+  const auto has_number = [](const analysis::NamedResults& of, const std::string& name) {
+    const auto found = of.find(name);
+    return found != of.end() && !std::isnan(found->second);
+  };
   for (const auto& [name, value] : both) {
+    // A table of trials has no name of its protocol: null where a database has a text.
+    if (!has_number(ours, name) && !has_number(theirs, name)) continue;
     if (text(ours, name) != text(theirs, name))
       out.evidence.push_back(printable(name, 120) + ": reported " + text(theirs, name) +
                              ", of these data " + text(ours, name));

@@ -314,6 +314,22 @@ TEST_F(TrialsCsv, AStimulusMayHaveTheNameOfAMissingValue) {
   EXPECT_EQ(table.warnings, std::vector<std::string>());
 }
 
+TEST_F(TrialsCsv, ShapesCanBePutInAnotherOrder) {
+  TrialTable table = read(kHeader +
+                          "P1,1,1,1,ray,torus,wedge,0,2\n"
+                          "P1,1,1,2,ray,prism,ring,0,2\n"
+                          "P1,1,1,3,ray,wedge,,0,2\n");
+  order_shapes(table, {"wedge", "torus"});
+  EXPECT_EQ(table.shapes, (std::vector<std::string>{"torus", "prism", "wedge"}));
+  order_shapes(table, {"wedge", "torus", "prism"});
+  EXPECT_EQ(table.shapes, (std::vector<std::string>{"wedge", "torus", "prism"}));
+  EXPECT_EQ(table.answers, (std::vector<std::string>{"wedge", "torus", "prism", "ring"}));
+  EXPECT_EQ(table.rows[0].shape, 1);
+  EXPECT_EQ(table.rows[0].answer, 0);
+  EXPECT_EQ(table.rows[1].answer, 3);
+  EXPECT_EQ(table.rows[2].answer, -1);
+}
+
 // Ten are named, of more how many they are.
 TEST_F(TrialsCsv, NamesTenRowsThatRepeatOthersAndCountsTheRest) {
   for (const int repeats : {1, 9, 10, 11, 13}) {

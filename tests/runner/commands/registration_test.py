@@ -306,6 +306,28 @@ class Check(Study):
             self.write("bad.json", bad)
             self.check("--analysis", "bad.json", status=2)
 
+    def test_the_reported_analysis_of_the_exported_table(self):
+        # A table lists shapes as they appear, a database as the protocol does: the numbers depend on the order.
+        quick = json.loads((SOURCE / "protocols/quick.json").read_text())
+        names = dict(zip(("sphere", "cone", "cylinder", "cube"), ("ball", "spike", "drum", "box")))
+        for stimulus in quick["stimuli"]:
+            stimulus["name"] = names[stimulus["name"]]
+        keys = {key: names[name] for key, name in quick["response"]["keys"].items()}
+        self.write("own.json", {**quick, "name": "own", "response": {**quick["response"], "keys": keys}})
+        self.write("own-hypotheses.json", json.loads(json.dumps(HYPOTHESES).replace("cone", "spike")))
+        run("simulate", "own.json", "--db", "own.db", "--participants", 3, folder=self.dir)
+        run("plan", "--db", "own.db", "--effect", "spike=50", "--participants", "2-3", "--trials", 3, "--studies", 100,
+            "--json", "own-plan.json", folder=self.dir)
+        run("register", "own.json", "--plan", "own-plan.json", "--hypotheses", "own-hypotheses.json", "--out", "own",
+            "--participants", 3, "--studies", 20, folder=self.dir)
+        run("export", "--db", "own.db", "--format", "csv", "--out", "own.csv", folder=self.dir)
+        orders = []
+        for source in "db", "csv":
+            run("analyze", f"--{source}", f"own.{source}", "--json", f"{source}.json", folder=self.dir)
+            run("check", "own", "--db", "own.db", "--analysis", f"{source}.json", folder=self.dir)
+            orders.append(list(json.loads((self.dir / f"{source}.json").read_text())["paired_by_shape"]))
+        self.assertNotEqual(*orders)
+
     def test_a_participant_too_many(self):
         run("simulate", "quick.json", "--db", "study.db", "--participants", self.participants + 1, folder=self.dir)
         done = self.check(status=1)
