@@ -66,6 +66,24 @@ StudyData read_study(data::Store& store) {
   return out;
 }
 
+/// Leaves out what was recorded with protocols of other names, such as a pilot, where there is one
+/// of this name. \return the name that chooses the study's trials (analysis::is_protocol)
+std::string keep_study_named(const std::string& name, StudyData& study) {
+  std::set<std::string> own;  // checksums
+  for (const data::ProtocolInfo& info : study.protocols) {
+    if (info.name == name) own.insert(info.sha256);
+  }
+  if (own.empty()) return "";
+  const auto is_other = [&](const auto& one) { return !own.contains(one.protocol_sha256); };
+  std::erase_if(study.participants, is_other);
+  std::erase_if(study.runs, is_other);
+  std::set<std::int64_t> people;
+  for (const data::StoredRun& run : study.runs) people.insert(run.participant.id);
+  std::erase_if(study.notes,
+                [&](const data::StoredNote& one) { return !people.contains(one.participant.id); });
+  return name;
+}
+
 /// Participants who ended a session by withdrawing and did not begin again.
 std::vector<std::string> withdrawn(const std::vector<data::StoredRun>& runs) {
   std::map<std::pair<std::int64_t, int>, const data::StoredRun*> latest;
@@ -465,12 +483,14 @@ std::string conclusion_of(const StudyCheck& check) {
 StudyCheck check_study(const Registration& registered, const std::string& folder,
                        const std::string& database, const ReportedAnalysis& reported) {
   data::Store store = data::Store::open(database, data::Store::Mode::read_only);
-  const StudyData study = read_study(store);
+  StudyData study = read_study(store);
   if (const auto codes = withdrawn(study.runs); !codes.empty())
     throw UsageError(printable(database) + ": " + analysis::joined(codes) +
                      (codes.size() == 1 ? " has" : " have") +
                      " withdrawn and must not be used; remove with 'palpate forget' first");
-  const analysis::TrialTable table = analysis::read_trials_store(database);
+  const CheckPoint protocol = of_protocol(registered, study);
+  const std::string name = keep_study_named(registered.protocol.name, study);
+  const analysis::TrialTable table = analysis::read_trials_store(database, name);
   analysis::AnalysisSettings settings;
   settings.too_fast = registered.too_fast;
   const analysis::NamedResults results = analysis::named_results(
@@ -479,7 +499,7 @@ StudyCheck check_study(const Registration& registered, const std::string& folder
   StudyCheck out;
   out.label = analysis::simulated_label(table.simulated);
   out.participants = study.participants.size();
-  out.points = {of_registration(folder),       of_protocol(registered, study),
+  out.points = {of_registration(folder),       protocol,
                 of_order(registered, study),   of_participants(registered, study),
                 of_trials(registered, study),  of_people(study),
                 of_dates(registered, study),   of_exclusion(registered, reported),

@@ -341,6 +341,17 @@ class Check(Study):
         self.assertTrue(done.stdout.startswith("1 deviation "), done.stdout)
         self.assertIn("in layout only", done.stdout)
 
+    def test_hypotheses_are_judged_without_the_trials_of_a_pilot(self):
+        self.check("--json", "alone.json")
+        quick = json.loads((self.dir / "quick.json").read_text())
+        self.write("pilot.json", {**quick, "name": "pilot", "repetitions": 4})
+        run("simulate", "pilot.json", "--db", "study.db", "--participants", 2, "--seed", 5, folder=self.dir)
+        done = self.check("--json", "both.json", status=1)
+        self.assertTrue(done.stdout.startswith("1 deviation "), done.stdout)
+        self.assertIn("shown with protocol pilot", done.stdout)
+        alone, both = (json.loads((self.dir / f"{name}.json").read_text()) for name in ("alone", "both"))
+        self.assertEqual(alone["hypotheses"], both["hypotheses"])
+
     def test_nothing_is_overwritten(self):
         before = tree(self.dir / "registration")
         self.write("check.json", "mine")
