@@ -1,7 +1,6 @@
 #include "analysis/input/task_trials.h"
 
 #include <algorithm>
-#include <array>
 #include <charconv>
 #include <cmath>
 #include <map>
@@ -50,12 +49,6 @@ Columns read_header(CsvReader& reader, std::vector<std::string>* twice = nullptr
       twice->push_back(name);
   }
   return columns;
-}
-
-/// Missing values as R, pandas, BIDS and spreadsheets write them; a name may be NA.
-bool is_missing(std::string_view text) {
-  constexpr std::array<std::string_view, 6> kNothing{"", "NA", "n/a", "N/A", "NaN", "nan"};
-  return std::ranges::find(kNothing, text) != kNothing.end();
 }
 
 /// One record by column names, faults with their line.
@@ -157,16 +150,6 @@ int intervals_of(const TaskRow& row) {
   const std::string_view onsets = row.value("interval_onsets");
   if (onsets.empty()) return 0;
   return static_cast<int>(std::count(onsets.begin(), onsets.end(), ';')) + 1;
-}
-
-void note_once(const std::string& value, std::vector<std::string>& known) {
-  if (!value.empty() && std::find(known.begin(), known.end(), value) == known.end())
-    known.push_back(value);
-}
-
-/// For values that are displayed only: at most eight, made printable.
-void note_shown(std::string_view value, std::vector<std::string>& known) {
-  if (known.size() < 8) note_once(printable(value, 80), known);
 }
 
 TaskTrial read_trial(TaskRow& row) {
@@ -363,16 +346,6 @@ std::optional<TrialTable> identification_of(const TaskTable& table) {
     return std::nullopt;
   }
 }
-
-namespace {
-
-std::string listed(const std::vector<std::string>& parts) {
-  std::string all;
-  for (const std::string& part : parts) all += (all.empty() ? "" : ", ") + part;
-  return all;
-}
-
-}  // namespace
 
 TaskTrial task_trial_of(const std::string& participant, const data::TrialRecord& record) {
   TaskTrial trial;

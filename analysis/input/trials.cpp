@@ -65,6 +65,27 @@ std::size_t renderer_rank(const std::string& name) {
 
 }  // namespace
 
+bool is_missing(std::string_view text) {
+  constexpr std::array<std::string_view, 6> kNothing{"", "NA", "n/a", "N/A", "NaN", "nan"};
+  return std::ranges::find(kNothing, text) != kNothing.end();
+}
+
+void note_once(const std::string& value, std::vector<std::string>& known) {
+  if (!value.empty() && std::ranges::find(known, value) == known.end()) known.push_back(value);
+}
+
+void note_shown(std::string_view value, std::vector<std::string>& known) {
+  constexpr std::size_t kMostShown = 8, kLongest = 80;
+  if (!known.empty() && known.back() == value) return;  // as in most rows
+  if (known.size() < kMostShown) note_once(printable(value, kLongest), known);
+}
+
+std::string listed(const std::vector<std::string>& parts) {
+  std::string all;
+  for (const std::string& part : parts) all += (all.empty() ? "" : ", ") + part;
+  return all;
+}
+
 std::uint32_t Interner::number(std::string_view name) {
   if (!names_.empty() && names_[last_] == name) return last_;
   const auto found = numbers_.find(name);
@@ -409,14 +430,6 @@ class CsvTrials {
     return value;
   }
 
-  /// Missing values as written by R, pandas, BIDS and spreadsheets.
-  static bool missing(std::string_view text) {
-    for (const std::string_view nothing : {"", "NA", "n/a", "N/A", "NaN", "nan"}) {
-      if (text == nothing) return true;
-    }
-    return false;
-  }
-
   bool truth(Column column) {
     if (at_[column] == kAbsent) return false;
     const std::string_view text = field(column);
@@ -457,19 +470,19 @@ class CsvTrials {
     raw.renderer = name(renderer, renderers_);
     raw.shape = name(shape, stimuli_);
     const std::string_view answer = field(response);
-    if (!missing(answer) || answer == field(shape) || stimuli_.contains(answer))
+    if (!is_missing(answer) || answer == field(shape) || stimuli_.contains(answer))
       raw.response = name(response, stimuli_);
     else if (!answer.empty())
       not_answers_.emplace(answer);
     raw.timed_out = at_[timed_out] == kAbsent ? raw.response.empty() : truth(timed_out);
     // Time and correctness of a time-out may be missing.
-    raw.correct = !(raw.timed_out && missing(field(correct))) && truth(correct);
+    raw.correct = !(raw.timed_out && is_missing(field(correct))) && truth(correct);
     raw.response_time =
-        raw.timed_out && missing(field(response_time)) ? kNoTime : time(response_time);
+        raw.timed_out && is_missing(field(response_time)) ? kNoTime : time(response_time);
     raw.practice = truth(practice);
     raw.simulated = truth(simulated);
     std::optional<bool> driven;
-    if (at_[torque_driven] != kAbsent && !missing(field(torque_driven)))
+    if (at_[torque_driven] != kAbsent && !is_missing(field(torque_driven)))
       driven = truth(torque_driven);
     raw.line = reader.line();
     if (!ok_ || too_many_) return;
@@ -479,8 +492,8 @@ class CsvTrials {
     if (!raw.response.empty()) stimuli_.number(raw.response);
     if (!within_limits()) return;
     if (at_[protocol_sha256] != kAbsent) raw.protocol = field(protocol_sha256);
-    if (at_[protocol_sha256] != kAbsent) remember(field(protocol_sha256), protocols_);
-    if (at_[program_version] != kAbsent) remember(field(program_version), versions_);
+    if (at_[protocol_sha256] != kAbsent) note_shown(field(protocol_sha256), protocols_);
+    if (at_[program_version] != kAbsent) note_shown(field(program_version), versions_);
     if (faults_.count() == 0) builder_.add(raw);
     if (!raw.practice) torque_.add(raw.renderer, driven);
   }
@@ -502,15 +515,6 @@ class CsvTrials {
     }
     too_many_ = true;
     return false;
-  }
-
-  /// Values of provenance are displayed only: made printable, at most eight are kept.
-  static void remember(std::string_view text, std::vector<std::string>& known) {
-    if (text.empty() || (!known.empty() && known.back() == text)) return;
-    const std::string shown = printable(text, 80);
-    if (known.size() < 8 && std::find(known.begin(), known.end(), shown) == known.end()) {
-      known.push_back(shown);
-    }
   }
 
   TrialTable finish() {
@@ -557,16 +561,6 @@ TrialTable read_trials_csv(const std::string& path, const std::string& protocol)
   return misread.empty() ? std::move(table) : CsvTrials(path, protocol, misread).read();
 }
 
-namespace {
-
-void note(const std::string& value, std::vector<std::string>& known) {
-  if (!value.empty() && std::find(known.begin(), known.end(), value) == known.end()) {
-    known.push_back(value);
-  }
-}
-
-}  // namespace
-
 void order_shapes(TrialTable& table, const std::vector<std::string>& order) {
   if (!std::ranges::is_permutation(order, table.shapes)) return;
   std::vector<std::size_t> place(table.shapes.size());
@@ -603,10 +597,11 @@ TrialTable read_trials_store(const std::string& path, const std::string& protoco
   data::Store store = data::Store::open(path, data::Store::Mode::read_only);
   Provenance provenance;
   provenance.source = path;
-  std::vector<std::string> listed, protocol_names, observers;
+  std::vector<std::string> stimuli, protocol_names, observers;
   for (const data::ProtocolInfo& one : store.protocols()) {
     if (!is_protocol(protocol, one.name, one.sha256)) continue;
-    for (const std::string& name : data::read_stored_protocol(one.text).stimuli) note(name, listed);
+    for (const std::string& name : data::read_stored_protocol(one.text).stimuli)
+      note_once(name, stimuli);
   }
   TrialTableBuilder builder;
   const data::TorqueNotes notes(store);
@@ -635,20 +630,15 @@ TrialTable read_trials_store(const std::string& path, const std::string& protoco
     raw.protocol = trial.protocol_sha256;
     builder.add(raw);
     if (!record.practice) torque.add(record.renderer, notes.driven(trial));
-    note(trial.protocol_name, protocol_names);
-    note(trial.protocol_sha256, provenance.protocol_sha256);
-    note(trial.run.program_version, provenance.program_versions);
-    note(trial.run.observer_sha256, observers);
+    note_once(trial.protocol_name, protocol_names);
+    note_once(trial.protocol_sha256, provenance.protocol_sha256);
+    note_once(trial.run.program_version, provenance.program_versions);
+    note_once(trial.run.observer_sha256, observers);
   });
-  const auto join = [](const std::vector<std::string>& parts) {
-    std::string all;
-    for (const auto& part : parts) all += (all.empty() ? "" : ", ") + part;
-    return all;
-  };
-  provenance.protocol_name = join(protocol_names);
-  provenance.observer_sha256 = join(observers);
+  provenance.protocol_name = listed(protocol_names);
+  provenance.observer_sha256 = listed(observers);
   try {
-    TrialTable table = builder.finish(std::move(provenance), listed);
+    TrialTable table = builder.finish(std::move(provenance), stimuli);
     torque.warn(table.warnings);
     return table;
   } catch (const std::runtime_error& error) {

@@ -110,6 +110,16 @@ constexpr std::size_t kMaxFaults = 50;
 
 // Builds a TrialTable from the rows of any source.
 
+/// Missing values as R, pandas, BIDS and spreadsheets write them; a name may be NA.
+bool is_missing(std::string_view text);
+
+/// Adds a value that is new and not empty.
+void note_once(const std::string& value, std::vector<std::string>& known);
+/// For values that are displayed only: made printable, at most eight are kept.
+void note_shown(std::string_view value, std::vector<std::string>& known);
+/// "a, b"
+std::string listed(const std::vector<std::string>& parts);
+
 /// Numbers distinct names, from 0, in order of first appearance (string interning).
 class Interner {
  public:
