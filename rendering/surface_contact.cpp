@@ -117,7 +117,7 @@ void SurfaceTool::step(const ToolPose& target, const ToolPose& from) {
     resume_planes();
     translate();
   } while (most > 0 && (stuck_ || in_crack_ || !planes_.leave_room()));
-  if (in_step_ && !stuck_) leave_steps();
+  if (step_ && !stuck_) leave_steps();
   own_.carrying_count = 0;
   for (const SurfacePlane& plane : planes_.all()) {
     if (!plane.step) own_.carrying[own_.carrying_count++] = plane.patch;

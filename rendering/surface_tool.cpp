@@ -355,7 +355,7 @@ bool SurfaceTool::in_the_way_at_rest(SurfacePlane& out) {
   double deepest = in_valley() ? kSides * glm::length(at_) : kInTheWay * tolerance_;
   double in_step = 0;
   bool found = false;
-  in_step_ = false;
+  step_.reset();
   const auto look = [&](const SurfacePatch& patch, const PatchPlane& plane) {
     const double under = plane.depth - glm::dot(plane.normal, exact_);
     if (!(under > deepest || (found && under == deepest && patch.segment == out.patch.segment &&
@@ -370,7 +370,6 @@ bool SurfaceTool::in_the_way_at_rest(SurfacePlane& out) {
     if (!hit.hit()) return;
     if (step) {
       in_step = under;
-      in_step_ = true;
       step_ = {patch, plane.normal, plane.depth, 0, false, true};
       return;
     }
@@ -469,14 +468,14 @@ void SurfaceTool::leave_steps() {
   const PlanesOf<SurfacePlane> held = planes_;
   const Vec3 rest = exact_;
   const double far = kSamePlace * skin_;
-  for (int i = 0; i < kMostInTheWay && in_step_; ++i) {
+  for (int i = 0; i < kMostInTheWay && step_; ++i) {
     if (planes_.full()) break;
-    planes_.add(step_);
+    planes_.add(*step_);
     if (!find_exact_place()) break;
     const Vec3 moved = exact_ - rest;
     SurfacePlane in_the_way;
     if (glm::dot(moved, moved) > far * far || in_the_way_at_rest(in_the_way)) break;
-    if (!in_step_) return;
+    if (!step_) return;
   }
   planes_ = held;
   exact_ = rest;

@@ -5,6 +5,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 
 #include "rendering/surface_contact.h"
 #include "rendering/union_state.h"
@@ -112,8 +113,8 @@ class SurfaceTool {
   Vec3 at_;           ///< from the virtual to the ideal tool, one skin off its contacts
   Vec3 exact_;        ///< the same without the skin, at rest
   PlanesOf<SurfacePlane> planes_;
-  bool in_step_ = false;  ///< at exact_ it is in the side of a step of rounding:
-  SurfacePlane step_;     ///< the one that it is deepest in
+  /// The side of a step of rounding that it is deepest in at exact_.
+  std::optional<SurfacePlane> step_;
   struct Parted {
     SurfacePatch patch;
     Vec3 at;
