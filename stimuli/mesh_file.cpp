@@ -156,6 +156,8 @@ MeshFileBytes mesh_file_bytes(const std::string& path) {
   return file;
 }
 
+bool has_unit(const std::string& path) { return lower_extension(path) == ".3mf"; }
+
 bool is_mesh_file_name(const std::string& path) {
   FileFaults faults(path);
   return format_of(path, faults) != MeshFormat::none;

@@ -12,6 +12,8 @@ inline constexpr const char* kMeshExtensions = ".obj, .stl, .gltf, .glb, .ply, .
 
 /// Whether the path ends in one of them.
 bool is_mesh_file_name(const std::string& path);
+/// Whether the file names the unit of its coordinates: .3mf.
+bool has_unit(const std::string& path);
 
 /// Reads a Wavefront .obj (v, f, g, o; other statements ignored; negative and v/vt/vn indices), an
 /// .stl (ASCII or binary) or glTF 2.0 (.gltf, .glb: triangles, strips and fans of the default scene

@@ -405,5 +405,12 @@ TEST_F(MeshFile, DamagedFilesNeverCrash) {
   }
 }
 
+TEST_F(MeshFile, OnlyA3mfFileNamesItsUnit) {
+  EXPECT_TRUE(has_unit("parts/cup.3mf"));
+  EXPECT_TRUE(has_unit("CUP.3MF"));
+  EXPECT_FALSE(has_unit("cup.stl"));
+  EXPECT_FALSE(has_unit("3mf"));
+}
+
 }  // namespace
 }  // namespace palpate::stimuli

@@ -10,6 +10,7 @@
 
 #include "data/base/text.h"
 #include "stimuli/closed_surface.h"
+#include "stimuli/mesh_file.h"
 #include "stimuli/primitives.h"
 
 namespace palpate::runner::commands {
@@ -67,7 +68,7 @@ std::vector<std::string> mesh_notes(const stimuli::ObjectSpec& object, SceneBuil
       size.x, size.y, size.z, mesh.faces);
   std::string note = printable(object.file_name) + ": " + text;
   if (largest > kBeyondHands) {
-    note += object.file_name.ends_with(".3mf")
+    note += stimuli::has_unit(object.file_name)
                 ? "; larger than a metre: check the unit in the file"
                 : "; larger than a metre: expected coordinates in metres; for a file in "
                   "millimetres give \"scale\": 0.001 beside \"file\"";
