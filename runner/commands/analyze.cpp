@@ -20,7 +20,7 @@
 #include "runner/commands/movement/movement_study.h"
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/outputs.h"
-#include "runner/commands/shared/study_options.h"
+#include "runner/commands/shared/study_trials.h"
 #include "runner/commands/sweep/planned.h"
 
 namespace palpate::runner::commands {

@@ -25,7 +25,7 @@
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/outputs.h"
 #include "runner/commands/shared/progress_line.h"
-#include "runner/commands/shared/study_options.h"
+#include "runner/commands/shared/study_trials.h"
 
 namespace palpate::runner::commands {
 

@@ -6,28 +6,12 @@
 #include <set>
 #include <string>
 
-#include "analysis/input/task_trials.h"
-#include "analysis/input/trials.h"
 #include "protocols/protocol.h"
 #include "runner/commands/shared/command.h"
 #include "runner/participants/simulated_settings.h"
 #include "runner/session/simulated_study.h"
 
 namespace palpate::runner::commands {
-
-/// The trials of a study: from the CSV file if given, else from the database.
-/// \param protocol  of several protocols, the one that is wanted (analysis::is_protocol)
-/// \throws UsageError, InputError: the file is not a study's
-analysis::TrialTable read_study_trials(const std::string& database, const std::string& csv,
-                                       const std::string& protocol = "");
-
-/// Whether the trials are of tasks, to be read by read_study_tasks. The reader reports unreadable
-/// data.
-bool is_of_tasks(const std::string& database, const std::string& csv, const std::string& protocol);
-
-/// The trials of a study of version 2, as above. \throws UsageError: they are of several protocols
-analysis::TaskTable read_study_tasks(const std::string& database, const std::string& csv,
-                                     const std::string& protocol);
 
 /// The options that determine the data of a simulated study.
 struct StudyOptions {
