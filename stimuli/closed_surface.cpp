@@ -48,15 +48,22 @@ class Cleaner {
     drop_fins();
     balance();
     link_triangles(points_, triangles_, across_);
-    const std::size_t flat =
+    const Flattened flat =
         collapse_flat_triangles(points_, triangles_, across_, kFlatErrors * error_);
-    if (flat > 0) {
+    if (flat.triangles > 0) {
       drop_gone();
       drop_fins();
       link_triangles(points_, triangles_, across_);
     }
-    note(dropped_ + flat, "triangle without area left out, its neighbours joined",
+    note(dropped_ + flat.triangles, "triangle without area left out, its neighbours joined",
          "triangles without area left out, their neighbours joined");
+    if (flat.farthest > error_) {
+      char text[100];
+      std::snprintf(text, sizeof text, " merged with another at most %.2g m from it",
+                    flat.farthest);
+      note(flat.corners, (std::string("corner") + text).c_str(),
+           (std::string("corners, each") + text).c_str());
+    }
     ClosedSurface surface = take_surface();
     check_winding(surface, kFlatErrors * error_,
                   [&](Index t) { return name_of_face(soup_, face_[t]); });
@@ -143,11 +150,55 @@ class Cleaner {
       corners.clear();
       for (const Index v : loop) corners.push_back(points_[v]);
       ++cut;
-      for (const Triangle& t : face_triangles(corners))
-        add_triangle({loop[t[0]], loop[t[1]], loop[t[2]]}, f);
+      const std::vector<Triangle> pieces = face_triangles(corners);
+      if (loop.size() == 4) note_bent(corners, loop, pieces, f);
+      for (const Triangle& t : pieces) add_triangle({loop[t[0]], loop[t[1]], loop[t[2]]}, f);
     }
     note(cut, "face of four or more corners cut into triangles",
          "faces of four or more corners cut into triangles");
+    note_diagonals();
+  }
+
+  /// Where a face of four corners was cut: bent, it is another surface along the other diagonal.
+  struct BentFace {
+    double bend;  ///< m, between the diagonals
+    Index face, from, to;
+    bool operator<(const BentFace& other) const {
+      return bend != other.bend ? bend > other.bend : face < other.face;
+    }
+  };
+
+  void note_bent(const std::vector<Vec3>& corners, const std::vector<Index>& loop,
+                 const std::vector<Triangle>& pieces, Index face) {
+    const Vec3 across = glm::cross(corners[2] - corners[0], corners[3] - corners[1]);
+    const double length = glm::length(across);
+    if (!(length > 0)) return;
+    const double bend = std::abs(glm::dot(across / length, corners[1] - corners[0]));
+    if (bend <= kFlatErrors * error_) return;
+    const auto is_in_both = [&](Index corner) {
+      return std::all_of(pieces.begin(), pieces.end(), [&](const Triangle& t) {
+        return std::find(t.begin(), t.end(), corner) != t.end();
+      });
+    };
+    const Index from = is_in_both(0) ? 0 : 1;
+    bent_.push_back({bend, face, loop[from], loop[from + 2]});
+  }
+
+  // Names the most bent.
+  void note_diagonals() {
+    constexpr std::size_t kNamed = 3;
+    std::sort(bent_.begin(), bent_.end());
+    for (std::size_t i = 0; i < std::min(kNamed, bent_.size()); ++i) {
+      const BentFace& bent = bent_[i];
+      char text[60];
+      std::snprintf(text, sizeof text, " is bent by %.2g m; cut between vertices ", bent.bend);
+      notes_.push_back(name_of_face(soup_, bent.face) + text + label(bent.from) + " and " +
+                       label(bent.to));
+    }
+    if (bent_.size() > kNamed) {
+      note(bent_.size() - kNamed, "other bent face cut where its triangles are least narrow",
+           "other bent faces cut where their triangles are least narrow");
+    }
   }
 
   // Two triangles back to back enclose nothing.
@@ -480,6 +531,7 @@ class Cleaner {
   std::vector<Index> vertex_;  // the soup's number of each point
   std::vector<Triangle> triangles_, across_;
   std::vector<Index> face_;  // the soup's number of each triangle's face
+  std::vector<BentFace> bent_;
   std::size_t dropped_ = 0;
   double size_ = 0;   // m, diagonal of the bounding box
   double error_ = 0;  // m, of a coordinate

@@ -7,6 +7,7 @@
 #include <iterator>
 #include <numeric>
 #include <queue>
+#include <unordered_map>
 #include <utility>
 
 namespace palpate::stimuli {
@@ -65,7 +66,7 @@ class Flattening {
              std::vector<Triangle>& across, double tolerance)
       : points_(points), triangles_(triangles), across_(across), tolerance_(tolerance) {}
 
-  std::size_t run() {
+  Flattened run() {
     std::vector<Index> first;
     for (Index t = 0; t < triangles_.size(); ++t) {
       if (flat(triangles_[t])) first.push_back(t);
@@ -89,7 +90,8 @@ class Flattening {
       std::erase_if(left, [&](Index t) { return gone(t) || !flat(triangles_[t]); });
       if (left.size() >= before && round > 2) break;
     }
-    return first.size() > left.size() ? first.size() - left.size() : 0;
+    result_.triangles = first.size() > left.size() ? first.size() - left.size() : 0;
+    return result_;
   }
 
  private:
@@ -191,7 +193,7 @@ class Flattening {
   // Collapses side k of t onto its second corner.
   bool move(const std::vector<std::pair<Index, Index>>& around, Index t, Index k, Index n,
             Index j) {
-    const Index to = triangles_[t][(k + 1) % 3];
+    const Index from = triangles_[t][k], to = triangles_[t][(k + 1) % 3];
     for (const auto& [s, i] : around) {
       if (s == t || s == n || flat(triangles_[s])) continue;
       Triangle moved = triangles_[s];
@@ -204,6 +206,10 @@ class Flattening {
     for (const auto& [s, i] : around) triangles_[s][i] = to;
     remove(t);
     remove(n);
+    ++result_.corners;
+    double& travelled = travelled_[to];
+    travelled = std::max(travelled, travelled_[from] + glm::distance(points_[from], points_[to]));
+    result_.farthest = std::max(result_.farthest, travelled);
     for (const auto& [s, i] : around) {
       todo_.push_back(s);
       touched_.push_back(s);
@@ -247,14 +253,15 @@ class Flattening {
   std::vector<Triangle>& across_;
   const double tolerance_;
   std::vector<Index> todo_, touched_;
+  std::unordered_map<Index, double> travelled_;  ///< m, of the corners merged into one
+  Flattened result_;
   bool last_resort_ = false;
 };
 
 }  // namespace
 
-std::size_t collapse_flat_triangles(const std::vector<Vec3>& points,
-                                    std::vector<Triangle>& triangles, std::vector<Triangle>& across,
-                                    double tolerance) {
+Flattened collapse_flat_triangles(const std::vector<Vec3>& points, std::vector<Triangle>& triangles,
+                                  std::vector<Triangle>& across, double tolerance) {
   return Flattening(points, triangles, across, tolerance).run();
 }
 

@@ -26,16 +26,22 @@ PolygonPlane plane_of(std::span<const Vec3> corners);
 
 // Triangles without area in a closed surface.
 
+/// What collapse_flat_triangles did.
+struct Flattened {
+  std::size_t triangles = 0;  ///< taken out
+  std::size_t corners = 0;    ///< merged with a neighbour
+  double farthest = 0;        ///< m, that a corner was moved
+};
+
 /// Takes triangles no higher than `tolerance` (m) out of a closed surface, which stays closed:
 /// where the shortest side is that short its ends become one, else the neighbour over the longest
 /// side is cut at the corner that lies on it. No other triangle turns over; one that could only be
 /// removed that way stays. Triangles that are gone get the corners 0xffffffff; `across` holds until
 /// the end.
-/// \return how many were taken out
-std::size_t collapse_flat_triangles(const std::vector<Vec3>& points,
-                                    std::vector<std::array<std::uint32_t, 3>>& triangles,
-                                    std::vector<std::array<std::uint32_t, 3>>& across,
-                                    double tolerance);
+Flattened collapse_flat_triangles(const std::vector<Vec3>& points,
+                                  std::vector<std::array<std::uint32_t, 3>>& triangles,
+                                  std::vector<std::array<std::uint32_t, 3>>& across,
+                                  double tolerance);
 
 /// Triangles with the numbers of the corners, turned as the face is: together they have its sides,
 /// each once, and no others at their rim. The face may be concave, bent, or visit a place twice (a

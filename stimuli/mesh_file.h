@@ -18,7 +18,7 @@ bool has_unit(const std::string& path);
 /// Reads a Wavefront .obj (v, f, g, o; other statements ignored; negative and v/vt/vn indices), an
 /// .stl (ASCII or binary) or glTF 2.0 (.gltf, .glb: triangles, strips and fans of the default scene
 /// or else the first, node transforms applied, each primitive a group; turned from +y up to +z up;
-/// no sparse accessors, morph targets or required extensions), a .ply (ASCII, binary in both byte
+/// no morph targets, no compression), a .ply (ASCII, binary in both byte
 /// orders; properties that are no coordinates or corners skipped) an .off (text; colours and
 /// normals skipped) or a .3mf (items of the build with their components and transforms, in the unit
 /// that it names). Units of the others are metres as they stand.

@@ -157,7 +157,7 @@ class ObjReader {
   }
 
  private:
-  // A backslash at the end of a line continues it on the next.
+  // A backslash at the end of a line continues it on the next, but no comment ("# C:\\models\\").
   bool next_line() {
     line_number_ += lines_taken_;
     lines_taken_ = 0;
@@ -170,7 +170,8 @@ class ObjReader {
       at_ = end + 1;
       ++lines_taken_;
       if (!line_.empty() && line_.back() == '\r') line_.remove_suffix(1);
-      continued = !line_.empty() && line_.back() == '\\';
+      const bool is_comment = line_.find('#') != std::string_view::npos;
+      continued = !line_.empty() && line_.back() == '\\' && !is_comment;
       if (continued) line_.remove_suffix(1);
       if (continued || !joined_.empty()) joined_.append(line_).append(" ");
     }

@@ -48,6 +48,7 @@ class GltfValue {
   std::size_t size() const;                      ///< of a list; none: 0
   std::string text(const char* expected) const;  ///< \param expected  "a name"
   double number() const;                         ///< finite
+  bool is_true() const;                          ///< none: false
   /// A whole number from 0 to 2^53, also written as 3.0.
   /// \param expected  "a number of bytes"
   std::size_t whole(const std::string& expected) const;
@@ -73,6 +74,7 @@ class GltfDocument {
   GltfValue list(const char* name) const { return root().member(name); }
   /// The entry that a value names by its number. \param kind  of the list's entries, "mesh"
   GltfValue named_by(const GltfValue& number, const char* list_name, const char* kind) const;
+  bool requires_extension(std::string_view name) const;
   /// The data chunk of a .glb.
   const std::optional<std::string_view>& binary() const { return binary_; }
 
@@ -88,26 +90,32 @@ class GltfDocument {
 /// Every function throws GltfRefused.
 class GltfAccessors {
  public:
-  explicit GltfAccessors(const GltfDocument& document);
+  /// \param most  values of an accessor: memory stays in proportion to the file
+  GltfAccessors(const GltfDocument& document, std::size_t most);
 
   /// How many values an accessor has. \param number  the value that names the accessor
   std::size_t count(const GltfValue& number) const;
-  /// m, as they stand: single precision, glTF's axes.
+  /// m, as they stand: single precision or, with KHR_mesh_quantization, integers; glTF's axes.
   std::vector<Vec3> positions(const GltfValue& number) const;
   /// Numbers of vertices. \param vertices  how many there are; all are below it
   std::vector<std::uint32_t> indices(const GltfValue& number, std::size_t vertices) const;
 
  private:
+  /// Values where they lie in a buffer.
   struct Values {
     std::string_view data;
-    std::size_t count, stride;
+    std::size_t stride;  ///< bytes
   };
   GltfValue accessor(const GltfValue& number) const;
-  Values values(const GltfValue& accessor, std::size_t bytes_each) const;
-  std::string_view view_of(const GltfValue& accessor, std::size_t bytes_each,
+  std::size_t count_of(const GltfValue& accessor) const;
+  std::string packed(const GltfValue& accessor, std::size_t bytes_each) const;
+  void put_sparse(const GltfValue& sparse, std::size_t bytes_each, std::string& all) const;
+  Values values(const GltfValue& source, std::size_t count, std::size_t bytes_each) const;
+  std::string_view view_of(const GltfValue& source, std::size_t bytes_each,
                            std::size_t& stride) const;
 
   const GltfDocument& document_;
+  const std::size_t most_;
   std::vector<std::string> buffers_;
 };
 
@@ -147,6 +155,28 @@ json parsed(std::string_view text) {
   }
 }
 
+// Positions as integers of 8 or 16 bits.
+constexpr const char* kQuantization = "KHR_mesh_quantization";
+
+// The solid does not depend on how it looks.
+bool changes_looks_only(std::string_view extension) {
+  constexpr std::array<std::string_view, 8> kLooks{
+      "KHR_materials_", "KHR_texture_", "EXT_texture_", "MSFT_texture_",
+      "MSFT_packing_",  "KHR_lights_",  "EXT_lights_",  "KHR_xmp"};
+  return std::any_of(kLooks.begin(), kLooks.end(),
+                     [&](std::string_view start) { return extension.starts_with(start); });
+}
+
+void require_known(const GltfValue& extension) {
+  const std::string name = extension.text("the name of an extension");
+  if (name == kQuantization || changes_looks_only(name)) return;
+  if (name == "KHR_draco_mesh_compression" || name == "EXT_meshopt_compression") {
+    extension.refuse(
+        "a file without compression (npx @gltf-transform/cli copy COMPRESSED.glb PLAIN.glb)");
+  }
+  extension.refuse("a file that needs no extension but KHR_mesh_quantization and those of looks");
+}
+
 }  // namespace
 
 void GltfValue::refuse(const std::string& expected) const {
@@ -177,6 +207,11 @@ std::string GltfValue::text(const char* expected) const {
 double GltfValue::number() const {
   if (!present() || !value_->is_number()) refuse("a number");
   return value_->get<double>();
+}
+
+bool GltfValue::is_true() const {
+  if (present() && !value_->is_boolean()) refuse("true or false");
+  return present() && value_->get<bool>();
 }
 
 std::optional<std::size_t> GltfValue::as_whole() const {
@@ -214,14 +249,21 @@ GltfDocument::GltfDocument(std::string_view bytes) : root_(parsed(take_chunks(by
   if (!version.member("version").text("\"2.0\"").starts_with("2."))
     version.member("version").refuse("\"2.0\"");
   const GltfValue extensions = list("extensionsRequired");
-  if (extensions.size() > 0)
-    extensions.element(0).refuse("a file that needs no extension (export without compression)");
+  for (std::size_t i = 0; i < extensions.size(); ++i) require_known(extensions.element(i));
 }
 
 GltfValue GltfDocument::named_by(const GltfValue& number, const char* list_name,
                                  const char* kind) const {
   const GltfValue all = list(list_name);
   return all.element(number.number_of(kind, all.size()));
+}
+
+bool GltfDocument::requires_extension(std::string_view name) const {
+  const GltfValue extensions = list("extensionsRequired");
+  for (std::size_t i = 0; i < extensions.size(); ++i) {
+    if (extensions.element(i).text("the name of an extension") == name) return true;
+  }
+  return false;
 }
 
 // A .glb is a header and chunks; a .gltf is its JSON alone.
@@ -259,7 +301,18 @@ std::string_view GltfDocument::take_chunks(std::string_view bytes) {
 
 namespace {
 
-constexpr std::size_t kByte = 5121, kShort = 5123, kInt = 5125, kFloat = 5126;  // componentType
+/// A number of an accessor by its componentType (glTF 2.0, 3.6.2.2).
+struct Component {
+  std::size_t type, bytes;
+  double most;  ///< of a normalised integer; a position of this value is 1
+  bool is_signed;
+};
+constexpr std::array<Component, 5> kIntegers{{{5120, 1, 127, true},
+                                              {5121, 1, 255, false},
+                                              {5122, 2, 32767, true},
+                                              {5123, 2, 65535, false},
+                                              {5125, 4, 0, false}}};
+constexpr std::size_t kFloat = 5126;
 constexpr const char* kBytes = "a number of bytes";
 
 std::string of_uri(const GltfValue& uri) {
@@ -273,9 +326,56 @@ std::string of_uri(const GltfValue& uri) {
   return std::move(*data);
 }
 
+/// \return bytes of an unsigned number of a vertex or value
+std::size_t index_bytes(const GltfValue& component) {
+  const std::string kinds = "5121, 5123 or 5125 (unsigned indices)";
+  const std::size_t type = component.whole(kinds);
+  for (const Component& known : kIntegers) {
+    if (known.type == type && !known.is_signed) return known.bytes;
+  }
+  component.refuse(kinds);
+}
+
+/// How a coordinate of a position is written.
+class PositionNumber {
+ public:
+  /// \throws GltfRefused: not in single precision, and no integer that the file announces
+  PositionNumber(const GltfDocument& document, const GltfValue& accessor)
+      : is_normalised_(accessor.member("normalized").is_true()) {
+    const GltfValue component = accessor.member("componentType");
+    const std::string kinds = "5126 (positions in single precision)";
+    const std::size_t type = component.whole(kinds);
+    if (type == kFloat) return;
+    const auto* const known =
+        std::find_if(kIntegers.begin(), kIntegers.end(),
+                     [&](const Component& c) { return c.type == type && c.bytes <= 2; });
+    if (known == kIntegers.end()) component.refuse(kinds);
+    if (!document.requires_extension(kQuantization))
+      component.refuse(kinds + ", or " + kQuantization + " in extensionsRequired");
+    integer_ = *known;
+  }
+
+  std::size_t bytes() const { return integer_ ? integer_->bytes : 4; }
+
+  /// \return m, before the node's transform; may be NaN or infinite
+  double at(std::string_view data, std::size_t byte) const {
+    const std::uint32_t bits = little_endian(data, byte, bytes());
+    if (!integer_) return std::bit_cast<float>(bits);
+    const double steps = 2 * (integer_->most + 1);
+    double value = bits;
+    if (integer_->is_signed && value > integer_->most) value -= steps;
+    return is_normalised_ ? std::max(value / integer_->most, -1.0) : value;
+  }
+
+ private:
+  bool is_normalised_;
+  std::optional<Component> integer_;  ///< none: single precision
+};
+
 }  // namespace
 
-GltfAccessors::GltfAccessors(const GltfDocument& document) : document_(document) {
+GltfAccessors::GltfAccessors(const GltfDocument& document, std::size_t most)
+    : document_(document), most_(most) {
   const GltfValue list = document.list("buffers");
   for (std::size_t i = 0; i < list.size(); ++i) {
     const GltfValue buffer = list.element(i), uri = buffer.member("uri");
@@ -297,12 +397,19 @@ std::size_t GltfAccessors::count(const GltfValue& number) const {
   return accessor(number).member("count").whole("a number of values");
 }
 
-std::string_view GltfAccessors::view_of(const GltfValue& accessor, std::size_t bytes_each,
+std::size_t GltfAccessors::count_of(const GltfValue& accessor) const {
+  const GltfValue count = accessor.member("count");
+  const std::size_t values = count.whole("a number of values");
+  if (values == 0) count.refuse("one value or more");
+  if (values > most_)
+    count.refuse("at most " + std::to_string(most_) + " values, for a file of this size");
+  return values;
+}
+
+std::string_view GltfAccessors::view_of(const GltfValue& source, std::size_t bytes_each,
                                         std::size_t& stride) const {
-  if (accessor.member("sparse").present())
-    accessor.member("sparse").refuse("none (export without sparse accessors)");
   const GltfValue view =
-      document_.named_by(accessor.member("bufferView"), "bufferViews", "bufferView");
+      document_.named_by(source.member("bufferView"), "bufferViews", "bufferView");
   const GltfValue step = view.member("byteStride"), length = view.member("byteLength");
   stride = step.whole_or(bytes_each, kBytes);
   if (stride < bytes_each || stride > 252)
@@ -318,17 +425,15 @@ std::string_view GltfAccessors::view_of(const GltfValue& accessor, std::size_t b
   return buffer.substr(start, length.whole(kBytes));
 }
 
-GltfAccessors::Values GltfAccessors::values(const GltfValue& accessor,
+GltfAccessors::Values GltfAccessors::values(const GltfValue& source, std::size_t count,
                                             std::size_t bytes_each) const {
   Values all{};
-  const std::string_view view = view_of(accessor, bytes_each, all.stride);
-  const std::size_t offset = accessor.member("byteOffset").whole_or(0, kBytes);
-  all.count = accessor.member("count").whole("a number of values");
-  if (all.count == 0) accessor.member("count").refuse("one value or more");
+  const std::string_view view = view_of(source, bytes_each, all.stride);
+  const std::size_t offset = source.member("byteOffset").whole_or(0, kBytes);
   const std::size_t room = offset <= view.size() ? view.size() - offset : 0;
-  if (room < bytes_each || (all.count - 1) > (room - bytes_each) / all.stride) {
-    throw GltfRefused{accessor.place(),
-                      "room for " + std::to_string(all.count) + " values of " +
+  if (room < bytes_each || (count - 1) > (room - bytes_each) / all.stride) {
+    throw GltfRefused{source.place(),
+                      "room for " + std::to_string(count) + " values of " +
                           std::to_string(bytes_each) + " bytes in its bufferView",
                       std::to_string(room) + " bytes"};
   }
@@ -336,16 +441,52 @@ GltfAccessors::Values GltfAccessors::values(const GltfValue& accessor,
   return all;
 }
 
+/// The values of an accessor one after the other; a sparse one without a bufferView begins as
+/// zeros (glTF 2.0, 3.6.2.3).
+std::string GltfAccessors::packed(const GltfValue& accessor, std::size_t bytes_each) const {
+  const std::size_t count = count_of(accessor);
+  const GltfValue sparse = accessor.member("sparse");
+  std::string all(count * bytes_each, '\0');
+  if (accessor.member("bufferView").present() || !sparse.present()) {
+    const Values dense = values(accessor, count, bytes_each);
+    for (std::size_t i = 0; i < count; ++i)
+      dense.data.copy(all.data() + i * bytes_each, bytes_each, i * dense.stride);
+  }
+  if (sparse.present()) put_sparse(sparse, bytes_each, all);
+  return all;
+}
+
+void GltfAccessors::put_sparse(const GltfValue& sparse, std::size_t bytes_each,
+                               std::string& all) const {
+  const std::size_t most = all.size() / bytes_each;
+  const std::size_t count = sparse.member("count").whole("a number of values");
+  if (count == 0 || count > most)
+    sparse.member("count").refuse("1 to " + std::to_string(most) + " values");
+  const GltfValue indices = sparse.member("indices"), given = sparse.member("values");
+  const std::size_t width = index_bytes(indices.member("componentType"));
+  const Values places = values(indices, count, width), other = values(given, count, bytes_each);
+  std::optional<std::size_t> before;
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::size_t place = little_endian(places.data, i * places.stride, width);
+    if (place >= most || (before && place <= *before)) {
+      throw GltfRefused{indices.place(), "rising numbers of values below " + std::to_string(most),
+                        std::to_string(place) + " as number " + std::to_string(i)};
+    }
+    other.data.copy(all.data() + place * bytes_each, bytes_each, i * other.stride);
+    before = place;
+  }
+}
+
 std::vector<Vec3> GltfAccessors::positions(const GltfValue& number) const {
   const GltfValue source = accessor(number);
-  const GltfValue type = source.member("type"), component = source.member("componentType");
+  const GltfValue type = source.member("type");
   if (type.text("\"VEC3\"") != "VEC3") type.refuse("\"VEC3\"");
-  if (component.whole("5126") != kFloat) component.refuse("5126 (positions in single precision)");
-  const Values all = values(source, 12);
-  std::vector<Vec3> positions(all.count);
-  for (std::size_t i = 0; i < all.count; ++i) {
+  const PositionNumber read(document_, source);
+  const std::string all = packed(source, 3 * read.bytes());
+  std::vector<Vec3> positions(all.size() / (3 * read.bytes()));
+  for (std::size_t i = 0; i < positions.size(); ++i) {
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      const auto value = std::bit_cast<float>(little_endian(all.data, i * all.stride + 4 * axis));
+      const double value = read.at(all, (3 * i + axis) * read.bytes());
       if (!std::isfinite(value)) {
         throw GltfRefused{source.place(), "finite coordinates",
                           "infinity or NaN at vertex " + std::to_string(i)};
@@ -359,16 +500,13 @@ std::vector<Vec3> GltfAccessors::positions(const GltfValue& number) const {
 std::vector<std::uint32_t> GltfAccessors::indices(const GltfValue& number,
                                                   std::size_t vertices) const {
   const GltfValue source = accessor(number);
-  const GltfValue type = source.member("type"), component = source.member("componentType");
+  const GltfValue type = source.member("type");
   if (type.text("\"SCALAR\"") != "SCALAR") type.refuse("\"SCALAR\"");
-  const std::string kinds = "5121, 5123 or 5125 (unsigned indices)";
-  const std::size_t kind = component.whole(kinds);
-  const std::size_t size = kind == kByte ? 1 : kind == kShort ? 2 : kind == kInt ? 4 : 0;
-  if (size == 0) component.refuse(kinds);
-  const Values all = values(source, size);
-  std::vector<std::uint32_t> corners(all.count);
-  for (std::size_t i = 0; i < all.count; ++i) {
-    corners[i] = little_endian(all.data, i * all.stride, size);
+  const std::size_t width = index_bytes(source.member("componentType"));
+  const std::string all = packed(source, width);
+  std::vector<std::uint32_t> corners(all.size() / width);
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    corners[i] = little_endian(all, i * width, width);
     if (corners[i] < vertices) continue;
     throw GltfRefused{source.place(),
                       "numbers of vertices from 0 to " + std::to_string(vertices - 1),
@@ -460,7 +598,7 @@ std::vector<Triangle> triangles_of(std::size_t mode, const std::vector<std::uint
 class GltfReader {
  public:
   explicit GltfReader(std::string_view bytes)
-      : document_(bytes), data_(document_), most_(std::max(bytes.size(), kAlwaysRead)) {}
+      : document_(bytes), most_(std::max(bytes.size(), kAlwaysRead)), data_(document_, 3 * most_) {}
 
   PolygonSoup read() {
     reached_.assign(document_.list("nodes").size(), 0);
@@ -611,8 +749,8 @@ class GltfReader {
   }
 
   GltfDocument document_;
+  std::size_t most_;  // vertices, and triangles
   GltfAccessors data_;
-  std::size_t most_;           // vertices, and triangles
   std::vector<char> reached_;  // of each node
   PolygonSoup soup_;
   MeshNames names_;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <cstdio>
 #include <glm/geometric.hpp>
 #include <limits>
 #include <numbers>
@@ -145,7 +146,62 @@ TEST(ClosedSurfaceTest, BentFacesAreCutNotRefused) {
   soup.vertices[0] *= 1.3;
   const CleanedSurface cleaned = closed_surface(soup);
   expect_closed(cleaned.surface);
-  EXPECT_EQ(notes_of(cleaned), "6 faces of four or more corners cut into triangles\n");
+  // Corner 0 is (-0.026, -0.026, -0.026), so three diagonals pass each other at 0.0026 m.
+  EXPECT_EQ(notes_of(cleaned),
+            "6 faces of four or more corners cut into triangles\n"
+            "face 0 (vertices 0 3 2 1) is bent by 0.0026 m; cut between vertices 3 and 1\n"
+            "face 2 (vertices 0 1 5 4) is bent by 0.0026 m; cut between vertices 1 and 4\n"
+            "face 5 (vertices 3 0 4 7) is bent by 0.0026 m; cut between vertices 3 and 4\n");
+}
+
+TEST(ClosedSurfaceTest, NamesTheDiagonalOfBentFaces) {
+  PolygonSoup soup = cube(0.04);
+  for (Vec3& v : soup.vertices) v.z += v.x > 0 && v.y > 0 && v.z > 0 ? 0.001 : 0;
+  const CleanedSurface cleaned = closed_surface(soup);
+  // The top's corners are at 0.02, but one at 0.021: its diagonals meet at 0.02 and 0.0205.
+  const std::string notes = notes_of(cleaned);
+  const std::size_t at = notes.find("is bent by 0.0005 m; cut between vertices ");
+  ASSERT_NE(at, std::string::npos) << notes;
+  std::size_t from = 0, to = 0;
+  ASSERT_EQ(std::sscanf(notes.c_str() + at, "is bent by 0.0005 m; cut between vertices %zu and %zu",
+                        &from, &to),
+            2)
+      << notes;
+  const auto has = [&](const std::array<Vec3, 3>& t, std::size_t corner) {
+    return std::find(t.begin(), t.end(), soup.vertices.at(corner)) != t.end();
+  };
+  const TriangleSurface triangles = places_of(cleaned.surface);
+  EXPECT_EQ(std::count_if(triangles.begin(), triangles.end(),
+                          [&](const auto& t) { return has(t, from) && has(t, to); }),
+            2);
+}
+
+TEST(ClosedSurfaceTest, NotesHowFarCornersMoved) {
+  PolygonSoup soup = triangulated(cube(0.04));
+  soup.coordinate_error = 1e-5;
+  const std::vector<std::uint32_t> face = soup.faces[0];
+  const auto near = static_cast<std::uint32_t>(soup.vertices.size());
+  // Three errors from the first corner, on an edge.
+  const Vec3 way = glm::normalize(soup.vertices[face[1]] - soup.vertices[face[0]]);
+  soup.vertices.push_back(soup.vertices[face[0]] + 3e-5 * way);
+  soup.faces[0] = {near, face[1], face[2]};
+  soup.faces.push_back({face[0], near, face[2]});
+  for (std::size_t f = 1; f + 1 < soup.faces.size(); ++f) {
+    std::vector<std::uint32_t>& other = soup.faces[f];
+    const auto at = std::find(other.begin(), other.end(), face[1]);
+    if (at == other.end() || std::find(other.begin(), other.end(), face[0]) == other.end())
+      continue;
+    const auto third = std::find_if(other.begin(), other.end(),
+                                    [&](std::uint32_t v) { return v != face[0] && v != face[1]; });
+    const std::uint32_t apex = *third;
+    other = {face[1], near, apex};
+    soup.faces.push_back({near, face[0], apex});
+    break;
+  }
+  const CleanedSurface cleaned = closed_surface(soup);
+  EXPECT_NE(notes_of(cleaned).find("1 corner merged with another at most 3e-05 m from it"),
+            std::string::npos)
+      << notes_of(cleaned);
 }
 
 // A face with a bridge to its hole visits two corners twice.

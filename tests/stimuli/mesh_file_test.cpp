@@ -260,6 +260,8 @@ TEST_F(MeshFile, ObjFaultsNameTheLine) {
   expect_fault("a.obj", head + "f 1 2 99999999999999999999", ": line 4:");
   expect_fault("a.obj", head + "f 1 2 3x", "\"3x\"");
   expect_fault("a.obj", head + "# a\\\nb\nf 1 2 4", ": line 6:");
+  expect_fault("a.obj", head + "# C:\\parts\\\nf 1 2 4",
+               ": line 5: expected vertex numbers up to 3");
   expect_fault("a.obj", head, "at least one f statement, found none");
   expect_fault("a.obj", "", "at least one f statement, found none");
 }

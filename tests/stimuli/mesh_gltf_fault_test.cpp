@@ -39,8 +39,11 @@ TEST(MeshGltfFaults, NameThePlaceAndWhatWasExpected) {
   expect("\"asset\"", "\"assets\"",
          "/asset: expected an object with the version of glTF, found nothing");
   expect("\"scene\": 0", "\"extensionsRequired\": [\"KHR_draco_mesh_compression\"]",
-         "/extensionsRequired/0: expected a file that needs no extension (export without "
-         "compression), found \"KHR_draco_mesh_compression\"");
+         "/extensionsRequired/0: expected a file without compression (npx @gltf-transform/cli copy "
+         "COMPRESSED.glb PLAIN.glb), found \"KHR_draco_mesh_compression\"");
+  expect("\"scene\": 0", "\"extensionsRequired\": [\"KHR_materials_unlit\", \"ADOBE_other\"]",
+         "/extensionsRequired/1: expected a file that needs no extension but KHR_mesh_quantization "
+         "and those of looks, found \"ADOBE_other\"");
   expect("\"scene\": 0", "\"scene\": 1",
          "/scene: expected the number of a scene from 0 to 0, found 1");
   expect("\"nodes\": [0]", "\"nodes\": [3]",
@@ -64,11 +67,24 @@ TEST(MeshGltfFaults, NameThePlaceAndWhatWasExpected) {
          "1, found nothing");
   expect("\"VEC3\"", "\"VEC4\"", "/accessors/0/type: expected \"VEC3\", found \"VEC4\"");
   expect("5126", "5123",
-         "/accessors/0/componentType: expected 5126 (positions in single precision), found 5123");
+         "/accessors/0/componentType: expected 5126 (positions in single precision), or "
+         "KHR_mesh_quantization in extensionsRequired, found 5123");
+  expect("5126", "5125",
+         "/accessors/0/componentType: expected 5126 (positions in single precision), found 5125");
   expect("5123", "5120",
          "/accessors/1/componentType: expected 5121, 5123 or 5125 (unsigned indices), found 5120");
   expect("\"bufferView\": 0,", "\"bufferView\": 0, \"sparse\": {},",
-         "/accessors/0/sparse: expected none (export without sparse accessors), found an object");
+         "/accessors/0/sparse/count: expected a number of values, found nothing");
+  expect("\"bufferView\": 0,", "\"bufferView\": 0, \"sparse\": {\"count\": 9},",
+         "/accessors/0/sparse/count: expected 1 to 8 values, found 9");
+  expect("\"bufferView\": 0,",
+         R"("bufferView": 0, "sparse": {"count": 4, "indices": {"bufferView": 1,
+            "componentType": 5123}, "values": {"bufferView": 0}},)",
+         "/accessors/0/sparse/indices: expected rising numbers of values below 8, found 0 as "
+         "number 3");
+  expect("\"count\": 36", "\"count\": 1e12",
+         "/accessors/1/count: expected at most 393216 values, for a file of this size, found "
+         "1000000000000.0");
   expect("\"bufferView\": 0,", "",
          "/accessors/0/bufferView: expected the number of a bufferView from 0 to 1, found nothing");
   expect("\"count\": 8", "\"count\": 9",

@@ -146,6 +146,80 @@ TEST(MeshGltf, StripsAndFansAreTriangles) {
              kSize, Vec3(0));
 }
 
+/// The box with corners as integers of two bytes, and its node's scale.
+std::string quantized(int component, bool normalised, int most, const std::string& scale) {
+  std::string data;
+  for (std::uint32_t corner = 0; corner < 8; ++corner) {
+    for (std::uint32_t axis = 0; axis < 3; ++axis) {
+      const bool low = (corner >> axis & 1U) == 0;
+      const int least = component == 5122 ? -most : 0;
+      gltf::append(data, static_cast<std::uint32_t>(low ? least : most), 2);
+    }
+    gltf::append(data, 0, 2);  // to a multiple of four bytes
+  }
+  data += gltf::box_indices();
+  std::string text = document(R"([{"mesh": 0, "scale": )" + scale + "}]", gltf::data_uri(data));
+  text = changed(text, "5126",
+                 std::to_string(component) + (normalised ? ", \"normalized\": true" : ""));
+  text = changed(text, "\"scene\": 0", R"("extensionsRequired": ["KHR_mesh_quantization"])");
+  text = changed(text, "\"byteLength\": 96", R"("byteLength": 64, "byteStride": 8)");
+  text = changed(text, "\"byteOffset\": 96", "\"byteOffset\": 64");
+  return changed(text, "\"byteLength\": 168", "\"byteLength\": 136");
+}
+
+TEST(MeshGltf, ReadsQuantizedPositions) {
+  const Vec3 corner(kSize.x, -kSize.y, kSize.z);
+  expect_box(read_mesh("a.gltf", quantized(5122, true, 32767, "[0.01, 0.02, 0.03]")), kSize,
+             Vec3(0));
+  expect_box(read_mesh("a.gltf", quantized(5122, false, 1000, "[1e-5, 2e-5, 3e-5]")), kSize,
+             Vec3(0));
+  expect_box(read_mesh("a.gltf", quantized(5123, true, 65535, "[0.02, 0.04, 0.06]")), kSize,
+             corner / 2.0);
+  expect_box(read_mesh("a.gltf", quantized(5123, false, 40000, "[5e-7, 1e-6, 1.5e-6]")), kSize,
+             corner / 2.0);
+}
+
+TEST(MeshGltf, NormalisedIntegersEndAtMinusOne) {
+  const PolygonSoup soup =
+      read_mesh("a.gltf", quantized(5122, true, 32768, "[1, 1, 1]"));  // -32768, 32768 wraps
+  for (const Vec3& vertex : soup.vertices) EXPECT_EQ(glm::abs(vertex), Vec3(1));
+}
+
+/// The box, whose first corners are wrong but for the values of a sparse accessor.
+std::string sparse(bool has_view) {
+  const std::string right = gltf::box_corners();
+  const std::size_t kept = has_view ? 4 : 0;  // corners of the bufferView
+  std::string data = std::string(96 - 12 * kept, '\0') + right.substr(96 - 12 * kept);
+  data += gltf::box_indices();
+  for (std::uint32_t corner = 0; corner < 8 - kept; ++corner) gltf::append(data, corner, 1);
+  data += right.substr(0, 96 - 12 * kept);
+  const std::size_t places = 168, values = places + 8 - kept;
+  std::string text = document(R"([{"mesh": 0}])", gltf::data_uri(data));
+  const std::string views = R"(, {"buffer": 0, "byteOffset": 168, "byteLength": )" +
+                            std::to_string(8 - kept) + R"(}, {"buffer": 0, "byteOffset": )" +
+                            std::to_string(values) + R"(, "byteLength": )" +
+                            std::to_string(96 - 12 * kept) + "}]";
+  text = changed(text, "\"byteLength\": 72}]", "\"byteLength\": 72}" + views);
+  text = changed(text, has_view ? "\"type\": \"VEC3\"" : "{\"bufferView\": 0,",
+                 std::string(has_view ? "" : "{") + R"("sparse": {"count": )" +
+                     std::to_string(8 - kept) +
+                     R"(, "indices": {"bufferView": 2, "componentType": 5121},
+                        "values": {"bufferView": 3}}, )" +
+                     (has_view ? "\"type\": \"VEC3\"" : ""));
+  return changed(text, "\"byteLength\": 168", "\"byteLength\": " + std::to_string(data.size()));
+}
+
+TEST(MeshGltf, ReadsSparsePositions) {
+  expect_box(read_mesh("a.gltf", sparse(true)), kSize, Vec3(0));
+  expect_box(read_mesh("a.gltf", sparse(false)), kSize, Vec3(0));
+}
+
+TEST(MeshGltf, PassesOverExtensionsOfLooks) {
+  const std::string looks =
+      R"("extensionsRequired": ["KHR_materials_unlit", "KHR_texture_transform"])";
+  expect_box(read_mesh("a.gltf", changed(document(), "\"scene\": 0", looks)), kSize, Vec3(0));
+}
+
 TEST(MeshGltf, ABinaryFileIsTheSame) {
   const std::string bytes = gltf::binary_file(document(R"([{"mesh": 0}])", ""), gltf::box_buffer());
   expect_box(read_mesh("box.glb", bytes), kSize, Vec3(0));
