@@ -522,12 +522,18 @@ std::string folder_of(const std::string& file) {
   return std::filesystem::path(file).parent_path().string();
 }
 
+// Pa, of a .msh file that stands for a scene: soft tissue.
+constexpr double kYoungOfFile = 20000;
+
 std::string read_scene_text(const std::string& path) {
-  if (!stimuli::is_mesh_file_name(path)) return read_text_file(path);
+  const bool is_solid = stimuli::is_gmsh_file_name(path);
+  if (!is_solid && !stimuli::is_mesh_file_name(path)) return read_text_file(path);
   const std::string name = std::filesystem::path(path).filename().string();
   if (!is_plain_utf8(name))
     throw InputError({{path, "(file)", "a name in UTF-8, as scenes are", 0}});
-  return json{{"objects", {{{"shape", "mesh"}, {"file", name}}}}}.dump();
+  json object{{"shape", "mesh"}, {"file", name}};
+  if (is_solid) object["soft"] = {{"young_pa", kYoungOfFile}};
+  return json{{"objects", {object}}}.dump();
 }
 
 SceneSpec parse_scene(const std::string& path) {

@@ -41,7 +41,8 @@ SolidMesh mesh_of_box(const Vec3& size, const std::array<int, 3>& counts);
 /// for a quadratic tetrahedron's.
 std::vector<SurfaceTriangle> surface_of(const SolidMesh& mesh);
 
-// Gmsh's mesh files, version 4.1 ASCII, as far as solids of tetrahedra need them.
+// Gmsh's mesh files, versions 1, 2 to 2.2 and 4.1, ASCII and binary, as far as solids of tetrahedra
+// need them (Gmsh reference manual, "MSH file format").
 
 /// Whether the path ends in .msh.
 bool is_gmsh_file_name(const std::string& path);
@@ -51,7 +52,7 @@ bool is_gmsh_file_name(const std::string& path);
 /// inverted ones are turned. Units are metres as they stand; nodes that no tetrahedron uses are
 /// left out.
 /// \param name  named in faults
-/// \throws MeshError with file, line and what was expected, every fault
+/// \throws MeshError with file, line (binary: byte) and what was expected, every fault
 SolidMesh read_gmsh(const std::string& name, const std::string& text);
 
 /// The same of an object's file, scaled. \throws MeshError

@@ -130,6 +130,9 @@ class Validate(unittest.TestCase):
                 path.write_text(json.dumps(document), "utf-8")
                 done = run("validate", str(path))
                 self.assertEqual((done.returncode, done.stderr), (0, b""))
+            alone = run("validate", str(solid))
+            self.assertEqual((alone.returncode, alone.stderr), (0, b""))
+            self.assertRegex(alone.stdout.decode(), r"tetrahedra.msh: [0-9.]+ x [0-9.]+ x [0-9.]+ mm, 1 tetrahedron, 10 nodes\n")
             path.write_text(json.dumps({"version": 1, "name": "own", "objects": [soft]}), "utf-8")
             self.assertIn(b"/stimuli: missing", run("validate", str(path)).stderr)
 

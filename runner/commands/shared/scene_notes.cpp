@@ -12,6 +12,7 @@
 #include "stimuli/closed_surface.h"
 #include "stimuli/mesh_file.h"
 #include "stimuli/primitives.h"
+#include "stimuli/solids/solid_mesh.h"
 
 namespace palpate::runner::commands {
 namespace {
@@ -52,29 +53,58 @@ std::optional<std::string> elements_felt(const rendering::SoftObject& object) {
   return text;
 }
 
+namespace {
+
+std::string size_in_mm(const Vec3& size_m) {
+  const Vec3 size = 1000.0 * size_m;
+  const bool is_large = std::max({size.x, size.y, size.z}) >= 1000;
+  char text[100];
+  std::snprintf(text, sizeof text, is_large ? "%.0f x %.0f x %.0f mm" : "%.4g x %.4g x %.4g mm",
+                size.x, size.y, size.z);
+  return text;
+}
+
+/// What a size says of the unit; empty: nothing.
+std::string unit_advice(const Vec3& size_m, const std::string& file_name) {
+  const double largest = 1000 * std::max({size_m.x, size_m.y, size_m.z});
+  if (largest > kBeyondHands) {
+    return stimuli::has_unit(file_name)
+               ? "; larger than a metre: check the unit in the file"
+               : "; larger than a metre: expected coordinates in metres; for a file in "
+                 "millimetres give \"scale\": 0.001 beside \"file\"";
+  }
+  return largest < kBelowTouch
+             ? "; smaller than a tenth of a millimetre: expected coordinates in metres"
+             : "";
+}
+
+/// Of a .msh file.
+std::string solid_note(const stimuli::ObjectSpec& object) {
+  const stimuli::SolidMesh solid = stimuli::solid_of_file(object);
+  Vec3 low(std::numeric_limits<double>::max()), high = -low;
+  for (const Vec3& node : solid.nodes) {
+    low = glm::min(low, node);
+    high = glm::max(high, node);
+  }
+  return printable(object.file_name) + ": " + size_in_mm(high - low) + ", " +
+         std::to_string(solid.tetrahedra.size()) +
+         (solid.tetrahedra.size() == 1 ? " tetrahedron, " : " tetrahedra, ") +
+         std::to_string(solid.nodes.size()) + " nodes" + unit_advice(high - low, object.file_name);
+}
+
+}  // namespace
+
 std::vector<std::string> mesh_notes(const stimuli::ObjectSpec& object, SceneBuilder& builder) {
   std::vector<std::string> notes;
   for (const stimuli::ObjectSpec& part : object.parts) {
     for (std::string& note : mesh_notes(part, builder)) notes.push_back(std::move(note));
   }
-  if (object.shape != stimuli::ShapeKind::mesh || object.soft) return notes;
+  if (object.shape != stimuli::ShapeKind::mesh) return notes;
+  if (object.soft) return {solid_note(object)};
   const LoadedMesh& mesh = builder.mesh(object);
-  const Vec3 size = 1000.0 * mesh.size;
-  char text[160];
-  const double largest = std::max({size.x, size.y, size.z});
-  std::snprintf(
-      text, sizeof text,
-      largest < 1000 ? "%.4g x %.4g x %.4g mm, %zu faces" : "%.0f x %.0f x %.0f mm, %zu faces",
-      size.x, size.y, size.z, mesh.faces);
-  std::string note = printable(object.file_name) + ": " + text;
-  if (largest > kBeyondHands) {
-    note += stimuli::has_unit(object.file_name)
-                ? "; larger than a metre: check the unit in the file"
-                : "; larger than a metre: expected coordinates in metres; for a file in "
-                  "millimetres give \"scale\": 0.001 beside \"file\"";
-  } else if (largest < kBelowTouch) {
-    note += "; smaller than a tenth of a millimetre: expected coordinates in metres";
-  }
+  std::string note = printable(object.file_name) + ": " + size_in_mm(mesh.size) + ", " +
+                     std::to_string(mesh.faces) + " faces" +
+                     unit_advice(mesh.size, object.file_name);
   std::vector<std::string> cleaned = mesh.notes;
   if (mesh.surface == nullptr) {
     try {

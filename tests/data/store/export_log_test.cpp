@@ -1,5 +1,6 @@
 #include "data/store/export_log.h"
 
+#include <SQLiteCpp/SQLiteCpp.h>
 #include <gtest/gtest.h>
 
 #include "data/base/input_file.h"
