@@ -9,7 +9,7 @@ build=(g++ cmake ninja-build libboost-dev libboost-program-options-dev libeigen3
   libpng-dev libstb-dev libwebp-dev libx11-dev)
 package=(dpkg-dev file help2man)  # `cmake --install` and cpack
 tests=(dbus-daemon imagemagick libbenchmark-dev libbullet-dev libegl1 libfcl-dev libode-dev libgl1-mesa-dri libgtest-dev librsvg2-bin
-  libumockdev-dev libxml2-utils man-db openbox python3 python3-jsonschema python3-pytest umockdev xdotool xfwm4 xvfb)
+  libumockdev-dev libxml2-utils man-db openbox python3 python3-jsonschema python3-pytest umockdev x11-utils xdotool xfwm4 xvfb)
 quality=(chromium clang clang-format clang-tidy devscripts lintian munge mypy octave python3-matplotlib rt-tests slurm-wlm valgrind)
 
 case "${1:-}" in

@@ -796,7 +796,7 @@ class ExploreWindow {
  public:
   ExploreWindow(ExploreSettings settings, TouchSource& source)
       : end_requested_(settings.end_requested), source_(source) {
-    if (glfwInit() == GLFW_FALSE)
+    if (!start_glfw())
       throw DisplayError("no graphical display: " + glfw_reason() +
                          "; --frames and --animation need none");
     try {

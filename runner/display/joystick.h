@@ -24,7 +24,7 @@ class Joystick {
   virtual std::optional<JoystickState> read() = 0;
 };
 
-/// The first connected device, read through GLFW. Use it in the main thread, after glfwInit.
+/// The first connected device, read through GLFW. Use it in the main thread, after start_glfw.
 std::unique_ptr<Joystick> make_joystick();
 
 /// Detects presses from successive states.

@@ -233,7 +233,7 @@ double seconds() {
 class GlfwLibrary {
  public:
   GlfwLibrary() {
-    if (glfwInit() == GLFW_FALSE) throw DisplayError("no graphical display: " + glfw_reason());
+    if (!start_glfw()) throw DisplayError("no graphical display: " + glfw_reason());
   }
   GlfwLibrary(const GlfwLibrary&) = delete;
   GlfwLibrary& operator=(const GlfwLibrary&) = delete;

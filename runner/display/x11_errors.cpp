@@ -1,11 +1,15 @@
 #include "runner/display/x11_errors.h"
 
+#define GLFW_INCLUDE_NONE
+#include <GLFW/glfw3.h>
+#include <X11/Xatom.h>
 #include <X11/Xlib.h>
 #include <X11/Xresource.h>
 #include <X11/Xutil.h>
 #include <poll.h>
 
 #include <csignal>
+#include <memory>
 
 // From GLFW's glfw3native.h, which asks for the headers of extensions that are not used here.
 extern "C" Display* glfwGetX11Display();
@@ -18,6 +22,36 @@ namespace {
 XContext our_windows() {
   static const XContext context = XUniqueContext();
   return context;
+}
+
+int ignore_error(Display*, XErrorEvent*) { return 0; }
+
+/// The window that a window's _NET_SUPPORTING_WM_CHECK names; None: it has none, or is gone.
+Window checked_window(Display* display, Window of) {
+  Atom type = None;
+  int format = 0;
+  unsigned long count = 0, rest = 0;
+  unsigned char* value = nullptr;
+  const Atom check = XInternAtom(display, "_NET_SUPPORTING_WM_CHECK", False);
+  const int failed = XGetWindowProperty(display, of, check, 0, 1, False, XA_WINDOW, &type, &format,
+                                        &count, &rest, &value);
+  const std::unique_ptr<unsigned char, decltype(&XFree)> owned(value, &XFree);
+  if (failed != Success || type != XA_WINDOW || format != 32 || count == 0) return None;
+  return *reinterpret_cast<const Window*>(value);
+}
+
+/// The window of a living window manager has the property, too (Extended Window Manager Hints 1.5,
+/// "Root Window Properties"). Another program may have been given the number of the dead one's.
+void forget_killed_manager(Display* display) {
+  XErrorHandler const before = XSetErrorHandler(&ignore_error);
+  XGrabServer(display);  // no manager can start between the question and the removal
+  const Window root = DefaultRootWindow(display);
+  const Window named = checked_window(display, root);
+  if (named != None && checked_window(display, named) == None)
+    XDeleteProperty(display, root, XInternAtom(display, "_NET_SUPPORTING_WM_CHECK", False));
+  XUngrabServer(display);
+  XSync(display, False);
+  XSetErrorHandler(before);
 }
 
 int ignore_io_error(Display*) { return 0; }
@@ -38,6 +72,14 @@ int flag_destroyed_window(Display* display, XErrorEvent* error) {
 }
 
 }  // namespace
+
+bool start_glfw() {
+  // Closed last: a server in memory resets itself when its only connection ends.
+  const std::unique_ptr<Display, decltype(&XCloseDisplay)> display(XOpenDisplay(nullptr),
+                                                                   &XCloseDisplay);
+  if (display) forget_killed_manager(display.get());
+  return glfwInit() != GLFW_FALSE;
+}
 
 void handle_display_errors() {
   Display* const display = glfwGetX11Display();

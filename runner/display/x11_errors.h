@@ -1,5 +1,5 @@
 #pragma once
-// Handling of a lost X server and of windows destroyed from outside.
+// Handling of a lost X server, of windows destroyed from outside, and of a killed window manager.
 
 struct GLFWwindow;
 
@@ -7,6 +7,10 @@ namespace palpate::runner::display {
 
 /// Thrown when the connection to the display is lost.
 class DisplayLost {};
+
+/// Starts GLFW. Where a window manager was killed, it first removes the property that still names
+/// it: GLFW 3.3.8 ends the program when it finds it. \return false: glfwGetError has the reason
+bool start_glfw();
 
 /// Replaces Xlib's error handlers, which end the program: from now on a call that meets a lost
 /// connection throws DisplayLost, SIGPIPE is ignored, and so are errors of single requests. After

@@ -36,7 +36,9 @@ def wait_for(what, condition):
 class VirtualScreen:
     next_number = 1000 + 100 * (os.getpid() % 10000)
 
-    def __init__(self, size="1600x1000"):
+    def __init__(self, size="1600x1000", *options):
+        """Options are the X server's own."""
+        self.options = options
         # Use a number of this process's own. If the server chooses, it may take a number that another test's server has
         # just released, and that one then removes the common socket as it ends.
         for number in range(self.next_number, self.next_number + 20):
@@ -57,7 +59,7 @@ class VirtualScreen:
         """False: the number is in use."""
         reading, writing = os.pipe()
         self.server = subprocess.Popen(
-            ["Xvfb", f":{number}", "-displayfd", str(writing), "-screen", "0", size + "x24", "-nolisten", "tcp"],
+            ["Xvfb", f":{number}", "-displayfd", str(writing), "-screen", "0", size + "x24", "-nolisten", "tcp", *self.options],
             pass_fds=[writing], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         os.close(writing)
         with os.fdopen(reading) as pipe:
@@ -84,9 +86,9 @@ class VirtualScreen:
         wait_for("the window manager", lambda: not subprocess.run(
             ["xdotool", "get_desktop"], env=self.environment, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE).stderr)
 
-    def stop_manager(self):
+    def stop_manager(self, how=signal.SIGTERM):
         home, process = self.manager
-        os.killpg(process.pid, signal.SIGTERM)
+        os.killpg(process.pid, how)
         process.wait()
         home.cleanup()
         self.manager = None

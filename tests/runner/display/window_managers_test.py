@@ -3,10 +3,13 @@
 Usage: window_managers_test.py PALPATE HARNESS     (PALPATE_PICTURES names a folder for pictures to look at)
 """
 
+import ctypes
 import json
+import pathlib
 import shutil
 import signal
 import subprocess
+import tempfile
 import time
 import unittest
 
@@ -16,6 +19,7 @@ from window_case import PALPATE, WindowCase
 
 MANAGERS = [None] + [name for name in ("openbox", "xfwm4") if shutil.which(name)]
 SIZES = ["1024x768", "1920x1080", "3840x2160"]
+SCENE = {"objects": [{"shape": "cube", "edge_m": 0.06, "stiffness_n_per_m": 300}]}
 PROTOCOL = {"version": 1, "name": "windows", "renderers": ["ray"],
             "stimuli": [{"name": "ball", "shape": "sphere", "radius_m": 0.03}, {"name": "die", "shape": "cube", "edge_m": 0.05}],
             "repetitions": 9, "response": {"keys": {"1": "ball", "2": "die"}}, "home": {"rest_s": 0.1},
@@ -112,6 +116,93 @@ class Placed(unittest.TestCase):
             windows.say("places")
             self.assertIn('"console_px"', windows.expect("places")[1])
             self.screen.keep("root", f"covered_{self.name}")
+
+
+class Killed(unittest.TestCase):
+    """A window manager that is killed leaves its properties on the root window."""
+
+    def setUp(self):
+        skip_without_screen()
+        if len(MANAGERS) < 2:
+            self.skipTest("no window manager is installed")
+        self.screen = VirtualScreen("1600x1000", "-noreset")
+        self.addCleanup(self.screen.close)
+
+    def kill_manager(self):
+        self.screen.stop_manager(signal.SIGKILL)
+
+    def named_manager(self):
+        seen = subprocess.run(["xprop", "-root", "_NET_SUPPORTING_WM_CHECK"], env=self.screen.environment, text=True,
+                              stdout=subprocess.PIPE, check=True).stdout
+        return seen.split()[-1] if "window id" in seen else None
+
+    def shows(self):
+        windows = Windows(self.screen, "--no-mouse")
+        self.addCleanup(windows.close)
+        windows.say("ping")
+        windows.expect("pong")
+        windows.close()
+
+    def test_windows_open_after_a_window_manager_was_killed(self):
+        managed(self.screen, "openbox")
+        self.kill_manager()
+        self.assertTrue(self.named_manager())
+        self.shows()
+
+    def test_explore_opens_after_a_window_manager_was_killed(self):
+        managed(self.screen, "openbox")
+        self.kill_manager()
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        scene = pathlib.Path(folder.name) / "scene.json"
+        scene.write_text(json.dumps(SCENE))
+        program = subprocess.Popen([PALPATE, "explore", scene, "--device", "mouse"], env=self.screen.environment,
+                                   stdin=subprocess.DEVNULL)
+        self.addCleanup(program.wait)
+        self.addCleanup(program.kill)
+        self.screen.window(".* - palpate explore")
+        self.assertIsNone(program.poll())
+
+    def test_windows_open_where_another_program_has_the_number_of_the_dead_managers_window(self):
+        other = Windows(self.screen, "--no-mouse")
+        self.addCleanup(other.close)
+        self.set_window_property("_NET_SUPPORTING_WM_CHECK", int(other.participant))
+        self.shows()
+
+    def set_window_property(self, name, window):
+        x11 = ctypes.CDLL("libX11.so.6")
+        x11.XOpenDisplay.restype = x11.XInternAtom.restype = x11.XDefaultRootWindow.restype = ctypes.c_void_p
+        display = ctypes.c_void_p(x11.XOpenDisplay(self.screen.name.encode()))
+        root, atom = (ctypes.c_void_p(x) for x in (x11.XDefaultRootWindow(display), x11.XInternAtom(display, name.encode(), 0)))
+        x11.XChangeProperty(display, root, atom, ctypes.c_ulong(33), 32, 0, ctypes.byref(ctypes.c_long(window)), 1)
+        x11.XCloseDisplay(display)
+
+    def test_a_living_window_manager_keeps_its_property(self):
+        managed(self.screen, "openbox")
+        before = self.named_manager()
+        self.shows()
+        self.assertTrue(before)
+        self.assertEqual(self.named_manager(), before)
+
+    def test_windows_outlive_their_window_manager_and_meet_the_next(self):
+        windows = Windows(self.screen, "--no-mouse")
+        self.addCleanup(windows.close)
+        for manager in MANAGERS[1:] * 2:
+            managed(self.screen, manager)
+            time.sleep(1)
+            windows.say("ping")
+            windows.expect("pong")
+            self.kill_manager()
+            windows.say("ping")
+            windows.expect("pong")
+        windows.say("end")
+        self.assertEqual(windows.program.wait(60), 0)
+
+    def test_windows_open_without_the_extensions_for_monitors(self):
+        self.screen.close()
+        self.screen = VirtualScreen("1600x1000", "-extension", "RANDR", "-extension", "XINERAMA")
+        self.addCleanup(self.screen.close)
+        self.shows()
 
 
 class Remembered(WindowCase):
