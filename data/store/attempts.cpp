@@ -2,11 +2,13 @@
 
 #include <sqlite3.h>
 #include <zlib.h>
+#include <zstd.h>
 
 #include <algorithm>
 #include <bit>
 #include <cstddef>
 #include <map>
+#include <memory>
 #include <span>
 #include <stdexcept>
 #include <string_view>
@@ -26,9 +28,14 @@
 namespace palpate::data {
 namespace {
 
+constexpr int kZlibPlain = 3, kZlibWithBodies = 4;
+constexpr bool is_zstd(int packing) { return packing > kZlibWithBodies; }
+constexpr bool has_bodies(int packing) {
+  return packing == kZlibWithBodies || packing == kSamplesPacking;
+}
 constexpr std::size_t bytes_a_sample(int packing) {
   return 4 + (packing > 1 ? 8 : 0) + 13 * 8 + 4 + (packing > 2 ? 2 * 8 + 6 * 8 + 3 : 0) +
-         (packing > 3 ? 1 + 13 * 8 : 0);
+         (has_bodies(packing) ? 1 + 13 * 8 : 0);
 }
 // Limits of the stored count, so that a damaged one cannot make the decoder allocate memory out of
 // proportion to the compressed bytes: at most a trial of an hour at the highest rate; beyond some
@@ -39,9 +46,9 @@ constexpr std::size_t kSamplesWithFewBytes = 400'000;
 constexpr std::size_t kLeastBytesASample = 2;
 constexpr std::size_t kMostShrunk = 1032;             // the highest compression ratio of zlib
 constexpr std::size_t kPiece = std::size_t{1} << 16;  // bytes decompressed at a time
-// zlib's level: a trial of 10 s takes some 50 ms, and higher levels save little, because the low
-// bytes of a measured signal are noise.
+// Higher levels of zstd save little, because the low bytes of a measured signal are noise.
 constexpr int kLevel = 3;
+constexpr int kMostWindow = 23;  // log2 of the bytes that a frame may refer back to: 8 MiB
 
 // Visits the columns in order, for encoder and decoder: calls column(rows, get, form), where
 // get(row) is a reference to the field and `form` a value of its stored type.
@@ -96,7 +103,7 @@ void visit_columns(int packing, Samples& samples, Bodies& bodies, Visitor&& visi
     column(
         [](auto& s) -> auto& { return s.faults; }, kByte);
   }
-  if (packing < 4) return;
+  if (!has_bodies(packing)) return;
   column(
       [](auto& s) -> auto& { return s.bodies; }, kByte);
   for (int i = 0; i < 3; ++i)
@@ -125,16 +132,84 @@ bool bytes_suffice(std::size_t count, std::size_t size) {
 
 [[noreturn]] void refuse() { throw StoreError("the samples are damaged"); }
 
-/// Decompresses a zlib stream piece by piece.
-class Planes {
+/// Decompresses piece by piece.
+class Decoder {
  public:
-  Planes(const void* data, std::size_t size) : left_(size) {
+  Decoder() = default;
+  Decoder(const Decoder&) = delete;
+  Decoder& operator=(const Decoder&) = delete;
+  virtual ~Decoder() = default;
+  /// Fills `room` in part. \return bytes, 0 at the end of the stream \throws StoreError: damaged
+  virtual std::size_t next(std::span<unsigned char> room) = 0;
+  /// Whether compressed bytes follow the end of the stream.
+  virtual bool has_more() const = 0;
+};
+
+class ZlibDecoder final : public Decoder {
+ public:
+  ZlibDecoder(const void* data, std::size_t size) : left_(size) {
     stream_.next_in = const_cast<Bytef*>(static_cast<const Bytef*>(data));
     if (inflateInit(&stream_) != Z_OK) throw StoreError("the samples: out of memory");
   }
-  Planes(const Planes&) = delete;
-  Planes& operator=(const Planes&) = delete;
-  ~Planes() { inflateEnd(&stream_); }
+  ~ZlibDecoder() override { inflateEnd(&stream_); }
+
+  std::size_t next(std::span<unsigned char> room) override {
+    std::size_t count = 0;
+    while (count == 0 && !ended_) {
+      if (stream_.avail_in == 0) {  // avail_in has 32 bits
+        stream_.avail_in = static_cast<uInt>(std::min<std::size_t>(left_, 1U << 30U));
+        left_ -= stream_.avail_in;
+      }
+      stream_.next_out = room.data();
+      stream_.avail_out = static_cast<uInt>(room.size());
+      const int status = inflate(&stream_, Z_NO_FLUSH);
+      if (status != Z_OK && status != Z_STREAM_END) refuse();
+      ended_ = status == Z_STREAM_END;
+      count = room.size() - stream_.avail_out;
+    }
+    return count;
+  }
+  bool has_more() const override { return left_ + stream_.avail_in > 0; }
+
+ private:
+  z_stream stream_{};
+  std::size_t left_;  ///< input bytes not yet given to the stream
+  bool ended_ = false;
+};
+
+class ZstdDecoder final : public Decoder {
+ public:
+  ZstdDecoder(const void* data, std::size_t size) : in_{data, size, 0} {
+    if (!stream_) throw StoreError("the samples: out of memory");
+    ZSTD_DCtx_setParameter(stream_.get(), ZSTD_d_windowLogMax, kMostWindow);
+  }
+
+  std::size_t next(std::span<unsigned char> room) override {
+    ZSTD_outBuffer out{room.data(), room.size(), 0};
+    while (out.pos == 0 && !ended_) {
+      const std::size_t before = in_.pos;
+      const std::size_t left = ZSTD_decompressStream(stream_.get(), &out, &in_);
+      if (ZSTD_isError(left) != 0) refuse();
+      ended_ = left == 0;
+      if (!ended_ && out.pos == 0 && in_.pos == before) refuse();  // cut off
+    }
+    return out.pos;
+  }
+  bool has_more() const override { return in_.pos < in_.size; }
+
+ private:
+  struct Free {
+    void operator()(ZSTD_DCtx* stream) const { ZSTD_freeDCtx(stream); }
+  };
+  std::unique_ptr<ZSTD_DCtx, Free> stream_{ZSTD_createDCtx()};
+  ZSTD_inBuffer in_;
+  bool ended_ = false;
+};
+
+/// The decompressed bytes, in order.
+class Planes {
+ public:
+  explicit Planes(std::unique_ptr<Decoder> decoder) : decoder_(std::move(decoder)) {}
 
   /// The next bytes, at least one and at most `most`. \throws StoreError at the end.
   std::span<const unsigned char> take(std::size_t most) {
@@ -146,7 +221,7 @@ class Planes {
 
   /// \throws StoreError: more bytes follow, compressed or decompressed.
   void expect_end() {
-    if (at_ != end_ || fill() || left_ + stream_.avail_in > 0) refuse();
+    if (at_ != end_ || fill() || decoder_->has_more()) refuse();
   }
 
   /// CRC-32 of all decompressed bytes.
@@ -155,56 +230,54 @@ class Planes {
  private:
   /// False at the end of the stream.
   bool fill() {
-    at_ = end_ = 0;
-    while (end_ == 0 && !ended_) {
-      if (stream_.avail_in == 0) {  // avail_in has 32 bits
-        stream_.avail_in = static_cast<uInt>(std::min<std::size_t>(left_, 1U << 30U));
-        left_ -= stream_.avail_in;
-      }
-      stream_.next_out = piece_.data();
-      stream_.avail_out = static_cast<uInt>(piece_.size());
-      const int status = inflate(&stream_, Z_NO_FLUSH);
-      if (status != Z_OK && status != Z_STREAM_END) refuse();
-      ended_ = status == Z_STREAM_END;
-      end_ = piece_.size() - stream_.avail_out;
-    }
+    at_ = 0;
+    end_ = decoder_->next(piece_);
     crc_ = crc32_z(crc_, piece_.data(), end_);
     return end_ > 0;
   }
 
-  z_stream stream_{};
-  std::size_t left_;  // input bytes not yet given to the stream
+  std::unique_ptr<Decoder> decoder_;
   std::vector<unsigned char> piece_ = std::vector<unsigned char>(kPiece);
   std::size_t at_ = 0, end_ = 0;
-  bool ended_ = false;
   uLong crc_ = crc32_z(0, nullptr, 0);
 };
+
+std::unique_ptr<Decoder> decoder_of(int packing, const void* data, std::size_t size) {
+  if (is_zstd(packing)) return std::make_unique<ZstdDecoder>(data, size);
+  return std::make_unique<ZlibDecoder>(data, size);
+}
 
 template <class Field>
 using Bits = std::conditional_t<sizeof(Field) == 8, std::uint64_t, Field>;
 
-std::string compressed(const std::vector<unsigned char>& planes, int level) {
+std::string compressed(const std::vector<unsigned char>& planes) {
+  std::string packed(ZSTD_compressBound(planes.size()), '\0');
+  const std::size_t size =
+      ZSTD_compress(packed.data(), packed.size(), planes.data(), planes.size(), kLevel);
+  if (ZSTD_isError(size) != 0)
+    throw StoreError("the samples could not be compressed: out of memory");
+  packed.resize(size);
+  return packed;
+}
+
+std::string uncompressed(const std::vector<unsigned char>& planes) {
   uLongf size = compressBound(planes.size());
   std::string packed(size, '\0');
   const int status = compress2(reinterpret_cast<Bytef*>(packed.data()), &size, planes.data(),
-                               planes.size(), level);
-  if (status != Z_OK) throw StoreError("the samples could not be compressed: out of memory");
+                               planes.size(), Z_NO_COMPRESSION);
+  if (status != Z_OK) throw StoreError("the samples could not be packed: out of memory");
   packed.resize(size);
   return packed;
 }
 
 }  // namespace
 
-int packing_for(const std::vector<BodyRecord>& bodies) {
-  return bodies.empty() ? kPlainSamplesPacking : kSamplesPacking;
-}
-
-std::string pack_samples(const std::vector<SampleRecord>& samples,
-                         const std::vector<BodyRecord>& bodies) {
+PackedSamples pack_samples(const std::vector<SampleRecord>& samples,
+                           const std::vector<BodyRecord>& bodies) {
   const std::size_t count = samples.size();
   if (!bodies.empty() && bodies.size() != count)
     throw std::invalid_argument("expected one body for each sample, or none");
-  const int packing = packing_for(bodies);
+  const int packing = bodies.empty() ? kPlainSamplesPacking : kSamplesPacking;
   std::vector<unsigned char> planes(count * bytes_a_sample(packing));
   std::size_t offset = 0;
   visit_columns(packing, samples, bodies, [&](const auto& of, auto get, auto form) {
@@ -222,11 +295,12 @@ std::string pack_samples(const std::vector<SampleRecord>& samples,
     }
     offset += sizeof(Field) * count;
   });
-  std::string packed = compressed(planes, kLevel);
+  PackedSamples packed{packing, compressed(planes)};
   // Store nearly equal samples uncompressed: their compressed size would look like a damaged count.
-  if (!bytes_suffice(count, packed.size())) packed = compressed(planes, Z_NO_COMPRESSION);
+  if (!bytes_suffice(count, packed.bytes.size()))
+    packed = {bodies.empty() ? kZlibPlain : kZlibWithBodies, uncompressed(planes)};
   const std::uint32_t crc = crc_of(planes.data(), planes.size());
-  for (int shift = 24; shift >= 0; shift -= 8) packed += static_cast<char>(crc >> shift);
+  for (int shift = 24; shift >= 0; shift -= 8) packed.bytes += static_cast<char>(crc >> shift);
   return packed;
 }
 
@@ -235,13 +309,14 @@ RecordedSamples unpack_samples(const void* data, std::size_t size, std::int64_t 
   if (count < 0 || count > kMostSamples) throw StoreError("the number of samples is damaged");
   const auto rows = static_cast<std::size_t>(count);
   const std::size_t expected = rows * bytes_a_sample(packing);
-  if (expected / kMostShrunk > size || (packing > 2 && size < kCrcSize)) refuse();
+  if ((!is_zstd(packing) && expected / kMostShrunk > size) || (packing > 2 && size < kCrcSize))
+    refuse();
   if (!bytes_suffice(rows, size)) refuse();
   if (packing > 2) size -= kCrcSize;
-  Planes planes(data, size);
+  Planes planes(decoder_of(packing, data, size));
   RecordedSamples out;
   out.samples.resize(rows);
-  if (packing > kPlainSamplesPacking) out.bodies.resize(rows);
+  if (has_bodies(packing)) out.bodies.resize(rows);
   std::vector<std::uint64_t> column(rows);
   visit_columns(packing, out.samples, out.bodies, [&](auto& of, auto get, auto form) {
     using Field = decltype(form);
@@ -651,18 +726,18 @@ void complete(SQLite::Database& db, SQLite::Statement& update, std::int64_t id,
   for (const double x : record.start_tail) bind << x;
   for_each_measured(record, [&](const MeasuredColumn&, const auto& value) { bind << value; });
   const auto count = static_cast<std::int64_t>(record.samples.size());
-  const std::string packed = count > 0 ? pack_samples(record.samples, record.bodies) : "";
-  const int packing = packing_for(record.bodies);
-  bind << (count > 0
-               ? std::optional(checksum_of_samples(packing, count, packed.data(), packed.size()))
-               : std::nullopt)
+  const PackedSamples packed =
+      count > 0 ? pack_samples(record.samples, record.bodies) : PackedSamples{};
+  bind << (count > 0 ? std::optional(checksum_of_samples(packed.packing, count, packed.bytes.data(),
+                                                         packed.bytes.size()))
+                     : std::nullopt)
        << task_text(record.task) << id;
   update.exec();
   if (count == 0) return;
   SQLite::Statement insert(
       db, "INSERT INTO samples (attempt_id, packing, count, data) VALUES (?, ?, ?, ?)");
-  Binder(insert) << id << packing << count;
-  insert.bindNoCopy(4, packed.data(), static_cast<int>(packed.size()));
+  Binder(insert) << id << packed.packing << count;
+  insert.bindNoCopy(4, packed.bytes.data(), static_cast<int>(packed.bytes.size()));
   insert.exec();
 }
 

@@ -20,8 +20,11 @@ namespace palpate::data {
 // Internal to data/store: compresses servo samples, lossless to the bit. The format is the column
 // `packing` of the table samples; tests/fuzz/samples.cpp feeds the decoder arbitrary bytes.
 
-/// Packing 4: packing 3, followed by `bodies` and the fields of TrialRecord::bodies; for samples
-/// with a body.
+/// Packing 6: packing 5 with `bodies` and the fields of TrialRecord::bodies, for samples with a
+/// body. Packing 5: the planes of packing 3 as one zstd frame (RFC 8878), which takes less room and
+/// time. A long standstill is still packed in 3 or 4, uncompressed.
+///
+/// Packing 4: packing 3, followed by `bodies` and the fields of TrialRecord::bodies.
 ///
 /// Packing 3: the fields of SampleRecord except `bodies`, in order of declaration, each as a column
 /// of `count` values (vectors as three columns). Delta encoding: a value is its bit pattern minus
@@ -32,8 +35,8 @@ namespace palpate::data {
 ///
 /// Packing 2: without lateness_ns, compute_ns, device1, device2 (all read as 0) and the CRC, and
 /// with only the lowest 8 bits of faults. Packing 1: in addition without period_ns.
-inline constexpr int kSamplesPacking = 4;
-inline constexpr int kPlainSamplesPacking = 3;  ///< for samples without bodies
+inline constexpr int kSamplesPacking = 6;
+inline constexpr int kPlainSamplesPacking = 5;  ///< for samples without bodies
 
 /// As in TrialRecord.
 struct RecordedSamples {
@@ -41,12 +44,15 @@ struct RecordedSamples {
   std::vector<BodyRecord> bodies;
 };
 
-/// The packing for samples: 4 if there are bodies, else 3.
-int packing_for(const std::vector<BodyRecord>& bodies);
-/// Packs samples in packing_for(bodies). \param bodies one for each sample, or none
+struct PackedSamples {
+  int packing = kPlainSamplesPacking;
+  std::string bytes;
+};
+
+/// \param bodies  one for each sample, or none
 /// \throws std::invalid_argument: another number of bodies
-std::string pack_samples(const std::vector<SampleRecord>& samples,
-                         const std::vector<BodyRecord>& bodies = {});
+PackedSamples pack_samples(const std::vector<SampleRecord>& samples,
+                           const std::vector<BodyRecord>& bodies = {});
 
 /// \param packing  1 to kSamplesPacking
 /// \throws StoreError: the bytes are not a packing of `count` samples. what() does not name the

@@ -15,10 +15,10 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   try {
     const auto first = data::unpack_samples(data + 4, size - 4, count, packing);
     if (static_cast<std::int64_t>(first.samples.size()) != count) std::abort();
-    const std::string again = data::pack_samples(first.samples, first.bodies);
+    const data::PackedSamples again = data::pack_samples(first.samples, first.bodies);
     const auto back =
-        data::unpack_samples(again.data(), again.size(), count, data::packing_for(first.bodies));
-    if (data::pack_samples(back.samples, back.bodies) != again) std::abort();
+        data::unpack_samples(again.bytes.data(), again.bytes.size(), count, again.packing);
+    if (data::pack_samples(back.samples, back.bodies).bytes != again.bytes) std::abort();
   } catch (const data::StoreError&) {
   }
   return 0;

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 #include <zlib.h>
+#include <zstd.h>
 
 #include <bit>
 #include <cmath>
@@ -33,10 +34,10 @@ std::vector<std::uint64_t> bits_of(const SampleRecord& sample) {
 }
 
 void expect_same_bits(const std::vector<SampleRecord>& samples) {
-  const std::string packed = pack_samples(samples);
-  const auto back =
-      unpack_samples(packed.data(), packed.size(), static_cast<std::int64_t>(samples.size()))
-          .samples;
+  const auto [packing, packed] = pack_samples(samples);
+  const auto back = unpack_samples(packed.data(), packed.size(),
+                                   static_cast<std::int64_t>(samples.size()), packing)
+                        .samples;
   ASSERT_EQ(back.size(), samples.size());
   for (std::size_t i = 0; i < samples.size(); ++i) {
     ASSERT_EQ(bits_of(back[i]), bits_of(samples[i])) << "sample " << i;
@@ -70,8 +71,8 @@ TEST(SamplesCodec, BodiesComeBackAndOtherSamplesKeepTheirPacking) {
   std::mt19937_64 random(kSeed);
   std::vector<SampleRecord> samples = a_stroke(50);
   std::vector<BodyRecord> bodies;
-  EXPECT_EQ(packing_for(bodies), kPlainSamplesPacking);
-  const std::string plain = pack_samples(samples);
+  const auto [plain_packing, plain] = pack_samples(samples);
+  EXPECT_EQ(plain_packing, kPlainSamplesPacking);
   bodies.resize(samples.size());
   for (std::size_t i = 10; i < samples.size(); ++i) {  // at first nothing was shown
     samples[i].bodies = 1;
@@ -80,8 +81,8 @@ TEST(SamplesCodec, BodiesComeBackAndOtherSamplesKeepTheirPacking) {
     }
     for (double& x : bodies[i].orientation_wxyz) x = std::bit_cast<double>(random());
   }
-  EXPECT_EQ(packing_for(bodies), kSamplesPacking);
-  const std::string packed = pack_samples(samples, bodies);
+  const auto [packing, packed] = pack_samples(samples, bodies);
+  EXPECT_EQ(packing, kSamplesPacking);
   const RecordedSamples back = unpack_samples(packed.data(), packed.size(), 50, kSamplesPacking);
   const auto bits = [](const auto& values) {
     std::vector<std::uint64_t> out;
@@ -138,7 +139,7 @@ TEST(SamplesCodec, AnyNumberOfSamplesComesBack) {
 
 TEST(SamplesCodec, AStrokeWithNoiseTakesLessThanHalf) {
   const auto samples = a_stroke(10'000);
-  EXPECT_LT(pack_samples(samples).size(), samples.size() * 94);  // 187 bytes each before
+  EXPECT_LT(pack_samples(samples).bytes.size(), samples.size() * 94);  // 187 bytes each before
 }
 
 TEST(SamplesCodec, TheFirstPackingIsReadWithoutPeriods) {
@@ -188,10 +189,49 @@ TEST(SamplesCodec, TheSecondPackingIsReadWithoutLatenessAndCommands) {
 }
 
 TEST(SamplesCodec, AnAbsurdCountIsRefusedBeforeMemoryIsAskedFor) {
-  const std::string packed = pack_samples(a_stroke(10));
+  const std::string packed = pack_samples(a_stroke(10)).bytes;
   EXPECT_THROW(unpack_samples(packed.data(), packed.size(), 99'999'999), StoreError);
   const std::vector<SampleRecord> still(200'000);  // the smallest packed samples
   expect_same_bits(still);
+}
+
+void add_crc(std::string& packed, std::uint32_t crc) {
+  for (int shift = 24; shift >= 0; shift -= 8) packed += static_cast<char>(crc >> shift);
+}
+
+/// Zeros as zstd packs them, a valid blob of packing 5.
+std::string a_zstd_bomb(std::size_t count) {
+  constexpr std::size_t kBytesASample = 187;
+  const std::string zeros(count * kBytesASample, '\0');
+  std::string packed(ZSTD_compressBound(zeros.size()), '\0');
+  packed.resize(ZSTD_compress(packed.data(), packed.size(), zeros.data(), zeros.size(), 3));
+  add_crc(packed,
+          static_cast<std::uint32_t>(crc32_z(
+              crc32_z(0, nullptr, 0), reinterpret_cast<const Bytef*>(zeros.data()), zeros.size())));
+  return packed;
+}
+
+/// The planes of packing 5 as packing 3 had them.
+std::string as_zlib(const std::string& packed, std::size_t planes) {
+  std::string bytes(planes, '\0');
+  EXPECT_EQ(ZSTD_decompress(bytes.data(), planes, packed.data(), packed.size() - 4), planes);
+  uLongf size = compressBound(planes);
+  std::string old(size, '\0');
+  compress2(reinterpret_cast<Bytef*>(old.data()), &size,
+            reinterpret_cast<const Bytef*>(bytes.data()), planes, 3);
+  return old.substr(0, size) + packed.substr(packed.size() - 4);
+}
+
+TEST(SamplesCodec, TheThirdPackingIsRead) {
+  constexpr std::size_t kTicks = 2000;
+  const auto samples = a_stroke(kTicks);
+  const std::string packed = pack_samples(samples).bytes;
+  const std::string old = as_zlib(packed, kTicks * 187);
+  const auto back = unpack_samples(old.data(), old.size(), kTicks, 3).samples;
+  for (std::size_t i = 0; i < kTicks; ++i) ASSERT_EQ(bits_of(back[i]), bits_of(samples[i]));
+  EXPECT_LT(packed.size(), old.size());
+  EXPECT_THROW(unpack_samples(old.data(), old.size(), kTicks, 5), StoreError);
+  EXPECT_THROW(unpack_samples(packed.data(), packed.size(), kTicks, 3), StoreError);
 }
 
 /// A valid blob of the third packing, with all-zero samples.
@@ -212,16 +252,17 @@ std::string a_bomb(std::size_t count) {
   }
   packed.resize(stream.total_out);
   deflateEnd(&stream);
-  for (int shift = 24; shift >= 0; shift -= 8) packed += static_cast<char>(crc >> shift);
+  add_crc(packed, static_cast<std::uint32_t>(crc));
   return packed;
 }
 
 TEST(SamplesCodec, MemoryIsInProportionToTheBytes) {
-  const auto peak = [](const std::string& packed, std::size_t count, bool good) {
+  const auto peak = [](const std::string& packed, std::size_t count, bool good, int packing) {
     return peak_memory([&] {
       try {
         const auto samples =
-            unpack_samples(packed.data(), packed.size(), static_cast<std::int64_t>(count)).samples;
+            unpack_samples(packed.data(), packed.size(), static_cast<std::int64_t>(count), packing)
+                .samples;
         if (!good || samples.size() != count) _exit(2);
       } catch (const StoreError&) {
         if (good) _exit(2);
@@ -229,33 +270,39 @@ TEST(SamplesCodec, MemoryIsInProportionToTheBytes) {
     });
   };
   constexpr std::size_t kRecord = sizeof(SampleRecord);
-  const std::string stroke = pack_samples(a_stroke(100'000));
-  const auto whole = peak(stroke, 100'000, true);
+  const std::string stroke = pack_samples(a_stroke(100'000)).bytes;
+  const auto whole = peak(stroke, 100'000, true, kPlainSamplesPacking);
   ASSERT_TRUE(whole);
   EXPECT_LT(*whole, 100'000 * (kRecord + 8) + (4U << 20U));  // no additional copy
   // 180 kB that unpack to a million samples, 187 MB; in memory they would take more.
   const std::string bomb = a_bomb(1'000'000);
   EXPECT_LT(bomb.size(), 500'000U);
-  const auto refused = peak(bomb, 1'000'000, false);
+  const auto refused = peak(bomb, 1'000'000, false, 3);
   ASSERT_TRUE(refused);
   EXPECT_LT(*refused, 4U << 20U);
+  const std::string smaller = a_zstd_bomb(1'000'000);
+  EXPECT_LT(smaller.size(), 50'000U);
+  const auto refused_too = peak(smaller, 1'000'000, false, 5);
+  ASSERT_TRUE(refused_too);
+  EXPECT_LT(*refused_too, 4U << 20U);
   // The largest count accepted with few bytes.
-  const auto most = peak(a_bomb(400'000), 400'000, true);
+  const auto most = peak(a_bomb(400'000), 400'000, true, 3);
   ASSERT_TRUE(most);
   EXPECT_LT(*most, 100U << 20U);
 }
 
 TEST(SamplesCodec, ALongStandstillIsStoredSoThatItIsReadAgain) {
   constexpr std::size_t kTicks = 450'000;
-  const std::string packed = pack_samples(std::vector<SampleRecord>(kTicks));
-  const auto back = unpack_samples(packed.data(), packed.size(), kTicks).samples;
+  const auto [packing, packed] = pack_samples(std::vector<SampleRecord>(kTicks));
+  EXPECT_EQ(packing, 3);
+  const auto back = unpack_samples(packed.data(), packed.size(), kTicks, packing).samples;
   ASSERT_EQ(back.size(), kTicks);
   EXPECT_EQ(bits_of(back.back()), bits_of(SampleRecord{}));
 }
 
 TEST(SamplesCodec, DamageIsRefused) {
   const auto samples = a_stroke(100);
-  const std::string packed = pack_samples(samples);
+  const std::string packed = pack_samples(samples).bytes;
   const auto unpack = [](const std::string& bytes, std::int64_t count) {
     return unpack_samples(bytes.data(), bytes.size(), count).samples;
   };
@@ -271,7 +318,7 @@ TEST(SamplesCodec, DamageIsRefused) {
     damaged[i] = static_cast<char>(damaged[i] ^ 0x10);
     try {
       const auto back = unpack(damaged, 100);
-      // A bit that zlib does not use (in its header) changes nothing.
+      // A bit that zstd does not use (in its header) changes nothing.
       for (std::size_t k = 0; k < back.size(); ++k)
         ASSERT_EQ(bits_of(back[k]), bits_of(samples[k]));
     } catch (const StoreError&) {

@@ -15,6 +15,7 @@ from command_case import CommandCase
 sys.dont_write_bytecode = True
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "data" / "store"))
 import seals  # noqa: E402
+from sample_planes import planes_of  # noqa: E402
 
 # kg, 1/s, m/s^2, s. Heavy and slow enough to stay within the hand's reach; lighter ones float away before some trials
 # touch them.
@@ -33,8 +34,9 @@ class Replay(CommandCase):
     @staticmethod
     def replace_samples(db, data):
         with sqlite3.connect(db) as base:
-            attempt, packing, count = base.execute("SELECT attempt_id, packing, count FROM samples LIMIT 1").fetchone()
-            base.execute("UPDATE samples SET data = ? WHERE attempt_id = ?", (data, attempt))
+            attempt, count = base.execute("SELECT attempt_id, count FROM samples LIMIT 1").fetchone()
+            packing = 4  # zlib
+            base.execute("UPDATE samples SET packing = ?, data = ? WHERE attempt_id = ?", (packing, data, attempt))
             checksum = hashlib.sha256(packing.to_bytes(4, "little") + count.to_bytes(8, "little") + data).digest()
             base.execute("UPDATE attempts SET samples_sha256 = ? WHERE id = ?", (checksum, attempt))
             seals.seal_again(base)
@@ -101,8 +103,8 @@ class Replay(CommandCase):
         with sqlite3.connect(db) as base:
             packing, count, data = base.execute("SELECT packing, count, data FROM samples LIMIT 1").fetchone()
         base.close()
-        self.assertEqual(packing, 4)
-        planes = bytearray(zlib.decompress(data[:-4]))
+        self.assertEqual(packing, 6)
+        planes = bytearray(planes_of(data))
         self.assertEqual(len(planes), count * (4 + 8 + 2 * 8 + 19 * 8 + 3 + 4 + 1 + 13 * 8))
         body_x_low = (4 + 8 + 2 * 8 + 19 * 8 + 3 + 4 + 1) * count + 7 * count
         planes[body_x_low + count - 1] ^= 1

@@ -18,9 +18,12 @@ import statistics
 import sys
 import tempfile
 import time
-import zlib
 
 from terminal import Terminal
+
+sys.dont_write_bytecode = True
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "data" / "store"))
+from sample_planes import planes_of  # noqa: E402
 
 RATE = 1000  # Hz
 PERIOD_NS = 1_000_000_000 // RATE
@@ -57,7 +60,7 @@ def column(planes, offset, rows, size):
 
 def unexplained(packed, rows, missed_on_record):
     """Samples of a trial that are not where the clock and the record have them."""
-    planes = zlib.decompress(packed[:-4])
+    planes = planes_of(packed)
     ticks = column(planes, 0, rows, 4)
     periods, late = ([v - (v >> 63 << 64) for v in column(planes, at * rows, rows, 8)] for at in (4, 12))
     wrong = sum(tick != i for i, tick in enumerate(ticks))
