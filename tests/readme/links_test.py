@@ -10,7 +10,7 @@ import sys
 import tempfile
 import unittest
 
-from markdown import NOT_RUN, PAGES, READMES, ROOMS, ROOT, RUN, SHELL, Page, broken_links, cells, codes
+from markdown import CONTRIBUTING, NOT_RUN, PAGES, READMES, ROOMS, ROOT, RUN, SHELL, Page, broken_links, cells, codes
 
 KINDS = ("Tutorial: ", "How to ", "Reference: ", "Explanation: ")  # of documentation, kept apart
 LARGEST_PICTURE = 300_000  # bytes
@@ -18,7 +18,7 @@ LARGEST_PICTURE = 300_000  # bytes
 
 class Links(unittest.TestCase):
     def test_every_link_leads_somewhere(self):
-        faults, followed = broken_links(ROOT, READMES)
+        faults, followed = broken_links(ROOT, READMES + [CONTRIBUTING])
         self.assertEqual(faults, [])
         self.assertGreater(followed, 40)
 
@@ -87,11 +87,11 @@ class Pictures(unittest.TestCase):
 
 class Form(unittest.TestCase):
     def test_the_first_page_is_short(self):
-        self.assertLess(len(PAGES["README.md"].text.splitlines()), 125)
+        self.assertLess(len(PAGES["README.md"].text.splitlines()), 145)  # with a whole study
 
     def test_tutorials_how_to_reference_and_explanation_are_kept_apart(self):
         for name, page in PAGES.items():
-            if name == "README.md":
+            if name in ("README.md", CONTRIBUTING):
                 continue
             kinds = [words for level, words in page.headings() if level == 2]
             self.assertGreater(len(kinds), 2, name)

@@ -8,6 +8,7 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 ROOMS = ["stimuli", "rendering", "protocols", "data", "analysis", "runner", "tests"]
 READMES = ["README.md"] + [f"{room}/README.md" for room in ROOMS] + ["runner/participants/README.md",
                                                                                "runner/python/README.md"]
+CONTRIBUTING = ".github/CONTRIBUTING.md"  # not installed
 
 SHELL = ("sh", "bash", "shell", "console")
 RUN, NOT_RUN = "sh test", "sh not tested: "  # marks of blocks
@@ -79,7 +80,7 @@ class Page:
         return "\n".join(out)
 
 
-PAGES = {name: Page(name) for name in READMES}
+PAGES = {name: Page(name) for name in READMES + [CONTRIBUTING]}
 
 
 def cells(section):
