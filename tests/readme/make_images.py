@@ -22,6 +22,7 @@ IMAGES = ROOT / ".github" / "images"
 PROTOCOLS = ROOT / "protocols"
 sys.path.insert(0, str(ROOT / "tests" / "runner" / "display"))
 
+from contact_patches import contact_patches  # noqa: E402
 from virtual_screen import VirtualScreen, wait_for  # noqa: E402
 
 KEYS = {"sphere": "1", "cone": "2", "cylinder": "3", "cube": "4"}
@@ -205,6 +206,7 @@ def explore_window(palpate, folder):
 
 SCENES = ["fig3b-extended-probe", "fig13-two-objects", "fig14-dumbbells", "fig16-rocket", "fig17a-engine", "fig17b-instrument", "layers"]
 PICTURES = {**{name: scene(name) for name in SCENES},
+            "contact-patches": lambda palpate, folder: (IMAGES / "contact-patches.svg").write_text(contact_patches()),
             "explore-window": explore_window, "live-session": lambda *arguments: undisturbed(live_session, *arguments), "figure15": figure("figure15"),
             "speedup": figure("speedup"), "power": power, "sweep-gains": sweep_gains, "soft-stability": soft_stability,
             "recover-parameters": example("recover_parameters"), "choose-sizes": example("choose_sizes")}
