@@ -111,7 +111,8 @@ void TrialTableBuilder::add(const RawTrial& raw) {
   shown_.resize(stimuli_.names().size());
   if (shown_[row.shape] == 0) shown_[row.shape] = ++n_shown_;
   n_simulated_ += raw.simulated;
-  n_contradicting_ += raw.correct != (raw.response == raw.shape) && !raw.timed_out;
+  n_contradicting_ +=
+      raw.names_shape && raw.correct != (raw.response == raw.shape) && !raw.timed_out;
   n_late_answers_ += raw.timed_out && (raw.correct || !raw.response.empty());
   keys_.push_back({row.participant, raw.session, raw.block, raw.trial,
                    protocols_.number(raw.protocol), static_cast<std::uint32_t>(rows_.size())});
@@ -623,6 +624,7 @@ TrialTable read_trials_store(const std::string& path, const std::string& protoco
     raw.block = record.block;
     raw.trial = record.trial;
     raw.correct = record.correct;
+    raw.names_shape = record.task.task == data::TaskRecord().task;
     raw.practice = record.practice;
     raw.timed_out = record.timed_out;
     raw.simulated = trial.participant.simulated;

@@ -145,6 +145,7 @@ struct RawTrial {
   std::string_view protocol{};  ///< its SHA-256; "": unknown
   int session = 1, block = 1, trial = 1;
   bool correct = false, practice = false, timed_out = false, simulated = false;
+  bool names_shape = true;   ///< the response names a shape, so that `correct` follows from both
   double response_time = 0;  ///< s; kNoTime only for a time-out
   std::size_t line = 0;      ///< line number in the file, from 1; 0: none
 };

@@ -121,10 +121,24 @@ void check_movement(const boost::program_options::variables_map& values, double 
   if (jobs < 1 || jobs > 1024) throw UsageError("--jobs: must be 1 to 1024");
 }
 
+/// \throws UsageError: no trial has measures, with the reasons
+void require_measures(const analysis::MovementTable& table, const std::string& database) {
+  std::size_t without = 0;
+  std::string reasons;
+  for (const auto& [reason, trials] : table.missing) {
+    without += trials;
+    reasons += (reasons.empty() ? "" : "; ") + std::to_string(trials) + ": " + printable(reason);
+  }
+  if (without == table.values.size())
+    throw UsageError(printable(database) + ": has no trial whose movement can be measured (" +
+                     reasons + ")");
+}
+
 void analyze_movement_of(MovementRequest request, Outputs& outputs) {
   request.pictures = outputs.wanted("report") || outputs.wanted("figures");
   MovementStudy study = measure_study(request);
   require_samples(study, request.database);
+  require_measures(study.table, request.database);
   if (outputs.wanted("movement-csv")) outputs.put("movement-csv", study.csv);
   const analysis::MovementAnalysis found =
       analysis::analyze_movement(std::move(study.table), PALPATE_VERSION);

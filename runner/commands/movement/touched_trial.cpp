@@ -218,11 +218,36 @@ std::shared_ptr<const TouchedStimuli> StudyStimuli::of(data::Store& store,
   return by_run_[run] = made;
 }
 
+namespace {
+
+/// Whether a level leaves shape, size and orientation as they are: materials only.
+bool keeps_geometry(const protocols::Protocol& protocol, const data::TaskRecord& task) {
+  const auto block =
+      std::ranges::find(protocol.blocks, task.block_name, &protocols::TaskBlock::name);
+  if (block == protocol.blocks.end() || !block->level) return true;
+  const std::string& path = block->level->pointer;
+  const std::string last = path.substr(path.rfind('/') + 1);
+  return last.starts_with("stiffness_") || last.starts_with("damping_") ||
+         last.starts_with("friction_");
+}
+
+/// Reason why a trial of a block has no measures; empty: it has one interval with the stimulus as
+/// the protocol describes its surface.
+std::string unmeasured_task(const protocols::Protocol& protocol, const data::TrialRecord& record) {
+  const std::vector<data::IntervalRecord> intervals = data::intervals_of(record);
+  if (intervals.size() != 1) return "a trial of several intervals";
+  if (intervals[0].stimulus.empty()) return "a trial without an object";
+  if (intervals[0].stimulus != record.shape) return "a trial with the object of catch trials";
+  return keeps_geometry(protocol, record.task) ? "" : "its level changes the shape of the object";
+}
+
+}  // namespace
+
 std::string read_movement(const TouchedStimuli& stimuli, const data::StoredTrial& stored,
                           analysis::MovementTrial& trial) {
   const data::TrialRecord& record = stored.record;
   const int stimulus = stimuli.stimulus(record.shape);
-  if (record.task.of_block()) return "a trial of a block of tasks";
+  if (const std::string why = unmeasured_task(stimuli.protocol(), record); !why.empty()) return why;
   if (stimulus < 0) return "the protocol has no such stimulus";
   if (record.samples.empty()) return "no samples";
 

@@ -191,8 +191,46 @@ class Movement(CommandCase):
             return done, list(csv.DictReader(file))
 
     def test_measures_equal_their_definitions(self):
-        db = self.study()
-        _, rows = self.measured(db)
+        self.check_definitions(self.study(), 8)
+
+    def task_study(self, name, *blocks):
+        cube = {"shape": "cube", "edge_m": EDGE, "stiffness_n_per_m": 500}
+        path = self.file(f"{name}.json", {
+            "version": 2, "name": name, "renderers": ["point", "ray"], "samples": True, "orientation": "fixed",
+            "stimuli": [{"name": "cube"} | cube, {"name": "other"} | cube], "blocks": blocks, "seed": 4})
+        db = self.dir / f"{name}.db"
+        self.palpate("simulate", path, "--db", db, "--participants", 2, "--seed", 3)
+        return db
+
+    def test_tasks_with_one_object_a_trial_are_measured(self):
+        rating = {"name": "soft", "task": "rate", "question": "How soft?", "stimuli": ["cube"],
+                  "level": {"path": "/stiffness_n_per_m"}, "procedure": {"kind": "constant", "levels": [300, 600], "repetitions": 1},
+                  "scale": [{"label": "hard"}, {"label": "soft"}]}
+        db = self.task_study("rated", rating)
+        done = self.check_definitions(db, 8)
+        self.assertNotIn("contradicts", done.stdout + done.stderr)
+        # Of a level that changes the size, nothing is known about the surface.
+        sized = rating | {"level": {"path": "/edge_m"}, "procedure": {"kind": "constant", "levels": [0.04, 0.05], "repetitions": 1}}
+        db = self.task_study("sized", sized)
+        said = self.palpate("analyze", "--db", db, "--movement", status=2).stderr
+        self.assertIn("8: its level changes the shape of the object", said)
+
+    def test_trials_of_several_intervals_are_refused_by_name(self):
+        compare = {"name": "two", "task": "compare", "question": "Which is harder?", "stimuli": ["cube"],
+                   "standard": "other", "level": {"path": "/stiffness_n_per_m"},
+                   "procedure": {"kind": "constant", "levels": [300, 600], "repetitions": 1}}
+        db = self.task_study("compared", compare)
+        said = self.palpate("analyze", "--db", db, "--movement", status=2).stderr
+        self.assertIn("has no trial whose movement can be measured (8: a trial of several intervals)", said)
+        both = self.task_study("both", compare, {"name": "names", "task": "identify", "stimuli": ["cube", "other"], "repetitions": 2,
+                                                 "question": "Which?"})
+        done, rows = self.measured(both)
+        self.assertEqual([row["missing"] for row in rows].count("a trial of several intervals"), 8)
+        self.assertEqual([row["missing"] for row in rows].count(""), 16)
+        self.assertNotIn("contradicts", done.stdout + done.stderr)
+
+    def check_definitions(self, db, count):
+        done, rows = self.measured(db)
         self.palpate("export", "--db", db, "--format", "psych-ds", "--out", self.dir / "psych")
         _, trials = self.exported(db)
         samples = {}
@@ -200,7 +238,7 @@ class Movement(CommandCase):
             with file.open() as opened:
                 for one in csv.DictReader(opened):
                     samples.setdefault((one["participant_id"], one["trial"]), []).append(one)
-        self.assertEqual(len(rows), 8)
+        self.assertEqual(len(rows), count)
         touched = 0
         for row, trial in zip(rows, trials, strict=True):
             self.assertEqual((row["participant_id"], row["trial"]), (trial["participant_id"], trial["trial"]))
@@ -224,6 +262,7 @@ class Movement(CommandCase):
                          0.005 if name == "ldlj" else 1e-3 * abs(value) + 1e-9)
                 self.assertAlmostEqual(float(row[name]), value, delta=delta, msg=f"{name} of trial {row['trial']}")
         self.assertGreaterEqual(touched, 1)
+        return done
 
     def test_results_do_not_depend_on_the_number_of_threads(self):
         db = self.study()
