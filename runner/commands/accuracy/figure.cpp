@@ -19,16 +19,18 @@ constexpr double kLeastOfShape = 1e-10, kLeastOfPolyhedron = 1e-18;
 struct MethodLook {
   std::string_view method;
   analysis::Role role;
+  analysis::MarkerShape shape;
 };
 // The program's own tick is dark, wide and on top.
-constexpr std::array kLooks = {MethodLook{"tick", analysis::Role::ink},
-                               MethodLook{"walk", analysis::Role::point},
-                               MethodLook{"walk-float", analysis::Role::eighth},
-                               MethodLook{"walk-cold", analysis::Role::soft},
-                               MethodLook{"scan", analysis::Role::fourth},
-                               MethodLook{"brute-force", analysis::Role::seventh},
-                               MethodLook{"bullet", analysis::Role::ray},
-                               MethodLook{"fcl", analysis::Role::third}};
+constexpr std::array kLooks = {
+    MethodLook{"tick", analysis::Role::ink, analysis::MarkerShape::circle},
+    MethodLook{"walk", analysis::Role::point, analysis::MarkerShape::square},
+    MethodLook{"walk-float", analysis::Role::eighth, analysis::MarkerShape::up},
+    MethodLook{"walk-cold", analysis::Role::soft, analysis::MarkerShape::down},
+    MethodLook{"scan", analysis::Role::fourth, analysis::MarkerShape::cross},
+    MethodLook{"brute-force", analysis::Role::seventh, analysis::MarkerShape::saltire},
+    MethodLook{"bullet", analysis::Role::ray, analysis::MarkerShape::right},
+    MethodLook{"fcl", analysis::Role::third, analysis::MarkerShape::left}};
 
 double of_shape(const rendering::AccuracyRow& row) {
   return std::max(kLeastOfShape, row.shape_errors.depth.rms);
@@ -36,6 +38,8 @@ double of_shape(const rendering::AccuracyRow& row) {
 double of_polyhedron(const rendering::AccuracyRow& row) {
   return std::max(kLeastOfPolyhedron, row.polyhedron_errors.depth.worst);
 }
+constexpr std::size_t kPanelsOfRow = 3;  // as many as a page has room for
+
 using ErrorOf = double (*)(const rendering::AccuracyRow&);
 
 /// Lines from the coarsest tessellation to the finest, one for each method.
@@ -48,11 +52,11 @@ void add_methods(analysis::Panel& panel, const AccuracyReport& report, std::stri
       if (row.probe != "ray" || row.shape != shape || row.method != look->method) continue;
       line.x.push_back(std::log10(row.ns_per_tick));
       line.y.push_back(std::log10(error(row)));
-      panel.marks.push_back(analysis::symbol(
-          look->role, analysis::MarkerShape::circle, line.x.back(), line.y.back(), ours ? 3.5 : 2.5,
-          row.method + ", " + thousands(row.triangles) +
-              " triangles: " + significant(row.ns_per_tick) + " ns a tick, error " +
-              significant(error(row)) + " m"));
+      panel.marks.push_back(
+          analysis::symbol(look->role, look->shape, line.x.back(), line.y.back(), ours ? 4.5 : 3.5,
+                           row.method + ", " + thousands(row.triangles) +
+                               " triangles: " + significant(row.ns_per_tick) +
+                               " ns a tick, error " + significant(error(row)) + " m"));
     }
     if (line.x.size() > 1) panel.marks.push_back(std::move(line));
   }
@@ -89,9 +93,9 @@ void add_row(analysis::Figure& figure, const AccuracyReport& report, ErrorOf err
     analysis::Panel panel;
     panel.title = shapes[s];
     panel.x = analysis::decades_axis(fastest, slowest, "ns a tick");
-    panel.y = analysis::decades_axis(low, high, s == 0 ? title : "");
-    panel.width = panel.height = 230;
-    panel.starts_row = s == 0;
+    panel.y = analysis::decades_axis(low, high, s % kPanelsOfRow == 0 ? title : "");
+    panel.width = panel.height = 215;
+    panel.starts_row = s % kPanelsOfRow == 0;
     add_methods(panel, report, shapes[s], error);
     figure.panels.push_back(std::move(panel));
   }
@@ -110,11 +114,10 @@ analysis::Figure accuracy_figure(const AccuracyReport& report) {
       "Error over time for each method of finding contact. One panel for each shape, both axes "
       "logarithmic. Top: error of depth against the analytic shape. Bottom: against the exact "
       "polyhedron.";
-  figure.max_row_width = 1e6;  // all shapes side by side
   for (const MethodLook& look : kLooks) {
     if (std::ranges::find(report.rows, look.method, &rendering::AccuracyRow::method) !=
         report.rows.end()) {
-      figure.legend.push_back({std::string(look.method), look.role, analysis::MarkerShape::circle});
+      figure.legend.push_back({std::string(look.method), look.role, look.shape});
     }
   }
   add_row(figure, report, of_shape, kHand.position, "rms error against the shape (m)");

@@ -57,16 +57,22 @@ struct StabilityReport {
   int points() const;
 };
 
-constexpr double kPanelWidth = 300, kPanelHeight = 250, kRoom = 1240;  // px: three side by side
+constexpr double kPanelWidth = 245, kPanelHeight = 245, kRoom = 1000;  // px: three side by side
 constexpr double kLeastDamping = 1e-4, kMostDamping = 1e3;             // N s/m
 constexpr double kLeastError = 1e-19;                                  // m
 
+/// The symbol of a curve or method, which tells it from others without colour.
+analysis::MarkerShape line_shape(std::size_t line) {
+  using enum analysis::MarkerShape;
+  constexpr std::array kShapes = {circle, square, diamond, up, cross, saltire, right, left};
+  return kShapes[line % kShapes.size()];
+}
+
 /// The curve's name in the panel's upper left corner, `row` names below the top.
-void add_name(analysis::Panel& panel, const std::string& name, analysis::Role role,
-              std::size_t row) {
+void add_name(analysis::Panel& panel, const std::string& name, std::size_t row) {
   const double dy = 18 + 15 * static_cast<double>(row);
   analysis::Mark dot =
-      analysis::symbol(role, analysis::MarkerShape::circle, panel.x.low, panel.y.high, 3.5);
+      analysis::symbol(analysis::line_role(row), line_shape(row), panel.x.low, panel.y.high, 3.5);
   dot.dx = 12;
   dot.dy = dy - 4;
   panel.marks.push_back(std::move(dot));
@@ -78,7 +84,9 @@ void add_name(analysis::Panel& panel, const std::string& name, analysis::Role ro
   panel.marks.push_back(std::move(text));
 }
 
-void add_curve(analysis::Panel& panel, const BoundaryCurve& curve, analysis::Role role) {
+void add_curve(analysis::Panel& panel, const BoundaryCurve& curve, std::size_t row) {
+  constexpr double kApart = 9;  // px between symbols of curves on the lower edge
+  const analysis::Role role = analysis::line_role(row);
   analysis::Mark theory = analysis::line_mark(role, {}, {}, 1.4);
   for (const stability::BoundaryPoint& point : curve.points) {
     const double x = std::log10(point.stiffness);
@@ -89,13 +97,13 @@ void add_curve(analysis::Panel& panel, const BoundaryCurve& curve, analysis::Rol
     const std::string text = curve.name + ", " + significant(point.stiffness) + " N/m: ";
     if (point.measured > 0) {
       panel.marks.push_back(
-          analysis::symbol(role, analysis::MarkerShape::circle, x,
+          analysis::symbol(role, line_shape(row), x,
                            std::clamp(std::log10(point.measured), panel.y.low, panel.y.high), 3.5,
                            text + significant(point.measured) + " N s/m"));
     } else {
-      panel.marks.push_back(analysis::symbol(role, analysis::MarkerShape::down, x, panel.y.low, 3.5,
+      panel.marks.push_back(analysis::symbol(role, line_shape(row), x, panel.y.low, 3.5,
                                              text + "stable without any damping"));
-      panel.marks.back().dy = -4;
+      panel.marks.back().dy = -5 - kApart * static_cast<double>(row);
     }
   }
   if (theory.x.size() > 1) panel.marks.push_back(std::move(theory));
@@ -110,10 +118,11 @@ std::string in_pascals(double modulus) {
 analysis::Figure stability_figure(const StabilityReport& report) {
   analysis::Figure figure;
   figure.id = "stability";
-  figure.title = "A stiffer wall needs more damping: lines are the theory, dots the loop";
+  figure.title = "A stiffer wall needs more damping: lines are the theory, symbols the loop";
   figure.subtitle =
-      "Below a line no hand can make it buzz. A dot on or under its line is on the safe side; a "
-      "triangle at the bottom: stable without any damping.";
+      "Below a line no hand can make it buzz. A symbol on or under its line is on the safe side; "
+      "in "
+      "a row at the bottom: stable without any damping.";
   figure.description =
       "Stability boundaries: damping over stiffness. Each panel asks one question; logarithmic "
       "both ways. Lines: b = K (T/2 + t_d) + |B|. Dots: the least damping with which the simulated "
@@ -133,8 +142,8 @@ analysis::Figure stability_figure(const StabilityReport& report) {
       row = 0;
     }
     analysis::Panel& panel = figure.panels.back();
-    add_curve(panel, curve, analysis::line_role(row));
-    add_name(panel, curve.name, analysis::line_role(row), row);
+    add_curve(panel, curve, row);
+    add_name(panel, curve.name, row);
     ++row;
   }
   return figure;
@@ -213,12 +222,12 @@ analysis::Figure integrator_figure(const StabilityReport& report) {
   analysis::Figure figure;
   figure.id = "integrators";
   figure.title = "Integrators: the exact one has the least cost and error";
-  figure.subtitle = "Dots: 1, 4, 16, ... 1024 steps a tick; diverging ones are not drawn.";
+  figure.subtitle = "Symbols: 1, 4, 16, ... 1024 steps a tick; diverging ones are not drawn.";
   figure.description =
       "Error over run time of integrators. A panel for each oscillator, logarithmic both ways.";
   figure.max_row_width = kRoom;
   for (std::size_t m = 0; m < kMethods.size(); ++m) {
-    figure.legend.push_back({kMethods[m], analysis::line_role(m), analysis::MarkerShape::circle});
+    figure.legend.push_back({kMethods[m], analysis::line_role(m), line_shape(m)});
   }
   for (const stability::IntegratorRow& row : report.integrators) {
     if (!figure.panels.empty() && figure.panels.back().title == row.oscillator) continue;
@@ -240,8 +249,7 @@ analysis::Figure integrator_figure(const StabilityReport& report) {
         line.y.push_back(
             std::clamp(std::log10(std::max(row.error, kLeastError)), panel.y.low, panel.y.high));
         panel.marks.push_back(analysis::symbol(
-            analysis::line_role(m), analysis::MarkerShape::circle, line.x.back(), line.y.back(),
-            m == 3 ? 5 : 3.5,
+            analysis::line_role(m), line_shape(m), line.x.back(), line.y.back(), m == 3 ? 5 : 3.5,
             row.method + ", " + std::to_string(row.steps) + " steps a tick: " +
                 significant(row.ns_per_tick) + " ns, error " + significant(row.error) + " m"));
       }

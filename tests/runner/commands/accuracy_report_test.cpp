@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <set>
 #include <string>
 #include <vector>
 
@@ -42,14 +43,41 @@ TEST(AccuracyReport, ShowsEveryShapeThatWasMeasured) {
   for (const char* shape : {"sphere", "octahedron", "wedge", "prism", "pyramid"}) {
     EXPECT_NE(figure.find(std::string(">") + shape + "<"), std::string::npos) << shape;
   }
-  // Two rows of five panels with the same axes.
+  // Two kinds of error with the same axes, each in rows of three panels.
   const std::vector<analysis::Panel> panels = accuracy_figure(report).panels;
   ASSERT_EQ(panels.size(), 10U);
   for (std::size_t p = 0; p < panels.size(); ++p) {
-    EXPECT_EQ(panels[p].starts_row, p % 5 == 0);
+    EXPECT_EQ(panels[p].starts_row, p % 5 == 0 || p % 5 == 3);
+    EXPECT_EQ(panels[p].y.title.empty(), !panels[p].starts_row);
     EXPECT_EQ(panels[p].x.high, panels[0].x.high);
     EXPECT_EQ(panels[p].y.low, panels[p < 5 ? 0 : 5].y.low);
   }
+}
+
+TEST(AccuracyReport, FitsThePageAndTellsMethodsWithoutColour) {
+  AccuracyReport report;
+  const std::vector<std::string> methods{"tick", "walk",        "walk-float", "walk-cold",
+                                         "scan", "brute-force", "bullet",     "fcl"};
+  for (const char* shape : {"sphere", "cone", "cylinder", "cube", "box"}) {
+    for (const std::string& method : methods) {
+      report.rows.push_back(row_of(shape, 20, "ray"));
+      report.rows.back().method = method;
+    }
+  }
+  const analysis::Figure figure = accuracy_figure(report);
+  ASSERT_EQ(figure.legend.size(), methods.size());
+  std::set<analysis::MarkerShape> shapes;
+  for (const analysis::LegendEntry& entry : figure.legend) shapes.insert(entry.shape);
+  EXPECT_EQ(shapes.size(), methods.size());
+  for (const analysis::LegendEntry& entry : figure.legend) {
+    const bool drawn = std::ranges::any_of(figure.panels[0].marks, [&](const analysis::Mark& mark) {
+      return mark.text.starts_with(entry.label + ",") && mark.shape == entry.shape;
+    });
+    EXPECT_TRUE(drawn) << entry.label;
+  }
+  // A page is some 920 px wide: a drawing of 1040 px has letters of 9 px there.
+  const std::string svg = analysis::figure_svg(figure, analysis::light_palette());
+  EXPECT_LE(std::stod(svg.substr(svg.find(" width=\"") + 8)), 1040);
 }
 
 }  // namespace

@@ -55,12 +55,24 @@ class Stability(unittest.TestCase):
         for renderer in ("point", "ray"):
             self.check_a_held_body(result, renderer)
         self.check_theory(result["theory"] + result["curves"])
-        # A dot or a triangle for every point, a dot for every name.
+        # A symbol with its numbers for every point; curves of a panel differ in more than colour.
         root = xml.etree.ElementTree.parse(figure).getroot()
         svg = "{http://www.w3.org/2000/svg}"
         points = sum(len(curve["points"]) for curve in result["curves"])
-        drawn = len(list(root.iter(svg + "circle"))) + len(list(root.iter(svg + "polygon")))
-        self.assertEqual(drawn, points + len(result["curves"]))
+        titles = [title.text for title in root.iter(svg + "title")]
+        said = [text for text in titles if text.endswith((" N s/m", ": stable without any damping"))]
+        self.assertEqual(len(said), points)
+        kinds = {}
+        for group in root.iter(svg + "g"):
+            title = group.find(svg + "title")
+            if title is None or not title.text.endswith(" N s/m"):
+                continue
+            for mark in group:
+                if mark.tag != svg + "title":
+                    form = (mark.tag, len(mark.get("points", "").split()), mark.get("fill") == "#ffffff")
+                    kinds.setdefault(form, set()).add(title.text.split(",")[0])
+        self.assertGreater(len(kinds), 3, "circles, squares, triangles, crosses")
+        self.assertLessEqual(float(root.get("width")), 1040, "letters of 9 px on a page of 920 px")
         as_xml = re.sub(r"<!DOCTYPE html>|<script>.*?</script>", "", page.read_text(), flags=re.S)
         xml.etree.ElementTree.fromstring(as_xml)
 
