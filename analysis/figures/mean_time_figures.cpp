@@ -75,21 +75,23 @@ void add_participants(Panel& panel, const Analysis& analysis, std::size_t render
   }
 }
 
-/// Upper end of the time axis, s. Intervals are cut at 1.5 times the largest participant's mean: an
-/// interval of two participants may be ten times as long.
+/// Upper end of the time axis, s. Intervals of two participants are cut at 1.5 times the largest
+/// participant's mean: they may be ten times as long.
 double highest_time(const Analysis& analysis, std::size_t renderers, std::size_t shapes) {
-  double largest = 0, largest_end = 0;
+  double largest = 0, largest_end = 0, end_of_two = 0;
   for (std::size_t r = 0; r < renderers; ++r) {
     for (std::size_t s = 0; s < shapes; ++s) {
       for (const ParticipantCell& participant : analysis.description.participant_cells[r][s]) {
         if (participant.n_used > 0) largest = std::max(largest, participant.mean);
       }
       if (const auto ends = interval_of(analysis.description.times[r][s])) {
-        largest_end = std::max(largest_end, ends->high);
+        double& end =
+            analysis.description.times[r][s].n_participants < 3 ? end_of_two : largest_end;
+        end = std::max(end, ends->high);
       }
     }
   }
-  const double highest = std::max(largest, std::min(largest_end, 1.5 * largest));
+  const double highest = std::max({largest, largest_end, std::min(end_of_two, 1.5 * largest)});
   return highest > 0 ? highest : 1;
 }
 
@@ -299,6 +301,13 @@ Figure speedup_of(const Analysis& analysis) {
                            "in trials without an answer in time."
                          : "") +
           (with_paper ? " n.s.: the paper found no significant difference." : ""));
+  const bool cut = std::ranges::any_of(figure.panels, [](const Panel& panel) {
+    return std::ranges::any_of(panel.marks,
+                               [](const Mark& mark) { return mark.shape == MarkerShape::down; });
+  });
+  if (cut)
+    figure.notes.emplace_back(
+        "An arrow: the interval goes on beyond the axis; the table has its end.");
   return figure;
 }
 

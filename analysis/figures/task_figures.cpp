@@ -118,8 +118,11 @@ std::pair<Role, MarkerShape> group_style(const std::string& renderer, std::size_
   return {kOthers[n % std::size(kOthers)], kShapes[n % std::size(kShapes)]};
 }
 
-/// Spans the participants' figures and the intervals, the latter at most by half the range beyond:
-/// those of two participants may be very wide.
+/// Of two participants an interval is some thirteen times their distance: it would hide them.
+bool may_be_cut(const GroupMean& one) { return one.participants.size() < 3; }
+
+/// Spans the participants' figures and the intervals; those of two participants at most by half the
+/// range beyond.
 FigureAxis group_axis(const TaskGroup& group) {
   double low = std::numeric_limits<double>::infinity(), high = -low;
   for (const GroupMean& one : group.renderers) {
@@ -128,13 +131,15 @@ FigureAxis group_axis(const TaskGroup& group) {
       high = std::max(high, figure.value);
     }
   }
-  const double range = std::max(high - low, 1e-3 * std::abs(high)), room = 0.5 * range;
-  const double least = low - room, most = high + room;
+  double range = std::max(high - low, 1e-3 * std::abs(high));
+  const double least = low - 0.5 * range, most = high + 0.5 * range;
   for (const GroupMean& one : group.renderers) {
     if (!one.ci95) continue;
-    low = std::min(low, std::max(one.ci95->low, least));
-    high = std::max(high, std::min(one.ci95->high, most));
+    const auto& [from, to] = *one.ci95;
+    if (std::isfinite(from)) low = std::min(low, may_be_cut(one) ? std::max(from, least) : from);
+    if (std::isfinite(to)) high = std::max(high, may_be_cut(one) ? std::min(to, most) : to);
   }
+  range = std::max(range, high - low);
   const double margin = 0.08 * range;
   const bool all_above = low > 0;
   low -= margin;
@@ -229,6 +234,7 @@ void add_group_figures(const TaskAnalysis& analysis, std::vector<Figure>& figure
         "Large symbols: means over participants with their 95 % intervals (t), geometric if all "
         "values are ratios. Small symbols: participants, joined by a line.");
     std::size_t most = 0;
+    bool cut = false;
     for (; i < analysis.groups.size() && same(analysis.groups[i], first); ++i) {
       const TaskGroup& group = analysis.groups[i];
       std::size_t shown = 0;
@@ -240,7 +246,11 @@ void add_group_figures(const TaskAnalysis& analysis, std::vector<Figure>& figure
       }
       if (shown > 0) figure.panels.push_back(group_panel(group));
       most = std::max(most, shown);
+      cut |= std::ranges::any_of(group.renderers,
+                                 [](const GroupMean& one) { return one.ci95 && may_be_cut(one); });
     }
+    if (cut)
+      figure.notes.push_back("An arrow: the interval of two participants goes on beyond the axis.");
     std::string differences;
     for (const TaskComparison& one : analysis.renderers) {
       if (same(one, first)) differences += difference_sentence(one);

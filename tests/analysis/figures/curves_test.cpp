@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <set>
 #include <string>
 #include <utility>
@@ -12,6 +13,7 @@
 #include "analysis/input/trials.h"
 #include "analysis/report/plan_report.h"
 #include "analysis/statistics/analysis.h"
+#include "analysis/statistics/task_analysis.h"
 
 namespace palpate::analysis {
 namespace {
@@ -55,6 +57,53 @@ TEST(PlanFigureCurves, HaveAShapeAndAColourEachAsTheLegendSays) {
     }
     EXPECT_EQ(shapes.size(), n) << "colours alone are not seen by everybody";
   }
+}
+
+/// The highest end of the intervals of `n` participants, drawn on the axis of mean times and of a
+/// task's means: above 1, it is beyond the axis.
+double overrun_of_times(int n) {
+  TrialTableBuilder builder;
+  for (int p = 0; p < n; ++p) {
+    const std::string person = "P" + std::to_string(p);
+    RawTrial raw;
+    raw.participant = person;
+    raw.renderer = "ray";
+    raw.shape = raw.response = "cone";
+    raw.correct = true;
+    raw.trial = 1;
+    raw.response_time = p == 0 ? 6 : 1;
+    builder.add(raw);
+  }
+  const Analysis analysis = analyze(builder.finish({}), {}, "test");
+  const TimesCell& cell = analysis.description.times[0][0];
+  const double n_double = n, t = n == 2 ? 12.706 : 4.303;
+  const double end =
+      *cell.mean_of_participant_means + t * *cell.sd_of_participant_means / std::sqrt(n_double);
+  return end / figure15_of(analysis).panels[0].y.high;
+}
+
+double overrun_of_tasks(std::size_t n) {
+  TaskAnalysis analysis;
+  TaskGroup& group = analysis.groups.emplace_back();
+  group.task = "compare";
+  group.measure = "jnd";
+  GroupMean& ray = group.renderers.emplace_back();
+  ray.renderer = "ray";
+  for (std::size_t p = 0; p < n; ++p)
+    ray.participants.push_back({"P" + std::to_string(p), p == 0 ? 10.0 : 12.0});
+  ray.mean = 11;
+  ray.ci95 = Interval{9, 25};
+  const std::vector<Figure> figures = task_figures(analysis);
+  const bool noted = figures.at(0).notes.back().find("arrow") != std::string::npos;
+  EXPECT_EQ(noted, n < 3);
+  return 25 / figures[0].panels.at(0).y.high;
+}
+
+TEST(AxesOfMeans, CutIntervalsOfTwoParticipantsOnly) {
+  EXPECT_LE(overrun_of_times(3), 1);
+  EXPECT_GT(overrun_of_times(2), 1);
+  EXPECT_LE(overrun_of_tasks(3), 1);
+  EXPECT_GT(overrun_of_tasks(2), 1);
 }
 
 Analysis analysis_of(const std::vector<std::string>& renderers) {
