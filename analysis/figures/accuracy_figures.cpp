@@ -145,10 +145,10 @@ std::optional<Interval> percent_change(const std::optional<Interval>& log_ratio)
 /// defined
 bool add_changes(Panel& panel, const Comparison& comparison, const std::vector<std::string>& names,
                  std::size_t shapes, std::string& description) {
-  panel.marks.push_back(rect_mark(Role::amber, panel.x.low, panel.y.low, 0, 0, 0.1,
-                                  "faster and less accurate: a trade-off"));
-  panel.marks.push_back(rect_mark(Role::amber, 0, 0, panel.x.high, panel.y.high, 0.1,
-                                  "slower and more accurate: a trade-off"));
+  panel.marks.push_back(
+      rect_mark(Role::amber, panel.x.low, panel.y.low, 0, 0, 0.1, "faster and less accurate"));
+  panel.marks.push_back(
+      rect_mark(Role::amber, 0, 0, panel.x.high, panel.y.high, 0.1, "slower and more accurate"));
   panel.marks.push_back(line_mark(Role::soft, {0, 0}, {panel.y.low, panel.y.high}, 1.2));
   panel.marks.push_back(line_mark(Role::soft, {panel.x.low, panel.x.high}, {0, 0}, 1.2));
   bool any = false;
@@ -166,7 +166,8 @@ bool add_changes(Panel& panel, const Comparison& comparison, const std::vector<s
     if (const auto& ends = both.test.log_ratio_ci95) {
       text += " (" + fixed(100 * ends->low, 1) + " to " + fixed(100 * ends->high, 1) + ")";
     }
-    if (!both.reading.empty()) text += ", " + both.reading;
+    if (!both.reading.empty())
+      text += both.reading == "none shown" ? ", no trade-off shown" : ", " + both.reading;
     if (time) add_interval_across(panel, Role::ink, y, time->low, time->high, text);
     if (const auto& ends = both.test.log_ratio_ci95) {
       add_interval(panel, Role::ink, x, 100 * ends->low, 100 * ends->high, text);
@@ -240,11 +241,13 @@ Figure speed_accuracy_of(const Analysis& analysis) {
   if (figure.panels.empty()) return figure;
   const bool paper =
       analysis.comparisons.size() == 1 && analysis.comparisons.front().pair.is_ray_minus_point();
-  figure.notes.insert(figure.notes.begin(),
-                      std::string(paper ? "Ray minus point" : "Renderer minus reference") +
-                          ", means over participants; bars: 95 % intervals of the change of time "
-                          "and of accuracy, not adjusted. Shaded: possible speed-accuracy "
-                          "trade-offs.");
+  figure.notes.insert(
+      figure.notes.begin(),
+      std::string(paper ? "Ray minus point" : "Renderer minus reference") +
+          ", means over participants; bars: 95 % intervals of the change of time "
+          "and of accuracy, not adjusted. Shaded: faster and less accurate, or slower "
+          "and more accurate. A trade-off is possible where the interval of "
+          "accuracy stays within the shade.");
   return figure;
 }
 

@@ -7,16 +7,17 @@ namespace palpate::analysis {
 
 namespace {
 
-constexpr double kNotableTime = 1;         // percent, smallest change of time that counts
-constexpr double kNotableAccuracy = 0.01;  // proportion, smallest change of accuracy that counts
-
-/// Compares the directions of the changes of time and accuracy; changes below the thresholds have
-/// no direction.
-std::string read(double percent_change_time, double accuracy_change) {
-  const bool notable = std::fabs(percent_change_time) > kNotableTime &&
-                       std::fabs(accuracy_change) > kNotableAccuracy;
-  const bool faster = percent_change_time < 0, less_accurate = accuracy_change < 0;
-  return notable && faster == less_accurate ? "trade-off possible" : "no trade-off";
+/// A trade-off needs evidence of a loss: point estimates of opposite sign come in half of all cells
+/// without any effect. \param change of accuracy, renderer minus reference
+std::string read(double percent_change_time, double change, const TTest& test,
+                 std::size_t participants) {
+  const bool renderer_is_faster = percent_change_time < 0;
+  if (const auto& ends = test.log_ratio_ci95) {
+    const bool faster_loses = renderer_is_faster ? ends->high < 0 : ends->low > 0;
+    return percent_change_time != 0 && faster_loses ? "trade-off possible" : "none shown";
+  }
+  // Without variance there is no interval; equal accuracies of everybody are no loss.
+  return participants > 1 && change == 0 ? "none shown" : "";
 }
 
 }  // namespace
@@ -52,7 +53,7 @@ std::vector<SpeedAccuracy> speed_accuracy(const TrialTable& table, const Descrip
     if (shapes[s].mean_log_ratio)
       one.percent_change_time = 100 * std::expm1(*shapes[s].mean_log_ratio);
     if (one.percent_change_time && one.accuracy_change) {
-      one.reading = read(*one.percent_change_time, *one.accuracy_change);
+      one.reading = read(*one.percent_change_time, *one.accuracy_change, one.test, changes.size());
     }
   }
   return out;

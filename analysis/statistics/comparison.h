@@ -43,7 +43,8 @@ struct SpeedAccuracy {
   std::optional<double> accuracy_change;  ///< mean over participants with trials of both
   std::size_t n_pairs = 0;                ///< participants with trials of both
   TTest test;                             ///< of the changes; log_ratio_ci95 is of accuracy_change
-  /// "trade-off possible", "no trade-off", or empty: undefined.
+  /// "trade-off possible": the interval of the faster renderer's change of accuracy lies below 0.
+  /// "none shown": it does not. Empty: undefined.
   std::string reading;
 };
 

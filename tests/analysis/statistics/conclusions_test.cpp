@@ -237,9 +237,9 @@ TEST(Answer, HasASentenceForEachComparison) {
 }
 
 TEST(SpeedAccuracy, ReadsSlowerAndBetterAsATradeOffToo) {
-  const Analysis analysis = analysis_with(3, 10, [](int, int i, RawTrial& trial) {
+  const Analysis analysis = analysis_with(3, 10, [](int p, int i, RawTrial& trial) {
     if (trial.renderer == "ray") trial.response_time = 6;
-    if (trial.renderer == "point" && i < 3) answer_wrongly(trial);
+    if (trial.renderer == "point" && i < 2 + p) answer_wrongly(trial);
     return true;
   });
   EXPECT_EQ(analysis.comparisons[0].speed_accuracy[0].reading, "trade-off possible");
