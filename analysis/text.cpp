@@ -117,4 +117,6 @@ std::string p_text(double p) {
   return fixed(p, 3);
 }
 
+std::string p_phrase(double p) { return p < 0.001 ? "p < 0.001" : "p = " + p_text(p); }
+
 }  // namespace palpate::analysis

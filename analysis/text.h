@@ -40,6 +40,8 @@ std::string short_number(double value);
 
 /// A p value with three decimals: "0.042", "<0.001".
 std::string p_text(double p);
+/// In a sentence: "p = 0.042", "p < 0.001".
+std::string p_phrase(double p);
 
 /// "a", "a and b", "a, b and c".
 template <class Strings>

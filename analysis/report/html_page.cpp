@@ -66,6 +66,21 @@ std::string escaped_lines(std::string_view text) {
   return out;
 }
 
+namespace {
+
+/// Buttons that the script shows: it reads the table above them.
+void put_table_tools(std::string& out, std::string_view caption) {
+  out += "<div class=\"tools of-table\">\n";
+  for (const auto& [kind, name] : {std::pair{"copy", "Copy"}, std::pair{"csv", "Save as CSV"}}) {
+    out += std::string("<button type=\"button\" data-table=\"") + kind +
+           "\" hidden=\"hidden\" aria-label=\"" + name + ": the table “" + escaped(caption) +
+           "”\">" + name + "</button>\n";
+  }
+  out += "</div>\n";
+}
+
+}  // namespace
+
 void put_table(std::string& out, const Table& table) {
   out += "<div class=\"wide\" tabindex=\"0\" role=\"region\" aria-label=\"";
   out += escaped(table.caption) + "\">\n<table>\n<caption>" + escaped_sentence(table.caption) +
@@ -75,6 +90,7 @@ void put_table(std::string& out, const Table& table) {
   const std::size_t n = std::min(table.rows.size(), kMostRows);
   for (std::size_t r = 0; r < n; ++r) put_row(out, table.rows[r], table.n_names, false);
   out += "</tbody>\n</table>\n</div>\n";
+  put_table_tools(out, table.caption);
   const auto note = [&](std::string_view text) {
     out += "<p class=\"note\">" + escaped_sentence(printable(text, 4000)) + "</p>\n";
   };
@@ -225,6 +241,12 @@ void put_list(std::string& out, const std::vector<std::string>& sentences) {
   for (const std::string& sentence : sentences)
     out += "<li>" + escaped_sentence(sentence) + "</li>\n";
   out += "</ul>\n";
+}
+
+void put_quotable(std::string& out, const std::vector<std::string>& sentences) {
+  if (sentences.empty()) return;
+  out += "<h3>To quote</h3>\n";
+  put_list(out, sentences);
 }
 
 }  // namespace palpate::analysis

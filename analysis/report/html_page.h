@@ -23,8 +23,8 @@ std::string escaped_sentence(std::string_view text);
 /// Escaped line by line, as escaped() makes line ends and tabs visible.
 std::string escaped_lines(std::string_view text);
 
-/// Appends a table in a box that scrolls horizontally, with its notes below. At most 400 rows and
-/// 60 columns, with a note if it was cut.
+/// Appends a table in a box that scrolls horizontally, with buttons to copy and to save it, and its
+/// notes below. At most 400 rows and 60 columns, with a note if it was cut.
 void put_table(std::string& out, const Table& table);
 
 /// Appends tables in a collapsed <details> element.
@@ -73,5 +73,7 @@ class HtmlPage {
 
 /// Appends an unordered list; nothing for no sentences.
 void put_list(std::string& out, const std::vector<std::string>& sentences);
+/// The same under the heading "To quote".
+void put_quotable(std::string& out, const std::vector<std::string>& sentences);
 
 }  // namespace palpate::analysis

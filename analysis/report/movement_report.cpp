@@ -58,8 +58,12 @@ Table measures_table(const MovementAnalysis& analysis, std::size_t comparison) {
   Table table;
   table.caption = movement_caption(analysis, "Movement: " + difference_name(pair));
   table.n_names = 2;
-  table.header = {"measure",  "shape", pair.reference, pair.renderer, "difference",
-                  "95 % low", "high",  "p (Holm)",     "model p"};
+  table.header = {"measure",      "shape",
+                  pair.reference, pair.renderer,
+                  "difference",   "95 % low",
+                  "high",         "t",
+                  "df",           holm_heading(analysis.table.trials.shapes.size()),
+                  "model p"};
   for (const MeasureComparison& measure : analysis.measures) {
     for (std::size_t s = 0; s < analysis.table.trials.shapes.size(); ++s) {
       const PairedShape& shape = measure.comparisons[comparison].shapes[s];
@@ -71,6 +75,7 @@ Table measures_table(const MovementAnalysis& analysis, std::size_t comparison) {
                             short_number(shape.mean_log_ratio),
                             short_number(interval ? std::optional(interval->low) : std::nullopt),
                             short_number(interval ? std::optional(interval->high) : std::nullopt),
+                            number(shape.t_test.t, 2), number(shape.t_test.df, 0),
                             p_or_missing(shape.t_test.p_holm),
                             p_or_missing(model ? model->p_holm : std::nullopt)});
     }

@@ -127,6 +127,9 @@ std::string report_text(const Analysis& analysis) {
     out += "\n";
     put_text_table(out, table);
   }
+  const std::vector<std::string> sentences = sentences_to_quote(analysis);
+  if (!sentences.empty()) out += "\nTo quote\n";
+  for (const std::string& sentence : sentences) put_wrapped(out, sentence, "  ");
   return out;
 }
 
@@ -324,12 +327,38 @@ constexpr std::size_t kMostCards = 12, kMostRowsOfCards = 4;
 /// Outcome of the t-test at alpha 0.05: Holm-adjusted, and also unadjusted if the two differ.
 std::string verdict(const TTest& test, std::size_t tests) {
   if (!test.p_holm) return "not testable";
-  const auto p_is = [](double p) { return std::string(p < 0.001 ? "p " : "p = ") + p_text(p); };
-  const std::string adjusted = "adjusted " + p_is(*test.p_holm);
+  const std::string adjusted = (tests == 1 ? "" : "adjusted ") + p_phrase(*test.p_holm);
   if (*test.p_holm < kSignificanceLevel) return "clear, " + adjusted;
   if (*test.p >= kSignificanceLevel) return "no clear difference, " + adjusted;
   return "no clear difference among " + std::to_string(tests) + " tests, " + adjusted +
-         " (by itself " + p_is(*test.p) + ")";
+         " (by itself " + p_phrase(*test.p) + ")";
+}
+
+/// A log ratio of times as a percentage in the direction of a card.
+class CardPercent {
+ public:
+  /// \param slower  the card says by how much slower: signs are turned, of ends too
+  explicit CardPercent(bool slower) : slower_(slower) {}
+
+  std::string value(double reduction) const { return fixed(slower_ ? -reduction : reduction, 1); }
+  /// "3.1 to 12.0", the lower end first.
+  std::string ends(const Interval& log_ratio) const {
+    const Interval reduction = percent_reduction(log_ratio);
+    return slower_ ? value(reduction.high) + " to " + value(reduction.low)
+                   : value(reduction.low) + " to " + value(reduction.high);
+  }
+  const char* word() const { return slower_ ? "slower" : "faster"; }
+
+ private:
+  bool slower_;
+};
+
+/// Estimate and interval with time-outs as censored times.
+void put_censored(std::string& out, const CensoredEstimate& censored, const CardPercent& shown) {
+  out += "</small><small>with its " + counted(censored.n_censored, "time-out", "time-outs") +
+         " as censored times: " + shown.value(percent_reduction(*censored.log_ratio)) + "\u00a0% ";
+  out += shown.word();
+  if (censored.log_ratio_ci95) out += " (" + shown.ends(*censored.log_ratio_ci95) + ")";
 }
 
 /// \param censored null: no time-outs \param tests number of tests that p is adjusted for
@@ -338,32 +367,27 @@ void put_card(std::string& out, const PairedShape& shape, const CensoredEstimate
   const auto& p = shape.t_test.p_holm;
   const bool clear = p && *p < kSignificanceLevel;
   const bool slower = shape.mean_log_ratio && *shape.mean_log_ratio > 0;
+  const CardPercent shown(slower);
   out += "<li";
   if (clear) out += slower ? " class=\"slower\"" : " class=\"clear\"";
   out += "><b>" + escaped(printable(name, 80)) + "</b><span class=\"value\">";
   if (const auto& reduction = shape.percent_reduction_geometric) {
-    out += fixed(*reduction < 0 ? -*reduction : *reduction, 1) + "\u00a0%</span> " +
-           (slower ? "slower" : "faster");
+    out += shown.value(*reduction) + "\u00a0%</span> " + shown.word();
   } else {
     out += "–</span>";
   }
   out += "<small>";
   if (shape.t_test.log_ratio_ci95) {
-    const Interval ends = percent_reduction(*shape.t_test.log_ratio_ci95);
-    out += "95\u00a0% interval " + fixed(ends.low, 1) + " to " + fixed(ends.high, 1) +
+    out += "95\u00a0% interval " + shown.ends(*shape.t_test.log_ratio_ci95) +
            "\u00a0%, not adjusted</small><small>";
   }
   out += escaped(verdict(shape.t_test, tests));
-  if (censored && censored->n_censored > 0 && censored->log_ratio) {
-    out += "</small><small>with its " + counted(censored->n_censored, "time-out", "time-outs") +
-           " as censored times: " +
-           escaped_sentence(fixed(percent_reduction(*censored->log_ratio), 1) + " %");
-    if (censored->log_ratio_ci95) {
-      const Interval ends = percent_reduction(*censored->log_ratio_ci95);
-      out += " (" + fixed(ends.low, 1) + " to " + fixed(ends.high, 1) + ")";
-    }
+  if (censored && censored->n_censored > 0 && censored->log_ratio)
+    put_censored(out, *censored, shown);
+  if (!paper.empty()) {
+    out += "</small><small>paper: " + escaped_sentence(paper);
+    if (paper.ends_with('%')) out += " faster";
   }
-  if (!paper.empty()) out += "</small><small>paper: " + escaped_sentence(paper);
   out += "</small></li>\n";
 }
 
@@ -373,11 +397,7 @@ void put_reduction_cards(std::string& out, const Analysis& analysis) {
   const std::vector<Comparison>& all = analysis.comparisons;
   const std::size_t rows = std::min(all.size(), kMostRowsOfCards);
   const std::size_t n = std::min(analysis.table.shapes.size(), kMostCards);
-  std::size_t tests = 0;
-  for (const Comparison& comparison : all) {
-    tests += static_cast<std::size_t>(std::ranges::count_if(
-        comparison.shapes, [](const PairedShape& shape) { return shape.t_test.p.has_value(); }));
-  }
+  const std::size_t tests = number_of_tests(all);
   for (std::size_t c = 0; c < rows; ++c) {
     std::string compared = with_renderer(analysis, "against");
     if (all.size() > 1) {
@@ -523,6 +543,7 @@ class Report {
           "No participant has times with both renderers, so there is nothing to compare.");
     }
     put_table(page_.body(), reduction_table(analysis_));
+    put_quotable(page_.body(), sentences_to_quote(analysis_));
     const Table censored = censored_table(analysis_);
     if (!censored.rows.empty()) put_table(page_.body(), censored);
     page_.end_section();

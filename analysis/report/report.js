@@ -1,4 +1,5 @@
-// Tooltips, highlighting of one participant, and saving of the page's figures.
+// Tooltips, highlighting of one participant, saving of the page's figures, and copying and saving of
+// its tables.
 (() => {
   'use strict';
   const colours = JSON.parse(document.getElementById('saved-colours').textContent);
@@ -131,6 +132,56 @@
     const id = button.closest('.tools').dataset.figure;
     button.hidden = false;
     button.addEventListener('click', () => (button.dataset.save === 'svg' ? saveSvg : savePng)(id));
+  }
+
+  // A table as rows of texts. Numbers get the minus sign and the spaces that programs read; a name
+  // that a spreadsheet would take for a formula gets an apostrophe, as in exports.
+  function rowsOf(table) {
+    return [...table.rows].map((row) => [...row.cells].map((cell) => {
+      const text = cell.textContent.replace(/\u00a0/g, ' ').replace(/\u2212/g, '-');
+      return /^[=+@\t\r-]/.test(text) && !/^[+-]?[\d.]/.test(text) ? "'" + text : text;
+    }));
+  }
+
+  function tableOf(button) {
+    return button.closest('.tools').previousElementSibling.querySelector('table');
+  }
+
+  function saveCsv(button) {
+    const table = tableOf(button);
+    const quoted = (text) => (/[",\n\r]/.test(text) ? '"' + text.replace(/"/g, '""') + '"' : text);
+    const text = rowsOf(table).map((row) => row.map(quoted).join(',') + '\r\n').join('');
+    const name = table.caption.textContent.toLowerCase().replace(/[^a-z0-9]+/g, '-');
+    // The mark at the beginning tells spreadsheets that it is UTF-8.
+    offer(new Blob(['\ufeff' + text], {type: 'text/csv;charset=utf-8'}),
+        `${name.replace(/^-|-$/g, '').slice(0, 60) || 'table'}.csv`);
+  }
+
+  // With tabs, as spreadsheets and word processors paste it.
+  function copied(button) {
+    const text = rowsOf(tableOf(button)).map((row) => row.join('\t')).join('\n');
+    const area = document.createElement('textarea');
+    area.value = text;
+    area.style.position = 'fixed';
+    area.style.opacity = '0';
+    document.body.append(area);
+    area.select();
+    const done = document.execCommand('copy');
+    area.remove();
+    button.focus();
+    return done;
+  }
+
+  function copyTable(button) {
+    const before = button.textContent;
+    button.textContent = copied(button) ? 'Copied' : 'Cannot copy here';
+    setTimeout(() => { button.textContent = before; }, 2000);
+  }
+
+  for (const button of document.querySelectorAll('button[data-table]')) {
+    button.hidden = false;
+    const run = button.dataset.table === 'csv' ? saveCsv : copyTable;
+    button.addEventListener('click', () => run(button));
   }
 
   // On paper everything is open.

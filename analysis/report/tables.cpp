@@ -53,6 +53,55 @@ std::string caption(const Analysis& analysis, const std::string& what) {
 
 bool has_several_comparisons(const Analysis& analysis) { return analysis.comparisons.size() > 1; }
 
+std::string test_text(const TTest& test) {
+  return "t(" + number(test.df, 0) + ") = " + number(test.t, 2) + ", " + p_phrase(*test.p);
+}
+
+std::string test_sentence(const TTest& test, const EffectSize& effect, std::size_t pairs,
+                          std::size_t tests) {
+  std::string text = test_text(test);
+  if (tests > 1 && test.p_holm)
+    text +=
+        " (" + p_phrase(*test.p_holm) + " adjusted over " + std::to_string(tests) + " tests, Holm)";
+  if (effect.dz) text += ", dz = " + number(effect.dz, 2);
+  return text + ", n = " + std::to_string(pairs);
+}
+
+std::vector<std::string> sentences_to_quote(const Analysis& analysis) {
+  const std::size_t tests = number_of_tests(analysis.comparisons);
+  const std::string label = simulated_label(analysis.table.simulated);
+  std::vector<std::string> sentences;
+  for (const Comparison& comparison : analysis.comparisons) {
+    for (std::size_t s = 0; s < comparison.shapes.size(); ++s) {
+      const PairedShape& shape = comparison.shapes[s];
+      if (!shape.t_test.p || !shape.t_test.log_ratio_ci95) continue;
+      const double reduction = *shape.percent_reduction_geometric;
+      const Interval ends = percent_reduction(*shape.t_test.log_ratio_ci95);
+      const bool more = reduction < 0;
+      sentences.push_back(
+          printable(analysis.table.shapes[s]) + ": " + fixed(std::fabs(reduction), 1) + " % " +
+          (more ? "more" : "less") + " time with " +
+          with_article(printable(comparison.pair.renderer)) + " than with " +
+          with_article(printable(comparison.pair.reference)) + ", 95 % CI [" +
+          fixed(more ? -ends.high : ends.low, 1) + ", " + fixed(more ? -ends.low : ends.high, 1) +
+          "], " + test_sentence(shape.t_test, shape.effect_size, shape.n_pairs, tests) +
+          " (paired t-test of log times" + (label.empty() ? "" : "; " + label) + ").");
+    }
+  }
+  return sentences;
+}
+
+std::size_t number_of_tests(const std::vector<Comparison>& comparisons) {
+  std::size_t tests = 0;
+  for (const Comparison& comparison : comparisons) {
+    tests += static_cast<std::size_t>(std::ranges::count_if(
+        comparison.shapes, [](const PairedShape& shape) { return shape.t_test.p.has_value(); }));
+  }
+  return tests;
+}
+
+const char* holm_heading(std::size_t tests) { return tests == 1 ? "p" : "p (Holm)"; }
+
 Table comparison_table(const Analysis& analysis, const std::string& what,
                        const std::vector<std::string>& header) {
   Table table;
@@ -120,7 +169,9 @@ void Reasons::put(std::vector<std::string>& notes) const {
 
 Table reduction_table(const Analysis& analysis) {
   const bool paper_too = compares_as_paper(analysis);
-  std::vector<std::string> header{"geometric", "95 % interval", "arithmetic", "p (Holm)", "pairs"};
+  const std::size_t tests = number_of_tests(analysis.comparisons);
+  std::vector<std::string> header{"geometric", "95 % interval",     "arithmetic", "t",
+                                  "df",        holm_heading(tests), "pairs"};
   if (paper_too) header.emplace_back("paper");
   Table table = comparison_table(
       analysis, "Reduction of response time " + with_renderer(analysis, "against"), header);
@@ -132,8 +183,9 @@ Table reduction_table(const Analysis& analysis) {
       auto& row = table.rows.emplace_back(row_names(analysis, comparison.pair, name));
       row.insert(row.end(), {percent(shape.percent_reduction_geometric),
                              reduction_interval(shape.t_test.log_ratio_ci95),
-                             percent(shape.percent_reduction_arithmetic),
-                             p_or_missing(shape.t_test.p_holm), std::to_string(shape.n_pairs)});
+                             percent(shape.percent_reduction_arithmetic), number(shape.t_test.t, 2),
+                             number(shape.t_test.df, 0), p_or_missing(shape.t_test.p_holm),
+                             std::to_string(shape.n_pairs)});
       if (paper_too) {
         const std::string paper = paper_reduction(comparison.pair, name);
         row.push_back(paper.empty() ? kMissing : paper);
@@ -146,9 +198,11 @@ Table reduction_table(const Analysis& analysis) {
   table.notes = {
       "Geometric: 100 (1 − exp m), m the mean over participants of mean log " + renderer +
       " − mean log " + first.reference +
-      "; interval (not adjusted) and p from the paired t-test on m, p adjusted over " +
-      (has_several_comparisons(analysis) ? "all shapes and comparisons" : "the shapes") +
-      " (Holm). Positive: " +
+      "; interval (not adjusted), t and p from the paired t-test on m" +
+      (tests == 1                          ? ""
+       : has_several_comparisons(analysis) ? ", p adjusted over all shapes and comparisons (Holm)"
+                                           : ", p adjusted over the shapes (Holm)") +
+      ". Positive: " +
       (has_several_comparisons(analysis) ? "faster than with " + with_article(first.reference)
                                          : with_article(first.renderer) + " is faster") +
       ". Arithmetic: from mean times" + (paper_too ? ", which the paper may have used." : ".")};
@@ -234,18 +288,21 @@ Table tests_table(const Analysis& analysis) {
                                              : difference_name(first)) +
           " on log times, over participants",
       {"t", "df", "p", "p (Holm)", "dz", "Hedges' gz", "V", "p (Wilcoxon)", "BCa 95 %"});
+  const bool one_test = number_of_tests(analysis.comparisons) == 1;
+  if (one_test) std::erase(table.header, "p (Holm)");
   Reasons reasons;
   for (const Comparison& comparison : analysis.comparisons) {
     for (std::size_t s = 0; s < comparison.shapes.size(); ++s) {
       const PairedShape& shape = comparison.shapes[s];
       const std::string& name = analysis.table.shapes[s];
       auto& row = table.rows.emplace_back(row_names(analysis, comparison.pair, name));
-      row.insert(
-          row.end(),
-          {number(shape.t_test.t, 2), number(shape.t_test.df, 0), p_or_missing(shape.t_test.p),
-           p_or_missing(shape.t_test.p_holm), number(shape.effect_size.dz, 2),
-           number(shape.effect_size.hedges_gz, 2), number(shape.wilcoxon.positive_rank_sum, 1),
-           p_or_missing(shape.wilcoxon.p), reduction_interval(shape.bootstrap.log_ratio_ci95)});
+      row.insert(row.end(), {number(shape.t_test.t, 2), number(shape.t_test.df, 0),
+                             p_or_missing(shape.t_test.p)});
+      if (!one_test) row.push_back(p_or_missing(shape.t_test.p_holm));
+      row.insert(row.end(),
+                 {number(shape.effect_size.dz, 2), number(shape.effect_size.hedges_gz, 2),
+                  number(shape.wilcoxon.positive_rank_sum, 1), p_or_missing(shape.wilcoxon.p),
+                  reduction_interval(shape.bootstrap.log_ratio_ci95)});
       for (const std::string& reason : {shape.t_test.undefined, shape.effect_size.undefined,
                                         shape.wilcoxon.undefined, shape.bootstrap.undefined}) {
         reasons.add(reason, listed_shape(analysis, comparison.pair, name));
@@ -256,7 +313,7 @@ Table tests_table(const Analysis& analysis) {
       "t, dz and gz are negative when " +
       (has_several_comparisons(analysis) ? "it is faster than with " + with_article(first.reference)
                                          : with_article(first.renderer) + " is faster") +
-      ". Primary: the paired t-test, Holm-adjusted" +
+      ". Primary: the paired t-test" + (one_test ? "" : ", Holm-adjusted") +
       (has_several_comparisons(analysis) ? " over all shapes and comparisons" : "") +
       ". Wilcoxon: exact, two-sided, V the positive rank sum. BCa: bootstrap interval of the "
       "percent reduction, " +
@@ -347,6 +404,7 @@ std::string learning_note(const std::string& who, const TTest& test,
   if (test.log_ratio_ci95) {
     text += " (95 % interval " + percent_change(test.log_ratio_ci95->low) + " to " +
             percent_change(test.log_ratio_ci95->high) + ")";
+    if (test.t && test.df && test.p) text += ", " + test_text(test);
   } else {
     text += "; " + test.undefined;
   }
@@ -379,7 +437,7 @@ Table speed_accuracy_table(const Analysis& analysis) {
       analysis, "Speed and accuracy together, " + who + " against " + first.reference,
       {"time", "accuracy " + first.reference,
        has_several_comparisons(analysis) ? "own accuracy" : "accuracy " + first.renderer,
-       "accuracy", "95 % interval", "p", "reading"});
+       "accuracy", "95 % interval", "t", "df", "p", "trade-off"});
   for (const Comparison& comparison : analysis.comparisons) {
     for (std::size_t s = 0; s < comparison.speed_accuracy.size(); ++s) {
       const SpeedAccuracy& shape = comparison.speed_accuracy[s];
@@ -396,13 +454,15 @@ Table speed_accuracy_table(const Analysis& analysis) {
                   interval ? signed_fixed(100 * interval->low, 1) + " to " +
                                  signed_fixed(100 * interval->high, 1)
                            : kMissing,
-                  p_or_missing(shape.test.p), shape.reading.empty() ? kMissing : shape.reading});
+                  number(shape.test.t, 2), number(shape.test.df, 0), p_or_missing(shape.test.p),
+                  shape.reading.empty() ? kMissing : shape.reading});
     }
   }
   table.notes = {
-      "Trade-off possible: faster and less accurate, or slower and more accurate, by more than 1 % "
-      "of the time and 1 percentage point. Interval and p: of the change of accuracy in percentage "
-      "points, paired over participants, not adjusted."};
+      "Trade-off possible: the interval of the change of accuracy excludes 0, and the faster "
+      "renderer is the less accurate one. None shown: accuracy may still differ by as much as the "
+      "interval says. Interval, t and p: of the change of accuracy in percentage points, paired "
+      "over participants, not adjusted."};
   return table;
 }
 
@@ -455,6 +515,8 @@ Table mixed_model_table(const Analysis& analysis) {
        has_several_comparisons(analysis) ? "− " + all.front().pair.reference
                                          : difference_name(all.front().pair),
        "se", "df", "t", "p", "p (Holm)"});
+  const bool one_test = all.size() * analysis.table.shapes.size() == 1;
+  if (one_test) table.header.pop_back();
   Reasons reasons;
   for (std::size_t c = 0; c < all.size(); ++c) {
     for (std::size_t s = 0; s < analysis.table.shapes.size(); ++s) {
@@ -466,7 +528,8 @@ Table mixed_model_table(const Analysis& analysis) {
       row.insert(row.end(),
                  {percent(reduction), reduction_interval(value.ci95), number(value.estimate, 4),
                   number(value.se, 4), number(value.df_satterthwaite, 1), number(value.t, 2),
-                  p_or_missing(value.p), p_or_missing(value.p_holm)});
+                  p_or_missing(value.p)});
+      if (!one_test) row.push_back(p_or_missing(value.p_holm));
       reasons.add(value.undefined, listed_shape(analysis, all[c].pair, name));
     }
   }
@@ -522,9 +585,10 @@ Table learning_table(const Analysis& analysis) {
 Table renderer_order_table(const Analysis& analysis) {
   const RendererPair& first = analysis.comparisons.front().pair;
   const std::string renderer = has_several_comparisons(analysis) ? "renderer" : first.renderer;
-  Table table = comparison_table(analysis, "Practice: reduction by the order of the renderers",
-                                 {first.reference + " first", "n", renderer + " first", "n",
-                                  "difference", "p (Holm)", "balanced", "95 % interval"});
+  Table table = comparison_table(
+      analysis, "Practice: reduction by the order of the renderers",
+      {first.reference + " first", "n", renderer + " first", "n", "difference", "t", "df",
+       holm_heading(analysis.practice.n_tests), "balanced", "95 % interval"});
   Reasons reasons;
   std::vector<std::string> interleaved;
   const auto add = [&](const RendererPair& pair, const std::string& name,
@@ -533,13 +597,14 @@ Table renderer_order_table(const Analysis& analysis) {
       return log_ratio ? percent(percent_reduction(*log_ratio)) : kMissing;
     };
     auto& row = table.rows.emplace_back(row_names(analysis, pair, name));
-    row.insert(row.end(),
-               {reduction(effect.reference_first.mean_log_ratio),
-                std::to_string(effect.reference_first.n_participants),
-                reduction(effect.renderer_first.mean_log_ratio),
-                std::to_string(effect.renderer_first.n_participants),
-                percent_change(effect.difference), p_or_missing(effect.test.p_holm),
-                reduction(effect.balanced_log_ratio), reduction_interval(effect.balanced_ci95)});
+    row.insert(
+        row.end(),
+        {reduction(effect.reference_first.mean_log_ratio),
+         std::to_string(effect.reference_first.n_participants),
+         reduction(effect.renderer_first.mean_log_ratio),
+         std::to_string(effect.renderer_first.n_participants), percent_change(effect.difference),
+         number(effect.test.t, 2), number(effect.test.df, 0), p_or_missing(effect.test.p_holm),
+         reduction(effect.balanced_log_ratio), reduction_interval(effect.balanced_ci95)});
     reasons.add(effect.test.undefined, listed_shape(analysis, pair, name));
   };
   for (std::size_t c = 0; c < analysis.comparisons.size(); ++c) {

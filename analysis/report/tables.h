@@ -78,6 +78,19 @@ std::string caption(const Analysis& analysis, const std::string& what);
 /// Whether there is more than one comparison: then rows of tables are named by renderer and shape,
 /// not by shape.
 bool has_several_comparisons(const Analysis& analysis);
+/// "t(6) = 2.10, p = 0.080". \pre the test is defined
+std::string test_text(const TTest& test);
+/// "t(6) = 2.10, p = 0.080, dz = 0.79, n = 7", with p adjusted over several tests. \pre as above
+std::string test_sentence(const TTest& test, const EffectSize& effect, std::size_t pairs,
+                          std::size_t tests);
+/// For a paper: a sentence for each primary test (paired t-tests of times) that is defined.
+std::vector<std::string> sentences_to_quote(const Analysis& analysis);
+
+/// Number of defined p values of paired tests: the family of Holm's adjustment.
+std::size_t number_of_tests(const std::vector<Comparison>& comparisons);
+/// Heading of the column of p values adjusted over so many tests: of one test it is p itself.
+const char* holm_heading(std::size_t tests);
+
 /// An empty table for a row for each comparison and shape. \param header of the columns after the
 /// names
 Table comparison_table(const Analysis& analysis, const std::string& what,

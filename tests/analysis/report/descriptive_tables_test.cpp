@@ -124,8 +124,8 @@ TEST(DescriptiveTables, TimeOutsNameTheLimitAndTheParticipantWithMost) {
 
 TEST(DescriptiveTables, ReductionsAreOfMeansAndOfMeanLogs) {
   const Table table = reduction_table(two_participants());
-  EXPECT_EQ(table.header, (Row{"shape", "geometric", "95 % interval", "arithmetic", "p (Holm)",
-                               "pairs", "paper"}));
+  EXPECT_EQ(table.header, (Row{"shape", "geometric", "95 % interval", "arithmetic", "t", "df",
+                               "p (Holm)", "pairs", "paper"}));
   ASSERT_EQ(table.rows.size(), 2U);
   // Cone: mean logs -ln 2 and +ln 2 apart; means 4 and 5 s. With one degree of freedom Student's t
   // is Cauchy's distribution: p = 1 - 2 atan(t) / pi.
@@ -133,9 +133,11 @@ TEST(DescriptiveTables, ReductionsAreOfMeansAndOfMeanLogs) {
   EXPECT_EQ(cone[0], "cone");
   EXPECT_EQ(cone[1], "0.0 %");
   EXPECT_EQ(cone[3], "−25.0 %");
-  EXPECT_EQ(cone[4], "1.000");
-  EXPECT_EQ(cone[5], "2");
-  EXPECT_EQ(cone[6], "22 %");
+  EXPECT_EQ(cone[4], "0.00");
+  EXPECT_EQ(cone[5], "1");
+  EXPECT_EQ(cone[6], "1.000");
+  EXPECT_EQ(cone[7], "2");
+  EXPECT_EQ(cone[8], "22 %");
   // Cube: A halves, B takes two thirds of the time: geometric mean 1/sqrt(3); means 6.5 and 4 s.
   const double a = std::log(2.0), b = std::log(1.5);
   const double t = (a + b) / std::fabs(a - b);  // mean over se of two values
@@ -143,18 +145,37 @@ TEST(DescriptiveTables, ReductionsAreOfMeansAndOfMeanLogs) {
   const Row& cube = table.rows[1];
   EXPECT_EQ(cube[1], "42.3 %");
   EXPECT_EQ(cube[3], "38.5 %");
-  EXPECT_NEAR(std::stod(cube[4]), 2 * p, 0.0006) << "two tests";
-  EXPECT_EQ(cube[6], "11 %");
+  EXPECT_NEAR(std::stod("-" + cube[4].substr(3)), -t, 0.006) << cube[4];
+  EXPECT_NEAR(std::stod(cube[6]), 2 * p, 0.0006) << "two tests";
+  EXPECT_EQ(cube[8], "11 %");
   const Row tests = tests_table(two_participants()).rows[1];
   // t, df, p, p (Holm), dz, gz (none for two pairs), V, p (Wilcoxon), BCa
   EXPECT_NEAR(std::stod("-" + tests[1].substr(3)), -t, 0.006) << tests[1];
   EXPECT_EQ(tests[2], "1");
   EXPECT_NEAR(std::stod(tests[3]), p, 0.0006);
-  EXPECT_EQ(tests[4], cube[4]);
+  EXPECT_EQ(tests[4], cube[6]);
   EXPECT_NEAR(std::stod("-" + tests[5].substr(3)), -t / std::sqrt(2.0), 0.006) << tests[5];
   EXPECT_EQ(tests[6], "–");
   EXPECT_EQ(tests[7], "0.0");
   EXPECT_EQ(tests[8], "0.500") << "2 times 1/4";
+}
+
+TEST(DescriptiveTables, POfASingleTestIsNotAdjusted) {
+  const auto named = [](const Table& table, const std::string& name) {
+    return std::ranges::count(table.header, name);
+  };
+  Analysis analysis = two_participants();
+  EXPECT_EQ(named(tests_table(analysis), "p (Holm)"), 1);
+  analysis.comparisons[0].shapes[0].t_test.p.reset();
+  for (const Table& table : {reduction_table(analysis), tests_table(analysis)}) {
+    EXPECT_EQ(named(table, "p (Holm)"), 0) << table.caption;
+    EXPECT_EQ(named(table, "p"), 1) << table.caption;
+    EXPECT_EQ(named(table, "t"), 1) << table.caption;
+    EXPECT_EQ(named(table, "df"), 1) << table.caption;
+    for (const auto& row : table.rows) EXPECT_EQ(row.size(), table.header.size());
+    for (const std::string& note : table.notes)
+      EXPECT_EQ(note.find("Holm"), std::string::npos) << note;
+  }
 }
 
 TEST(DescriptiveTables, CensoredEstimatesHaveTheirTimeOutsBeside) {

@@ -258,18 +258,23 @@ TEST(Documents, CardsHaveTheNumbersOfTheStatistics) {
         const PairedShape& shape = comparison.shapes[s];
         expect_card_numbers(card, "class=\"value\">",
                             {std::fabs(*shape.percent_reduction_geometric)});
-        const Interval ends = percent_reduction(*shape.t_test.log_ratio_ci95);
-        expect_card_numbers(card, "95\u00a0% interval", {ends.low, ends.high});
+        // A card that says by how much slower has all its signs turned.
+        const double turn = *shape.mean_log_ratio > 0 ? -1 : 1;
+        const auto turned = [&](const Interval& reduction) {
+          return turn < 0 ? std::vector{-reduction.high, -reduction.low}
+                          : std::vector{reduction.low, reduction.high};
+        };
+        expect_card_numbers(card, "95\u00a0% interval",
+                            turned(percent_reduction(*shape.t_test.log_ratio_ci95)));
         if (comparison.censored.empty() || comparison.censored[s].n_censored == 0) continue;
         const CensoredEstimate& censored = comparison.censored[s];
         if (!censored.log_ratio || !censored.log_ratio_ci95) continue;
         ++with_time_outs;
         const Interval wide = percent_reduction(*censored.log_ratio_ci95);
-        expect_card_numbers(
-            card, "with its",
-            {static_cast<double>(censored.n_censored), percent_reduction(*censored.log_ratio)});
-        expect_card_numbers(card.substr(card.find("as censored times")), "(",
-                            {wide.low, wide.high});
+        expect_card_numbers(card, "with its",
+                            {static_cast<double>(censored.n_censored),
+                             turn * percent_reduction(*censored.log_ratio)});
+        expect_card_numbers(card.substr(card.find("as censored times")), "(", turned(wide));
       }
     }
     EXPECT_EQ(next, cards.size());

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <string>
 #include <vector>
 
@@ -134,6 +135,64 @@ TEST(Cards, AreCutWithANote) {
   EXPECT_FALSE(holds(cards_of(5, 1), "The first"));
   EXPECT_EQ(count_of(cards_of(6, 1), "<li"), 4U);
   EXPECT_TRUE(holds(cards_of(6, 1), "The first 4 of 5 comparisons."));
+}
+
+/// The card of a cone whose times with the ray are `factor` times those with the point.
+std::string card_of(double factor, double low, double high) {
+  Analysis analysis;
+  analysis.table.shapes = {"cone"};
+  Comparison& comparison = analysis.comparisons.emplace_back();
+  comparison.pair = {"point", "ray", 0, 1};
+  PairedShape& shape = comparison.shapes.emplace_back();
+  shape.mean_log_ratio = std::log(factor);
+  shape.percent_reduction_geometric = percent_reduction(std::log(factor));
+  shape.t_test.log_ratio_ci95 = Interval{std::log(low), std::log(high)};
+  CensoredEstimate& censored = comparison.censored.emplace_back();
+  censored.n_censored = 2;
+  censored.log_ratio = std::log(factor);
+  censored.log_ratio_ci95 = shape.t_test.log_ratio_ci95;
+  std::string out;
+  put_reduction_cards(out, analysis);
+  return out;
+}
+
+TEST(Cards, TurnTheIntervalWithTheEstimate) {
+  const std::string slower = card_of(1.341, 0.682, 2.638);
+  EXPECT_TRUE(holds(slower, "34.1\u00a0%</span> slower<small>95\u00a0% interval −31.8 to 163.8"));
+  EXPECT_TRUE(holds(slower, "as censored times: 34.1\u00a0% slower (−31.8 to 163.8)"));
+  EXPECT_TRUE(holds(slower, "paper: 22\u00a0% faster"));
+  const std::string faster = card_of(0.8, 0.5, 1.1);
+  EXPECT_TRUE(holds(faster, "20.0\u00a0%</span> faster<small>95\u00a0% interval −10.0 to 50.0"));
+  EXPECT_TRUE(holds(faster, "as censored times: 20.0\u00a0% faster (−10.0 to 50.0)"));
+}
+
+TEST(Quotable, SentencesHaveTestsAndTurnWithTheirDirection) {
+  Analysis analysis;
+  analysis.table.shapes = {"cone"};
+  Comparison& comparison = analysis.comparisons.emplace_back();
+  comparison.pair = {"point", "ray", 0, 1};
+  PairedShape& cone = comparison.shapes.emplace_back();
+  cone.n_pairs = 7;
+  cone.percent_reduction_geometric = percent_reduction(std::log(0.8));
+  cone.t_test = {"", 0.25, 0.1, -2.5, 6, 0.0468, Interval{std::log(0.65), std::log(0.99)}, 0.0465};
+  cone.effect_size.dz = -0.94;
+  EXPECT_EQ(sentences_to_quote(analysis),
+            std::vector<std::string>{
+                "cone: 20.0 % less time with the ray than with the point, 95 % CI [1.0, 35.0], "
+                "t(6) = −2.50, p = 0.047, dz = −0.94, n = 7 (paired t-test of log times)."});
+  analysis.table.shapes.push_back("cube");
+  comparison.shapes.push_back(PairedShape(cone));
+  PairedShape& cube = comparison.shapes.back();
+  cube.percent_reduction_geometric = percent_reduction(std::log(1.5));
+  cube.t_test = {"", 0.25, 0.1, 9, 6, 0.0001, Interval{std::log(0.9), std::log(2.5)}, 0.0002};
+  analysis.table.simulated = Simulated::yes;
+  EXPECT_EQ(
+      sentences_to_quote(analysis)[1],
+      "cube: 50.0 % more time with the ray than with the point, 95 % CI [−10.0, 150.0], t(6) = "
+      "9.00, p < 0.001 (p < 0.001 adjusted over 2 tests, Holm), dz = −0.94, n = 7 (paired "
+      "t-test of log times; SIMULATED PARTICIPANTS).");
+  comparison.shapes[0].t_test.p.reset();
+  EXPECT_EQ(sentences_to_quote(analysis).size(), 1U) << "an undefined test has no sentence";
 }
 
 TEST(HtmlPage, LinksItsSectionsAndAllowsItsOwnScriptOnly) {
