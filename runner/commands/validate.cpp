@@ -19,6 +19,7 @@
 #include "runner/devices/device_delay.h"
 #include "runner/devices/registry.h"
 #include "runner/devices/simulated.h"
+#include "runner/serve/served_scene.h"
 #include "runner/session/device_check.h"
 #include "runner/session/simulated_study.h"
 #include "stimuli/closed_surface.h"
@@ -205,6 +206,37 @@ bool is_scene(const std::string& text, const std::string& path) {
   return root.is_object() && root.contains("objects") && !root.contains("version");
 }
 
+/// Adds the reasons that a device would buzz on a material of an object, with their places.
+void add_buzzing(const stimuli::ObjectSpec& object, const std::string& place,
+                 const protocols::Protocol& shown, const servo::DeviceCapabilities& device,
+                 std::vector<std::string>& reasons) {
+  for (std::size_t i = 0; i < object.parts.size(); ++i)
+    add_buzzing(object.parts[i], place + "/parts/" + std::to_string(i), shown, device, reasons);
+  if (!object.parts.empty()) return;
+  const session::ShowableMaterial can = session::showable(object.material, device, shown.servo_rate,
+                                                          session::felt_gain(shown), false);
+  if (!can.reason.empty()) reasons.push_back(place + " has " + can.reason);
+}
+
+/// Prints which devices can show the materials of a scene, through its tool and reach, or why not.
+void print_scene_fitness(const protocols::SceneSpec& spec, std::ostream& out) {
+  const protocols::Protocol shown =
+      serve::protocol_of(spec, renderer_for(protocols::RendererKind::ray));
+  servo::DeviceConfig config;
+  config.rate = shown.servo_rate;
+  config.stylus_length = shown.stylus.length;
+  config.stylus_grip = shown.stylus.grip;
+  out << "  materials can be shown by (explore, serve --device NAME)\n";
+  for (const devices::DeviceKind& kind : devices::device_kinds()) {
+    const servo::DeviceCapabilities can = kind.nominal(config);
+    if (can.actuated_freedom == 0) continue;
+    std::vector<std::string> reasons;
+    for (std::size_t i = 0; i < spec.objects.size(); ++i)
+      add_buzzing(spec.objects[i], "/objects/" + std::to_string(i), shown, can, reasons);
+    print_verdict(kind.name, reasons, {}, out);
+  }
+}
+
 /// Checks a scene, or a mesh alone, as both renderers show it.
 /// \throws protocols::InputError, stimuli::MeshError with every fault
 void validate_scene(const std::string& text, const std::string& path, std::ostream& out) {
@@ -221,6 +253,7 @@ void validate_scene(const std::string& text, const std::string& path, std::ostre
     out << "  note        " << note << "\n";
   for (std::size_t i = 0; i < spec.objects.size(); ++i)
     print_overlaps(spec.objects[i], "/objects/" + std::to_string(i), builder, out);
+  print_scene_fitness(spec, out);
   out << "  touch it    palpate explore " << printable(shell_quoted(path)) << "\n";
 }
 
@@ -235,7 +268,8 @@ int validate_command(const std::vector<std::string>& args) {
   line.summary =
       "Checks a protocol with its meshes and its schedule, and lists all faults. Lists the\n"
       "devices that can run it, whether it can be simulated, and the reasons if not.\n"
-      "Or checks a scene, or a mesh file alone: its size in mm, and what was cleaned.";
+      "Or checks a scene, or a mesh file alone: its size in mm, what was cleaned, and which\n"
+      "devices can show its materials without buzzing.";
   line.example = R"(  palpate validate protocols/ho2000.json
   palpate validate bunny.stl
   palpate validate protocols/roughness-magnitude.json --texts > texts.de.json   to be translated

@@ -118,6 +118,22 @@ class Validate(unittest.TestCase):
                 self.assertEqual((refused.returncode, refused.stdout), (2, b""))
                 self.assertIn(words, refused.stderr)
 
+    def test_a_scene_that_would_buzz_is_told(self):
+        with tempfile.TemporaryDirectory() as folder:
+            path = pathlib.Path(folder) / "scene.json"
+            plate = {"shape": "box", "size_m": [0.1, 0.1, 0.01]}
+            def told(scene):
+                path.write_text(json.dumps(scene))
+                done = run("validate", str(path))
+                self.assertEqual((done.returncode, done.stderr), (0, b""))
+                return done.stdout.decode()
+            self.assertRegex(told({"objects": [plate]}), r"falcon2 +yes\n")
+            stiff = {"shape": "compound", "parts": [plate, {**plate, "stiffness_n_per_m": 100000}]}
+            self.assertRegex(told({"objects": [plate, stiff]}),
+                             r"falcon2 +no:\n +/objects/1/parts/1 has 100000 N/m, and 'falcon2' shows up to 3000 N/m at 1000 Hz\n")
+            self.assertIn("/objects/0 has 800 N/m (8e+06 N/m at the hand)",
+                          told({"objects": [plate], "reach": {"factor": 100, "pivot": "grip"}}))
+
     def test_soft_objects_of_tetrahedra_are_checked(self):
         solid = SOURCE / "tests" / "protocols" / "good" / "tetrahedra.msh"
         soft = {"shape": "mesh", "file": str(solid), "soft": {"young_pa": 50000}}
