@@ -21,6 +21,11 @@ FileIdentity identity_of(const std::string& path) {
   return {found.st_dev, found.st_ino};
 }
 
+std::uint64_t names_of_file(const std::string& path) {
+  struct stat found {};
+  return ::stat(path.c_str(), &found) == 0 ? found.st_nlink : 0;
+}
+
 namespace {
 
 namespace fs = std::filesystem;

@@ -3,6 +3,7 @@
 
 #include <sys/types.h>
 
+#include <cstdint>
 #include <string>
 
 namespace palpate::data {
@@ -18,6 +19,9 @@ struct FileIdentity {
 
 /// Follows symbolic links.
 FileIdentity identity_of(const std::string& path);
+
+/// The number of hard links of the file that `path` leads to; 0: there is no file.
+std::uint64_t names_of_file(const std::string& path);
 
 // Resolves symbolic links of a path that is to be written. In a shared folder another user could
 // place a link that redirects the output: only links of this user and of root are followed.

@@ -7,10 +7,13 @@
 #include <sys/stat.h>
 #include <sys/statvfs.h>
 #include <unistd.h>
+#include <sys/vfs.h>
 
 #include <array>
+#include <algorithm>
 #include <cerrno>
 #include <filesystem>
+#include <cstdint>
 #include <string_view>
 #include <system_error>
 
@@ -117,6 +120,7 @@ void require_our_lock(const struct stat& found, const std::string& file, const s
     refuse_foreign_lock(file, path, "it belongs to user " + std::to_string(found.st_uid));
   }
   if ((found.st_mode & 077) != 0) refuse_foreign_lock(file, path, "others may access it");
+constexpr const char* kLockEnd = ".palpate-lock";
   if (found.st_nlink > 1) refuse_foreign_lock(file, path, "it has a hard link");
 }
 
@@ -180,7 +184,7 @@ bool is_same_file(int descriptor, const std::string& file) {
 
 }  // namespace
 
-WriterLock::WriterLock(const std::string& path) : file_(path + ".palpate-lock") {
+WriterLock::WriterLock(const std::string& path) : path_(path), file_(path + kLockEnd) {
   while (true) {
     descriptor_ = open_lock_file(file_, path);
     if (::flock(descriptor_, LOCK_EX | LOCK_NB) != 0) {
@@ -201,10 +205,63 @@ WriterLock::WriterLock(const std::string& path) : file_(path + ".palpate-lock") 
   // The process id is for messages only: the lock holds even if a full disk leaves the file empty.
   if (::ftruncate(descriptor_, 0) == 0 && ::pwrite(descriptor_, text.data(), text.size(), 0) < 0) {
     errno = 0;
+/// On a network file system flock() is a POSIX lock of the whole file, which would exclude SQLite.
+bool has_flock_of_its_own(int descriptor) {
+  constexpr std::array<std::uint32_t, 4> kNetwork = {0x6969, 0x517B, 0xFF534D42, 0xFE534D42};
+  struct statfs system {};
+  return ::fstatfs(descriptor, &system) == 0 &&
+         std::find(kNetwork.begin(), kNetwork.end(), static_cast<std::uint32_t>(system.f_type)) ==
+             kNetwork.end();
+}
+
+/// \return -1: there is no such file, or it cannot be locked for another reason than a writer
+/// \param taken set if another process holds the lock
+int lock_file_itself(const std::string& path, bool& taken) {
+  taken = false;
+  const int descriptor =
+      ::open(path.c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_NOCTTY | O_CLOEXEC);
+  if (descriptor < 0) return -1;
+  struct stat found {};
+  if (::fstat(descriptor, &found) == 0 && S_ISREG(found.st_mode) &&
+      has_flock_of_its_own(descriptor)) {
+    if (::flock(descriptor, LOCK_EX | LOCK_NB) == 0) return descriptor;
+    taken = errno == EWOULDBLOCK;
+  }
+  ::close(descriptor);
+  return -1;
+}
+
+bool is_locked(const std::string& file) {
+  const int descriptor = ::open(file.c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
+  if (descriptor < 0) return false;
+  const bool locked = ::flock(descriptor, LOCK_SH | LOCK_NB) != 0 && errno == EWOULDBLOCK;
+  ::close(descriptor);
+  return locked;
+}
+
+[[noreturn]] void refuse_writer_by_another_name(const std::string& path) {
+  throw StoreRefused(path +
+                     ": is open for writing in another program, under another name of the same "
+                     "file (a hard link, a mount, or the name it had before it was moved); nothing "
+                     "was written. Wait until that has ended, then go on under that name");
+}
+
   }
 }
 
-WriterLock::~WriterLock() {
+WriterLock::~WriterLock() { release(); }
+
+void WriterLock::lock_database() {
+  if (database_ >= 0 && is_same_file(database_, path_)) return;
+  bool taken = false;
+  const int locked = lock_file_itself(path_, taken);
+  if (taken) refuse_writer_by_another_name(path_);
+  if (database_ >= 0) ::close(database_);
+  database_ = locked;
+}
+
+void WriterLock::release() {
+  if (database_ >= 0) ::close(database_);
   if (is_same_file(descriptor_, file_)) ::unlink(file_.c_str());
   ::close(descriptor_);
 }
@@ -225,6 +282,12 @@ void Store::Impl::require_running(const Run& run) {
 }
 
 void Store::Impl::require_files_in_place() {
+  try {
+    lock_database();
+  } catch (...) {
+    release();
+    throw;
+  }
   repair_wal_index();
   const FileIdentity wal = identity_of(file + "-wal");
   if (wal_identity == FileIdentity{}) wal_identity = wal;  // created by the first write
@@ -232,6 +295,27 @@ void Store::Impl::require_files_in_place() {
     throw StoreError(path +
                      ": the file or its -wal was moved, replaced or deleted while in use; this "
                      "step is not safely stored. Put both back where they were before continuing, "
+void require_one_name(const std::string& file, const std::string& path) {
+  const std::uint64_t names = names_of_file(file);
+  if (names <= 1) return;
+  throw StoreRefused(
+      path + ": has " + std::to_string(names) +
+      " names (hard links), and trials stored under one are lost under the other; it can be read, "
+      "nothing was written. Find the names with: find / -xdev -samefile '" +
+      file +
+      "'. Remove those that are not needed, or make a file of its own for this one: cp -p '" +
+      file + "' '" + file + ".own' && mv '" + file + ".own' '" + file +
+      "'. A name with a -wal file beside it is the one to keep");
+}
+
+void require_no_writer_by_another_name(const std::string& file, const std::string& path) {
+  if (is_locked(file + kLockEnd)) return;  // the writer uses this name
+  bool taken = false;
+  const int locked = lock_file_itself(file, taken);
+  if (locked >= 0) ::close(locked);
+  if (taken) refuse_writer_by_another_name(path);
+}
+
                      "or restore a backup");
   }
 }

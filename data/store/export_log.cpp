@@ -48,6 +48,11 @@ void shorten_paths(SQLite::Database& db, const std::string& file) {
 void open_current(std::optional<SQLite::Database>& db, const std::string& file,
                   const std::string& database) {
   require_private_sqlite_files(file);
+  try {
+    require_one_name(file, database);
+  } catch (const StoreRefused& error) {
+    throw StoreError(error.what());  // reading may go on: the export is made without a record
+  }
   db.emplace(file, SQLite::OPEN_READWRITE, kBusyMs);
   if (checked_version(*db, database) < kSchemaVersion) {
     db.reset();

@@ -135,7 +135,10 @@ void open_for_reading(std::optional<SQLite::Database>& db, const std::string& fi
                       bool for_export) {
   if (may_write(file)) {
     db.emplace(file, kOpenWrite, kBusyTimeoutMs);
-    if (for_export) db->tryExec("PRAGMA journal_mode = WAL");
+    // Under another name of the file there may be another log: leave both as they are.
+    const bool one_name = names_of_file(file) <= 1;
+    if (!one_name) sqlite3_db_config(db->getHandle(), SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 1, nullptr);
+    if (for_export && one_name) db->tryExec("PRAGMA journal_mode = WAL");
     db->exec("PRAGMA query_only = ON");
   } else if (std::filesystem::exists(file + "-wal")) {
     db.emplace(file, kOpenRead, kBusyTimeoutMs);
@@ -228,7 +231,10 @@ Store Store::open(const std::string& path, Mode mode) {
     impl->lock.emplace(file);
     impl->create_if_absent();
   }
+    impl->lock->lock_database();  // of a new file
+    require_one_name(file, path);
   std::error_code error;
+  if (mode == Mode::read_for_export) require_no_writer_by_another_name(file, path);
   if (std::filesystem::file_size(file, error) == 0 && !error) {
     impl->refuse(
         "is empty; a palpate database is never empty. Restore a backup, or remove the file to "

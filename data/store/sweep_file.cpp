@@ -479,9 +479,11 @@ struct SweepFile::Impl {
                          "a study's database with --db");
     }
     require_private_sqlite_files(file);
+    const bool one_name = names_of_file(file) <= 1;
+    if (fs::exists(file + "-journal")) require_one_name(file, path);
     guarded(path, [&] {
       // Opening the file rolls back the journal of a killed process.
-      if (writes || ::access(file.c_str(), W_OK) == 0) {
+      if (writes || (one_name && ::access(file.c_str(), W_OK) == 0)) {
         db.emplace(file, kOpenWrite, kBusyTimeoutMs);
       } else if (fs::exists(file + "-journal")) {
         db.emplace(file, SQLITE_OPEN_READONLY | SQLITE_OPEN_NOMUTEX, kBusyTimeoutMs);
@@ -519,6 +521,8 @@ SweepFile SweepFile::open(const std::string& path, const SweepPlan& plan) {
   impl->resolve(true);
   impl->lock.emplace(impl->file);
   if (!fs::exists(impl->file)) impl->create(plan);
+  impl->lock->lock_database();  // of a new file
+  require_one_name(impl->file, path);
   impl->connect(true);
   const std::vector<std::string> reasons = differences(impl->tables.plan, plan);
   if (!reasons.empty()) refuse_other_plan(path, reasons);
@@ -603,6 +607,7 @@ void SweepFile::rewrite(bool writing) {
                      ": cannot be put in order: " + std::generic_category().message(errno));
   }
   sync_path(fs::path(impl_->file).parent_path().string(), impl_->path);
+  impl_->lock->lock_database();  // of the file that replaced it
   impl_->connect(writing);
 }
 

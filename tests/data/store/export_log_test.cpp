@@ -73,6 +73,15 @@ TEST_F(Forgetting, ExportsOfACopyThatHasNoWriteAheadLogAreRecorded) {
   EXPECT_EQ(store.participant_summary(kGone).exports.size(), 1u);
 }
 
+TEST_F(Forgetting, NoExportIsRecordedInADatabaseOfTwoNames) {
+  std::int64_t person = open().participants(a_protocol().sha256)[0].id;
+  std::filesystem::create_hard_link(path_, folder_ / "second.db");
+  const std::string before = contents_of(path_);
+  const auto record = [&] { log_export(path_, {folder_ / "all.csv", "csv", 1}, {person}); };
+  EXPECT_TRUE(contains(error_of(record), "has 2 names"));
+  EXPECT_EQ(contents_of(path_), before);
+}
+
 TEST_F(Forgetting, AnExportMadeMeanwhileIsRefused) {
   Store store = open();
   const auto people = store.participants(a_protocol().sha256);

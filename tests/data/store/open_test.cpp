@@ -191,6 +191,72 @@ TEST_F(StoreOpen, TheSecondWriterIsRefusedAndToldWhoHoldsIt) {
   EXPECT_NO_THROW(write(path_)) << "and ends with the store";
 }
 
+TEST_F(StoreOpen, ADatabaseOfTwoNamesIsReadOnly) {
+  make_study(1);
+  const std::string second = folder_ / "second.db";
+  fs::create_hard_link(path_, second);
+  const std::string before = contents_of(path_);
+  for (const std::string& name : {path_, second}) {
+    const std::string error = error_of([&] { write(name); });
+    EXPECT_TRUE(contains(error, "has 2 names")) << error;
+    EXPECT_EQ(read(name).counts().participants, 1);
+    EXPECT_EQ(contents_of(name), before);
+  }
+  fs::remove(second);
+  EXPECT_NO_THROW(write(path_));
+}
+
+TEST_F(StoreOpen, AReaderOfTwoNamesLeavesTheLog) {
+  make_study(1);
+  {
+    ChildProcess writer({"hold", path_});
+    ASSERT_EQ(writer.read_line(), "held");
+    writer.kill();
+  }
+  write_file(path_ + "-wal", "");
+  fs::permissions(path_ + "-wal", fs::perms::owner_read | fs::perms::owner_write);
+  fs::create_hard_link(path_, folder_ / "second.db");
+  EXPECT_EQ(read(path_).counts().participants, 1);
+  EXPECT_TRUE(fs::exists(path_ + "-wal")) << "it may belong to the other name";
+}
+
+TEST_F(StoreOpen, ANewNameOfAnOpenDatabaseIsRefused) {
+  make_study(1);
+  ChildProcess holder({"hold", path_});
+  ASSERT_EQ(holder.read_line(), "held");
+  const std::string moved = folder_ / "moved.db";
+  fs::rename(path_, moved);
+  const std::string error = error_of([&] { write(moved); });
+  EXPECT_TRUE(contains(error, "under another name")) << error;
+  EXPECT_FALSE(fs::exists(moved + ".palpate-lock"));
+  const auto export_it = [&] { Store::open(moved, Store::Mode::read_for_export); };
+  EXPECT_TRUE(contains(error_of(export_it), "under another name"));
+  fs::rename(moved, path_);
+  EXPECT_NO_THROW(Store::open(path_, Store::Mode::read_for_export));
+  holder.kill();
+  EXPECT_NO_THROW(write(path_));
+}
+
+TEST_F(StoreOpen, ALinkMadeInASessionLosesNoTrial) {
+  const std::string second = folder_ / "second.db";
+  {
+    Store store = write(path_);
+    const palpate::data::Run run = store.begin_run(store.enrol(a_protocol(), "A"), a_run());
+    for (int trial = 1; trial <= 3; ++trial) {
+      if (trial == 2) fs::create_hard_link(path_, second);
+      TrialRecord record = a_record(trial);
+      record.attempt = store.begin_attempt(run, record, record.onset_ns - 1);
+      store.finish_attempt(run, record);
+      if (trial > 1) {
+        EXPECT_TRUE(contains(error_of([&] { write(second); }), "under another name"));
+      }
+    }
+  }
+  EXPECT_EQ(read(path_).counts().completed, 3);
+  EXPECT_EQ(read(second).counts().completed, 3);
+  EXPECT_TRUE(contains(error_of([&] { write(path_); }), "has 2 names"));
+}
+
 TEST_F(StoreOpen, AReaderSeesWhatWasCommittedWhenItOpened) {
   Store writer = write(path_);
   const palpate::data::Run run = writer.begin_run(writer.enrol(a_protocol(), "A"), a_run());

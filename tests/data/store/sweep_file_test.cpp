@@ -53,6 +53,33 @@ TEST_F(Sweeps, ReadBackAsTheyWereRecorded) {
   EXPECT_TRUE(same(rows[2], a_sweep_row(20)));
 }
 
+TEST_F(Sweeps, AFileOfTwoNamesIsReadOnly) {
+  make_sweep(path_, {7});
+  const std::string second = folder_ / "b.sweep";
+  fs::create_hard_link(path_, second);
+  const std::string before = contents_of(path_);
+  for (const std::string& name : {path_, second}) {
+    expect_refused([&] { SweepFile::open(name, a_sweep_plan()); }, "has 2 names");
+    EXPECT_EQ(SweepFile::open(name).count(), 1);
+  }
+  write_file(second + "-journal", "");
+  fs::permissions(second + "-journal", fs::perms::owner_read | fs::perms::owner_write);
+  expect_refused([&] { SweepFile::open(second); }, "has 2 names");
+  EXPECT_EQ(contents_of(path_), before);
+}
+
+TEST_F(Sweeps, ANewNameOfAnOpenFileIsRefused) {
+  const std::string second = folder_ / "b.sweep";
+  SweepFile file = SweepFile::open(path_, a_sweep_plan());
+  file.record({a_sweep_row(7)});
+  fs::create_hard_link(path_, second);
+  expect_refused([&] { SweepFile::open(second, a_sweep_plan()); }, "under another name");
+  fs::remove(second);
+  file.finish();
+  fs::create_hard_link(path_, second);
+  expect_refused([&] { SweepFile::open(second, a_sweep_plan()); }, "under another name");
+}
+
 TEST_F(Sweeps, EveryPointIsVisitedOnceInOrderHoweverManyThereAre) {
   for (const std::int64_t points : {1, 999, 1000, 1001, 2000, 2500}) {
     const std::string path = folder_ / (std::to_string(points) + ".sweep");
