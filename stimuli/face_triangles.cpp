@@ -284,6 +284,9 @@ double shape_of(const Vec2& a, const Vec2& b, const Vec2& c) {
 }
 
 class FaceCutter {
+  /// Faces of scans and CAD programs take some tens of steps a corner.
+  static constexpr std::size_t kMostSteps = 20'000'000, kMostStepsACorner = 1000;
+
  public:
   explicit FaceCutter(std::vector<Vec2> corners)
       : at_(std::move(corners)),
@@ -308,7 +311,7 @@ class FaceCutter {
     while (left > 3) {
       queue_all();
       const Index before = left;
-      while (left > 3 && !ears_.empty()) {
+      while (left > 3 && !ears_.empty() && !tired()) {
         const Ear ear = ears_.top();
         ears_.pop();
         if (gone_[ear.corner] != 0 || version_[ear.corner] != ear.version) continue;
@@ -316,11 +319,15 @@ class FaceCutter {
         cut(ear.corner);
         --left;
       }
+      steps_ += 16 * static_cast<std::size_t>(count_);  // of a round
+      if (tired()) break;
       if (left == before) {  // crossed: take the least turned ear
         cut(best_corner());
         --left;
       }
     }
+    // A face that crosses itself at every turn would take the square of its corners.
+    for (const Index from = first_left(); left > 3; --left) cut_off(next_[from]);
     const Index a = first_left();
     triangles_.push_back({a, next_[a], previous_[a]});
     return std::move(triangles_);
@@ -334,6 +341,8 @@ class FaceCutter {
       return shape != other.shape ? shape < other.shape : corner > other.corner;
     }
   };
+
+  bool tired() const { return steps_ > kMostSteps + kMostStepsACorner * count_; }
 
   Index first_left() const {
     Index i = 0;
@@ -362,12 +371,13 @@ class FaceCutter {
   }
 
   // Whether a concave corner lies in the triangle that would be cut off.
-  bool occupied(Index i) const {
+  bool occupied(Index i) {
     const Vec2 &a = at_[previous_[i]], &b = at_[i], &c = at_[next_[i]];
     const auto first = std::lower_bound(concave_.begin(), concave_.end(), std::min({a.x, b.x, c.x}),
                                         [&](Index k, double x) { return at_[k].x < x; });
     const auto end = std::upper_bound(first, concave_.end(), std::max({a.x, b.x, c.x}),
                                       [&](double x, Index k) { return x < at_[k].x; });
+    steps_ += static_cast<std::size_t>(end - first);
     return std::any_of(first, end, [&](Index k) {
       const Vec2& p = at_[k];
       if (gone_[k] != 0 || p == a || p == b || p == c) return false;
@@ -375,12 +385,17 @@ class FaceCutter {
     });
   }
 
-  void cut(Index i) {
+  void cut_off(Index i) {
     const Index before = previous_[i], after = next_[i];
     triangles_.push_back({before, i, after});
     gone_[i] = 1;
     next_[before] = after;
     previous_[after] = before;
+  }
+
+  void cut(Index i) {
+    const Index before = previous_[i], after = next_[i];
+    cut_off(i);
     for (const Index k : {before, after}) {
       ++version_[k];
       queue(k);
@@ -394,6 +409,7 @@ class FaceCutter {
   std::vector<Index> version_;
   std::vector<Index> concave_;  // along x; once concave, some no longer are
   std::priority_queue<Ear> ears_;
+  std::size_t steps_ = 0;
   std::vector<Triangle> triangles_;
 };
 

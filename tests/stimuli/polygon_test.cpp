@@ -3,11 +3,15 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
+#include <chrono>
 #include <cmath>
 #include <cstdint>
 #include <glm/geometric.hpp>
 #include <glm/gtc/quaternion.hpp>
+#include <map>
 #include <numbers>
+#include <utility>
 #include <vector>
 
 #include "data/base/random.h"
@@ -83,6 +87,32 @@ TEST(PlaneOf, WithoutAreaThereIsNoNormal) {
   EXPECT_EQ(plane_of(point).normal, Vec3(0));
   EXPECT_EQ(plane_of(point).diameter, 0);
   EXPECT_EQ(plane_of(point).middle, Vec3(1, 2, 3));
+}
+
+/// Triangles keep their number and turn; the square of 90,000 corners would take minutes.
+TEST(FaceTriangles, ManyRepeatedCornersTakeNoSquare) {
+  const std::array<Vec3, 3> places{Vec3(0, 0, 0), Vec3(1, 0, 0), Vec3(1, 1, 0)};
+  std::vector<Vec3> corners;
+  for (int i = 0; i < 90'000; ++i) corners.push_back(places[static_cast<std::size_t>(i) % 3]);
+  const auto began = std::chrono::steady_clock::now();
+  const auto triangles = face_triangles(corners);
+  EXPECT_LT(std::chrono::steady_clock::now() - began, std::chrono::seconds(20));
+  ASSERT_EQ(triangles.size(), corners.size() - 2);
+  std::map<std::pair<std::uint32_t, std::uint32_t>, int> sides;
+  for (const auto& one : triangles) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      ++sides[{one[k], one[(k + 1) % 3]}];
+      --sides[{one[(k + 1) % 3], one[k]}];
+    }
+  }
+  std::size_t at_the_rim = 0;
+  for (const auto& [side, count] : sides) {
+    if (count <= 0) continue;
+    EXPECT_EQ(count, 1);
+    EXPECT_EQ(side.second, (side.first + 1) % corners.size());
+    ++at_the_rim;
+  }
+  EXPECT_EQ(at_the_rim, corners.size());
 }
 
 }  // namespace polygons
