@@ -74,7 +74,9 @@ void ServoHealth::add(const Sample& sample, std::int64_t period_ns) noexcept {
   lateness_.add(sample.lateness_ns);
   compute_.add(sample.compute_ns);
   if (counted_.ticks++ == 0) first_due_ns_ = sample.time_ns - sample.lateness_ns;
-  counted_.missed_ticks += static_cast<std::uint64_t>(sample.lateness_ns / period_ns);
+  // A clock that stands still or steps back makes a tick early: none was missed.
+  counted_.missed_ticks +=
+      static_cast<std::uint64_t>(std::max<std::int64_t>(sample.lateness_ns, 0) / period_ns);
   counted_.elapsed_ns = sample.time_ns - first_due_ns_;
   time_kept_.write(counted_);
   faults_.store(faults() | sample.faults, std::memory_order_relaxed);

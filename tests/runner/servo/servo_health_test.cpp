@@ -59,5 +59,15 @@ TEST(ServoHealth, TheRecordHasCountsTimesAndFaults) {
   EXPECT_LE(p99, 450'000);
 }
 
+TEST(ServoHealth, MissesNoTickWhileTheClockStandsStill) {
+  ServoHealth health;
+  constexpr std::int64_t kNow_ns = 7'000'000;
+  for (int i = 0; i < 5; ++i) {  // each tick is due a period later than the clock says
+    const std::int64_t due_ns = kNow_ns + i * kPeriod_ns;
+    health.add(tick_at(due_ns, kNow_ns - due_ns, 4), kPeriod_ns);
+  }
+  EXPECT_EQ(health.missed_ticks(), 0u);
+}
+
 }  // namespace
 }  // namespace palpate::runner::servo
