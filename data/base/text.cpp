@@ -62,6 +62,14 @@ std::size_t edit_distance(std::string_view a, std::string_view b) {
 }
 
 std::string nearest_word(std::string_view word, const std::vector<std::string>& known) {
+  std::string begun;
+  int begun_words = 0;
+  for (const std::string& one : known) {
+    if (word.size() < 2 || !one.starts_with(word)) continue;
+    begun = one;
+    ++begun_words;
+  }
+  if (begun_words == 1) return begun;
   std::string nearest;
   std::size_t distance = word.size() / 2 + 1;
   for (const std::string& one : known) {

@@ -47,6 +47,8 @@ TEST(EditDistance, SuggestsTheNearestWord) {
   EXPECT_EQ(nearest_word("plan", known), "plan");
   EXPECT_EQ(nearest_word("simulation", known), "");
   EXPECT_EQ(nearest_word("", known), "");
+  EXPECT_EQ(nearest_word("anal", known), "analyze") << "the beginning of one word";
+  EXPECT_EQ(nearest_word("re", {"render", "replay"}), "") << "of two";
   EXPECT_EQ(nearest_word("x", {}), "");
 }
 
