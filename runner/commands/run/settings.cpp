@@ -154,6 +154,11 @@ std::optional<RunSettings> parse_run_settings(const std::vector<std::string>& ar
   if (values->count("number") > 0) settings.number = number;
   if (values->count("session") > 0) settings.session = session;
   if (values->count("response-latency") > 0) settings.response_latency = latency;
+  for (const char* option : {"participant-monitor", "console-monitor"}) {
+    if (values->count(option) > 0 && (*values)[option].as<int>() < 1)
+      throw UsageError(std::string("--") + option +
+                       ": must be 1 or more, as monitors count from 1");
+  }
   if (values->count("ui-scale") > 0) {
     if (!(scale >= 0.5 && scale <= 4)) throw UsageError("--ui-scale: must be 0.5 to 4");
     settings.ui_scale = scale;
