@@ -118,9 +118,13 @@ Pilot read_pilot(const Analysis& analysis) {
                         "): its standard deviations are imprecise.");
   }
   if (fit.n_participants < 10) {
-    out.notes.push_back("Standard deviations from " +
-                        counted(fit.n_participants, "participant", "participants") +
-                        " are imprecise: also try a --gain-sd 1.5 times as large.");
+    constexpr double kShownAsNothing = 0.0005;  // three decimals
+    out.notes.push_back(
+        "Standard deviations from " + counted(fit.n_participants, "participant", "participants") +
+        " are imprecise: also try " +
+        (model.gain_sd < kShownAsNothing
+             ? "--gain-sd 0.1 (gains that differ by some 10 %), as this pilot's is 0."
+             : "a --gain-sd 1.5 times as large."));
   }
   if (analysis.comparisons.size() > 1) {
     out.notes.push_back("The pilot has " + std::to_string(analysis.table.renderers.size()) +
