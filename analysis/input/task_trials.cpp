@@ -101,9 +101,10 @@ class TaskRow {
 
   bool yes(std::string_view column) {
     const std::string_view field = value(column);
-    if (field.empty() || field == "0") return false;
-    if (field != "1") add_fault(column, "expected 0, 1 or nothing");
-    return field == "1";
+    if (field.empty()) return false;
+    const std::optional<bool> yes = truth_of(field);
+    if (!yes) add_fault(column, "expected 0, 1 (or TRUE, FALSE) or nothing");
+    return yes.value_or(false);
   }
 
   void add_fault(std::string_view column, const std::string& expected) {
@@ -242,6 +243,18 @@ void drop_missing_answers(std::vector<TaskTrial>& trials) {
   }
 }
 
+void warn_of_alike_names(TaskTable& table) {
+  Interner participants, renderers, shapes;
+  for (const TaskTrial& trial : table.trials) {
+    participants.number(trial.participant);
+    renderers.number(trial.renderer);
+    shapes.number(trial.shape);
+  }
+  warn_of_alike("Participants", participants.names(), table.warnings);
+  warn_of_alike("Renderers", renderers.names(), table.warnings);
+  warn_of_alike("Stimuli", shapes.names(), table.warnings);
+}
+
 }  // namespace
 
 TaskTable read_task_trials_csv(const std::string& path, const std::string& protocol) {
@@ -313,6 +326,7 @@ TaskTable read_task_trials_csv(const std::string& path, const std::string& proto
   if (!faults.empty()) throw protocols::InputError(std::move(faults));
   if (numbered) order_trials(table.trials);
   drop_missing_answers(table.trials);
+  warn_of_alike_names(table);
   torque.warn(table.warnings);
   return table;
 }
@@ -419,3 +433,4 @@ TaskTable read_task_trials_store(const std::string& path, const std::string& pro
 }
 
 }  // namespace palpate::analysis
+  warn_of_alike_names(table);

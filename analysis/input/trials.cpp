@@ -4,6 +4,7 @@
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <map>
 #include <numeric>
 #include <optional>
 #include <set>
@@ -68,6 +69,53 @@ std::size_t renderer_rank(const std::string& name) {
 bool is_missing(std::string_view text) {
   constexpr std::array<std::string_view, 6> kNothing{"", "NA", "n/a", "N/A", "NaN", "nan"};
   return std::ranges::find(kNothing, text) != kNothing.end();
+}
+
+std::optional<bool> truth_of(std::string_view text) {
+  if (text == "1" || text == "TRUE" || text == "True" || text == "true") return true;
+  if (text == "0" || text == "FALSE" || text == "False" || text == "false") return false;
+  return std::nullopt;
+}
+
+namespace {
+
+bool is_digit(char c) { return c >= '0' && c <= '9'; }
+
+/// Without spaces at the ends, capitals and leading zeros of numbers.
+std::string plain_name(std::string_view name) {
+  while (!name.empty() && name.front() == ' ') name.remove_prefix(1);
+  while (!name.empty() && name.back() == ' ') name.remove_suffix(1);
+  std::string plain;
+  bool in_number = false;  // past its leading zeros
+  for (std::size_t i = 0; i < name.size(); ++i) {
+    const char c = name[i];
+    if (c == '0' && !in_number && i + 1 < name.size() && is_digit(name[i + 1])) continue;
+    in_number = is_digit(c);
+    plain += c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  }
+  return plain;
+}
+
+}  // namespace
+
+void warn_of_alike(const std::string& what, const std::deque<std::string>& names,
+                   std::vector<std::string>& warnings) {
+  constexpr std::size_t kMostGroups = 10;
+  std::map<std::string, std::vector<std::string>> alike;
+  for (const std::string& name : names) alike[plain_name(name)].push_back(name);
+  std::size_t groups = 0;
+  for (const auto& [plain, group] : alike) {
+    if (group.size() < 2 || ++groups > kMostGroups) continue;
+    std::string text;
+    for (std::size_t i = 0; i < group.size(); ++i) {
+      text += (i == 0                  ? " '"
+               : i + 1 == group.size() ? " and '"
+                                       : ", '") +
+              printable(group[i], 40) + "'";
+    }
+    warnings.push_back(what + text +
+                       " look alike; they count as different. Write one name in one way.");
+  }
 }
 
 void note_once(const std::string& value, std::vector<std::string>& known) {
@@ -248,6 +296,9 @@ TrialTable TrialTableBuilder::finish(Provenance provenance,
   }
   table.rows = std::move(rows_);
 
+  warn_of_alike("Participants", participants_.names(), table.warnings);
+  warn_of_alike("Renderers", renderers_.names(), table.warnings);
+  warn_of_alike("Stimuli and answers", stimuli_.names(), table.warnings);
   if (n_contradicting_ > 0) {
     table.warnings.push_back("In " + counted(n_contradicting_, "row", "rows") +
                              " `correct` contradicts shape and response; `correct` was used.");
@@ -433,9 +484,9 @@ class CsvTrials {
 
   bool truth(Column column) {
     if (at_[column] == kAbsent) return false;
-    const std::string_view text = field(column);
-    if (text != "0" && text != "1") fault(column, "0 or 1");
-    return text == "1";
+    const std::optional<bool> value = truth_of(field(column));
+    if (!value) fault(column, "0 or 1 (or TRUE, FALSE)");
+    return value.value_or(false);
   }
 
   double time(Column column) {

@@ -113,6 +113,15 @@ constexpr std::size_t kMaxFaults = 50;
 /// Missing values as R, pandas, BIDS and spreadsheets write them; a name may be NA.
 bool is_missing(std::string_view text);
 
+/// 1, 0, and true and false as R (TRUE), Python (True) and JSON write them; nullopt: another text.
+std::optional<bool> truth_of(std::string_view text);
+
+/// Warns of names that differ in case, spaces around them or leading zeros only, as spreadsheets
+/// change them: "Participants '1' and '01' look alike; they count as different."
+/// \param what  "Participants"
+void warn_of_alike(const std::string& what, const std::deque<std::string>& names,
+                   std::vector<std::string>& warnings);
+
 /// Adds a value that is new and not empty.
 void note_once(const std::string& value, std::vector<std::string>& known);
 /// For values that are displayed only: made printable, at most eight are kept.

@@ -69,6 +69,34 @@ TEST_F(TrialsCsv, ReadsTheNineColumns) {
   EXPECT_TRUE(table.warnings.empty());
 }
 
+TEST_F(TrialsCsv, ReadsTruthAsOtherProgramsWriteIt) {
+  const TrialTable table = read(kHeader +
+                                "P1,1,1,1,ray,cone,cone,TRUE,2\n"
+                                "P1,1,1,2,ray,cone,cube,FALSE,2\n"
+                                "P1,1,1,3,ray,cone,cone,True,2\n"
+                                "P1,1,1,4,ray,cone,cube,False,2\n"
+                                "P1,1,1,5,ray,cone,cone,true,2\n");
+  std::vector<bool> correct;
+  for (const TrialRow& row : table.rows) correct.push_back(row.correct);
+  EXPECT_EQ(correct, (std::vector<bool>{true, false, true, false, true}));
+  EXPECT_TRUE(table.warnings.empty());
+  expect_fault(kHeader + "P1,1,1,1,ray,cone,cone,yes,2\n", "line 2, column correct", "TRUE");
+}
+
+TEST_F(TrialsCsv, WarnsOfNamesThatLookAlike) {
+  const TrialTable table = read(kHeader +
+                                "1,1,1,1,ray,cone,cone,1,2\n"
+                                "01,1,1,1,ray,cone,cone,1,2\n"
+                                "1 ,1,1,1,ray,Cone,Cone,1,2\n"
+                                "10,1,1,1,ray,cone,cone,1,2\n"
+                                "P00,1,1,1,ray,cone,cone,1,2\n");
+  EXPECT_EQ(table.participants.size(), 5u);
+  const std::string end = " look alike; they count as different. Write one name in one way.";
+  EXPECT_EQ(table.warnings,
+            (std::vector<std::string>{"Participants '1', '01' and '1 '" + end,
+                                      "Stimuli and answers 'cone' and 'Cone'" + end}));
+}
+
 TEST_F(TrialsCsv, SaysInHowManyTrialsTorqueWasLeftOut) {
   const std::string header = kHeader.substr(0, kHeader.size() - 1) + ",torque_driven\n";
   const std::string rows =
