@@ -416,6 +416,9 @@ void warn_of_small_shards(const std::string& items, double felt) {
 fs::path make_folder(const ClusterSettings& settings) {
   if (settings.folder.empty())
     throw UsageError("missing --dir DIR, a new folder that all nodes see");
+  const data::ResolvedPath place = data::resolve_trusted_links(settings.folder);
+  if (!place.fault.empty()) throw UsageError("--dir " + settings.folder + ": " + place.fault);
+  if (settings.folder == "-") throw UsageError("--dir: expected a new folder");
   fs::path folder = fs::absolute(settings.folder).lexically_normal();
   if (fs::exists(folder) && !(fs::is_directory(folder) && fs::is_empty(folder)))
     throw UsageError("--dir " + settings.folder +

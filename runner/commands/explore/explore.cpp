@@ -15,6 +15,7 @@
 #include "data/base/text.h"
 #include "data/files/atomic_file.h"
 #include "data/files/atomic_folder.h"
+#include "data/files/file_permissions.h"
 #include "protocols/parse.h"
 #include "rendering/renderer.h"
 #include "runner/commands/explore/live_touch.h"
@@ -177,7 +178,9 @@ display::Camera camera_for(const display::SceneDrawing& drawing, const TouchedSc
 /// nothing but frames. \throws UsageError
 void check_frames_folder(const std::string& folder, bool may_replace) {
   const std::string named = "--frames " + folder + ": ";
-  if (folder.empty()) throw UsageError("--frames: expected a folder");
+  if (folder.empty() || folder == "-") throw UsageError("--frames: expected a folder");
+  const std::string fault = data::resolve_trusted_links(folder).fault;
+  if (!fault.empty()) throw UsageError(named + fault);
   std::error_code error;
   if (!fs::exists(folder, error)) return;
   if (!fs::is_directory(folder, error))

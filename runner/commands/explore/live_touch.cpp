@@ -10,9 +10,11 @@
 #include <iostream>
 #include <iterator>
 #include <memory>
+#include <stdexcept>
 #include <utility>
 
 #include "data/base/text.h"
+#include "data/files/file_permissions.h"
 #include "runner/commands/render/forces.h"
 #include "runner/commands/run/opening.h"
 #include "runner/commands/shared/command.h"
@@ -111,6 +113,8 @@ namespace fs = std::filesystem;
 /// Keeps pictures as scene-1.png and so on, the first number that is free; clips likewise.
 std::string keep_in(const std::string& folder, const std::string& bytes, const char* kind) {
   try {
+    const std::string fault = data::resolve_trusted_links(folder).fault;
+    if (!fault.empty()) throw std::runtime_error(folder + ": " + fault);
     fs::create_directories(folder);
     for (int number = 1;; ++number) {
       const fs::path path = fs::path(folder) / ("scene-" + std::to_string(number) + kind);

@@ -16,6 +16,7 @@
 
 #include "data/files/atomic_file.h"
 #include "runner/commands/shared/command.h"
+#include "data/files/file_permissions.h"
 
 namespace palpate::runner::commands {
 namespace {
@@ -104,7 +105,9 @@ Outputs::Outputs(const po::variables_map& values, std::initializer_list<const ch
   if (folder != nullptr && wanted(folder)) {
     folder_option_ = std::string("--") + folder;
     folder_ = values[folder].as<std::string>();
-    if (folder_.empty()) throw UsageError(folder_option_ + ": expected a folder");
+    if (folder_.empty() || folder_ == "-") throw UsageError(folder_option_ + ": expected a folder");
+    const std::string fault = data::resolve_trusted_links(folder_).fault;
+    if (!fault.empty()) throw UsageError(folder_option_ + " " + folder_ + ": " + fault);
     if (fs::exists(folder_) && !fs::is_directory(folder_)) {
       throw UsageError(folder_option_ + " " + folder_ + ": expected a folder; this is a file");
     }

@@ -32,11 +32,26 @@ class Words(CommandCase):
     def test_an_unknown_command_names_the_nearest(self):
         self.assertEqual(self.said("analyse"), "palpate: no command 'analyse'; did you mean 'analyze'? 'palpate --help' lists them\n")
         self.assertIn("did you mean 'export'?", self.said("exprot", "--db", "x"))
+        self.assertIn("did you mean 'analyze'?", self.said("anal"))
         self.assertEqual(self.said("xyzzy"), "palpate: no command 'xyzzy'; 'palpate --help' lists them\n")
 
     def test_an_unknown_option_names_the_nearest(self):
         self.assertIn("did you mean '--participants'?", self.said("simulate", "p.json", "--participents=3"))
         self.assertNotIn("did you mean", self.said("simulate", "p.json", "--xyzzy"))
+
+    def test_monitors_count_from_1(self):
+        for option in ("--participant-monitor", "--console-monitor"):
+            self.assertIn(option + ": must be 1 or more", self.said("run", "p.json", "--db", "x.db", "--participant", "A",
+                                                                  "--device", "mouse", option, "0"))
+
+    def test_no_folder_is_made_through_anothers_link(self):
+        if os.geteuid() == 0:
+            os.symlink(self.dir / "theirs", self.dir / "link")
+            os.chown(self.dir / "link", 65534, 65534, follow_symlinks=False)
+            self.file("t.csv", "")
+            self.assertIn("a link of another user", self.said("cluster", "plan", "--csv", "t.csv", "--trials", "10", "--no-submit",
+                                                             "--participants", "2-3", "--dir", self.dir / "link/new"))
+            self.assertFalse((self.dir / "theirs").exists())
 
     def test_help_on_a_command(self):
         for command in COMMANDS:
