@@ -59,18 +59,25 @@ void require_writable(const fs::path& path, bool force, const ProtectedFiles& ot
   if (!reason.empty()) throw StoreRefused(path.string() + ": " + reason);
 }
 
+/// A file beside that of the trials. It takes its name, so that studies exported into one folder
+/// keep their own: a_attempts.csv beside a.csv, but attempts.csv beside trials.csv.
+fs::path companion(const fs::path& trials, const std::string& what) {
+  if (trials.filename() == "trials.csv") return trials.parent_path() / (what + ".csv");
+  const bool csv = trials.extension() == ".csv";
+  const std::string stem = csv ? trials.stem().string() : trials.filename().string();
+  return trials.parent_path() / (stem + "_" + what + ".csv");
+}
+
 /// \throws StoreRefused
 CsvPaths checked_paths(Store& store, const std::string& path, const ExportSettings& settings) {
-  const fs::path trials(path), attempts = trials.parent_path() / "attempts.csv";
+  const fs::path trials(path), attempts = companion(trials, "attempts");
   if (trials.filename().empty()) throw StoreRefused("'" + path + "' names no file to write to");
-  if (trials.filename() == attempts.filename()) {
-    throw StoreRefused(
-        path + ": that name is reserved for the attempts that were cut off; choose another");
+  for (const char* reserved : {"attempts.csv", "pages.csv"}) {
+    if (trials.filename() != reserved) continue;
+    throw StoreRefused(path +
+                       ": that name is reserved for a file beside trials.csv; choose another");
   }
-  const fs::path pages = trials.parent_path() / "pages.csv";
-  if (settings.pages && trials.filename() == pages.filename()) {
-    throw StoreRefused(path + ": that name is reserved for the answers to pages; choose another");
-  }
+  const fs::path pages = companion(trials, "pages");
   CsvPaths paths{.trials = trials, .attempts = {}, .pages = {}, .codebook = settings.codebook};
   if (settings.pages) paths.pages = pages;
   if (store.counts().cut_off > 0) paths.attempts = attempts;
@@ -81,7 +88,7 @@ CsvPaths checked_paths(Store& store, const std::string& path, const ExportSettin
   if (paths.pages) require_writable(pages, settings.force, others);
   if (!paths.codebook.empty()) {
     others.add(trials.string(), "the trials go there");
-    others.add(attempts.string(), "that name is reserved for the attempts that were cut off");
+    others.add(attempts.string(), "the attempts that were cut off go there");
     if (paths.pages) others.add(pages.string(), "the answers to pages go there");
     require_writable(paths.codebook, settings.force, others);
   }

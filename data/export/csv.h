@@ -20,11 +20,12 @@ namespace palpate::data {
 std::int64_t write_attempts(Store& store, TextSink& out, const ExportClock& clock,
                             ExportedParticipants& participants, ProgressCounter& counter);
 
-/// Writes every completed trial to `path` and, where attempts were cut off, those to attempts.csv
-/// in the same folder. UTF-8 without BOM, RFC 4180 (lines end in CRLF, fields quoted only where
-/// needed), numbers as the shortest text that reads back exactly; texts that a spreadsheet would
-/// evaluate are guarded (text_sink.h). settings.codebook names a file for the meaning of the
-/// columns. Columns: delimited_row.h. Each file appears complete or not at all
+/// Writes every completed trial to `path`, a file NAME.csv. Where attempts were cut off, writes
+/// those to NAME_attempts.csv in the same folder, and answers to pages to NAME_pages.csv; beside
+/// trials.csv these are attempts.csv and pages.csv. UTF-8 without BOM, RFC 4180 (lines end in CRLF,
+/// fields quoted only where needed), numbers as the shortest text that reads back exactly; texts
+/// that a spreadsheet would evaluate are guarded (text_sink.h). settings.codebook names a file for
+/// the meaning of the columns. Columns: delimited_row.h. Each file appears complete or not at all
 /// (atomic_file.h), and the database records the export.
 ///
 /// \throws StoreRefused: a file exists and `force` is not given, or `path` must not be written to;

@@ -132,7 +132,9 @@ void add_options(CommandLine& line) {
   line.summary =
       "Writes the trials of a database for others, completely or not at all. Can be used while a\n"
       "session runs. csv: every completed trial as a row of PATH, and the attempts that were cut\n"
-      "off, if there are any, in attempts.csv in the same folder. bids, psych-ds: a\n"
+      "off, if there are any, in NAME_attempts.csv beside NAME.csv (attempts.csv beside "
+      "trials.csv).\n"
+      "bids, psych-ds: a\n"
       "self-describing folder, with the servo-rate samples if they were kept.\n"
       "Times are relative in bids and psych-ds: dates are shifted so that a participant's first\n"
       "trial is at 1900-01-01T00:00:00Z, and the column elapsed counts the seconds from it. csv\n"
@@ -164,8 +166,9 @@ void add_options(CommandLine& line) {
       "bids and psych-ds: JSON with authors, license, funding, ethics_approvals, references, doi, "
       "which go into the dataset's description");
   add("pages", po::bool_switch(),
-      "the answers to pages as well, which are personal data: pages.csv in the same folder, or in "
-      "the dataset");
+      "the answers to pages as well, which are personal data: NAME_pages.csv beside NAME.csv "
+      "(pages.csv beside trials.csv), or in the dataset; bids: also in participants.tsv, where "
+      "the protocol's questions name a column");
   add("motion", po::bool_switch(),
       "bids: servo samples as Motion-BIDS, in place of a physiological recording; larger, because "
       "BIDS does not compress motion");

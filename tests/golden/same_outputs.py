@@ -102,7 +102,7 @@ def written(path, place):
         text = found.decode()
     except UnicodeDecodeError:
         return Output(hashlib.sha256(found).hexdigest(), place)
-    live = ".live." in path.name or path.name == "attempts.csv"
+    live = ".live." in path.name or path.name.endswith("attempts.csv")
     return Output(without_live_columns(text) if live else text, place, ".timed." in path.name)
 
 

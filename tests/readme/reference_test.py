@@ -87,7 +87,7 @@ class Dictionary(unittest.TestCase):
         output_of("simulate", ROOT / "protocols/roughness-magnitude.json", "--db", "pages.db", "--participants", 1,
                   folder=self.folder)
         output_of("export", "--db", "pages.db", "--format", "csv", "--out", "rough.csv", "--pages", folder=self.folder)
-        header = (self.folder / "pages.csv").read_text().split("\n", 1)[0].split(",")
+        header = (self.folder / "rough_pages.csv").read_text().split("\n", 1)[0].split(",")
         self.assertEqual(set(header), set(self.documented("pages")))
 
     def test_columns_of_samples_with_their_units(self):

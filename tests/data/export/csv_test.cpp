@@ -4,6 +4,7 @@
 #include <sys/stat.h>
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 
 #include "data/files/text_sink.h"
@@ -275,12 +276,31 @@ TEST_F(ExportCsv, NothingIsOverwrittenWithoutForce) {
   EXPECT_EQ(files(), 2);
 }
 
+TEST_F(ExportCsv, FilesBesideItTakeItsName) {
+  show(a_record(1));
+  store_.begin_attempt(run_, a_plan(2), 1);
+  store_.cut_off_attempt(run_, "x");
+  const ExportSettings settings{.pages = true};
+  for (const auto& [out, attempts, pages] : std::vector<std::array<std::string, 3>>{
+           {"trials.csv", "attempts.csv", "pages.csv"},
+           {"one.csv", "one_attempts.csv", "one_pages.csv"},
+           {"two.trials.csv", "two.trials_attempts.csv", "two.trials_pages.csv"},
+           {"three", "three_attempts.csv", "three_pages.csv"}}) {
+    const ExportResult done = export_csv(store_, out_folder_ / out, settings);
+    EXPECT_EQ(done.attempts_path, out_folder_ / attempts);
+    EXPECT_EQ(done.pages_path, out_folder_ / pages);
+  }
+  EXPECT_EQ(files(), 12) << "each study keeps its own";
+}
+
 TEST_F(ExportCsv, InvalidPathsAreRefused) {
   EXPECT_THROW(export_csv(store_, out_folder_.path(), true), StoreRefused);
   EXPECT_THROW(export_csv(store_, out_folder_ / "", true), StoreRefused);
   EXPECT_THROW(export_csv(store_, "", true), StoreRefused);
   EXPECT_THROW(export_csv(store_, "/dev/null", true), StoreRefused);
   EXPECT_THROW(export_csv(store_, out_folder_ / "attempts.csv", true), StoreRefused);
+  EXPECT_THROW(export_csv(store_, out_folder_ / "pages.csv", true), StoreRefused);
+  EXPECT_THROW(export_csv(store_, "-", true), StoreRefused);
   EXPECT_THROW(export_csv(store_, folder_ / "study.db", true), StoreRefused);
   EXPECT_THROW(export_csv(store_, folder_ / "study.db-wal", true), StoreRefused);
   EXPECT_THROW(export_csv(store_, out_folder_ / "none/trials.csv", false), StoreError);

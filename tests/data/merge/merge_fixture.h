@@ -61,12 +61,12 @@ inline void record_otherwise(const std::string& path, const std::string& sql) {
   seal_again(db);
 }
 
-/// Every line of a CSV export but the header, and of attempts.csv.
+/// Every line of a CSV export but the header, and of the attempts beside it.
 inline Lines exported(const std::string& database, const TemporaryFolder& folder) {
   Store store = Store::open(database, Store::Mode::read_only);
   export_csv(store, folder / "t.csv", true);
   Lines lines;
-  for (const char* name : {"t.csv", "attempts.csv"}) {
+  for (const char* name : {"t.csv", "t_attempts.csv"}) {
     std::ifstream in(folder / name);
     std::string line;
     std::getline(in, line);

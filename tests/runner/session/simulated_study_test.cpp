@@ -47,7 +47,7 @@ class SimulatedStudy : public ::testing::Test {
     data::Store store = data::Store::open(db, data::Store::Mode::read_only);
     const fs::path csv = folder_ / "out.csv";
     data::export_csv(store, csv, true);
-    EXPECT_FALSE(fs::exists(folder_ / "attempts.csv"))
+    EXPECT_FALSE(fs::exists(folder_ / "out_attempts.csv"))
         << "a simulated trial leaves no cut-off attempt";
     std::ifstream in(csv, std::ios::binary);
     std::ostringstream text;

@@ -98,7 +98,7 @@ class Folders(Study):
             # Otherwise the next round may be interrupted before it removes them.
             for path in [*self.dir.glob("killed.??????"), *self.dir.glob(".killed*")]:
                 shutil.rmtree(path) if path.is_dir() else path.unlink()
-            (self.dir / "attempts.csv").unlink(missing_ok=True)
+            (self.dir / "killed_attempts.csv").unlink(missing_ok=True)
         self.assertGreater(len(outcomes), 1)
 
 
