@@ -12,10 +12,13 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <csignal>
 #include <cstdio>
 #include <exception>
 #include <iostream>
+#include <new>
 #include <string>
+#include <system_error>
 #include <vector>
 
 #include "data/base/text.h"
@@ -134,6 +137,8 @@ int run(int argc, char** argv) {
 int main(int argc, char** argv) {
   ::umask(0077);  // all that is written is the user's alone, folders as well
   occupy_standard_descriptors();
+  // Beyond a limit on the size of files, writing fails with EFBIG instead of ending the program.
+  std::signal(SIGXFSZ, SIG_IGN);
   try {
     const int status = run(argc, argv);
     std::cout.flush();
@@ -152,6 +157,18 @@ int main(int argc, char** argv) {
   } catch (const palpate::data::StoreRefused& error) {
     std::cerr << "palpate: " << palpate::printable_lines(error.what()) << "\n";
     return 2;
+  } catch (const std::bad_alloc&) {
+    std::cerr << "palpate: out of memory: this command needs more than the machine or its limit "
+                 "gives. Close other programs, raise the limit (ulimit -v, or --mem of a batch "
+                 "system), or give it fewer --jobs or less data\n";
+    return 1;
+  } catch (const std::system_error& error) {
+    std::cerr << "palpate: " << palpate::printable_lines(error.what());
+    if (error.code() == std::errc::resource_unavailable_try_again)
+      std::cerr << ": a thread could not be started; raise the limit on memory or processes "
+                   "(ulimit -v, ulimit -u), or give fewer --jobs";
+    std::cerr << "\n";
+    return 1;
   } catch (const std::exception& error) {
     std::cerr << "palpate: " << palpate::printable_lines(error.what()) << "\n";
     return 1;

@@ -16,6 +16,7 @@
 
 #include "data/errors.h"
 #include "data/files/file_permissions.h"
+#include "data/files/output_check.h"
 
 namespace palpate::data {
 namespace {
@@ -95,6 +96,7 @@ bool leads_to(int folder, const std::string& name, int descriptor) {
 }  // namespace
 
 AtomicFile::AtomicFile(const std::string& target) : target_(target) {
+  require_name(target);
   const ResolvedPath resolved = resolve_trusted_links(target);
   if (!resolved.fault.empty()) throw StoreRefused(target + ": " + resolved.fault);
   open_folder(resolved.path);
@@ -191,7 +193,7 @@ void AtomicFile::roll_back() {
 }
 
 void AtomicFile::fail(const char* what, int error) const {
-  throw StoreError(target_ + ": " + what + ": " + std::generic_category().message(error) +
+  throw StoreError(target_ + ": " + what + ": " + write_fault(error) +
                    "; nothing was written. Check the folder, its permissions and the free space");
 }
 

@@ -17,6 +17,7 @@
 #include "data/errors.h"
 #include "data/files/atomic_file.h"
 #include "data/files/file_permissions.h"
+#include "data/files/output_check.h"
 
 namespace palpate::data {
 namespace {
@@ -46,6 +47,7 @@ bool made_by_palpate(const fs::path& description) {
 
 AtomicFolder::AtomicFolder(const std::string& target)
     : target_(without_trailing_slash(target).string()) {
+  require_name(target);
   const std::string fault = resolve_trusted_links(fs::path(target_).parent_path().string()).fault;
   if (!fault.empty()) throw StoreRefused(target_ + ": " + fault);
   remove_stale_temporaries(target_);
@@ -104,13 +106,14 @@ void AtomicFolder::commit(bool replace) {
 }
 
 void AtomicFolder::fail(const char* what, int error) const {
-  throw StoreError(target_ + ": " + what + ": " + std::generic_category().message(error) +
+  throw StoreError(target_ + ": " + what + ": " + write_fault(error) +
                    "; nothing was written. Check the folder, its permissions and the free space");
 }
 
 void require_replaceable(const std::string& target, bool force,
                          const std::function<bool(const std::string&)>& ours) {
   if (target.empty()) throw StoreRefused("'' names no folder to write to");
+  require_name(target);
   const fs::path folder = without_trailing_slash(target);
   const fs::file_status status = fs::symlink_status(folder);
   if (!fs::exists(status)) return;

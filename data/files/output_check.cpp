@@ -1,11 +1,13 @@
 #include "data/files/output_check.h"
 
 #include <fcntl.h>
+#include <sys/resource.h>
 #include <sys/stat.h>
 #include <sys/sysmacros.h>
 #include <unistd.h>
 
 #include <array>
+#include <cerrno>
 #include <charconv>
 #include <filesystem>
 #include <string_view>
@@ -109,6 +111,26 @@ std::optional<int> descriptor_of_path(const std::string& path) {
   return std::nullopt;
 }
 
+std::string write_fault(int error) {
+  // A copy within the system (copy_file_range) tells of the limit as of a broken disk.
+  struct rlimit limit {};
+  const bool limited = ::getrlimit(RLIMIT_FSIZE, &limit) == 0 && limit.rlim_cur != RLIM_INFINITY;
+  if (error == EFBIG || (error == EIO && limited))
+    return "the limit on the size of a file is reached, as if the disk were full (ulimit -f shows "
+           "it)";
+  return std::generic_category().message(error);
+}
+
+namespace {
+
+constexpr const char* kNoName = "names no file or folder here; for a file of this name write ./-";
+
+}  // namespace
+
+void require_name(const std::string& path) {
+  if (path == "-") throw StoreRefused(path + ": " + kNoName);
+}
+
 void ProtectedFiles::add(const std::string& path, const std::string& reason) {
   if (path.empty()) return;
   const std::string file = resolved(path);
@@ -133,6 +155,7 @@ std::string ProtectedFiles::reason(const std::string& path) const {
 std::string write_refusal(const std::string& path, bool force,
                           const ProtectedFiles& protected_files) {
   if (path.empty()) return "must not be empty";
+  if (path == "-") return kNoName;
   const auto found = stat_of(path);
   const auto descriptor = descriptor_of_path(path);
   if (descriptor) {

@@ -23,6 +23,14 @@ bool belongs_to_database(const std::string& path);
 /// The open descriptor that a path names: "/dev/stdout", "/dev/fd/63" (process substitution).
 std::optional<int> descriptor_of_path(const std::string& path);
 
+/// Why writing failed, for a message. \param error an errno; a limit on the size of files (ulimit
+/// -f) reads like a full disk
+std::string write_fault(int error);
+
+/// Refuses "-" where a file or folder is to be written: a file of that name surprises who meant a
+/// stream. \throws StoreRefused
+void require_name(const std::string& path);
+
 /// Files that must not be overwritten, each with the reason: inputs and other outputs of a command.
 class ProtectedFiles {
  public:

@@ -6,10 +6,10 @@
 
 #include <array>
 #include <cerrno>
-#include <system_error>
 #include <utility>
 
 #include "data/errors.h"
+#include "data/files/output_check.h"
 
 namespace palpate::data {
 
@@ -20,7 +20,7 @@ FileSink::FileSink(int descriptor, std::string path)
     : path_(std::move(path)), descriptor_(descriptor) {
   if (descriptor_ >= 0) return;
   const int error = errno;
-  throw StoreError(path_ + ": cannot be created: " + std::generic_category().message(error) +
+  throw StoreError(path_ + ": cannot be created: " + write_fault(error) +
                    "; nothing was exported. Check the folder, its permissions and the free space");
 }
 
@@ -51,7 +51,7 @@ void FileSink::flush() {
 }
 
 void FileSink::fail(int error) const {
-  throw StoreError(path_ + ": cannot be written: " + std::generic_category().message(error) +
+  throw StoreError(path_ + ": cannot be written: " + write_fault(error) +
                    "; nothing was exported. Check the folder, its permissions and the free space");
 }
 

@@ -721,8 +721,7 @@ void sync_file(const std::string& file) {
   const bool done = descriptor >= 0 && ::fsync(descriptor) == 0;
   const int error = errno;
   if (descriptor >= 0) ::close(descriptor);
-  if (!done)
-    throw StoreError(file + ": cannot be written: " + std::generic_category().message(error));
+  if (!done) throw StoreError(file + ": cannot be written: " + write_fault(error));
 }
 
 }  // namespace

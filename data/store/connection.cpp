@@ -4,16 +4,18 @@
 #include <fcntl.h>
 #include <sqlite3.h>
 #include <sys/file.h>
+#include <sys/resource.h>
 #include <sys/stat.h>
 #include <sys/statvfs.h>
-#include <unistd.h>
 #include <sys/vfs.h>
+#include <unistd.h>
 
-#include <array>
 #include <algorithm>
+#include <array>
 #include <cerrno>
-#include <filesystem>
 #include <cstdint>
+#include <filesystem>
+#include <optional>
 #include <string_view>
 #include <system_error>
 
@@ -31,11 +33,28 @@ bool disk_is_full(const std::string& path) {
          disk.f_bavail * disk.f_frsize < 2 * kMappedAtOnce;
 }
 
+/// The limit on the size of a file, in bytes, where there is one: beyond it writing fails.
+std::optional<std::uint64_t> file_size_limit() {
+  struct rlimit limit {};
+  if (::getrlimit(RLIMIT_FSIZE, &limit) != 0 || limit.rlim_cur == RLIM_INFINITY)
+    return std::nullopt;
+  return limit.rlim_cur;
+}
+
+/// "the disk is full", or the limit that reads like it
+std::string full_disk(const std::string& path) {
+  const auto limit = file_size_limit();
+  if (!limit || disk_is_full(path)) return "the disk is full";
+  return "the disk is full, or the limit on the size of a file is reached (ulimit -f: " +
+         std::to_string(*limit) + " bytes)";
+}
+
 /// \return the primary result code
 int cause_of(const std::string& path, const SQLite::Exception& error) {
   const int code = error.getErrorCode() & 0xff;
   const bool may_be_full = code == SQLITE_IOERR || code == SQLITE_CANTOPEN;
-  return may_be_full && disk_is_full(path) ? SQLITE_FULL : code;
+  const bool limited = code == SQLITE_IOERR && file_size_limit();
+  return limited || (may_be_full && disk_is_full(path)) ? SQLITE_FULL : code;
 }
 
 }  // namespace
@@ -51,8 +70,12 @@ void raise_store_error(const std::string& path, const SQLite::Exception& error) 
           path + ": is damaged or truncated" + detail + "; keep a copy of it and of " + path +
           "-wal, then restore a backup or recover with: sqlite3 '" + path + "' .recover");
     case SQLITE_FULL:
-      throw StoreError(path + ": the disk is full, this step was not saved" + detail +
-                       "; free some space, then start again: the session resumes at this trial");
+      throw StoreError(path + ": " + full_disk(path) + ", this step was not saved" + detail +
+                       "; free some space or raise the limit, then give the same command again");
+    case SQLITE_NOMEM:
+      throw StoreError(path + ": out of memory, this step was not saved" + detail +
+                       "; close other programs or raise the limit (ulimit -v), then give the same "
+                       "command again");
     case SQLITE_BUSY:
     case SQLITE_LOCKED:
       throw StoreError(path + ": another program has locked it, this step was not saved" + detail +
@@ -97,6 +120,7 @@ std::vector<SQLite::Column> columns_of(SQLite::Statement& statement) {
 
 namespace {
 
+constexpr const char* kLockEnd = ".palpate-lock";
 constexpr std::string_view kMark = "palpate ";  // and the process's number
 
 [[noreturn]] void refuse_foreign_lock(const std::string& file, const std::string& path,
@@ -120,7 +144,6 @@ void require_our_lock(const struct stat& found, const std::string& file, const s
     refuse_foreign_lock(file, path, "it belongs to user " + std::to_string(found.st_uid));
   }
   if ((found.st_mode & 077) != 0) refuse_foreign_lock(file, path, "others may access it");
-constexpr const char* kLockEnd = ".palpate-lock";
   if (found.st_nlink > 1) refuse_foreign_lock(file, path, "it has a hard link");
 }
 
@@ -182,29 +205,6 @@ bool is_same_file(int descriptor, const std::string& file) {
          opened.st_dev == found.st_dev && opened.st_ino == found.st_ino;
 }
 
-}  // namespace
-
-WriterLock::WriterLock(const std::string& path) : path_(path), file_(path + kLockEnd) {
-  while (true) {
-    descriptor_ = open_lock_file(file_, path);
-    if (::flock(descriptor_, LOCK_EX | LOCK_NB) != 0) {
-      const int error = errno;
-      const std::string who = holder(descriptor_);
-      ::close(descriptor_);
-      if (error == EINTR) continue;
-      if (error != EWOULDBLOCK) {
-        throw StoreError(path + ": cannot be locked: " + std::generic_category().message(error) +
-                         "; keep the database on a local disk");
-      }
-      refuse_second_writer(path, who);
-    }
-    if (is_same_file(descriptor_, file_)) break;
-    ::close(descriptor_);
-  }
-  const std::string text = std::string(kMark) + std::to_string(::getpid()) + "\n";
-  // The process id is for messages only: the lock holds even if a full disk leaves the file empty.
-  if (::ftruncate(descriptor_, 0) == 0 && ::pwrite(descriptor_, text.data(), text.size(), 0) < 0) {
-    errno = 0;
 /// On a network file system flock() is a POSIX lock of the whole file, which would exclude SQLite.
 bool has_flock_of_its_own(int descriptor) {
   constexpr std::array<std::uint32_t, 4> kNetwork = {0x6969, 0x517B, 0xFF534D42, 0xFE534D42};
@@ -246,6 +246,35 @@ bool is_locked(const std::string& file) {
                      "was written. Wait until that has ended, then go on under that name");
 }
 
+}  // namespace
+
+WriterLock::WriterLock(const std::string& path) : path_(path), file_(path + kLockEnd) {
+  while (true) {
+    descriptor_ = open_lock_file(file_, path);
+    if (::flock(descriptor_, LOCK_EX | LOCK_NB) != 0) {
+      const int error = errno;
+      const std::string who = holder(descriptor_);
+      ::close(descriptor_);
+      if (error == EINTR) continue;
+      if (error != EWOULDBLOCK) {
+        throw StoreError(path + ": cannot be locked: " + std::generic_category().message(error) +
+                         "; keep the database on a local disk");
+      }
+      refuse_second_writer(path, who);
+    }
+    if (is_same_file(descriptor_, file_)) break;
+    ::close(descriptor_);
+  }
+  const std::string text = std::string(kMark) + std::to_string(::getpid()) + "\n";
+  // The process id is for messages only: the lock holds even if a full disk leaves the file empty.
+  if (::ftruncate(descriptor_, 0) == 0 && ::pwrite(descriptor_, text.data(), text.size(), 0) < 0) {
+    errno = 0;
+  }
+  try {
+    lock_database();
+  } catch (...) {
+    release();
+    throw;
   }
 }
 
@@ -266,35 +295,6 @@ void WriterLock::release() {
   ::close(descriptor_);
 }
 
-void Store::Impl::refuse(const std::string& why) const { throw StoreRefused(path + ": " + why); }
-
-void Store::Impl::require_writer() const {
-  if (!writes()) refuse("was opened for reading only");
-}
-
-void Store::Impl::require_running(const Run& run) {
-  SQLite::Statement find(
-      *db, "SELECT 1 FROM runs WHERE id = ? AND session_id = ? AND end_reason = 'running'");
-  Binder(find) << run.id << run.session_id;
-  if (!find.executeStep()) {
-    refuse("this run of session " + std::to_string(run.session) + " has ended");
-  }
-}
-
-void Store::Impl::require_files_in_place() {
-  try {
-    lock_database();
-  } catch (...) {
-    release();
-    throw;
-  }
-  repair_wal_index();
-  const FileIdentity wal = identity_of(file + "-wal");
-  if (wal_identity == FileIdentity{}) wal_identity = wal;  // created by the first write
-  if (identity_of(file) != identity || wal != wal_identity || wal == FileIdentity{}) {
-    throw StoreError(path +
-                     ": the file or its -wal was moved, replaced or deleted while in use; this "
-                     "step is not safely stored. Put both back where they were before continuing, "
 void require_one_name(const std::string& file, const std::string& path) {
   const std::uint64_t names = names_of_file(file);
   if (names <= 1) return;
@@ -316,6 +316,29 @@ void require_no_writer_by_another_name(const std::string& file, const std::strin
   if (taken) refuse_writer_by_another_name(path);
 }
 
+void Store::Impl::refuse(const std::string& why) const { throw StoreRefused(path + ": " + why); }
+
+void Store::Impl::require_writer() const {
+  if (!writes()) refuse("was opened for reading only");
+}
+
+void Store::Impl::require_running(const Run& run) {
+  SQLite::Statement find(
+      *db, "SELECT 1 FROM runs WHERE id = ? AND session_id = ? AND end_reason = 'running'");
+  Binder(find) << run.id << run.session_id;
+  if (!find.executeStep()) {
+    refuse("this run of session " + std::to_string(run.session) + " has ended");
+  }
+}
+
+void Store::Impl::require_files_in_place() {
+  repair_wal_index();
+  const FileIdentity wal = identity_of(file + "-wal");
+  if (wal_identity == FileIdentity{}) wal_identity = wal;  // created by the first write
+  if (identity_of(file) != identity || wal != wal_identity || wal == FileIdentity{}) {
+    throw StoreError(path +
+                     ": the file or its -wal was moved, replaced or deleted while in use; this "
+                     "step is not safely stored. Put both back where they were before continuing, "
                      "or restore a backup");
   }
 }

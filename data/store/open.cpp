@@ -163,6 +163,7 @@ void Store::Impl::require_usable_path() {
   if (path.empty() || error) throw StoreRefused("'" + path + "' is not a path of a database");
   // Reading follows links of other users; writing does not, because they could redirect it.
   if (writes()) {
+    require_name(path);
     const ResolvedPath resolved = resolve_trusted_links(path);
     if (!resolved.fault.empty()) refuse(resolved.fault);
     file = resolved.path;
@@ -230,11 +231,11 @@ Store Store::open(const std::string& path, Mode mode) {
   if (writes) {
     impl->lock.emplace(file);
     impl->create_if_absent();
-  }
     impl->lock->lock_database();  // of a new file
     require_one_name(file, path);
-  std::error_code error;
+  }
   if (mode == Mode::read_for_export) require_no_writer_by_another_name(file, path);
+  std::error_code error;
   if (std::filesystem::file_size(file, error) == 0 && !error) {
     impl->refuse(
         "is empty; a palpate database is never empty. Restore a backup, or remove the file to "

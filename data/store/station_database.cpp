@@ -6,6 +6,7 @@
 #include <filesystem>
 
 #include "data/files/file_permissions.h"
+#include "data/files/output_check.h"
 #include "data/store/attempts.h"
 #include "data/store/connection.h"
 #include "data/store/open.h"
@@ -31,7 +32,7 @@ std::string cause_of(const std::error_code& error, const std::string& copy) {
   constexpr std::uintmax_t kFull = 65'536;  // bytes
   std::error_code unknown;
   const fs::space_info disk = fs::space(fs::path(copy).parent_path(), unknown);
-  return !unknown && disk.available < kFull ? "the disk is full" : error.message();
+  return !unknown && disk.available < kFull ? "the disk is full" : write_fault(error.value());
 }
 
 }  // namespace

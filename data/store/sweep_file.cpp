@@ -379,8 +379,7 @@ void sync_path(const std::string& path, const std::string& named) {
   const bool done = opened >= 0 && ::fsync(opened) == 0;
   const int error = errno;
   if (opened >= 0) ::close(opened);
-  if (!done)
-    throw StoreError(named + ": cannot be written: " + std::generic_category().message(error));
+  if (!done) throw StoreError(named + ": cannot be written: " + write_fault(error));
 }
 
 void make_empty_file(const std::string& file) {
@@ -434,6 +433,7 @@ struct SweepFile::Impl {
     std::error_code error;
     file = fs::weakly_canonical(fs::absolute(path, error), error).string();
     if (path.empty() || error) throw StoreRefused("'" + path + "' is not a path of a sweep's file");
+    if (writing) require_name(path);
     if (writing) {
       const ResolvedPath resolved = resolve_trusted_links(path);
       if (!resolved.fault.empty()) throw StoreRefused(path + ": " + resolved.fault);

@@ -6,6 +6,7 @@
 #include <boost/any.hpp>
 #include <cerrno>
 #include <csignal>
+#include <cstdio>
 #include <deque>
 #include <filesystem>
 #include <iostream>
@@ -15,8 +16,8 @@
 #include <utility>
 
 #include "data/files/atomic_file.h"
-#include "runner/commands/shared/command.h"
 #include "data/files/file_permissions.h"
+#include "runner/commands/shared/command.h"
 
 namespace palpate::runner::commands {
 namespace {
@@ -47,7 +48,7 @@ void require_folder(const std::string& path) {
 
 bool is_stream(const std::string& path) {
   std::error_code error;
-  return data::descriptor_of_path(path) ||
+  return path == "-" || data::descriptor_of_path(path) ||
          (fs::exists(path, error) && !fs::is_regular_file(path, error));
 }
 
@@ -63,10 +64,11 @@ class NoPipeSignal {
   void (*before_)(int);
 };
 
-void stream_out(const std::string& path, std::string_view text) {
+/// \param standard_output  where "-" goes
+void stream_out(const std::string& path, int standard_output, std::string_view text) {
   std::cout.flush();  // keeps the order of the output
   const NoPipeSignal quiet;
-  const auto named = data::descriptor_of_path(path);
+  const auto named = path == "-" ? standard_output : data::descriptor_of_path(path);
   const int out = named ? *named : ::open(path.c_str(), O_WRONLY | O_NOCTTY | O_CLOEXEC);
   int error = out < 0 ? errno : 0;
   while (error == 0 && !text.empty()) {
@@ -79,7 +81,7 @@ void stream_out(const std::string& path, std::string_view text) {
   }
   if (!named && out >= 0) ::close(out);
   if (error == 0) return;
-  throw std::runtime_error(path + ": cannot be written: " + std::generic_category().message(error));
+  throw std::runtime_error(path + ": cannot be written: " + data::write_fault(error));
 }
 
 }  // namespace
@@ -100,7 +102,10 @@ Outputs::Outputs(const po::variables_map& values, std::initializer_list<const ch
     }
   }
   for (const char* option : options) {
-    for (const std::string& path : paths_of(values, option)) outputs_.push_back({option, path, ""});
+    for (const std::string& path : paths_of(values, option)) {
+      outputs_.push_back({option, path, ""});
+      if (path == "-") take_standard_output();
+    }
   }
   if (folder != nullptr && wanted(folder)) {
     folder_option_ = std::string("--") + folder;
@@ -113,6 +118,23 @@ Outputs::Outputs(const po::variables_map& values, std::initializer_list<const ch
     }
   }
   check();
+}
+
+void Outputs::take_standard_output() {
+  if (standard_output_ >= 0) throw UsageError("-: two outputs cannot go to standard output");
+  std::cout.flush();
+  std::fflush(stdout);
+  standard_output_ = ::fcntl(STDOUT_FILENO, F_DUPFD_CLOEXEC, 3);
+  if (standard_output_ < 0) throw std::runtime_error("-: standard output is closed");
+  ::dup2(STDERR_FILENO, STDOUT_FILENO);
+}
+
+Outputs::~Outputs() {
+  if (standard_output_ < 0) return;
+  std::cout.flush();
+  std::fflush(stdout);
+  ::dup2(standard_output_, STDOUT_FILENO);
+  ::close(standard_output_);
 }
 
 void Outputs::protect_files(const stimuli::ObjectSpec& object) {
@@ -132,6 +154,7 @@ void Outputs::check() const {
   data::ProtectedFiles others;
   for (const Output& output : outputs_) {
     const std::string named = "--" + output.option + " " + output.path;
+    if (output.path == "-") continue;
     std::string why = data::write_refusal(output.path, force_, inputs_);
     if (why.empty()) why = others.reason(output.path);
     if (!why.empty()) faults += (faults.empty() ? "" : "\n") + named + ": " + why;
@@ -173,7 +196,7 @@ void Outputs::write() {
       draft.sync();
     }
     for (const Output& output : outputs_) {
-      if (is_stream(output.path)) stream_out(output.path, output.text);
+      if (is_stream(output.path)) stream_out(output.path, standard_output_, output.text);
     }
     data::commit_all(drafts, force_);
   } catch (...) {

@@ -60,13 +60,17 @@ void write_whole(const std::string& path, const std::string& text);
 
 class Outputs {
  public:
-  /// Checks the files of the given options. An existing file is replaced only with --force. The
-  /// files of the options `inputs`, databases, devices and folders are never replaced. \param
+  /// Checks the files of the given options. "-" is standard output: until destruction, everything
+  /// else that goes there goes to standard error. An existing file is replaced only with --force.
+  /// The files of the options `inputs`, databases, devices and folders are never replaced. \param
   /// folder an option that names a folder of files, or nullptr \throws UsageError with every fault;
   /// std::runtime_error if a folder is not writable.
   Outputs(const boost::program_options::variables_map& values,
           std::initializer_list<const char*> options, std::initializer_list<const char*> inputs,
           const char* folder = nullptr);
+  ~Outputs();
+  Outputs(const Outputs&) = delete;
+  Outputs& operator=(const Outputs&) = delete;
 
   /// Protects all files from which the meshes of an object were read; no option names them.
   /// \throws UsageError.
@@ -86,12 +90,14 @@ class Outputs {
     std::string option, path, text;
   };
   void check() const;
+  void take_standard_output();
   void protect_files(const stimuli::ObjectSpec& object);
   const boost::program_options::variables_map& values_;
   bool force_ = false;
   data::ProtectedFiles inputs_;
   std::vector<Output> outputs_;
   std::string folder_option_, folder_;
+  int standard_output_ = -1;  ///< where "-" goes, if an option has it
 };
 
 }  // namespace palpate::runner::commands

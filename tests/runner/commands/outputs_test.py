@@ -6,7 +6,9 @@ Usage: outputs_test.py PALPATE PROTOCOLS
 import json
 import os
 import pathlib
+import resource
 import shutil
+import signal
 import stat
 import struct
 import subprocess
@@ -228,6 +230,73 @@ class Outputs(unittest.TestCase):
         shell = f"exec {PALPATE} simulate {PROTOCOLS}/quick.json --db {self.dir}/n.db --participants 1 <&- >&- 2>&-"
         self.assertEqual(subprocess.run(["bash", "-c", shell]).returncode, 1)
         self.palpate("analyze", "--db", self.dir / "n.db")
+
+    def test_a_dash_is_standard_output_and_nothing_else_goes_there(self):
+        for command, options, _ in self.writers():
+            for option in options:
+                with self.subTest(command=command[0], option=option):
+                    if command[0] == "export":
+                        self.assertIn("-", self.palpate(*command, "--out", "-", status=2, cwd=self.dir).stderr)
+                    else:
+                        stream = self.palpate(*command, f"--{option}", "-", cwd=self.dir)
+                        whole = self.dir / "whole"
+                        self.palpate(*command, f"--{option}", whole, "--force", cwd=self.dir)
+                        if command[0] not in ("bench", "devices", "accuracy", "stability"):  # they measure
+                            self.assertEqual(stream.stdout, whole.read_text())
+                        if option == "json":
+                            json.loads(stream.stdout)
+                    self.assertFalse((self.dir / "-").exists())
+        self.palpate("analyze", "--db", self.db, "--json", "-", "--report", "-", status=2)
+
+    def test_no_folder_or_database_is_named_dash(self):
+        for command in (["export", "--db", self.db, "--format", "bids", "--out", "-"],
+                        ["merge", "--out", "-", self.db],
+                        ["simulate", PROTOCOLS / "quick.json", "--participants", "1", "--db", "-"],
+                        ["analyze", "--db", self.db, "--figures", "-"],
+                        ["cluster", "plan", "--db", self.db, "--trials", "10", "--participants", "2-3", "--dir", "-"]):
+            with self.subTest(command=command[0]):
+                self.palpate(*command, status=2, cwd=self.dir)
+                self.assertFalse((self.dir / "-").exists())
+
+    def limited(self, which, limit, *args):
+        """Under a limit, as a batch system sets it."""
+        def limit_it():
+            signal.signal(signal.SIGXFSZ, signal.SIG_DFL)
+            resource.setrlimit(which, (limit, limit))
+        return subprocess.run([PALPATE, *map(str, args)], capture_output=True, text=True, timeout=120, cwd=self.dir,
+                              preexec_fn=limit_it)
+
+    def test_a_limit_on_the_size_of_files_is_said(self):
+        kept = {path.name for path in self.dir.iterdir()}
+        reads = [["analyze", "--db", self.db, "--report", "a.html"], ["merge", "--out", "all.db", self.db],
+                 ["export", "--db", self.db, "--format", "csv", "--out", "a.csv"],
+                 ["export", "--db", self.db, "--format", "bids", "--out", "bids"],
+                 ["export", "--db", self.db, "--format", "psych-ds", "--out", "psychds"]]
+        writes = [["simulate", PROTOCOLS / "quick.json", "--participants", "1", "--db", "new.db"],
+                  ["forget", "--db", self.db, "--participant", "S001", "--yes"]]
+        for limit, commands in ((2048, reads + writes), (40_000, reads[:2] + writes)):
+            for command in commands:
+                with self.subTest(limit=limit, command=command):
+                    done = self.limited(resource.RLIMIT_FSIZE, limit, *command)
+                    self.assertEqual(done.returncode, 1, done.stderr)
+                    self.assertIn("ulimit -f", done.stderr)
+                    self.assertNotIn("session", done.stderr)
+        self.assertEqual({path.name for path in self.dir.iterdir()} - kept - {"s.db-wal", "s.db-shm"}, set())
+        self.palpate("forget", "--db", self.db, "--participant", "S001", "--yes")
+
+    def test_a_limit_on_memory_is_said(self):
+        many = self.write("many.csv", TRIALS + "".join(
+            f"P{i},1,1,{t},{('point', 'ray')[t % 2]},cone,cone,1,2.{t}\n" for i in range(4000) for t in range(1, 41)))
+        ends = set()
+        for megabytes in range(40, 400, 4):
+            done = self.limited(resource.RLIMIT_AS, megabytes << 20, "analyze", "--csv", many)
+            if done.returncode == 0:
+                break
+            if done.stderr.startswith("palpate: "):  # else the loader of libraries had not enough
+                ends.add((done.returncode, "ulimit -v" in done.stderr))
+        else:
+            return  # a sanitizer needs more than any limit
+        self.assertEqual(ends, {(1, True)})
 
     def test_own_links_are_followed(self):
         target = self.write("real.json", "old")
