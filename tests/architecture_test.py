@@ -93,7 +93,7 @@ PUBLIC = {
     "protocols": "answer_keys difference json_document parse protocol schedule sweep_space "
                  "tasks/task_plan tasks/levels tasks/texts",
     "protocols/procedures": "procedure procedure_spec psychometric",
-    "data/base": "checksum input_file json_text random text",
+    "data/base": "checksum input_file json_text markdown random text",
     "data": "column_table record stored_protocol sweep_record",
     "data/files": "atomic_file atomic_folder file_permissions text_sink output_check utc",
     "data/store": "export_log protocol_rows schema connection station_database store sweep_file "

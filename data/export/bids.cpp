@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "data/base/json_text.h"
+#include "data/base/markdown.h"
 #include "data/export/dataset_description.h"
 #include "data/export/datasets.h"
 #include "data/export/delimited_row.h"
@@ -551,8 +552,9 @@ std::string readme_text(const std::map<std::string, StudyLabel>& labels, bool si
             "it holds\nthose of all its trials, one row per servo period, and its JSON file "
             "gives the rows of each trial,\nthe object that was felt, its orientation and the "
             "renderer. ";
-  return dataset_name(labels, simulated) + "\n\n" + dataset_description(labels, simulated) +
-         "\n\n" + about_text(settings.about) +
+  return as_paragraph(dataset_name(labels, simulated)) + "\n\n" +
+         as_paragraph(dataset_description(labels, simulated)) + "\n\n" +
+         about_text(settings.about) +
          "sub-CODE/ses-S/beh/ holds the trials of session S of a participant, one row per trial, "
          "sorted by\nonset. Every column is described in the JSON file beside the table. The "
          "protocol that was run\nis in sourcedata/, byte for byte; protocol_sha256 is its "

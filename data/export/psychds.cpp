@@ -3,6 +3,7 @@
 #include <set>
 #include <string_view>
 
+#include "data/base/markdown.h"
 #include "data/export/dataset_description.h"
 #include "data/export/datasets.h"
 #include "data/export/delimited_row.h"
@@ -45,7 +46,8 @@ std::string dataset_readme(const std::string& name, const std::string& descripti
                          "samples, one row per trial.\n" +
                              settings.derived->how + "\n"
                        : "";
-  return "# " + name + "\n\n" + description + "\n\n" + about_text(settings.about) +
+  return "# " + as_markdown(name) + "\n\n" + as_paragraph(description) + "\n\n" +
+         about_text(settings.about) +
          "`data/subject-CODE/study-T_subject-CODE_data.csv` holds all trials of a participant, "
          "one row per trial.\n"
          "`..._session-S_description-haptic_data.csv`, if present, holds the servo-rate "

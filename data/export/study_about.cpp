@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "data/base/markdown.h"
+
 namespace palpate::data {
 namespace {
 
@@ -35,12 +37,12 @@ void put(Json& json, const char* key, const Json& list) {
 template <class Each, class Text>
 std::string paragraph(const char* title, const Each& all, const char* between, Text text_of) {
   std::string text;
-  for (const auto& one : all) text += (text.empty() ? "" : between) + std::string(text_of(one));
+  for (const auto& one : all) text += (text.empty() ? "" : between) + as_markdown(text_of(one));
   return text.empty() ? "" : std::string(title) + ": " + text + "\n\n";
 }
 
 std::string paragraph(const char* title, const std::string& text) {
-  return text.empty() ? "" : std::string(title) + ": " + text + "\n\n";
+  return text.empty() ? "" : std::string(title) + ": " + as_markdown(text) + "\n\n";
 }
 
 }  // namespace

@@ -21,6 +21,7 @@
 #include "analysis/statistics/analysis.h"
 #include "analysis/text.h"
 #include "data/base/json_text.h"
+#include "data/base/markdown.h"
 #include "data/base/text.h"
 #include "data/export/csv.h"
 #include "data/export/datasets.h"

@@ -9,6 +9,7 @@
 #include "analysis/statistics/paired.h"
 #include "analysis/statistics/sensitivity.h"
 #include "analysis/text.h"
+#include "data/base/markdown.h"
 #include "data/base/text.h"
 #include "data/files/utc.h"
 #include "runner/commands/shared/command.h"
@@ -404,13 +405,6 @@ class Questions {
   std::vector<std::string> stimuli_, renderers_;
 };
 
-std::string one_line(std::string_view words) {
-  std::string out(words);
-  std::ranges::replace_if(
-      out, [](char c) { return c == '\n' || c == '\r' || c == '\t'; }, ' ');
-  return printable(out);
-}
-
 std::string outcome_row(const std::string& id, const char* studies, const VerdictCounts& counts) {
   const auto share = [&](std::size_t n) {
     return std::to_string(n) + " of " + std::to_string(counts.studies());
@@ -458,32 +452,6 @@ void put_answer(const Question& question, std::string& out) {
 
 std::vector<Question> registration_questions(const Registration& registration) {
   return Questions(registration).all();
-}
-
-std::string as_markdown(std::string_view text) {
-  constexpr std::string_view kMarks = "\\`*_[]<>&|~$";
-  const std::string line = one_line(text);
-  std::string out;
-  for (std::size_t i = 0; i < line.size(); ++i) {
-    const char c = line[i];
-    const bool link = c == ':' && line.compare(i, 3, "://") == 0;
-    if (kMarks.find(c) != std::string_view::npos || link) out += '\\';
-    out += c;
-  }
-  return out;
-}
-
-std::string as_paragraph(std::string_view text) {
-  std::string out = as_markdown(text);
-  out.erase(0, std::min(out.find_first_not_of(' '), out.size()));
-  // "# " would begin a heading, "1. " and "- " a list.
-  const std::size_t digits = std::min(out.find_first_not_of("0123456789"), out.size());
-  const bool numbered =
-      digits > 0 && digits < out.size() && (out[digits] == '.' || out[digits] == ')');
-  if (numbered) out.insert(digits, "\\");
-  if (!out.empty() && std::string_view("#+-=").find(out[0]) != std::string_view::npos)
-    out.insert(0, "\\");
-  return out;
 }
 
 std::string registration_markdown(const Registration& made,

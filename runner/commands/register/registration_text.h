@@ -36,10 +36,4 @@ std::string registration_markdown(const Registration& registration,
 /// osf.json: the answers by question id.
 std::string registration_osf(const std::vector<Question>& questions);
 
-/// Escapes text from files for Markdown within a line: it is shown literally, without markup, HTML
-/// or links.
-std::string as_markdown(std::string_view text);
-/// The same at the beginning of a paragraph, where more characters are markup.
-std::string as_paragraph(std::string_view text);
-
 }  // namespace palpate::runner::commands
