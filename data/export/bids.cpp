@@ -499,12 +499,19 @@ std::span<const Column> beh_columns(const ExportClock& clock) {
 const Column kOnset{
     "onset",
     "First tick with forces on (with several intervals: in the first one), from that "
-    "of the first row",
+    "of the first row; negative where the computer's clock was set back between sittings",
     "s"};
 const Column kDuration{"duration", "From onset to the response; in a time-out, the time limit",
                        "s"};
 
 /// Levels of the columns whose values come from the runs: device, version, protocol, observer.
+/// Negative where the clock was set back. Damaged times may differ by more than 63 bits.
+double seconds_between(std::int64_t from_ns, std::int64_t to_ns) {
+  const auto from = static_cast<std::uint64_t>(from_ns), to = static_cast<std::uint64_t>(to_ns);
+  return to_ns >= from_ns ? static_cast<double>(to - from) / 1e9
+                          : -static_cast<double>(from - to) / 1e9;
+}
+
 Json recorded_levels(const std::string& column, const std::vector<RunInfo>& runs,
                      const StudyLabel& study) {
   Json levels;
@@ -593,6 +600,7 @@ class BidsWriter : public DatasetWriter {
     std::int64_t onset_ns = 0;
     std::string rest;  // from the second column on, with the line end
   };
+    int trial = 0;
   /// The session, or with samples the BIDS run, whose rows are being collected.
   struct Table {
     std::string stem;         // of its files, with folders
@@ -608,6 +616,7 @@ class BidsWriter : public DatasetWriter {
   void write_sidecar();
   std::string recording_name() const;
   void write_recording();
+  void note_clock(Json& json) const;
   void end_session();
   void describe_derivatives(bool simulated);
   void describe_participants();
@@ -686,7 +695,8 @@ void BidsWriter::add(const StoredTrial& trial) {
 void BidsWriter::add_row(const StoredTrial& trial) {
   row_ << duration_of(trial.record);
   put_trial_without_participant(row_, trial, clock_);
-  table_.rows.push_back({to_unix_ns(trial.run.clock, first_onset_ns(trial.record)), row_.end()});
+  table_.rows.push_back(
+      {to_unix_ns(trial.run.clock, first_onset_ns(trial.record)), trial.record.trial, row_.end()});
   const ClockStamp& clock = trial.run.clock;
   if (table_.runs.empty() || table_.runs.back().clock.utc_ns != clock.utc_ns ||
       table_.runs.back().clock.monotonic_ns != clock.monotonic_ns) {
@@ -706,6 +716,22 @@ void BidsWriter::end_table() {
 
 std::string BidsWriter::recording_name() const {
   if (!settings_.motion) return table_.stem + "_recording-haptic_physio.tsv.gz";
+void BidsWriter::note_clock(Json& json) const {
+  const auto& rows = table_.rows;
+  Json notes = Json::array();
+  for (std::size_t i = 1; i < rows.size(); ++i) {
+    if (rows[i].onset_ns >= rows[i - 1].onset_ns) continue;
+    notes.push_back({{"BeforeTrial", rows[i].trial},
+                     {"Seconds", seconds_between(rows[i - 1].onset_ns, rows[i].onset_ns)}});
+  }
+  if (notes.empty()) return;
+  json["ClockSetBack"] = std::move(notes);
+  json["ClockSetBackNote"] =
+      "The computer's clock was set back before these trials: by its time they began before the "
+      "trial above them. The rows are in the order in which they were shown; onsets, dates and "
+      "elapsed times do not compare across such a place";
+}
+
   return table_.motion + "_tracksys-" + kTrackingSystem + table_.run + "_motion.tsv";
 }
 
@@ -728,17 +754,12 @@ void BidsWriter::write_recording() {
 }
 
 void BidsWriter::write_table() {
-  auto& rows = table_.rows;
-  std::stable_sort(rows.begin(), rows.end(),
-                   [](const Row& a, const Row& b) { return a.onset_ns < b.onset_ns; });
+  const auto& rows = table_.rows;
   FileSink file(folder_.prepare(table_.stem + "_beh.tsv"));
   row_ << kOnset.name << kDuration.name << beh_columns(clock_);
   file.write(row_.end());
   for (const Row& row : rows) {
-    // Unsigned: damaged times may differ by more than 63 bits.
-    const auto since = static_cast<std::uint64_t>(row.onset_ns) -
-                       static_cast<std::uint64_t>(rows.front().onset_ns);
-    row_ << static_cast<double>(since) / 1e9;
+    row_ << seconds_between(rows.front().onset_ns, row.onset_ns);
     const std::string_view onset = row_.end();
     file.write(onset.substr(0, onset.size() - 1));
     file.write("\t");
@@ -755,6 +776,7 @@ void BidsWriter::write_sidecar() {
   if (table_.person.simulated) json["SimulatedNote"] = kSimulatedSentence;
   for (const RunInfo& run : table_.runs) {
     json["Sittings"].push_back(describe_run(run, table_.person, clock_));
+  note_clock(json);
   }
   for (const Column& column : {kOnset, kDuration}) {
     json[column.name] = describe_column(column, study.facts, settings_.fault_bits);
