@@ -36,6 +36,22 @@ StoredBlock read_block(const nlohmann::json& json) {
   return block;
 }
 
+void read_columns(const nlohmann::json& page, std::vector<StoredColumn>& to) {
+  for (const auto& item : list_of(page, "items")) {
+    StoredColumn one;
+    read_text(item, "column", one.column);
+    if (one.column.empty()) continue;
+    std::string kind;
+    read_text(item, "kind", kind);
+    one.number = kind == "number";
+    read_text(page, "name", one.page);
+    read_text(item, "name", one.item);
+    read_text(item, "question", one.question);
+    read_texts(item, kind == "scale" ? "labels" : "choices", one.choices);
+    to.push_back(std::move(one));
+  }
+}
+
 }  // namespace
 
 StoredProtocol read_stored_protocol(const std::string& text) {
@@ -53,6 +69,7 @@ StoredProtocol read_stored_protocol(const std::string& text) {
     read_text(stimulus, "name", name);
     if (!name.empty()) out.stimuli.push_back(name);
   }
+  for (const auto& page : list_of(json, "pages")) read_columns(page, out.columns);
   std::vector<std::string> renderers;
   read_texts(json, "renderers", renderers);
   for (const auto& one : list_of(json, "blocks")) {

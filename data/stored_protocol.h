@@ -16,12 +16,20 @@ struct StoredBlock {
   std::vector<std::string> renderers, stimuli;  ///< names, in the block's order
 };
 
+/// A question of a page whose answer describes the participant: age, sex, handedness.
+struct StoredColumn {
+  std::string column, page, item, question;
+  bool number = false;
+  std::vector<std::string> choices;  ///< empty: any text or number
+};
+
 struct StoredProtocol {
-  std::string name, title;           ///< "": none
-  std::string seed;                  ///< of the trial orders, as written; "": none
-  std::vector<std::string> stimuli;  ///< names, in the protocol's order
-  int repetitions = 0;               ///< of a protocol without blocks
-  std::vector<StoredBlock> blocks;   ///< empty: version 1
+  std::string name, title;            ///< "": none
+  std::string seed;                   ///< of the trial orders, as written; "": none
+  std::vector<std::string> stimuli;   ///< names, in the protocol's order
+  int repetitions = 0;                ///< of a protocol without blocks
+  std::vector<StoredBlock> blocks;    ///< empty: version 1
+  std::vector<StoredColumn> columns;  ///< of participants
 };
 
 StoredProtocol read_stored_protocol(const std::string& text);

@@ -96,7 +96,7 @@ PUBLIC = {
     "data/base": "checksum input_file json_text markdown random text",
     "data": "column_table record stored_protocol sweep_record",
     "data/files": "atomic_file atomic_folder file_permissions text_sink output_check utc",
-    "data/store": "export_log protocol_rows schema connection station_database store sweep_file "
+    "data/store": "export_log participant_columns protocol_rows schema connection station_database store sweep_file "
                   "forget task_text",
     "data/export": "csv datasets sample_slots settings study_about delimited_row",
     "data/merge": "merge",

@@ -421,6 +421,11 @@ TaskTable read_task_trials_store(const std::string& path, const std::string& pro
         table.protocols, [&](const auto& known) { return known.second == one.sha256; });
     if (used && table.title.empty()) table.title = data::read_stored_protocol(one.text).title;
   }
+  table.people = data::participant_columns(store);
+  std::set<std::string> shown;
+  for (const TaskTrial& trial : table.trials) shown.insert(trial.participant);
+  for (data::ParticipantColumn& column : table.people)
+    std::erase_if(column.answers, [&](const auto& one) { return !shown.contains(one.first); });
   table.provenance.protocol_name = listed(names);
   table.provenance.observer_sha256 = listed(observers);
   if (table.trials.empty())
@@ -428,9 +433,9 @@ TaskTable read_task_trials_store(const std::string& path, const std::string& pro
         {{path, "trials",
           "expected at least one completed trial that is not practice" +
               (protocol.empty() ? "" : " of the protocol " + printable(protocol))}});
+  warn_of_alike_names(table);
   torque.warn(table.warnings);
   return table;
 }
 
 }  // namespace palpate::analysis
-  warn_of_alike_names(table);

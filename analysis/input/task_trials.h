@@ -9,6 +9,7 @@
 
 #include "analysis/input/trials.h"
 #include "data/record.h"
+#include "data/store/participant_columns.h"
 #include "protocols/tasks/task_plan.h"
 
 namespace palpate::analysis {
@@ -36,6 +37,8 @@ struct TaskTable {
   Provenance provenance;          ///< of all trials
   std::string title;              ///< of the study, from its protocol; "": unknown
   std::vector<std::string> warnings;
+  /// Answers that describe the participants of these trials; from databases only.
+  std::vector<data::ParticipantColumn> people;
   /// Their protocols: name and SHA-256, each once.
   std::vector<std::pair<std::string, std::string>> protocols;
   /// The procedures, by SHA-256 of the protocol and name of the block; from databases only.

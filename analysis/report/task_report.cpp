@@ -1,6 +1,9 @@
 #include <algorithm>
+#include <charconv>
 #include <cmath>
+#include <map>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <variant>
 
 #include "analysis/figures/figures.h"
@@ -83,7 +86,6 @@ Table comparison_table(const TaskAnalysis& analysis, const std::string& label) {
   }
   table.notes = {
       "Paired t-tests: of ratios (/) on natural logarithms if all values are positive and have a "
-      "a "
       "true zero, otherwise of differences (−)."};
   return table;
 }
@@ -95,6 +97,58 @@ std::string study_of(const TaskTable& table) {
     if (!name.empty()) return name;
   }
   return "Tasks of " + table.source;
+}
+
+}  // namespace
+
+namespace {
+
+/// "left 3, right 9", or "20 to 31, mean 24.5, SD 3.2"
+std::string described_answers(const data::ParticipantColumn& column) {
+  std::map<std::string, std::size_t> counts;
+  for (const std::string& choice : column.from.choices) counts[choice] = 0;
+  std::vector<double> numbers;
+  for (const auto& [code, answer] : column.answers) {
+    ++counts[answer];
+    double value = 0;
+    const auto [end, error] = std::from_chars(answer.data(), answer.data() + answer.size(), value);
+    if (error == std::errc() && end == answer.data() + answer.size()) numbers.push_back(value);
+  }
+  if (column.answers.empty()) return kNoNumber;
+  if (column.from.number && numbers.size() == column.answers.size()) {
+    const auto [least, most] = std::ranges::minmax(numbers);
+    double mean = 0, squares = 0;
+    for (const double one : numbers) mean += one / static_cast<double>(numbers.size());
+    for (const double one : numbers) squares += (one - mean) * (one - mean);
+    std::string text =
+        short_number(least) + " to " + short_number(most) + ", mean " + short_number(mean);
+    if (numbers.size() > 1)
+      text += ", SD " + short_number(std::sqrt(squares / static_cast<double>(numbers.size() - 1)));
+    return text;
+  }
+  // A text could tell who wrote it.
+  if (column.from.choices.empty())
+    return counted(counts.size(), "different answer", "different answers");
+  std::string text;
+  for (const std::string& choice : column.from.choices)
+    text += (text.empty() ? "" : ", ") + choice + " " + std::to_string(counts[choice]);
+  return text;
+}
+
+Table people_table(const TaskTable& source, const std::string& label) {
+  Table table;
+  table.caption = label.empty() ? "Who took part" : "Who took part, " + label;
+  table.header = {"column", "question", "answers", "answered"};
+  table.n_names = 3;
+  std::set<std::string> codes;
+  for (const TaskTrial& trial : source.trials) codes.insert(trial.participant);
+  for (const data::ParticipantColumn& one : source.people) {
+    table.rows.push_back(
+        {one.from.column, printable(one.from.question, 200), printable(described_answers(one), 400),
+         std::to_string(one.answers.size()) + " of " + std::to_string(codes.size())});
+  }
+  table.notes = {"Answers to the questions of pages that name a column of participants."};
+  return table;
 }
 
 }  // namespace
@@ -114,6 +168,11 @@ std::string task_report_html(const TaskAnalysis& analysis, const std::string& pr
     page.below_title() += "<div class=\"warnings\" aria-label=\"Warnings\">\n";
     put_list(page.below_title(), source.warnings);
     page.below_title() += "</div>\n";
+  }
+  if (!source.people.empty()) {
+    page.begin_section("people", "Participants", "Participants");
+    put_table(page.body(), people_table(source, label));
+    page.end_section();
   }
   const std::vector<Figure> figures = task_figures(analysis);
   const auto put_figures = [&](bool of_groups) {

@@ -19,6 +19,7 @@
 #include "data/export/sample_slots.h"
 #include "data/files/text_sink.h"
 #include "data/files/utc.h"
+#include "data/store/participant_columns.h"
 #include "data/store/store.h"
 
 namespace palpate::data {
@@ -504,7 +505,6 @@ const Column kOnset{
 const Column kDuration{"duration", "From onset to the response; in a time-out, the time limit",
                        "s"};
 
-/// Levels of the columns whose values come from the runs: device, version, protocol, observer.
 /// Negative where the clock was set back. Damaged times may differ by more than 63 bits.
 double seconds_between(std::int64_t from_ns, std::int64_t to_ns) {
   const auto from = static_cast<std::uint64_t>(from_ns), to = static_cast<std::uint64_t>(to_ns);
@@ -512,6 +512,7 @@ double seconds_between(std::int64_t from_ns, std::int64_t to_ns) {
                           : -static_cast<double>(from - to) / 1e9;
 }
 
+/// Levels of the columns whose values come from the runs: device, version, protocol, observer.
 Json recorded_levels(const std::string& column, const std::vector<RunInfo>& runs,
                      const StudyLabel& study) {
   Json levels;
@@ -563,7 +564,8 @@ std::string readme_text(const std::map<std::string, StudyLabel>& labels, bool si
          as_paragraph(dataset_description(labels, simulated)) + "\n\n" +
          about_text(settings.about) +
          "sub-CODE/ses-S/beh/ holds the trials of session S of a participant, one row per trial, "
-         "sorted by\nonset. Every column is described in the JSON file beside the table. The "
+         "in the\norder in which they were shown. Every column is described in the JSON file "
+         "beside the table. The "
          "protocol that was run\nis in sourcedata/, byte for byte; protocol_sha256 is its "
          "checksum.\n\n" +
          samples +
@@ -598,9 +600,9 @@ class BidsWriter : public DatasetWriter {
  private:
   struct Row {
     std::int64_t onset_ns = 0;
+    int trial = 0;
     std::string rest;  // from the second column on, with the line end
   };
-    int trial = 0;
   /// The session, or with samples the BIDS run, whose rows are being collected.
   struct Table {
     std::string stem;         // of its files, with folders
@@ -614,9 +616,9 @@ class BidsWriter : public DatasetWriter {
   void add_row(const StoredTrial& trial);
   void write_table();
   void write_sidecar();
+  void note_clock(Json& json) const;
   std::string recording_name() const;
   void write_recording();
-  void note_clock(Json& json) const;
   void end_session();
   void describe_derivatives(bool simulated);
   void describe_participants();
@@ -714,8 +716,6 @@ void BidsWriter::end_table() {
   table_ = {};
 }
 
-std::string BidsWriter::recording_name() const {
-  if (!settings_.motion) return table_.stem + "_recording-haptic_physio.tsv.gz";
 void BidsWriter::note_clock(Json& json) const {
   const auto& rows = table_.rows;
   Json notes = Json::array();
@@ -732,6 +732,8 @@ void BidsWriter::note_clock(Json& json) const {
       "elapsed times do not compare across such a place";
 }
 
+std::string BidsWriter::recording_name() const {
+  if (!settings_.motion) return table_.stem + "_recording-haptic_physio.tsv.gz";
   return table_.motion + "_tracksys-" + kTrackingSystem + table_.run + "_motion.tsv";
 }
 
@@ -774,9 +776,9 @@ void BidsWriter::write_sidecar() {
             {"TaskDescription", study.facts.title},
             {"Simulated", table_.person.simulated}};
   if (table_.person.simulated) json["SimulatedNote"] = kSimulatedSentence;
+  note_clock(json);
   for (const RunInfo& run : table_.runs) {
     json["Sittings"].push_back(describe_run(run, table_.person, clock_));
-  note_clock(json);
   }
   for (const Column& column : {kOnset, kDuration}) {
     json[column.name] = describe_column(column, study.facts, settings_.fault_bits);
@@ -801,11 +803,23 @@ std::string BidsWriter::begin_pages() {
 }
 
 void BidsWriter::describe_participants() {
-  std::string table = "participant_id\tsimulated\n";
-  for (const auto& [code, simulated] : participants_)
-    table += "sub-" + code + "\t" + simulated + "\n";
+  // Answers are personal data.
+  const std::vector<ParticipantColumn> columns =
+      settings_.pages ? participant_columns(store_) : std::vector<ParticipantColumn>();
+  row_ << "participant_id"
+       << "simulated";
+  for (const ParticipantColumn& one : columns) row_ << one.from.column;
+  std::string table(row_.end());
+  for (const auto& [code, simulated] : participants_) {
+    row_ << "sub-" + code << simulated;
+    for (const ParticipantColumn& one : columns) {
+      const auto answer = one.answers.find(code);
+      row_ << (answer == one.answers.end() ? std::string() : answer->second);
+    }
+    table += row_.end();
+  }
   write("participants.tsv", table);
-  const Json json{
+  Json json{
       {"participant_id", {{"Description", "Pseudonym of the participant"}}},
       {"simulated",
        {{"Description", "Person or simulated participant"},
@@ -813,6 +827,12 @@ void BidsWriter::describe_participants() {
          {{"0", "a person"},
           {"1", "a SIMULATED participant, not a person"},
           {"mixed", "simulated with one protocol, a person with another: see the beh.tsv"}}}}}};
+  for (const ParticipantColumn& one : columns) {
+    Json& about = json[one.from.column] = {{"Description", one.from.question}};
+    if (one.from.column == "age") about["Units"] = "year";
+    for (const std::string& choice : one.from.choices)
+      about["Levels"][guarded_text(choice)] = "an answer to choose";
+  }
   write("participants.json", json_text(json));
 }
 

@@ -142,6 +142,24 @@ void read_choices(ObjectReader& reader, PageItem& item) {
   item.shown = item.choices;
 }
 
+/// As BIDS names columns of participants.tsv; two are the program's own.
+void read_column(ObjectReader& reader, PageItem& item) {
+  constexpr std::size_t kLongest = 32;
+  reader.text("column", item.column);
+  const json* const value = reader.member("column", Presence::optional);
+  if (value == nullptr || !value->is_string()) return;
+  const std::string& name = item.column;
+  const bool fits = !name.empty() && name.size() <= kLongest && name[0] >= 'a' && name[0] <= 'z' &&
+                    std::ranges::all_of(name, [](char c) {
+                      return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '_';
+                    });
+  if (!fits || name == "participant_id" || name == "simulated")
+    reader.faults().add(reader.pointer("column"),
+                        "expected a name of 1 to 32 of a to z, 0 to 9 and _, a letter first, such "
+                        "as 'age', 'sex' or 'handedness'; not participant_id or simulated" +
+                            found_text(*value));
+}
+
 PageItem read_item(ObjectReader& reader) {
   PageItem item;
   reader.name("name", item.name);
@@ -161,6 +179,7 @@ PageItem read_item(ObjectReader& reader) {
   }
   read_choices(reader, item);
   reader.boolean("required", item.required);
+  read_column(reader, item);
   reader.refuse_unknown_keys();
   return item;
 }
@@ -309,6 +328,20 @@ PageSpec read_page(ObjectReader& reader, const Protocol& protocol, const MeshFil
   return page;
 }
 
+/// Each column is filled by one question.
+void refuse_repeated_columns(ObjectReader& reader, const Protocol& protocol) {
+  std::set<std::string> columns;
+  for (std::size_t p = 0; p < protocol.pages.size(); ++p) {
+    for (std::size_t i = 0; i < protocol.pages[p].items.size(); ++i) {
+      const std::string& column = protocol.pages[p].items[i].column;
+      if (column.empty() || columns.insert(column).second) continue;
+      const std::string page = child_pointer(reader.pointer("pages"), p);
+      reader.faults().add(child_pointer(page + "/items", i) + "/column",
+                          "expected a column of its own, found '" + column + "' again");
+    }
+  }
+}
+
 }  // namespace
 
 void read_pages(ObjectReader& reader, Protocol& protocol, const MeshFiles& files) {
@@ -324,6 +357,7 @@ void read_pages(ObjectReader& reader, Protocol& protocol, const MeshFiles& files
                           "expected a unique name, found '" + name + "' again");
     }
   }
+  refuse_repeated_columns(reader, protocol);
 }
 
 }  // namespace palpate::protocols

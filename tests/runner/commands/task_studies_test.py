@@ -95,6 +95,44 @@ class TaskStudies(CommandCase):
         self.assertEqual(self.exported(parts)[0], text)
         self.assertNotEqual(self.exported(self.simulated(protocol, f"{name}-7", seed=7))[0], text)
 
+    def protocol_with_columns(self, hand="handedness", age="age"):
+        protocol = json.loads((PROTOCOLS / "roughness-magnitude.json").read_text())
+        for item, column in zip(protocol["pages"][1]["items"], (hand, age), strict=True):
+            item["column"] = column
+        del protocol["$schema"]
+        return self.file("columns.json", protocol)
+
+    def test_questions_with_a_column_describe_the_participants(self):
+        db = self.simulated(self.protocol_with_columns(), "columns", participants=4)
+        self.palpate("export", "--db", db, "--format", "bids", "--out", self.dir / "without")
+        self.assertEqual((self.dir / "without/participants.tsv").read_text().splitlines()[0], "participant_id\tsimulated")
+        self.palpate("export", "--db", db, "--format", "bids", "--out", self.dir / "with", "--pages")
+        with open(self.dir / "with/sourcedata/pages.csv", newline="") as file:
+            answers = {(row["participant_id"], row["item"]): row["answer"] for row in csv.DictReader(file)}
+        with open(self.dir / "with/participants.tsv", newline="") as file:
+            rows = list(csv.DictReader(file, delimiter="\t"))
+        self.assertEqual(len(rows), 4)
+        for row in rows:
+            code = row["participant_id"].removeprefix("sub-")
+            self.assertEqual(row["handedness"], answers[code, "hand"])
+            self.assertEqual(row["age"], answers[code, "age"] or "n/a")
+        about = json.loads((self.dir / "with/participants.json").read_text())
+        self.assertEqual(about["handedness"]["Description"], "Which hand do you write with?")
+        self.assertEqual(list(about["handedness"]["Levels"]), ["left", "right", "both"])
+        self.assertEqual(about["age"], {"Description": "How old are you?", "Units": "year"})
+        self.palpate("analyze", "--db", db, "--report", self.dir / "report.html")
+        page = (self.dir / "report.html").read_text()
+        counts = [sum(answers[f"S00{n}", "hand"] == hand for n in (1, 2, 3, 4)) for hand in ("left", "right", "both")]
+        self.assertIn("left {}, right {}, both {}".format(*counts), page)
+        self.assertIn("Which hand do you write with?", page)
+
+    def test_a_column_of_participants_has_a_name_of_its_own(self):
+        self.palpate("validate", self.protocol_with_columns())
+        for hand, age in (("age", "age"), ("simulated", "age"), ("participant_id", "age"), ("Age", "age"), ("", "age"), ("a-b", "age")):
+            with self.subTest(hand=hand):
+                said = self.palpate("validate", self.protocol_with_columns(hand, age), status=2)
+                self.assertIn("/column", said.stdout + said.stderr)
+
     def test_answers_to_pages_are_exported_on_request(self):
         db = self.simulated(PROTOCOLS / "roughness-magnitude.json", "pages", participants=3)
         expected = [(f"S00{n}", page, item) for n in (1, 2, 3)
