@@ -31,7 +31,6 @@ STL = File("corner.stl", "solid corner\n" + "".join(
     "facet normal 0 0 0\nouter loop\n" + "".join("vertex {} {} {}\n".format(*corner) for corner in facet) + "endloop\nendfacet\n"
     for facet in TETRAHEDRON) + "endsolid corner\n")
 OPEN_STL = File("open.stl", re.sub(r"facet normal.*?endfacet\n", "", STL.text, count=1, flags=re.S))
-SAMPLED = Shell("samples", """sed 's/"seed": 1/"samples": true, "seed": 1/' protocols/quick.json > sampled.json""")
 
 
 def all_lines(known):
@@ -134,8 +133,8 @@ def data_lines():
            Call(["forget", "--db", "study.db", "--participant", "-", "--yes"], typed="S001\n"),
            *steps("forget --db study.db --participant S002 --yes", "export --db study.db --format csv --out rest.csv"),
            refused("forget --db study.db --participant S009 --yes")]
-    yield [SAMPLED, ABOUT,
-           *steps("simulate sampled.json --db moved.db --participants 2 --jobs 1",
+    yield [ABOUT,
+           *steps("simulate protocols/quick.json --db moved.db --participants 2 --jobs 1",
                   "analyze --db moved.db --movement --movement-csv movement.csv --json movement.json --report movement.html --figures figures"
                   " --meshes . --jobs 1 --cutoff-hz 10",
                   "analyze --db moved.db --movement --movement-csv movement.csv --force",

@@ -84,15 +84,15 @@ def main():
     good = True
     with tempfile.TemporaryDirectory() as scratch:
         folder = pathlib.Path(scratch)
-        plain = simulate(folder, "plain", 2, practice={"repetitions": 1}, sessions={"count": 2, "warm_up_trials": 2})
-        sampled = simulate(folder, "sampled", 2, name="with-samples", repetitions=1, samples=True)
+        plain = simulate(folder, "plain", 2, samples=False, practice={"repetitions": 1}, sessions={"count": 2, "warm_up_trials": 2})
+        sampled = simulate(folder, "sampled", 2, name="with-samples", repetitions=1)
         tasks = simulate(folder, "tasks", 1, start="stiffness-2afc", samples=True)
         for dataset in (plain, sampled, tasks):
             errors, warnings = issues(command, dataset)
             good &= expect(errors == [], f"{dataset.name}: no errors {errors}")
             good &= expect(set(warnings) <= {"NO_AUTHORS"}, f"{dataset.name}: no warning but that authors are to be added {warnings}")
         about = PROTOCOLS.parent / "tests" / "protocols" / "studies" / "good" / "everything.json"
-        errors, warnings = issues(command, simulate(folder, "authors", 2, about=about))
+        errors, warnings = issues(command, simulate(folder, "authors", 2, about=about, samples=False))
         good &= expect(errors == [] and warnings == [], f"with --about: no errors {errors}, no warnings {warnings}")
         for name, start, changes in [("motion", "quick", {"repetitions": 1}), ("motion-tasks", "stiffness-2afc", {}),
                                      ("motion-body", "floating", {"repetitions": 1})]:

@@ -24,10 +24,10 @@ def run_palpate(*args, status=0):
 
 
 def simulate(folder, name, participants, /, **changes):
-    """A database of simulated participants; `changes` to protocols/quick.json."""
+    """A database of simulated participants; `changes` to protocols/quick.json, which here keeps no samples."""
     protocol = json.loads((PROTOCOLS / "quick.json").read_text())
     protocol.pop("$schema")
-    protocol.update(changes)
+    protocol.update({"samples": False} | changes)
     path = folder / f"{name}.json"
     path.write_text(json.dumps(protocol))
     run_palpate("simulate", path, "--db", folder / f"{name}.db", "--participants", participants)
