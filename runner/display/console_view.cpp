@@ -583,6 +583,12 @@ ConsoleView::ConsoleView(const WindowSettings& settings, bool shared)
   if (settings.mouse != nullptr) control_.emplace(*settings.mouse, settings.workspace);
 }
 
+void ConsoleView::share(bool shared) {
+  shared = shared && !control_;
+  if (shared != shared_) hidden_ = shared;
+  shared_ = shared;
+}
+
 void ConsoleView::update(ConsoleState state, double now) {
   state_ = std::move(state);
   updated_at_ = now;

@@ -146,6 +146,9 @@ class ConsoleView {
 
   /// \param now  s, time of arrival
   void update(ConsoleState state, double now);
+  /// One monitor shows both windows, or no longer does: hides the shape and the scene, or shows
+  /// them.
+  void share(bool shared);
   /// Draws a frame. \return the commands given in it, without times. \param now  s
   std::vector<ConsoleCommand> draw(double now, const Modifiers& modifiers);
   /// Whether a pointer position (px) lies in the emergency button, which spans the window's width.

@@ -117,6 +117,10 @@ class ParticipantScreen {
   virtual std::vector<KeyPress> keys() = 0;
   /// False once the user has closed it or its display was lost.
   virtual bool open() const = 0;
+  /// False until the window manager has had time to show it.
+  virtual bool settled() const { return true; }
+  /// The reason why the participant may not see it; empty: it is in its place.
+  virtual std::string misplaced() const { return {}; }
   /// Problem of an additional input device, in words; empty: none.
   virtual std::string trouble() const { return {}; }
 };

@@ -784,6 +784,7 @@ void ExploreView::draw_faults() {
 namespace {
 
 constexpr double kExploreFrame = 1.0 / 60;                 // s
+constexpr double kEveryMonitors = 0.5;                     // s
 constexpr int kStepsOfPage = 100;                          // ticks
 constexpr int kExploreWidth = 1480, kExploreHeight = 900;  // px, at scale 1
 
@@ -816,6 +817,10 @@ class ExploreWindow {
       while (glfwWindowShouldClose(window_) == GLFW_FALSE && !gone_ && !ended()) {
         if (connection_lost()) throw DisplayLost();
         const double started = steady_seconds();
+        if (started >= look_at_monitors_) {
+          bring_into_sight(window_);
+          look_at_monitors_ = started + kEveryMonitors;
+        }
         draw(started - before);
         before = started;
         // After a slow frame (software rendering) wait as long as it took, to leave half of the
@@ -949,6 +954,7 @@ class ExploreWindow {
   std::unique_ptr<ExploreView> view_;
   float pointer_y_ = 1e6F;
   bool gone_ = false, keep_ = false;
+  double look_at_monitors_ = 0;  ///< s
 };
 
 }  // namespace

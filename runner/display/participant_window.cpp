@@ -681,6 +681,19 @@ void ParticipantWindow::abandon() noexcept {
   open_.store(false);
 }
 
+std::string ParticipantWindow::misplaced() const {
+  const std::lock_guard lock(place_mutex_);
+  return misplaced_;
+}
+
+void ParticipantWindow::put_place(bool settled, const std::string& misplaced) {
+  {
+    const std::lock_guard lock(place_mutex_);
+    misplaced_ = misplaced;
+  }
+  settled_.store(settled);
+}
+
 bool ParticipantWindow::is_answer_key(int key, int scancode) const {
   const std::string name = match_key(key_names(key, scancode), page_.keys);
   return std::any_of(page_.keys.begin(), page_.keys.end(),

@@ -2,6 +2,8 @@
 
 #include <atomic>
 #include <cstdint>
+#include <mutex>
+#include <string>
 #include <vector>
 
 #include "runner/display/display.h"
@@ -54,6 +56,10 @@ class ParticipantWindow final : public ParticipantScreen {
   void show(const Page& page) override { pages_.put(page); }
   std::vector<KeyPress> keys() override { return keys_.take(); }
   bool open() const override { return open_.load(); }
+  bool settled() const override { return settled_.load(); }
+  std::string misplaced() const override;
+  /// Sets the results of settled() and misplaced(). Called by the display's thread.
+  void put_place(bool settled, const std::string& misplaced);
 
   GLFWwindow* handle() const { return window_; }
   /// A key was pressed, here or in the console. \return false: the key has no name
@@ -96,7 +102,9 @@ class ParticipantWindow final : public ParticipantScreen {
   EventQueue<KeyPress> keys_;
   bool ignore_character_ = false;  ///< skip the next one: its key was handled already
   double wheel_ = 0;               ///< fraction of a notch, carried over
-  std::atomic<bool> open_{true};
+  std::atomic<bool> open_{true}, settled_{false};
+  mutable std::mutex place_mutex_;
+  std::string misplaced_;
 };
 
 }  // namespace palpate::runner::display

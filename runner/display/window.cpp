@@ -10,18 +10,21 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <cstdio>
 #include <memory>
 #include <mutex>
 #include <optional>
 #include <string>
 #include <utility>
 
+#include "data/base/text.h"
 #include "runner/display/console_view.h"
 #include "runner/display/console_words.h"
 #include "runner/display/fonts.h"
 #include "runner/display/joystick.h"
 #include "runner/display/key_names.h"
 #include "runner/display/mailbox.h"
+#include "runner/display/monitors.h"
 #include "runner/display/participant_window.h"
 #include "runner/display/window_layout.h"
 #include "runner/display/x11_errors.h"
@@ -47,6 +50,8 @@ class ConsoleWindow final : public ExperimenterConsole {
   std::string places() const override;
   /// Sets the result of places(). Called by the display's thread.
   void put_places(std::string note);
+  /// One monitor shows both windows, or no longer does.
+  void share(bool shared) { view_->share(shared); }
   /// Height of the emergency button with its margin, px.
   float emergency_height() const { return view_->emergency_height(); }
 
@@ -257,7 +262,8 @@ class Windows final : public DisplayLoop {
         layout_(lay_out_windows(settings_)),
         participant_(settings_, layout_.participant, layout_.participant_scale),
         console_(settings_, layout_, participant_),
-        placing_(participant_.handle(), console_.handle(), layout_),
+        placing_(participant_.handle(), console_.handle(), settings_, layout_),
+        lit_(layout_.participant.full_screen),
         joystick_(settings_.joystick.empty() ? nullptr : make_joystick()),
         joystick_keys_(settings_.joystick) {
     GLFWwindow* const window = participant_.handle();
@@ -305,6 +311,7 @@ class Windows final : public DisplayLoop {
       }
       if (window_gone_) participant_.close();
       // Not in destructors: these calls throw if the display is lost.
+      lit_.end();
       console_.destroy();
       participant_.destroy();
       library_.close();
@@ -330,6 +337,7 @@ class Windows final : public DisplayLoop {
     const double next = std::max(started + kFrame, 2 * drawn - started);
     glfwPollEvents();
     placing_.step(drawn, console_.emergency_height());
+    report_place();
     const std::optional<WindowPlaces> moved = placing_.moved_to();
     console_.put_places(moved ? to_note(*moved) : "");
     for (double now = seconds(); now < next && !ended_.load(); now = seconds()) {
@@ -341,6 +349,14 @@ class Windows final : public DisplayLoop {
       glfwSetWindowShouldClose(console_.handle(), GLFW_FALSE);
       console_.send_command(ConsoleCommand::Kind::quit);
     }
+  }
+
+  void report_place() {
+    console_.share(placing_.shared());
+    participant_.put_place(placing_.settled(), placing_.misplaced());
+    if (placing_.misplaced() == reported_) return;
+    reported_ = placing_.misplaced();
+    if (!reported_.empty()) std::fprintf(stderr, "%s\n", printable_lines(reported_).c_str());
   }
 
   void poll_joystick() {
@@ -374,6 +390,8 @@ class Windows final : public DisplayLoop {
   ParticipantWindow participant_;
   ConsoleWindow console_;
   WindowPlacing placing_;
+  std::string reported_;  ///< WindowPlacing::misplaced()
+  LitScreens lit_;
   std::unique_ptr<Joystick> joystick_;  ///< null: the protocol maps none
   JoystickKeys joystick_keys_;
   std::atomic<bool> ended_{false};

@@ -4,18 +4,19 @@
 #include <optional>
 #include <string>
 
+#include "runner/display/monitors.h"
 #include "runner/display/window.h"
 #include "runner/display/window_places.h"
 
-struct GLFWmonitor;
 struct GLFWwindow;
 
 namespace palpate::runner::display {
 
 /// The planned place of a window, without its frame.
 struct WindowGeometry {
-  GLFWmonitor* full_screen_on = nullptr;  ///< nullptr: a window with a frame
+  bool full_screen = false;  ///< without a frame; the box is its monitor's
   ScreenBox box;
+  Monitor monitor;
   int least_width = 0, least_height = 0;  ///< px; limits for the user's resizing
 };
 
@@ -31,6 +32,9 @@ struct WindowLayout {
 /// \throws DisplayError if a requested monitor is not connected
 WindowLayout lay_out_windows(const WindowSettings& settings);
 
+/// The layout on the monitors that are left of one, or that are back.
+WindowLayout lay_out_again(const WindowSettings& settings, const WindowLayout& first);
+
 /// Space for the participant's window when it must not cover the console: the rest of the console's
 /// monitor. \param console  without its frame \param bar  height of its emergency button, px
 ScreenBox room_beside(const ScreenBox& console, int bar, const FrameSize& frame);
@@ -41,8 +45,9 @@ WindowGeometry lay_out_single(int width, int height, double scale);
 /// The scale scales of text and buttons on the first monitor. \param wanted  0: use the monitor's
 double single_scale(double wanted);
 
-/// The part of the desktop that all monitors cover together.
-ScreenBox desktop();
+/// Puts a window that no monitor shows into the middle of the first one: its monitor was switched
+/// off.
+void bring_into_sight(GLFWwindow* window);
 
 /// The frame around a window; for a hidden window the future frame, if the window manager reports
 /// it.
@@ -55,16 +60,24 @@ GLFWwindow* make_window(const std::string& title, const WindowGeometry& geometry
 std::string glfw_reason();
 
 /// Keeps a session's two windows in place: at the requested places, even if the window manager
-/// moves them at first, and the participant's never over the console's emergency button. Belongs to
-/// the display's thread.
+/// moves them at first or a monitor is switched off, and the participant's never over the console's
+/// emergency button. Belongs to the display's thread.
 class WindowPlacing {
  public:
-  WindowPlacing(GLFWwindow* participant, GLFWwindow* console, const WindowLayout& layout);
+  /// \param settings  must outlive it
+  WindowPlacing(GLFWwindow* participant, GLFWwindow* console, const WindowSettings& settings,
+                const WindowLayout& layout);
 
   /// Call it between two frames. \param now  s \param bar  px, height of the emergency button
   void step(double now, float bar);
   /// Places to which the experimenter has moved the windows; none: they have not moved.
   std::optional<WindowPlaces> moved_to() const;
+  /// False while the window manager has time to show them.
+  bool settled() const { return settled_; }
+  /// The reason why the participant may not see the right window; empty: all is well.
+  const std::string& misplaced() const { return misplaced_; }
+  /// Whether one monitor shows both windows.
+  bool shared() const { return shared_; }
 
  private:
   struct Placed {
@@ -74,16 +87,28 @@ class WindowPlacing {
     int tries = 0;
   };
   bool look();
+  bool full_screen() const { return layout_.participant.full_screen; }
+  void look_at_monitors(double now);
+  void place_again(const WindowLayout& layout, double now);
+  bool fills_its_monitor() const;
+  void fill_monitor();
   void settle(double now);
+  void judge(double now);
+  std::string misplacement() const;
   void uncover(double now, int bar);
   void move_away(int bar);
+  void bring_back(int bar);
   static void ask_for(Placed& placed);
 
+  const WindowSettings& settings_;
+  const WindowLayout first_;  ///< on the monitors at the beginning
+  WindowLayout layout_;       ///< on those that are there now
   Placed participant_, console_;
-  bool full_screen_;
-  bool settled_ = false, covered_ = false;
+  std::vector<Monitor> monitors_;
+  bool settled_ = false, covered_ = false, shared_, put_back_ = false;
   int attempts_ = 0;  ///< failed attempts to move the participant's window away
-  double began_ = -1, next_ = 0, moved_at_ = 0, raised_at_ = 0;  ///< s
+  double began_ = -1, next_ = 0, moved_at_ = 0, raised_at_ = 0, next_monitors_ = 0;  ///< s
+  std::string misplaced_;
 };
 
 }  // namespace palpate::runner::display

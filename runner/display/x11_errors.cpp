@@ -6,10 +6,13 @@
 #include <X11/Xlib.h>
 #include <X11/Xresource.h>
 #include <X11/Xutil.h>
+#include <X11/extensions/Xrandr.h>
 #include <poll.h>
 
 #include <csignal>
 #include <memory>
+
+#include "runner/display/x11_properties.h"
 
 // From GLFW's glfw3native.h, which asks for the headers of extensions that are not used here.
 extern "C" Display* glfwGetX11Display();
@@ -28,16 +31,8 @@ int ignore_error(Display*, XErrorEvent*) { return 0; }
 
 /// The window that a window's _NET_SUPPORTING_WM_CHECK names; None: it has none, or is gone.
 Window checked_window(Display* display, Window of) {
-  Atom type = None;
-  int format = 0;
-  unsigned long count = 0, rest = 0;
-  unsigned char* value = nullptr;
-  const Atom check = XInternAtom(display, "_NET_SUPPORTING_WM_CHECK", False);
-  const int failed = XGetWindowProperty(display, of, check, 0, 1, False, XA_WINDOW, &type, &format,
-                                        &count, &rest, &value);
-  const std::unique_ptr<unsigned char, decltype(&XFree)> owned(value, &XFree);
-  if (failed != Success || type != XA_WINDOW || format != 32 || count == 0) return None;
-  return *reinterpret_cast<const Window*>(value);
+  const auto named = read_property(display, of, "_NET_SUPPORTING_WM_CHECK", XA_WINDOW);
+  return named.empty() ? None : named.front();
 }
 
 /// The window of a living window manager has the property, too (Extended Window Manager Hints 1.5,
@@ -78,7 +73,13 @@ bool start_glfw() {
   const std::unique_ptr<Display, decltype(&XCloseDisplay)> display(XOpenDisplay(nullptr),
                                                                    &XCloseDisplay);
   if (display) forget_killed_manager(display.get());
-  return glfwInit() != GLFW_FALSE;
+  if (glfwInit() == GLFW_FALSE) return false;
+  // GLFW's own list of monitors is not used; keeping it up to date can end the program.
+  int first_event = 0, first_error = 0;
+  Display* const own = glfwGetX11Display();
+  if (own != nullptr && XRRQueryExtension(own, &first_event, &first_error) != 0)
+    XRRSelectInput(own, DefaultRootWindow(own), 0);
+  return true;
 }
 
 void handle_display_errors() {

@@ -169,6 +169,8 @@ class ScreenWithBox final : public display::ParticipantScreen {
   void show(const display::Page& page) override { screen_.show(page); }
   std::vector<display::KeyPress> keys() override;
   bool open() const override { return screen_.open(); }
+  bool settled() const override { return screen_.settled(); }
+  std::string misplaced() const override { return screen_.misplaced(); }
   std::string trouble() const override;
 
  private:

@@ -375,6 +375,7 @@ void LiveSession::attend() {
     obey(command);
   }
   check_noise();
+  check_screen();
   check_device();
   if (!monitor_.in_trial() || monitor_.asking()) respondent_.look_at_buttons(forces_.newest());
   if (!station_.screen.open())
@@ -395,6 +396,23 @@ void LiveSession::check_noise() {
   if (!noise_.has_failed()) return;
   hold_.pause();
   if (monitor_.in_trial()) throw participants::TrialCutOff("the masking noise stopped");
+}
+
+/// A participant who cannot see the keys, or sees the console, must not go on: the experimenter
+/// decides.
+void LiveSession::check_screen() {
+  std::string now = station_.screen.misplaced();
+  if (now == misplaced_) return;
+  misplaced_ = std::move(now);
+  if (misplaced_.empty()) {
+    say("the windows are in their places again");
+    return;
+  }
+  station_.record.note(station_.clock.now_ns(),
+                       nlohmann::ordered_json{{"screen_trouble", misplaced_}}.dump());
+  hold_.pause(misplaced_);
+  say(misplaced_ + "; " + hold_.how_to_continue());
+  if (monitor_.in_trial()) throw participants::TrialCutOff(misplaced_);
 }
 
 /// In a break there are no trials, so check here whether the device is gone.

@@ -117,6 +117,7 @@ class LiveSession final : public participants::Attendant {
   void plan_stop(display::ConsoleCommand::Kind kind);
   void take_last_commands(Outcome& outcome);
   void check_noise();
+  void check_screen();
   void check_device();
   void note(std::int64_t at_ns, const std::string& text);
 
@@ -128,6 +129,7 @@ class LiveSession final : public participants::Attendant {
   participants::KeyboardRespondent respondent_;
   Session session_;
   std::deque<display::ConsoleCommand> commands_;  ///< not obeyed yet
+  std::string misplaced_;                         ///< the participant's window, as told last
   std::string shown_trouble_;                     ///< of the participant's inputs, as shown last
   enum class Stop { no, after_trial, after_block } stop_ = Stop::no;
 };

@@ -51,7 +51,10 @@ std::string emergency_reason() {
 
 }  // namespace
 
-void SessionHold::pause() { kind_ = std::max(kind_, Kind::pause); }
+void SessionHold::pause(const std::string& reason) {
+  kind_ = std::max(kind_, Kind::pause);
+  if (kind_ == Kind::pause && !reason.empty()) reason_ = reason;
+}
 
 void SessionHold::hold(const std::string& reason, bool transient, servo::DeviceTrouble trouble) {
   kind_ = transient ? Kind::transient_fault : Kind::fault;

@@ -61,7 +61,8 @@ class SessionHold {
   /// The button or command to resume.
   std::string how_to_continue() const;
 
-  void pause();
+  /// \param reason  shown until the experimenter resumes; empty: the experimenter asked for it
+  void pause(const std::string& reason = {});
   /// Turns forces off and holds the session until the experimenter resumes it.
   /// \param transient  whether the cause ends by itself
   void hold(const std::string& reason, bool transient, servo::DeviceTrouble trouble);

@@ -192,13 +192,24 @@ void tell(session::LiveSession& session, const session::LiveStation& station,
   if (!missing.empty()) session.say(missing);
 }
 
+/// The windows must stand before anything is felt.
+void wait_for_windows(const session::LiveStation& station) {
+  constexpr std::int64_t kNap_ns = 4'000'000;
+  while (!station.screen.settled() && station.screen.open() && station.end_requested() == 0)
+    station.clock.wait_until(station.clock.now_ns() + kNap_ns);
+}
+
 /// Runs the pre-flight, then the unrecorded trials, in the session's own thread.
 /// \throws as LiveSession::run
 session::LiveSession::Outcome run_session(const session::LiveStation& station,
                                           const Beforehand& known) {
+  wait_for_windows(station);
+  std::vector<std::string> news = known.news;
+  if (const std::string misplaced = station.screen.misplaced(); !misplaced.empty())
+    news.push_back("WARNING: " + misplaced);
   session::PreflightResult preflight;
   try {
-    preflight = session::run_preflight(station, known.news);
+    preflight = session::run_preflight(station, news);
   } catch (const session::EndOfSession& end) {
     return end_before_trials(station, end);
   }

@@ -1,7 +1,9 @@
-"""A display in memory, with keyboard, pointer and a camera: Xvfb, xdotool, ImageMagick."""
+"""A display in memory, with keyboard, pointer and a camera: Xvfb, xdotool, ImageMagick. With several monitors: Xorg with its
+driver for no graphics card (dummy), xrandr."""
 
 import ctypes
 import os
+import pathlib
 import shutil
 import signal
 import subprocess
@@ -58,15 +60,17 @@ class VirtualScreen:
     def start(self, number, size):
         """False: the number is in use."""
         reading, writing = os.pipe()
-        self.server = subprocess.Popen(
-            ["Xvfb", f":{number}", "-displayfd", str(writing), "-screen", "0", size + "x24", "-nolisten", "tcp", *self.options],
-            pass_fds=[writing], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        self.server = subprocess.Popen([*self.server_of(size), f":{number}", "-displayfd", str(writing), "-nolisten", "tcp", *self.options],
+                                       pass_fds=[writing], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         os.close(writing)
         with os.fdopen(reading) as pipe:
             ready = pipe.readline().strip() == str(number)
         if not ready:
             self.server.wait()
         return ready
+
+    def server_of(self, size):
+        return ["Xvfb", "-screen", "0", size + "x24"]
 
     def close(self):
         if self.manager:
@@ -191,3 +195,61 @@ class VirtualScreen:
             time.sleep(0.1)
             return first if first == self.picture(window) and first != differs_from else None
         return wait_for("a picture that stands still", pair)
+
+
+XORG = """
+Section "Device"
+  Identifier "card"
+  Driver "dummy"
+  VideoRam 256000
+EndSection
+Section "Monitor"
+  Identifier "monitor"
+  HorizSync 5.0 - 1000.0
+  VertRefresh 5.0 - 200.0
+EndSection
+Section "Screen"
+  Identifier "screen"
+  Device "card"
+  Monitor "monitor"
+  DefaultDepth 24
+EndSection
+Section "ServerFlags"
+  Option "AutoAddDevices" "false"
+EndSection
+"""
+
+
+class MonitorScreen(VirtualScreen):
+    """Two monitors, DUMMY0 and DUMMY1; nothing is on them until place()."""
+
+    def __init__(self):
+        missing = [tool for tool in ("Xorg", "xrandr") if shutil.which(tool) is None]
+        if not pathlib.Path("/usr/lib/xorg/modules/drivers/dummy_drv.so").exists():
+            missing.append("xserver-xorg-video-dummy")
+        if missing:
+            raise unittest.SkipTest("not installed: " + ", ".join(missing))
+        self.folder = tempfile.TemporaryDirectory()
+        super().__init__("", "-noreset", "+extension", "GLX")
+
+    def server_of(self, size):
+        folder = pathlib.Path(self.folder.name)
+        (folder / "xorg.conf").write_text(XORG)
+        return ["/usr/lib/xorg/Xorg", "-config", str(folder / "xorg.conf"), "-logfile", str(folder / "log")]
+
+    def close(self):
+        super().close()
+        self.folder.cleanup()
+
+    def place(self, *monitors, primary=0):
+        """Each as "1280x800+0+0"; None: switched off."""
+        words = []
+        for number, monitor in enumerate(monitors):
+            words += ["--output", f"DUMMY{number}"]
+            if monitor is None:
+                words.append("--off")
+                continue
+            size, left, top = monitor.split("+")
+            subprocess.run(["xrandr", "--addmode", f"DUMMY{number}", size], env=self.environment, stderr=subprocess.DEVNULL)
+            words += ["--mode", size, "--pos", f"{left}x{top}"] + (["--primary"] if number == primary else [])
+        subprocess.run(["xrandr", *words], env=self.environment, check=True)

@@ -6,6 +6,7 @@
 //                       trial with a tool of three segments on the cube
 //   where               answers "tip x y z axis x y z" of the mouse's stylus
 //   ping                answers "pong"
+//   settled             answers "settled" once the windows are in their places, or were tried
 //   places              answers "places" and where the windows have been put
 //   end
 //   end slowly          answers "over", and takes everything down after another line
@@ -18,7 +19,9 @@
 #include <mutex>
 #include <optional>
 #include <sstream>
+#include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "runner/display/window.h"
@@ -140,6 +143,10 @@ class Talk {
     }
     if (const std::lock_guard lock(state_mutex_); state_)
       windows_.console().show(*state_);  // repeatedly, like a session
+    if (std::string now = windows_.participant().misplaced(); now != misplaced_) {
+      misplaced_ = std::move(now);
+      say("misplaced " + misplaced_);
+    }
     if (!windows_.participant().open() && !closed_) {
       closed_ = true;
       say("closed");
@@ -156,6 +163,11 @@ class Talk {
       state_ = state_of(words, stylus_);
     }
     if (verb == "ping") say("pong");
+    if (verb == "settled") {
+      while (!windows_.participant().settled())
+        std::this_thread::sleep_for(std::chrono::milliseconds(5));
+      say("settled");
+    }
     if (verb == "places") say("places " + windows_.console().places());
     if (verb == "where") {
       const Vec3 axis = glm::normalize(stylus_.tail - stylus_.tip);
@@ -174,6 +186,7 @@ class Talk {
   std::mutex state_mutex_;
   std::optional<ConsoleState> state_;
   bool closed_ = false;
+  std::string misplaced_;
 };
 
 int show(const std::vector<std::string>& args) {
