@@ -265,7 +265,10 @@ void ForceDimensionDevice::open() {
     library_.emulate_button(1, id);  // report a closed gripper as a button
   // Forces stay off until the device has been calibrated.
   std::array<int, kStatusRoom> status{};
-  const bool calibrated = library_.get_status(status.data(), id) >= 0 && status[kReset] == 0;
+  need(library_.get_status(status.data(), id), "a query of its status");
+  need(status[kGravity] != 0 ? 0 : -1, "gravity compensation");
+  need(status[kTimeGuard] == 0 ? 0 : -1, "no time guard");
+  const bool calibrated = status[kReset] == 0;
   if (calibrated) need(library_.enable_force(1, id), "forces on");
   library_.set_force_and_torque(0, 0, 0, 0, 0, 0, id);
 

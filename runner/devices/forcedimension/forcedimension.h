@@ -69,7 +69,8 @@ struct Library {
 
 inline constexpr int kStatusRoom = 64;  ///< 16 or 17 are written, by version
 /// Places in the status.
-inline constexpr int kPower = 0, kConnected = 1, kReset = 3, kForce = 5, kError = 9;
+inline constexpr int kPower = 0, kConnected = 1, kReset = 3, kForce = 5, kError = 9, kGravity = 10,
+                     kTimeGuard = 11;
 
 /// Convert between the library's frame and the world frame (x right, y away from the user, z up).
 inline Vec3 to_world(const Vec3& v) { return {v.y, -v.x, v.z}; }

@@ -54,6 +54,7 @@ Library::Library(const std::string& path) {
   require("hdBeginFrame", begin_frame);
   require("hdEndFrame", end_frame);
   require("hdEnable", enable);
+  require("hdIsEnabled", is_enabled);
   require("hdGetDoublev", get_doubles);
   require("hdGetIntegerv", get_integers);
   require("hdSetDoublev", set_doubles);
@@ -85,6 +86,8 @@ constexpr double kFarthest = 0.5;       // m; no model reaches so far
 constexpr double kMaxSpeed = 5, kJump = 1e-3;  // m/s and m
 // A Touch's continuous force, the safe value, for devices that report none.
 constexpr double kLeastForce = 0.88, kMostForce = 40, kLeastStiffness = 500, kMostStiffness = 5000;
+// The widest side of a workspace, as reported: 160 mm of a Touch to 838 mm of the largest Phantom.
+constexpr double kNarrowest = 50, kWidest = 2000;
 constexpr double kReach = 0.035;  // m; half the smallest side of a Touch's workspace
 
 /// Number of this process's devices that the scheduler calls. The scheduler is stopped while
@@ -115,6 +118,15 @@ std::string why_not_opened(const Library& library, unsigned code) {
   return text_of(code != 0 ? library.error_string(code) : nullptr, "no reason is given") +
          ": check its cable, its power supply and the rights of its serial port (group dialout), "
          "and run the maker's setup";
+}
+
+/// The style for an update of the calibration: the library takes one, not the mask of those that
+/// the device has. 0: none may be used. A reset of the encoders would set their zero where the hand
+/// is.
+unsigned style_of(unsigned mask) {
+  for (const unsigned style : {kAuto, kInkwell})
+    if ((mask & style) != 0) return style;
+  return 0;
 }
 
 servo::DeviceCapabilities capabilities_of() {
@@ -158,6 +170,14 @@ void TouchDevice::open() {
   library_.make_current(handle_);
   library_.enable(kForceOutput);
   library_.enable(kForceClamping);
+  try {
+    check_settings();
+  } catch (const std::runtime_error&) {
+    library_.disable_device(handle_);
+    handle_ = kNoHandle;
+    if (running() > 0) library_.start();
+    throw;
+  }
   capabilities_ = capabilities_of();
   capabilities_.serial = name;
   double force = 0, stiffness = 0;
@@ -187,6 +207,25 @@ void TouchDevice::open() {
     clock.wait_until(clock.now_ns() + 1'000'000);
     frames_.read(seen_);
   }
+}
+
+/// \throws std::runtime_error if a setting that forces or positions depend on has no effect
+void TouchDevice::check_settings() {
+  if (library_.is_enabled(kForceOutput) == 0)
+    throw std::runtime_error(
+        "the device of 3D Systems has its forces off although palpate enabled them, and forces "
+        "stay off: run the maker's diagnostics");
+  std::array<double, 6> corners{};
+  library_.get_doubles(kWorkspace, corners.data());
+  double widest = 0;
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    widest = std::max(widest, std::abs(corners[axis + 3] - corners[axis]));
+  // An older library may not report it.
+  if (widest > 0 && !(widest >= kNarrowest && widest <= kWidest))
+    throw std::runtime_error("the device of 3D Systems reports a workspace of " +
+                             std::to_string(widest) +
+                             ", so its positions are not in millimetres: this library is not "
+                             "one that palpate can use");
 }
 
 void TouchDevice::close() noexcept {
@@ -261,8 +300,10 @@ void TouchDevice::exchange() noexcept {
     if (found == kCalibrationUpdate) {
       int style = 0;
       library_.get_integers(kCalibrationStyle, &style);
-      library_.update_calibration(static_cast<unsigned>(style));
-      found = library_.check_calibration();
+      if (const unsigned one = style_of(static_cast<unsigned>(style))) {
+        library_.update_calibration(one);
+        found = library_.check_calibration();
+      }
     }
     calibrated_ = found == kCalibrated;
   }

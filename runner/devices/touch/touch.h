@@ -39,6 +39,7 @@ struct Library {
   void (*begin_frame)(Handle) = nullptr;
   void (*end_frame)(Handle) = nullptr;
   void (*enable)(unsigned what) = nullptr;
+  unsigned char (*is_enabled)(unsigned what) = nullptr;
   void (*get_doubles)(unsigned what, double*) = nullptr;
   void (*get_integers)(unsigned what, int*) = nullptr;
   void (*set_doubles)(unsigned what, const double*) = nullptr;
@@ -62,9 +63,11 @@ struct Library {
 // Parameters to get and set, and returned values.
 inline constexpr unsigned kButtons = 0x2000, kPosition = 0x2050, kTransform = 0x2052,
                           kForce = 0x2700, kModel = 0x2501, kSerialNumber = 0x2504,
-                          kCalibrationStyle = 0x2555, kStiffness = 0x2602, kMaxForce = 0x2603,
-                          kForceOutput = 0x4000, kForceClamping = 0x4001, kCalibrated = 0x5000,
-                          kCalibrationUpdate = 0x5001;
+                          kCalibrationStyle = 0x2555, kWorkspace = 0x2551, kStiffness = 0x2602,
+                          kMaxForce = 0x2603, kForceOutput = 0x4000, kForceClamping = 0x4001,
+                          kCalibrated = 0x5000, kCalibrationUpdate = 0x5001;
+/// Styles of calibration, bits of kCalibrationStyle.
+inline constexpr unsigned kEncoderReset = 1, kAuto = 2, kInkwell = 4;
 inline constexpr unsigned kWarm = 0x0200, kTooFast = 0x0203, kFault = 0x0300, kInUse = 0x0301,
                           kCommunication = 0x0302, kLicence = 0x0600;
 
@@ -102,6 +105,7 @@ class TouchDevice final : public servo::Device {
     std::int64_t time_ns = 0;
   };
   void open();
+  void check_settings();
   void close() noexcept;
   static unsigned called(void* device) noexcept;
   void exchange() noexcept;

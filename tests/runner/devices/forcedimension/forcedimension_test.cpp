@@ -135,6 +135,18 @@ TEST_F(ForceDimension, EveryFaultIsTroubleAndZeroForceUntilItIsOver) {
   }
 }
 
+TEST_F(ForceDimension, SettingsAreReadBackBeforeTheFirstForce) {
+  one().deaf = 1;
+  EXPECT_NE(refusal().find("gravity compensation"), std::string::npos) << refusal();
+  EXPECT_EQ(one().open, 0);
+  make_well();
+  one().deaf = 2;
+  one().gravity = 1;
+  EXPECT_NE(refusal().find("time guard"), std::string::npos) << refusal();
+  make_well();
+  EXPECT_EQ(refusal(), "");
+}
+
 TEST_F(ForceDimension, ReadsAndWritesDoNotAllocate) {
   const auto device = open(config_);
   ASSERT_EQ(settle(*device), servo::DeviceTrouble::none);

@@ -137,6 +137,8 @@ int dhdGetStatus(int* status, char id) {
   status[3] = device->reset != 0;
   status[5] = device->forces_on != 0;
   status[6] = device->brakes != 0 && device->forces_on == 0;
+  status[10] = device->gravity != 0;
+  status[11] = device->guarded != 0;
   status[14] = device->too_fast != 0 ? 2 : 0;
   return 0;
 }
@@ -203,7 +205,12 @@ int dhdSetBrakes(int on, char id) {
   return 0;
 }
 
-int dhdSetGravityCompensation(int /*on*/, char id) { return device_of(id) == nullptr ? -1 : 0; }
+int dhdSetGravityCompensation(int on, char id) {
+  StubDevice* const device = device_of(id);
+  if (device == nullptr) return -1;
+  if (device->deaf == 0) device->gravity = on;
+  return 0;
+}
 
 unsigned dhdGetButtonMask(char id) {
   StubDevice* const device = device_of(id);
@@ -211,7 +218,12 @@ unsigned dhdGetButtonMask(char id) {
 }
 
 int dhdEnableExpertMode() { return 0; }
-int dhdSetTimeGuard(int /*microseconds*/, char id) { return device_of(id) == nullptr ? -1 : 0; }
+int dhdSetTimeGuard(int microseconds, char id) {
+  StubDevice* const device = device_of(id);
+  if (device == nullptr) return -1;
+  if (device->deaf < 2) device->guarded = microseconds != 0;
+  return 0;
+}
 int dhdErrorGetLast() { return last_error; }
 const char* dhdErrorGetLastStr() {
   switch (last_error) {

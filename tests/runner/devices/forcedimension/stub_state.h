@@ -28,6 +28,13 @@ struct StubDevice {
   double force[3] = {0, 0, 0}, torque[3] = {0, 0, 0};  ///< N, N m, of a real device
   double forces_on = 0, brakes = 0, watchdog = 0, open = 0, commands = 0, last_command = 0;
   double moved = 0;  ///< times that the arm moved by itself
+  // Set by the test.
+  double deaf = 0;    ///< 1: settings have no effect; 2: nor has the time guard's
+  double styles = 0;  ///< mask of the calibration styles, of 3D Systems; 0: auto alone
+  double metres = 0;  ///< 1: the workspace is reported in another unit
+  // Set by the stub.
+  double gravity = 0, guarded = 1;  ///< gravity compensation; time guard
+  double style = 0;                 ///< of the last update of the calibration
 };
 
 struct StubState {

@@ -2,8 +2,8 @@
 // (forcedimension/stub_state.h; PALPATE_STUB_STATE names the file). Written from the public
 // documentation, without the maker's code. Differences from Force Dimension's: the hand is in the
 // library's frame (x right, y up, z to the user); `reset` 1: calibrate by hand, 2: an update is
-// due; `error` is a code of libHD that every frame reports, 1: errors without end; `delay` > 0: the
-// scheduler stalls.
+// due, by one of `styles`; `error` is a code of libHD that every frame reports, 1: errors without
+// end; `delay` > 0: the scheduler stalls.
 
 #include <atomic>
 #include <chrono>
@@ -58,6 +58,8 @@ int index_of(const char* name) {
   return -1;
 }
 
+int styles_of(const StubDevice& one) { return one.styles > 0 ? static_cast<int>(one.styles) : 2; }
+
 }  // namespace
 
 extern "C" {
@@ -104,8 +106,10 @@ void hdEndFrame(unsigned id) {
 }
 
 void hdEnable(unsigned what) {
-  if (what == 0x4000) device().forces_on = 1;
+  if (what == 0x4000 && device().deaf == 0) device().forces_on = 1;
 }
+
+unsigned char hdIsEnabled(unsigned what) { return what == 0x4000 && device().forces_on != 0; }
 
 void hdGetDoublev(unsigned what, double* out) {
   StubDevice& one = device();
@@ -121,6 +125,9 @@ void hdGetDoublev(unsigned what, double* out) {
     if (one.wrong == 3) out[2] = 1e9;
     if (one.wrong == 4) out[0] += 50;
   }
+  if (what == 0x2551) {
+    for (int i = 0; i < 6; ++i) out[i] = (i < 3 ? -80 : 80) * (one.metres != 0 ? 1e-3 : 1);
+  }
   if (what == 0x2052) {
     for (int i = 0; i < 16; ++i) out[i] = i % 5 == 0;
   }
@@ -128,7 +135,7 @@ void hdGetDoublev(unsigned what, double* out) {
 
 void hdGetIntegerv(unsigned what, int* out) {
   if (what == 0x2000) *out = static_cast<int>(device().buttons);
-  if (what == 0x2555) *out = 2;
+  if (what == 0x2555) *out = styles_of(device());
 }
 
 void hdSetDoublev(unsigned what, const double* in) {
@@ -161,7 +168,14 @@ unsigned hdCheckCalibration() {
 }
 
 void hdUpdateCalibration(unsigned style) {
-  if (style == 2 && device().reset == 2) device().reset = 0;
+  StubDevice& one = device();
+  one.style = style;
+  const bool single = style != 0 && (style & (style - 1)) == 0;
+  if (!single || (static_cast<unsigned>(styles_of(one)) & style) == 0) {
+    library().pending = 0x0101;  // an invalid value
+  } else if (one.reset == 2) {
+    one.reset = 0;
+  }
 }
 
 void hdSetSchedulerRate(unsigned long) {}

@@ -148,6 +148,48 @@ TEST_F(Touch, ACalibrationThatIsDueIsUpdated) {
   EXPECT_EQ(one().reset, 0);
 }
 
+TEST_F(Touch, ACalibrationIsUpdatedByOneStyleAtATime) {
+  constexpr int kEncoderReset = 1, kAuto = 2, kInkwell = 4;
+  const struct {
+    int styles, taken;
+  } cases[] = {{kAuto, kAuto},
+               {kInkwell, kInkwell},
+               {kAuto | kInkwell, kAuto},
+               {kEncoderReset | kInkwell, kInkwell},
+               {kEncoderReset | kAuto | kInkwell, kAuto}};
+  for (const auto& [styles, taken] : cases) {
+    SCOPED_TRACE(styles);
+    make_well();
+    one().styles = styles;
+    one().reset = 2;
+    const auto device = open(config_);
+    EXPECT_TRUE(works(*device));
+    EXPECT_EQ(one().style, taken);
+  }
+}
+
+TEST_F(Touch, EncodersAreNeverResetUnasked) {
+  one().styles = 1;
+  one().reset = 2;
+  const auto device = open(config_);
+  EXPECT_TRUE(until(*device, [](const servo::DeviceReading& read) {
+    return read.trouble == servo::DeviceTrouble::not_calibrated;
+  }));
+  EXPECT_EQ(one().style, 0) << "the zero of the encoders would be where the hand is";
+}
+
+TEST_F(Touch, ForcesThatStayOffAreRefused) {
+  one().deaf = 1;
+  EXPECT_NE(refusal().find("forces stay off"), std::string::npos) << refusal();
+  one().deaf = 0;
+  EXPECT_TRUE(works(*open(config_))) << "and it is closed again";
+}
+
+TEST_F(Touch, AWorkspaceThatIsNotInMillimetresIsRefused) {
+  one().metres = 1;
+  EXPECT_NE(refusal().find("not in millimetres"), std::string::npos) << refusal();
+}
+
 TEST_F(Touch, TwoDevicesAreIdentifiedByNameAndShareOneScheduler) {
   state_->count = 2;
   other().serial = 99;
