@@ -291,7 +291,11 @@ GuardedDevice::GuardedDevice(const DeviceFactory& factory, const GuardSettings& 
   }
   capabilities_ = channel_->capabilities.numbers();
   // Wait for a first reading: it can replace later ones that are late.
-  for (read(); unanswered_ > 0; read()) {
+  const auto try_to_read = [this] {
+    answered_ns_ = servo::RealClock().now_ns();  // settings.patience counts, not given_up
+    read();
+  };
+  for (try_to_read(); unanswered_ > 0; try_to_read()) {
     if (!ended() && std::chrono::steady_clock::now() < give_up) continue;
     kill(guard_, SIGKILL);
     end();
@@ -302,8 +306,23 @@ GuardedDevice::GuardedDevice(const DeviceFactory& factory, const GuardSettings& 
 GuardedDevice::~GuardedDevice() { end(); }
 
 bool GuardedDevice::ended() noexcept {
-  if (!ended_) ended_ = waitpid(guard_, nullptr, WNOHANG) != 0;
+  if (ended_) return true;
+  int status = 0;
+  const pid_t changed = waitpid(guard_, &status, WNOHANG | WUNTRACED);
+  if (changed > 0 && WIFSTOPPED(status)) {
+    end_stopped();
+  } else {
+    ended_ = changed != 0;
+  }
   return ended_;
+}
+
+/// A stopped guard leaves its last force on the device. It may go on only to send zero and to end.
+void GuardedDevice::end_stopped() noexcept {
+  channel_->quit.store(true);
+  emergency_zero();
+  kill(guard_, stopped_ ? SIGKILL : SIGCONT);
+  stopped_ = true;
 }
 
 void GuardedDevice::end() noexcept {
@@ -351,6 +370,10 @@ servo::DeviceReading GuardedDevice::read() noexcept {
 
 servo::DeviceTrouble GuardedDevice::without_answer() noexcept {
   if (ended()) return servo::DeviceTrouble::guard_lost;
+  if (stopped_) {
+    if (unanswered_ >= kUnanswered) kill(guard_, SIGKILL);
+    return servo::DeviceTrouble::guard_lost;
+  }
   const std::int64_t now = servo::RealClock().now_ns();
   if (reopening()) {
     answered_ns_ = now;  // the guard is at work
@@ -358,7 +381,9 @@ servo::DeviceTrouble GuardedDevice::without_answer() noexcept {
   }
   if (unanswered_ < kUnanswered) return servo::DeviceTrouble::late;
   const bool given_up = static_cast<double>(now - answered_ns_) * 1e-9 >= settings_.given_up;
-  return given_up ? servo::DeviceTrouble::guard_lost : servo::DeviceTrouble::guard_late;
+  if (!given_up) return servo::DeviceTrouble::guard_late;
+  kill(guard_, SIGKILL);  // its last force must not stay
+  return servo::DeviceTrouble::guard_lost;
 }
 
 void GuardedDevice::write(const Vec3& device1, const Vec3& device2) noexcept {

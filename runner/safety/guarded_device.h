@@ -103,7 +103,8 @@ void run_guard(GuardChannel& channel, const DeviceFactory& factory, const GuardS
 /// The runner's side of the watchdog. If a reading takes longer than half a period, the last one is
 /// repeated (DeviceTrouble::late). After many such readings in a row the device counts as lost
 /// (guard_late) until readings arrive again. A guard that has ended, or hangs longer than a busy
-/// machine explains, is lost for good (guard_lost).
+/// machine explains, is lost for good (guard_lost) and killed. One that was stopped (SIGSTOP) sends
+/// zero force and ends.
 class GuardedDevice final : public servo::Device {
  public:
   /// Forks: call it before creating other threads. `factory` runs in the guard. Returns once the
@@ -134,13 +135,14 @@ class GuardedDevice final : public servo::Device {
 
  private:
   bool ended() noexcept;
+  void end_stopped() noexcept;
   servo::DeviceTrouble without_answer() noexcept;
   void end() noexcept;
 
   SharedMemory<GuardChannel> channel_;
   const GuardSettings settings_;
   int guard_ = -1;
-  bool ended_ = false;
+  bool ended_ = false, stopped_ = false;
   servo::DeviceCapabilities capabilities_;
   servo::DeviceReading last_;
   std::uint32_t trips_seen_ = 0;

@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <csignal>
+#include <cstdio>
 #include <memory>
 #include <stdexcept>
 
@@ -162,27 +163,70 @@ bool is_well(const servo::DeviceReading& reading) {
   return !reading.lost && reading.trouble == servo::DeviceTrouble::none;
 }
 
+/// Its readings wait while the test says so.
+class Waiting final : public servo::Device {
+ public:
+  explicit Waiting(Stage& stage) : stage_(stage), recording_(stage.shared->record, visiting) {}
+  const servo::DeviceCapabilities& capabilities() const override {
+    return recording_.capabilities();
+  }
+  servo::DeviceReading read() noexcept override {
+    while (stage_.shared->go) nap(1);
+    return recording_.read();
+  }
+  void write(const Vec3& device1, const Vec3& device2) noexcept override {
+    recording_.write(device1, device2);
+  }
+
+ private:
+  Stage& stage_;
+  RecordingDevice recording_;
+};
+
 TEST(Guard, ALateGuardIsALostDeviceOnlyUntilItRecovers) {
   Stage stage;
-  GuardedDevice device(
-      [&] { return std::make_unique<RecordingDevice>(stage.shared->record, visiting); },
-      no_rights());
+  GuardedDevice device([&] { return std::make_unique<Waiting>(stage); }, no_rights());
   for (int i = 0; i < 3; ++i) {
     EXPECT_TRUE(is_well(read_until(device, is_well)));
-    kill(device.guard_process(), SIGSTOP);
+    stage.shared->go = true;
     EXPECT_EQ(read_until(device, is_lost).trouble, servo::DeviceTrouble::guard_late);
-    kill(device.guard_process(), SIGCONT);
+    stage.shared->go = false;
   }
   EXPECT_TRUE(is_well(read_until(device, is_well)));
 }
 
-TEST(Guard, AGuardThatHangsForGoodCountsAsEnded) {
+TEST(Guard, AStoppedGuardSendsZeroAndEnds) {
+  Stage stage;
+  GuardedDevice device(
+      [&] { return std::make_unique<RecordingDevice>(stage.shared->record, visiting); },
+      no_rights());
+  const auto press = [&](const servo::DeviceReading&) {
+    device.write({0, 0, 1}, Vec3(0));
+    return stage.shared->record.last_force() > 0;
+  };
+  EXPECT_TRUE(is_well(read_until(device, is_well)));
+  read_until(device, press);
+  ASSERT_GT(stage.shared->record.last_force(), 0);
+  kill(device.guard_process(), SIGSTOP);
+  servo::RealClock clock;
+  const std::int64_t stopped = clock.now_ns();
+  const auto is_over = [](const servo::DeviceReading& reading) {
+    return reading.trouble == servo::DeviceTrouble::guard_lost;
+  };
+  EXPECT_TRUE(is_over(read_until(device, is_over)));
+  while (!stage.shared->record.closed && clock.now_ns() - stopped < 5'000'000'000) device.read();
+  EXPECT_TRUE(stage.shared->record.closed) << "it has closed the device";
+  EXPECT_EQ(stage.shared->record.last_force(), 0);
+  std::printf("  zero force and closed after %.1f ms\n",
+              1e-6 * static_cast<double>(clock.now_ns() - stopped));
+}
+
+TEST(Guard, AGuardThatHangsForGoodIsKilled) {
   Stage stage;
   GuardSettings settings = no_rights();
   settings.given_up = 0.2;
-  GuardedDevice device(
-      [&] { return std::make_unique<RecordingDevice>(stage.shared->record, visiting); }, settings);
-  kill(device.guard_process(), SIGSTOP);
+  GuardedDevice device([&] { return std::make_unique<Waiting>(stage); }, settings);
+  stage.shared->go = true;
   servo::RealClock clock;
   const std::int64_t began = clock.now_ns();
   EXPECT_EQ(read_until(device, is_lost).trouble, servo::DeviceTrouble::guard_late);
@@ -191,6 +235,12 @@ TEST(Guard, AGuardThatHangsForGoodCountsAsEnded) {
   });
   EXPECT_EQ(last.trouble, servo::DeviceTrouble::guard_lost);
   EXPECT_GE(clock.now_ns() - began, 190'000'000);
+  const auto is_gone = [&] { return kill(device.guard_process(), 0) != 0; };
+  for (int i = 0; i < 5000 && !is_gone(); ++i) {
+    device.read();
+    nap(1);
+  }
+  EXPECT_TRUE(is_gone());
 }
 
 /// Unplugged and plugged in again by the test.

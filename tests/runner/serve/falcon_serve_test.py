@@ -218,6 +218,19 @@ class Falcon(ServeCase):
         print(f"the server killed: zero {(zero - at) / 1e6:.1f} ms later, {len(with_force)} packets with force", file=sys.stderr)
         self.assertLessEqual(len(with_force), 1)
 
+    def test_a_stopped_guard_leaves_no_force(self):
+        self.start_program()
+        self.put_into_the_ball()
+        guard, = self.children(self.server)
+        os.kill(guard, signal.SIGSTOP)
+        at = time.monotonic_ns()
+        self.assertEqual(self.emulator.wait(PATIENCE), 1)
+        self.assertTrue(json.loads(self.last.read_text())[0]["torque_is_zero"])
+        record = read_record(self.heard)
+        zero = next(t for t, counts in record if t > at and counts == 0)
+        print(f"the guard stopped: zero {(zero - at) / 1e6:.1f} ms later", file=sys.stderr)
+        self.assertFalse([t for t, counts in record if t > zero and counts > 0])
+
     def test_the_server_ends_if_its_guard_has_ended(self):
         self.start_program()
         self.put_into_the_ball()
