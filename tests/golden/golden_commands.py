@@ -233,7 +233,9 @@ def scene_lines():
                        f"render --scene protocols/shapes/torus.obj --renderer point {path} --out torus.csv"),
            *steps(f"explore corner.stl {path} --animation corner.webp --every 1s --size 160x90",
                   f"explore corner.stl {path} --animation corner.webp --every 2s --size 160x90 --force", timed=True),
-           refused("explore corner.stl --device simulated --calibration none.json --without-calibration --pictures kept", 1)]
+           refused("explore corner.stl --device simulated --calibration none.json --without-calibration --pictures kept", 1),
+           refused("explore corner.stl --device touch --library none.so --serial A", 1),
+           refused("explore corner.stl --device inverse3 --service 127.0.0.1:9 --firmware none", 1)]
 
 
 def examining_lines():

@@ -352,6 +352,11 @@ void add_explore_options(CommandLine& line) {
       ("labels", po::bool_switch(), "number and shape at each object")    //
       ("pictures", po::value<std::string>()->value_name("DIR"),
        "where the window keeps pictures: scene-1.png and so on")  //
+      ("serial", po::value<std::vector<std::string>>()->composing()->value_name("NUMBER"),
+       "which device; two of a stylus: twice, tip first")                                   //
+      ("firmware", po::value<std::string>()->value_name("FILE"), "as for palpate run")      //
+      ("library", po::value<std::string>()->value_name("FILE"), "as for palpate run")       //
+      ("service", po::value<std::string>()->value_name("HOST:PORT"), "as for palpate run")  //
       ("calibration", po::value<std::string>()->value_name("FILE"),
        "of the device, as for palpate run")                                                       //
       ("without-calibration", po::bool_switch(), "a device that was not calibrated may be used")  //
@@ -400,8 +405,14 @@ int open_window(const po::variables_map& values, const rendering::Renderer& rend
                            .device = text_of(values, "device"),
                            .pictures = text_of(values, "pictures"),
                            .calibration = text_of(values, "calibration"),
+                           .firmware = text_of(values, "firmware"),
+                           .library = text_of(values, "library"),
+                           .service = text_of(values, "service"),
                            .without_calibration = values["without-calibration"].as<bool>(),
-                           .labels = values["labels"].as<bool>()};
+                           .labels = values["labels"].as<bool>(),
+                           .serials = {}};
+  if (values.count("serial") > 0)
+    settings.serials = values["serial"].as<std::vector<std::string>>();
   if (!settings.trajectory.empty() && !settings.device.empty())
     throw UsageError("--device and --trajectory: expected one of them");
   if (settings.trajectory.empty() && settings.device.empty()) settings.device = "mouse";

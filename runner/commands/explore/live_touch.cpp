@@ -173,6 +173,10 @@ int explore_live(const protocols::SceneSpec& spec, const rendering::Renderer& re
   run.device = settings.device;
   run.calibration = settings.calibration;
   run.without_calibration = settings.without_calibration;
+  run.firmware = settings.firmware;
+  run.library = settings.library;
+  run.service = settings.service;
+  run.serials = settings.serials;
   const devices::DeviceKind& kind = find_device_kind(settings.device);
   display::ExploreSettings window = window_settings(spec, renderer, settings);
   safety::FaultSignals signals;

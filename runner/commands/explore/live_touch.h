@@ -59,7 +59,9 @@ struct HandsOnSettings {
   std::string scene_path, trajectory, device;  ///< a path or a device
   std::string pictures;                        ///< folder for those that are kept; empty: none
   std::string calibration;                     ///< file of calibrations; empty: the usual one
+  std::string firmware, library, service;      ///< as of palpate run; empty: the usual ones
   bool without_calibration = false, labels = false;
+  std::vector<std::string> serials;  ///< empty: any device
 };
 
 /// Touches the scene in a window until that is closed. \return exit status
