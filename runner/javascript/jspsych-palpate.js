@@ -32,7 +32,7 @@ export const info = {
     trial: {type: 'INT'}, stimulus: {type: TEXT}, renderer: {type: TEXT}, response: {type: TEXT}, correct: {type: YES},
     response_time_s: {type: NUMBER}, first_contact_s: {type: NUMBER}, missed_ticks: {type: 'INT'}, rt: {type: NUMBER},
     t_ns: {type: 'INT'}, at_ms: {type: NUMBER}, clock_offset_ms: {type: NUMBER}, clock_within_ms: {type: NUMBER},
-    stamped: {type: TEXT},
+    stamped: {type: TEXT}, timed_out: {type: YES},
   },
   citations: {apa: '', bibtex: ''},
 };
@@ -53,36 +53,59 @@ export function palpate_plugin(hand) {
       this.jsPsych = jsPsych;
     }
 
-    async trial(display, trial) {
+    async trial(display, trial, on_load, simulated_rt = null) {
       const what = {};
       for (const name of ['stimulus', 'renderer', 'level', 'orientation_wxyz'])
         if (trial[name] !== null && trial[name].length !== 0) what[name] = trial[name];
       if (hand.next) what.trial = hand.next.trial;
+      on_load?.();
       for (;;) {
         try {
           display.innerHTML = trial.waiting;
           await hand.clock(5);
           await hand.start(what);
-          const {choice, at_ms} = await this.#choice(display, trial);
+          const {choice, at_ms, stored} = await this.#choice(display, trial, simulated_rt);
+          if (stored) return this.#finish(display, stored, {});
           const said = await hand.answer(choice, {at_ms});
-          const {offset_ms, within_ms} = hand.best_clock;
-          const data = {...said, rt: 1000 * said.response_time_s, at_ms, clock_offset_ms: offset_ms, clock_within_ms: within_ms};
-          for (const name of ['re', 'ok', 'next', 'record']) delete data[name];
-          display.innerHTML = '';
-          return this.jsPsych.finishTrial(data);
+          return this.#finish(display, said, {rt: 1000 * said.response_time_s, at_ms});
         } catch (error) {
+          if (error.code === 'timed-out') return this.#finish(display, error.stored, {});
           if (error.code === 'closed') display.textContent = `palpate: ${error.reason}. Forces are off.`;
-          if (!trial.try_again || !['forces-off', 'stopped', 'nothing-felt'].includes(error.code)) throw error;
+          if (!trial.try_again || !['emergency', 'forces-off', 'stopped', 'nothing-felt'].includes(error.code)) throw error;
           await this.#go_on(display, error);
         }
       }
     }
 
-    /** Resolves with {choice, at_ms}: one of the choices, and when. */
-    #choice(display, trial) {
+    /** 'data-only' gives data without the server; 'visual' feels the trial and presses a button after a time. */
+    simulate(trial, mode, options, on_load) {
+      const rt = options.data?.rt ?? 500 + 1500 * Math.random();
+      const response = options.data?.response ?? trial.choices[Math.floor(trial.choices.length * Math.random())];
+      if (mode === 'visual')
+        return this.trial(this.jsPsych.getDisplayElement(), trial, on_load, {rt, response});
+      on_load?.();
+      this.jsPsych.finishTrial({
+        trial: null, stimulus: trial.stimulus, renderer: trial.renderer, response, correct: response === trial.stimulus,
+        timed_out: false, response_time_s: rt / 1000, rt, ...options.data});
+    }
+
+    #finish(display, said, {rt = null, at_ms = null}) {
+      const {offset_ms, within_ms} = hand.best_clock;
+      const data = {...said, rt, at_ms, clock_offset_ms: offset_ms, clock_within_ms: within_ms};
+      if (said.timed_out) data.response = null;
+      for (const name of ['re', 'ok', 'next', 'record', 'event']) delete data[name];
+      display.innerHTML = '';
+      return this.jsPsych.finishTrial(data);
+    }
+
+    /** Resolves with {choice, at_ms}: one of the choices, and when; or with {stored}, where the protocol's time was over. */
+    #choice(display, trial, simulated) {
       display.innerHTML = trial.prompt;
+      let timer = null;
       return new Promise((resolve, reject) => {
-        const off = event => done(() => reject(Object.assign(new Error(event.detail.reason), {code: 'forces-off'})));
+        const off = event => done(() => reject(Object.assign(
+            new Error(event.detail.reason), {code: event.detail.code === 'emergency' ? 'emergency' : 'forces-off'})));
+        const stored = event => done(() => resolve({stored: event.detail}));
         const gone = () => done(() => reject(Object.assign(new Error('closed'), {code: 'closed', reason: 'the server has gone'})));
         const pressed = event => {
           const at = (trial.keys ?? []).indexOf(event.key);
@@ -90,7 +113,9 @@ export function palpate_plugin(hand) {
         };
         const done = act => {
           document.removeEventListener('keydown', pressed);
+          clearTimeout(timer);
           hand.removeEventListener('forces_off', off);
+          hand.removeEventListener('stored', stored);
           hand.removeEventListener('closed', gone);
           act();
         };
@@ -103,14 +128,19 @@ export function palpate_plugin(hand) {
         });
         document.addEventListener('keydown', pressed);
         hand.addEventListener('forces_off', off);
+        hand.addEventListener('stored', stored);
+        if (simulated) timer = setTimeout(() => {
+          display.querySelector(`[data-choice="${CSS.escape(simulated.response)}"]`)?.click();
+        }, simulated.rt);
         hand.addEventListener('closed', gone);
       });
     }
 
-    /** Forces went off: the experimenter, or the participant, says when they may come again. */
+    /** Forces went off: a person says when they may come again; of another client's emergency, where it was raised. */
     #go_on(display, error) {
       display.innerHTML = '';
       element('p', display, `Forces are off: ${error.reason ?? error.message}`);
+      if (error.code === 'emergency' && !hand.emergency_raised) return hand.wait_for('cleared');
       const button = element('button', display, 'Go on');
       button.className = 'jspsych-btn';
       button.dataset.choice = 'go on';

@@ -15,10 +15,10 @@ const WIDTHS = {tip: 3, tail: 3, force: 3, rendered: 3, contact: 3};  // columns
 
 /** The server refused a message, or has gone. `code` is for programs, `place` a JSON pointer. */
 export class ServeError extends Error {
-  constructor({code, message, place = '', faults = []}) {
+  constructor({code, message, place = '', faults = []}, stored = null) {
     super(`${code}: ${message}${place ? ` (${place})` : ''}`);
     this.name = 'ServeError';
-    Object.assign(this, {code, reason: message, place, faults});
+    Object.assign(this, {code, reason: message, place, faults, stored});  // stored: of 'timed-out', the trial on record
   }
 }
 
@@ -40,6 +40,8 @@ export class Hand extends EventTarget {
   next = null;
   /** Rows that the server left out because this page did not keep up. */
   dropped = 0;
+  /** Whether this page has asked for zero force and not taken it back by clear(). */
+  emergency_raised = false;
   /** As clock() found it: {offset_ms, within_ms, round_trip_ms, asked_ms}; null before. */
   best_clock = null;
 
@@ -63,11 +65,13 @@ export class Hand extends EventTarget {
       this.#waiting.delete(message.re);
       if (!waiting) return;
       if (message.ok) waiting.resolve(message);
-      else waiting.reject(new ServeError(message.error));
+      else waiting.reject(new ServeError(message.error, message.stored));
     } else if (message.stream) {
       this.dropped += message.dropped;
       this.dispatchEvent(new CustomEvent('samples', {detail: this.#rows(message.stream)}));
     } else if (message.event) {
+      if (message.event === 'cleared') this.emergency_raised = false;
+      if (message.event === 'stored') this.#next(message);  // also of a trial that timed out
       this.dispatchEvent(new CustomEvent(message.event, {detail: message}));
       this.dispatchEvent(new CustomEvent('event', {detail: message}));
     }
@@ -140,8 +144,13 @@ export class Hand extends EventTarget {
   /** An event for all clients; in words. */
   mark(code, text = '') { return this.ask('mark', {code, text}); }
   note(text) { return this.ask('note', {text}); }
-  /** Zero force at once, until clear(). */
-  emergency() { return this.ask('emergency'); }
+  /** Zero force at once, until clear() of this page or of a person at the server. */
+  emergency() {
+    this.emergency_raised = true;
+    return this.ask('emergency');
+  }
+  /** Forces may come again: for a person to say. Another client's emergency is refused with the code 'emergency'; the
+      event 'cleared' tells when it is over. */
   clear() { return this.ask('clear'); }
   /** Rows of ticks from now on, as 'samples' events; 0 ends them. */
   async subscribe(rate_hz = 60, fields = ['tip', 'force']) {
@@ -204,6 +213,7 @@ export function connect(url, token, {role = 'control'} = {}) {
     const hand = new Hand(socket);
     socket.addEventListener('open', () => hand.hello(token, role).then(() => resolve(hand), reject));
     socket.addEventListener('error', () => reject(new ServeError({
-      code: 'closed', message: `no server at ${url}, or it does not allow pages from ${location.origin}`})));
+      code: 'closed', message: `no server at ${url}, or it does not allow pages from ${location.origin} ` +
+          '(--allow-origin), or the browser does not (allow the page to reach this computer\'s network)'})));
   });
 }

@@ -16,10 +16,15 @@ while (! isempty (due))
       done = true;
     catch problem
       done = false;
-      if (! any (strcmp (problem.identifier, {"palpate:forces-off", "palpate:stopped", "palpate:nothing-felt"})))
+      fprintf (stderr, "%s\n", problem.message);
+      if (strcmp (problem.identifier, "palpate:emergency"))
+        pause (0.5);  % it is cleared where it was raised, or at the server
+      elseif (any (strcmp (problem.identifier, {"palpate:forces-off", "palpate:stopped", "palpate:nothing-felt"})))
+        input ("Look what it was, then press Enter: forces come again. ", "s");
+        palpate (hand, "clear");
+      else
         rethrow (problem);
       endif
-      palpate (hand, "clear");
     end_try_catch
   until (done)
   printf ("%d,%s,%s,%d,%.6f\n", trial.trial, trial.stimulus, trial.response, trial.correct, trial.response_time_s);

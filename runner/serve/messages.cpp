@@ -323,7 +323,8 @@ ordered_json remark(const Message& message) {
   return out;
 }
 
-std::string refused(const std::optional<std::int64_t>& id, const std::vector<Refusal>& why) {
+std::string refused(const std::optional<std::int64_t>& id, const std::vector<Refusal>& why,
+                    const ordered_json& more) {
   constexpr std::size_t kMostFaults = 20;
   const auto shown = [](const Refusal& refusal) {
     return ordered_json{
@@ -336,6 +337,7 @@ std::string refused(const std::optional<std::int64_t>& id, const std::vector<Ref
     for (std::size_t i = 0; i < std::min(why.size(), kMostFaults); ++i)
       out["error"]["faults"].push_back(shown(why[i]));
   }
+  out.update(more);
   return out.dump(-1, ' ', false, json::error_handler_t::replace);
 }
 

@@ -123,7 +123,9 @@ Message parse_message(const std::string& text);
 /// {"re":id,"ok":true,...}. \param more  an object
 std::string accepted(std::int64_t id,
                      const nlohmann::ordered_json& more = nlohmann::ordered_json::object());
-std::string refused(const std::optional<std::int64_t>& id, const std::vector<Refusal>& why);
+/// The same for a refusal: {"re":id,"ok":false,"error":{...},...}
+std::string refused(const std::optional<std::int64_t>& id, const std::vector<Refusal>& why,
+                    const nlohmann::ordered_json& more = nlohmann::ordered_json::object());
 /// What a mark or a note says: {"code":...,"text":...}, the code of a mark alone.
 nlohmann::ordered_json remark(const Message& message);
 /// {"event":name,"t_ns":t,...}

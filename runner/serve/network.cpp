@@ -19,6 +19,7 @@
 #include <chrono>
 #include <cmath>
 #include <deque>
+#include <limits>
 #include <map>
 #include <mutex>
 #include <stdexcept>
@@ -44,10 +45,12 @@ constexpr std::int64_t kSilence = 500'000'000;                // ns
 constexpr auto kStreamEvery = std::chrono::milliseconds(17);  // at most 60 messages a second
 constexpr auto kWatchEvery = std::chrono::milliseconds(5);
 constexpr std::size_t kMostWatchers = 8;
-constexpr std::size_t kMostUnknown = 16;   // connections before their hello
+constexpr std::size_t kMostUnknown = 64;   // connections of a kind before their hello
 constexpr int kMostMessages = 200;         // a second; above twice as many the client is closed
 constexpr std::size_t kMostWaiting = 256;  // queued replies and events of a client
 constexpr std::size_t kMostWaitingBytes = 8 << 20;
+/// Bytes a second that belong to no message: frames without contents; one message may be under way.
+constexpr std::uint64_t kMostOverhead = kLongestScene + 2 * kLongestMessage;
 constexpr std::size_t kMostCommands = 64;  // commands not yet taken by the session
 constexpr std::size_t kMostRows = 1024;    // rows in a stream's message
 constexpr const char* kSubprotocol = "palpate.1";
@@ -133,6 +136,8 @@ class Client : public std::enable_shared_from_this<Client> {
   /// Reads messages until it is closed.
   virtual void begin() = 0;
   virtual void close() = 0;
+  /// Bytes that came so far, of messages or not.
+  virtual std::uint64_t read_bytes() const { return heard_bytes; }
 
   /// A client that does not read is disconnected, so that its queue stays bounded.
   void send(std::string text) {
@@ -155,7 +160,8 @@ class Client : public std::enable_shared_from_this<Client> {
   asio::steady_timer hello_timer;
   ClientClock clock;
   std::int64_t second_ns = 0;  ///< start of the second in which messages are counted
-  int in_second = 0;           ///< messages
+  int in_second = 0;           ///< messages, pings, empty lines
+  std::uint64_t heard_bytes = 0, overhead_before = 0;
   // Stream:
   double rate = 0;  ///< Hz; 0: none
   std::int64_t next_ns = 0;
@@ -191,7 +197,25 @@ class Hub {
  public:
   virtual ~Hub() = default;
   virtual void heard(Client& client, const std::string& text) = 0;
+  /// Anything that takes time. \return false: it comes too often, close the client
+  virtual bool count(Client& client) = 0;
   virtual void gone(Client& client) = 0;
+};
+
+/// Counts the bytes that a stream reads.
+class CountedBytes {
+ public:
+  std::uint64_t read() const noexcept { return read_; }
+
+ private:
+  friend class beast::rate_policy_access;
+  static constexpr std::size_t kAny = std::numeric_limits<std::size_t>::max();
+  std::size_t available_read_bytes() const noexcept { return kAny; }
+  std::size_t available_write_bytes() const noexcept { return kAny; }
+  void transfer_read_bytes(std::size_t size) noexcept { read_ += size; }
+  void transfer_write_bytes(std::size_t) noexcept {}
+  void on_timer() noexcept {}
+  std::uint64_t read_ = 0;
 };
 
 class WebClient final : public Client {
@@ -201,6 +225,10 @@ class WebClient final : public Client {
 
   void accept(const http::request<http::empty_body>& request) {
     stream_.read_message_max(kLongestMessage);
+    stream_.control_callback([this](websocket::frame_type kind, beast::string_view) {
+      if (kind == websocket::frame_type::close || hub_.count(*this)) return;
+      asio::post(stream_.get_executor(), [self = shared_from_this()] { self->close(); });
+    });
     stream_.set_option(websocket::stream_base::decorator([](websocket::response_type& response) {
       response.set(http::field::sec_websocket_protocol, kSubprotocol);
     }));
@@ -225,10 +253,11 @@ class WebClient final : public Client {
     if (closed) return;
     closed = true;
     Code ignored;
-    stream_.next_layer().shutdown(tcp::socket::shutdown_both, ignored);
-    stream_.next_layer().close(ignored);
+    stream_.next_layer().socket().shutdown(tcp::socket::shutdown_both, ignored);
+    stream_.next_layer().socket().close(ignored);
     hub_.gone(*this);
   }
+  std::uint64_t read_bytes() const override { return stream_.next_layer().rate_policy().read(); }
 
  private:
   void write(const std::string& text) override {
@@ -237,7 +266,7 @@ class WebClient final : public Client {
         [self = shared_from_this(), this](const Code& error, std::size_t) { written(error); });
   }
   Hub& hub_;
-  websocket::stream<tcp::socket> stream_;
+  websocket::stream<beast::basic_stream<tcp, tcp::socket::executor_type, CountedBytes>> stream_;
   beast::flat_buffer buffer_;
 };
 
@@ -256,7 +285,10 @@ class LineClient final : public Client {
                              std::string line = text_.substr(0, size - 1);
                              text_.erase(0, size);
                              if (!line.empty() && line.back() == '\r') line.pop_back();
-                             if (!line.empty()) hub_.heard(*this, line);
+                             if (!line.empty())
+                               hub_.heard(*this, line);
+                             else if (!hub_.count(*this))
+                               return close();
                              begin();
                            });
   }
@@ -354,15 +386,26 @@ class Network::Impl final : public Hub {
     asio::post(io_, [this, text = std::move(text)] { tell_all(text); });
   }
 
-  void heard(Client& client, const std::string& text) override {
+  /// A flooding client would take all of this thread's time.
+  bool count(Client& client) override {
     const std::int64_t now = now_ns();
     if (now - client.second_ns >= 1'000'000'000) {
       client.second_ns = now;
       client.in_second = 0;
+      client.overhead_before = overhead(client);
     }
+    return ++client.in_second <= 2 * kMostMessages;
+  }
+  /// Beast passes over empty fragments of a message without a word.
+  static std::uint64_t overhead(const Client& client) {
+    const std::uint64_t read = client.read_bytes();
+    return read > client.heard_bytes ? read - client.heard_bytes : 0;
+  }
+  void heard(Client& client, const std::string& text) override {
+    const std::int64_t now = now_ns();
+    client.heard_bytes += text.size();
     if (client.role == Client::Role::control) controller_heard_ns_ = now;
-    // Close a flooding client: it would take all of this thread's time.
-    if (++client.in_second > 2 * kMostMessages) return client.close();
+    if (!count(client)) return client.close();
     Message message;
     try {
       message = parse_message(text);
@@ -380,7 +423,7 @@ class Network::Impl final : public Hub {
       return client.close_after_writing();
     }
     if (message.type == MessageType::emergency) {  // bypasses queues and limits
-      hooks_.emergency();
+      hooks_.emergency(client.id);
       client.send(accepted(message.id, {{"t_ns", now_ns()}}));
       return tell_all(event("emergency", now, {{"by", client.id}}));
     }
@@ -391,10 +434,10 @@ class Network::Impl final : public Hub {
   void gone(Client& client) override {
     if (client.role == Client::Role::control) {
       if (hooks_.forces_may_come()) {
-        hooks_.emergency();
+        hooks_.zero();
         tell_all(event("controller_gone", now_ns()));  // from now on no force is commanded
       }
-      command({client.id, true, {}});
+      command({client.id, true, {}, true});
     }
     clients_.erase(client.id);
   }
@@ -444,42 +487,42 @@ class Network::Impl final : public Hub {
     });
     return client;
   }
-  bool full() const {
-    return std::ranges::count_if(
-               clients_,
-               [](const auto& entry) { return entry.second->role == Client::Role::unknown; }) +
-               greetings_ >=
-           static_cast<std::ptrdiff_t>(kMostUnknown);
+  /// A newcomer takes the place of the oldest of its kind that has not said hello: a program
+  /// without the token cannot keep others out. Both kinds have places of their own: the Unix
+  /// socket's belong to the user alone.
+  template <class Kind>
+  void make_room() {
+    std::vector<std::shared_ptr<Client>> unknown;  // the oldest first
+    for (const auto& [id, client] : clients_)
+      if (client->role == Client::Role::unknown && dynamic_cast<Kind*>(client.get()) != nullptr)
+        unknown.push_back(client);
+    if (unknown.size() >= kMostUnknown) unknown.front()->close();
   }
 
   void accept() {
     acceptor_.async_accept([this](const Code& error, tcp::socket socket) {
       if (error == asio::error::operation_aborted) return;
-      if (!error && !full()) read_request(std::move(socket));
+      if (!error) read_request(std::move(socket));
       accept();
     });
   }
   void accept_local() {
     local_acceptor_.async_accept([this](const Code& error, Local::socket socket) {
       if (error == asio::error::operation_aborted) return;
-      if (!error && !full())
+      if (!error) {
+        make_room<LineClient>();
         admit(std::make_shared<LineClient>(++newest_, io_, std::move(socket), *this))->begin();
+      }
       accept_local();
     });
   }
 
   /// The request of a connection before it is a WebSocket.
   struct Greeting {
-    Greeting(tcp::socket socket, std::ptrdiff_t& greetings)
-        : count(greetings), stream(std::move(socket)) {
-      ++count;
+    explicit Greeting(tcp::socket socket) : stream(std::move(socket)) {
       parser.header_limit(8 << 10);
       parser.body_limit(0);
     }
-    ~Greeting() { --count; }
-    Greeting(const Greeting&) = delete;
-    Greeting& operator=(const Greeting&) = delete;
-    std::ptrdiff_t& count;
     beast::tcp_stream stream;
     beast::flat_buffer buffer;
     http::request_parser<http::empty_body> parser;
@@ -488,7 +531,13 @@ class Network::Impl final : public Hub {
   void read_request(tcp::socket socket) {
     Code ignored;
     socket.set_option(tcp::no_delay(true), ignored);
-    auto greeting = std::make_shared<Greeting>(std::move(socket), greetings_);
+    auto greeting = std::make_shared<Greeting>(std::move(socket));
+    std::erase_if(greetings_, [](const auto& other) { return other.expired(); });
+    if (greetings_.size() >= kMostUnknown) {
+      if (const auto oldest = greetings_.front().lock()) oldest->stream.close();
+      greetings_.pop_front();
+    }
+    greetings_.push_back(greeting);
     greeting->stream.expires_after(kHelloPatience);
     http::async_read(greeting->stream, greeting->buffer, greeting->parser,
                      [this, greeting](const Code& error, std::size_t) {
@@ -513,6 +562,7 @@ class Network::Impl final : public Hub {
     if (!offers_subprotocol(request))
       return respond(greeting, http::status::bad_request, "expected the subprotocol palpate.1\n");
     greeting->stream.expires_never();
+    make_room<WebClient>();
     auto client =
         std::make_shared<WebClient>(++newest_, io_, greeting->stream.release_socket(), *this);
     admit(client);
@@ -618,25 +668,29 @@ class Network::Impl final : public Hub {
         client.send(accepted(message.id));
         if (client.role == Client::Role::control) {
           client.role = Client::Role::watch;  // a regular end: closing causes no emergency
-          command({client.id, true, {}});
+          command({client.id, true, {}, true});
         }
         return client.close_after_writing();
       default:
         break;
     }
-    if (client.role != Client::Role::control)
+    const bool controls = client.role == Client::Role::control;
+    if (!controls && !(message.type == MessageType::clear && hooks_.has_emergency(client.id)))
       return refuse("not-controller", "only the controller may send this");
     message.clock_is_known = client.clock.is_known(received_ns);
     message.times_off = hooks_.times_off();
     const std::int64_t id = message.id;
-    if (!command({client.id, false, std::move(message)}))
+    if (!command({client.id, false, std::move(message), controls}))
       client.send(refused(id, {{"busy", "64 messages wait for the session already", ""}}));
   }
 
   bool command(ServeCommand command) {
-    const std::lock_guard lock(mutex_);
-    if (!command.left && commands_.size() >= kMostCommands) return false;
-    commands_.push_back(std::move(command));
+    {
+      const std::lock_guard lock(mutex_);
+      if (!command.left && commands_.size() >= kMostCommands) return false;
+      commands_.push_back(std::move(command));
+    }
+    hooks_.wake();
     return true;
   }
 
@@ -653,6 +707,9 @@ class Network::Impl final : public Hub {
       if (error) return;
       const bool on = hooks_.forces_are_on();
       const std::int64_t now = now_ns();
+      for (const auto& [id, client] : std::map(clients_)) {
+        if (overhead(*client) > client->overhead_before + kMostOverhead) client->close();
+      }
       if (!on) silent_ = false;
       if (on && !silent_ && now - controller_heard_ns_ > kSilence) {
         silent_ = true;
@@ -706,12 +763,12 @@ class Network::Impl final : public Hub {
   NetworkSettings settings_;
   NetworkHooks hooks_;
   struct stat socket_file_ {};
-  std::ptrdiff_t greetings_ = 0;  ///< outlives those that io_ still holds
   asio::io_context io_{1};
   tcp::acceptor acceptor_;
   Local::acceptor local_acceptor_;
   asio::steady_timer watch_timer_, stream_timer_;
   std::map<std::uint64_t, std::shared_ptr<Client>> clients_;
+  std::deque<std::weak_ptr<Greeting>> greetings_;  ///< the oldest first
   std::uint64_t newest_ = 0;
   std::int64_t controller_heard_ns_ = 0;
   bool silent_ = false;

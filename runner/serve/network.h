@@ -25,13 +25,17 @@ struct NetworkSettings {
 
 /// Functions that the network calls in its thread; they must not wait.
 struct NetworkHooks {
-  std::function<void()> emergency, silence;  ///< zero force: at once; by the ramp
+  /// Zero force at once, until this client takes it back. \return false: it had asked before
+  std::function<bool(std::uint64_t client)> emergency;
+  std::function<bool(std::uint64_t client)> has_emergency;  ///< and has not taken it back
+  std::function<void()> zero, silence;                      ///< zero force: at once; by the ramp
   std::function<bool()> forces_are_on;
   std::function<bool()> forces_may_come;     ///< on, or a scene is about to begin
   std::function<std::uint32_t()> times_off;  ///< LiveForces::times_off()
   std::function<nlohmann::json()> state;     ///< an object: part of the answer to hello
   std::function<std::string()> picture;      ///< of the scene: members of an answer, as JSON
   TickStream* ticks = nullptr;
+  std::function<void()> wake;  ///< the session's thread: there is a command
 };
 
 /// 128 bits as 32 hexadecimal digits, from the kernel. \throws std::runtime_error

@@ -68,11 +68,13 @@ class ServeOutput {
 /// Draws the surfaces of objects in the world frame, as members of an answer to `picture`.
 using PictureOf = std::function<std::string(const std::vector<stimuli::ObjectSpec>&)>;
 
-/// A command of the controller, for the session's thread.
+/// A command of the controller, for the session's thread; or a `clear` of whoever asked for zero
+/// force.
 struct ServeCommand {
   std::uint64_t client = 0;
   bool left = false;  ///< the controller has left; there is no message
   Message message;
+  bool controls = true;  ///< it comes from the controller
 };
 
 }  // namespace palpate::runner::serve

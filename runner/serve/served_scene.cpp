@@ -79,6 +79,17 @@ ServedScene::~ServedScene() { emergency_zero(); }
 
 void ServedScene::emergency_zero() noexcept { forces_.off(); }
 
+bool ServedScene::emergency(std::uint64_t client) {
+  const bool first = emergencies_.raise(client);  // before zero force is seen, with its reason
+  forces_.off();
+  return first;
+}
+
+MessageRefused ServedScene::forces_off() const {
+  if (emergencies_.any()) return {emergencies_.why().code, emergencies_.why().words};
+  return {"forces-off", "forces are off (" + held_by_->words + "): clear first"};
+}
+
 json ServedScene::state() const {
   const std::lock_guard lock(mutex_);
   return {{"scene", scene_}};
@@ -148,8 +159,7 @@ void ServedScene::show(const protocols::SceneSpec& spec, const rendering::Render
 void ServedScene::start(std::uint64_t client, const Message& message) {
   if (trial_) throw MessageRefused("running", "a scene is running: stop it first");
   if (scene_.is_null()) throw MessageRefused("no-scene", "load a scene first");
-  if (!held_by_.empty())
-    throw MessageRefused("forces-off", "forces are off (" + held_by_ + "): clear first");
+  if (held_by_ || emergencies_.any()) throw forces_off();
   if (!message.stimulus.empty() || message.level || message.orientation)
     throw MessageRefused("bad-message", "stimulus, level and orientation are for --protocol only");
   const rendering::Renderer& renderer =
@@ -220,10 +230,14 @@ void ServedScene::drop_pending(const std::string& code, const std::string& why) 
 }
 
 void ServedScene::clear(std::uint64_t client, const Message& message) {
+  const std::set<std::uint64_t> lifted = emergencies_.lift(client);
   if (trial_) end_trial();
   const std::string trouble = forces_.allow(stop_, message.times_off);
-  if (!trouble.empty()) throw MessageRefused("forces-off", trouble);
-  held_by_.clear();
+  if (!trouble.empty()) {
+    emergencies_.restore(lifted);
+    throw MessageRefused(emergencies_.any() ? emergencies_.why().code : "forces-off", trouble);
+  }
+  held_by_.reset();
   silent_.store(false);
   tell("cleared", clock_.now_ns());
   output_->reply(client, accepted(message.id));
@@ -290,15 +304,17 @@ void ServedScene::controller_left() {
 }
 
 /// The reason, from the first tick without forces.
-std::string ServedScene::why_off(const servo::Sample& sample) {
-  if (silent_.exchange(false)) return "the client was silent";
-  return safety::fault_words(sample.faults & ~servo::servo_fault::kForceLimited);
+WhyOff ServedScene::reason_of(const servo::Sample& sample) {
+  if (emergencies_.any()) return emergencies_.why();
+  if (silent_.exchange(false)) return {"client-silent", "the client was silent"};
+  return why_off(sample.faults, sample.trouble);
 }
 
 void ServedScene::take_first(const servo::Sample& sample) {
   if (sample.faults & servo::servo_fault::kTripped) {
-    held_by_ = why_off(sample);
-    return drop_pending("forces-off", "forces are off (" + held_by_ + "): clear first");
+    held_by_ = reason_of(sample);
+    const MessageRefused why = forces_off();
+    return drop_pending(why.why().front().code, why.why().front().message);
   }
   if (sample.phase != servo::Phase::feeling) {
     if (clock_.now_ns() - trial_->asked_ns > kStartPatience)
@@ -321,8 +337,8 @@ void ServedScene::take(const servo::Sample& sample) {
   if ((sample.faults & servo::servo_fault::kTripped) != 0 && !trial_->forces_off_sent) {
     trial_->forces_off_sent = true;
     shown_.store(false);
-    held_by_ = why_off(sample);
-    tell("forces_off", sample.time_ns, {{"reason", held_by_}});
+    held_by_ = reason_of(sample);
+    tell("forces_off", sample.time_ns, {{"code", held_by_->code}, {"reason", held_by_->words}});
   }
   if (sample.rendering.contacts > 0) {
     trial_->without_contact = 0;
@@ -345,14 +361,14 @@ void ServedScene::attend() {
     take(*sample);
   }
   if (forces_.newest().trouble == servo::DeviceTrouble::guard_lost) {
-    held_by_ = "the guard process has ended";
-    tell("fault", clock_.now_ns(), {{"reason", held_by_}});
+    held_by_ = {"guard-lost", "the guard process has ended"};
+    tell("fault", clock_.now_ns(), {{"code", held_by_->code}, {"reason", held_by_->words}});
     forces_.end_without_guard();
   }
   if (!trial_ || !patience_.is_over()) return;
   emergency_zero();
-  held_by_ = "the servo gives no more samples";
-  tell("fault", clock_.now_ns(), {{"reason", held_by_}});
+  held_by_ = {"stalled", "the servo gives no more samples"};
+  tell("fault", clock_.now_ns(), {{"code", held_by_->code}, {"reason", held_by_->words}});
   patience_.begin();
 }
 

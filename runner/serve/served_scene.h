@@ -14,6 +14,7 @@
 #include "runner/safety/guarded_device.h"
 #include "runner/serve/messages.h"
 #include "runner/serve/outlets.h"
+#include "runner/serve/why_off.h"
 #include "runner/servo/servo_thread.h"
 #include "runner/session/live_forces.h"
 
@@ -55,6 +56,9 @@ class ServedScene {
 
   /// Commands zero force at once, until `clear`. From any thread.
   void emergency_zero() noexcept;
+  /// The same, until this client takes it back. From any thread. \return false: it had asked before
+  bool emergency(std::uint64_t client);
+  const Emergencies& emergencies() const noexcept { return emergencies_; }
   /// The same by the ramp, because the controller is silent. From any thread.
   void controller_is_silent() noexcept {
     silent_.store(true);
@@ -95,7 +99,8 @@ class ServedScene {
   void clear(std::uint64_t client, const Message& message);
   void take(const servo::Sample& sample);
   void take_first(const servo::Sample& sample);
-  std::string why_off(const servo::Sample& sample);
+  WhyOff reason_of(const servo::Sample& sample);
+  MessageRefused forces_off() const;
   void drop_pending(const std::string& code, const std::string& why);
   void tell(const std::string& name, std::int64_t t_ns,
             const nlohmann::ordered_json& more = nlohmann::ordered_json::object());
@@ -112,7 +117,8 @@ class ServedScene {
   const rendering::Renderer* renderer_ = nullptr;  ///< of the trial
   std::optional<Trial> trial_;
   std::int64_t last_ns_ = 0;  ///< of the newest processed sample
-  std::string held_by_;       ///< reason why forces are off, until `clear`
+  std::optional<WhyOff> held_by_;  ///< reason why forces are off, until `clear`
+  Emergencies emergencies_;
   TickStream ticks_;
   std::atomic<bool> silent_{false};
   std::atomic<bool> shown_{false};  ///< from `start` until its end, or until forces are off

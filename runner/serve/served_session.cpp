@@ -162,7 +162,13 @@ ServedSession::Outcome ServedSession::run_trials() {
       session_.step();
     } catch (const session::SessionFault& fault) {
       in_trial_ = false;
-      held(silent_.exchange(false) ? "the client was silent" : fault.reason);
+      const bool was_silent = silent_.exchange(false);
+      if (emergencies_.any())
+        held(emergencies_.why());
+      else if (was_silent)
+        held({"client-silent", "the client was silent"});
+      else
+        held(why_off(fault.faults, fault.trouble));
       if (fault.trouble == servo::DeviceTrouble::guard_lost)
         return {data::RunEnd::aborted, fault.reason, true};
     } catch (const session::EndOfSession& end) {
@@ -185,6 +191,7 @@ ServedSession::Outcome ServedSession::run_trials() {
     said["faults"] = safety::fault_words(stored_->faults);
     said["next"] = next_trial();
     tell("stored", clock_.now_ns(), said);
+    if (stored_->timed_out && !answer_) timed_out_ = said;
     if (answer_) said["stamped"] = stamped_by(answer_->message);
     if (answer_) output_->reply(answer_->client, accepted(answer_->message.id, said));
     answer_.reset();
@@ -202,17 +209,28 @@ void ServedSession::wait_for_the_end() {
     } catch (const session::EndOfSession&) {
       return;
     }
-    clock_.wait_until(clock_.now_ns() + session::kSessionNap_ns);
+    parts_.servo.bell().wait(session::kSessionNap_ns);
   }
 }
 
-void ServedSession::held(const std::string& reason) {
-  held_by_ = reason;
-  const std::string why = "forces are off (" + reason + "): clear first";
-  refuse(std::exchange(start_, {}), "forces-off", why);
+bool ServedSession::emergency(std::uint64_t client) {
+  const bool first = emergencies_.raise(client);  // before zero force is seen, with its reason
+  forces_.off();
+  return first;
+}
+
+MessageRefused ServedSession::forces_off() const {
+  if (emergencies_.any()) return {emergencies_.why().code, emergencies_.why().words};
+  return {"forces-off", "forces are off (" + held_by_->words + "): clear first"};
+}
+
+void ServedSession::held(const WhyOff& why) {
+  held_by_ = why;
+  const Refusal off = forces_off().why().front();
+  refuse(std::exchange(start_, {}), off.code, off.message);
   keep_under_way();
-  refuse(std::exchange(answer_, {}), "forces-off", why);
-  tell("forces_off", clock_.now_ns(), {{"reason", reason}});
+  refuse(std::exchange(answer_, {}), off.code, off.message);
+  tell("forces_off", clock_.now_ns(), {{"code", why.code}, {"reason", why.words}});
 }
 
 /// \throws EndOfSession, TrialCutOff
@@ -228,7 +246,7 @@ void ServedSession::attend() {
       left();
       continue;
     }
-    controller_ = command.client;
+    if (command.controls) controller_ = command.client;
     const Asked asked{command.client, std::move(command.message)};
     try {
       obey(asked);
@@ -288,10 +306,10 @@ void ServedSession::obey(const Asked& asked) {
 void ServedSession::start(const Asked& asked) {
   if (session_.plan().finished()) throw MessageRefused("over", "the last trial is on record");
   if (in_trial_ || start_) throw MessageRefused("running", "a trial is under way");
-  if (!held_by_.empty())
-    throw MessageRefused("forces-off", "forces are off (" + held_by_ + "): clear first");
+  if (held_by_ || emergencies_.any()) throw forces_off();
   choice_of(asked.message, session_.plan().next());  // refuse a bad choice at once, even in a break
   start_ = asked;
+  timed_out_.reset();
   keep_under_way();
 }
 
@@ -366,6 +384,11 @@ participants::Answer ServedSession::answer_of(const Message& message) const {
 }
 
 void ServedSession::answer(const Asked& asked) {
+  if (!in_trial_ && timed_out_) {
+    const Refusal late{"timed-out", "the time for the answer was over: the trial is on record", ""};
+    const ordered_json more = {{"stored", *timed_out_}, {"next", (*timed_out_)["next"]}};
+    return output_->reply(asked.client, refused(asked.message.id, {late}, more));
+  }
   if (!in_trial_ || onset_ns_ == 0)
     throw MessageRefused("nothing-felt", "no trial is running: start first");
   if (given_) throw MessageRefused("answered", "the trial is answered");
@@ -389,10 +412,14 @@ void ServedSession::answer(const Asked& asked) {
 
 void ServedSession::clear(const Asked& asked) {
   if (in_trial_) throw MessageRefused("running", "a trial is under way");
+  const std::set<std::uint64_t> lifted = emergencies_.lift(asked.client);
   const std::string trouble =
       forces_.allow([this] { return parts_.end_requested() != 0; }, asked.message.times_off);
-  if (!trouble.empty()) throw MessageRefused("forces-off", trouble);
-  held_by_.clear();
+  if (!trouble.empty()) {
+    emergencies_.restore(lifted);
+    throw MessageRefused(emergencies_.any() ? emergencies_.why().code : "forces-off", trouble);
+  }
+  held_by_.reset();
   silent_.store(false);
   tell("cleared", clock_.now_ns());
   output_->reply(asked.client, accepted(asked.message.id));
@@ -406,7 +433,7 @@ void ServedSession::rest(const std::string& text, std::int64_t until_ns) {
   tell("rest", clock_.now_ns(), {{"text", text}, {"until_ns", until_ns}});
   while (clock_.now_ns() < until_ns) {
     attend();
-    clock_.wait_until(std::min(until_ns, clock_.now_ns() + session::kSessionNap_ns));
+    parts_.servo.bell().wait(std::min(until_ns - clock_.now_ns(), session::kSessionNap_ns));
   }
 }
 
@@ -421,7 +448,7 @@ std::optional<protocols::TrialChoice> ServedSession::choose(const protocols::Tri
       start_.reset();
       keep_under_way();
     }
-    clock_.wait_until(clock_.now_ns() + session::kSessionNap_ns / 5);
+    parts_.servo.bell().wait(session::kSessionNap_ns);
   }
 }
 
@@ -472,7 +499,7 @@ void ServedSession::cut_off(const std::string& reason) {
   stop_.reset();
   refuse(std::exchange(start_, {}), "stopped", "the trial was cut off: " + reason);
   keep_under_way();
-  if (answer_ && held_by_.empty())
+  if (answer_ && !held_by_)
     refuse(std::exchange(answer_, {}), "stopped", "the trial was cut off: " + reason);
 }
 

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "runner/serve/outlets.h"
+#include "runner/serve/why_off.h"
 #include "runner/session/live_forces.h"
 #include "runner/session/session.h"
 #include "runner/session/station.h"
@@ -50,6 +51,9 @@ class ServedSession final : public participants::Respondent, public session::Ses
 
   /// Commands zero force at once, until `clear`. From any thread.
   void emergency_zero() noexcept { forces_.off(); }
+  /// The same, until this client takes it back. From any thread. \return false: it had asked before
+  bool emergency(std::uint64_t client);
+  const Emergencies& emergencies() const noexcept { return emergencies_; }
   /// The same by the ramp, because the controller is silent. From any thread.
   void controller_is_silent() noexcept {
     silent_.store(true);
@@ -104,7 +108,8 @@ class ServedSession final : public participants::Respondent, public session::Ses
   void keep_state();
   void keep_under_way() noexcept { under_way_.store(start_.has_value() || in_trial_); }
   void draw(const protocols::Trial& trial);
-  void held(const std::string& reason);
+  void held(const WhyOff& why);
+  MessageRefused forces_off() const;
   void refuse(const std::optional<Asked>& asked, const std::string& code, const std::string& why);
   void tell(const std::string& name, std::int64_t t_ns,
             const nlohmann::ordered_json& more = nlohmann::ordered_json::object());
@@ -128,9 +133,11 @@ class ServedSession final : public participants::Respondent, public session::Ses
   servo::Waiting waits_for_ = servo::Waiting::nothing;
   std::int64_t waits_since_ns_ = 0;
 
+  std::optional<nlohmann::ordered_json> timed_out_;  ///< what was told of it; until the next start
   std::optional<data::TrialRecord> stored_;  ///< the trial stored last, without samples
   std::uint64_t controller_ = 0;  ///< the client that sent a command last; 0: none, or it has left
-  std::string held_by_;           ///< reason why forces are off, until `clear`
+  std::optional<WhyOff> held_by_;  ///< reason why forces are off, until `clear`
+  Emergencies emergencies_;
   std::atomic<bool> silent_{false};
   std::atomic<bool> under_way_{false};  ///< start_, or in_trial_
   mutable std::mutex mutex_;            ///< guards the next two: this thread writes, others read

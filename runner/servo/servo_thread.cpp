@@ -203,7 +203,8 @@ namespace {
 
 using std::chrono::steady_clock;
 
-constexpr auto kNap = std::chrono::milliseconds(4);  // sleep of the session while no sample is new
+constexpr std::int64_t kNap_ns = 4'000'000;  // the session waits while no sample is new
+constexpr auto kShortNap = std::chrono::microseconds(250);  // the same, once it has news
 constexpr std::size_t kPlaces = 4096;                // ticks
 constexpr auto kPatience = std::chrono::seconds(1);
 constexpr auto kPatienceWithoutMotors = std::chrono::seconds(10);
@@ -290,6 +291,7 @@ void ServoThread::take_requests() noexcept {
     away_.store(0);
     if (lost_samples_) quality_.faults |= servo_fault::kSamplesLost;
     stops_done_.store(asked, std::memory_order_release);
+    bell_.ring();
   }
 }
 
@@ -331,6 +333,8 @@ void ServoThread::publish(const Sample& sample) noexcept {
   off_.store((sample.faults & servo_fault::kTripped) != 0 || sample.phase != Phase::feeling);
   health_.add(sample, servo_.period_ns());
   latest_.write(sample);
+  const bool begins = sample.phase == Phase::feeling && !feels_;
+  feels_ = sample.phase == Phase::feeling;
   if (sample.phase == Phase::idle) return;
   if (!gap_) {
     gap_ = !hand_over(sample);
@@ -339,6 +343,7 @@ void ServoThread::publish(const Sample& sample) noexcept {
     after_gap.faults |= servo_fault::kSamplesLost;
     gap_ = !hand_over(after_gap);
   }
+  if (begins) bell_.ring();
   if (!gap_) return;
   lost_samples_ = true;
   health_.add_lost_sample();
@@ -369,12 +374,16 @@ void ServoThread::prepare(const rendering::Scene& scene, const rendering::Render
 
 const Sample& ServoThread::next() noexcept {
   Patience patience(has_motors_);
+  bool news = false;
   while (next_now() == nullptr) {
     if (patience.is_over()) {
       popped_.faults |= servo_fault::kStalled | servo_fault::kTripped;
       return popped_;
     }
-    std::this_thread::sleep_for(kNap);
+    if (news)
+      std::this_thread::sleep_for(kShortNap);
+    else
+      news = bell_.wait(kNap_ns);
   }
   return popped_;
 }
@@ -402,7 +411,7 @@ ServoQuality ServoThread::stop() noexcept {
       stalled.faults = servo_fault::kStalled | servo_fault::kTripped;
       return stalled;
     }
-    std::this_thread::sleep_for(kNap);
+    bell_.wait(kNap_ns);
   }
   scene_set_ = false;
   return quality_;

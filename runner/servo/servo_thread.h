@@ -19,6 +19,7 @@
 #include <vector>
 
 #include "rendering/bodies/soft/soft_scene.h"
+#include "runner/servo/bell.h"
 #include "runner/servo/realtime.h"
 #include "runner/servo/ring.h"
 #include "runner/servo/sample.h"
@@ -243,6 +244,9 @@ class ServoThread final : public TickSource {
   void fade_out() noexcept { servo_.fade_out(); }
   void clear_fault() noexcept { servo_.clear_fault(); }
   void clear_trip() noexcept { servo_.clear_trip(); }
+  /// Ends the session's waits in next() and stop() early, and those of its owner: rung when forces
+  /// begin, when a scene has stopped, and by whoever has news for the session.
+  Bell& bell() noexcept { return bell_; }
   /// True once the device was commanded zero force after emergency_zero(). Signal safe.
   bool forces_are_off() const noexcept { return off_.load(); }
 
@@ -302,10 +306,12 @@ class ServoThread final : public TickSource {
   std::optional<rendering::LineProbe> felt_at_;  ///< m, the stylus in its last tick
   bool waits_ = false;                           ///< waits for the stylus to resume
   std::uint32_t steps_left_ = 0;                 ///< 0: no limit
+  bool feels_ = false;                           ///< in the last tick
   bool gap_ = false;           ///< samples were lost since the last one in the ring
   bool lost_samples_ = false;  ///< in this trial
   std::atomic<bool> off_{true}, quit_{false};
   std::atomic<int> thread_id_{0};
+  Bell bell_;
   Sample popped_;
   std::vector<rendering::BodyPose> popped_bodies_;  ///< used by the session's thread, with popped_
   std::jthread thread_;

@@ -82,6 +82,7 @@
     const {event: name, t_ns, ...more} = event;
     if (kOn.has(name)) say('forces on', 'on');
     if (kOff.has(name)) say('forces off', '');
+    if (name === 'cleared') $('allow').hidden = true;
     if (kAlarm.has(name)) say(more.reason ? `forces off: ${more.reason}` : 'forces off', 'off');
     if (name === 'started') forces.length = 0;
     if (name === 'loaded' || name === 'set' || name === 'started') picture().catch(fail);
@@ -113,12 +114,14 @@
     socket.onopen = () => begin().catch(fail);
     socket.onmessage = event => take(JSON.parse(event.data));
     socket.onclose = () => {
-      $('off').hidden = true;
+      $('off').hidden = $('allow').hidden = true;
       if ($('state').className !== 'off') say('the server has gone', 'off');
     };
   }
-  const off = () => socket?.readyState === WebSocket.OPEN && ask('emergency').catch(fail);
+  const off = () => socket?.readyState === WebSocket.OPEN &&
+      ask('emergency').then(() => $('allow').hidden = false).catch(fail);
   $('off').addEventListener('click', off);
+  $('allow').addEventListener('click', () => ask('clear').catch(fail));
 
   // ---- the pictures ----------------------------------------------------------------------------
 

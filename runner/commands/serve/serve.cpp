@@ -1,12 +1,12 @@
+#include <poll.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include <chrono>
+#include <array>
 #include <filesystem>
 #include <fstream>
 #include <iostream>
 #include <optional>
-#include <thread>
 
 #include "data/base/text.h"
 #include "data/files/atomic_file.h"
@@ -97,12 +97,25 @@ class TokenFile {
   bool written_ = false;
 };
 
-/// The scene's or session's thread beside the network's: what both kinds of server have.
-class Server {
+/// Lines typed at the server's terminal. Never waits. In the background it reads nothing, which
+/// would stop the program.
+std::string typed_now() {
+  const pid_t in_front = ::tcgetpgrp(STDIN_FILENO);  // -1: not the terminal that controls it
+  if (::isatty(STDIN_FILENO) == 0 || (in_front >= 0 && in_front != ::getpgrp())) return "";
+  pollfd input{STDIN_FILENO, POLLIN, 0};
+  std::array<char, 256> text;
+  if (::poll(&input, 1, 0) <= 0 || (input.revents & POLLIN) == 0) return "";
+  const ssize_t size = ::read(STDIN_FILENO, text.data(), text.size());
+  return size > 0 ? std::string(text.data(), static_cast<std::size_t>(size)) : "";
+}
+
+/// The scene's or session's thread beside the network's: what both kinds of server have. Replies
+/// to the person at its terminal go to standard error.
+class Server final : public serve::ServeOutput {
  public:
   Server(const po::variables_map& values, safety::FaultSignals& signals)
       : values_(values), signals_(signals), network_(settings_of(values)) {}
-  ~Server() {
+  ~Server() override {
     network_.end();  // first: it calls the served object
     signals_.watch(static_cast<servo::ServoThread*>(nullptr));
     signals_.watch(static_cast<safety::GuardedDevice*>(nullptr));
@@ -110,7 +123,25 @@ class Server {
   Server(const Server&) = delete;
   Server& operator=(const Server&) = delete;
 
-  serve::Network& network() { return network_; }
+  void reply(std::uint64_t client, std::string text) override {
+    if (client != serve::Emergencies::kHere) return network_.reply(client, std::move(text));
+    protocols::FaultList none("reply");
+    const nlohmann::json said = protocols::read_json(text, none);
+    std::cerr << (said["ok"] ? "cleared" : said["error"]["message"].get<std::string>())
+              << std::endl;
+  }
+  void tell(std::string text) override { network_.tell(std::move(text)); }
+
+  /// Commands of clients, and of the person at the terminal.
+  std::vector<serve::ServeCommand> commands() {
+    std::vector<serve::ServeCommand> out = network_.commands();
+    if (typed_now() != "clear\n") return out;
+    serve::Message clear;
+    clear.type = serve::MessageType::clear;
+    clear.times_off = times_off_();
+    out.push_back({serve::Emergencies::kHere, false, std::move(clear), false});
+    return out;
+  }
   /// Prints the address and starts answering. \param served  a ServedScene or ServedSession
   template <class Served>
   void begin(Served& served, servo::ServoThread& servo) {
@@ -122,14 +153,28 @@ class Server {
     serving["token"] = token_;
     serving["page"] = "http://127.0.0.1:" + std::to_string(network_.port()) + "/#" + token_;
     token_file_.emplace(text_of(values_, "token-file"), network_.port(), serving.dump());
-    network_.begin({.emergency = [&served] { served.emergency_zero(); },
-                    .silence = [&served] { served.controller_is_silent(); },
-                    .forces_are_on = [&servo] { return !servo.forces_are_off(); },
-                    .forces_may_come = [&served] { return served.forces_may_come(); },
-                    .times_off = [&served] { return served.times_off(); },
-                    .state = [&served] { return served.state(); },
-                    .picture = [&served] { return served.picture(); },
-                    .ticks = &served.ticks()});
+    times_off_ = [&served] { return served.times_off(); };
+    network_.begin(
+        {.emergency =
+             [&served](std::uint64_t client) {
+               const bool first = served.emergency(client);
+               if (first)
+                 std::cerr << "emergency by client " << client
+                           << ": forces are off until it clears them, or the word clear "
+                              "is typed here\n";
+               return first;
+             },
+         .has_emergency =
+             [&served](std::uint64_t client) { return served.emergencies().raised_by(client); },
+         .zero = [&served] { served.emergency_zero(); },
+         .silence = [&served] { served.controller_is_silent(); },
+         .forces_are_on = [&servo] { return !servo.forces_are_off(); },
+         .forces_may_come = [&served] { return served.forces_may_come(); },
+         .times_off = times_off_,
+         .state = [&served] { return served.state(); },
+         .picture = [&served] { return served.picture(); },
+         .ticks = &served.ticks(),
+         .wake = [&servo] { servo.bell().ring(); }});
     // The token is in the file, where one is asked for: not in a log as well.
     if (values_.count("token-file") > 0) {
       serving.erase("token");
@@ -155,6 +200,7 @@ class Server {
   const po::variables_map& values_;
   safety::FaultSignals& signals_;
   std::string token_;
+  std::function<std::uint32_t()> times_off_;
   serve::Network network_;
   std::optional<TokenFile> token_file_;
 };
@@ -164,6 +210,8 @@ void tell_of_servo(const servo::ServoThread& servo) {
   std::cerr << "palpate serve ends: " << health.ticks() << " ticks, " << health.missed_ticks()
             << " missed\n";
 }
+
+constexpr std::int64_t kNap_ns = 2'000'000;  // between two looks at the servo's samples
 
 int serve_scene(const po::variables_map& values, const RunSettings& run) {
   const devices::DeviceKind& kind = find_device_kind(run.device);
@@ -194,19 +242,19 @@ int serve_scene(const po::variables_map& values, const RunSettings& run) {
                             .servo = servo,
                             .picture = picture_of});
   Server server(values, signals);
-  scene.answer_through(server.network());
+  scene.answer_through(server);
   scene.give_up_when([&signals] { return signals.end_requested() != 0; });
   server.begin(scene, scene.servo());
   try {
     while (signals.end_requested() == 0) {
-      for (const serve::ServeCommand& command : server.network().commands()) {
+      for (const serve::ServeCommand& command : server.commands()) {
         if (command.left)
           scene.controller_left();
         else
           scene.obey(command.client, command.message);
       }
       scene.attend();
-      std::this_thread::sleep_for(std::chrono::milliseconds(2));
+      scene.servo().bell().wait(kNap_ns);
     }
   } catch (const session::EndOfSession& end) {
     scene.emergency_zero();
@@ -253,6 +301,14 @@ int serve_session(const RunSettings& settings, const po::variables_map& values) 
     std::cerr << resumed << "\n";
 
   record.note(clock.now_ns(), R"({"served":{"preflight":"left out"}})");
+  if (protocol.masking_noise) {
+    std::cerr << "WITHOUT the protocol's masking noise, which needs palpate run\n";
+    record.note(clock.now_ns(), R"({"masking_noise":"left out"})");
+  }
+  if (protocol.sounds) {
+    std::cerr << "WITHOUT the protocol's sounds, which need palpate run\n";
+    record.note(clock.now_ns(), R"({"sounds":"left out"})");
+  }
   for (const std::string& note : admission.notes) record.note(clock.now_ns(), note);
   if (!limited.empty())
     record.note(clock.now_ns(), session::to_json_text(limited, device, protocol.servo_rate));
@@ -268,7 +324,7 @@ int serve_session(const RunSettings& settings, const po::variables_map& values) 
   Server server(values, signals);
   server.begin(served, servo);
   const serve::ServedSession::Outcome outcome =
-      served.run(server.network(), [&server] { return server.network().commands(); });
+      served.run(server, [&server] { return server.commands(); });
   served.emergency_zero();
   tell_of_servo(servo);
   if (!outcome.reason.empty()) std::cerr << outcome.reason << "\n";
@@ -280,6 +336,10 @@ int serve(const po::variables_map& values) {
   run.device = text_of(values, "device");
   run.calibration = text_of(values, "calibration");
   run.without_calibration = values["without-calibration"].as<bool>();
+  run.firmware = text_of(values, "firmware");
+  run.library = text_of(values, "library");
+  run.service = text_of(values, "service");
+  if (values.count("serial") > 0) run.serials = values["serial"].as<std::vector<std::string>>();
   const int port = values["port"].as<int>();
   if (port < 0 || port > 65535) throw UsageError("--port: expected a number from 0 to 65535");
   const bool recorded = values.count("protocol") > 0;
@@ -349,6 +409,11 @@ int serve_command(const std::vector<std::string>& args) {
        "pages from there may connect; repeatable")  //
       ("rate", po::value<double>()->value_name("HZ")->default_value(1000, "1000"),
        "of the servo; with --protocol the protocol's")  //
+      ("serial", po::value<std::vector<std::string>>()->composing()->value_name("NUMBER"),
+       "which device; two of a stylus: twice, tip first")                                   //
+      ("firmware", po::value<std::string>()->value_name("FILE"), "as for palpate run")      //
+      ("library", po::value<std::string>()->value_name("FILE"), "as for palpate run")       //
+      ("service", po::value<std::string>()->value_name("HOST:PORT"), "as for palpate run")  //
       ("calibration", po::value<std::string>()->value_name("FILE"),
        "of the device, as for palpate run")  //
       ("without-calibration", po::bool_switch(), "a device that was not calibrated may be used");

@@ -9,6 +9,7 @@ import asyncio
 import json
 import pathlib
 import sys
+import threading
 import time
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "palpate"))
@@ -16,7 +17,8 @@ from client import AsyncClient, ServeError  # noqa: E402  with the module: from 
 
 SCENE = {"objects": [{"shape": "sphere", "radius_m": 0.03, "stiffness_n_per_m": 100}]}
 FRAME = 1 / 60  # s
-MAY_COME_AGAIN = ("forces-off", "not-started", "stopped")  # then the scene is put there again
+MAY_COME_AGAIN = ("emergency", "forces-off", "not-started", "stopped")  # then the scene is put there again
+FOREVER = 1e9  # s
 
 
 def to_engine(v):
@@ -39,25 +41,59 @@ class Stylus:
         self.touched = bool((samples["object"] >= 0).any())  # a tap between two frames is not lost
 
 
-async def felt(hand):
-    """Keeps the scene before the hand, also after forces went off. Ends with what only a person can mend."""
+class Person:
+    """Whoever presses Enter at this program's terminal."""
+
+    def __init__(self):
+        self.loop, self.pressed = asyncio.get_running_loop(), None
+        threading.Thread(target=self._listen, daemon=True).start()
+
+    def _listen(self):
+        for _ in sys.stdin:
+            self.loop.call_soon_threadsafe(self._press)
+
+    def _press(self):
+        if self.pressed is not None and not self.pressed.done():
+            self.pressed.set_result(None)
+
+    async def agrees(self):
+        """Only what is pressed from now on counts."""
+        print("Look what it was, then press Enter: forces come again.", file=sys.stderr, flush=True)
+        self.pressed = self.loop.create_future()
+        await self.pressed
+
+
+async def forces_may_come(hand, person, code):
+    """Until a person says so; an emergency is cleared where it was raised."""
+    if code == "emergency":
+        await hand.wait_for("cleared", FOREVER)
+        return
     while True:
+        await person.agrees()
         try:
-            await hand.start(renderer="ray")
-            off = await hand.wait_for(("forces_off", "fault"), 1e6)
-            print(f"forces are off: {off['reason']}", file=sys.stderr)
-        except ServeError as error:
-            if error.code not in MAY_COME_AGAIN:
-                raise
-            print(error, file=sys.stderr)
-        await hand.stop()
-        try:
-            await hand.clear()
+            return await hand.clear()
         except ServeError as error:  # as while the device is unplugged
             if error.code not in MAY_COME_AGAIN:
                 raise
             print(error, file=sys.stderr)
-            await asyncio.sleep(1)
+
+
+async def felt(hand):
+    """Keeps the scene before the hand, also after forces went off."""
+    person = Person()
+    while True:
+        try:
+            await hand.start(renderer="ray")
+            off = await hand.wait_for(("forces_off", "fault"), FOREVER)
+            code = off["code"]
+            print(f"forces are off: {off['reason']}", file=sys.stderr)
+            await hand.stop()
+        except ServeError as error:
+            if error.code not in MAY_COME_AGAIN:
+                raise
+            code = error.code
+            print(f"forces are off: {error}", file=sys.stderr)
+        await forces_may_come(hand, person, code)
 
 
 async def run(token_file, frames):

@@ -13,7 +13,8 @@ import sys
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "palpate"))
 from client import Client, ServeError  # noqa: E402  with the module: from palpate import Client, ServeError
 
-MAY_COME_AGAIN = ("forces-off", "stopped", "nothing-felt")  # the trial is shown again
+MAY_COME_AGAIN = ("emergency", "forces-off", "stopped", "nothing-felt")  # the trial is shown again
+FOREVER = 1e9  # s
 
 
 class Window:
@@ -35,6 +36,18 @@ def wait_keys(choices, pressed):
     return key
 
 
+def wait_for_person(hand, window, error, pressed):
+    """Forces come again only when a person says so."""
+    if error.code == "emergency":
+        window.message(str(error))
+        hand.wait_for("cleared", FOREVER)
+        return
+    window.message(f"{error}. Look what it was, then press g to go on.")
+    if not pressed:
+        wait_keys(["g"], pressed)
+    hand.clear()
+
+
 def felt_trial(hand, window, stimulus, renderer, keys, pressed):
     """Until it is on record: forces may go off before, as where the stylus is torn away."""
     while True:
@@ -45,10 +58,11 @@ def felt_trial(hand, window, stimulus, renderer, keys, pressed):
             window.flip()
             return hand.answer(keys[wait_keys(list(keys), pressed)])
         except ServeError as error:
+            if error.code == "timed-out":
+                return error.stored
             if error.code not in MAY_COME_AGAIN:
                 raise
-            window.message(str(error))
-            hand.clear()
+            wait_for_person(hand, window, error, pressed)
 
 
 def main():
@@ -64,7 +78,7 @@ def main():
         while hand.next is not None:
             keys = {str(i + 1): name for i, name in enumerate(hand.next["answers"])}
             trial = felt_trial(hand, window, chance.choice(hand.next["stimuli"]), "ray", keys, pressed)
-            row = {name: trial[name] for name in ("trial", "stimulus", "renderer", "response", "correct", "response_time_s")}
+            row = {name: trial[name] for name in ("trial", "stimulus", "renderer", "response", "correct", "timed_out", "response_time_s")}
             if table is None:
                 table = csv.DictWriter(file, row)
                 table.writeheader()

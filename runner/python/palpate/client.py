@@ -44,9 +44,11 @@ LONGEST_LINE = 4 << 20  # bytes
 class ServeError(RuntimeError):
     """The server refused a message, or has gone. `code` is for programs, `place` a JSON pointer."""
 
-    def __init__(self, code: str, message: str, place: str = "", faults: Sequence[Mapping[str, str]] = ()) -> None:
+    def __init__(self, code: str, message: str, place: str = "", faults: Sequence[Mapping[str, str]] = (),
+                 stored: Optional[Mapping[str, Any]] = None) -> None:
         super().__init__(f"{code}: {message}" + (f" ({place})" if place else ""))
         self.code, self.message, self.place, self.faults = code, message, place, list(faults)
+        self.stored = stored  #: of "timed-out": the trial as it is on record
 
 
 class Clock(NamedTuple):
@@ -217,6 +219,8 @@ class _Inbox:
             self._rows.extend(message["stream"])
             self.dropped += message["dropped"]
         elif "event" in message:
+            if message["event"] == "stored":  # also of a trial that timed out, which nobody has answered
+                self._take_next(message)
             self._events.append(message)
         else:
             self._events.append({"event": "refused", **message["error"]})
@@ -266,7 +270,7 @@ def _columns(rows: Sequence[Sequence[float]], fields: Sequence[str]) -> Dict[str
 
 def _answer_of(reply: Mapping[str, Any]) -> Dict[str, Any]:
     if not reply["ok"]:
-        raise ServeError(**reply["error"])
+        raise ServeError(**reply["error"], stored=reply.get("stored"))
     return {key: value for key, value in reply.items() if key not in ("re", "ok")}
 
 
@@ -424,6 +428,8 @@ class Client(_Inbox):
         """Ends the trial; what it was like: response_time_s, first_contact_s, missed_ticks and more.
 
         With a protocol this returns once the trial is on record; `next` is what is due then, None behind the last one.
+        Where the protocol's time was over before, it raises ServeError with the code "timed-out" and the trial as
+        `stored`; the event "stored" has told it at that time.
         `t_ns`: when it was given, by the server's clock, which clock() must have measured within 1 ms; without it the
         server's time of arrival counts. `stamped` says which: "client" or "arrival". `correct`: of an external block; without it whether the response is the stimulus.
         """
@@ -445,11 +451,12 @@ class Client(_Inbox):
         self.ask("note", text=text)
 
     def emergency(self) -> None:
-        """Zero force at once, until clear()."""
+        """Zero force at once, until clear() of this client or of a person at the server."""
         self.ask("emergency")
 
     def clear(self) -> None:
-        """Allows forces again."""
+        """Allows forces again; for a person to say. Another client's emergency is refused with the code "emergency":
+        the event "cleared" tells when it is over."""
         self.ask("clear")
 
     def clock(self, times: int = 10) -> Clock:
@@ -782,7 +789,8 @@ def pipe(hand: Client, lines: Iterable[str], out: TextIO) -> None:
             print(json.dumps({"ok": True, **answer}), file=out, flush=True)
         except ServeError as error:
             refusal = {"code": error.code, "message": error.message, "place": error.place}
-            print(json.dumps({"ok": False, "error": refusal}), file=out, flush=True)
+            late = {} if error.stored is None else {"stored": error.stored, "next": hand.next}
+            print(json.dumps({"ok": False, "error": refusal, **late}), file=out, flush=True)
         except (AttributeError, KeyError, TypeError, ValueError) as error:
             refusal = {"code": "bad-message", "message": f"no message: {error}", "place": ""}
             print(json.dumps({"ok": False, "error": refusal}), file=out, flush=True)

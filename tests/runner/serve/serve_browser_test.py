@@ -169,6 +169,30 @@ class Pages(ServeCase):
                 self.assertGreater(one["t_ns"], of_page - 1e6 * one["clock_within_ms"])
         self.assertEqual({one["response"] for one in data}, {"ball", "box"})
 
+    def test_trials_whose_time_is_over_are_data_too(self):
+        block = {**PROTOCOL["blocks"][0], "time_out_s": 0.3}
+        process = self.open_block(protocol={**PROTOCOL, "blocks": [block]})
+        self.run_block()
+        self.until("document.querySelector('[data-choice=\"go on\"]')?.click(), window.failed || window.data !== undefined")
+        self.assertIsNone(self.browser.run("window.failed ?? null"))
+        self.assertEqual([(one["trial"], one["timed_out"], one["response"], one["rt"]) for one in self.browser.run("window.data")],
+                         [(trial, True, None, None) for trial in range(1, 7)])
+        self.assertEqual(process.wait(PATIENCE), 0)
+
+    def test_a_block_is_simulated(self):
+        process = self.open_block(PAGE.replace("jsPsych.run(", "jsPsych.simulate(").replace("})));", "})), window.mode);", 1))
+        self.browser.run("window.mode = 'data-only'")
+        self.run_block()
+        self.until("window.failed || window.data !== undefined")
+        self.assertIsNone(self.browser.run("window.failed ?? null"))
+        self.assertEqual({one["response"] for one in self.browser.run("window.data")} - {"ball", "box"}, set())
+        self.browser.run("window.data = undefined, window.mode = 'visual'")
+        self.run_block()
+        self.until("document.querySelector('[data-choice=\"go on\"]')?.click(), window.failed || window.data !== undefined")
+        self.assertIsNone(self.browser.run("window.failed ?? null"))
+        self.assertEqual([one["trial"] for one in self.browser.run("window.data")], list(range(1, 7)))
+        self.assertEqual(process.wait(PATIENCE), 0)
+
     def test_a_block_ends_with_the_server(self):
         process = self.open_block()
         self.browser.run(f"""void (async () => {{
@@ -294,8 +318,13 @@ window.ready = true;
                 picture.write_bytes(self.browser.screenshot())
             self.browser.run("document.getElementById('off').click()")
             off = hand.wait_for("forces_off", PATIENCE)
-            self.assertIn("emergency", off["reason"])
+            self.assertEqual(off["code"], "emergency")
             self.until("document.getElementById('state').className === 'off'")
+            hand.stop()
+            self.refused("emergency", hand.clear)
+            self.browser.run("document.getElementById('allow').click()")
+            hand.wait_for("cleared", PATIENCE)
+            self.until("document.getElementById('allow').hidden")
         self.browser.open_url(self.said["page"].split("#")[0])
         self.until("document.getElementById('state').textContent.includes('no token')")
 

@@ -4,6 +4,7 @@ Usage: serve_clients_test.py PALPATE PROTOCOLS CLIENT.py
 """
 
 import asyncio
+import contextlib
 import csv
 import importlib.util
 import io
@@ -14,6 +15,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import threading
 import time
 import unittest
 
@@ -32,14 +34,26 @@ PROTOCOL = {
 }
 
 
+def agrees(program):
+    """A person who presses Enter now and again: on a busy machine the servo may take the forces off."""
+
+    def press():
+        with contextlib.suppress(OSError, ValueError):
+            while program.poll() is None:
+                program.stdin.write("\n")
+                program.stdin.flush()
+                time.sleep(0.3)
+    threading.Thread(target=press, daemon=True).start()
+
+
 class Clients(ServeCase):
     def setUp(self):
         super().setUp()
         self.token = self.dir / "token.json"
         self.db = self.dir / "study.db"
 
-    def record(self):
-        (self.dir / "p.json").write_text(json.dumps(PROTOCOL))
+    def record(self, **block):
+        (self.dir / "p.json").write_text(json.dumps({**PROTOCOL, "blocks": [{**PROTOCOL["blocks"][0], **block}]}))
         process = self.run_server([PALPATE, "serve", "--device", "simulated", "--protocol", self.dir / "p.json", "--db", self.db,
                                    "--participant", "P01", "--token-file", self.token])
         self.said = json.loads(self.token.read_text())
@@ -58,6 +72,19 @@ class Clients(ServeCase):
             raise AssertionError(f"it does not end; it said: {hang.stdout}\n{hang.stderr}") from hang
         self.assertEqual(done.returncode, 0, done.stderr)
         return done.stdout
+
+    def run_with_a_person(self, *command):
+        program = subprocess.Popen(list(map(str, command)), stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+                                   stderr=subprocess.PIPE, text=True, cwd=self.dir)
+        self.addCleanup(program.kill)
+        agrees(program)
+        said = []
+        for stream in (program.stdout, program.stderr):
+            said.append([])
+            threading.Thread(target=lambda where, to: to.extend(where), args=(stream, said[-1]), daemon=True).start()
+        self.assertEqual(program.wait(PATIENCE), 0, said)
+        time.sleep(0.2)  # until its last words were read
+        return "".join(said[0])
 
     def assert_on_record(self, table):
         """A table of trial, stimulus, response, correct and response time against the record."""
@@ -206,9 +233,44 @@ class Clients(ServeCase):
         with open(out, newline="") as table:
             self.assert_on_record(list(csv.DictReader(table)))
 
+    def test_a_trial_whose_time_is_over_does_not_end_the_experiment(self):
+        process = self.record(time_out_s=0.2)
+        with self.client() as hand:
+            while hand.next["trial"] == 1:
+                try:
+                    hand.start(stimulus="ball", trial=1)
+                    stored = self.one_of(hand, "stored", "forces_off")
+                    if stored["event"] == "stored":
+                        break
+                except ServeError as error:
+                    self.assertEqual(error.code, "forces-off")
+                hand.clear()
+            self.assertEqual((stored["trial"], stored["timed_out"]), (1, True))
+            self.assertEqual(hand.next["trial"], 2)
+            late = self.refused("timed-out", hand.answer, "ball")
+            self.assertEqual((late.stored["trial"], late.stored["next"]["trial"]), (1, 2))
+        out = self.dir / "trials.csv"
+        eye = self.client(role="watch")
+        program = subprocess.Popen([sys.executable, EXAMPLES / "serve_trials.py", self.token, "--out", out], text=True,
+                                   stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+        self.addCleanup(lambda: (program.kill(), program.communicate()))
+
+        def press():
+            with contextlib.suppress(OSError, ValueError, ServeError):
+                while program.poll() is None:  # always too late
+                    came = eye.wait_for(("stored", "forces_off"), PATIENCE)
+                    program.stdin.write("1\n" if came["event"] == "stored" else "1\ng\n")
+                    program.stdin.flush()
+        threading.Thread(target=press, daemon=True).start()
+        self.assertEqual(program.wait(PATIENCE), 0, program.stderr.read())
+        self.assertEqual(process.wait(PATIENCE), 0)
+        self.assertEqual([row["timed_out"] for row in self.rows()], ["1", "1", "1"])
+        with open(out, newline="") as table:
+            self.assertEqual([(row["trial"], row["timed_out"]) for row in csv.DictReader(table)], [("2", "True"), ("3", "True")])
+
     def test_frames_of_a_game_engine(self):
         self.serve("--token-file", self.token, scene=False)
-        frames = [json.loads(line) for line in self.run_program(
+        frames = [json.loads(line) for line in self.run_with_a_person(
             sys.executable, EXAMPLES / "serve_frames.py", self.token, "--frames", 60).splitlines()]
         self.assertEqual([frame["frame"] for frame in frames], list(range(60)))
         for frame in frames:
@@ -220,14 +282,18 @@ class Clients(ServeCase):
         process = self.serve("--token-file", self.token, scene=False)
         self.said = json.loads(self.token.read_text())
         program = subprocess.Popen([sys.executable, EXAMPLES / "serve_frames.py", self.token, "--frames", "1000000"],
-                                   stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+                                   stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         self.addCleanup(lambda: (program.kill(), program.communicate()))
+        agrees(program)
         with self.client(role="watch") as eye:
             for _ in range(2):
                 self.one_of(eye, "started")
                 self.assertTrue(program.stdout.readline())
                 eye.emergency()
-                self.one_of(eye, "forces_off", "stopped")
+                self.one_of(eye, "emergency")
+                time.sleep(1.5)
+                self.assertNotIn("started", [event["event"] for event in eye.events()])
+                eye.clear()
             self.one_of(eye, "started")
         process.kill()
         _, said = program.communicate(timeout=PATIENCE)
@@ -282,9 +348,12 @@ class Clients(ServeCase):
         return process
 
     def study_as_in_the_readme(self, trials):
-        """Its protocol has the block of the README, with fewer trials and a slower servo."""
-        block = json.loads(self.readme("json", '"external"'))
-        (self.dir / "study.json").write_text(json.dumps({**PROTOCOL, "blocks": [{**block, "trials": trials}]}))
+        """Its protocol is that of the README, with fewer trials, softer objects and a slower servo."""
+        whole = json.loads(self.readme("json", '"external"'))
+        (self.dir / "study.json").write_text(json.dumps(whole))
+        subprocess.run([PALPATE, "validate", self.dir / "study.json"], check=True, capture_output=True)
+        small = {name: PROTOCOL[name] for name in ("servo", "home", "material", "stimuli")}
+        (self.dir / "study.json").write_text(json.dumps({**whole, **small, "blocks": [{**whole["blocks"][0], "trials": trials}]}))
         return self.serve_as_in_the_readme(self.readme("sh not tested:[^\n]*", "--participant P03"))
 
     def run_until_done(self, command, **more):
@@ -327,7 +396,7 @@ class Clients(ServeCase):
         if shutil.which("octave-cli") is None:
             self.skipTest("Octave is not installed")
         process = self.record()
-        out = self.run_program("octave-cli", "--no-init-file", OCTAVE / "trials.m", self.token)
+        out = self.run_with_a_person("octave-cli", "--no-init-file", OCTAVE / "trials.m", self.token)
         self.assertEqual(process.wait(PATIENCE), 0)
         self.assert_on_record(list(csv.DictReader(io.StringIO(out))))
         lost = subprocess.run(["octave-cli", "--no-init-file", OCTAVE / "trials.m", self.token], capture_output=True, text=True,

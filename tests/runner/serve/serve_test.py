@@ -13,6 +13,8 @@ import signal
 import socket
 import stat
 import subprocess
+import sys
+import threading
 import time
 import unittest
 
@@ -42,6 +44,9 @@ BAD = ['{"id":1,"type":"jump"}', '{"type":"alive"}', '{"id":-1,"type":"alive"}',
 NO_JSON = ['', '{', '{"id":1,"type":"alive"', "{'id':1}", '{"id":1,"id":2,"type":"alive"}', '\xff', '[' * 5000,
            '{"id":NaN,"type":"alive"}', '{"id":1,"type":"note","text":"\\ud800"}', '{"id":1e400,"type":"alive"}',
            '{"id":1,"type":"load","scene":' + '{"objects":' * 300 + '1' + '}' * 301]
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "session"))
+from terminal import Terminal  # noqa: E402
 
 
 def schemas():
@@ -245,8 +250,9 @@ class Serve(ServeCase):
         replies = {reply["re"]: reply for reply in (self.hears(hand) for _ in range(4))}
         self.assertTrue(replies[1]["ok"] and replies[2]["ok"], replies)
         for number in (3, 4):
-            self.assertEqual(replies[number]["error"]["code"], "forces-off")
-        hand.send('{"id": 6, "type": "clear"}')
+            self.assertEqual(replies[number]["error"]["code"], "emergency")
+        eye.clear()
+        hand.send('{"id": 6, "type": "start"}')
         self.assertTrue(self.hears(hand)["ok"])
 
     def test_a_client_that_reads_nothing_is_closed_before_it_takes_much_memory(self):
@@ -326,6 +332,59 @@ class Serve(ServeCase):
         self.assertIn("busy", codes)
         self.assertLess(len(codes), 1000)
 
+    def test_programs_without_the_token_keep_nobody_out(self):
+        self.serve()
+        port = int(self.said["url"].rsplit(":", 1)[1])
+        held, end = [], time.monotonic() + 3
+
+        def crowd():
+            while time.monotonic() < end:
+                with contextlib.suppress(OSError):
+                    link = socket.create_connection(("127.0.0.1", port), timeout=PATIENCE)
+                    held.append(link)
+                    if len(held) % 2:
+                        link.sendall(b"GET / HTT")
+                    if len(held) > 300:
+                        held.pop(0).close()
+                time.sleep(0.002)
+        crowding = threading.Thread(target=crowd)
+        crowding.start()
+        self.addCleanup(lambda: [link.close() for link in held])
+        self.addCleanup(crowding.join)
+        while len(held) < 150:
+            time.sleep(0.01)
+        for _ in range(10):
+            with self.client(), self.client(role="watch"):
+                pass
+            link = self.lines()
+            self.assertTrue(self.hello(link, role="watch")["ok"])
+            link.socket.close()
+
+    def test_frames_without_contents_count_against_a_client(self):
+        self.serve()
+        hand = self.client()
+        for frame in (client._frame(9, b""), b"\x00\x80abcd"):  # pings; empty fragments of a message that never ends
+            eye = client._WebSocket(self.said["url"], PATIENCE)
+            self.addCleanup(eye.socket.close)
+            eye.send(json.dumps({"id": 0, "type": "hello", "token": self.said["token"], "version": 1, "role": "watch"}))
+            self.assertTrue(json.loads(eye.receive())["ok"])
+            threading.Thread(target=self.read_all, args=(eye.socket,), daemon=True).start()
+            if frame[0] == 0:
+                eye.socket.sendall(b"\x01\x80abcd")
+            with self.assertRaises(OSError):
+                end = time.monotonic() + PATIENCE
+                while time.monotonic() < end:
+                    eye.socket.sendall(frame * 10_000)
+            began = time.monotonic()
+            hand.ask("alive")
+            self.assertLess(time.monotonic() - began, 5)
+
+    @staticmethod
+    def read_all(link):
+        with contextlib.suppress(OSError):
+            while link.recv(65536):
+                pass
+
     def test_messages_and_their_schema_agree(self):
         self.serve()
         says, answers = schemas()
@@ -382,7 +441,7 @@ class Serve(ServeCase):
         time.sleep(0.1)
         eye.emergency()
         off = hand.wait_for("forces_off", PATIENCE)
-        self.assertIn("emergency", off["reason"])
+        self.assertEqual(off["code"], "emergency")
         time.sleep(0.3)
         got = hand.samples()
         after = got["t_ns"] >= off["t_ns"]
@@ -390,9 +449,10 @@ class Serve(ServeCase):
         self.assertFalse(got["force"][after].any())
         self.assertTrue(got["force"][~after].any())
         hand.stop()
-        self.refused("forces-off", hand.start)
-        self.refused("not-controller", eye.clear)
-        hand.clear()
+        self.refused("emergency", hand.start)
+        self.refused("emergency", hand.clear)
+        eye.clear()
+        self.refused("not-controller", eye.clear)  # there is nothing of its own any more
         hand.start()
         eye.events()
         # Forces end if the controller disconnects without a message.
@@ -404,6 +464,37 @@ class Serve(ServeCase):
         other.clear()
         other.start()
         other.stop()
+
+    def test_an_emergency_is_cleared_where_it_was_raised_or_at_the_server(self):
+        self.serve()
+        eye, hand = self.client(role="watch"), self.client()
+        hand.emergency()
+        eye.emergency()
+        self.refused("emergency", hand.clear)
+        self.refused("emergency", eye.clear)
+        eye.close()  # nobody can clear it over the network now
+        for _ in range(3):
+            self.refused("emergency", hand.clear)
+        other = self.client(role="watch")
+        self.refused("not-controller", other.clear)
+        self.assertIn("emergency by client", self.refused("emergency", hand.start).message)
+
+    def test_a_person_at_the_server_clears_an_emergency(self):
+        with Terminal([PALPATE, "serve", "--device", "simulated", "--scene", self.scene, "--rate", "100"]) as terminal:
+            terminal.wait_for("}\n")
+            self.said = json.loads(terminal.text)
+            eye, hand = self.client(role="watch"), self.client()
+            eye.emergency()
+            eye.close()
+            terminal.wait_for("the word clear is typed here")
+            self.refused("emergency", hand.start)
+            terminal.type("celar\n")
+            self.refused("emergency", hand.start)
+            terminal.type("clear\n")
+            terminal.wait_for("cleared")
+            hand.wait_for("cleared", PATIENCE)
+            hand.start()
+            hand.stop()
 
     def test_clocks(self):
         self.serve()
@@ -483,6 +574,15 @@ class Serve(ServeCase):
             while True:
                 dropped += json.loads(deaf.receive()).get("dropped", 0)
         self.assertGreater(dropped, 0)
+
+    def test_devices_are_named_as_for_run(self):
+        for command in (["serve", "--scene", self.scene], ["explore", self.scene]):
+            for device, option, words in (("falcon2", ["--serial", "A"], "--serial: "),
+                                          ("touch", ["--library", self.dir / "none.so"], "none.so"),
+                                          ("inverse3", ["--service", "127.0.0.1:9"], "127.0.0.1:9")):
+                done = subprocess.run([PALPATE, *command, "--device", device, *option], capture_output=True, text=True,
+                                      timeout=PATIENCE)
+                self.assertIn(words, done.stderr, (command, device))
 
     def test_wrong_use(self):
         process = self.serve()
