@@ -1,5 +1,6 @@
 """The report in a headless Chromium. Usage: report_browser_test.py PALPATE QUICK_PROTOCOL FIXTURES"""
 
+import csv
 import json
 import pathlib
 import re
@@ -160,6 +161,65 @@ class Report(unittest.TestCase):
             self.assertEqual([width, height], [2 * int(written.get(side)) for side in ("width", "height")])
         self.assertEqual(self.browser.complaints(), [])
 
+    def test_tables_are_saved_as_csv_and_copied(self):
+        self.open()
+        out = self.dir / "tables"
+        out.mkdir()
+        self.browser.call("Page.setDownloadBehavior", behavior="allow", downloadPath=str(out))
+        cells = self.browser.run("[...document.querySelector('#speedup table').rows].map("
+                                 "r => [...r.cells].map(c => c.textContent))")
+        wanted = [[text.replace("\u00a0", " ").replace("\u2212", "-") for text in row] for row in cells]
+        self.assertEqual(wanted[0][0], "shape")
+        self.browser.run("document.querySelector('#speedup button[data-table=csv]').focus()")
+        self.press("Enter", 13, text="\r")
+        deadline = time.monotonic() + 60
+        while not list(out.glob("*.csv")) and time.monotonic() < deadline:
+            self.browser.run("new Promise(r => setTimeout(r, 20))")
+        saved, = out.glob("*.csv")
+        self.assertEqual(saved.name, "reduction-of-response-time-with-the-ray-simulated-participan.csv")
+        with saved.open(encoding="utf-8-sig", newline="") as opened:
+            self.assertEqual(list(csv.reader(opened)), wanted)
+        self.browser.run("document.addEventListener('copy', () => { window.copied = document.activeElement.value; })")
+        self.browser.run("document.querySelector('#speedup button[data-table=copy]').focus()")
+        self.press("Enter", 13, text="\r")
+        self.assertEqual(self.browser.run("window.copied"), "\n".join("\t".join(row) for row in wanted))
+        self.assertEqual(self.browser.run("document.activeElement.textContent"), "Copied")
+
+    def test_a_copied_name_is_no_formula(self):
+        page = self.dir / "formula.html"
+        fixture = (FIXTURES / "two_people.csv").read_text()
+        table = self.dir / "formula.csv"
+        table.write_text(fixture.replace("cone", "=1+2").replace("cube", "@sum"))
+        self.run_palpate("analyze", "--csv", table, "--report", page)
+        self.open(page)
+        self.browser.run("document.addEventListener('copy', () => { window.copied = document.activeElement.value; })")
+        self.browser.run("document.querySelector('#speedup button[data-table=copy]').focus()")
+        self.press("Enter", 13, text="\r")
+        copied = self.browser.run("window.copied")
+        self.assertRegex(copied, r"(?m)^'=1\+2\t")
+        self.assertRegex(copied, r"(?m)^'@sum\t")
+        self.assertNotRegex(copied, r"(?m)(^|\t)[=@]")
+
+    def test_words_in_cells_stay_whole(self):
+        broken = """(() => {
+          for (const part of document.querySelectorAll('details')) part.open = true;
+          const found = [];
+          for (const cell of document.querySelectorAll('th.name, td.name')) {
+            const text = cell.firstChild;
+            if (!text) continue;
+            for (const word of text.data.matchAll(/[A-Za-z]{2,20}/g)) {
+              const range = document.createRange();
+              range.setStart(text, word.index);
+              range.setEnd(text, word.index + word[0].length);
+              if (range.getClientRects().length > 1) found.push(word[0]);
+            }
+          }
+          return found;
+        })()"""
+        for width in (1280, 390):
+            self.open(width=width)
+            self.assertEqual(self.browser.run(broken), [], width)
+
     def test_the_page_and_the_files_show_the_same_numbers(self):
         for width in (1200, 390):
             self.open(width=width)
@@ -215,7 +275,7 @@ class Report(unittest.TestCase):
                 "document.getElementById(s.getAttribute('aria-describedby')).textContent]; })()")
             self.assertGreater(len(named), 10, name)
             self.assertGreater(len(said), 40, name)
-            self.assertEqual(self.browser.run(f"document.querySelectorAll('#{name} button').length"), 2)
+            self.assertEqual(self.browser.run(f"document.querySelectorAll('#{name} button[data-save]').length"), 2)
         reached = []
         for _ in range(30):
             self.press("Tab", 9)

@@ -1,0 +1,33 @@
+#pragma once
+// The results of tasks as tables, and as sentences for a paper.
+
+#include <string>
+#include <vector>
+
+#include "analysis/report/tables.h"
+#include "analysis/statistics/task_analysis.h"
+
+namespace palpate::analysis {
+
+/// "compare, stiffness, ball": a task, a block and a stimulus; empty ones are left out.
+std::string stimulus_of(const std::string& task, const std::string& block,
+                        const std::string& shape);
+
+/// The finding in a sentence or two: what differs clearly between renderers (Holm-adjusted
+/// p < 0.05) or, with one renderer, between rated stimuli; without any comparison the means.
+std::string conclusion(const TaskAnalysis& analysis);
+
+/// Means over participants with their intervals, and comparisons within participants with their
+/// tests; those without rows are left out.
+std::vector<Table> group_tables(const TaskAnalysis& analysis);
+/// For a paper: a sentence for each comparison between renderers or, with one renderer, between
+/// stimuli.
+std::vector<std::string> sentences_to_quote(const TaskAnalysis& analysis);
+
+/// The tables of one cell: ratings and their steps, each participant's function, tracks, detection,
+/// exponents, settings; those without rows are left out.
+std::vector<Table> cell_tables(const TaskCell& cell, const std::string& label);
+/// Over all cells: information transfer, confidence, the model of accuracy.
+std::vector<Table> summary_tables(const TaskAnalysis& analysis);
+
+}  // namespace palpate::analysis
