@@ -506,10 +506,12 @@ void WindowPlacing::bring_back(int bar) {
 
 void WindowPlacing::uncover(double now, int bar) {
   const ScreenBox &console = console_.now, button{console.left, console.top, console.width, bar};
+  // A window that should fill another monitor must not hide the words that say so.
+  const ScreenBox& kept = full_screen() && !misplaced_.empty() ? console : button;
   const bool shown = glfwGetWindowAttrib(console_.window, GLFW_ICONIFIED) == GLFW_FALSE &&
                      glfwGetWindowAttrib(participant_.window, GLFW_ICONIFIED) == GLFW_FALSE;
   const bool covers =
-      shown && overlap(with_frame(participant_.now, frame_of(participant_.window)), button);
+      shown && overlap(with_frame(participant_.now, frame_of(participant_.window)), kept);
   if (covers != covered_) {
     glfwSetWindowAttrib(console_.window, GLFW_FLOATING, covers ? GLFW_TRUE : GLFW_FALSE);
     covered_ = covers;

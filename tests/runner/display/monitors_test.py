@@ -166,6 +166,12 @@ class Session(WindowCase):
         notes = [json.loads(text) for (text,) in self.rows("SELECT text FROM notes") if text.startswith("{")]
         return [note["screen_trouble"] for note in notes if "screen_trouble" in note]
 
+    def console_is_above(self):
+        """Where both windows are."""
+        left, top, right, bottom = self.screen.box(self.console)
+        self.screen.do("mousemove", (left + right) // 2, bottom - 60)
+        return f"window:{self.console}" in self.screen.do("getmouselocation").split()
+
     def bar_is_seen(self):
         left, top, right, _ = self.screen.box(self.console)
         seen = self.screen.pixels("root", left, top + 14, right - left, 1)
@@ -200,7 +206,20 @@ class Session(WindowCase):
             time.sleep(0.3)
         self.assertEqual(self.rows("SELECT 1 FROM attempts"), [])
         self.assertIsNone(self.program.poll())
+        wait_for("the whole console", self.console_is_above)
         self.screen.keep("root", "on_the_wrong_monitor")
+
+    def test_explore_moves_to_the_monitor_that_is_left(self):
+        self.screen.place(*self.monitors, primary=1)
+        scene = self.folder / "scene.json"
+        scene.write_text(json.dumps({"objects": [{"shape": "cube", "edge_m": 0.06, "stiffness_n_per_m": 300}]}))
+        program = subprocess.Popen([PALPATE, "explore", scene, "--device", "mouse"], env=self.screen.environment, stdin=subprocess.DEVNULL)
+        self.addCleanup(program.wait)
+        self.addCleanup(program.kill)
+        window = self.screen.window("scene.json - palpate explore")
+        wait_for("the window", lambda: self.is_on(window, 1))
+        self.screen.place(self.monitors[0], None)
+        wait_for("the window", lambda: self.is_on(window, 0))
 
     def lose(self, *options):
         for manager in MANAGERS:
@@ -215,8 +234,9 @@ class Session(WindowCase):
                     self.assertIn(f"monitor DUMMY{lost} is gone", self.cut_off()[0])
                     self.assertEqual(len(self.troubles()), 1)
                     self.assertIn(f"monitor DUMMY{lost} is gone", self.messages())
-                    left = 1 - lost
-                    wait_for("both", lambda: self.is_on(self.participant, left) and self.is_on(self.console, left) and self.bar_is_seen())
+                    left = box_of(self.monitors[1 - lost].split("+")[0] + "+0+0")  # xrandr begins the desktop there
+                    wait_for("both", lambda: all(inside(self.screen.box(window), left) for window in (self.participant, self.console)) and
+                             self.bar_is_seen())
                     self.screen.keep("root", f"lost_{manager}_{lost}_{len(options)}")
                     time.sleep(1)
                     self.assertTrue(self.bar_is_seen())
