@@ -232,21 +232,22 @@ class Outputs(unittest.TestCase):
         self.palpate("analyze", "--db", self.dir / "n.db")
 
     def test_a_dash_is_standard_output_and_nothing_else_goes_there(self):
-        for command, options, _ in self.writers():
+        render = ["render", "--scene", self.scene, "--renderer", "ray"]
+        for command, options in ((["analyze", "--db", self.db], ["json", "report"]),
+                                 (["plan", "--db", self.db, "--participants", "2-3", "--trials", "10", "--studies", "100"],
+                                  ["json", "figure"]),
+                                 (render + ["--trajectory", self.path], ["out"])):
             for option in options:
                 with self.subTest(command=command[0], option=option):
-                    if command[0] == "export":
-                        self.assertIn("-", self.palpate(*command, "--out", "-", status=2, cwd=self.dir).stderr)
-                    else:
-                        stream = self.palpate(*command, f"--{option}", "-", cwd=self.dir)
-                        whole = self.dir / "whole"
-                        self.palpate(*command, f"--{option}", whole, "--force", cwd=self.dir)
-                        if command[0] not in ("bench", "devices", "accuracy", "stability"):  # they measure
-                            self.assertEqual(stream.stdout, whole.read_text())
-                        if option == "json":
-                            json.loads(stream.stdout)
+                    stream = self.palpate(*command, f"--{option}", "-", cwd=self.dir)
+                    self.palpate(*command, f"--{option}", self.dir / "whole", "--force", cwd=self.dir)
+                    self.assertEqual(stream.stdout, (self.dir / "whole").read_text())
                     self.assertFalse((self.dir / "-").exists())
+        for measures in (render + ["--explain"], ["devices", "--device", "simulated"]):
+            json.loads(self.palpate(*measures, "--json", "-", cwd=self.dir).stdout)
         self.palpate("analyze", "--db", self.db, "--json", "-", "--report", "-", status=2)
+        self.palpate("export", "--db", self.db, "--format", "csv", "--out", "-", status=2, cwd=self.dir)
+        self.assertFalse((self.dir / "-").exists())
 
     def test_no_folder_or_database_is_named_dash(self):
         for command in (["export", "--db", self.db, "--format", "bids", "--out", "-"],
