@@ -49,6 +49,13 @@ class Drawer {
   Role role(std::size_t renderer) const {
     return role_of(table_.trials.renderers[renderer], renderer);
   }
+  /// Tells a renderer's curve from others without colour.
+  static MarkerShape symbol_of(std::size_t renderer) {
+    constexpr std::array kShapes = {MarkerShape::circle, MarkerShape::square, MarkerShape::diamond,
+                                    MarkerShape::up};
+    return kShapes[renderer % kShapes.size()];
+  }
+  void add_symbols(Panel& panel, std::size_t renderer, const CoverageCurve& curve) const;
   std::string name(std::size_t renderer) const {
     return printable(table_.trials.renderers[renderer], 40);
   }
@@ -397,6 +404,19 @@ Figure Drawer::speed() const {
 
 // --- coverage over time -----------------------------------------------------------------------
 
+void Drawer::add_symbols(Panel& panel, std::size_t renderer, const CoverageCurve& curve) const {
+  constexpr std::size_t kSymbols = 6;
+  const auto steps = static_cast<std::size_t>(panel.x.high / TrialTally::kStep);
+  // Curves of several renderers have theirs at different places.
+  for (std::size_t i = 0; i < kSymbols; ++i) {
+    const std::size_t k = steps * (renderers_ * i + renderer + 1) / (renderers_ * kSymbols + 1);
+    if (k >= curve.mean.size()) break;
+    panel.marks.push_back(symbol(role(renderer), symbol_of(renderer),
+                                 static_cast<double>(k) * TrialTally::kStep, 100 * curve.mean[k], 4,
+                                 name(renderer) + ": " + fixed(100 * curve.mean[k], 1) + " %"));
+  }
+}
+
 Figure Drawer::coverage() const {
   Figure figure = new_figure("movement-coverage", "Share of the surface touched, over time");
   figure.description = "Mean share of the surface touched at the median duration:";
@@ -439,13 +459,14 @@ Figure Drawer::coverage() const {
         panel.marks.push_back(line_mark(role(r), x[part], y[part], part == 0 ? 2.5 : 1.5));
         panel.marks.back().dashed = part == 1;
       }
+      add_symbols(panel, r, curve);
       figure.description += " " + shape(s) + ", " + name(r) + ": " + fixed(at_median, 1) +
                             " % at " + fixed(curve.median_duration, 1) + " s;";
     }
     figure.panels.push_back(std::move(panel));
   }
   for (std::size_t r = 0; r < renderers_; ++r)
-    figure.legend.push_back({name(r), role(r), MarkerShape::dash});
+    figure.legend.push_back({name(r), role(r), symbol_of(r)});
   figure.notes.push_back(
       "Share of 10,000 points on the surface that were within 5 mm of a contact so far: mean over "
       "participants' means. A trial that has ended keeps its last value; dashed: more than half of "
@@ -457,15 +478,15 @@ Figure Drawer::coverage() const {
 
 Figure Drawer::procedures() const {
   struct Kind {
-    const char *measure, *name;
+    const char *measure, *name, *letter;
     Role role;
     double opacity;
   };
   static constexpr std::array<Kind, kProcedures> kKinds{
-      {{"share_static", "static contact", Role::soft, 0.55},
-       {"share_pressure", "pressure", Role::third, 0.9},
-       {"share_lateral", "lateral motion", Role::fourth, 0.9},
-       {"share_contour", "contour following", Role::seventh, 0.9}}};
+      {{"share_static", "static contact", "S", Role::soft, 0.55},
+       {"share_pressure", "pressure", "P", Role::third, 0.9},
+       {"share_lateral", "lateral motion", "L", Role::fourth, 0.9},
+       {"share_contour", "contour following", "C", Role::seventh, 0.9}}};
   Figure figure = new_figure("movement-procedures", "Exploratory procedures in contact");
   figure.description = "Share of exploratory procedures, static, pressure, lateral, contour:";
   for (std::size_t r = 0; r < renderers_; ++r) {
@@ -487,6 +508,11 @@ Figure Drawer::procedures() const {
         panel.marks.push_back(rect_mark(
             kind.role, x + 0.18, below, x + 0.82, below + percent, kind.opacity,
             shape(s) + ", " + name(r) + ": " + kind.name + " " + fixed(percent, 1) + " %"));
+        if (percent >= 8) {
+          panel.marks.push_back(
+              text_mark(Role::ink, x + 0.5, below + 0.5 * percent, kind.letter, 12));
+          panel.marks.back().dy = 4;
+        }
         below += percent;
         said += (said.empty() ? " " : ", ") + fixed(percent, 0) + " %";
         any = true;
@@ -496,7 +522,8 @@ Figure Drawer::procedures() const {
     if (any) figure.panels.push_back(std::move(panel));
   }
   for (const Kind& kind : kKinds)
-    figure.legend.push_back({kind.name, kind.role, MarkerShape::square});
+    figure.legend.push_back(
+        {std::string(kind.letter) + ": " + kind.name, kind.role, MarkerShape::square});
   figure.notes.push_back(
       "Procedures of Lederman & Klatzky (1987), classified in windows of 100 ms by speed along the "
       "surface (10 mm/s), change of force (0.3 of its mean) and nearness of an edge (3 mm); the "
