@@ -134,7 +134,10 @@ constexpr std::size_t kShownParticipants = 200;
 // Figures of tasks.
 
 /// For each stimulus in a block with means over participants: "group1", ...: a panel for each
-/// measure with every participant, the mean and its 95 % interval, by renderer. For each cell with
+/// measure with every participant, the mean and its 95 % interval, by renderer. For each block of
+/// ratings on steps or without levels: "rating1", ...: means of the stimuli and shares of the
+/// steps. For each stimulus of magnitude estimation: "magnitude1", ...: numbers over levels, both
+/// logarithmic, with every participant. For each cell with
 /// psychometric functions: "function1", ...: a panel for each participant with the share of
 /// successes at each level (area of the symbol: trials), the fitted function and the threshold's
 /// interval; and "track1", ...: levels over the trials of up to four tracks with the answers, and

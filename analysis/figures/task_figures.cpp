@@ -237,6 +237,7 @@ void add_group_figures(const TaskAnalysis& analysis, std::vector<Figure>& figure
     bool cut = false;
     for (; i < analysis.groups.size() && same(analysis.groups[i], first); ++i) {
       const TaskGroup& group = analysis.groups[i];
+      if (group.measure == "rating") continue;  // all stimuli of a block have one figure
       std::size_t shown = 0;
       figure.description += measure_plural(group.measure) + ": ";
       for (const GroupMean& one : group.renderers) {
@@ -263,17 +264,367 @@ void add_group_figures(const TaskAnalysis& analysis, std::vector<Figure>& figure
   }
 }
 
-Figure figure_of(const TaskAnalysis& analysis, const TaskCell& cell, std::string id,
-                 const std::string& what) {
+/// A figure of cells: titled by what they have in common.
+Figure new_task_figure(const TaskAnalysis& analysis, std::string id, const std::string& title,
+                       const TaskCell& cell, const std::string& shape) {
   Figure figure;
   figure.id = std::move(id);
-  figure.title = what + ": " + cell.task;
-  for (const std::string* name : {&cell.block_name, &cell.shape, &cell.renderer}) {
+  figure.title = title + ": " + cell.task;
+  for (const std::string* name : {&cell.block_name, &shape}) {
     if (!name->empty()) figure.title += ", " + printable(*name);
   }
-  figure.subtitle = counted(cell.participants.size(), "participant", "participants") + ", " +
-                    counted(cell.trials, "trial", "trials");
+  figure.subtitle = counted(cell.participants.size(), "participant", "participants");
   if (analysis.table.simulated) figure.label = "SIMULATED PARTICIPANTS";
+  return figure;
+}
+
+// Ratings.
+
+/// Ratings of a stimulus, or at a level of it.
+struct RatedPlace {
+  double x = 0;
+  std::string name;
+  const MeanRating* mean = nullptr;
+  const std::vector<ParticipantRatings>* participants = nullptr;
+};
+
+using CellList = std::vector<const TaskCell*>;
+
+/// Cells with something to draw that agree in `key`, in order of their first.
+template <class Key, class KeyOf>
+std::vector<CellList> grouped_cells(const TaskAnalysis& analysis, bool (*has)(const TaskCell&),
+                                    KeyOf key_of) {
+  std::vector<CellList> groups;
+  std::map<Key, std::size_t> places;
+  for (const TaskCell& cell : analysis.cells) {
+    if (!has(cell)) continue;
+    const auto [place, is_new] = places.emplace(key_of(cell), groups.size());
+    if (is_new) groups.emplace_back();
+    groups[place->second].push_back(&cell);
+  }
+  return groups;
+}
+
+std::vector<std::string> distinct(const CellList& cells, std::string TaskCell::*name) {
+  std::vector<std::string> names;
+  for (const TaskCell* cell : cells) {
+    if (std::ranges::find(names, cell->*name) == names.end()) names.push_back(cell->*name);
+  }
+  return names;
+}
+
+double place_of(const std::vector<std::string>& names, const std::string& name) {
+  return static_cast<double>(std::ranges::find(names, name) - names.begin());
+}
+
+/// Spans scale, participants and intervals.
+FigureAxis rating_axis(const CellList& cells) {
+  double low = std::numeric_limits<double>::infinity(), high = -low;
+  const auto take = [&](double value) {
+    low = std::min(low, value);
+    high = std::max(high, value);
+  };
+  const auto take_mean = [&](const MeanRating& mean,
+                             const std::vector<ParticipantRatings>& participants) {
+    for (const ParticipantRatings& one : participants) take(one.spread.mean);
+    if (!mean.ci95 || participants.size() < 3) return;
+    take(mean.ci95->low);
+    take(mean.ci95->high);
+  };
+  for (const TaskCell* cell : cells) {
+    for (const RatingStep& step : cell->ratings->steps) take(step.number);
+    take_mean(cell->ratings->mean, cell->ratings->participants);
+    for (const RatingsAtLevel& at : cell->ratings->levels) take_mean(at.mean, at.participants);
+  }
+  const double margin = 0.04 * std::max(high - low, 1e-3);
+  return linear_axis(low - margin, high + margin, "rating");
+}
+
+void add_ratings(Panel& panel, const TaskCell& cell, const std::vector<RatedPlace>& places,
+                 std::size_t renderer, bool joined_by_lines) {
+  const auto [role, shape] = group_style(cell.renderer, renderer);
+  std::map<std::size_t, Mark> lines;
+  for (const RatedPlace& place : places) {
+    for (const ParticipantRatings& one : *place.participants) {
+      const std::string& person = cell.participants[one.participant];
+      Mark dot = symbol(role, shape, place.x, one.spread.mean, 2.6,
+                        printable(person) + ", " + place.name + ", " + printable(cell.renderer) +
+                            ": mean " + short_number(one.spread.mean) + " of " +
+                            counted(one.spread.ratings, "rating", "ratings"));
+      dot.opacity = 0.35;
+      dot.participant = printable(person, 40);
+      if (!joined_by_lines) dot.dx = 7;
+      panel.marks.push_back(std::move(dot));
+      Mark& line = lines.try_emplace(one.participant, line_mark(role, {}, {}, 1)).first->second;
+      line.participant = printable(person, 40);
+      line.x.push_back(place.x);
+      line.y.push_back(one.spread.mean);
+    }
+  }
+  Mark group = line_mark(role, {}, {}, 3);
+  for (auto& [participant, line] : lines) {
+    line.opacity = 0.25;
+    if (joined_by_lines && line.x.size() > 1) panel.marks.push_back(std::move(line));
+  }
+  for (const RatedPlace& place : places) {
+    if (!place.mean->mean) continue;
+    std::string text =
+        place.name + ", " + printable(cell.renderer) + ": mean " + short_number(*place.mean->mean);
+    if (const auto& ends = place.mean->ci95) {
+      text += ", 95 % interval " + short_number(ends->low) + " to " + short_number(ends->high);
+      add_interval(panel, role, place.x, ends->low, ends->high, text);
+    }
+    panel.marks.push_back(symbol(role, shape, place.x, *place.mean->mean, 6, text));
+    group.x.push_back(place.x);
+    group.y.push_back(*place.mean->mean);
+  }
+  if (joined_by_lines && group.x.size() > 1) panel.marks.push_back(std::move(group));
+}
+
+/// Means of all stimuli of a block side by side.
+Panel named_ratings_panel(const CellList& cells) {
+  const std::vector<std::string> shapes = distinct(cells, &TaskCell::shape);
+  const std::vector<std::string> renderers = distinct(cells, &TaskCell::renderer);
+  Panel panel;
+  panel.title = "Mean ratings";
+  panel.x = names_axis(shapes, shapes.size(), "");
+  panel.y = rating_axis(cells);
+  panel.width = std::min(900.0, 80 + 70 * static_cast<double>(shapes.size()));
+  panel.height = 260;
+  for (const TaskCell* cell : cells) {
+    const double r = place_of(renderers, cell->renderer);
+    const double apart = 0.6 / static_cast<double>(renderers.size());
+    const double x = place_of(shapes, cell->shape) + 0.2 + (r + 0.4) * apart;
+    add_ratings(panel, *cell,
+                {{x, printable(cell->shape), &cell->ratings->mean, &cell->ratings->participants}},
+                static_cast<std::size_t>(r), false);
+  }
+  return panel;
+}
+
+/// Means over the levels of a stimulus.
+Panel levels_panel(const CellList& cells, const std::string& shape) {
+  const std::vector<std::string> renderers = distinct(cells, &TaskCell::renderer);
+  double low = std::numeric_limits<double>::infinity(), high = -low;
+  for (const TaskCell* cell : cells) {
+    if (cell->shape != shape || cell->ratings->levels.empty()) continue;
+    low = std::min(low, cell->ratings->levels.front().level);
+    high = std::max(high, cell->ratings->levels.back().level);
+  }
+  Panel panel;
+  panel.title = printable(shape, 40);
+  panel.x = linear_axis(low, low < high ? high : low + 1, level_title(cells.front()->level_unit));
+  panel.y = rating_axis(cells);
+  panel.width = 400;
+  panel.height = 260;
+  for (const TaskCell* cell : cells) {
+    if (cell->shape != shape) continue;
+    std::vector<RatedPlace> places;
+    for (const RatingsAtLevel& at : cell->ratings->levels)
+      places.push_back({at.level, "level " + short_number(at.level), &at.mean, &at.participants});
+    add_ratings(panel, *cell, places, static_cast<std::size_t>(place_of(renderers, cell->renderer)),
+                true);
+  }
+  return panel;
+}
+
+/// Shares of the steps of each stimulus with a renderer, from the lowest step upwards.
+Panel shares_panel(const CellList& cells, const std::string& renderer) {
+  const std::vector<std::string> shapes = distinct(cells, &TaskCell::shape);
+  Panel panel;
+  panel.title = "Shares of the answers, " + printable(renderer, 40);
+  panel.x = names_axis(shapes, shapes.size(), "");
+  panel.y = linear_axis(0, 100, "share (%)");
+  panel.width = std::min(900.0, 80 + 70 * static_cast<double>(shapes.size()));
+  panel.height = 260;
+  // One shade for a step in all columns: without labels each has the steps that occur in it.
+  double low = std::numeric_limits<double>::infinity(), high = -low;
+  for (const TaskCell* cell : cells) {
+    for (const RatingStep& step : cell->ratings->steps) {
+      low = std::min(low, step.number);
+      high = std::max(high, step.number);
+    }
+  }
+  for (const TaskCell* cell : cells) {
+    if (cell->renderer != renderer) continue;
+    const std::vector<RatingStep>& steps = cell->ratings->steps;
+    const double x = place_of(shapes, cell->shape);
+    double from = 0;
+    for (std::size_t i = 0; i < steps.size(); ++i) {
+      const double to = from + 100 * steps[i].share;
+      const double depth = 0.12 + 0.78 * (steps[i].number - low) / std::max(high - low, 1e-9);
+      const std::string text = printable(cell->shape) + ", " + short_number(steps[i].number) +
+                               (steps[i].label.empty() ? "" : " " + printable(steps[i].label)) +
+                               ": " + fixed(100 * steps[i].share, 1) + " %";
+      if (to > from)
+        panel.marks.push_back(rect_mark(Role::point, x + 0.15, from, x + 0.85, to, depth, text));
+      if (to - from >= 7) {
+        Mark number = text_mark(depth > 0.72 ? Role::page : Role::ink, x + 0.5, 0.5 * (from + to),
+                                short_number(steps[i].number), 12);
+        number.dy = 4;
+        panel.marks.push_back(std::move(number));
+      }
+      from = to;
+    }
+  }
+  return panel;
+}
+
+void add_rating_figures(const TaskAnalysis& analysis, std::vector<Figure>& figures) {
+  const auto has = [](const TaskCell& cell) {
+    return cell.ratings && cell.ratings->spread.ratings > 0;
+  };
+  std::size_t number = 0;
+  for (const CellList& cells : grouped_cells<std::string>(
+           analysis, has, [](const TaskCell& cell) { return cell.block_name; })) {
+    const TaskCell& first = *cells.front();
+    Figure figure =
+        new_task_figure(analysis, "rating" + std::to_string(++number), "Ratings", first, "");
+    const std::vector<std::string> renderers = distinct(cells, &TaskCell::renderer);
+    for (std::size_t r = 0; r < renderers.size(); ++r) {
+      const auto [role, shape] = group_style(renderers[r], r);
+      figure.legend.push_back({printable(renderers[r], 40), role, shape});
+    }
+    if (first.ratings->levels.empty()) {
+      figure.panels.push_back(named_ratings_panel(cells));
+    } else {
+      for (const std::string& shape : distinct(cells, &TaskCell::shape))
+        figure.panels.push_back(levels_panel(cells, shape));
+    }
+    if (!first.ratings->steps.empty()) {
+      for (const std::string& renderer : renderers) {
+        figure.panels.push_back(shares_panel(cells, renderer));
+        figure.panels.back().starts_row = renderer == renderers.front();
+      }
+    }
+    figure.notes.push_back(
+        "Large symbols: means over participants with their 95 % intervals (t). Small symbols: "
+        "means of a participant's ratings.");
+    std::string steps;
+    for (const RatingStep& step : first.ratings->steps) {
+      if (!step.label.empty())
+        steps +=
+            (steps.empty() ? "" : ", ") + short_number(step.number) + " " + printable(step.label);
+    }
+    if (!steps.empty()) figure.notes.push_back("Steps: " + steps + ".");
+    for (const TaskCell* cell : cells)
+      figure.description += printable(cell->shape) + ", " + printable(cell->renderer) + ": mean " +
+                            short_number(*cell->ratings->mean.mean) + ", median " +
+                            short_number(cell->ratings->spread.median) + ". ";
+    figures.push_back(std::move(figure));
+  }
+}
+
+// Magnitude estimation.
+
+/// log10 of a participant's magnitudes, moved to the common mean.
+struct Moved {
+  const StevensLine* line = nullptr;
+  double shift = 0;
+};
+
+std::vector<Moved> equalized(const MagnitudeEstimation& magnitude) {
+  std::vector<Moved> moved;
+  double common = 0;
+  for (const StevensLine& line : magnitude.lines) {
+    double own = 0;
+    for (const StevensLine::Point& point : line.points)
+      own += std::log10(point.magnitude) / static_cast<double>(line.points.size());
+    moved.push_back({&line, -own});
+    common += own / static_cast<double>(magnitude.lines.size());
+  }
+  for (Moved& one : moved) one.shift += common;
+  return moved;
+}
+
+Panel magnitude_panel(const TaskCell& cell, std::size_t renderer) {
+  const MagnitudeEstimation& magnitude = *cell.magnitude;
+  const auto [role, shape] = group_style(cell.renderer, renderer);
+  double low = std::numeric_limits<double>::infinity(), high = -low;
+  const auto take = [&](double value) {
+    low = std::min(low, value);
+    high = std::max(high, value);
+  };
+  Panel panel;
+  for (const auto& [line, shift] : equalized(magnitude)) {
+    Mark mark = line_mark(Role::soft, {}, {}, 1);
+    mark.opacity = 0.5;
+    mark.participant = printable(cell.participants[line->participant], 40);
+    mark.text = mark.participant + (line->exponent ? ": exponent " + short_number(*line->exponent)
+                                                   : ": " + line->undefined);
+    for (const StevensLine::Point& point : line->points) {
+      mark.x.push_back(std::log10(point.level));
+      mark.y.push_back(std::log10(point.magnitude) + shift);
+      take(mark.y.back());
+      Mark dot = symbol(Role::soft, shape, mark.x.back(), mark.y.back(), 2.2, mark.text);
+      dot.participant = mark.participant;
+      panel.marks.push_back(std::move(dot));
+    }
+    if (mark.x.size() > 1) panel.marks.push_back(std::move(mark));
+  }
+  for (const MagnitudeMean& one : magnitude.means) {
+    if (!one.ci95 || one.participants < 3) continue;
+    take(std::log10(one.ci95->low));
+    take(std::log10(one.ci95->high));
+  }
+  const double margin = 0.05 * std::max(high - low, 0.1);
+  panel.title = printable(cell.renderer, 40);
+  const double first = std::log10(magnitude.means.front().level);
+  const double last = std::log10(magnitude.means.back().level);
+  const double beside = 0.05 * std::max(last - first, 0.1);
+  panel.x = log_axis(first - beside, last + beside, level_title(cell.level_unit));
+  panel.y = log_axis(low - margin, high + margin, "rating");
+  panel.width = 360;
+  panel.height = 280;
+  Mark group = line_mark(role, {}, {}, 3);
+  for (const MagnitudeMean& one : magnitude.means) {
+    const double x = std::log10(one.level), y = std::log10(one.geometric_mean);
+    std::string text =
+        "level " + short_number(one.level) + ": geometric mean " + short_number(one.geometric_mean);
+    if (one.ci95) {
+      text +=
+          ", 95 % interval " + short_number(one.ci95->low) + " to " + short_number(one.ci95->high);
+      add_interval(panel, role, x, std::log10(one.ci95->low), std::log10(one.ci95->high), text);
+    }
+    panel.marks.push_back(symbol(role, shape, x, y, 6, text));
+    group.x.push_back(x);
+    group.y.push_back(y);
+  }
+  if (group.x.size() > 1) panel.marks.push_back(std::move(group));
+  return panel;
+}
+
+void add_magnitude_figures(const TaskAnalysis& analysis, std::vector<Figure>& figures) {
+  const auto has = [](const TaskCell& cell) {
+    return cell.magnitude && !cell.magnitude->means.empty();
+  };
+  std::size_t number = 0;
+  for (const CellList& cells : grouped_cells<std::pair<std::string, std::string>>(
+           analysis, has,
+           [](const TaskCell& cell) { return std::pair(cell.block_name, cell.shape); })) {
+    const TaskCell& first = *cells.front();
+    Figure figure = new_task_figure(analysis, "magnitude" + std::to_string(++number),
+                                    "Ratings over levels", first, first.shape);
+    for (std::size_t r = 0; r < cells.size(); ++r) {
+      figure.panels.push_back(magnitude_panel(*cells[r], r));
+      figure.description += printable(cells[r]->renderer) + ": ";
+      for (const MagnitudeMean& one : cells[r]->magnitude->means)
+        figure.description +=
+            "level " + short_number(one.level) + " " + short_number(one.geometric_mean) + ". ";
+    }
+    figure.notes.push_back(
+        "Both axes are logarithmic: a power law is a straight line. Thin: participants, moved to "
+        "one mean of logarithms (modulus equalization). Bold: geometric means over participants "
+        "with their 95 % intervals (t).");
+    figures.push_back(std::move(figure));
+  }
+}
+
+Figure figure_of(const TaskAnalysis& analysis, const TaskCell& cell, std::string id,
+                 const std::string& what) {
+  Figure figure = new_task_figure(analysis, std::move(id), what, cell, cell.shape);
+  if (!cell.renderer.empty()) figure.title += ", " + printable(cell.renderer);
+  figure.subtitle += ", " + counted(cell.trials, "trial", "trials");
   if (cell.functions.size() > kDrawnParticipants)
     figure.notes.push_back("The first " + std::to_string(kDrawnParticipants) + " of " +
                            std::to_string(cell.functions.size()) + " participants.");
@@ -285,6 +636,8 @@ Figure figure_of(const TaskAnalysis& analysis, const TaskCell& cell, std::string
 std::vector<Figure> task_figures(const TaskAnalysis& analysis) {
   std::vector<Figure> figures;
   add_group_figures(analysis, figures);
+  add_rating_figures(analysis, figures);
+  add_magnitude_figures(analysis, figures);
   std::size_t number = 0;
   for (const TaskCell& cell : analysis.cells) {
     if (cell.functions.empty()) continue;

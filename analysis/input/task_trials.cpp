@@ -146,6 +146,16 @@ bool success_of(TaskRow& row, TaskTrial& trial) {
   return true;
 }
 
+/// Ratings of other programs have their number as the response.
+void take_rated_number(TaskTrial& trial) {
+  if (trial.task != "rate" || trial.number) return;
+  const std::string& text = trial.response;
+  double number = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  const bool whole = error == std::errc() && end == text.data() + text.size();
+  if (whole && std::isfinite(number)) trial.number = number;
+}
+
 /// For an export: the number of onsets.
 int intervals_of(const TaskRow& row) {
   const std::string_view onsets = row.value("interval_onsets");
@@ -166,6 +176,7 @@ TaskTrial read_trial(TaskRow& row) {
   trial.level = row.number("level");
   trial.standard_level = row.number("standard_level");
   trial.number = row.number("number");
+  take_rated_number(trial);
   trial.confidence = row.number("confidence");
   trial.catch_trial = row.yes("catch_trial");
   trial.success = row.yes("success");

@@ -9,6 +9,7 @@
 #include "analysis/figures/figures.h"
 #include "analysis/report/html_page.h"
 #include "analysis/report/report.h"
+#include "analysis/report/task_tables.h"
 #include "analysis/statistics/task_analysis.h"
 #include "analysis/text.h"
 #include "data/base/json_text.h"
@@ -16,79 +17,6 @@
 
 namespace palpate::analysis {
 namespace {
-
-constexpr const char* kNoNumber = "–";
-
-/// "compare, stiffness, ball"
-std::string stimulus_of(const std::string& task, const std::string& block,
-                        const std::string& shape) {
-  std::string name = task;
-  for (const std::string* part : {&block, &shape}) {
-    if (!part->empty()) name += ", " + *part;
-  }
-  return name;
-}
-
-std::string interval_cell(const std::optional<Interval>& interval) {
-  if (!interval) return kNoNumber;
-  return short_number(interval->low) + " to " + short_number(interval->high);
-}
-
-Table group_table(const TaskAnalysis& analysis, const std::string& label) {
-  Table table;
-  table.caption = "Means over participants" + (label.empty() ? "" : " (" + label + ")");
-  table.header = {"measure",       "task, block, stimulus", "renderer", "mean",
-                  "95 % interval", "participants",          "left out"};
-  table.n_names = 3;
-  for (const TaskGroup& group : analysis.groups) {
-    std::string measure = measure_plural(group.measure);
-    if (!group.unit.empty()) measure += " (" + group.unit + ")";
-    for (const GroupMean& one : group.renderers)
-      table.rows.push_back({measure, stimulus_of(group.task, group.block_name, group.shape),
-                            one.renderer, one.mean ? short_number(*one.mean) : kNoNumber,
-                            interval_cell(one.ci95), std::to_string(one.participants.size()),
-                            std::to_string(one.n_undetermined)});
-  }
-  table.notes = {
-      "Means are geometric if all values are positive and have a true zero, except for exponents; "
-      "t "
-      "intervals from two participants on. Left out: functions without a threshold among the "
-      "levels shown, with a slope too steep for them, or with reversed answers."};
-  return table;
-}
-
-Table comparison_table(const TaskAnalysis& analysis, const std::string& label) {
-  Table table;
-  table.caption =
-      "Comparison within participants, by renderer" + (label.empty() ? "" : " (" + label + ")");
-  table.header = {"measure",       "task, block, stimulus",
-                  "compared",      "value",
-                  "95 % interval", "p",
-                  "p (Holm)",      "dz",
-                  "pairs"};
-  table.n_names = 3;
-  for (const TaskComparison& one : analysis.renderers) {
-    for (const ConditionDifference& difference : one.comparison.differences) {
-      const auto back = [&](double value) { return one.logarithms ? std::exp(value) : value; };
-      std::optional<Interval> ends = difference.t_test.log_ratio_ci95;
-      if (ends) ends = Interval{back(ends->low), back(ends->high)};
-      const auto& test = difference.t_test;
-      table.rows.push_back(
-          {measure_plural(one.measure), stimulus_of(one.task, one.block_name, one.shape),
-           one.conditions[difference.condition] + (one.logarithms ? " / " : " − ") +
-               one.conditions[0],
-           difference.n_pairs > 0 ? short_number(back(difference.mean)) : kNoNumber,
-           interval_cell(ends), test.p ? p_text(*test.p) : kNoNumber,
-           test.p_holm ? p_text(*test.p_holm) : kNoNumber,
-           difference.effect_size.dz ? short_number(*difference.effect_size.dz) : kNoNumber,
-           std::to_string(difference.n_pairs)});
-    }
-  }
-  table.notes = {
-      "Paired t-tests: of ratios (/) on natural logarithms if all values are positive and have a "
-      "true zero, otherwise of differences (−)."};
-  return table;
-}
 
 /// The study's title, or its name, or its file.
 std::string study_of(const TaskTable& table) {
@@ -99,9 +27,50 @@ std::string study_of(const TaskTable& table) {
   return "Tasks of " + table.source;
 }
 
-}  // namespace
+std::string explanation(const FunctionSettings& functions) {
+  std::string text =
+      std::string("Intervals are 95 % intervals. Psychometric functions: ") +
+      to_string(functions.shape) + ", lapse rate free up to " + short_number(kMostLapse) +
+      ".\ncompare with levels on both sides of the standard: the same lapse rate at both "
+      "asymptotes; on one\nside: guess rate 1 / intervals, and the ";
+  text += functions.shape == protocols::PsychometricShape::weibull
+              ? "JND is measured half-way from there to certainty (threshold: at 63 %)"
+              : "threshold is half-way from there to certainty";
+  return text +
+         ";\ndetect, same/different: guess rate free. d': log-linear correction.\nBayes: posterior "
+         "mean of the threshold on a grid.\n";
+}
 
-namespace {
+/// Notes on what a table without its protocol does not contain: the scale of levels, and whether
+/// numbers are steps.
+std::string scale_note(const TaskAnalysis& analysis) {
+  const bool unknown =
+      analysis.table.procedures.empty() && !analysis.functions.scale &&
+      std::any_of(analysis.cells.begin(), analysis.cells.end(), [](const auto& cell) {
+        return !cell.functions.empty() && cell.no_function.empty() &&
+               cell.scale == protocols::LevelScale::linear;
+      });
+  const bool numbers = analysis.table.procedures.empty() &&
+                       std::ranges::any_of(analysis.cells, [](const TaskCell& cell) {
+                         return cell.magnitude.has_value();
+                       });
+  std::string text;
+  if (unknown)
+    text +=
+        "A table does not contain the scale of an adaptive procedure's levels: if it is\n"
+        "logarithmic, give --scale log.\n";
+  if (numbers)
+    text +=
+        "A table does not say whether numbers are steps of a labelled scale, for which a power law "
+        "says\nnothing: analyse the database, or give the labels as responses.\n";
+  return text;
+}
+
+/// On a page lines end where there is no room left.
+std::string without_line_ends(std::string text) {
+  std::ranges::replace(text, '\n', ' ');
+  return text;
+}
 
 /// "left 3, right 9", or "20 to 31, mean 24.5, SD 3.2"
 std::string described_answers(const data::ParticipantColumn& column) {
@@ -114,7 +83,7 @@ std::string described_answers(const data::ParticipantColumn& column) {
     const auto [end, error] = std::from_chars(answer.data(), answer.data() + answer.size(), value);
     if (error == std::errc() && end == answer.data() + answer.size()) numbers.push_back(value);
   }
-  if (column.answers.empty()) return kNoNumber;
+  if (column.answers.empty()) return kMissing;
   if (column.from.number && numbers.size() == column.answers.size()) {
     const auto [least, most] = std::ranges::minmax(numbers);
     double mean = 0, squares = 0;
@@ -151,52 +120,106 @@ Table people_table(const TaskTable& source, const std::string& label) {
   return table;
 }
 
+/// Sections of a page of tasks: results over participants, figures, each task's numbers.
+class TaskPage {
+ public:
+  explicit TaskPage(const TaskAnalysis& analysis)
+      : analysis_(analysis),
+        label_(analysis.table.simulated ? "SIMULATED PARTICIPANTS" : ""),
+        figures_(task_figures(analysis)),
+        page_(conclusion(analysis), label_) {}
+
+  std::string html(const std::string& program_version) {
+    put_header();
+    put_people();
+    put_results();
+    put_figures(true);
+    put_cells();
+    put_figures(false);
+    put_identification();
+    return page_.html("Analysed with palpate " + program_version + ".");
+  }
+
+ private:
+  void put_header() {
+    const TaskTable& source = analysis_.table;
+    if (source.simulated)
+      page_.put_banner(
+          "SIMULATED PARTICIPANTS: numbers below are from a model of a participant, not from "
+          "humans.");
+    page_.above_title() +=
+        "<p class=\"study\">" + escaped(printable(study_of(source), 400)) + "</p>\n";
+    page_.below_title() += "<p class=\"lead\">" + counted(source.trials.size(), "trial", "trials") +
+                           " of " + escaped(printable(source.source, 400)) + "</p>\n";
+    if (source.warnings.empty()) return;
+    page_.below_title() += "<div class=\"warnings\" aria-label=\"Warnings\">\n";
+    put_list(page_.below_title(), source.warnings);
+    page_.below_title() += "</div>\n";
+  }
+
+  void put_people() {
+    if (analysis_.table.people.empty()) return;
+    page_.begin_section("people", "Participants", "Participants");
+    put_table(page_.body(), people_table(analysis_.table, label_));
+    page_.end_section();
+  }
+
+  void put_results() {
+    const std::vector<Table> groups = group_tables(analysis_),
+                             summaries = summary_tables(analysis_);
+    if (groups.empty() && summaries.empty()) return;
+    page_.begin_section("participants", "Results over participants", "Results over participants");
+    for (const Table& table : groups) put_table(page_.body(), table);
+    put_quotable(page_.body(), sentences_to_quote(analysis_));
+    for (const Table& table : summaries) put_table(page_.body(), table);
+    page_.end_section();
+  }
+
+  /// \param of_all  of results over participants; otherwise of each one's functions and tracks
+  void put_figures(bool of_all) {
+    for (const Figure& figure : figures_) {
+      const bool single = figure.id.starts_with("function") || figure.id.starts_with("track");
+      if (single != of_all) page_.put_figure_section(figure, figure.title);
+    }
+  }
+
+  void put_cells() {
+    page_.begin_section("numbers", "Numbers of each participant", "Numbers");
+    for (const TaskCell& cell : analysis_.cells) {
+      const std::vector<Table> tables = cell_tables(cell, label_);
+      if (tables.empty()) continue;
+      put_collapsible_tables(page_.body(),
+                             stimulus_of(cell.task, cell.block_name, cell.shape) + ", " +
+                                 printable(cell.renderer) + ": " +
+                                 counted(cell.trials, "trial", "trials") + " of " +
+                                 counted(cell.participants.size(), "participant", "participants") +
+                                 ", " + std::to_string(cell.answered) + " answered",
+                             tables);
+    }
+    page_.put_note(without_line_ends(explanation(analysis_.functions) + scale_note(analysis_)));
+    page_.end_section();
+  }
+
+  void put_identification() {
+    if (!analysis_.identification) return;
+    for (const Figure& figure : figures_of(*analysis_.identification, {}))
+      page_.put_figure_section(figure, figure.title);
+    page_.begin_section("identification", "Times and accuracy of identification", "Identification");
+    for (const Table& table : all_tables(*analysis_.identification)) put_table(page_.body(), table);
+    put_quotable(page_.body(), sentences_to_quote(*analysis_.identification));
+    page_.end_section();
+  }
+
+  const TaskAnalysis& analysis_;
+  std::string label_;
+  std::vector<Figure> figures_;
+  HtmlPage page_;
+};
+
 }  // namespace
 
 std::string task_report_html(const TaskAnalysis& analysis, const std::string& program_version) {
-  const TaskTable& source = analysis.table;
-  const std::string label = source.simulated ? "SIMULATED PARTICIPANTS" : "";
-  HtmlPage page(printable(study_of(source), 400), label);
-  if (source.simulated)
-    page.put_banner(
-        "SIMULATED PARTICIPANTS: numbers below are from a model of a participant, not from "
-        "humans.");
-  page.below_title() += "<p class=\"lead\">Thresholds and other results of tasks, " +
-                        counted(source.trials.size(), "trial", "trials") + " of " +
-                        escaped(printable(source.source, 400)) + "</p>\n";
-  if (!source.warnings.empty()) {
-    page.below_title() += "<div class=\"warnings\" aria-label=\"Warnings\">\n";
-    put_list(page.below_title(), source.warnings);
-    page.below_title() += "</div>\n";
-  }
-  if (!source.people.empty()) {
-    page.begin_section("people", "Participants", "Participants");
-    put_table(page.body(), people_table(source, label));
-    page.end_section();
-  }
-  const std::vector<Figure> figures = task_figures(analysis);
-  const auto put_figures = [&](bool of_groups) {
-    for (const Figure& figure : figures) {
-      if (figure.id.starts_with("group") == of_groups)
-        page.put_figure_section(figure, figure.title);
-    }
-  };
-  if (!analysis.groups.empty()) {
-    page.begin_section("participants", "Results over participants", "Results over participants");
-    put_table(page.body(), group_table(analysis, label));
-    if (!analysis.renderers.empty()) put_table(page.body(), comparison_table(analysis, label));
-    page.end_section();
-  }
-  put_figures(true);
-  page.begin_section("numbers", "Numbers", "Numbers");
-  page.body() += "<pre tabindex=\"0\">" + escaped_lines(task_report_text(analysis)) + "</pre>\n";
-  page.end_section();
-  put_figures(false);
-  if (analysis.identification) {
-    for (const Figure& figure : figures_of(*analysis.identification, {}))
-      page.put_figure_section(figure, figure.title);
-  }
-  return page.html("Analysed with palpate " + program_version + ".");
+  return TaskPage(analysis).html(program_version);
 }
 
 namespace {
@@ -323,17 +346,79 @@ TaskJson magnitude_json(const TaskCell& cell) {
   TaskJson out{{"exponent", maybe(cell.magnitude->exponent)},
                {"exponent_ci95", ends_json(cell.magnitude->exponent_ci95)},
                {"n_without_logarithm", cell.magnitude->without_logarithm}};
-  for (const StevensLine& line : cell.magnitude->lines)
+  for (const StevensLine& line : cell.magnitude->lines) {
     out["participants"].push_back({{"participant_id", cell.participants[line.participant]},
                                    {"exponent", maybe(line.exponent)},
                                    {"exponent_se", maybe(line.exponent_se)},
                                    {"log10_scale", maybe(line.log10_scale)},
-                                   {"r_squared", maybe(line.r_squared)}});
+                                   {"r_squared", maybe(line.r_squared)},
+                                   {"levels", TaskJson::array()}});
+    for (const StevensLine::Point& point : line.points)
+      out["participants"].back()["levels"].push_back(
+          {{"level", point.level}, {"geometric_mean", finite(point.magnitude)}});
+  }
   for (const MagnitudeMean& one : cell.magnitude->means)
     out["levels"].push_back({{"level", one.level},
                              {"geometric_mean", one.geometric_mean},
                              {"ci95", ends_json(one.ci95)},
                              {"n_participants", one.participants}});
+  return out;
+}
+
+TaskJson spread_json(const RatingSpread& spread) {
+  return {{"n_ratings", spread.ratings},
+          {"median", spread.median},
+          {"lower_quartile", spread.lower_quartile},
+          {"upper_quartile", spread.upper_quartile},
+          {"mean", spread.mean}};
+}
+
+TaskJson mean_json(const MeanRating& mean) {
+  return {{"n_participants", mean.participants},
+          {"mean", maybe(mean.mean)},
+          {"sd", maybe(mean.sd)},
+          {"ci95", ends_json(mean.ci95)}};
+}
+
+TaskJson rated_participants_json(const std::vector<ParticipantRatings>& participants,
+                                 const TaskCell& cell) {
+  TaskJson out = TaskJson::array();
+  for (const ParticipantRatings& one : participants) {
+    TaskJson& entry =
+        out.emplace_back(TaskJson{{"participant_id", cell.participants[one.participant]}});
+    entry.update(spread_json(one.spread));
+  }
+  return out;
+}
+
+TaskJson ratings_json(const TaskCell& cell) {
+  const Ratings& ratings = *cell.ratings;
+  TaskJson out{{"labelled", ratings.labelled}, {"steps", TaskJson::array()}};
+  for (const RatingStep& step : ratings.steps)
+    out["steps"].push_back({{"number", step.number},
+                            {"label", step.label.empty() ? TaskJson() : TaskJson(step.label)},
+                            {"n_ratings", step.count},
+                            {"share", finite(step.share)}});
+  out["all"] = ratings.spread.ratings > 0 ? spread_json(ratings.spread) : TaskJson();
+  out["mean_of_participants"] = mean_json(ratings.mean);
+  out["participants"] = rated_participants_json(ratings.participants, cell);
+  for (const RatingsAtLevel& at : ratings.levels)
+    out["levels"].push_back({{"level", at.level},
+                             {"all", spread_json(at.spread)},
+                             {"mean_of_participants", mean_json(at.mean)},
+                             {"participants", rated_participants_json(at.participants, cell)}});
+  return out;
+}
+
+TaskJson wilcoxon_json(const Wilcoxon& ranks) {
+  TaskJson out;
+  put_status(out, ranks.undefined);
+  out["V_positive_rank_sum"] = maybe(ranks.positive_rank_sum);
+  out["n_nonzero"] = ranks.n_nonzero;
+  out["p"] = maybe(ranks.p);
+  out["method"] = ranks.exact ? "exact" : "normal approximation";
+  if (ranks.p && ranks.n_nonzero < kLeastForWilcoxon)
+    out["note"] = "With 5 or fewer participants who differ, the exact p cannot be below 0.05.";
   return out;
 }
 
@@ -364,6 +449,7 @@ TaskJson cell_json(const TaskCell& cell) {
   for (const ParticipantFunction& one : cell.functions)
     out["psychometric_functions"].push_back(function_json(one));
   if (cell.magnitude) out["magnitude_estimation"] = magnitude_json(cell);
+  if (cell.ratings) out["ratings"] = ratings_json(cell);
   for (const Adjustment& one : cell.adjustments)
     out["adjustments"].push_back({{"participant_id", cell.participants[one.participant]},
                                   {"n_settings", one.settings},
@@ -419,6 +505,7 @@ TaskJson group_json(const TaskGroup& group) {
 TaskJson comparison_json(const TaskComparison& one, bool of_renderers) {
   const char* const condition = of_renderers ? "renderer" : "condition";
   TaskJson out{{"task", one.task}, {"measure", one.measure}};
+  if (one.measure == "rating" && !of_renderers) out["block_name"] = one.block_name;
   if (of_renderers) {
     out["block_name"] = one.block_name;
     out["shape"] = one.shape;
@@ -431,17 +518,22 @@ TaskJson comparison_json(const TaskComparison& one, bool of_renderers) {
   put_status(out, one.comparison.undefined);
   out["participant_sd"] = maybe(one.comparison.participant_sd);
   out["residual_sd"] = maybe(one.comparison.residual_sd);
-  for (const ConditionDifference& difference : one.comparison.differences)
+  if (!one.comparison.differences.empty()) out["n_tests"] = one.n_tests;
+  for (const ConditionDifference& difference : one.comparison.differences) {
     out["differences"].push_back({{condition, one.conditions[difference.condition]},
                                   {"n_pairs", difference.n_pairs},
                                   {"mean", finite(difference.mean)},
                                   {"ci95", ends_json(difference.t_test.log_ratio_ci95)},
                                   {"t", maybe(difference.t_test.t)},
+                                  {"df", maybe(difference.t_test.df)},
                                   {"p", maybe(difference.t_test.p)},
                                   {"p_holm", maybe(difference.t_test.p_holm)},
                                   {"dz", maybe(difference.effect_size.dz)},
                                   {"mixed_estimate", maybe(difference.mixed_estimate)},
                                   {"mixed_se", maybe(difference.mixed_se)}});
+    if (one.measure == "rating")
+      out["differences"].back()["wilcoxon"] = wilcoxon_json(difference.wilcoxon);
+  }
   return out;
 }
 
@@ -598,33 +690,6 @@ std::string function_text(const ParticipantFunction& one,
   return text;
 }
 
-std::string explanation(const FunctionSettings& functions) {
-  std::string text =
-      std::string("Intervals are 95 % intervals. Psychometric functions: ") +
-      to_string(functions.shape) + ", lapse rate free up to " + short_number(kMostLapse) +
-      ".\ncompare with levels on both sides of the standard: the same lapse rate at both "
-      "asymptotes; on one\nside: guess rate 1 / intervals, and the ";
-  text += functions.shape == protocols::PsychometricShape::weibull
-              ? "JND is measured half-way from there to certainty (threshold: at 63 %)"
-              : "threshold is half-way from there to certainty";
-  return text +
-         ";\ndetect, same/different: guess rate free. d': log-linear correction.\nBayes: posterior "
-         "mean of the threshold on a grid.\n";
-}
-
-/// A note if levels are taken as they are because their procedure is unknown.
-std::string scale_note(const TaskAnalysis& analysis) {
-  const bool unknown =
-      analysis.table.procedures.empty() && !analysis.functions.scale &&
-      std::any_of(analysis.cells.begin(), analysis.cells.end(), [](const auto& cell) {
-        return !cell.functions.empty() && cell.no_function.empty() &&
-               cell.scale == protocols::LevelScale::linear;
-      });
-  return unknown ? "A table does not contain the scale of an adaptive procedure's levels: if "
-                   "it is\nlogarithmic, give --scale log.\n"
-                 : "";
-}
-
 std::string magnitude_text(const TaskCell& cell) {
   std::string text;
   const MagnitudeEstimation& magnitude = *cell.magnitude;
@@ -645,6 +710,32 @@ std::string magnitude_text(const TaskCell& cell) {
     text += "  " + counted(magnitude.without_logarithm, "answer", "answers") +
             " of 0 or below left out: they have no logarithm\n";
   return text;
+}
+
+std::string spread_text(const RatingSpread& spread) {
+  return "median " + short_number(spread.median) + ", quartiles " +
+         short_number(spread.lower_quartile) + " to " + short_number(spread.upper_quartile) +
+         ", mean " + short_number(spread.mean) + " (" +
+         counted(spread.ratings, "rating", "ratings") + ")\n";
+}
+
+std::string ratings_text(const TaskCell& cell) {
+  const Ratings& ratings = *cell.ratings;
+  if (ratings.spread.ratings == 0) return "  no ratings with a number\n";
+  std::string text;
+  for (const ParticipantRatings& one : ratings.participants)
+    text += "  " + pad_right(printable(cell.participants[one.participant]), 12) +
+            spread_text(one.spread);
+  for (const RatingStep& step : ratings.steps)
+    text += "  " + short_number(step.number) +
+            (step.label.empty() ? "" : " " + printable(step.label, 60)) + ": " +
+            fixed(100 * step.share, 1) + " % (" + counted(step.count, "rating", "ratings") + ")\n";
+  text += "  all ratings: " + spread_text(ratings.spread);
+  for (const RatingsAtLevel& at : ratings.levels)
+    text += "  level " + short_number(at.level) + ": mean of participants " +
+            optional_interval(at.mean.mean, at.mean.ci95) + ", " + spread_text(at.spread);
+  return text + "  mean of participants " +
+         optional_interval(ratings.mean.mean, ratings.mean.ci95) + "\n";
 }
 
 std::string adjustment_text(const TaskCell& cell) {
@@ -681,6 +772,7 @@ std::string cell_text(const TaskCell& cell) {
   for (const ParticipantFunction& one : cell.functions)
     text += function_text(one, cell.expected_easier);
   if (cell.magnitude) text += magnitude_text(cell);
+  if (cell.ratings) text += ratings_text(cell);
   text += adjustment_text(cell);
   if (cell.information && cell.information->plain) {
     text += "  information transfer " + short_number(*cell.information->plain) + " bit of " +
@@ -721,6 +813,14 @@ std::string group_text(const TaskGroup& group) {
   return text + "\n";
 }
 
+/// Beside the t-test of ratings.
+std::string wilcoxon_text(const Wilcoxon& ranks) {
+  if (!ranks.p) return "";
+  const bool few = ranks.n_nonzero < kLeastForWilcoxon;
+  return "; Wilcoxon V = " + short_number(*ranks.positive_rank_sum) + ", " + p_phrase(*ranks.p) +
+         (few ? " (5 or fewer differ: p cannot be below 0.05)" : "");
+}
+
 std::string comparison_text(const TaskComparison& one, bool of_renderers) {
   std::string text =
       measure_plural(one.measure) + " by " + (of_renderers ? "renderer" : "block and stimulus");
@@ -750,9 +850,13 @@ std::string comparison_text(const TaskComparison& one, bool of_renderers) {
     text += shown(difference.mean);
     if (const auto& ends = difference.t_test.log_ratio_ci95)
       text += " [" + shown(ends->low) + ", " + shown(ends->high) + "]";
-    if (difference.t_test.p) text += ", p " + p_text(*difference.t_test.p);
-    if (difference.t_test.p_holm && one.comparison.differences.size() > 1)
-      text += " (Holm " + p_text(*difference.t_test.p_holm) + ")";
+    const TTest& test = difference.t_test;
+    if (test.p) text += ", " + test_text(test);
+    if (test.p_holm && one.n_tests > 1)
+      text += " (" + p_phrase(*test.p_holm) + " adjusted over " + std::to_string(one.n_tests) +
+              " tests, Holm)";
+    if (difference.effect_size.dz) text += ", dz = " + fixed(*difference.effect_size.dz, 2);
+    if (one.measure == "rating") text += wilcoxon_text(difference.wilcoxon);
     if (difference.mixed_estimate) text += "; mixed model " + shown(*difference.mixed_estimate);
     text += " (" + counted(difference.n_pairs, "pair", "pairs") + ")\n";
   }
@@ -782,6 +886,8 @@ std::string accuracy_text(const MixedLogistic& model) {
 std::string task_report_text(const TaskAnalysis& analysis) {
   std::string text;
   if (analysis.table.simulated) text += "SIMULATED PARTICIPANTS\n\n";
+  if (!analysis.groups.empty() || analysis.identification)
+    text += paragraph_text(conclusion(analysis)) + "\n";
   for (const std::string& warning : analysis.table.warnings) text += printable(warning, 400) + "\n";
   if (!analysis.table.warnings.empty()) text += "\n";
   for (const TaskCell& cell : analysis.cells) text += cell_text(cell);
@@ -789,6 +895,10 @@ std::string task_report_text(const TaskAnalysis& analysis) {
   for (const TaskComparison& one : analysis.renderers) text += comparison_text(one, true);
   for (const TaskComparison& one : analysis.conditions) text += comparison_text(one, false);
   if (analysis.accuracy) text += accuracy_text(*analysis.accuracy);
+  const std::vector<std::string> sentences = sentences_to_quote(analysis);
+  if (!sentences.empty()) text += "To quote\n";
+  for (const std::string& sentence : sentences) text += paragraph_text(sentence);
+  if (!sentences.empty()) text += "\n";
   text += explanation(analysis.functions) + scale_note(analysis);
   if (analysis.identification)
     text += "\nTimes and accuracy of identification\n\n" + report_text(*analysis.identification);

@@ -14,9 +14,9 @@ namespace palpate::analysis {
 
 std::string stimulus_of(const std::string& task, const std::string& block,
                         const std::string& shape) {
-  std::string name = task;
-  for (const std::string* part : {&block, &shape}) {
-    if (!part->empty()) name += ", " + printable(*part);
+  std::string name;
+  for (const std::string* part : {&task, &block, &shape}) {
+    if (!part->empty()) name += (name.empty() ? "" : ", ") + printable(*part);
   }
   return name;
 }
@@ -206,7 +206,7 @@ bool is_clear(const ConditionDifference& difference) {
 /// "35 % lower", "0.8 higher"
 std::string how_far(const TaskComparison& one, double mean) {
   const double away = one.logarithms ? 100 * std::abs(std::expm1(mean)) : std::abs(mean);
-  return (one.logarithms ? fixed(away, 0) + " %" : short_number(away)) +
+  return (one.logarithms ? fixed(away, 0) + " %" : fixed(away, away < 0.1 ? 3 : 1)) +
          (mean < 0 ? " lower" : " higher");
 }
 
@@ -217,8 +217,9 @@ std::string finding_on_renderers(const TaskAnalysis& analysis) {
   for (const TaskComparison& one : analysis.renderers) {
     for (const ConditionDifference& difference : one.comparison.differences) {
       if (!difference.t_test.p_holm) continue;
+      const std::string where = stimulus_of(one.block_name, one.shape, "");
       const std::string place =
-          measure_word(one.measure) + " (" + stimulus_of(one.block_name, one.shape, "") + ")";
+          measure_word(one.measure) + (where.empty() ? "" : " (" + where + ")");
       if (!is_clear(difference)) {
         unclear.push_back(place);
       } else if (clear.size() == kMostTold) {

@@ -38,6 +38,7 @@ StevensLine line_of(std::size_t participant, const LogsByLevel& logs) {
     line.trials += values.size();
     mean_x += std::log10(level) / n;
     mean_y += mean(values) / n;
+    line.points.push_back({level, std::pow(10, mean(values))});
   }
   if (logs.size() < 2) {
     line.undefined = "fewer than two levels";
@@ -604,6 +605,48 @@ void add_functions(TaskCell& cell, const Trials& trials, const Context& context)
     cell.functions.push_back(function_of(participant, own, cell, usual, context));
 }
 
+/// The labelled steps of a cell's ratings, from the protocol or, without one, from labels that are
+/// the answers; empty: numbers were typed, or nothing says.
+std::vector<RatingStep> rating_steps(const Trials& trials, const TaskTable& table) {
+  std::vector<RatingStep> steps;
+  if (const auto* block = block_of(*trials.front(), table)) {
+    for (const auto& step : block->rating_steps) steps.push_back({step.number, step.label, 0, 0});
+    return steps;
+  }
+  std::map<double, std::string> labels;
+  for (const TaskTrial* trial : trials) {
+    if (!trial->answered || !trial->number) continue;
+    const bool label = trial->response.find_first_not_of("0123456789.,+-eE ") != std::string::npos;
+    std::string& known = labels[*trial->number];
+    if (label) known = trial->response;
+  }
+  const bool labelled =
+      std::ranges::any_of(labels, [](const auto& l) { return !l.second.empty(); });
+  for (const auto& [number, label] : labels) {
+    if (labelled) steps.push_back({number, label, 0, 0});
+  }
+  return steps;
+}
+
+/// \return false: numbers of any size were given to levels, so magnitude estimation describes them
+bool add_ratings(TaskCell& cell, const Trials& trials, const TaskTable& table) {
+  std::vector<RatingStep> steps = rating_steps(trials, table);
+  const bool levels =
+      std::ranges::any_of(trials, [](const TaskTrial* trial) { return trial->level.has_value(); });
+  if (steps.empty() && levels) return false;
+  std::vector<Rating> ratings;
+  std::size_t number = 0;
+  for (const auto& [participant, own] : by_participant(trials)) {
+    for (const TaskTrial* trial : own) {
+      if (trial->answered && trial->number)
+        ratings.push_back({number, *trial->number, trial->level});
+    }
+    ++number;
+  }
+  cell.ratings = ratings_of(ratings, std::move(steps));
+  return true;
+}
+
 void add_magnitude(TaskCell& cell, const Trials& trials) {
   std::vector<MagnitudeTrial> judged;
   std::size_t number = 0;
@@ -686,7 +729,7 @@ TaskCell cell_of(const CellKey& key, const Trials& trials, const Context& contex
     if (block->level_unit != "1") cell.level_unit = block->level_unit;
   }
   if (cell.task == "compare" || cell.task == "detect") add_functions(cell, trials, context);
-  if (cell.task == "rate") add_magnitude(cell, trials);
+  if (cell.task == "rate" && !add_ratings(cell, trials, context.table)) add_magnitude(cell, trials);
   if (cell.task == "adjust") add_adjustments(cell, trials);
   if (cell.task == "identify") add_information(cell, trials);
   cell.confidence = confidence_of(trials);

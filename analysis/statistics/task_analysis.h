@@ -13,6 +13,7 @@
 #include "analysis/statistics/mixed_model.h"
 #include "analysis/statistics/paired.h"
 #include "analysis/statistics/psychometric_fit.h"
+#include "analysis/statistics/ratings.h"
 #include "analysis/statistics/task_comparisons.h"
 
 namespace palpate::analysis {
@@ -29,12 +30,18 @@ struct MagnitudeTrial {
 /// Straight line of log10 magnitude over log10 level (Stevens 1957), by least squares on the log
 /// means of each level.
 struct StevensLine {
+  /// Geometric mean of the magnitudes at a level.
+  struct Point {
+    double level = 0, magnitude = 0;
+  };
+
   std::string undefined;
   std::size_t participant = 0;
   std::size_t trials = 0, levels = 0;
   std::optional<double> exponent, log10_scale;  ///< magnitude = 10^log10_scale level^exponent
   std::optional<double> r_squared;
   std::optional<double> exponent_se;  ///< from three levels on
+  std::vector<Point> points;          ///< in order of the level, as judged
 };
 
 /// Geometric mean of the magnitudes at a level over participants, after equalising their means of
@@ -200,7 +207,8 @@ struct TaskCell {
   std::string no_function;  ///< reason if no psychometric function is fitted; empty: it is
   std::vector<std::string> participants;           ///< indexed by `magnitude` and `adjustments`
   std::vector<ParticipantFunction> functions;      ///< compare, detect
-  std::optional<MagnitudeEstimation> magnitude;    ///< rate
+  std::optional<MagnitudeEstimation> magnitude;    ///< rate: free numbers for levels
+  std::optional<Ratings> ratings;                  ///< rate: labelled steps, or without levels
   std::vector<Adjustment> adjustments;             ///< adjust
   std::optional<InformationTransfer> information;  ///< identify: over all its stimuli, pooled
   std::vector<InformationTransfer> informations;   ///< of each participant

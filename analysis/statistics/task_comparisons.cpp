@@ -142,6 +142,7 @@ ThresholdComparison compare_thresholds(const std::vector<ParticipantFigure>& fig
     if (!differences.empty()) difference.mean = mean(differences);
     difference.t_test = t_test(differences);
     difference.effect_size = effect_size(differences);
+    difference.wilcoxon = wilcoxon(differences);
     p.push_back(difference.t_test.p);
     result.differences.push_back(std::move(difference));
   }
@@ -242,10 +243,23 @@ Figures setting_jnds(const TaskCell& cell) {
   return figures;
 }
 
+/// Means of a participant's ratings. A scale has no true zero.
+Figures ratings(const TaskCell& cell) {
+  Figures figures;
+  figures.ratios = false;
+  if (!cell.ratings) return figures;
+  for (const ParticipantRatings& one : cell.ratings->participants)
+    figures.add(cell.participants[one.participant], one.spread.mean);
+  return figures;
+}
+
+constexpr const char* kRating = "rating";
+
 /// The compared measures. Weber fractions are left out: they are JNDs over the same standard.
 std::vector<Measure> measures() {
   return {{"threshold", thresholds}, {"pse", pses},     {"jnd", jnds},
-          {"exponent", exponents},   {"pse", settings}, {"jnd", setting_jnds}};
+          {"exponent", exponents},   {"pse", settings}, {"jnd", setting_jnds},
+          {kRating, ratings}};
 }
 
 void add_mean(GroupMean& group, bool geometric) {
@@ -287,6 +301,12 @@ std::optional<TaskGroup> group_of(const std::vector<const TaskCell*>& cells,
   return result;
 }
 
+std::size_t number_of_tests(const TaskComparison& one) {
+  return static_cast<std::size_t>(std::ranges::count_if(
+      one.comparison.differences,
+      [](const ConditionDifference& difference) { return difference.t_test.p.has_value(); }));
+}
+
 /// None: fewer than two cells have figures.
 std::optional<TaskComparison> compared(const std::vector<const TaskCell*>& cells,
                                        const Measure& measure,
@@ -314,6 +334,7 @@ std::optional<TaskComparison> compared(const std::vector<const TaskCell*>& cells
     for (ParticipantFigure& figure : all) figure.value = std::log(figure.value);
   }
   result.comparison = compare_thresholds(all, result.conditions.size());
+  result.n_tests = number_of_tests(result);
   return result;
 }
 
@@ -344,12 +365,53 @@ std::vector<std::vector<const TaskCell*>> groups_by_renderer(const std::vector<T
   return groups;
 }
 
+/// Ratings of many stimuli are many tests: adjusts p over all of a block (and of a renderer, if
+/// stimuli are compared).
+void adjust_ratings(std::vector<TaskComparison>& comparisons) {
+  using Family = std::tuple<std::string, std::string, std::string>;
+  std::map<Family, std::vector<TaskComparison*>> families;
+  for (TaskComparison& one : comparisons) {
+    if (one.measure == kRating) families[{one.task, one.block_name, one.renderer}].push_back(&one);
+  }
+  for (const auto& [name, family] : families) {
+    std::vector<TTest*> tests;
+    std::vector<std::optional<double>> p;
+    for (TaskComparison* one : family) {
+      for (ConditionDifference& difference : one->comparison.differences) {
+        tests.push_back(&difference.t_test);
+        p.push_back(difference.t_test.p);
+      }
+    }
+    const auto adjusted = holm(p);
+    const auto n = static_cast<std::size_t>(
+        std::ranges::count_if(p, [](const auto& one) { return one.has_value(); }));
+    for (std::size_t i = 0; i < tests.size(); ++i) tests[i]->p_holm = adjusted[i];
+    for (TaskComparison* one : family) one->n_tests = n;
+  }
+}
+
+/// The stimuli of a block with a renderer, each with the later ones.
+void compare_rated_stimuli(const std::vector<const TaskCell*>& cells,
+                           std::vector<TaskComparison>& results) {
+  const std::size_t references = cells.size() > kMostPaired ? 1 : cells.size();
+  for (std::size_t i = 0; i < references; ++i) {
+    const std::vector<const TaskCell*> from(cells.begin() + static_cast<std::ptrdiff_t>(i),
+                                            cells.end());
+    auto one = compared(from, {kRating, ratings}, [](const TaskCell& cell) { return cell.shape; });
+    if (!one) continue;
+    one->block_name = cells.front()->block_name;
+    one->renderer = cells.front()->renderer;
+    results.push_back(std::move(*one));
+  }
+}
+
 }  // namespace
 
 std::string measure_plural(const std::string& measure) {
   if (measure == "threshold") return "Thresholds";
   if (measure == "jnd") return "JNDs";
   if (measure == "weber_fraction") return "Weber fractions";
+  if (measure == "rating") return "Mean ratings";
   return measure == "pse" ? "PSEs" : "Exponents";
 }
 
@@ -376,6 +438,7 @@ std::vector<TaskComparison> compare_renderers(const std::vector<TaskCell>& cells
       results.push_back(std::move(*one));
     }
   }
+  adjust_ratings(results);
   return results;
 }
 
@@ -386,6 +449,7 @@ std::vector<TaskComparison> compare_conditions(const std::vector<TaskCell>& cell
          return Key{c.task, c.renderer, c.standard_level};
        })) {
     for (const Measure& measure : measures()) {
+      if (std::string(measure.name) == kRating) continue;  // another block has another question
       auto one = compared(group, measure, [](const TaskCell& cell) {
         return cell.block_name + (cell.shape.empty() ? "" : ", " + cell.shape);
       });
@@ -394,6 +458,12 @@ std::vector<TaskComparison> compare_conditions(const std::vector<TaskCell>& cell
       results.push_back(std::move(*one));
     }
   }
+  using Block = std::tuple<std::string, std::string, std::string>;
+  for (const auto& group : groups_of<Block>(cells, [](const TaskCell& c) {
+         return Block{c.task, c.renderer, c.block_name};
+       }))
+    compare_rated_stimuli(group, results);
+  adjust_ratings(results);
   return results;
 }
 

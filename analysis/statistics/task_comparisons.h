@@ -29,6 +29,7 @@ struct ConditionDifference {
   double mean = 0;
   TTest t_test;  ///< its interval is that of the difference; p_holm over the conditions
   EffectSize effect_size;
+  Wilcoxon wilcoxon;
   /// From the mixed model, which also uses participants who lack one of the two.
   std::optional<double> mixed_estimate, mixed_se;
 };
@@ -65,7 +66,7 @@ struct GroupMean {
 /// A measure of a stimulus in a block, with each renderer.
 struct TaskGroup {
   std::string task, block_name, shape;
-  std::string measure;  ///< "threshold", "pse", "jnd", "weber_fraction", "exponent"
+  std::string measure;  ///< "threshold", "pse", "jnd", "weber_fraction", "exponent", "rating"
   std::string unit;     ///< "N/m", ...; "": unknown, or without unit
   /// Means are geometric if all figures are positive and have a true zero, except for exponents.
   bool geometric = false;
@@ -75,17 +76,19 @@ struct TaskGroup {
 /// Natural logarithms if all figures are positive.
 struct TaskComparison {
   std::string task;
-  std::string measure;            ///< "threshold", "pse", "jnd", "exponent"
+  std::string measure;            ///< "threshold", "pse", "jnd", "exponent", "rating"
   std::string block_name, shape;  ///< of a comparison of renderers
   std::string renderer;           ///< of a comparison of blocks and stimuli
   /// Renderers, or "BLOCK, STIMULUS"; the first is the reference.
   std::vector<std::string> conditions;
   bool logarithms = false;
   std::size_t n_undetermined = 0;  ///< functions whose threshold is undetermined: left out
+  /// Tests that p_holm is adjusted over: the differences; of ratings, all of the block.
+  std::size_t n_tests = 0;
   ThresholdComparison comparison;
 };
 
-/// "Thresholds", "PSEs", "JNDs", "Weber fractions", "Exponents".
+/// "Thresholds", "PSEs", "JNDs", "Weber fractions", "Exponents", "Mean ratings".
 std::string measure_plural(const std::string& measure);
 
 /// Means over participants, for each measure with a value.
@@ -93,7 +96,9 @@ std::vector<TaskGroup> group_results(const std::vector<TaskCell>& cells);
 /// Compares renderers within a block and stimulus; the reference is point, or else the renderer of
 /// the first trial.
 std::vector<TaskComparison> compare_renderers(const std::vector<TaskCell>& cells);
-/// Compares blocks and stimuli of a task with a renderer, if they have the same standard.
+/// Compares blocks and stimuli of a task with a renderer, if they have the same standard. Ratings:
+/// the stimuli of a block, each with each up to kMostPaired of them, else with the first.
+constexpr std::size_t kMostPaired = 20;
 std::vector<TaskComparison> compare_conditions(const std::vector<TaskCell>& cells);
 
 }  // namespace palpate::analysis

@@ -91,6 +91,8 @@ std::vector<TaskAnswer> answers_of(const Protocol& protocol, const TaskBlock& bl
   return answers;
 }
 
+}  // namespace
+
 std::vector<ScaleStep> read_scale_steps(ObjectReader& reader, const char* key, Presence presence) {
   std::vector<ScaleStep> steps;
   const json* const list = reader.array(key, 2, kMostSteps, presence);
@@ -107,6 +109,8 @@ std::vector<ScaleStep> read_scale_steps(ObjectReader& reader, const char* key, P
   }
   return steps;
 }
+
+namespace {
 
 /// 1, 2, ..., 9, 0, then letters: a separate key for each step.
 std::string step_key(std::size_t i) {

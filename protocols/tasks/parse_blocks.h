@@ -2,6 +2,7 @@
 // Reads the additions of protocol version 2: blocks of tasks, and pages.
 
 #include <optional>
+#include <vector>
 
 #include "protocols/json_document.h"
 #include "protocols/parse_scene.h"
@@ -18,6 +19,8 @@ std::optional<ProcedureSpec> read_procedure(ObjectReader& reader);
 void read_blocks(ObjectReader& reader, Protocol& protocol);
 /// Reads `procedure` of a block: one, or a list of them.
 void read_procedures(ObjectReader& block, std::vector<ProcedureSpec>& procedures);
+/// Reads the steps of a labelled scale; without a number of its own a step has its place from 1.
+std::vector<ScaleStep> read_scale_steps(ObjectReader& reader, const char* key, Presence presence);
 /// Reads pages, which refer to the blocks.
 /// \param files  source of their pictures
 void read_pages(ObjectReader& reader, Protocol& protocol, const MeshFiles& files);

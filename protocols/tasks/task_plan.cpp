@@ -353,6 +353,8 @@ std::map<std::string, BlockProcedures> procedures_of_blocks(const std::string& t
     const nlohmann::json::json_pointer path("/level/path");
     if (one.is_object() && one.contains(path) && one[path].is_string())
       procedures.level_unit = unit_of_level(one[path].get<std::string>());
+    if (one.is_object() && one.contains("task") && one["task"] == "rate")
+      procedures.rating_steps = read_scale_steps(block, "scale", Presence::optional);
     all.emplace(name, std::move(procedures));
   }
   faults.throw_if_any();

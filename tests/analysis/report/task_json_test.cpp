@@ -164,7 +164,7 @@ TEST(TaskJson, NumbersSettingsAnswersAndConfidence) {
   cell.magnitude->exponent = 0.75;
   cell.magnitude->exponent_ci95 = Interval{0.5, 1.25};
   cell.magnitude->without_logarithm = 4;
-  cell.magnitude->lines = {{"", 1, 9, 3, 0.625, -0.5, 0.9375, 0.0625}};
+  cell.magnitude->lines = {{"", 1, 9, 3, 0.625, -0.5, 0.9375, 0.0625, {{300, 11.5}}}};
   cell.magnitude->means = {{300, 12.5, Interval{11.5, 13.75}, 2}};
   cell.adjustments = {{1, 4, 502.5, Interval{490, 515}, 2.25, 11, 7.5, 5.5}};
   const InformationTransfer pooled{"", 40, 2, 1.25, 1.125, 2.25, 0.0625};
@@ -182,7 +182,8 @@ TEST(TaskJson, NumbersSettingsAnswersAndConfidence) {
   EXPECT_EQ(found["magnitude_estimation"], Expected::parse(R"({"exponent": 0.75,
     "exponent_ci95": [0.5, 1.25], "n_without_logarithm": 4,
     "participants": [{"participant_id": "B", "exponent": 0.625, "exponent_se": 0.0625,
-                      "log10_scale": -0.5, "r_squared": 0.9375}],
+                      "log10_scale": -0.5, "r_squared": 0.9375,
+                      "levels": [{"level": 300.0, "geometric_mean": 11.5}]}],
     "levels": [{"level": 300.0, "geometric_mean": 12.5, "ci95": [11.5, 13.75],
                 "n_participants": 2}]})"));
   EXPECT_EQ(found["adjustments"], Expected::parse(R"([{"participant_id": "B", "n_settings": 4,
@@ -238,6 +239,7 @@ TEST(TaskJson, ComparisonsHaveEveryFigure) {
   one.conditions = {"first", "second"};
   one.logarithms = true;
   one.n_undetermined = 2;
+  one.n_tests = 3;
   one.comparison.participant_sd = 0.5;
   one.comparison.residual_sd = 0.25;
   one.comparison.differences = {difference_of(1, 6, -0.75)};
@@ -256,8 +258,8 @@ TEST(TaskJson, ComparisonsHaveEveryFigure) {
   EXPECT_EQ(found["renderer_comparisons"], Expected::parse(R"([{"task": "compare",
     "measure": "jnd", "block_name": "stiff", "shape": "ball", "reference": "first",
     "natural_logarithms": true, "n_undetermined": 2, "status": "ok", "participant_sd": 0.5,
-    "residual_sd": 0.25, "differences": [{"renderer": "second", "n_pairs": 6, "mean": -0.75,
-      "ci95": [-1.5, -0.125], "t": -2.5, "p": 0.03125, "p_holm": 0.0625, "dz": -1.125,
+    "residual_sd": 0.25, "n_tests": 3, "differences": [{"renderer": "second", "n_pairs": 6, "mean": -0.75,
+      "ci95": [-1.5, -0.125], "t": -2.5, "df": 5.0, "p": 0.03125, "p_holm": 0.0625, "dz": -1.125,
       "mixed_estimate": -0.625, "mixed_se": 0.375}]}])"));
   EXPECT_EQ(found["condition_comparisons"], Expected::parse(R"([{"task": "compare",
     "measure": "jnd", "renderer": "ray", "reference": "first", "natural_logarithms": false,

@@ -157,7 +157,12 @@ class TaskReport(unittest.TestCase):
                 sign = "/" if one["natural_logarithms"] else "-"
                 ends = [number(end) for end in difference["ci95"]]
                 (line,) = [x for x in below.splitlines() if x.startswith(f"  {difference['renderer']} {sign} {one['reference']}: ")]
-                self.assertIn(": " + with_interval(number(difference["mean"]), ends) + ", p " + p_text(difference["p"]), line)
+                p = "p < 0.001" if difference["p"] < 0.001 else f"p = {difference['p']:.3f}"
+                t = f"t({difference['df']:.0f}) = {difference['t']:.2f}".replace("-", "\u2212")
+                self.assertIn(": " + with_interval(number(difference["mean"]), ends) + f", {t}, {p}", line)
+                self.assertIn(f", dz = {difference['dz']:.2f}".replace("-", "\u2212"), line)
+                self.assertEqual(one["n_tests"], 1)
+                self.assertNotIn("Holm", line)
                 self.assertIn("mixed model " + short(number(difference["mixed_estimate"])), line)
                 self.assertTrue(line.endswith(f"({difference['n_pairs']} pairs)"), line)
 

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -147,7 +148,9 @@ TEST(TaskText, GroupResultsSayWhoWasLeftOut) {
   analysis.groups = {group};
   EXPECT_EQ(
       task_report_text(analysis),
-      std::string("Weber fractions over participants, compare, ball (geometric means)\n"
+      std::string("Weber fraction (ball, point): 0.25, 95 % interval 0.125 to 0.5, 2 participants. "
+                  "Weber fraction (ball,\nray): 0.75, 1 participant.\n\n"
+                  "Weber fractions over participants, compare, ball (geometric means)\n"
                   "  point       0.25 [0.125, 0.5] (2 participants, 1 not determined and left "
                   "out)\n"
                   "  ray         0.75 (1 participant)\n"
@@ -157,7 +160,9 @@ TEST(TaskText, GroupResultsSayWhoWasLeftOut) {
   analysis.groups[0].measure = "pse";
   analysis.groups[0].geometric = false;
   analysis.groups[0].unit = "N/m";
-  EXPECT_EQ(task_report_text(analysis).substr(0, 54),
+  const std::string text = task_report_text(analysis);
+  EXPECT_TRUE(text.starts_with("PSE (ball, point): 0.25 N/m, 95 % interval 0.125 to 0.5")) << text;
+  EXPECT_EQ(text.substr(text.find("PSEs over"), 54),
             "PSEs over participants, compare, ball (means, N/m)\n  p");
 }
 
@@ -296,7 +301,7 @@ std::string text_of_comparison(const TaskComparison& one, bool of_renderers) {
   TaskAnalysis analysis;
   (of_renderers ? analysis.renderers : analysis.conditions).push_back(one);
   const std::string text = task_report_text(analysis);
-  return text.substr(0, text.find("Intervals are"));
+  return text.substr(0, std::min(text.find("To quote"), text.find("Intervals are")));
 }
 
 TEST(TaskText, ComparisonsSayDifferencesAndTests) {
@@ -308,13 +313,14 @@ TEST(TaskText, ComparisonsSayDifferencesAndTests) {
   one.conditions = {"point", "ray", "line"};
   one.comparison.differences = {difference_of(1, 6, 2.5), difference_of(2, 0, 9)};
   TTest& test = one.comparison.differences[0].t_test;
-  test.log_ratio_ci95 = Interval{1.5, 3.5};
-  test.p = 0.0312;
-  test.p_holm = 0.0624;
+  test = {"", 1, 0.5, 2.875, 5, 0.0312, Interval{1.5, 3.5}, 0.0624};
+  one.n_tests = 2;
+  one.comparison.differences[0].effect_size.dz = 1.18;
   one.comparison.differences[0].mixed_estimate = 2.75;
   EXPECT_EQ(text_of_comparison(one, true),
             "Thresholds by renderer, compare, stiff, ball (differences)\n"
-            "  ray - point: 2.5 [1.5, 3.5], p 0.031 (Holm 0.062); mixed model 2.75 (6 pairs)\n"
+            "  ray - point: 2.5 [1.5, 3.5], t(5) = 2.88, p = 0.031 (p = 0.062 adjusted "
+            "over 2 tests, Holm), dz = 1.18; mixed model 2.75 (6 pairs)\n"
             "  line - point: no participant has both\n\n");
 
   one = {};
@@ -325,16 +331,18 @@ TEST(TaskText, ComparisonsSayDifferencesAndTests) {
   one.n_undetermined = 2;
   one.conditions = {"a, ball", "b, ball"};
   one.comparison.differences = {difference_of(1, 1, std::log(0.5))};
-  one.comparison.differences[0].t_test.p_holm = 0.5;  // of one comparison it is no other than p
-  one.comparison.differences[0].t_test.p = 0.5;
+  one.n_tests = 1;
+  // Of one comparison the adjusted p is no other than p.
+  one.comparison.differences[0].t_test = {
+      "", 1, 1, -1, 1, 0.5, Interval{std::log(0.25), std::log(4)}, 0.5};
   one.comparison.differences[0].mixed_estimate = std::log(2);
-  one.comparison.differences[0].t_test.log_ratio_ci95 = Interval{std::log(0.25), std::log(4)};
-  EXPECT_EQ(text_of_comparison(one, false),
-            "JNDs by block and stimulus, detect, ray (ratios)\n"
-            "  2 functions left out: no threshold among the levels shown, a slope too steep for "
-            "them, or reversed answers\n"
-            ""
-            "  b, ball / a, ball: 0.5 [0.25, 4], p 0.500; mixed model 2 (1 pair)\n\n");
+  EXPECT_EQ(
+      text_of_comparison(one, false),
+      "JNDs by block and stimulus, detect, ray (ratios)\n"
+      "  2 functions left out: no threshold among the levels shown, a slope too steep for "
+      "them, or reversed answers\n"
+      ""
+      "  b, ball / a, ball: 0.5 [0.25, 4], t(1) = −1.00, p = 0.500; mixed model 2 (1 pair)\n\n");
 
   one.comparison.differences.clear();
   one.n_undetermined = 1;
@@ -348,6 +356,39 @@ TEST(TaskText, ComparisonsSayDifferencesAndTests) {
             "\n");
   one.measure = "exponent";
   EXPECT_EQ(text_of_comparison(one, false).substr(0, 10), "Exponents ");
+}
+
+TEST(TaskText, RatingsHaveAWilcoxonTestWithItsWarning) {
+  TaskComparison one;
+  one.task = "rate";
+  one.measure = "rating";
+  one.block_name = "rough";
+  one.renderer = "point";
+  one.conditions = {"silk", "wool"};
+  one.n_tests = 1;
+  one.comparison.differences = {difference_of(1, 6, 1.5)};
+  ConditionDifference& difference = one.comparison.differences[0];
+  difference.t_test = {"", 1, 0.5, 3, 5, 0.03, Interval{0.25, 2.75}, 0.03};
+  difference.wilcoxon = {"", 6, 21, 0.03125, true};
+  EXPECT_EQ(
+      text_of_comparison(one, false),
+      "Mean ratings by block and stimulus, rate, rough, point (differences)\n"
+      "  wool - silk: 1.5 [0.25, 2.75], t(5) = 3.00, p = 0.030; Wilcoxon V = 21, p = 0.031 (6 "
+      "pairs)\n\n");
+  difference.wilcoxon = {"", 5, 15, 0.0625, true};
+  EXPECT_NE(text_of_comparison(one, false)
+                .find("V = 15, p = 0.062 (5 or fewer differ: p cannot be below 0.05)"),
+            std::string::npos);
+  TaskAnalysis analysis;
+  analysis.table.simulated = true;
+  analysis.conditions = {one};
+  const std::string text = task_report_text(analysis);
+  EXPECT_NE(
+      text.find("To quote\nMean ratings (rate, rough, point), wool − silk: 1.5, 95 % CI [0.25, "
+                "2.75], t(5) = 3.00, p ="),
+      std::string::npos)
+      << text;
+  EXPECT_NE(text.find("SIMULATED PARTICIPANTS)."), std::string::npos) << text;
 }
 
 TEST(TaskText, AccuracyOfIdentification) {
