@@ -504,6 +504,10 @@ std::span<const Column> page_columns() {
       {"consent_version", "Version of a consent's text, as in the protocol"},
       {"text_sha256", "SHA-256 of the text or question that was shown"},
       {"answered_utc", "Time of the answer, ISO 8601, UTC", "ISO 8601"},
+      {"replaced",
+       "Whether a later answer to the same question is in force",
+       "",
+       {{"0", "in force"}, {"1", "corrected later, by the participant or the experimenter"}}},
       {"simulated",
        "Who answered",
        "",
@@ -522,7 +526,7 @@ std::int64_t write_pages(Store& store, TextSink& out, const ExportClock& clock,
     const PageAnswer& answer = one.answer;
     row << one.participant.code << one.protocol_name << one.session << answer.page << answer.item
         << answer.answer << answer.version << answer.text_sha256
-        << clock.utc(one.participant, one.unix_ns) << one.participant.simulated;
+        << clock.utc(one.participant, one.unix_ns) << one.replaced << one.participant.simulated;
     out.write(row.end());
     participants.add(one.participant);
     ++rows;

@@ -19,7 +19,7 @@ std::vector<ParticipantColumn> participant_columns(Store& store) {
   if (columns.empty()) return columns;
   for (const StoredPageAnswer& one : store.page_answers()) {
     const auto found = column_of.find({one.protocol_name, one.answer.page, one.answer.item});
-    if (found == column_of.end() || one.answer.answer.empty()) continue;
+    if (one.replaced || found == column_of.end() || one.answer.answer.empty()) continue;
     const auto column = std::ranges::find_if(columns, [&](const ParticipantColumn& other) {
       return other.from.column == found->second;
     });

@@ -2,6 +2,11 @@
 
 #include <SQLiteCpp/Statement.h>
 
+#include <algorithm>
+#include <set>
+#include <tuple>
+#include <utility>
+
 #include "data/files/utc.h"
 #include "data/store/connection.h"
 #include "data/store/forget.h"
@@ -12,6 +17,15 @@ namespace palpate::data {
 namespace {
 
 constexpr int kPagesSince = 5;  // schema version
+
+/// \param answers  in the order in which they were given
+void mark_replaced(std::vector<StoredPageAnswer>& answers) {
+  std::set<std::tuple<std::int64_t, int, std::string, std::string>> later;
+  for (auto one = answers.rbegin(); one != answers.rend(); ++one)
+    one->replaced =
+        !later.insert({one->participant.id, one->session, one->answer.page, one->answer.item})
+             .second;
+}
 
 }  // namespace
 
@@ -55,21 +69,35 @@ std::vector<StoredPageAnswer> Store::page_answers() {
       one.unix_ns = to_unix_ns(clock, one.answer.at_ns);
       one.utc = format_utc(one.unix_ns);
     }
+    mark_replaced(all);
     return all;
   });
 }
 
-std::vector<std::string> Store::answered_pages(const Participant& participant, int session) {
+std::vector<PageAnswer> Store::answers_in_force(const Participant& participant, int session) {
   return guarded(impl_->path, [&] {
-    std::vector<std::string> pages;
-    if (impl_->version < kPagesSince) return pages;
-    SQLite::Statement find(*impl_->db,
-                           "SELECT DISTINCT p.page FROM page_answers p JOIN runs r ON r.id = "
-                           "p.run_id JOIN sessions s ON s.id = r.session_id WHERE "
-                           "s.participant_id = ? AND s.number = ?");
+    std::vector<PageAnswer> answers;
+    if (impl_->version < kPagesSince) return answers;
+    SQLite::Statement find(
+        *impl_->db, std::string("SELECT ") + kPageAnswerColumns +
+                        " FROM page_answers p JOIN runs r ON r.id = p.run_id JOIN sessions s "
+                        "ON s.id = r.session_id WHERE s.participant_id = ? AND s.number = ? "
+                        "ORDER BY r.id, p.id");
     Binder(find) << participant.id << session;
-    while (find.executeStep()) pages.push_back(find.getColumn(0).getString());
-    return pages;
+    while (find.executeStep()) {
+      PageAnswer answer;
+      RowReader row(find);
+      row >> answer;
+      const auto before = std::find_if(answers.begin(), answers.end(), [&](const PageAnswer& one) {
+        return one.page == answer.page && one.item == answer.item;
+      });
+      if (before == answers.end()) {
+        answers.push_back(std::move(answer));
+      } else {
+        *before = std::move(answer);
+      }
+    }
+    return answers;
   });
 }
 

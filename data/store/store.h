@@ -74,6 +74,7 @@ struct StoredPageAnswer {
   std::string utc;
   PageAnswer answer;
   std::int64_t unix_ns = 0;  ///< the same as utc
+  bool replaced = false;     ///< a later answer of the session to the same question is in force
 };
 
 /// A run and how it ended, for reports.
@@ -176,7 +177,8 @@ class Store {
   /// finish_attempt; a participant who is not simulated.
   void record_simulated(const Run& run, const std::vector<TrialRecord>& records);
 
-  /// Stores the answers to a page, together; on disk when it returns. Personal data.
+  /// Stores answers to questions, together; on disk when it returns. A second answer to a question
+  /// in a session replaces the first one, which stays on record. Personal data.
   void add_page_answers(const Run& run, const std::vector<PageAnswer>& answers);
 
   /// Stores an experimenter's note. \param at_ns session clock
@@ -207,10 +209,10 @@ class Store {
   std::vector<std::string> codes();  ///< of all participants, in the order of insertion
   std::vector<StoredRun> runs();     ///< by protocol, participant number, session, start
   std::vector<StoredNote> notes();   ///< in the same order
-  /// Answers to pages, in the same order.
+  /// Answers to pages, in the same order, with the replaced ones.
   std::vector<StoredPageAnswer> page_answers();
-  /// Names of the pages answered in a session.
-  std::vector<std::string> answered_pages(const Participant& participant, int session);
+  /// The answers in force of a session, in the order in which the questions were first answered.
+  std::vector<PageAnswer> answers_in_force(const Participant& participant, int session);
   /// The latest recorded time of live sessions, ns since 1970; simulated sessions use a virtual
   /// clock. Used to detect a clock that was set back.
   std::optional<std::int64_t> latest_recorded_time();

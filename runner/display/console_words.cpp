@@ -31,6 +31,8 @@ const char* button_label(ConsoleCommand::Kind kind) {
       return "End now...";
     case Kind::answer:
       return "Enter";
+    case Kind::correct:
+      return "Correct an answer...";
   }
   return "";
 }

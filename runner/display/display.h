@@ -57,6 +57,7 @@ struct ConsoleCommand {
     note,    ///< free text with a time stamp
     quit,    ///< ends the session at once and cuts off the current trial
     answer,  ///< the participant's answer, typed by the experimenter; text "": on to the next
+    correct,  ///< an answer of a page; text: page, question and new answer, spaces between them
   };
   Kind kind = Kind::note;
   /// Of note, quit and answer; for emergency_zero its source, "the key F12".
@@ -97,6 +98,8 @@ struct Page {
   /// While an answer is typed, keys arrive as the characters that they write.
   enum class Typing { none, number, text } typing = Typing::none;
   std::string typed;        ///< so far
+  std::string chosen{};     ///< the key of the answer given before; empty: none
+  bool back = false;        ///< a key goes back to the question before
   bool wheel = false;       ///< turns of the wheel arrive as keys
   int part = 0, parts = 0;  ///< place in a text of several pages, from 1; 0: a single page
   std::shared_ptr<const std::string> picture{};  ///< a PNG file's bytes, above the text, or null
@@ -131,6 +134,12 @@ struct ShapeScore {
   int right = 0, shown = 0;
 };
 
+/// An answer to a question of a page that the experimenter may correct.
+struct GivenAnswer {
+  std::string page, question;  ///< names
+  std::string answer;
+};
+
 /// State shown to the experimenter, updated about 30 times a second.
 struct ConsoleState {
   std::string study, participant, state;  ///< state: a word or two, "trial", "rest", "paused"
@@ -161,6 +170,7 @@ struct ConsoleState {
   int interval = 0, intervals = 0;  ///< number within the trial, and their count
   std::string level;                ///< level presented now, as text; empty: none
   bool takes_answers = false;       ///< the experimenter types the participant's answers
+  std::vector<GivenAnswer> given;   ///< in this session, of pages
 };
 
 class ExperimenterConsole {

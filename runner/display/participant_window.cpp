@@ -193,6 +193,7 @@ class KeyMap {
   bool lay_in_columns(cairo_t* canvas, const Page& page, double width, double room, int columns);
 
   double unit_, height_ = 0;
+  std::size_t chosen_;  ///< the answer given before, as an index; past the last: none
   std::vector<Item> items_;
 };
 
@@ -217,7 +218,8 @@ namespace {
 constexpr double kKeycapHeight = 2.3;   // units
 constexpr double kSmallestKeys = 0.45;  // of the normal size
 
-void draw_keycap(cairo_t* canvas, double x, double y, double width, double height) {
+void draw_keycap(cairo_t* canvas, double x, double y, double width, double height,
+                 const Colour& edge = kKeycapEdge) {
   const double radius = 0.18 * height;
   cairo_new_path(canvas);
   cairo_arc(canvas, x + width - radius, y + radius, radius, -M_PI / 2, 0);
@@ -227,7 +229,7 @@ void draw_keycap(cairo_t* canvas, double x, double y, double width, double heigh
   cairo_close_path(canvas);
   set_colour(canvas, kKeycap);
   cairo_fill_preserve(canvas);
-  set_colour(canvas, kKeycapEdge);
+  set_colour(canvas, edge);
   cairo_set_line_width(canvas, std::max(1.0, 0.035 * height));
   cairo_stroke(canvas);
 }
@@ -256,7 +258,11 @@ std::string keycap_label(const std::string& key) {
 }  // namespace
 
 KeyMap::KeyMap(cairo_t* canvas, const Page& page, double unit, double width, double room)
-    : unit_(unit) {
+    : unit_(unit),
+      chosen_(static_cast<std::size_t>(
+          std::find_if(page.keys.begin(), page.keys.end(),
+                       [&page](const auto& entry) { return entry.first == page.chosen; }) -
+          page.keys.begin())) {
   if (page.keys.empty()) return;
   if (lay_side_by_side(canvas, page, width) && height_ <= room) return;
   for (const double share : {1.0, 0.85, 0.7, 0.55, kSmallestKeys}) {
@@ -358,12 +364,14 @@ bool KeyMap::lay_in_columns(cairo_t* canvas, const Page& page, double width, dou
 void KeyMap::draw(cairo_t* canvas, double middle, double top) const {
   for (const Item& item : items_) {
     const double left = middle + item.x, y = top + item.y;
+    const bool chosen = &item == items_.data() + chosen_;
     draw_keycap(canvas, std::round(left), std::round(y), std::round(item.cap_width),
-                std::round(kKeycapHeight * unit_));
+                std::round(kKeycapHeight * unit_), chosen ? kGo : kKeycapEdge);
     const Size key = item.key.size();
     item.key.draw(canvas, left + (item.cap_width - key.width) / 2,
                   y + (kKeycapHeight * unit_ - key.height) / 2, kText);
-    item.answer.draw(canvas, middle + item.answer_x, top + item.answer_y, kQuietInk);
+    item.answer.draw(canvas, middle + item.answer_x, top + item.answer_y,
+                     chosen ? kGo : kQuietInk);
   }
 }
 
@@ -570,6 +578,8 @@ class PageLayout {
     if (page_.typing != Page::Typing::none)
       draw_typed(canvas_, page_.typed, width_ / 2, typed_top_, unit_, text_width(width_, unit_));
     draw_progress(canvas_, page_, unit_, width_);
+    if (page_.back)
+      TextBlock(canvas_, "\u2190", 1.4 * unit_).draw(canvas_, unit_, go_on_top_, kQuietInk);
     if (page_.seconds_left > 0)
       draw_line(minutes_and_seconds(page_.seconds_left), 3 * unit_, count_top_, kQuietInk);
     if (!page_.reply.empty()) draw_line(page_.reply, 1.2 * unit_, reply_top_, kReply);

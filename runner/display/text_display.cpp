@@ -62,6 +62,7 @@ constexpr CommandText kCommands[] = {
     {"clear", Kind::clear_fault},
     {"quit", Kind::quit},
     {"answer", Kind::answer},
+    {"correct", Kind::correct},
 };
 
 constexpr char kEscape = '\x1b';
@@ -92,7 +93,8 @@ const char* text_commands_help() {
          "               (repeat the command to cancel)\n"
          "  :zero, Esc   emergency: forces off       :clear       allow forces again\n"
          "  :quit        end at once                 :quit withdrawn  the participant withdraws\n"
-         "  :answer X    the participant's answer, spoken; without X: on to the next\n";
+         "  :answer X    the participant's answer, spoken; without X: on to the next\n"
+         "  :correct PAGE QUESTION ANSWER  another answer to a question of a page\n";
 }
 
 std::string_view text_command(Kind kind) {
@@ -111,6 +113,7 @@ ConsoleCommand parse_text_command(std::string_view line, std::int64_t time_ns) {
   }
   for (const auto& [word, kind] : {std::pair(std::string_view("note "), Kind::note),
                                    std::pair(std::string_view("answer "), Kind::answer),
+                                   std::pair(std::string_view("correct "), Kind::correct),
                                    std::pair(std::string_view("quit "), Kind::quit)}) {
     if (said.rfind(word, 0) == 0)
       return {kind, std::string(trimmed(line.substr(word.size()))), time_ns};
@@ -237,10 +240,12 @@ std::string text_of(const Page& page) {
   if (page.typing != Page::Typing::none) text += "\n> " + printable(page.typed);
   for (const auto& [key, answer] : page.keys) {
     text += text.empty() ? "" : "   ";
+    if (key == page.chosen) text += '*';
     text += printable(key);
     text += ' ';
     text += printable(answer);
   }
+  if (page.back) text += "\n[left arrow: back]";
   return text;
 }
 

@@ -267,7 +267,8 @@ namespace {
 using protocols::TaskKind;
 
 constexpr std::int64_t kAskPause_ns = 5'000'000;
-constexpr std::size_t kMostTyped = 200;  // bytes
+constexpr std::size_t kMostTyped = 200;          // bytes
+constexpr std::int64_t kBurst_ns = 400'000'000;  // keys of one number follow each other faster
 
 using NamedKeys = std::vector<std::pair<std::string, std::string>>;
 
@@ -309,6 +310,16 @@ std::string lower_case(std::string text) {
   return text;
 }
 
+std::optional<double> number_in(const std::string& typed, std::optional<double> least,
+                                std::optional<double> most) {
+  double number = 0;
+  const char* const end = typed.data() + typed.size();
+  const auto [at, error] = std::from_chars(typed.data(), end, number);
+  if (error != std::errc{} || at != end || !std::isfinite(number)) return std::nullopt;
+  if ((least && number < *least) || (most && number > *most)) return std::nullopt;
+  return number + 0.0;  // -0 is 0
+}
+
 bool is_turn(const protocols::TaskBlock& block, const Answer& answer) {
   if (block.task != TaskKind::adjust) return false;
   const std::string& act = block.answers[static_cast<std::size_t>(answer.stimulus)].name;
@@ -316,6 +327,23 @@ bool is_turn(const protocols::TaskBlock& block, const Answer& answer) {
 }
 
 }  // namespace
+
+std::optional<std::string> accepted_answer(const protocols::PageItem& item,
+                                           const std::string& typed) {
+  using Kind = protocols::PageItem::Kind;
+  const bool blank = typed.find_first_not_of(' ') == std::string::npos;
+  if (item.kind == Kind::number || item.kind == Kind::text) {
+    if (blank) return item.required ? std::nullopt : std::optional<std::string>("");
+    if (item.kind == Kind::number && !number_in(typed, item.least, item.most)) return std::nullopt;
+    return typed;
+  }
+  for (std::size_t i = 0; i < item.choices.size(); ++i) {
+    const std::string& shown = i < item.shown.size() ? item.shown[i] : item.choices[i];
+    if (lower_case(typed) == lower_case(item.choices[i]) || lower_case(typed) == lower_case(shown))
+      return item.choices[i];
+  }
+  return std::nullopt;
+}
 
 void KeyboardRespondent::begin_interval(const protocols::Trial&, const IntervalView& view) {
   view_ = view;
@@ -350,7 +378,7 @@ std::string KeyboardRespondent::interval_text() const {
   if (!view_.answers) return text + texts.next_interval;
   const protocols::TaskBlock& asked = *block_;
   text += asked.question.empty() ? texts.answer_now : asked.question;
-  if (asked.answers.empty()) text += "\n" + texts.type_number;
+  if (asked.answers.empty()) text += "\n" + texts.type_number + range_text(asked.least, asked.most);
   return text;
 }
 
@@ -391,17 +419,6 @@ bool KeyboardRespondent::type(const std::string& key) {
   typed += key == "space" ? " " : !text && key == "," ? "." : key;
   screen_.show(page_);
   return true;
-}
-
-std::optional<double> KeyboardRespondent::number_in(const std::string& typed,
-                                                    std::optional<double> least,
-                                                    std::optional<double> most) {
-  double number = 0;
-  const char* const end = typed.data() + typed.size();
-  const auto [at, error] = std::from_chars(typed.data(), end, number);
-  if (error != std::errc{} || at != end || !std::isfinite(number)) return std::nullopt;
-  if ((least && number < *least) || (most && number > *most)) return std::nullopt;
-  return number + 0.0;  // -0 is 0
 }
 
 /// Says which numbers are accepted, and keeps the typed text.
@@ -514,11 +531,14 @@ bool KeyboardRespondent::spoken(const std::string& answer, std::int64_t time_ns)
   return false;
 }
 
-display::KeyPress KeyboardRespondent::wait_for_key(std::int64_t since_ns) {
+display::KeyPress KeyboardRespondent::wait_for_key(std::int64_t since_ns, bool whole_bursts) {
   while (true) {
     std::vector<display::KeyPress> keys = take_keys();
     for (std::size_t i = 0; i < keys.size(); ++i) {
-      if (keys[i].time_ns < since_ns) continue;
+      if (keys[i].time_ns < since_ns) {
+        if (whole_bursts) since_ns = std::max(since_ns, keys[i].time_ns + kBurst_ns);
+        continue;
+      }
       // Keep the others for the next call: keys may arrive faster than they are polled.
       spoken_.assign(keys.begin() + static_cast<std::ptrdiff_t>(i) + 1, keys.end());
       return keys[i];
@@ -584,26 +604,38 @@ std::optional<Answer> KeyboardRespondent::confidence(const protocols::Confidence
   return answer;
 }
 
-std::string KeyboardRespondent::ask_typed(const protocols::PageItem& item) {
+display::Page KeyboardRespondent::question_page(const protocols::PageItem& item,
+                                                display::Page::Kind kind, const Asking& how) const {
+  display::Page page = between_trials(kind, item.question);
+  page.back = how.can_go_back;
+  return page;
+}
+
+std::optional<std::string> KeyboardRespondent::ask_typed(const protocols::PageItem& item,
+                                                         const Asking& how) {
   const std::int64_t since_ns = clock_.now_ns();
   const bool text = item.kind == protocols::PageItem::Kind::text;
-  display::Page page = between_trials(display::Page::Kind::message, item.question);
+  display::Page page = question_page(item, display::Page::Kind::message, how);
   page.typing = text ? display::Page::Typing::text : display::Page::Typing::number;
+  page.typed = how.given.value_or("");
+  if (const std::string range = range_text(item.least, item.most); !text && !range.empty())
+    page.text += "\n" + range.substr(1);
   least_ = item.least;
   most_ = item.most;
   show(std::move(page));
+  std::int64_t erased_ns = since_ns - kBurst_ns;
   while (true) {
-    const display::KeyPress press = wait_for_key(since_ns);
+    const display::KeyPress press = wait_for_key(since_ns, !text);
+    const bool erases = press.key == "backspace";
+    // A Backspace that is held down to erase the answer must not go on to the question before.
+    const bool anew = erases && page_.typed.empty() && press.time_ns - erased_ns >= kBurst_ns;
+    if (how.can_go_back && (press.key == "left" || anew)) return std::nullopt;
+    if (erases) erased_ns = press.time_ns;
     if (press.key != "enter") {
       if (!type(press.key)) reply();
-      continue;
-    }
-    const std::string& typed = page_.typed;
-    const bool blank = typed.find_first_not_of(' ') == std::string::npos;
-    if (blank && !item.required) return "";
-    if (!text && number_in(typed, item.least, item.most)) return typed;
-    if (text && !blank) return typed;
-    if (text) {
+    } else if (auto answer = accepted_answer(item, page_.typed)) {
+      return answer;
+    } else if (text) {
       reply_with(protocol_.texts.answer_first);
     } else {
       refuse_number(item.least, item.most);
@@ -611,21 +643,69 @@ std::string KeyboardRespondent::ask_typed(const protocols::PageItem& item) {
   }
 }
 
-std::string KeyboardRespondent::ask(const protocols::PageSpec& page,
-                                    const protocols::PageItem& item) {
-  std::int64_t time_ns = 0;
+bool KeyboardRespondent::number_begins(const display::KeyPress& digit) {
+  const auto of_number = [](const std::string& key) {
+    return key == "enter" || (key.size() == 1 && key.find_first_of("0123456789.,-") == 0);
+  };
+  bool begins = false;
+  std::vector<display::KeyPress> others;
+  for (std::int64_t until_ns = digit.time_ns + kBurst_ns; clock_.now_ns() < until_ns;) {
+    for (const display::KeyPress& press : take_keys()) {
+      const bool more = of_number(press.key) && (begins || press.key != "enter");
+      if (more && press.time_ns < until_ns) {
+        begins = true;
+        until_ns = press.time_ns + kBurst_ns;
+      } else {
+        others.push_back(press);
+      }
+    }
+    attendant_.attend();
+    clock_.wait_until(clock_.now_ns() + kAskPause_ns);
+  }
+  spoken_.insert(spoken_.begin(), others.begin(), others.end());
+  return begins;
+}
+
+std::optional<std::string> KeyboardRespondent::ask_choice(const protocols::PageItem& item,
+                                                          const Asking& how) {
+  const std::int64_t since_ns = clock_.now_ns();
+  const Keys keys = numbered(item.shown);
+  display::Page page = question_page(item, display::Page::Kind::text, how);
+  page.part = page.parts = 1;
+  page.keys = keys;
+  const auto given = std::find(item.choices.begin(), item.choices.end(), how.given.value_or(""));
+  if (how.given && given != item.choices.end())
+    page.chosen = keys[static_cast<std::size_t>(given - item.choices.begin())].first;
+  show(std::move(page));
+  while (true) {
+    const display::KeyPress press = wait_for_key(since_ns);
+    const bool forward = press.key == "space" || press.key == "enter" || press.key == "right";
+    const bool back = press.key == "left" || press.key == "backspace";
+    if (how.can_go_back && back) return std::nullopt;
+    if (how.given && forward) return how.given;
+    const auto key = std::find_if(keys.begin(), keys.end(), [&press](const auto& entry) {
+      return protocols::one_key(entry.first) == protocols::one_key(press.key);
+    });
+    const bool digit = press.key.size() == 1 && press.key[0] >= '0' && press.key[0] <= '9';
+    if (key != keys.end() && !(how.number_follows && digit && number_begins(press)))
+      return item.choices[static_cast<std::size_t>(key - keys.begin())];
+    reply();
+  }
+}
+
+std::optional<std::string> KeyboardRespondent::ask(const protocols::PageSpec& page,
+                                                   const protocols::PageItem& item,
+                                                   const Asking& how) {
+  using Kind = protocols::PageItem::Kind;
   if (page.kind == protocols::PageSpec::Kind::consent) {
+    std::int64_t time_ns = 0;
     const Keys keys = numbered({protocol_.texts.agree, protocol_.texts.disagree});
     const int at =
         page_through(screens_of_text(page.text), keys, display::Page::Kind::text, time_ns);
     return at == 0 ? "agree" : "disagree";
   }
-  if (item.kind != protocols::PageItem::Kind::choice &&
-      item.kind != protocols::PageItem::Kind::scale)
-    return ask_typed(item);
-  const int at = page_through({{item.question, nullptr}}, numbered(item.shown),
-                              display::Page::Kind::text, time_ns);
-  return item.choices[static_cast<std::size_t>(at)];
+  const bool choice = item.kind == Kind::choice || item.kind == Kind::scale;
+  return choice ? ask_choice(item, how) : ask_typed(item, how);
 }
 
 namespace {

@@ -36,6 +36,11 @@ enum class AnswerBy {
   experimenter,  ///< types the participant's spoken answers; the participant's keys only continue
 };
 
+/// The answer that is stored if `typed` answers a question: a number within its range, a choice by
+/// its name or as it is shown, any text. none: it does not.
+std::optional<std::string> accepted_answer(const protocols::PageItem& item,
+                                           const std::string& typed);
+
 class KeyboardRespondent final : public Respondent {
  public:
   /// All arguments must outlive it. \param clock  the clock that time-stamps keys
@@ -50,7 +55,8 @@ class KeyboardRespondent final : public Respondent {
   void begin_interval(const protocols::Trial& trial, const IntervalView& view) override;
   std::optional<Answer> step(const servo::Sample& sample) override;
   std::optional<Answer> confidence(const protocols::ConfidenceSpec& asked) override;
-  std::string ask(const protocols::PageSpec& page, const protocols::PageItem& item) override;
+  std::optional<std::string> ask(const protocols::PageSpec& page, const protocols::PageItem& item,
+                                 const Asking& how) override;
 
   /// Takes the participant's spoken answer: a key, its label or a number; "": on to the next.
   /// \return  false: not expected now, a number is out of range, or forces are not on
@@ -88,16 +94,20 @@ class KeyboardRespondent final : public Respondent {
   bool listen_to_task(const display::KeyPress& press);  ///< false: to be handled after a turn
   std::optional<Answer> typed_answer(const std::string& key);
   bool type(const std::string& key);  ///< false: the key does not type
-  static std::optional<double> number_in(const std::string& typed, std::optional<double> least,
-                                         std::optional<double> most);
   void reply_with(const std::string& text);
   void refuse_number(std::optional<double> least, std::optional<double> most);
-  display::KeyPress wait_for_key(std::int64_t since_ns);
+  /// \param whole_bursts  drop also the rest of a number whose first digits came too early
+  display::KeyPress wait_for_key(std::int64_t since_ns, bool whole_bursts = false);
+  /// Whether more digits follow a digit at once: a number typed ahead of its question. Drops them.
+  bool number_begins(const display::KeyPress& digit);
+  display::Page question_page(const protocols::PageItem& item, display::Page::Kind kind,
+                              const Asking& how) const;
   /// \return  index into keys, which are shown with the last screen; -1: continued without an
   /// answer
   int page_through(const std::vector<ReadScreen>& screens, const Keys& keys,
                    display::Page::Kind kind, std::int64_t& time_ns);
-  std::string ask_typed(const protocols::PageItem& item);
+  std::optional<std::string> ask_typed(const protocols::PageItem& item, const Asking& how);
+  std::optional<std::string> ask_choice(const protocols::PageItem& item, const Asking& how);
 
   const protocols::Protocol& protocol_;
   display::ParticipantScreen& screen_;

@@ -38,6 +38,13 @@ struct ReadScreen {
   std::shared_ptr<const std::string> picture{};  ///< bytes of a PNG file; may be null
 };
 
+/// How a question of a page is asked.
+struct Asking {
+  bool can_go_back = false;            ///< there is a question before it
+  std::optional<std::string> given{};  ///< the answer in force, to be kept or changed
+  bool number_follows = false;         ///< the next question wants a number
+};
+
 /// Short tones for the participant.
 enum class SoundCue { ready, go, right, wrong };
 
@@ -74,10 +81,11 @@ class Respondent {
   virtual std::optional<Answer> confidence(const protocols::ConfidenceSpec& /*asked*/) {
     return std::nullopt;
   }
-  /// Version 2: asks a question of a page. \return the answer; "": skipped. Consent is "agree" or
-  /// "disagree", a choice one of the item's `choices`.
-  virtual std::string ask(const protocols::PageSpec& /*page*/,
-                          const protocols::PageItem& /*item*/) {
+  /// Version 2: asks a question of a page. \return the answer; "": skipped; none: back to the
+  /// question before. Consent is "agree" or "disagree", a choice one of the item's `choices`.
+  virtual std::optional<std::string> ask(const protocols::PageSpec& /*page*/,
+                                         const protocols::PageItem& /*item*/,
+                                         const Asking& /*how*/) {
     return "";
   }
   /// Called with every sample of the servo. Returns the answer once there is one; answers before

@@ -459,7 +459,8 @@ std::optional<Answer> TaskParticipant::confidence(const protocols::ConfidenceSpe
   return given;
 }
 
-std::string TaskParticipant::ask(const protocols::PageSpec& page, const protocols::PageItem& item) {
+std::optional<std::string> TaskParticipant::ask(const protocols::PageSpec& page,
+                                                const protocols::PageItem& item, const Asking&) {
   if (page.kind == protocols::PageSpec::Kind::consent) return "agree";
   // Seed with the question, so that the answer does not depend on earlier ones.
   Random random(seed_, {static_cast<std::uint64_t>(number_), kPages, number_of(page.name),

@@ -160,7 +160,8 @@ class TaskParticipant final : public Respondent {
   void begin_interval(const protocols::Trial& trial, const IntervalView& view) override;
   std::optional<Answer> step(const servo::Sample& sample) override;
   std::optional<Answer> confidence(const protocols::ConfidenceSpec& asked) override;
-  std::string ask(const protocols::PageSpec& page, const protocols::PageItem& item) override;
+  std::optional<std::string> ask(const protocols::PageSpec& page, const protocols::PageItem& item,
+                                 const Asking& how) override;
 
  private:
   Answer answer(std::int64_t time_ns);

@@ -53,6 +53,18 @@ SessionMonitor::SessionMonitor(const LiveStation& station, const Sources& source
   for (const protocols::StimulusSpec& stimulus : station.protocol.stimuli)
     state_.scores.push_back({stimulus.name, 0, 0});
   state_.takes_answers = station.answer_by == participants::AnswerBy::experimenter;
+  show_answers();
+}
+
+void SessionMonitor::show_answers() {
+  state_.given.clear();
+  for (data::PageAnswer& one : station_.record.answers()) {
+    const bool consent = std::any_of(
+        station_.protocol.pages.begin(), station_.protocol.pages.end(), [&](const auto& page) {
+          return page.name == one.page && page.kind == protocols::PageSpec::Kind::consent;
+        });
+    if (!consent) state_.given.push_back({one.page, one.item, std::move(one.answer)});
+  }
 }
 
 double SessionMonitor::elapsed() const {
@@ -145,6 +157,7 @@ void SessionMonitor::page(const PageView& view) {
               ? "page: " + view.page
               : "question " + std::to_string(view.number) + " of " +
                     std::to_string(view.questions) + ": " + view.page + ", " + view.question;
+  show_answers();
   show();
 }
 
@@ -186,6 +199,15 @@ void SessionMonitor::first_contact(const data::TrialRecord&, std::int64_t time_n
   marker_.kind = Marker::Kind::first_contact;
   marker_.time_ns = time_ns;
   station_.markers.send(marker_);
+}
+
+void SessionMonitor::unrated(const data::TrialRecord& so_far) {
+  const nlohmann::ordered_json event = {{"answered_before_confidence",
+                                         {{"trial", so_far.trial},
+                                          {"attempt", so_far.attempt},
+                                          {"response", so_far.response},
+                                          {"response_ns", so_far.response_ns}}}};
+  station_.record.note(so_far.response_ns, event.dump());
 }
 
 void SessionMonitor::answered(const data::TrialRecord& record) {
@@ -241,6 +263,17 @@ namespace {
 
 EndOfSession end_by_signal(int signal) {
   return {data::RunEnd::aborted, std::string("signal: ") + strsignal(signal), true};
+}
+
+/// A question of a page; null: there is none. A consent has none.
+const protocols::PageItem* item_of(const protocols::Protocol& protocol, const std::string& page,
+                                   const std::string& name) {
+  for (const protocols::PageSpec& one : protocol.pages) {
+    for (const protocols::PageItem& item : one.items) {
+      if (one.name == page && item.name == name) return &item;
+    }
+  }
+  return nullptr;
 }
 
 }  // namespace
@@ -473,9 +506,45 @@ void LiveSession::obey(const display::ConsoleCommand& command) {
             "' is not accepted: forces are off, or it is not a valid answer or out of range");
       }
       break;
+    case Kind::correct:
+      correct(command);
+      break;
     case Kind::quit:
       throw end_by_experimenter(command.text);
   }
+}
+
+/// The answer before stays on record.
+void LiveSession::correct(const display::ConsoleCommand& command) {
+  const std::string& text = command.text;
+  const std::size_t first = std::min(text.find(' '), text.size());
+  const std::size_t second = std::min(text.find(' ', first + 1), text.size());
+  const std::string page = text.substr(0, first);
+  const std::string name = text.substr(std::min(first + 1, text.size()), second - first - 1);
+  const std::string typed = second < text.size() ? text.substr(second + 1) : "";
+  const std::vector<data::PageAnswer> answers = station_.record.answers();
+  const auto before = std::find_if(answers.begin(), answers.end(), [&](const auto& one) {
+    return one.page == page && one.item == name;
+  });
+  const protocols::PageItem* const item = item_of(station_.protocol, page, name);
+  if (before == answers.end() || item == nullptr) {
+    say("there is no answer of page '" + page + "' to question '" + name + "' to correct");
+    return;
+  }
+  const std::optional<std::string> answer = participants::accepted_answer(*item, typed);
+  if (!answer) {
+    say("'" + typed + "' is not a valid answer to " + name + ", or out of range");
+    return;
+  }
+  data::PageAnswer corrected = *before;
+  corrected.answer = *answer;
+  corrected.at_ns = command.time_ns;
+  station_.record.answered(corrected);
+  const nlohmann::ordered_json event = {
+      {"answer_corrected", {{"page", page}, {"item", name}, {"by", "experimenter"}}}};
+  station_.record.note(command.time_ns, event.dump());
+  monitor_.show_answers();
+  say("corrected: " + page + ", " + name + " (the answer before stays on record)");
 }
 
 void LiveSession::plan_stop(display::ConsoleCommand::Kind kind) {

@@ -47,6 +47,8 @@ class SessionMonitor final : public SessionEvents {
   void count(const data::TrialRecord& record);
   /// "after this trial"; empty: no stop is planned.
   void plan_stop(const std::string& when) { state_.stop_plan = when; }
+  /// Shows the answers to pages that the experimenter may correct.
+  void show_answers();
   /// The session is held, as `hold` says, until going_on().
   void held();
   void going_on() { state_.held_by.clear(); }
@@ -59,6 +61,7 @@ class SessionMonitor final : public SessionEvents {
   void recorded(const data::TrialRecord& record) override;
   void interval(const protocols::Trial& trial, const participants::IntervalView& view) override;
   void page(const PageView& view) override;
+  void unrated(const data::TrialRecord& so_far) override;
   void asking(bool now) override { asking_ = now; }
   /// Whether the trial's intervals are over but a question of it is still open.
   bool asking() const { return asking_; }
@@ -115,6 +118,7 @@ class LiveSession final : public participants::Attendant {
   void wait_while_held();
   void obey(const display::ConsoleCommand& command);
   void plan_stop(display::ConsoleCommand::Kind kind);
+  void correct(const display::ConsoleCommand& command);
   void take_last_commands(Outcome& outcome);
   void check_noise();
   void check_screen();

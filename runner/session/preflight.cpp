@@ -267,6 +267,7 @@ class PreflightDialogue {
         break;
       case Kind::pause:
       case Kind::answer:
+      case Kind::correct:
       case Kind::stop_after_trial:
       case Kind::stop_after_block:
         say("there is no trial yet");

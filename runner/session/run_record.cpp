@@ -76,15 +76,14 @@ int RunRecord::begin(const data::TrialRecord& planned, std::int64_t began_ns) {
   return store_.begin_attempt(*run_, planned, began_ns);
 }
 
-void RunRecord::answered(const std::vector<data::PageAnswer>& answers) {
+void RunRecord::answered(const data::PageAnswer& answer) {
   begin();
-  store_.add_page_answers(*run_, answers);
+  store_.add_page_answers(*run_, {answer});
 }
 
-bool RunRecord::has_answers(const std::string& page) {
-  if (participant_.id == 0) return false;
-  const std::vector<std::string> pages = store_.answered_pages(participant_, info_.session);
-  return std::find(pages.begin(), pages.end(), page) != pages.end();
+std::vector<data::PageAnswer> RunRecord::answers() {
+  if (participant_.id == 0) return {};
+  return store_.answers_in_force(participant_, info_.session);
 }
 
 }  // namespace palpate::runner::session

@@ -48,13 +48,14 @@ class TrialLog {
   virtual void finish(const data::TrialRecord& record) = 0;
   /// The trial will be shown again.
   virtual void cut_off(const std::string& reason) = 0;
-  /// Stores the answers to a page of version 2, together. A log without pages ignores them.
-  virtual void answered(const std::vector<data::PageAnswer>& /*answers*/) {}
+  /// Stores an answer to a question of a page of version 2; when this returns, it is durable. A log
+  /// without pages ignores it.
+  virtual void answered(const data::PageAnswer& /*answer*/) {}
   /// Stores an event of the session, as JSON. A log without notes ignores it. \param at_ns  session
   /// clock
   virtual void note(std::int64_t /*at_ns*/, const std::string& /*text*/) {}
-  /// Whether a page of this session has been answered; then it is not shown again.
-  virtual bool has_answers(const std::string& /*page*/) { return false; }
+  /// The answers of this session that are in force; their questions are not asked again.
+  virtual std::vector<data::PageAnswer> answers() { return {}; }
 };
 
 /// The log of a live session. A new participant is enrolled, and takes a number of the
@@ -84,8 +85,8 @@ class RunRecord final : public TrialLog {
   int begin(const data::TrialRecord& planned, std::int64_t began_ns) override;
   void finish(const data::TrialRecord& record) override { store_.finish_attempt(*run_, record); }
   void cut_off(const std::string& reason) override { store_.cut_off_attempt(*run_, reason); }
-  void answered(const std::vector<data::PageAnswer>& answers) override;
-  bool has_answers(const std::string& page) override;
+  void answered(const data::PageAnswer& answer) override;
+  std::vector<data::PageAnswer> answers() override;
 
  private:
   struct Note {

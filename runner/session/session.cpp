@@ -305,7 +305,11 @@ std::optional<participants::Answer> Session::show_intervals(const protocols::Tri
   }
   if (servo.tripped()) return std::nullopt;
   record_.timed_out = !answer;
-  if (answer && block.confidence) ask_confidence(*block.confidence);
+  if (answer && block.confidence) {
+    take_answer(trial, answer);
+    if (events_ != nullptr) events_->unrated(record_);
+    ask_confidence(*block.confidence);
+  }
   return answer;
 }
 
@@ -456,43 +460,88 @@ void Session::resume_task_block() {
   if (block != nullptr && !station_.plan.block_begins()) read_instructions(*block);
 }
 
+namespace {
+
+std::vector<PageItem> questions_of(const PageSpec& page) {
+  if (page.kind != PageSpec::Kind::consent) return page.items;
+  PageItem agree;
+  agree.name = "consent";
+  return {agree};
+}
+
+std::optional<std::string> answer_to(const PageSpec& page, const PageItem& item,
+                                     const std::vector<data::PageAnswer>& answers) {
+  for (const data::PageAnswer& one : answers) {
+    if (one.page == page.name && one.item == item.name) return one.answer;
+  }
+  return std::nullopt;
+}
+
+/// The questions of a page without an answer, as indices.
+std::vector<std::size_t> open_questions(const PageSpec& page,
+                                        const std::vector<data::PageAnswer>& answers) {
+  std::vector<std::size_t> open;
+  const std::vector<PageItem> items = questions_of(page);
+  for (std::size_t i = 0; i < items.size(); ++i) {
+    if (!answer_to(page, items[i], answers)) open.push_back(i);
+  }
+  return open;
+}
+
+}  // namespace
+
 bool Session::has_open_pages() const {
   const auto& pages = station_.protocol.pages;
   return std::any_of(pages.begin(), pages.end(), [this](const PageSpec& page) {
     return page.when == PageSpec::When::after && !page.items.empty() &&
-           !station_.log.has_answers(page.name);
+           !open_questions(page, station_.log.answers()).empty();
   });
 }
 
 void Session::show_pages(PageSpec::When when, const std::string& block) {
   for (const PageSpec& page : station_.protocol.pages) {
     if (page.when != when || page.before_block != block) continue;
-    if (!station_.log.has_answers(page.name)) show_page(page);
+    const bool asks = !questions_of(page).empty();
+    if (!asks || !open_questions(page, station_.log.answers()).empty()) show_page(page);
   }
   tell_page({});
 }
 
+/// Each answer is durable before the next question is shown. After an interruption the page begins
+/// with the first question without an answer, and without its text.
 void Session::show_page(const PageSpec& page) {
   const bool consent = page.kind == PageSpec::Kind::consent;
-  PageItem agree;
-  agree.name = "consent";
-  const std::vector<PageItem> items = consent ? std::vector<PageItem>{agree} : page.items;
+  const std::vector<PageItem> items = questions_of(page);
+  const std::vector<std::size_t> open = open_questions(page, station_.log.answers());
   PageView view{page.name, "", 0, static_cast<int>(items.size())};
   tell_page(view);
-  if (!consent) participant_.read_screens(screens_of(page.text, page.pictures));
-  std::vector<data::PageAnswer> answers;
-  for (const PageItem& item : items) {
+  if (!consent && open.size() == items.size())
+    participant_.read_screens(screens_of(page.text, page.pictures));
+  for (std::size_t at = items.empty() ? 0 : open.front(); at < items.size();) {
+    const PageItem& item = items[at];
     view.question = item.name;
-    ++view.number;
+    view.number = static_cast<int>(at) + 1;
     tell_page(view);
-    const std::string shown = consent ? page.text : item.question;
-    std::string answer = participant_.ask(page, item);
-    if (consent && answer != "agree")
+    const bool number_follows =
+        at + 1 < items.size() && items[at + 1].kind == PageItem::Kind::number;
+    const std::optional<std::string> given = answer_to(page, item, station_.log.answers());
+    const std::optional<std::string> answer =
+        participant_.ask(page, item, {at > 0, given, number_follows});
+    if (!answer) {
+      --at;
+      continue;
+    }
+    if (consent && *answer != "agree")
       throw EndOfSession(data::RunEnd::aborted, "consent was not given");
-    answers.push_back({page.name, item.name, page.version, checksum_hex(shown), std::move(answer),
-                       station_.clock.now_ns()});
+    if (answer != given) store_answer(page, item, *answer);
+    ++at;
   }
-  if (!answers.empty()) station_.log.answered(answers);
+}
+
+void Session::store_answer(const PageSpec& page, const PageItem& item, const std::string& answer) {
+  const std::string& shown = page.kind == PageSpec::Kind::consent ? page.text : item.question;
+  station_.log.answered(
+      {page.name, item.name, page.version, checksum_hex(shown), answer, station_.clock.now_ns()});
 }
 
 void Session::tell_page(const PageView& view) {

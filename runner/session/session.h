@@ -158,6 +158,8 @@ class SessionEvents {
   /// A page is shown, or one of its questions: its number, from 1, and their count; 0:
   /// the text. Empty names: the page is over.
   virtual void page(const PageView& /*view*/) {}
+  /// The trial is answered, and confidence will be asked. A kill would lose the answer otherwise.
+  virtual void unrated(const data::TrialRecord& /*so_far*/) {}
   /// The question for confidence begins (forces off) or ends.
   virtual void asking(bool /*now*/) {}
 };
@@ -226,6 +228,8 @@ class Session {
   void resume_task_block();
   void show_pages(protocols::PageSpec::When when, const std::string& block = "");
   void show_page(const protocols::PageSpec& page);
+  void store_answer(const protocols::PageSpec& page, const protocols::PageItem& item,
+                    const std::string& answer);
   void tell_page(const PageView& view);
   void cut_off(const std::string& reason);
   void rest_between_blocks();

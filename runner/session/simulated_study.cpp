@@ -140,7 +140,7 @@ struct Work {
   std::vector<protocols::TrialOutcome> answers;  ///< of the trials on record
   std::int64_t clock_ns = 0;                     ///< the session's clock at its last record
   data::RunInfo info;
-  std::vector<std::string> answered_pages;
+  std::vector<data::PageAnswer> page_answers;
   std::vector<data::TrialRecord> completed;  ///< for an advisor that proposes levels
 };
 
@@ -162,9 +162,10 @@ class Queue {
     done_.notify_all();
   }
   /// The thread that owns the store keeps answers to a page before the session's next trial.
-  void push(std::size_t work, const std::vector<data::PageAnswer>& answers) {
+  void push(std::size_t work, const data::PageAnswer& answer) {
     const std::lock_guard lock(mutex_);
-    pages_.emplace_back(work, answers);
+    if (pages_.empty() || pages_.back().first != work) pages_.emplace_back().first = work;
+    pages_.back().second.push_back(answer);
   }
   void push(std::size_t work, std::int64_t at_ns, const std::string& note) {
     const std::lock_guard lock(mutex_);
@@ -209,28 +210,27 @@ class Queue {
 
 class QueueLog final : public TrialLog {
  public:
-  /// \param answered_pages  of earlier runs of the session
-  QueueLog(Queue& queue, std::size_t work, std::vector<std::string> answered_pages)
-      : queue_(queue), work_(work), answered_(std::move(answered_pages)) {}
+  /// \param given  answers to pages in earlier runs of the session
+  QueueLog(Queue& queue, std::size_t work, std::vector<data::PageAnswer> given)
+      : queue_(queue), work_(work), given_(std::move(given)) {}
   int begin(const data::TrialRecord&, std::int64_t) override { return 1; }
   void finish(const data::TrialRecord& record) override { queue_.push(work_, record); }
   void cut_off(const std::string& reason) override {
     throw std::runtime_error("a simulated trial was cut off: " + reason);
   }
-  void answered(const std::vector<data::PageAnswer>& answers) override {
-    queue_.push(work_, answers);
+  void answered(const data::PageAnswer& answer) override {
+    queue_.push(work_, answer);
+    given_.push_back(answer);
   }
   void note(std::int64_t at_ns, const std::string& text) override {
     queue_.push(work_, at_ns, text);
   }
-  bool has_answers(const std::string& page) override {
-    return std::find(answered_.begin(), answered_.end(), page) != answered_.end();
-  }
+  std::vector<data::PageAnswer> answers() override { return given_; }
 
  private:
   Queue& queue_;
   std::size_t work_;
-  std::vector<std::string> answered_;
+  std::vector<data::PageAnswer> given_;
 };
 
 SessionPlan plan_of(const protocols::Protocol& protocol, const Work& work) {
@@ -248,7 +248,7 @@ void run_session(const SimulatedStudy& study, const Work& work, std::size_t inde
         SocketAdvisor::Settings{plan.advisor, plan.advisor_time_out,
                                 work.participant.enrolled_number, work.session},
         work.completed);
-  QueueLog log(queue, index, work.answered_pages);
+  QueueLog log(queue, index, work.page_answers);
   run_simulated_session(study,
                         {work.participant.enrolled_number, plan_of(study.protocol, work),
                          work.clock_ns, work.info.clock, advisor.get()},
@@ -292,7 +292,7 @@ std::vector<Work> unfinished_work(const protocols::Protocol& protocol, data::Sto
       if (!plan.advisor.empty()) work.completed = before.completed;
       work.clock_ns = before.latest_ns;
       work.info = simulated_run(protocol, settings, number, session);
-      if (!protocol.pages.empty()) work.answered_pages = store.answered_pages(participant, session);
+      if (!protocol.pages.empty()) work.page_answers = store.answers_in_force(participant, session);
       const SessionPlan trials = plan_of(protocol, work);
       progress.recorded += static_cast<std::int64_t>(trials.done());
       progress.expected += static_cast<std::int64_t>(trials.size());

@@ -167,14 +167,37 @@ TEST(PageAnswers, AreKeptInTheirOrderAndSealed) {
     EXPECT_EQ(answers[0].answer.version, "2026-1");
     EXPECT_EQ(answers[0].answer.at_ns, 4'000'000'000);
     EXPECT_EQ(answers[1].answer.answer, "");
-    EXPECT_EQ(store.answered_pages(answers[0].participant, 1),
-              std::vector<std::string>{"about-you"});
-    EXPECT_TRUE(store.answered_pages(answers[0].participant, 2).empty());
+    EXPECT_EQ(store.answers_in_force(answers[0].participant, 1).size(), 2U);
+    EXPECT_TRUE(store.answers_in_force(answers[0].participant, 2).empty());
   }
   EXPECT_EQ(refusal_of(folder / "a.db"), "");
   SQLite::Database(folder / "a.db", SQLite::OPEN_READWRITE)
       .exec("UPDATE page_answers SET answer = '73' WHERE item = 'age'");
   EXPECT_NE(refusal_of(folder / "a.db").find("answer to a page 1"), std::string::npos);
+}
+
+TEST(PageAnswers, StayOnRecordWhenTheyAreCorrected) {
+  const TemporaryFolder folder;
+  record_study(folder / "a.db", "P1", 1);
+  {
+    Store store = Store::open(folder / "a.db", Store::Mode::write_or_create);
+    const Participant person = store.page_answers().front().participant;
+    const Run run = store.begin_run(person, a_run(1));
+    PageAnswer corrected = an_answer("age", "38");
+    corrected.at_ns = 9'000'000'000;
+    store.add_page_answers(run, {corrected});
+    const std::vector<PageAnswer> in_force = store.answers_in_force(person, 1);
+    ASSERT_EQ(in_force.size(), 2U);
+    EXPECT_EQ(in_force[0].answer, "38");
+    EXPECT_EQ(in_force[0].at_ns, 9'000'000'000);
+    const std::vector<StoredPageAnswer> all = store.page_answers();
+    ASSERT_EQ(all.size(), 3U);
+    EXPECT_EQ(all[0].answer.answer, "37");
+    EXPECT_TRUE(all[0].replaced);
+    EXPECT_FALSE(all[1].replaced);
+    EXPECT_FALSE(all[2].replaced);
+  }
+  EXPECT_EQ(refusal_of(folder / "a.db"), "");
 }
 
 TEST(PageAnswers, GoAlongInAMergeAndAreForgottenWithTheirParticipant) {

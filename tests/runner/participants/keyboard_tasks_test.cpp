@@ -93,10 +93,11 @@ class KeyboardTasks : public ::testing::Test {
     }
     return std::nullopt;
   }
+  /// "BACK": to the question before.
   std::string ask(const protocols::PageItem& item, const std::string& keys) {
     screen_.script.push_back({});
     screen_.type(keys);
-    return person_->ask({}, item);
+    return person_->ask({}, item, how_).value_or("BACK");
   }
 
   protocols::Protocol protocol_ = protocols::parse_protocol_text(kTasks, "t.json");
@@ -105,6 +106,7 @@ class KeyboardTasks : public ::testing::Test {
   Nobody nobody_;
   std::optional<KeyboardRespondent> person_;
   protocols::Trial trial_;
+  Asking how_;
 };
 
 TEST_F(KeyboardTasks, NumbersAreTypedWithPointCommaMinusAndBackspace) {
@@ -260,9 +262,81 @@ TEST_F(KeyboardTasks, ConsentIsGivenBelowItsLastScreenOnly) {
   page.kind = protocols::PageSpec::Kind::consent;
   page.text = "first\fsecond";
   screen_.script = {{}, {"1"}, {"space"}, {}, {"space"}, {"2"}};
-  EXPECT_EQ(person_->ask(page, {}), "disagree");
+  EXPECT_EQ(person_->ask(page, {}, {}), "disagree");
   for (const display::Page& shown : screen_.pages)
     EXPECT_EQ(shown.keys.empty(), shown.text == "first");
+}
+
+const protocols::PageItem kHand{protocols::PageItem::Kind::choice,
+                                "hand",
+                                "HAND?",
+                                {"l", "r"},
+                                {},
+                                {},
+                                true,
+                                {"left", "right"}};
+const protocols::PageItem kAge{protocols::PageItem::Kind::number, "age", "AGE?", {}, 18, 120};
+
+TEST_F(KeyboardTasks, LeftAndBackspaceGoBackToTheQuestionBefore) {
+  person();
+  for (const char* const key : {"left", "backspace"}) {
+    how_ = {.can_go_back = true};
+    screen_.script = {{}, {key}};
+    EXPECT_EQ(ask(kHand, ""), "BACK");
+    screen_.script = {{}, {key}};
+    EXPECT_EQ(ask(kAge, ""), "BACK");
+    how_ = {};
+    screen_.script = {{}, {key}, {"2"}};
+    EXPECT_EQ(ask(kHand, ""), "r");
+  }
+}
+
+TEST_F(KeyboardTasks, AQuestionAgainShowsItsAnswerAndKeepsIt) {
+  person();
+  how_ = {.can_go_back = true, .given = "r"};
+  screen_.script = {{}, {"enter"}};
+  EXPECT_EQ(ask(kHand, ""), "r");
+  EXPECT_EQ(screen_.pages.back().chosen, "2");
+  screen_.script = {{}, {"1"}};
+  EXPECT_EQ(ask(kHand, ""), "l");
+  how_.given = "42";
+  screen_.script = {{}, {"enter"}};
+  EXPECT_EQ(ask(kAge, ""), "42");
+  EXPECT_EQ(screen_.pages.back().typed, "42");
+  screen_.script = {{}, {"backspace"}, {"4"}, {"enter"}};
+  EXPECT_EQ(ask(kAge, ""), "44");
+}
+
+TEST_F(KeyboardTasks, HeldBackspaceErasesWithoutGoingBack) {
+  person();
+  how_ = {.can_go_back = true, .given = "42"};
+  screen_.script = {{}};
+  for (int i = 0; i < 20; ++i) screen_.script.push_back({"backspace"});
+  EXPECT_EQ(ask(kAge, "51\n"), "51");
+}
+
+TEST_F(KeyboardTasks, ANumberTypedAheadAnswersNoChoice) {
+  person();
+  how_.number_follows = true;
+  screen_.script = {{}, {"2"}, {"1"}, {"enter"}};
+  screen_.script.resize(200);
+  screen_.script.push_back({"1"});
+  EXPECT_EQ(ask(kHand, ""), "l");
+  EXPECT_EQ(screen_.replies.count("OTHER KEY"), 1U);
+  how_.number_follows = false;
+  screen_.script = {{}, {"2"}, {"1"}};
+  EXPECT_EQ(ask(kHand, ""), "r");
+}
+
+TEST_F(KeyboardTasks, TheRangeIsShownBeforeAnError) {
+  person();
+  ask(kAge, "42\n");
+  EXPECT_EQ(screen_.pages.front().text, "AGE?\n(18 \u2013 120)");
+  begin(1, {});
+  screen_.script = {{}, {}};
+  screen_.type("7\n");
+  ASSERT_TRUE(answer());
+  EXPECT_NE(screen_.pages.back().text.find("(0 \u2013 50)"), std::string::npos);
 }
 
 TEST_F(KeyboardTasks, LongScalesHaveAKeyForEachStep) {
@@ -323,7 +397,7 @@ TEST_F(KeyboardTasks, ButtonsAnswerPagesAndConfidence) {
                                  true,
                                  {"left", "right"}};
   press_at(one, nobody_, clock_, {{0, 3}, {2, 2}});
-  EXPECT_EQ(one.ask({}, hand), "r");
+  EXPECT_EQ(one.ask({}, hand, {}), "r");
   const std::size_t pages = screen_.pages.size();
   press_at(one, nobody_, clock_, {{2, 4}, {4, 1}});
   one.read_screens({{"FIRST", nullptr}, {"SECOND", nullptr}});

@@ -4,15 +4,18 @@ Usage: task_run_test.py PALPATE
 """
 
 import array
+import csv
 import hashlib
 import json
 import math
 import os
 import pty
+import signal
+import subprocess
 import time
 import unittest
 
-from task_case import Task
+from task_case import PALPATE, Task
 
 PAGES = [
     {"name": "consent", "kind": "consent", "consent_version": "3b", "text": "YOU MAY STOP\fDO YOU TAKE PART"},
@@ -142,6 +145,49 @@ class Pages(Task):
         self.play(again, ("1 I agree   2 I do not agree", "1"), ("WHICH HAND", ""))
         again.kill()
         self.assertEqual(self.answers(), [("consent", "consent", "3b", "agree")])
+
+    def test_each_answer_is_on_disk_before_the_next_question(self):
+        for end in (signal.SIGKILL, signal.SIGINT):
+            self.db = self.dir / f"{end}.db"
+            terminal = self.start("number", pages=PAGES[1:2])
+            self.play(terminal, ("1 left   2 right", "2"), ("HOW OLD", "42\n"), ("WHAT WORK", "some"), ("> some", ""))
+            terminal.send_signal(end)
+            terminal.finish()
+            self.assertEqual([(item, answer) for _, item, _, answer in self.answers()],
+                             [("hand", "right"), ("age", "42")])
+            again = self.start("number", pages=PAGES[1:2])
+            self.play(again, ("WHAT WORK", "\x1b[D"), ("HOW OLD", ""), ("> 42", "\n"), ("WHAT WORK", "w\n"),
+                      ("1 not   2 very", "1"), ("ANYTHING ELSE", "\n"), ("WELCOME", " "), ("HOW HARD", "5\n"),
+                      ("GOOD BYE", " "))
+            self.end(again)
+            self.assertNotIn("WHICH HAND", again.text)
+            self.assertEqual(len(self.answers()), 5)
+
+    def test_a_wrong_key_is_corrected_by_going_back_and_later_on_the_console(self):
+        terminal = self.start("number", pages=PAGES[1:2])
+        self.play(terminal, ("1 left   2 right", "1"), ("(18 \u2013 120)", "\x1b[D"), ("*1 left   2 right", "2"),
+                  ("HOW OLD", "42\n"), ("WHAT WORK", "w\n"), ("1 not   2 very", "1"), ("ANYTHING ELSE", "\n"),
+                  ("WELCOME", ":correct you age 420\n"), ("'420' is not a valid answer", ":correct you nose 4\n"),
+                  ("there is no answer", ":correct you age 43\n"), ("corrected: you, age", ":correct you tired very\n"),
+                  ("corrected: you, tired", " "), ("HOW HARD", "5\n"), ("GOOD BYE", " "))
+        self.end(terminal)
+        self.assertEqual([(item, answer) for _, item, _, answer in self.answers()],
+                         [("hand", "left"), ("hand", "right"), ("age", "42"), ("job", "w"), ("tired", "not"),
+                          ("more", ""), ("age", "43"), ("tired", "very")])
+        self.assertEqual(self.sql("SELECT count(*) FROM notes WHERE text LIKE '%answer_corrected%'"), [(2,)])
+        out = self.dir / "out.csv"
+        subprocess.run([PALPATE, "export", "--db", self.db, "--format", "csv", "--out", out, "--pages"], check=True,
+                       capture_output=True)
+        table, = self.dir.glob("*pages*.csv")
+        with open(table, newline="", encoding="utf-8") as rows:
+            self.assertEqual([row["replaced"] for row in csv.DictReader(rows)], list("10101000"))
+
+    def test_an_answer_is_on_disk_before_confidence_is_asked(self):
+        terminal = self.start("comp")
+        self.play(terminal, ("WELCOME", " "), ("1 / 2", " "), ("2 / 2", "1"), ("1 guessed   2 sure", ""))
+        terminal.kill()
+        (note,), = self.sql("SELECT text FROM notes WHERE text LIKE '%answered_before_confidence%'")
+        self.assertEqual(json.loads(note)["answered_before_confidence"]["response"], "1")
 
     def test_after_a_kill_in_the_last_questionnaire_only_that_is_repeated(self):
         last = {"name": "last", "kind": "questionnaire", "when": "after",
