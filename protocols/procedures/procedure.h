@@ -169,6 +169,11 @@ class InterleavedTracks {
   std::uint64_t rounds_ = 0;
 };
 
+/// The trials still to come: exactly, or for an up-down staircase with a limit of reversals and for
+/// the method of limits the mean of simulated courses. They assume a participant with the estimate
+/// so far, at first half way between the start and the harder end of the range.
+double expected_trials(const ProcedureSpec& spec, const Procedure& so_far);
+
 // The accuracy of a procedure's estimates for simulated participants of known threshold.
 
 /// Bias and spread over simulated participants, on the procedure's scale.

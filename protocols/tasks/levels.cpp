@@ -1,12 +1,14 @@
 #include "protocols/tasks/levels.h"
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <glm/gtc/quaternion.hpp>
 #include <numbers>
+#include <string_view>
 #include <utility>
 
 #include "data/base/json_text.h"
@@ -119,21 +121,46 @@ std::vector<double> levels_of(const TaskBlock& block) {
   return levels;
 }
 
-std::string unit_of_level(const std::string& of) {
-  std::string path = of;  // without list indices: /size_m/0
+namespace {
+
+/// Endings of names, and the unit that each stands for.
+constexpr std::array<std::pair<std::string_view, const char*>, 7> kUnits = {
+    {{"_n_per_m", "N/m"},
+     {"_ns_per_m", "N s/m"},
+     {"_n", "N"},
+     {"_kg_per_m3", "kg/m^3"},
+     {"_kg", "kg"},
+     {"_pa", "Pa"},
+     {"_m", "m"}}};
+
+/// Without list indices: /size_m/0.
+std::string named_part(std::string path) {
   while (!path.empty() && path.back() >= '0' && path.back() <= '9') path.pop_back();
   if (path.ends_with('/')) path.pop_back();
+  return path;
+}
+
+}  // namespace
+
+std::string unit_of_level(const std::string& of) {
+  const std::string path = named_part(of);
   if (path.ends_with("/orientation")) return "deg";
-  for (const auto& [ending, unit] : {std::pair{"_n_per_m", "N/m"},
-                                     {"_ns_per_m", "N s/m"},
-                                     {"_n", "N"},
-                                     {"_kg_per_m3", "kg/m^3"},
-                                     {"_kg", "kg"},
-                                     {"_pa", "Pa"},
-                                     {"_m", "m"}}) {
+  for (const auto& [ending, unit] : kUnits) {
     if (path.ends_with(ending)) return unit;
   }
   return "1";
+}
+
+std::string level_name(const std::string& of) {
+  const std::string path = named_part(of);
+  std::string name = path.substr(path.rfind('/') + 1);
+  for (const auto& [ending, unit] : kUnits) {
+    if (!name.ends_with(ending)) continue;
+    name.resize(name.size() - ending.size());
+    break;
+  }
+  std::replace(name.begin(), name.end(), '_', ' ');
+  return name;
 }
 
 int side_of_levels(const Protocol& protocol, const TaskBlock& block) {

@@ -31,6 +31,10 @@ Protocol with_all_levels(const Protocol& protocol);
 /// \param path  JSON pointer
 std::string unit_of_level(const std::string& path);
 
+/// The varied number for people: "stiffness" for "/stiffness_n_per_m", "size" for "/size_m/0".
+/// \param path  JSON pointer
+std::string level_name(const std::string& path);
+
 /// The shortest text that reads back as the same level.
 std::string level_text(double level);
 

@@ -429,6 +429,14 @@ long long most_trials_of(const TaskBlock& block) {
   return with_catch_trials(block, trials);
 }
 
+long long expected_trials_of(const TaskBlock& block) {
+  if (!is_adaptive(block)) return most_trials_of(block);
+  double trials = 0;
+  for (const BlockTrack& track : tracks_of(block))
+    trials += expected_trials(*track.procedure, Procedure(*track.procedure, 0));
+  return with_catch_trials(block, std::llround(trials));
+}
+
 std::size_t most_unanswered(const TaskBlock& block) {
   return static_cast<std::size_t>(std::max(kLeastUnanswered, most_trials_of(block) / 4));
 }
@@ -595,6 +603,21 @@ void TaskPlan::answered(const TrialOutcome& outcome) {
   ++shown_;
   ++done_;
   find_next();
+}
+
+std::size_t TaskPlan::expected_size() const {
+  if (finished()) return done_;
+  long long left = tracks_ ? 0 : most_trials_of(block()) - static_cast<long long>(shown_);
+  if (tracks_) {
+    double trials = 0;
+    const std::vector<BlockTrack> all = tracks_of(block());
+    for (std::size_t i = 0; i < all.size(); ++i)
+      trials += expected_trials(*all[i].procedure, tracks_->tracks()[i]);
+    left = with_catch_trials(block(), std::llround(trials));
+  }
+  for (std::size_t i = at_ + 1; i < order_.size(); ++i)
+    left += expected_trials_of(protocol_->blocks[static_cast<std::size_t>(order_[i])]);
+  return done_ + static_cast<std::size_t>(std::max(1LL, left));
 }
 
 std::size_t TaskPlan::size() const {

@@ -66,7 +66,8 @@ class TaskPlan {
   bool finished() const { return !next_.has_value(); }
   const Trial& next() const { return *next_; }  ///< \pre not finished()
   std::size_t done() const { return done_; }
-  std::size_t size() const;  ///< at most, as far as known now
+  std::size_t size() const;           ///< at most, as far as known now
+  std::size_t expected_size() const;  ///< likewise, if adaptive blocks take their usual course
   int last_block() const { return first_block_ + static_cast<int>(order_.size()) - 1; }
   bool block_begins() const { return shown_ == 0; }
   /// Shows the next trial at another level, which the procedure records with the answer.
@@ -111,6 +112,8 @@ bool is_external(const Protocol& protocol);
 bool is_adaptive(const TaskBlock& block);
 /// The most trials of a participant in a block, not counting unanswered ones.
 long long most_trials_of(const TaskBlock& block);
+/// The trials of a participant that adaptive blocks usually take.
+long long expected_trials_of(const TaskBlock& block);
 /// An adaptive block ends after this many unanswered trials, whose levels are repeated: nobody is
 /// there. A quarter of most_trials_of, at least 10.
 std::size_t most_unanswered(const TaskBlock& block);

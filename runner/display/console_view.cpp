@@ -9,6 +9,7 @@
 #include <cstring>
 #include <exception>
 #include <glm/geometric.hpp>
+#include <initializer_list>
 #include <utility>
 
 #include "runner/display/console_words.h"
@@ -288,6 +289,18 @@ struct Plot {
   ImDrawList* list;
 };
 
+double text_width(const std::string& words) { return ImGui::CalcTextSize(words.c_str()).x; }
+
+/// The first name that fits the width of a plot, else the last.
+const char* fitting(std::initializer_list<const char*> names, float width) {
+  const char* last = "";
+  for (const char* const name : names) {
+    last = name;
+    if (text_width(name) <= width - 1.2F * ImGui::GetFontSize()) break;
+  }
+  return last;
+}
+
 /// \param top  largest value of the axis; 0: no axis
 Plot plot_frame(const char* name, float width, float height, double top = 0,
                 const char* unit = "") {
@@ -295,9 +308,8 @@ Plot plot_frame(const char* name, float width, float height, double top = 0,
   const float size = ImGui::GetFontSize();
   ImDrawList* const list = ImGui::GetWindowDrawList();
   list->AddRectFilled(at, {at.x + width, at.y + height}, ImGui::GetColorU32(ImGuiCol_FrameBg), 6);
-  list->PushClipRect(at, {at.x + width, at.y + height}, true);
-  list->AddText({at.x + 0.6F * size, at.y + 0.4F * size}, kAxisColour, name);
-  list->PopClipRect();
+  const std::string title = shortened(name, width - 1.2F * size, text_width);
+  list->AddText({at.x + 0.6F * size, at.y + 0.4F * size}, kAxisColour, title.c_str());
   const Plot plot{{at.x + 3.6F * size, at.y + 2.0F * size},
                   {at.x + width - 0.8F * size, at.y + height - 0.8F * size},
                   list};
@@ -327,7 +339,9 @@ void draw_forces(const std::deque<ForcePoint>& forces, float width, float height
   double most = 1;
   for (const ForcePoint& point : forces) most = std::max(most, point.force);
   const double top = round_up(most);
-  const Plot plot = plot_frame("Force on the hand, last 10 s", width, height, top, " N");
+  const Plot plot = plot_frame(
+      fitting({"Force on the hand, last 10 s", "Force, last 10 s", "Force, 10 s"}, width), width,
+      height, top, " N");
   if (forces.size() < 2) return;
   std::vector<ImVec2> line;
   line.reserve(forces.size());
@@ -345,7 +359,8 @@ void draw_times(const std::vector<double>& times, float width, float height) {
   double most = 1;
   for (const double time : times) most = std::max(most, std::isfinite(time) ? time : 0);
   const double top = round_up(most);
-  const Plot plot = plot_frame("Identification times so far", width, height, top, " s");
+  const Plot plot = plot_frame(fitting({"Response times so far", "Response times", "Times"}, width),
+                               width, height, top, " s");
   const auto count = static_cast<float>(std::max<std::size_t>(times.size(), 20));
   for (std::size_t i = 0; i < times.size(); ++i) {
     if (!std::isfinite(times[i])) continue;
@@ -358,8 +373,14 @@ void draw_times(const std::vector<double>& times, float width, float height) {
   }
 }
 
-void draw_scores(const std::vector<ShapeScore>& scores, float width, float height) {
-  const Plot plot = plot_frame("Correct, without practice", width, height);
+void draw_scores(const ConsoleState& state, float width, float height) {
+  const std::vector<ShapeScore>& scores = state.scores;
+  const char* const name = state.counts_right
+                               ? fitting({"Correct, without practice", "Correct"}, width)
+                               : fitting({"Answers, without practice", "Answers"}, width);
+  const Plot plot = plot_frame(name, width, height);
+  int most = 1;
+  for (const ShapeScore& score : scores) most = std::max(most, score.answered);
   const float line = ImGui::GetTextLineHeight();
   const float each =
       std::min(1.5F * line, (plot.to.y - plot.from.y) /
@@ -368,8 +389,9 @@ void draw_scores(const std::vector<ShapeScore>& scores, float width, float heigh
   for (std::size_t i = 0; i < scores.size(); ++i) {
     const ShapeScore& score = scores[i];
     const float y = plot.from.y + static_cast<float>(i) * each;
-    const float fraction =
-        score.shown > 0 ? static_cast<float>(score.right) / static_cast<float>(score.shown) : 0;
+    const int whole = state.counts_right ? std::max(score.shown, 1) : most;
+    const int part = state.counts_right ? score.right : score.answered;
+    const float fraction = static_cast<float>(part) / static_cast<float>(whole);
     plot.list->AddRectFilled({left, y}, {left + fraction * wide, y + 0.86F * each},
                              IM_COL32(60, 92, 120, 255), 3);
     const float size = std::min(line, 0.86F * each);
@@ -377,9 +399,13 @@ void draw_scores(const std::vector<ShapeScore>& scores, float width, float heigh
       plot.list->AddText(ImGui::GetFont(), size, {x, y + (0.86F * each - size) / 2},
                          IM_COL32(235, 233, 226, 255), words.c_str());
     };
-    write(left + 6, score.shape);
-    const std::string count = std::to_string(score.right) + " of " + std::to_string(score.shown);
-    write(plot.to.x - ImGui::CalcTextSize(count.c_str()).x * size / line - 6, count);
+    const std::string count =
+        state.counts_right ? std::to_string(score.right) + " of " + std::to_string(score.shown)
+                           : std::to_string(score.answered);
+    const auto counted = static_cast<float>(text_width(count)) * size / line;
+    write(plot.to.x - counted - 6, count);
+    const double room = (wide - counted - 18) * line / size;
+    write(left + 6, shortened(score.shape, room, text_width));
   }
 }
 
@@ -394,44 +420,60 @@ void progress(const ConsoleState& state) {
   ImGui::ProgressBar(static_cast<float>(fraction_done(state)), {-1, 6}, "");
 }
 
-void title(const ConsoleState& state) {
-  const float font = ImGui::GetFontSize();
-  ImGui::PushFont(ImGui::GetIO().Fonts->Fonts.back());
-  coloured_text(state.state == "fault" ? kBad : kBright, state_title(state));
+/// The study and the state of the session. Words that do not fit beside the state replace the study
+/// above it: no button may move when the words change.
+void headline(const ConsoleState& state) {
+  const float font = ImGui::GetFontSize(), gap = ImGui::GetStyle().ItemSpacing.x;
+  const float room = ImGui::GetContentRegionAvail().x;
+  const ImVec4 colour = state.stop_plan.empty() ? kBright : kBad;
+  const std::string title = state_title(state), detail = state_detail(state);
+  ImFont* const large = ImGui::GetIO().Fonts->Fonts.back();
+  ImGui::PushFont(large);
+  const double titled = text_width(title);
   ImGui::PopFont();
+  const bool beside = titled + gap + text_width(detail) <= room;
+  const std::string study =
+      state.study + "  ·  " + state.participant + "  ·  session " + std::to_string(state.session);
+  coloured_text(beside ? kQuiet : colour, shortened(beside ? study : detail, room, text_width));
+  ImGui::PushFont(large);
+  coloured_text(state.state == "fault" ? kBad : kBright, shortened(title, room, text_width));
+  ImGui::PopFont();
+  if (!beside) return;
   const ImVec2 corner = ImGui::GetItemRectMax();
-  ImGui::GetWindowDrawList()->AddText(
-      {corner.x + ImGui::GetStyle().ItemSpacing.x, corner.y - 1.35F * font},
-      ImGui::GetColorU32(state.stop_plan.empty() ? kBright : kBad), state_detail(state).c_str());
+  ImGui::GetWindowDrawList()->AddText({corner.x + gap, corner.y - 1.35F * font},
+                                      ImGui::GetColorU32(colour), detail.c_str());
 }
 
 std::string of(int number, int all) {
   return all > 0 ? std::to_string(number) + " of " + std::to_string(all) : "-";
 }
 
-}  // namespace
-
-void draw_status(const ConsoleState& state, bool hidden, bool compact) {
-  if (compact && !state.checklist.steps.empty()) return;  // no trial yet: the space is needed
-  coloured_text(kQuiet, state.study + "  ·  " + state.participant + "  ·  session " +
-                            std::to_string(state.session));
-  title(state);
-  progress(state);
-  if (!ImGui::BeginTable("status", compact ? 4 : 2)) return;
+/// A table of names and values. \param compact  two values in a row
+bool begin_values(const char* name, bool compact) {
+  if (!ImGui::BeginTable(name, compact ? 4 : 2)) return false;
   for (int i = 0; i < (compact ? 2 : 1); ++i) {
     ImGui::TableSetupColumn("name", ImGuiTableColumnFlags_WidthFixed,
                             (compact ? 6.0F : 7.5F) * ImGui::GetFontSize());
     ImGui::TableSetupColumn("value");
   }
+  return true;
+}
+
+}  // namespace
+
+void draw_status(const ConsoleState& state, bool hidden, bool compact) {
+  if (compact && !state.checklist.steps.empty()) return;  // no trial yet: the space is needed
+  headline(state);
+  progress(state);
+  if (!begin_values("status", compact)) return;
   const bool practice = state.practice && (state.state == "trial" || state.state == "homing");
-  table_row("Trial", of(state.trial, state.trials) + (practice ? "  PRACTICE" : ""),
-            practice ? kGood : kBright);
+  table_row("Trial", trial_of(state) + (practice ? "  PRACTICE" : ""), practice ? kGood : kBright);
   table_row("Block", of(state.block, state.blocks));
-  table_row("Shape", state.shape.empty() ? "-" : hidden ? "hidden" : state.shape);
+  table_row("Stimulus", state.shape.empty() ? "-" : hidden ? "hidden" : state.shape);
   table_row("Renderer", state.renderer.empty() ? "-" : state.renderer);
   if (!state.task.empty()) {
     table_row("Task", state.task + ", interval " + of(state.interval, state.intervals));
-    table_row("Level", state.level.empty() ? "-" : hidden ? "hidden" : state.level);
+    table_row("Level", state.level.empty() ? "-" : hidden ? "hidden" : level_text(state));
   }
   table_row("Last answer", state.answer.empty() ? "-" : hidden ? "hidden" : state.answer);
   table_row("Elapsed", duration_text(state.elapsed));
@@ -465,14 +507,47 @@ void draw_ending(EndRequest& ending, float half, std::vector<ConsoleCommand>& co
   end("Participant withdraws", "withdrawn");
 }
 
+void draw_correction(const ConsoleState& state, Correction& correction, float half,
+                     std::vector<ConsoleCommand>& commands) {
+  correction.at = std::min(correction.at, state.given.size() - 1);
+  const GivenAnswer& one = state.given[correction.at];
+  wrapped_text(kBright, one.page + ", " + one.question + ": " +
+                            (one.answer.empty() ? "(left out)" : one.answer));
+  const auto turn = [&](const char* words, std::size_t to) {
+    ImGui::BeginDisabled(to >= state.given.size());
+    if (wide_button(words, half)) {
+      correction.at = to;
+      correction.answer = {};
+    }
+    ImGui::EndDisabled();
+  };
+  turn("Answer before", correction.at - 1);  // wraps to a large number at the first
+  ImGui::SameLine();
+  turn("Next answer", correction.at + 1);
+  ImGui::SetNextItemWidth(-1);
+  ImGui::InputTextWithHint("##corrected", "The right answer; the one before stays on record",
+                           correction.answer.data(), correction.answer.size());
+  if (wide_button("Store the correction", half)) {
+    const std::string answer = correction.answer.data();
+    commands.push_back({Kind::correct, one.page + " " + one.question + " " + answer, 0});
+    correction = {};
+  }
+  ImGui::SameLine();
+  if (wide_button("Back", half)) correction = {};
+}
+
 }  // namespace
 
 void draw_buttons(const ConsoleState& state, bool compact, EndRequest& ending,
-                  std::vector<ConsoleCommand>& commands) {
+                  Correction& correction, std::vector<ConsoleCommand>& commands) {
   const float gap = ImGui::GetStyle().ItemSpacing.x;
   const float half = (ImGui::GetContentRegionAvail().x - gap) / 2;
   if (ending.open) {
     draw_ending(ending, half, commands);
+    return;
+  }
+  if (correction.open && !state.given.empty()) {
+    draw_correction(state, correction, half, commands);
     return;
   }
   if (compact && !state.checklist.steps.empty()) {
@@ -483,7 +558,9 @@ void draw_buttons(const ConsoleState& state, bool compact, EndRequest& ending,
     const Look look = due ? Look::due : lit ? Look::lit : Look::plain;
     if (wide_button(words, half, look)) commands.push_back({kind, {}, 0});
   };
-  button("Pause", Kind::pause, state.state == "paused");
+  const bool in_trial = state.state == "trial" || state.state == "homing";
+  button(in_trial ? "Pause after trial" : "Pause", Kind::pause,
+         state.pauses || state.state == "paused");
   ImGui::SameLine();
   button("Go on", Kind::go_on, false, !state.held_by.empty() && !off(state));
   button("Stop after trial", Kind::stop_after_trial, state.stop_plan == "after this trial");
@@ -492,6 +569,8 @@ void draw_buttons(const ConsoleState& state, bool compact, EndRequest& ending,
   button("Repeat trial", Kind::repeat_trial);
   ImGui::SameLine();
   if (wide_button("End now...", half)) ending.open = true;
+  if (!state.given.empty() && wide_button(button_label(Kind::correct), half))
+    correction.open = true;
 }
 
 float draw_emergency(bool lit) {
@@ -541,29 +620,27 @@ void draw_forces_off(const ConsoleState& state, double silence,
   ImGui::EndDisabled();
 }
 
-void draw_health(const ConsoleState& state, bool brief) {
+void draw_health(const ConsoleState& state, bool compact) {
   const servo::Sample& sample = state.sample;
-  if (!ImGui::BeginTable("health", 2)) return;
-  ImGui::TableSetupColumn("name", ImGuiTableColumnFlags_WidthFixed, 7.5F * ImGui::GetFontSize());
-  ImGui::TableSetupColumn("value");
+  if (!begin_values("health", compact)) return;
   const std::string faults = safety::fault_words(sample.faults);
   table_row("Servo", faults.empty() ? "no fault" : faults,
             faults.empty()             ? kGood
             : forces_not_yet_on(state) ? kQuiet
                                        : kBad);
-  if (brief) {
-    ImGui::EndTable();
-    return;
-  }
-  table_row("Period",
-            fixed_point(static_cast<double>(sample.period_ns) * 1e-6, 3) + " ms, longest " +
-                fixed_point(static_cast<double>(state.longest_period_ns) * 1e-6, 2) + " ms");
+  table_row("Period", fixed_point(static_cast<double>(sample.period_ns) * 1e-6, 3) +
+                          (compact ? " ms, up to " : " ms, longest ") +
+                          fixed_point(static_cast<double>(state.longest_period_ns) * 1e-6, 2) +
+                          " ms");
   table_row("Computing", fixed_point(static_cast<double>(sample.compute_ns) * 1e-3, 1) + " µs");
   table_row("Missed",
-            std::to_string(state.missed_ticks) + " of " + std::to_string(state.ticks) + " ticks",
+            std::to_string(state.missed_ticks) + " of " + std::to_string(state.ticks) +
+                (compact ? "" : " ticks"),
             state.missed_ticks == 0 ? kBright : kBad);
-  table_row("Force", fixed_point(glm::length(sample.device1), 2) + " N at the tip, " +
-                         fixed_point(glm::length(sample.device2), 2) + " N at the tail");
+  table_row("Force", fixed_point(glm::length(sample.device1), 2) +
+                         (compact ? " N tip, " : " N at the tip, ") +
+                         fixed_point(glm::length(sample.device2), 2) +
+                         (compact ? " N tail" : " N at the tail"));
   table_row("Contact", sample.rendering.contacts == 0
                            ? "none"
                            : fixed_point(sample.rendering.deepest.depth * 1e3, 2) + " mm deep");
@@ -656,7 +733,7 @@ void ConsoleView::draw_picture(const Modifiers& modifiers, bool with_plots,
   draw_times(state_.times, part, plots);
   if (hidden_) return;
   ImGui::SameLine();
-  draw_scores(state_.scores, part, plots);
+  draw_scores(state_, part, plots);
 }
 
 void ConsoleView::draw_hidden(float width, float height) {
@@ -742,11 +819,10 @@ void ConsoleView::draw_side(double now, bool narrow, std::vector<ConsoleCommand>
   draw_forces_off(state_, has_state_ && now - updated_at_ > kSilence ? now - updated_at_ : 0,
                   commands);
   draw_status(state_, hidden_, narrow);
-  draw_buttons(state_, narrow, end_request_, commands);
-  const bool brief = narrow || room < 46 * ImGui::GetFontSize();
-  if (!brief) ImGui::Dummy({0, 2});
-  const bool crowded = narrow && (end_request_.open || !state_.checklist.steps.empty());
-  if (!crowded) draw_health(state_, brief);
+  draw_buttons(state_, narrow, end_request_, correction_, commands);
+  const bool crowded =
+      narrow && (end_request_.open || correction_.open || !state_.checklist.steps.empty());
+  if (!crowded) draw_health(state_, narrow);
   ImGui::Dummy({0, 2});
   controls_ = ImGui::GetCursorPosY();
   ImGui::EndChild();

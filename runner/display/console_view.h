@@ -134,6 +134,13 @@ struct EndRequest {
   TypedText reason{};  ///< as typed so far
 };
 
+/// The dialog for another answer to a question of a page.
+struct Correction {
+  bool open = false;
+  std::size_t at = 0;  ///< into ConsoleState::given
+  TypedText answer{};  ///< as typed so far
+};
+
 /// Modifier keys held down in either window.
 struct Modifiers {
   bool ctrl = false, shift = false;
@@ -155,6 +162,9 @@ class ConsoleView {
   bool in_emergency_button(float y) const { return y >= 0 && y < emergency_bottom_; }
   float emergency_height() const { return emergency_bottom_; }  ///< px, with its margin
   void highlight_emergency(bool on) { emergency_highlit_ = on; }
+  /// Asks whether to end the session, as its button does.
+  void ask_to_end() { end_request_.open = true; }
+  bool asks_to_end() const { return end_request_.open; }
 
  private:
   void draw_picture(const Modifiers& modifiers, bool with_plots,
@@ -176,6 +186,7 @@ class ConsoleView {
   std::deque<ForcePoint> forces_;
   TypedText note_{}, answer_{};
   EndRequest end_request_;
+  Correction correction_;
   float emergency_bottom_ = 40;  ///< px, lower edge of the button
   bool emergency_highlit_ = false;
   float controls_ = 1;  ///< px, height of the controls as drawn last
@@ -193,9 +204,9 @@ void draw_checklist(const Checklist& list, EndRequest& ending,
                     std::vector<ConsoleCommand>& commands);
 /// Adds a command, without a time, for each button pressed. The dialog for ending the session
 /// replaces the buttons: the console has no pop-ups, so nothing can cover the emergency button.
-/// \param compact  as for the status
+/// The dialog for correcting an answer does so, too. \param compact  as for the status
 void draw_buttons(const ConsoleState& state, bool compact, EndRequest& ending,
-                  std::vector<ConsoleCommand>& commands);
+                  Correction& correction, std::vector<ConsoleCommand>& commands);
 /// The emergency button along the upper edge of the window, over everything else. Only drawn: its
 /// clicks are handled by ConsoleWindow. \return its lower edge, px
 float draw_emergency(bool lit);
@@ -203,11 +214,11 @@ float draw_emergency(bool lit);
 /// \param silence  s without an update from the session; 0: updates arrive
 void draw_forces_off(const ConsoleState& state, double silence,
                      std::vector<ConsoleCommand>& commands);
-/// \param brief  show the servo's faults only
-void draw_health(const ConsoleState& state, bool brief);
+/// \param compact  as for the status
+void draw_health(const ConsoleState& state, bool compact);
 /// \param height  px
 void draw_forces(const std::deque<ForcePoint>& forces, float width, float height);
 void draw_times(const std::vector<double>& times, float width, float height);
-void draw_scores(const std::vector<ShapeScore>& scores, float width, float height);
+void draw_scores(const ConsoleState& state, float width, float height);
 
 }  // namespace palpate::runner::display

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "data/base/text.h"
 #include "runner/safety/fault_signals.h"
 
 namespace palpate::runner::display {
@@ -52,6 +53,7 @@ std::string state_title(const ConsoleState& state) {
 
 std::string state_detail(const ConsoleState& state) {
   if (!state.stop_plan.empty()) return "stops " + state.stop_plan;
+  if (state.pauses) return "pauses after this trial";
   if (!state.held_by.empty()) return {};
   if (state.seconds_left > 0) return duration_text(state.seconds_left) + " left";
   // "question 2 of 5: PAGE, QUESTION", "page: PAGE"
@@ -64,6 +66,29 @@ std::string state_detail(const ConsoleState& state) {
   if (state.state != "homing") return {};
   if (state.sample.waiting == servo::Waiting::for_distance) return "stylus too near: move it away";
   if (state.sample.waiting == servo::Waiting::for_rest) return "stylus must rest: hold it still";
+  return {};
+}
+
+std::string trial_of(const ConsoleState& state) {
+  if (state.trials <= 0) return "-";
+  return std::to_string(state.trial) + (state.about ? " of about " : " of ") +
+         std::to_string(std::max(state.trials, state.trial));
+}
+
+std::string level_text(const ConsoleState& state) {
+  if (state.level.empty()) return "-";
+  return (state.level_name.empty() ? "" : state.level_name + " ") + state.level;
+}
+
+std::string shortened(const std::string& words, double room,
+                      const std::function<double(const std::string&)>& width) {
+  if (width(words) <= room) return words;
+  std::string cut = words;
+  while (!cut.empty()) {
+    while (continues_character(cut.back())) cut.pop_back();
+    cut.pop_back();
+    if (width(cut + "\u2026") <= room) return cut + "\u2026";
+  }
   return {};
 }
 

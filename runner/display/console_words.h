@@ -1,6 +1,7 @@
 #pragma once
 // The texts of the experimenter's console that follow from its state.
 
+#include <functional>
 #include <string>
 
 #include "runner/display/display.h"
@@ -14,6 +15,13 @@ std::string forces_off_reason(const ConsoleState& state);
 /// State of the session in a word or two; and what it waits for, or the key to press.
 std::string state_title(const ConsoleState& state);
 std::string state_detail(const ConsoleState& state);
+/// "3 of 24", "3 of about 28"
+std::string trial_of(const ConsoleState& state);
+/// The level with the name of what varies: "stiffness 80 N/m"; "-": none.
+std::string level_text(const ConsoleState& state);
+/// The words, or as many letters as fit and an ellipsis. \param room, width  px
+std::string shortened(const std::string& words, double room,
+                      const std::function<double(const std::string&)>& width);
 /// Share of the session's trials that are done, 0 to 1.
 double fraction_done(const ConsoleState& state);
 /// Whether forces are off only because they have not been needed yet.

@@ -54,9 +54,9 @@ struct ConsoleCommand {
     stop_after_block,
     emergency_zero,  ///< zero force at once and until clear_fault
     clear_fault,
-    note,    ///< free text with a time stamp
-    quit,    ///< ends the session at once and cuts off the current trial
-    answer,  ///< the participant's answer, typed by the experimenter; text "": on to the next
+    note,     ///< free text with a time stamp
+    quit,     ///< ends the session at once and cuts off the current trial
+    answer,   ///< the participant's answer, typed by the experimenter; text "": on to the next
     correct,  ///< an answer of a page; text: page, question and new answer, spaces between them
   };
   Kind kind = Kind::note;
@@ -128,10 +128,11 @@ class ParticipantScreen {
   virtual std::string trouble() const { return {}; }
 };
 
-/// How often a shape was identified correctly.
+/// How often a stimulus was answered correctly.
 struct ShapeScore {
   std::string shape;
-  int right = 0, shown = 0;
+  int right = 0, shown = 0;  ///< of trials with a right answer
+  int answered = 0;          ///< of all trials
 };
 
 /// An answer to a question of a page that the experimenter may correct.
@@ -169,6 +170,10 @@ struct ConsoleState {
   std::string task;                 ///< "compare", ...; empty: version 1
   int interval = 0, intervals = 0;  ///< number within the trial, and their count
   std::string level;                ///< level presented now, as text; empty: none
+  std::string level_name;           ///< what varies: "stiffness"; empty: nothing
+  bool counts_right = true;         ///< the task has right answers
+  bool about = false;               ///< `trials` is expected, as answers decide
+  bool pauses = false;              ///< a pause follows this trial
   bool takes_answers = false;       ///< the experimenter types the participant's answers
   std::vector<GivenAnswer> given;   ///< in this session, of pages
 };

@@ -370,8 +370,7 @@ void KeyMap::draw(cairo_t* canvas, double middle, double top) const {
     const Size key = item.key.size();
     item.key.draw(canvas, left + (item.cap_width - key.width) / 2,
                   y + (kKeycapHeight * unit_ - key.height) / 2, kText);
-    item.answer.draw(canvas, middle + item.answer_x, top + item.answer_y,
-                     chosen ? kGo : kQuietInk);
+    item.answer.draw(canvas, middle + item.answer_x, top + item.answer_y, chosen ? kGo : kQuietInk);
   }
 }
 

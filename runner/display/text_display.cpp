@@ -14,6 +14,7 @@
 #include <utility>
 
 #include "data/base/text.h"
+#include "runner/display/console_words.h"
 
 namespace palpate::runner::display {
 
@@ -267,7 +268,7 @@ std::string status(const ConsoleState& state) {
   if (state.practice && (state.state == "trial" || state.state == "homing")) text += ", practice";
   if (state.trial > 0) {
     text += ", block " + std::to_string(state.block) + " of " + std::to_string(state.blocks) +
-            ", trial " + std::to_string(state.trial) + " of " + std::to_string(state.trials);
+            ", trial " + trial_of(state);
   }
   if (state.remaining > 60)
     text += ", " + std::to_string(static_cast<int>(state.remaining / 60)) + " min left";

@@ -54,6 +54,9 @@ class ConsoleWindow final : public ExperimenterConsole {
   void share(bool shared) { view_->share(shared); }
   /// Height of the emergency button with its margin, px.
   float emergency_height() const { return view_->emergency_height(); }
+  /// Asks the experimenter whether to end the session.
+  void ask_to_end() { view_->ask_to_end(); }
+  bool asks_to_end() const { return view_->asks_to_end(); }
 
   GLFWwindow* handle() const { return window_; }
   void draw();
@@ -344,8 +347,24 @@ class Windows final : public DisplayLoop {
       glfwWaitEventsTimeout(joystick_ ? std::min(next - now, kJoystickPoll) : next - now);
       poll_joystick();
     }
-    if (glfwWindowShouldClose(participant_.handle()) != 0) participant_.close();
-    if (glfwWindowShouldClose(console_.handle()) != 0) {
+    ask_before_closing();
+  }
+
+  /// The console asks, where nothing covers the emergency button. Closing a window again while it
+  /// asks ends the session.
+  void ask_before_closing() {
+    const bool participant = glfwWindowShouldClose(participant_.handle()) != 0;
+    const bool console = glfwWindowShouldClose(console_.handle()) != 0;
+    if (!participant && !console) return;
+    if (!console_.asks_to_end()) {
+      for (GLFWwindow* const window : {participant_.handle(), console_.handle()})
+        glfwSetWindowShouldClose(window, GLFW_FALSE);
+      console_.ask_to_end();
+      glfwRequestWindowAttention(console_.handle());
+      return;
+    }
+    if (participant) participant_.close();
+    if (console) {
       glfwSetWindowShouldClose(console_.handle(), GLFW_FALSE);
       console_.send_command(ConsoleCommand::Kind::quit);
     }

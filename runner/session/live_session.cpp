@@ -86,9 +86,16 @@ void SessionMonitor::show() {
   const SessionPlan& plan = session.plan();
   state_.seconds_left = sources_.respondent.seconds_left();
   state_.elapsed = static_cast<double>(shown_ns_ - started_ns_) / kSecond_ns;
-  state_.trials = static_cast<int>(plan.size());
+  const std::size_t expected = expected_trials();
+  state_.trials = static_cast<int>(expected);
+  state_.about = expected != plan.size();
+  if (state_.trial == 0 && plan.done() > 0) {  // resumed, and no trial has begun yet
+    state_.trial = static_cast<int>(plan.done());
+    if (!plan.finished()) state_.block = plan.next().block;
+  }
+  state_.pauses = in_trial_ && sources_.hold.kind() == SessionHold::Kind::pause;
   state_.blocks = plan.blocks();
-  state_.remaining = seconds_per_trial_ * static_cast<double>(plan.size() - plan.done());
+  state_.remaining = seconds_per_trial_ * static_cast<double>(expected - plan.done());
   state_.sample = sources_.forces.newest();
   state_.bodies.clear();
   if (feeling_) {
@@ -110,6 +117,15 @@ void SessionMonitor::show() {
   station_.console.show(state_);
 }
 
+std::size_t SessionMonitor::expected_trials() {
+  const SessionPlan& plan = sources_.session.plan();
+  if (expected_at_ != plan.done()) {
+    expected_at_ = plan.done();
+    expected_ = plan.expected_size();
+  }
+  return expected_;
+}
+
 void SessionMonitor::show_if_due() {
   if (station_.clock.now_ns() - shown_ns_ >= kFrame_ns) show();
 }
@@ -120,9 +136,11 @@ void SessionMonitor::held() {
 }
 
 void SessionMonitor::count(const data::TrialRecord& record) {
-  if (record.practice || !data::has_right_answer(record)) return;
+  if (record.practice) return;
   for (display::ShapeScore& score : state_.scores) {
     if (score.shape != record.shape) continue;
+    score.answered += record.timed_out ? 0 : 1;
+    if (!data::has_right_answer(record)) continue;
     ++score.shown;
     score.right += record.correct ? 1 : 0;
   }
@@ -134,6 +152,9 @@ void SessionMonitor::interval(const protocols::Trial& trial,
   turned_ = view.continues;
   feeling_ = feeling_ && view.continues;
   state_.task = to_string(block.task);
+  state_.counts_right =
+      block.task != protocols::TaskKind::rate && block.task != protocols::TaskKind::adjust;
+  state_.level_name = block.level ? protocols::level_name(block.level->pointer) : "";
   state_.interval = view.interval;
   state_.intervals = view.intervals;
   state_.level.clear();
@@ -356,7 +377,7 @@ void LiveSession::take_last_commands(Outcome& outcome) {
 void LiveSession::before_step() {
   const Session::State now = session_.state();
   if (now == Session::State::response) return;  // a shown trial is recorded
-  respondent_.set_progress(session_.plan().done(), session_.plan().size());
+  respondent_.set_progress(session_.plan().done(), monitor_.expected_trials());
   attend();
   stop_if_due();
   const auto& longest = station_.protocol.sessions.max_minutes;

@@ -43,6 +43,8 @@ class SessionMonitor final : public SessionEvents {
   bool in_trial() const { return in_trial_; }
   /// s, since the session began.
   double elapsed() const;
+  /// Trials of the session, if adaptive blocks take their usual course.
+  std::size_t expected_trials();
   /// Counts a recorded trial, for the accuracy so far.
   void count(const data::TrialRecord& record);
   /// "after this trial"; empty: no stop is planned.
@@ -75,7 +77,9 @@ class SessionMonitor final : public SessionEvents {
   Marker marker_;  ///< of the current trial, to be filled in
   std::int64_t started_ns_, trial_began_ns_ = 0, shown_ns_ = 0;  ///< session clock
   double seconds_per_trial_ = 0;                                 ///< mean, since the session began
-  int timed_trials_ = 0;                                         ///< in that mean
+  std::optional<std::size_t> expected_at_;  ///< the trials done when they were expected last
+  std::size_t expected_ = 0;
+  int timed_trials_ = 0;  ///< in that mean
   bool in_trial_ = false, feeling_ = false;
   bool began_feeling_ = false;  ///< the first interval of the trial has begun
   bool turned_ = false;   ///< the interval follows a turn: it is no new event for other recordings

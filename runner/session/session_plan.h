@@ -59,6 +59,7 @@ class IdentificationPlan {
   const protocols::Trial& next() const { return trials_[next_]; }  ///< \pre not finished()
   std::size_t done() const { return next_; }
   std::size_t size() const { return trials_.size(); }  ///< as far as known now
+  std::size_t expected_size() const { return size(); }
   int last_block() const { return trials_.empty() ? 0 : trials_.back().block; }
   bool block_begins() const { return next_ == 0 || next().block != trials_[next_ - 1].block; }
   void answered(const protocols::TrialOutcome& outcome);
@@ -98,6 +99,10 @@ class SessionPlan {
   /// As far as known now.
   std::size_t size() const {
     return std::visit([](const auto& plan) { return plan.size(); }, plan_);
+  }
+  /// The same, if adaptive blocks take their usual course rather than as many trials as they may.
+  std::size_t expected_size() const {
+    return std::visit([](const auto& plan) { return plan.expected_size(); }, plan_);
   }
   /// The number of its last block.
   int blocks() const {

@@ -205,6 +205,9 @@ std::vector<std::string> in_words(const protocols::Protocol& protocol,
   if (block.practice) head += "; practice";
   head += "; " + std::string(protocols::is_adaptive(block) ? "at most " : "") +
           std::to_string(protocols::most_trials_of(block)) + " trials";
+  const long long expected = protocols::expected_trials_of(block);
+  if (expected != protocols::most_trials_of(block))
+    head += ", usually about " + std::to_string(expected);
   std::vector<std::string> lines{head};
   for (const protocols::ProcedureSpec& procedure : block.procedures)
     lines.push_back(in_words(procedure));

@@ -160,5 +160,37 @@ TEST(Staircase, ALongRunHoversAboutItsConvergencePoint) {
   }
 }
 
+TEST(ExpectedTrials, OfAStaircaseAreItsCourseNotItsLimit) {
+  Staircase spec = simple_staircase();
+  spec.stop_trials = 200;
+  spec.stop_reversals = 8;
+  spec.discard_reversals = 2;
+  spec.down = 2;
+  const Procedure fresh(spec, 1);
+  const double all = expected_trials(spec, fresh);
+  EXPECT_GT(all, 15);
+  EXPECT_LT(all, 80);
+  // A participant with a steep function half way to the hard end takes about as many.
+  Procedure course = fresh;
+  int trials = 0;
+  while (const auto level = course.next_level()) {
+    course.record({*level, *level > 5});
+    ++trials;
+    EXPECT_LE(expected_trials(spec, course), 200 - trials);
+  }
+  EXPECT_GT(all, 0.5 * trials);
+  EXPECT_LT(all, 2.5 * trials);
+  EXPECT_EQ(expected_trials(spec, course), 0);
+}
+
+TEST(ExpectedTrials, OfAFixedNumberAreExact) {
+  Staircase spec = simple_staircase();
+  spec.stop_trials = 30;
+  Procedure run(spec, 1);
+  EXPECT_EQ(expected_trials(spec, run), 30);
+  run.record({10, true});
+  EXPECT_EQ(expected_trials(spec, run), 29);
+}
+
 }  // namespace
 }  // namespace palpate::protocols

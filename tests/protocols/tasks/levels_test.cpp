@@ -96,5 +96,13 @@ TEST(Levels, AStimulusHasItsOwnOrTheDefaultOfItsMaterial) {
 }
 
 }  // namespace levels_by_hand
+TEST(LevelName, IsTheNumbersNameWithoutItsUnit) {
+  EXPECT_EQ(level_name("/stiffness_n_per_m"), "stiffness");
+  EXPECT_EQ(level_name("/size_m/0"), "size");
+  EXPECT_EQ(level_name("/layers/1/break_n"), "break");
+  EXPECT_EQ(level_name("/friction"), "friction");
+  EXPECT_EQ(level_name("/contact_transient/decay_per_s"), "decay per s");
+}
+
 }  // namespace
 }  // namespace palpate::protocols

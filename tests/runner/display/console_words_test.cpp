@@ -41,6 +41,44 @@ TEST(ConsoleWords, AQuestionOfAPageShowsItsNumber) {
   EXPECT_EQ(state_detail(in("page: welcome")), "welcome");
 }
 
+TEST(ConsoleWords, ATrialStandsAmongAllOrAboutAsMany) {
+  ConsoleState state;
+  EXPECT_EQ(trial_of(state), "-");
+  state.trial = 3;
+  state.trials = 24;
+  EXPECT_EQ(trial_of(state), "3 of 24");
+  state.about = true;
+  EXPECT_EQ(trial_of(state), "3 of about 24");
+  state.trial = 26;
+  EXPECT_EQ(trial_of(state), "26 of about 26");
+}
+
+TEST(ConsoleWords, ALevelHasTheNameOfWhatVaries) {
+  ConsoleState state;
+  EXPECT_EQ(level_text(state), "-");
+  state.level = "80 N/m";
+  state.level_name = "stiffness";
+  EXPECT_EQ(level_text(state), "stiffness 80 N/m");
+}
+
+TEST(ConsoleWords, APauseInATrialSaysThatItComesAfterIt) {
+  ConsoleState state = in("trial");
+  state.pauses = true;
+  EXPECT_EQ(state_detail(state), "pauses after this trial");
+}
+
+TEST(ConsoleWords, ANameIsShortenedAtAWholeLetter) {
+  const auto letters = [](const std::string& words) {
+    double count = 0;
+    for (const char c : words) count += (c & 0xC0) != 0x80 ? 1 : 0;
+    return count;
+  };
+  EXPECT_EQ(shortened("sphere", 6, letters), "sphere");
+  EXPECT_EQ(shortened("sphere", 4, letters), "sph\u2026");
+  EXPECT_EQ(shortened("W\u00fcrfel", 3, letters), "W\u00fc\u2026");
+  EXPECT_EQ(shortened("sphere", 0, letters), "");
+}
+
 TEST(ConsoleWords, NumbersOfAnAxisAreNotRounded) {
   EXPECT_EQ(axis_label(0), "0");
   EXPECT_EQ(axis_label(2.5), "2.5");  // half of 5

@@ -186,6 +186,27 @@ class SessionTest(WindowCase):
         self.finish()
         self.check_whole(cut_off=1)
 
+    def test_closing_a_window_in_a_session_asks_first(self):
+        self.start()
+        for window in (self.participant, self.console):
+            self.answer()
+            self.wait_for_trial()
+            self.screen.ask_to_close(window)
+            time.sleep(1)
+            self.assertIsNone(self.program.poll(), self.messages())
+            self.screen.keep(self.console, "session_closing")
+            self.screen.key("F12")
+            wait_for("zero force", lambda: "EMERGENCY by the key F12" in self.messages())
+            if window == self.console:
+                break
+            self.screen.ask_to_close(window)
+            wait_for("the end", lambda: self.program.poll() is not None)
+            self.assertIn("closed", self.messages())
+            self.start()
+        self.screen.ask_to_close(self.console)
+        wait_for("the end", lambda: self.program.poll() is not None)
+        self.assertIn("ended by the experimenter", self.messages())
+
     def test_the_display_server_dies_in_mid_trial(self):
         self.start()
         self.answer(2)

@@ -116,6 +116,8 @@ class Soak:
 
     def close(self):
         self.screen.ask_to_close(self.participant)
+        time.sleep(1)  # the console asks; closing the window again ends the session
+        self.screen.ask_to_close(self.participant)
         if self.program.wait(1200 if self.options.using else 300) != 1:  # closed by the participant's window
             raise AssertionError(f"status {self.program.returncode}")
 
