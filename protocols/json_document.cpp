@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "data/base/checksum.h"
 #include "data/base/input_file.h"
 #include "data/base/json_text.h"
 #include "data/base/text.h"
@@ -39,13 +40,14 @@ bool contains(const NumberRange& range, double value) {
   return (range.above_min ? value > range.min : value >= range.min) && value <= range.max;
 }
 
-bool read_integer(const json& value, const std::string& pointer, int& out, const NumberRange& range,
-                  FaultList& faults) {
+template <class Integer>
+bool read_integer(const json& value, const std::string& pointer, Integer& out,
+                  const NumberRange& range, FaultList& faults) {
   // JSON knows numbers only: 76.0 is an integer too.
   if (value.is_number()) {
     const double number = value.get<double>();
     if (contains(range, number) && std::floor(number) == number) {
-      out = static_cast<int>(number);
+      out = static_cast<Integer>(number);
       return true;
     }
   }
@@ -79,6 +81,30 @@ bool read_number(const json& value, const std::string& pointer, double& out,
     return true;
   }
   faults.add(pointer, describe("a number", range) + found_text(value));
+  return false;
+}
+
+bool read_text(const json& value, const std::string& pointer, std::string& out, std::size_t most,
+               FaultList& faults) {
+  if (value.is_string()) {
+    const auto& text = value.get_ref<const std::string&>();
+    if (text.size() <= most && text.find('\0') == std::string::npos) {
+      out = text;
+      return true;
+    }
+  }
+  faults.add(pointer, "expected a text of at most " + std::to_string(most) +
+                          " bytes without U+0000" + found_text(value));
+  return false;
+}
+
+bool read_checksum(const json& value, const std::string& pointer, std::string& out,
+                   FaultList& faults) {
+  if (value.is_string() && is_checksum(value.get_ref<const std::string&>())) {
+    out = value.get<std::string>();
+    return true;
+  }
+  faults.add(pointer, "expected a SHA-256, 64 digits 0-9 and a-f" + found_text(value));
   return false;
 }
 
@@ -147,6 +173,40 @@ void ObjectReader::integer(const char* key, std::optional<int>& out, const Numbe
   int number = 0;
   if (value == nullptr || value->is_null()) return;
   if (read_integer(*value, pointer(key), number, range, faults_)) out = number;
+}
+
+void ObjectReader::count(const char* key, std::size_t& out, const NumberRange& range) {
+  const json* const value = member(key, Presence::required);
+  if (value != nullptr) read_integer(*value, pointer(key), out, range, faults_);
+}
+
+void ObjectReader::count(const char* key, std::optional<std::size_t>& out,
+                         const NumberRange& range) {
+  const json* const value = member(key, Presence::required);
+  std::size_t number = 0;
+  if (value == nullptr || value->is_null()) return;
+  if (read_integer(*value, pointer(key), number, range, faults_)) out = number;
+}
+
+void ObjectReader::text(const char* key, std::string& out, std::size_t most) {
+  const json* const value = member(key, Presence::required);
+  if (value != nullptr) read_text(*value, pointer(key), out, most, faults_);
+}
+
+void ObjectReader::checksum(const char* key, std::string& out) {
+  const json* const value = member(key, Presence::required);
+  if (value != nullptr) read_checksum(*value, pointer(key), out, faults_);
+}
+
+bool ObjectReader::sealed() {
+  const json* const value = member("sha256");
+  if (value == nullptr) return false;
+  std::string found;
+  if (read_checksum(*value, pointer("sha256"), found, faults_) && found != json_checksum(*object_))
+    faults_.add(pointer("sha256"), "expected the checksum of this object, " +
+                                       json_checksum(*object_) + ", found " + found +
+                                       ": it has changed since it was measured; measure again");
+  return true;
 }
 
 void ObjectReader::seed(const char* key, std::uint64_t& out) {

@@ -115,6 +115,14 @@ bool read_choice(const nlohmann::json& value, const std::string& pointer, T& out
 bool read_number(const nlohmann::json& value, const std::string& pointer, double& out,
                  const NumberRange& range, FaultList& faults);
 
+/// A text without U+0000, of at most `most` bytes. False and a fault otherwise.
+bool read_text(const nlohmann::json& value, const std::string& pointer, std::string& out,
+               std::size_t most, FaultList& faults);
+
+/// A SHA-256 as 64 digits 0-9 and a-f. False and a fault otherwise.
+bool read_checksum(const nlohmann::json& value, const std::string& pointer, std::string& out,
+                   FaultList& faults);
+
 /// A unit quaternion [w, x, y, z]; within 1e-6 of unit length, then normalised. nullopt and a fault
 /// otherwise.
 std::optional<Quat> read_quaternion(const nlohmann::json& value, const std::string& pointer,
@@ -138,13 +146,21 @@ class ObjectReader {
   void integer(const char* key, int& out, const NumberRange& range,
                Presence presence = Presence::optional);
   void integer(const char* key, std::optional<int>& out, const NumberRange& range);  ///< null: none
+  /// Whole numbers that an int may not hold; range.max at most 2^53. null: none
+  void count(const char* key, std::size_t& out, const NumberRange& range);  ///< required
+  void count(const char* key, std::optional<std::size_t>& out, const NumberRange& range);
   void seed(const char* key, std::uint64_t& out);
   void boolean(const char* key, bool& out);
   void text(const char* key, std::string& out);
+  void text(const char* key, std::string& out, std::size_t most);  ///< required; bytes
+  void checksum(const char* key, std::string& out);                ///< required; SHA-256 in hex
   void name(const char* key, std::string& out);  ///< required; letters, digits, '-'
   void vector(const char* key, Vec3& out, const NumberRange& range,
               Presence presence = Presence::optional);
   void quaternion(const char* key, Quat& out);
+
+  /// Whether the object has a member "sha256" (json_checksum); a wrong one is a fault.
+  bool sealed();
 
   template <class T, class Options = std::initializer_list<std::pair<const char*, T>>>
   void choice(const char* key, T& out, const Options& options,

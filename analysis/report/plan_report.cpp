@@ -4,10 +4,10 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <numeric>
 #include <span>
-#include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
@@ -18,6 +18,7 @@
 #include "analysis/statistics/threshold_plan.h"
 #include "analysis/text.h"
 #include "data/base/json_text.h"
+#include "protocols/json_document.h"
 
 namespace palpate::analysis {
 
@@ -84,136 +85,212 @@ Json curve_json(const Plan& plan, const PlanCurve& curve) {
   return out;
 }
 
-std::size_t count_of(const Json& proportion, std::size_t studies) {
-  return static_cast<std::size_t>(
-      std::llround(proportion.get<double>() * static_cast<double>(studies)));
+using protocols::FaultList;
+using protocols::ObjectReader;
+using protocols::Presence;
+
+// Limits of what is read; those of 'palpate plan' are narrower or the same.
+constexpr double kMostSd = 100;  // log seconds
+constexpr double kMostParticipants = 10'000, kMostTrials = 10'000, kMostStudies = 10'000'000;
+constexpr std::size_t kMostShapes = 1'000, kMostCurves = 10'000, kMostText = 10'000;
+
+/// A point of a plan as its file has it.
+struct StatedPoint {
+  StudyDesign design;
+  double power = 0, power_all = 0, power_any = 0;
+  std::map<std::string, double> by_shape;
+};
+
+StatedPoint read_point(ObjectReader& reader, bool in_full) {
+  StatedPoint out;
+  const Presence others = in_full ? Presence::required : Presence::optional;
+  reader.count("participants", out.design.participants, {2, kMostParticipants});
+  reader.count("trials_per_cell", out.design.trials, {1, kMostTrials});
+  reader.number("power", out.power, {0, 1}, Presence::required);
+  reader.number("power_all", out.power_all, {0, 1}, others);
+  reader.number("power_any", out.power_any, {0, 1}, others);
+  if (const auto* shapes = reader.member("power_by_shape", others)) {
+    ObjectReader inner(*shapes, reader.pointer("power_by_shape"), reader.faults());
+    for (const auto& [shape, value] : shapes->items())
+      inner.number(shape.c_str(), out.by_shape[shape], {0, 1}, Presence::required);
+  }
+  return out;
 }
 
-/// \throws std::invalid_argument
-void require_same(const std::string& what, const Json& found, const Json& expected) {
+std::vector<StatedPoint> read_points(ObjectReader& reader, bool in_full) {
+  std::vector<StatedPoint> out;
+  const auto* curves = reader.array("curves", 0, kMostCurves, Presence::required);
+  for (std::size_t c = 0; curves != nullptr && c < curves->size(); ++c) {
+    ObjectReader curve((*curves)[c], protocols::child_pointer(reader.pointer("curves"), c),
+                       reader.faults());
+    const auto* points = curve.array("points", 0, kMostCurves, Presence::required);
+    for (std::size_t i = 0; points != nullptr && i < points->size(); ++i) {
+      ObjectReader point((*points)[i], protocols::child_pointer(curve.pointer("points"), i),
+                         reader.faults());
+      out.push_back(read_point(point, in_full));
+    }
+  }
+  return out;
+}
+
+/// \throws protocols::InputError: not JSON, or not of a plan of times in this version
+nlohmann::json read_document(const std::string& text, FaultList& faults) {
+  nlohmann::json json = protocols::read_json(text, faults);
+  ObjectReader reader(json, "", faults);
+  if (json.is_object() && !json.contains("model"))
+    faults.add("/model",
+               "expected a plan of times (palpate plan --effect), found another kind of plan");
+  int version = 1;
+  reader.integer("version", version, {1, 1}, Presence::required);
+  faults.throw_if_any();
+  return json;
+}
+
+/// Adds a fault for each key that has another value than expected.
+void require_same(const nlohmann::json& found, const std::string& place, const Json& expected,
+                  const char* what, FaultList& faults) {
   for (const auto& [key, value] : expected.items()) {
-    if (found.contains(key) && found.at(key) == value) continue;
-    throw std::invalid_argument("has another " + what + ": " + key + " is " +
-                                (found.contains(key) ? json_excerpt(found.at(key)) : "missing") +
-                                ", expected " + json_excerpt(value));
+    const nlohmann::json wanted = value;
+    const auto at = found.is_object() ? found.find(key) : found.end();
+    if (found.is_object() && at != found.end() && *at == wanted) continue;
+    faults.add(protocols::child_pointer(place, key),
+               std::string("has another ") + what + ": expected " + json_excerpt(wanted) +
+                   (found.is_object() && at != found.end() ? protocols::found_text(*at)
+                                                           : ", found nothing"));
   }
 }
 
-}  // namespace
+const nlohmann::json& member_or_null(const nlohmann::json& json, const char* key) {
+  static const nlohmann::json null;
+  const auto found = json.find(key);
+  return found == json.end() ? null : *found;
+}
 
-std::vector<PlanPoint> read_plan_points(const std::string& json, const StudyModel& model,
-                                        const PlanSettings& settings) {
-  try {
-    const Json in = read_ordered_json(json);
-    Json simulation = settings_json(settings);
-    for (const char* other : {"power", "goal", "participants"}) simulation.erase(other);
-    require_same("plan", in, {{"version", 1}});
-    require_same("simulation", in.at("settings"), simulation);
-    require_same("model", in.at("model"), model_json(model));
-    std::vector<PlanPoint> points;
-    for (const Json& curve : in.at("curves")) {
-      for (const Json& one : curve.at("points")) {
-        PlanPoint point;
-        point.design = {one.at("participants"), one.at("trials_per_cell")};
-        Power& power = point.power;
-        power.studies = settings.simulation.studies;
-        power.all = count_of(one.at("power_all"), power.studies);
-        power.any = count_of(one.at("power_any"), power.studies);
-        for (const std::string& shape : model.shapes)
-          power.found.push_back(count_of(one.at("power_by_shape").at(shape), power.studies));
-        points.push_back(std::move(point));
+std::size_t count_of(double proportion, std::size_t studies) {
+  return static_cast<std::size_t>(std::llround(proportion * static_cast<double>(studies)));
+}
+
+StudyModel read_model(ObjectReader& reader) {
+  StudyModel model;
+  if (const auto* ratios = reader.member("log_ratio", Presence::required)) {
+    ObjectReader inner(*ratios, reader.pointer("log_ratio"), reader.faults());
+    if (ratios->is_object() && (ratios->empty() || ratios->size() > kMostShapes))
+      reader.faults().add(inner.pointer(), "expected 1 to " + std::to_string(kMostShapes) +
+                                               " shapes, found " + std::to_string(ratios->size()));
+    if (ratios->is_object()) {
+      for (const auto& [shape, value] : ratios->items()) {
+        model.shapes.push_back(shape);
+        protocols::read_number(value, inner.pointer(shape), model.log_ratios.emplace_back(),
+                               {-kMostSd, kMostSd}, reader.faults());
       }
     }
-    return points;
-  } catch (const JsonError& error) {
-    throw std::invalid_argument(std::string("is not what 'palpate plan --json' writes: ") +
-                                error.what());
-  } catch (const Json::exception& error) {
-    throw std::invalid_argument(std::string("is not what 'palpate plan --json' writes: ") +
-                                error.what());
   }
-}
-
-namespace {
-
-double number_within(const Json& object, const char* key, double least, double most) {
-  const auto value = object.at(key).get<double>();
-  if (value >= least && value <= most) return value;
-  throw std::invalid_argument(std::string("has an impossible ") + key + ": " +
-                              object.at(key).dump());
-}
-
-StudyModel read_model(const Json& in) {
-  constexpr double kMostSd = 100;
-  StudyModel model;
-  for (const auto& [shape, ratio] : in.at("log_ratio").items()) {
-    model.shapes.push_back(shape);
-    model.log_ratios.push_back(ratio.get<double>());
-    if (!(std::fabs(model.log_ratios.back()) <= kMostSd))
-      throw std::invalid_argument("has an impossible log_ratio: " + ratio.dump());
-  }
-  if (model.shapes.empty()) throw std::invalid_argument("has no shapes");
-  model.gain_sd = number_within(in, "gain_sd", 0, kMostSd);
-  model.shape_gain_sd = number_within(in, "shape_gain_sd", 0, kMostSd);
-  model.intercept_sd = number_within(in, "intercept_sd", 0, kMostSd);
-  model.correlation = number_within(in, "correlation", -1, 1);
-  model.residual_sd = number_within(in, "residual_sd", 0, kMostSd);
-  model.proportion_used = number_within(in, "share_used", 0, 1);
+  reader.number("gain_sd", model.gain_sd, {0, kMostSd}, Presence::required);
+  reader.number("shape_gain_sd", model.shape_gain_sd, {0, kMostSd}, Presence::required);
+  reader.number("intercept_sd", model.intercept_sd, {0, kMostSd}, Presence::required);
+  reader.number("correlation", model.correlation, {-1, 1}, Presence::required);
+  reader.number("residual_sd", model.residual_sd, {0, kMostSd}, Presence::required);
+  reader.number("share_used", model.proportion_used, {0, 1}, Presence::required);
   return model;
 }
 
-/// One of two words.
-bool is_first(const Json& value, const char* first, const char* second) {
-  const auto word = value.get<std::string>();
-  if (word != first && word != second)
-    throw std::invalid_argument("expected " + std::string(first) + " or " + second + ", found " +
-                                json_excerpt(value));
-  return word == first;
+/// Puts the shapes into the order of the file, which nlohmann::json does not keep.
+void order_as_written(const std::string& text, StudyModel& model) {
+  const StudyModel sorted = model;
+  std::size_t at = 0;
+  const Json json = read_ordered_json(text);
+  for (const auto& [shape, value] : json.at("model").at("log_ratio").items()) {
+    const auto from = std::ranges::find(sorted.shapes, shape) - sorted.shapes.begin();
+    model.shapes[at] = shape;
+    model.log_ratios[at++] = sorted.log_ratios[static_cast<std::size_t>(from)];
+  }
+}
+
+void read_settings(ObjectReader& settings, PlanRecord& plan) {
+  settings.number("power", plan.power, {0, 1}, Presence::required);
+  settings.number("alpha", plan.alpha, {0, 1, "", true}, Presence::required);
+  settings.choice("goal", plan.goal, {std::pair{"all", Goal::all}, {"any", Goal::any}},
+                  Presence::required);
+  settings.choice("test", plan.test,
+                  {std::pair{"paired", StudyTest::paired}, {"model", StudyTest::model}},
+                  Presence::required);
+  settings.count("studies", plan.studies, {1, kMostStudies});
+}
+
+void read_words(ObjectReader& reader, PlanRecord& plan) {
+  if (const auto* label = reader.member("pilot_label", Presence::required);
+      label != nullptr && !label->is_null())
+    protocols::read_text(*label, reader.pointer("pilot_label"), plan.pilot_label, kMostText,
+                         reader.faults());
+  const auto* notes = reader.array("notes", 0, kMostCurves, Presence::required);
+  for (std::size_t i = 0; notes != nullptr && i < notes->size(); ++i)
+    protocols::read_text((*notes)[i], protocols::child_pointer("/notes", i),
+                         plan.notes.emplace_back(), kMostText, reader.faults());
+}
+
+void read_curves(ObjectReader& reader, PlanRecord& plan) {
+  const auto* needed = reader.array("needed", 1, kMostCurves, Presence::required);
+  for (std::size_t i = 0; needed != nullptr && i < needed->size(); ++i) {
+    ObjectReader one((*needed)[i], protocols::child_pointer("/needed", i), reader.faults());
+    PlanRecord::Curve& curve = plan.curves.emplace_back();
+    one.count("trials_per_cell", curve.trials, {1, kMostTrials});
+    one.count("participants", curve.participants, {2, kMostParticipants});
+  }
+  for (const StatedPoint& point : read_points(reader, false)) {
+    for (PlanRecord::Curve& curve : plan.curves) {
+      if (curve.trials == point.design.trials) curve.power[point.design.participants] = point.power;
+    }
+  }
 }
 
 }  // namespace
 
-PlanRecord read_plan(const std::string& json) {
-  try {
-    const Json in = read_ordered_json(json);
-    if (in.is_object() && !in.contains("model"))
-      throw std::invalid_argument(
-          "expected a plan of times (palpate plan --effect), found another kind of plan");
-    require_same("version of plans", in, {{"version", 1}});
-    PlanRecord plan;
-    plan.model = read_model(in.at("model"));
-    const Json& settings = in.at("settings");
-    plan.power = number_within(settings, "power", 0, 1);
-    plan.alpha = number_within(settings, "alpha", 0, 1);
-    plan.goal = is_first(settings.at("goal"), "all", "any") ? Goal::all : Goal::any;
-    plan.test =
-        is_first(settings.at("test"), "paired", "model") ? StudyTest::paired : StudyTest::model;
-    plan.studies = settings.at("studies").get<std::size_t>();
-    if (in.at("pilot_label").is_string()) plan.pilot_label = in.at("pilot_label");
-    for (const Json& note : in.at("notes")) plan.notes.push_back(note.get<std::string>());
-    for (const Json& needed : in.at("needed")) {
-      PlanRecord::Curve& curve = plan.curves.emplace_back();
-      curve.trials = needed.at("trials_per_cell").get<std::size_t>();
-      const Json& participants = needed.at("participants");
-      if (!participants.is_null()) curve.participants = participants.get<std::size_t>();
-    }
-    for (const Json& points : in.at("curves")) {
-      for (const Json& point : points.at("points")) {
-        for (PlanRecord::Curve& curve : plan.curves) {
-          if (curve.trials == point.at("trials_per_cell").get<std::size_t>())
-            curve.power[point.at("participants").get<std::size_t>()] =
-                number_within(point, "power", 0, 1);
-        }
+std::vector<PlanPoint> read_plan_points(const std::string& text, const std::string& file,
+                                        const StudyModel& model, const PlanSettings& settings) {
+  FaultList faults(file);
+  const nlohmann::json json = read_document(text, faults);
+  Json simulation = settings_json(settings);
+  for (const char* other : {"power", "goal", "participants"}) simulation.erase(other);
+  require_same(member_or_null(json, "settings"), "/settings", simulation, "simulation", faults);
+  require_same(member_or_null(json, "model"), "/model", model_json(model), "model", faults);
+  faults.throw_if_any();
+  ObjectReader reader(json, "", faults);
+  std::vector<PlanPoint> points;
+  for (const StatedPoint& one : read_points(reader, true)) {
+    PlanPoint point;
+    point.design = one.design;
+    Power& power = point.power;
+    power.studies = settings.simulation.studies;
+    power.all = count_of(one.power_all, power.studies);
+    power.any = count_of(one.power_any, power.studies);
+    for (const std::string& shape : model.shapes) {
+      const auto found = one.by_shape.find(shape);
+      if (found == one.by_shape.end()) {
+        faults.add("/curves", "expected a power_by_shape for '" + shape + "' in every point");
+        break;
       }
+      power.found.push_back(count_of(found->second, power.studies));
     }
-    return plan;
-  } catch (const JsonError& error) {
-    throw std::invalid_argument(std::string("is not what 'palpate plan --json' writes: ") +
-                                error.what());
-  } catch (const Json::exception& error) {
-    throw std::invalid_argument(std::string("is not what 'palpate plan --json' writes: ") +
-                                error.what());
+    points.push_back(std::move(point));
   }
+  faults.throw_if_any();
+  return points;
+}
+
+PlanRecord read_plan(const std::string& text, const std::string& file) {
+  FaultList faults(file);
+  const nlohmann::json json = read_document(text, faults);
+  ObjectReader reader(json, "", faults);
+  PlanRecord plan;
+  ObjectReader model(member_or_null(json, "model"), "/model", faults);
+  plan.model = read_model(model);
+  ObjectReader settings(member_or_null(json, "settings"), "/settings", faults);
+  read_settings(settings, plan);
+  read_words(reader, plan);
+  read_curves(reader, plan);
+  faults.throw_if_any();
+  order_as_written(text, plan.model);
+  return plan;
 }
 
 std::string plan_json(const Plan& plan) {

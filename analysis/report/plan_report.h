@@ -13,10 +13,10 @@ namespace palpate::analysis {
 
 std::string plan_text(const Plan& plan);
 std::string plan_json(const Plan& plan);
-/// The points of a plan from its JSON. \throws std::invalid_argument: it is not output of
-/// plan_json, or has another model or simulation; the message names the difference
-std::vector<PlanPoint> read_plan_points(const std::string& json, const StudyModel& model,
-                                        const PlanSettings& settings);
+/// The points of a plan from its JSON. \throws protocols::InputError: it is not output of
+/// plan_json, or has another model or simulation; with every fault
+std::vector<PlanPoint> read_plan_points(const std::string& text, const std::string& file,
+                                        const StudyModel& model, const PlanSettings& settings);
 /// The planned study, from a plan's JSON.
 struct PlanRecord {
   StudyModel model;
@@ -34,8 +34,8 @@ struct PlanRecord {
   };
   std::vector<Curve> curves;
 };
-/// \throws std::invalid_argument: it is not output of plan_json; the message names the fault
-PlanRecord read_plan(const std::string& json);
+/// \throws protocols::InputError: it is not output of plan_json; with every fault
+PlanRecord read_plan(const std::string& text, const std::string& file);
 /// Power (%) over the number of participants, a line for each number of trials.
 Figure plan_figure(const Plan& plan);
 

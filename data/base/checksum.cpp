@@ -25,4 +25,8 @@ std::string checksum_hex(std::string_view bytes) {
   return to_hex(checksum(bytes.data(), bytes.size()));
 }
 
+bool is_checksum(std::string_view text) {
+  return text.size() == 64 && text.find_first_not_of("0123456789abcdef") == text.npos;
+}
+
 }  // namespace palpate

@@ -4,6 +4,8 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "data/base/checksum.h"
+
 namespace palpate {
 namespace {
 
@@ -73,6 +75,12 @@ nlohmann::json json_or_discarded(std::string_view text) {
   } catch (const JsonError&) {
     return nlohmann::json(nlohmann::json::value_t::discarded);
   }
+}
+
+std::string json_checksum(const nlohmann::json& object) {
+  nlohmann::json body = object;
+  if (body.is_object()) body.erase("sha256");
+  return checksum_hex(body.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
 }
 
 std::string json_excerpt(const nlohmann::json& value, std::size_t most) {

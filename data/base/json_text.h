@@ -33,6 +33,9 @@ nlohmann::ordered_json read_ordered_json(std::string_view text);
 /// Like read_json(), but returns a discarded value instead of throwing.
 nlohmann::json json_or_discarded(std::string_view text);
 
+/// SHA-256 of an object without its member "sha256": of its text with sorted keys and no spaces.
+std::string json_checksum(const nlohmann::json& object);
+
 /// A value as JSON in ASCII, cut after `most` characters, for messages. A long value is not
 /// serialised in full.
 std::string json_excerpt(const nlohmann::json& value, std::size_t most = 60);

@@ -9,6 +9,11 @@
 #include "data/store/record_columns.h"
 
 namespace palpate::data {
+namespace {
+
+constexpr int kTombstonesSince = 2;  // version of the schema
+
+}  // namespace
 
 SessionProgress Store::progress(const Participant& participant, int session) {
   return guarded(impl_->path, [&] {
@@ -157,6 +162,11 @@ StoreCounts Store::counts() {
     StoreCounts counts;
     RowReader(count) >> counts.protocols >> counts.participants >> counts.sessions >> counts.runs >>
         counts.completed >> counts.cut_off >> counts.interrupted_runs >> counts.sampled;
+    if (impl_->version >= kTombstonesSince) {
+      SQLite::Statement tombstones(*impl_->db, "SELECT count(*) FROM tombstones");
+      tombstones.executeStep();
+      RowReader(tombstones) >> counts.withdrawn;
+    }
     return counts;
   });
 }

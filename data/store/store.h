@@ -104,6 +104,7 @@ struct Withdrawal {
 struct StoreCounts {
   std::int64_t protocols = 0, participants = 0, sessions = 0, runs = 0, completed = 0, cut_off = 0,
                interrupted_runs = 0, sampled = 0;  ///< sampled: attempts with servo samples
+  std::int64_t withdrawn = 0;                      ///< codes removed by forget(), of all protocols
 };
 
 class Store {

@@ -200,8 +200,11 @@ def registration_lines():
                   "check registration --db study.db --analysis analysis.json --json check.json --report check.html",
                   "check registration --db study.db --json check.json --force"),
            refused("check registration --db study.db --too-fast-s 0.5 --alpha 0.1", 1),
+           Shell("digest", "palpate check registration --db study.db --digest $(sha256sum < registration/SHA256SUMS | cut -c-64)"),
+           refused(f"check registration --db study.db --digest {64 * 'a'}", 1),
            *steps("bundle --db study.db --registration registration --about about.json --out study --format bids",
                   "bundle --db study.db --registration registration --about about.json --out study --force", "bundle --verify study"),
+           Shell("its digest", "palpate bundle --verify study --digest $(sha256sum < registration/SHA256SUMS | cut -c-64)"),
            Shell("other data", "sed -i 2d study/data/trials.csv; palpate bundle --verify study", status=1)]
 
 

@@ -26,10 +26,11 @@ from golden_steps import Place
 
 COSTS = "ns_per_tick|ns_per_step|us_per_step|paper_test_ns|exact_test_ns"
 OF_REPLIES = "t_ns|zero_t_ns|t_received_ns|t_sent_ns|first_contact_s|response_time_s|ticks|missed_ticks|max_force_n|faults"
-DATED = r"(registration\.(json|md)|check\.(json|html)|SHA256SUMS|ro-crate-metadata\.json)"
+DATED = r"(registration\.(json|md)|osf\.json|form\.json|check\.(json|html)|report\.html|README\.md|SHA256SUMS|ro-crate-metadata\.json)"
 HIDDEN = (
     (r"\d{4}-\d\d-\d\d(T\d\d:\d\d(:\d\d(\.\d+)?)?Z?| \d\d:\d\d UTC)?|today \d\d:\d\d|at \d\d:\d\d:\d\d UTC", "DATE"),
-    (rf'[0-9a-f]{{64}}(?=  (\S*/)?{DATED}\n)|(?<="sha256_when_made": ")[0-9a-f]{{64}}', "SUM"),
+    (rf'[0-9a-f]{{64}}(?=  (\S*/)?{DATED}\n)', "SUM"),
+    (r"([Dd]igest[^\n]{0,60}?)[0-9a-f]{64}|[0-9a-f]{64}(?=; compare it with the one)", r"\1DIGEST"),
     (rf'("name": "(\S*/)?{DATED}"[^{{}}]*"sha256": ")[0-9a-f]{{64}}', r"\1SUM"),
     (r"[\d.]+ simulated s in [\d.]+ s, [\d.]+ simulated seconds per second", "PACE"),
     (r"\b[\d.]+(e[-+]?\d+)? (us|ms|s|min|simulated seconds per second)\b", "TIME"),

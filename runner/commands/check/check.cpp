@@ -2,11 +2,9 @@
 
 #include <filesystem>
 #include <iostream>
-#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
-#include "data/base/json_text.h"
 #include "data/base/text.h"
 #include "protocols/json_document.h"
 #include "runner/commands/check/deviations.h"
@@ -29,30 +27,13 @@ void require_outside(const po::variables_map& values, const char* option,
     throw UsageError(std::string("--") + option + ": name a file outside of the registration");
 }
 
-/// \throws UsageError
-ReportedAnalysis read_reported(const std::string& path) {
-  ReportedAnalysis reported;
-  if (path.empty()) return reported;
-  reported.json = protocols::read_text_file(path);
-  try {
-    const auto json = read_json(reported.json);
-    reported.too_fast = json.at("settings").at("too_fast_s").get<double>();
-    if (!(*reported.too_fast > 0) || !json.contains("paired_by_shape"))
-      throw UsageError(path + ": expected what 'palpate analyze --json' wrote for this study");
-  } catch (const JsonError&) {
-    throw UsageError(path + ": expected what 'palpate analyze --json' wrote for this study");
-  } catch (const nlohmann::json::exception&) {
-    throw UsageError(path + ": expected what 'palpate analyze --json' wrote for this study");
-  }
-  return reported;
-}
-
 }  // namespace
 
 int check_command(const std::vector<std::string>& args) {
   CommandLine line;
   line.usage =
-      "palpate check REGISTRATION --db FILE [--analysis FILE] [--json FILE] [--report FILE.html]";
+      "palpate check REGISTRATION --db FILE [--analysis FILE] [--digest SHA256]\n"
+      "       [--json FILE] [--report FILE.html]";
   line.summary =
       "Compares a study with its registration (a folder that 'palpate register' made): protocol,\n"
       "order of trials, numbers, dates, settings of the analysis, versions, omissions. Lists each\n"
@@ -63,7 +44,7 @@ int check_command(const std::vector<std::string>& args) {
       "  palpate check registration --db study.db\n"
       "  palpate check registration --db study.db --analysis analysis.json --report check.html";
   line.positional_names = {"REGISTRATION"};
-  std::string database, analysis_file, json, report;
+  std::string database, analysis_file, digest, json, report;
   double too_fast = 0, alpha = 0;
   auto add = line.options.add_options();
   add("db", po::value(&database)->required()->value_name("FILE"), "the study's database");
@@ -74,6 +55,8 @@ int check_command(const std::vector<std::string>& args) {
       "limit of too fast answers that the report of the study uses; default: the registered one");
   add("alpha", po::value(&alpha)->value_name("P"),
       "alpha that the report of the study uses; default: the registered one");
+  add("digest", po::value(&digest)->value_name("SHA256"),
+      "the digest that the registry holds: the registration must be that one");
   add("json", po::value(&json)->value_name("FILE"), "write every point as JSON");
   add("report", po::value(&report)->value_name("FILE.html"), "write a page");
   add("force", "replace existing files");
@@ -82,7 +65,9 @@ int check_command(const std::vector<std::string>& args) {
   const std::string folder = (*values)["REGISTRATION"].as<std::string>();
   Outputs outputs(*values, {"json", "report"}, {"db", "analysis"});
   for (const char* option : {"json", "report"}) require_outside(*values, option, folder);
-  ReportedAnalysis reported = read_reported(analysis_file);
+  ReportedAnalysis reported;
+  if (!analysis_file.empty())
+    reported = read_reported(protocols::read_text_file(analysis_file), analysis_file);
   if (values->count("too-fast-s")) {
     if (!(too_fast > 0)) throw UsageError("--too-fast-s: expected a time in s above 0");
     if (reported.too_fast)
@@ -93,6 +78,7 @@ int check_command(const std::vector<std::string>& args) {
     if (!(alpha > 0 && alpha < 1)) throw UsageError("--alpha: expected a number from 0 to 1");
     reported.alpha = alpha;
   }
+  if (values->count("digest")) reported.digest = read_digest(digest);
   const Registration registered = read_registration(folder);
   warn_of_exposure(database);
   const StudyCheck check = check_study(registered, folder, database, reported);

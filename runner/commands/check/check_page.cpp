@@ -99,7 +99,8 @@ void put_evidence(const CheckPoint& point, std::string& out) {
 std::string check_text(const StudyCheck& check, const Registration& registered) {
   std::string out = conclusion_of(check) + ": " + registered.protocol.name + ", " +
                     analysis::counted(check.participants, "participant", "participants") +
-                    ", registration of " + made_on(registered) + "\n";
+                    ", registration of " + made_on(registered) + "\nDigest of the registration " +
+                    registered.digest + "\n";
   if (!check.label.empty()) out += check.label + "\n";
   out += "\n";
   for (const CheckPoint& point : check.points) {
@@ -127,6 +128,7 @@ std::string check_json(const StudyCheck& check, const Registration& registered) 
   out["simulated"] = check.label.empty() ? Json(false) : Json(check.label);
   out["program_version"] = PALPATE_VERSION;
   out["registration"] = {{"made_utc", data::format_utc(registered.made_utc_ns)},
+                         {"digest", registered.digest},
                          {"protocol", registered.protocol.name},
                          {"protocol_sha256", registered.protocol.sha256},
                          {"participants", registered.participants}};
@@ -136,6 +138,7 @@ std::string check_json(const StudyCheck& check, const Registration& registered) 
     const char* finding =
         point.finding == Finding::deviation ? "deviation" : word_of(point.finding);
     out["points"].push_back({{"id", point.id},
+                             {"title", point.title},
                              {"finding", finding},
                              {"sentence", point.sentence},
                              {"evidence", point.evidence}});
@@ -204,6 +207,7 @@ std::string check_html(const StudyCheck& check, const Registration& registered) 
   table.header = {"", "registered"};
   table.n_names = 2;
   table.rows = {{"made", data::format_utc(registered.made_utc_ns).substr(0, 19) + "Z"},
+                {"digest", registered.digest},
                 {"protocol", protocol.name},
                 {"SHA-256 of the protocol", protocol.sha256},
                 {"participants", std::to_string(registered.participants)},

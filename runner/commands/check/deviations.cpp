@@ -15,6 +15,9 @@
 #include "data/files/utc.h"
 #include "data/store/task_text.h"
 #include "protocols/difference.h"
+#include "protocols/json_document.h"
+#include "runner/build_info.h"
+#include "runner/commands/register/registration_text.h"
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/sealed_folder.h"
 #include "runner/participants/simulated_settings.h"
@@ -23,21 +26,6 @@ namespace palpate::runner::commands {
 namespace {
 
 using analysis::counted;
-
-struct StudyParticipant {
-  data::Participant person;
-  std::string protocol_sha256;
-  std::vector<OrderRow> rows;  ///< trials that count, in their order
-};
-
-/// The study's data from a database.
-struct StudyData {
-  std::vector<data::ProtocolInfo> protocols;
-  std::vector<StudyParticipant> participants;  ///< with trials, practice or not
-  std::vector<data::StoredRun> runs;
-  std::vector<data::StoredNote> notes;
-  std::map<std::string, std::vector<data::ProtocolFile>> files;  ///< by SHA-256 of the protocol
-};
 
 /// Most lines of evidence; the rest is counted: "; and 12 more".
 constexpr std::size_t kMostEvidence = 50;
@@ -54,6 +42,7 @@ StudyData read_study(data::Store& store) {
   out.protocols = store.protocols();
   out.runs = store.runs();
   out.notes = store.notes();
+  out.removed = static_cast<std::size_t>(store.counts().withdrawn);
   for (const data::ProtocolInfo& info : out.protocols)
     out.files[info.sha256] = store.files(info.sha256);
   store.for_each_trial([&](const data::StoredTrial& trial) {
@@ -64,24 +53,6 @@ StudyData read_study(data::Store& store) {
                                             trial.record.shape, trial.record.orientation_wxyz});
   });
   return out;
-}
-
-/// Leaves out what was recorded with protocols of other names, such as a pilot, where there is one
-/// of this name. \return the name that chooses the study's trials (analysis::is_protocol)
-std::string keep_study_named(const std::string& name, StudyData& study) {
-  std::set<std::string> own;  // checksums
-  for (const data::ProtocolInfo& info : study.protocols) {
-    if (info.name == name) own.insert(info.sha256);
-  }
-  if (own.empty()) return "";
-  const auto is_other = [&](const auto& one) { return !own.contains(one.protocol_sha256); };
-  std::erase_if(study.participants, is_other);
-  std::erase_if(study.runs, is_other);
-  std::set<std::int64_t> people;
-  for (const data::StoredRun& run : study.runs) people.insert(run.participant.id);
-  std::erase_if(study.notes,
-                [&](const data::StoredNote& one) { return !people.contains(one.participant.id); });
-  return name;
 }
 
 /// Participants who ended a session by withdrawing and did not begin again.
@@ -104,16 +75,53 @@ std::string names(const std::set<std::string>& codes) {
   return analysis::joined(std::vector<std::string>(codes.begin(), codes.end()));
 }
 
-CheckPoint of_registration(const std::string& folder) {
+CheckPoint of_registration(const Registration& registered, const std::string& folder) {
   CheckPoint out{"registration", "The registration", Finding::as_registered,
                  "No file of the registration has changed since it was made."};
   out.evidence = checksum_faults(folder, files_to_fill_in());
+  out.evidence.insert(out.evidence.end(), registered.contradictions.begin(),
+                      registered.contradictions.end());
+  const FilledIn filled = filled_in(folder, registered);
+  for (const std::string& change : filled.changes)
+    out.evidence.push_back(change + ", outside of the fields to fill in");
+  // Another build may word its texts otherwise.
+  if (registered.form && registered.contradictions.empty() &&
+      registered.build == build_description() && registered.program_version == PALPATE_VERSION &&
+      registration_form(registered) != *registered.form)
+    out.evidence.push_back(
+        "form.json does not say what the protocol, the plan, the hypotheses and registration.json "
+        "say");
   if (!out.evidence.empty()) {
     out.finding = Finding::deviation;
     out.sentence = "The registration has changed since it was made.";
+    cut(out.evidence);
   }
-  if (const auto filled = filled_in(folder); !filled.empty())
-    out.sentence += " Fields filled in as requested: " + analysis::joined(filled) + ".";
+  if (filled.files.empty() || !filled.changes.empty()) return out;
+  const std::string files = analysis::joined(filled.files);
+  if (filled.comparable) {
+    out.sentence += " Fields filled in as requested: " + files + ".";
+  } else {
+    if (out.finding == Finding::as_registered) out.finding = Finding::note;
+    out.sentence += " Filled in: " + files +
+                    ". This registration was made before form.json held the other words of these "
+                    "texts: compare them with what the registry holds.";
+  }
+  return out;
+}
+
+/// The registry's date covers the digest alone: whoever changes a file can make its checksum again.
+CheckPoint of_digest(const Registration& registered, const std::string& expected) {
+  CheckPoint out{"digest", "Digest of the registration", Finding::as_registered,
+                 "It is the given one: " + registered.digest + "."};
+  if (expected.empty()) {
+    out.finding = Finding::note;
+    out.sentence =
+        registered.digest + "; compare it with the one that the registry holds (--digest).";
+  } else if (expected != registered.digest) {
+    out.finding = Finding::deviation;
+    out.sentence = "This is not the registration that the given digest belongs to.";
+    out.evidence = {"given " + expected, "found " + registered.digest};
+  }
   return out;
 }
 
@@ -230,26 +238,99 @@ CheckPoint of_order(const Registration& registered, const StudyData& study) {
   return out;
 }
 
-CheckPoint of_participants(const Registration& registered, const StudyData& study) {
-  const std::size_t n = study.participants.size();
-  CheckPoint out{"participants", "Number of participants", Finding::as_registered,
-                 counted(n, "participant", "participants") + ", as registered."};
-  if (n == registered.participants) return out;
-  out.finding = Finding::deviation;
-  out.sentence = counted(n, "participant", "participants") + ", " +
-                 std::to_string(registered.participants) + " registered.";
-  std::set<int> used;
-  for (const StudyParticipant& one : study.participants) used.insert(one.person.enrolled_number);
+/// "point, then ray" -> number of participants.
+using OrderCounts = std::map<std::string, std::size_t>;
+
+/// The order in which the renderers first came.
+std::string renderers_in_order(const std::vector<OrderRow>& rows) {
+  std::vector<std::string> seen;
+  for (const OrderRow& row : rows) {
+    if (std::ranges::find(seen, row.renderer) == seen.end()) seen.push_back(row.renderer);
+  }
+  std::string out;
+  for (const std::string& renderer : seen) out += (out.empty() ? "" : ", then ") + renderer;
+  return out;
+}
+
+/// Empty where the renderers' order is not counterbalanced.
+OrderCounts registered_orders(const Registration& registered) {
+  OrderCounts out;
+  const auto repeat = static_cast<std::size_t>(protocols::renderer_orders(registered.protocol));
+  if (repeat < 2) return out;
+  for (std::size_t i = 0; i < std::min(repeat, registered.participants); ++i)
+    out[renderers_in_order(order_of(registered.protocol, static_cast<int>(i) + 1))] +=
+        (registered.participants - i + repeat - 1) / repeat;
+  return out;
+}
+
+/// "Order of the renderers: point, then ray: 3 (3 registered); ray, then point: 0 (3 registered)."
+std::string orders_text(OrderCounts registered, const StudyData& study) {
+  if (registered.empty()) return "";
+  OrderCounts shown;
   for (const StudyParticipant& one : study.participants) {
-    if (static_cast<std::size_t>(one.person.enrolled_number) > registered.participants)
-      out.evidence.push_back(one.person.code + " has number " +
-                             std::to_string(one.person.enrolled_number));
+    if (!one.rows.empty()) ++shown[renderers_in_order(one.rows)];
   }
-  for (int number = 1; static_cast<std::size_t>(number) <= registered.participants; ++number) {
-    if (!used.contains(number))
-      out.evidence.push_back("no participant has number " + std::to_string(number));
+  for (const auto& [order, n] : shown) registered.try_emplace(order, 0);
+  std::string out;
+  for (const auto& [order, n] : registered)
+    out += (out.empty() ? "" : "; ") + printable(order) + ": " + std::to_string(shown[order]) +
+           " (" + std::to_string(n) + " registered)";
+  return "Order of the renderers: " + out + ".";
+}
+
+/// Who began a session and completed no trial, each once.
+std::vector<data::Participant> people_without_trials(const StudyData& study) {
+  std::set<std::int64_t> known;
+  for (const StudyParticipant& one : study.participants) known.insert(one.person.id);
+  std::vector<data::Participant> out;
+  for (const data::StoredRun& run : study.runs) {
+    if (known.insert(run.participant.id).second) out.push_back(run.participant);
   }
-  cut(out.evidence);
+  return out;
+}
+
+/// Whose data are there, by number. A sample that is selected afterwards shows in the numbers,
+/// which are given in the order of arrival, or in the removals.
+CheckPoint of_participants(const Registration& registered, const StudyData& study) {
+  const std::size_t n = study.participants.size(), planned = registered.participants;
+  CheckPoint out{"participants", "Participants", Finding::as_registered,
+                 counted(n, "participant", "participants") + " with the numbers 1 to " +
+                     std::to_string(planned) + ", as registered; nobody was removed."};
+  std::map<int, std::set<std::string>> by_number, without_trials;
+  for (const StudyParticipant& one : study.participants)
+    by_number[one.person.enrolled_number].insert(one.person.code);
+  for (const data::Participant& one : people_without_trials(study))
+    without_trials[one.enrolled_number].insert(one.code);
+  for (int number = 1; static_cast<std::size_t>(number) <= planned; ++number) {
+    if (by_number.contains(number)) continue;
+    const auto began = without_trials.find(number);
+    out.evidence.push_back("no participant has number " + std::to_string(number) +
+                           (began == without_trials.end()
+                                ? ""
+                                : ": " + names(began->second) + " began and completed no trial"));
+  }
+  for (const auto& [number, codes] : by_number) {
+    if (number < 1 || static_cast<std::size_t>(number) > planned)
+      out.evidence.push_back(names(codes) + (codes.size() == 1 ? " has" : " have") + " number " +
+                             std::to_string(number) + ", " + std::to_string(planned) +
+                             " registered");
+    if (codes.size() > 1)
+      out.evidence.push_back(names(codes) + " have the same number " + std::to_string(number));
+  }
+  if (study.removed > 0)
+    out.evidence.push_back(counted(study.removed, "code was", "codes were") +
+                           " removed from the database with 'palpate forget'; it does not keep "
+                           "their numbers, trials or protocol");
+  const std::string orders = orders_text(registered_orders(registered), study);
+  if (!out.evidence.empty() || n != planned) {
+    out.finding = Finding::deviation;
+    out.sentence =
+        counted(n, "participant", "participants") + ", " + std::to_string(planned) + " registered" +
+        (study.removed > 0 ? "; " + std::to_string(study.removed) + " more removed" : "") +
+        ". Who is in the study is not as registered.";
+    cut(out.evidence);
+  }
+  if (!orders.empty()) out.sentence += " " + orders;
   return out;
 }
 
@@ -425,6 +506,7 @@ std::vector<std::string> shapes_of(const std::string& analysis_json) {
   const nlohmann::ordered_json json = read_ordered_json(analysis_json);
   const auto accuracy = json.find("accuracy");
   if (accuracy == json.end() || !accuracy->is_object() || accuracy->empty()) return shapes;
+  if (!accuracy->begin()->is_object()) return shapes;
   for (const auto& [shape, figures] : accuracy->begin()->items()) shapes.push_back(shape);
   return shapes;
 }
@@ -469,6 +551,55 @@ CheckPoint of_reported(analysis::TrialTable table, const ReportedAnalysis& repor
 
 }  // namespace
 
+std::string keep_study_named(const std::string& name, StudyData& study) {
+  std::set<std::string> own;  // checksums
+  for (const data::ProtocolInfo& info : study.protocols) {
+    if (info.name == name) own.insert(info.sha256);
+  }
+  if (own.empty()) return "";
+  const auto is_other = [&](const auto& one) { return !own.contains(one.protocol_sha256); };
+  std::erase_if(study.participants, is_other);
+  std::erase_if(study.runs, is_other);
+  std::set<std::int64_t> people;
+  for (const data::StoredRun& run : study.runs) people.insert(run.participant.id);
+  std::erase_if(study.notes,
+                [&](const data::StoredNote& one) { return !people.contains(one.participant.id); });
+  return name;
+}
+
+std::vector<CheckPoint> points_of_trials(const Registration& registered, const std::string& folder,
+                                         const StudyData& study, const ReportedAnalysis& reported) {
+  return {of_registration(registered, folder), of_digest(registered, reported.digest),
+          of_order(registered, study),         of_participants(registered, study),
+          of_trials(registered, study),        of_people(study),
+          of_exclusion(registered, reported),  of_alpha(registered, reported)};
+}
+
+ReportedAnalysis read_reported(const std::string& text, const std::string& file) {
+  protocols::FaultList faults(file);
+  const nlohmann::json json = protocols::read_json(text, faults);
+  protocols::ObjectReader reader(json, "", faults);
+  double too_fast = 0;
+  const auto read_object = [&](protocols::ObjectReader& object) {
+    if (object.pointer() == "/settings")
+      object.number("too_fast_s", too_fast, {0, kMostTooFast, "s", true},
+                    protocols::Presence::required);
+  };
+  for (const char* key : {"settings", "paired_by_shape", "accuracy"}) {
+    if (const auto* value = reader.member(key, protocols::Presence::required)) {
+      protocols::ObjectReader object(*value, reader.pointer(key), faults);
+      read_object(object);
+    }
+  }
+  if (!faults.empty())
+    faults.add("", "expected what 'palpate analyze --json' wrote for this study");
+  faults.throw_if_any();
+  ReportedAnalysis out;
+  out.too_fast = too_fast;
+  out.json = text;
+  return out;
+}
+
 std::size_t StudyCheck::deviations() const {
   return static_cast<std::size_t>(
       std::ranges::count(points, Finding::deviation, &CheckPoint::finding));
@@ -499,11 +630,15 @@ StudyCheck check_study(const Registration& registered, const std::string& folder
   StudyCheck out;
   out.label = analysis::simulated_label(table.simulated);
   out.participants = study.participants.size();
-  out.points = {of_registration(folder),       protocol,
-                of_order(registered, study),   of_participants(registered, study),
-                of_trials(registered, study),  of_people(study),
-                of_dates(registered, study),   of_exclusion(registered, reported),
-                of_alpha(registered, reported)};
+  out.removed = study.removed;
+  out.without_trials = people_without_trials(study);
+  out.points = points_of_trials(registered, folder, study, reported);
+  const auto behind = [&](const char* id, CheckPoint point) {
+    const auto at = std::ranges::find(out.points, id, &CheckPoint::id);
+    out.points.insert(at + 1, std::move(point));
+  };
+  behind("digest", protocol);
+  behind("people", of_dates(registered, study));
   if (!reported.json.empty())
     out.points.push_back(
         of_reported(table, reported, reported.too_fast.value_or(registered.too_fast)));

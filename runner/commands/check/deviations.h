@@ -2,6 +2,7 @@
 // The comparison of a study with its registration: each point with its finding and evidence.
 
 #include <cstddef>
+#include <map>
 #include <optional>
 #include <string>
 #include <utility>
@@ -27,20 +28,52 @@ struct CheckPoint {
   std::vector<std::string> evidence = {};  ///< a line each: participant, registered value, finding
 };
 
-/// The analysis for the report of the study, as far as it is known.
+/// A participant with trials, and their order.
+struct StudyParticipant {
+  data::Participant person;
+  std::string protocol_sha256;
+  std::vector<OrderRow> rows;  ///< trials that count, in their order
+};
+
+/// What of a study is compared, from a database or a bundle.
+struct StudyData {
+  std::vector<data::ProtocolInfo> protocols;
+  std::vector<StudyParticipant> participants;  ///< with trials, practice or not
+  std::vector<data::StoredRun> runs;
+  std::vector<data::StoredNote> notes;
+  std::map<std::string, std::vector<data::ProtocolFile>> files;  ///< by SHA-256 of the protocol
+  std::size_t removed = 0;  ///< codes that 'palpate forget' removed, of all protocols
+};
+
+/// Leaves out what was recorded with protocols of other names, such as a pilot, where there is one
+/// of this name. \return the name that chooses the study's trials (analysis::is_protocol)
+std::string keep_study_named(const std::string& name, StudyData& study);
+
+/// What is compared beside the data: the analysis for the report of the study, as far as it is
+/// known, and the digest that a registry holds.
 struct ReportedAnalysis {
   std::optional<double> too_fast = {}, alpha = {};  ///< s; none: as registered
   std::string json = {};                            ///< text of its analysis.json; "": not given
+  std::string digest = {};                          ///< of the registration; "": not given
 };
+
+/// \param text  what 'palpate analyze --json' wrote \throws protocols::InputError with every fault
+ReportedAnalysis read_reported(const std::string& text, const std::string& file);
 
 struct StudyCheck {
   std::string label;  ///< "SIMULATED PARTICIPANTS"; empty: people
   std::size_t participants = 0;
+  std::size_t removed = 0;                        ///< codes, with 'palpate forget'
+  std::vector<data::Participant> without_trials;  ///< who began and completed none
   std::vector<CheckPoint> points;
   std::vector<std::pair<analysis::Hypothesis, analysis::Judgement>> hypotheses;
 
   std::size_t deviations() const;
 };
+
+/// The points that follow from the registration and the trials alone.
+std::vector<CheckPoint> points_of_trials(const Registration& registered, const std::string& folder,
+                                         const StudyData& study, const ReportedAnalysis& reported);
 
 /// \param folder  of the registration \throws UsageError: a participant has withdrawn and is still
 /// in the database; exceptions of analysis and store

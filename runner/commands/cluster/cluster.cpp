@@ -22,7 +22,6 @@
 #include <string>
 #include <vector>
 
-#include "data/base/json_text.h"
 #include "data/base/text.h"
 #include "data/files/file_permissions.h"
 #include "data/store/store.h"
@@ -31,6 +30,7 @@
 #include "protocols/parse.h"
 #include "protocols/protocol.h"
 #include "protocols/tasks/task_plan.h"
+#include "runner/commands/cluster/cluster_job.h"
 #include "runner/commands/plan/plan.h"
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/outputs.h"
@@ -44,25 +44,6 @@ namespace {
 namespace fs = std::filesystem;
 namespace po = boost::program_options;
 using nlohmann::json;
-
-// A folder of 'palpate cluster': its work, its number of shards, and the progress of each.
-
-/// The contents of DIR/cluster.json.
-struct ClusterJob {
-  std::string work;  ///< "sweep", "simulate", "plan"
-  std::string unit;  ///< "points", "sessions", "curves": the unit of progress
-  std::int64_t shards = 0;
-  std::int64_t items = 0;            ///< shared among the shards: points, participants, curves
-  std::int64_t per_item = 1;         ///< units of each
-  std::vector<std::string> options;  ///< of sbatch
-  std::string array_job;             ///< latest one; "": none was submitted
-  std::int64_t submitted_s = 0;      ///< since 1970
-  std::int64_t done_then = 0;        ///< units on record at submission
-
-  const char* extension() const {
-    return work == "sweep" ? ".sweep" : work == "simulate" ? ".db" : ".json";
-  }
-};
 
 /// The progress of a shard, in units.
 struct ShardState {
@@ -136,8 +117,6 @@ std::map<std::int64_t, std::string> queue_states(const std::string& job) {
   return out;
 }
 
-constexpr int kVersion = 2;
-
 fs::path part_of(const fs::path& folder, const ClusterJob& job, std::int64_t shard) {
   const std::string digits = std::to_string(shard);
   return folder / "parts" /
@@ -166,46 +145,6 @@ std::int64_t seconds_since_1970() {
   return std::chrono::duration_cast<std::chrono::seconds>(
              std::chrono::system_clock::now().time_since_epoch())
       .count();
-}
-
-void write_job(const fs::path& folder, const ClusterJob& job) {
-  const json out{
-      {"version", kVersion},       {"work", job.work},           {"unit", job.unit},
-      {"shards", job.shards},      {"items", job.items},         {"per_item", job.per_item},
-      {"sbatch", job.options},     {"array_job", job.array_job}, {"submitted_s", job.submitted_s},
-      {"done_then", job.done_then}};
-  write_whole((folder / "cluster.json").string(), out.dump(1) + "\n");
-}
-
-/// \throws UsageError: the file was not written by write_job
-ClusterJob read_job(const fs::path& folder) {
-  const std::string path = (folder / "cluster.json").string();
-  try {
-    const json in = read_json(protocols::read_text_file(path));
-    if (in.at("version") != kVersion) {
-      throw UsageError(path + ": expected version " + std::to_string(kVersion) + ", found " +
-                       json_excerpt(in.at("version")) +
-                       "; resume it with the program that wrote it");
-    }
-    ClusterJob job;
-    job.work = in.at("work");
-    job.unit = in.at("unit");
-    job.shards = in.at("shards");
-    job.items = in.at("items");
-    job.per_item = in.at("per_item");
-    job.options = in.at("sbatch").get<std::vector<std::string>>();
-    job.array_job = in.at("array_job");
-    job.submitted_s = in.at("submitted_s");
-    job.done_then = in.at("done_then");
-    if (job.shards < 1 || job.shards > job.items || job.per_item < 1)
-      throw UsageError(path + ": expected 1 or more shards of at least one item each, found " +
-                       std::to_string(job.shards) + " shards of " + std::to_string(job.items));
-    return job;
-  } catch (const JsonError& error) {
-    throw UsageError(path + ": is not what 'palpate cluster' wrote: " + error.what());
-  } catch (const json::exception& error) {
-    throw UsageError(path + ": is not what 'palpate cluster' wrote: " + error.what());
-  }
 }
 
 /// Units in the merged file; 0: there is none yet. A plan has no such file and needs none.

@@ -432,16 +432,12 @@ namespace po = boost::program_options;
 
 namespace {
 
-/// \throws UsageError
+/// \throws protocols::InputError
 void read_known(const std::string& file, const analysis::StudyModel& model,
                 analysis::PlanSettings& settings) {
-  try {
-    for (analysis::PlanPoint& point :
-         analysis::read_plan_points(protocols::read_text_file(file), model, settings))
-      settings.known.push_back(std::move(point));
-  } catch (const std::invalid_argument& error) {
-    throw UsageError("--reuse " + file + ": " + error.what());
-  }
+  for (analysis::PlanPoint& point :
+       analysis::read_plan_points(protocols::read_text_file(file), file, model, settings))
+    settings.known.push_back(std::move(point));
 }
 
 }  // namespace

@@ -281,7 +281,6 @@ std::vector<Rehearsal> PlannedStudies::rehearse(
 namespace po = boost::program_options;
 namespace fs = std::filesystem;
 
-constexpr std::size_t kMostParticipants = 10'000;
 constexpr const char* kMark = "registration.json";
 
 struct RegisterOptions {
@@ -337,9 +336,9 @@ hypotheses.json:
   if (!values) return std::nullopt;
   options.protocol = (*values)["PROTOCOL.json"].as<std::string>();
   if (values->count("participants") &&
-      (options.participants < 2 || options.participants > kMostParticipants))
+      (options.participants < kFewestParticipants || options.participants > kMostParticipants))
     throw UsageError("--participants: must be 2 to " + std::to_string(kMostParticipants));
-  if (!(options.too_fast > 0 && options.too_fast <= 60))
+  if (!(options.too_fast > 0 && options.too_fast <= kMostTooFast))
     throw UsageError("--too-fast-s: must be above 0, at most 60 s");
   if (options.studies < 20 || options.studies > 100'000)
     throw UsageError("--studies: must be 20 to 100000");
@@ -351,37 +350,27 @@ hypotheses.json:
 void require_replaceable(const RegisterOptions& options) {
   require_replaceable_folder(options.out, options.force, kMark, files_to_fill_in());
   if (!options.force || !fs::exists(fs::path(options.out) / kMark)) return;
-  for (const std::string& file : filled_in(options.out))
+  for (const std::string& file : filled_in(options.out, read_registration(options.out)).files)
     throw UsageError(printable(options.out) + ": " + file +
                      " has been filled in and would be lost; name another folder");
 }
 
 protocols::Protocol read_protocol(const std::string& path) {
   protocols::Protocol protocol = protocols::parse_protocol(path);
-  if (protocol.version != 1)
-    throw UsageError(path +
-                     ": expected a protocol of version 1: hypotheses on the results of "
-                     "tasks cannot be registered yet");
-  if (protocol.renderers.size() != 2)
-    throw UsageError(path + ": expected two renderers to compare, point and ray");
+  require_registrable(protocol, path);
   return protocol;
 }
 
 /// The plan, with a curve for the protocol's trials and the same shapes. \throws UsageError
 analysis::PlanRecord read_fitting_plan(const std::string& path, const std::string& text,
                                        const protocols::Protocol& protocol) {
-  analysis::PlanRecord plan;
-  try {
-    plan = analysis::read_plan(text);
-  } catch (const std::invalid_argument& error) {
-    throw UsageError(path + ": " + error.what());
-  }
+  analysis::PlanRecord plan = analysis::read_plan(text, path);
   std::vector<std::string> planned = plan.model.shapes, shown;
   for (const protocols::StimulusSpec& stimulus : protocol.stimuli) shown.push_back(stimulus.name);
   std::ranges::sort(planned);
   std::ranges::sort(shown);
   if (planned != shown)
-    throw UsageError(path + ": expected a plan for the protocol's shapes (" +
+    throw UsageError(path + ": /model/log_ratio: expected a plan for the protocol's shapes (" +
                      printable(analysis::joined(shown)) + "); this one is for " +
                      printable(analysis::joined(planned)));
   const auto trials = static_cast<std::size_t>(protocol.repetitions);
@@ -390,7 +379,8 @@ analysis::PlanRecord read_fitting_plan(const std::string& path, const std::strin
     if (curve.trials == trials) return plan;
     others += (others.empty() ? "" : ", ") + std::to_string(curve.trials);
   }
-  throw UsageError(path + ": expected a plan for the protocol's " + std::to_string(trials) +
+  throw UsageError(path + ": /needed: expected a plan for the protocol's " +
+                   std::to_string(trials) +
                    " trials of each shape with each renderer; this one is for " + others +
                    ": plan again with --trials " + std::to_string(trials));
 }
@@ -525,18 +515,19 @@ void put_simulated(const RegisterOptions& options, const data::AtomicFolder& dra
   line.clear();
 }
 
-void write_registration(const data::AtomicFolder& draft, const Registration& made) {
+/// Sets the digest.
+void write_registration(const data::AtomicFolder& draft, Registration& made) {
   write_member(draft, "protocol.json", made.protocol.source_text);
   for (const data::ProtocolFile& file : made.files) write_member(draft, file.name, file.bytes);
   write_member(draft, "plan.json", made.plan_text);
   write_member(draft, "hypotheses.json", made.hypotheses_text);
-  const std::vector<Question> questions = registration_questions(made);
-  const std::vector<std::string> texts = {registration_markdown(made, questions),
-                                          registration_osf(questions)};
-  for (std::size_t i = 0; i < texts.size(); ++i)
-    write_member(draft, files_to_fill_in()[i], texts[i]);
-  write_member(draft, "registration.json", registration_json(made, texts));
+  const Form form = registration_form(made);
+  write_member(draft, "form.json", form_json(form));
+  write_member(draft, "registration.json", registration_json(made));
   write_checksums(draft, files_to_fill_in());
+  made.digest = registration_digest(draft / "");
+  write_member(draft, files_to_fill_in()[0], markdown_as_made(form, made.digest));
+  write_member(draft, files_to_fill_in()[1], osf_as_made(form, made.digest));
 }
 
 }  // namespace
@@ -581,8 +572,10 @@ int register_command(const std::vector<std::string>& args) {
   std::cout << printable(options.out) << ": " << made.protocol.name << ", " << made.participants
             << " participants, "
             << analysis::counted(made.hypotheses.size(), "hypothesis", "hypotheses") << "\n"
+            << "Digest " << made.digest << "\n"
             << "Answer what is marked FILL IN in registration.md and osf.json, then deposit the "
-               "folder.\n";
+               "folder. The digest stands in\nboth; with the date of the registry it shows that "
+               "nothing was changed later ('palpate check --digest').\n";
   return 0;
 }
 

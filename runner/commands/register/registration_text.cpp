@@ -17,6 +17,21 @@
 namespace palpate::runner::commands {
 namespace {
 
+/// A paragraph, an item of a list, literal lines, or what only the lab can say.
+struct Paragraph {
+  enum class Kind { text, item, lines, field } kind = Kind::text;
+  std::string text;
+};
+
+/// A question of the form with its answer.
+struct Question {
+  std::string id;     ///< "q2"
+  std::string title;  ///< "Hypotheses"
+  std::vector<Paragraph> answer;
+  std::vector<std::string> chosen = {};  ///< of the form's options, in its words
+  bool several = false;                  ///< options can be chosen together
+};
+
 using Kind = Paragraph::Kind;
 using analysis::counted;
 using analysis::joined;
@@ -33,7 +48,7 @@ std::string percent(double share) { return plain(100 * share) + " %"; }
 Paragraph text(std::string words) { return {Kind::text, std::move(words)}; }
 Paragraph item(std::string words) { return {Kind::item, std::move(words)}; }
 Paragraph lines(std::string words) { return {Kind::lines, std::move(words)}; }
-Paragraph fill_in(const std::string& words) { return text(kFillIn + words); }
+Paragraph fill_in(std::string words) { return {Kind::field, std::move(words)}; }
 
 class Questions {
  public:
@@ -82,7 +97,13 @@ class Questions {
          "Exploratory analysis",
          {fill_in("analyses beyond those of question 17, if any. All numbers of analysis.json "
                   "that no hypothesis names are exploratory.")}},
-        {"q23", "Other", {fill_in("related work, funding, conflicts of interest, or nothing.")}}};
+        {"q23",
+         "Other",
+         {text("Digest of this registration: " + std::string(kDigestMark) +
+               ". It covers every file of the folder but registration.md and osf.json; what these "
+               "two say beside the fields that the lab fills in follows from form.json, which it "
+               "covers. 'palpate check --digest' compares it."),
+          fill_in("related work, funding, conflicts of interest, or nothing.")}}};
   }
 
  private:
@@ -427,11 +448,11 @@ std::string in_markdown(const Paragraph& paragraph) {
       }
       return out;
     }
+    case Kind::field:
+      return as_field("**FILL IN:** " + as_markdown(paragraph.text)) + "\n";
     case Kind::text:
       break;
   }
-  if (paragraph.text.starts_with(kFillIn))
-    return "**FILL IN:** " + as_markdown(paragraph.text.substr(std::string(kFillIn).size())) + "\n";
   return as_paragraph(paragraph.text) + "\n";
 }
 
@@ -448,14 +469,8 @@ void put_answer(const Question& question, std::string& out) {
   }
 }
 
-}  // namespace
-
-std::vector<Question> registration_questions(const Registration& registration) {
-  return Questions(registration).all();
-}
-
-std::string registration_markdown(const Registration& made,
-                                  const std::vector<Question>& questions) {
+/// registration.md with its marks.
+std::string markdown_of(const Registration& made, const std::vector<Question>& questions) {
   const protocols::Protocol& protocol = made.protocol;
   const std::string title = protocol.title.empty() ? protocol.name : protocol.title;
   std::string out = "# Registration: " + as_markdown(title) + "\n\n";
@@ -466,6 +481,9 @@ std::string registration_markdown(const Registration& made,
          "through a stylus whose device renders forces. It answers the questions of the OSF "
          "Preregistration form (version 3) in their order. What the program cannot know is marked "
          "**FILL IN**: answer it before you deposit this folder.\n";
+  out += "\nDigest: `" + std::string(kDigestMark) +
+         "`. It is the SHA-256 of `SHA256SUMS`. The registry that holds this text dates it, and so "
+         "every file of the folder; `palpate check --digest` compares it.\n";
   if (!protocol.description.empty()) out += "\n" + as_paragraph(protocol.description) + "\n";
   if (!made.warnings.empty()) {
     out += "\n## Warnings\n\n";
@@ -498,12 +516,14 @@ std::string registration_markdown(const Registration& made,
       "| `hypotheses.json` | the hypotheses with their conditions |\n"
       "| `registration.json` | numbers, checksums and versions, which `palpate check` reads |\n"
       "| `osf.json` | the answers above by the id of their question |\n"
+      "| `form.json` | both texts as made, with their fields |\n"
       "| `codebook.csv` | every column of the data |\n"
       "| `simulated/` | SIMULATED data: one study with the planned effect, one with no effect |\n"
       "| `analysis-simulated.json` | the analysis of both |\n"
       "| `SHA256SUMS` | checksums of all files but this one and `osf.json` |\n"
-      "\nAnswer the questions in this file and in `osf.json`, which `SHA256SUMS` leaves out; leave "
-      "the other files as they are. After the study, `palpate check` compares the data with "
+      "\nReplace what is marked FILL IN in this file and in `osf.json`, which `SHA256SUMS` leaves "
+      "out; leave everything else as it is. After the study, `palpate check` compares the data "
+      "with "
       "this folder.\n";
   out += "\nMade with " + as_markdown(made.build) +
          "; simulated participants of `palpate simulate` "
@@ -513,15 +533,16 @@ std::string registration_markdown(const Registration& made,
   return out;
 }
 
-std::string registration_osf(const std::vector<Question>& questions) {
-  nlohmann::ordered_json out;
+/// The answers of osf.json.
+std::vector<FormAnswer> osf_of(const std::vector<Question>& questions) {
+  std::vector<FormAnswer> out;
   for (const Question& question : questions) {
     if (question.several) {
-      out[question.id] = question.chosen;
+      out.push_back({question.id, {}, question.chosen});
       continue;
     }
     if (!question.chosen.empty()) {
-      out[question.id] = question.chosen.front();
+      out.push_back({question.id, form_text(question.chosen.front()), {}});
       continue;
     }
     std::string text;
@@ -532,12 +553,20 @@ std::string registration_osf(const std::vector<Question>& questions) {
       text += (i == 0    ? ""
                : in_list ? "\n"
                          : "\n\n") +
-              std::string(paragraph.kind == Kind::item ? "- " : "") +
-              printable_lines(paragraph.text);
+              std::string(paragraph.kind == Kind::item ? "- " : "");
+      const std::string words = printable_lines(paragraph.text);
+      text += paragraph.kind == Kind::field ? as_field("FILL IN: " + words) : words;
     }
-    out[question.id] = text;
+    out.push_back({question.id, form_text(text), {}});
   }
-  return out.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
+  return out;
+}
+
+}  // namespace
+
+Form registration_form(const Registration& registration) {
+  const std::vector<Question> questions = Questions(registration).all();
+  return {form_text(markdown_of(registration, questions)), osf_of(questions)};
 }
 
 }  // namespace palpate::runner::commands

@@ -69,8 +69,7 @@ std::map<std::string, std::string> listed_checksums(const std::string& folder) {
   while (std::getline(lines, line)) {
     const std::string_view hex =
         std::string_view(line).substr(0, std::min<std::size_t>(64, line.size()));
-    const bool good = line.size() > 66 && hex.find_first_not_of("0123456789abcdef") == hex.npos &&
-                      line.compare(64, 2, "  ") == 0;
+    const bool good = line.size() > 66 && is_checksum(hex) && line.compare(64, 2, "  ") == 0;
     if (!good)
       throw UsageError(printable((fs::path(folder) / kChecksums).string()) +
                        ": expected lines of sha256sum, found '" + printable(line, 80) + "'");
@@ -118,14 +117,17 @@ void write_member(const data::AtomicFolder& draft, const std::string& name,
   file.close(false);
 }
 
-void write_checksums(const data::AtomicFolder& draft, const std::vector<std::string>& open) {
-  const std::string folder = draft / "";
+std::string checksum_lines(const std::string& folder, const std::vector<std::string>& open) {
   std::string lines;
   for (const std::string& name : files_below(folder)) {
     if (name != kChecksums && !contains(open, name))
       lines += checksum_of_member(folder, name) + "  " + name + "\n";
   }
-  write_member(draft, kChecksums, lines);
+  return lines;
+}
+
+void write_checksums(const data::AtomicFolder& draft, const std::vector<std::string>& open) {
+  write_member(draft, kChecksums, checksum_lines(draft / "", open));
 }
 
 std::vector<std::string> checksum_faults(const std::string& folder,

@@ -29,6 +29,9 @@ void write_member(const data::AtomicFolder& draft, const std::string& name,
 /// Writes SHA256SUMS of all files in the folder. \param open  files that are not listed
 void write_checksums(const data::AtomicFolder& draft, const std::vector<std::string>& open = {});
 
+/// The lines that SHA256SUMS should have now. \param open  files that are not listed
+std::string checksum_lines(const std::string& folder, const std::vector<std::string>& open = {});
+
 /// Differences of a folder from its SHA256SUMS, a sentence for each file: "x.csv has changed".
 /// Empty: none. \param open  files that are not listed
 /// \throws UsageError: it has no such list, or an invalid one

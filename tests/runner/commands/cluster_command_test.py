@@ -198,8 +198,8 @@ class Cluster(unittest.TestCase):
         found = json.loads((self.folder / "two.json").read_text())
         self.assertEqual(found["curves"][0]["points"][-1]["power"], 0.0125)  # it was reused, not simulated
         self.assertEqual(found["curves"][1:], known["curves"][1:])
-        for change, words in ((["--residual-sd", 0.6], "another model: residual_sd"), (["--studies", 500], "another simulation: studies"),
-                              (["--seed", 3], "another simulation: seed"), (["--effect", "cone=22"], "another model")):
+        for change, words in ((["--residual-sd", 0.6], "/model/residual_sd: has another model"), (["--studies", 500], "/settings/studies: has another simulation"),
+                              (["--seed", 3], "/settings/seed: has another simulation"), (["--effect", "cone=22"], "another model")):
             options = {**dict(zip(self.PLAN_OPTIONS[::2], self.PLAN_OPTIONS[1::2])), **dict([change])}
             words_now = [word for pair in options.items() for word in pair]
             self.assertIn(words, self.palpate("plan", *words_now, "--reuse", "one.json", status=2))

@@ -80,7 +80,7 @@ class Register(Study):
         names = set(tree(folder))
         self.assertEqual(names, {
             "registration.md", "osf.json", "registration.json", "protocol.json", "plan.json", "hypotheses.json",
-            "codebook.csv", "analysis-simulated.json", "simulated/README.md", "simulated/planned-effect.csv",
+            "form.json", "codebook.csv", "analysis-simulated.json", "simulated/README.md", "simulated/planned-effect.csv",
             "simulated/no-effect.csv", "SHA256SUMS"})
         for name in ("protocol.json", "plan.json", "hypotheses.json"):
             source = self.dir / ("quick.json" if name == "protocol.json" else name)
@@ -145,7 +145,10 @@ class Register(Study):
         self.register("--jobs", "1")
         ours, again = tree(self.dir / "registration"), tree(self.dir / "new")
         self.assertEqual({name for name in ours if ours[name] != again[name]} -
-                         {"registration.json", "registration.md", "SHA256SUMS"}, set())
+                         {"registration.json", "registration.md", "osf.json", "form.json", "SHA256SUMS"}, set())
+        # The date and what follows from it alone.
+        date = json.loads(ours["registration.json"])["made_utc"][:10]
+        self.assertIn(date, ours["registration.md"].decode())
         self.register(out="other", seed="2")
         self.assertNotEqual(again["simulated/no-effect.csv"], tree(self.dir / "other")["simulated/no-effect.csv"])
 
@@ -265,9 +268,156 @@ class Register(Study):
             self.register(hypotheses="h.json", status=2)
 
 
+    def test_one_digest_stands_everywhere(self):
+        folder = self.dir / "registration"
+        digest = hashlib.sha256((folder / "SHA256SUMS").read_bytes()).hexdigest()
+        self.assertIn(f"`{digest}`", (folder / "registration.md").read_text())
+        said = self.register("--force", out="registration").stdout
+        digest = hashlib.sha256((folder / "SHA256SUMS").read_bytes()).hexdigest()
+        self.assertIn(f"Digest {digest}\n", said)
+        self.assertIn(f"`{digest}`", (folder / "registration.md").read_text())
+        self.assertIn(digest, json.loads((folder / "osf.json").read_text())["q23"])
+
+
 class Check(Study):
     def check(self, *more, status=0, database="study.db"):
         return run("check", "registration", "--db", database, *more, status=status, folder=self.dir)
+
+    def digest(self):
+        return hashlib.sha256((self.dir / "registration/SHA256SUMS").read_bytes()).hexdigest()
+
+    def make_checksums_again(self):
+        folder = self.dir / "registration"
+        names = sorted(set(tree(folder)) - {"registration.md", "osf.json", "SHA256SUMS"})
+        (folder / "SHA256SUMS").write_text("".join(
+            f"{hashlib.sha256((folder / name).read_bytes()).hexdigest()}  {name}\n" for name in names))
+
+    def fill_in(self, name, answer=lambda prompt: f"Answer to: {prompt}"):
+        """Fills in every field as a lab does, with an editor that changes ends of lines."""
+        path = self.dir / "registration" / name
+        if name == "registration.md":
+            text = re.sub(r"\*\*FILL IN:\*\* (.*)", lambda m: answer(m[1]), path.read_text())
+            path.write_text(text.replace("\n", "\r\n"))
+        else:
+            answers = json.loads(path.read_text())
+            path.write_text(json.dumps({key: re.sub(r"FILL IN: (.*)", lambda m: answer(m[1]), text)
+                                        if isinstance(text, str) else text for key, text in answers.items()}))
+
+    def test_a_selected_sample_is_no_study_as_registered(self):
+        n = self.participants
+        run("simulate", "quick.json", "--db", "study.db", "--participants", 2 * n, folder=self.dir)
+        for number in range(2, 2 * n + 1, 2):
+            run("forget", "--db", "study.db", "--participant", f"S{number:03}", "--yes", folder=self.dir)
+        done = self.check(status=1)
+        self.assertTrue(done.stdout.startswith("1 deviation "), done.stdout)
+        self.assertIn("no participant has number 2", done.stdout)
+        self.assertIn(f"has number {2 * n - 1}, {n} registered", done.stdout)
+        self.assertIn(f"{n} codes were removed", done.stdout)
+        self.assertRegex(done.stdout, rf"Order of the renderers: .*: {n} \({(n + 1) // 2} registered\)")
+        self.assertRegex(done.stdout, rf": 0 \({n // 2} registered\)")
+
+    def test_filled_in_fields_are_no_change(self):
+        for name in ("registration.md", "osf.json"):
+            self.fill_in(name)
+        done = self.check()
+        self.assertIn("Fields filled in as requested: registration.md and osf.json", done.stdout)
+        self.fill_in("registration.md")  # nothing is left to fill in
+        self.check()
+
+    def test_emptied_fields_are_no_change(self):
+        for name in ("registration.md", "osf.json"):
+            self.fill_in(name, lambda prompt: "")
+        self.check()
+
+    def test_changes_outside_of_the_fields_are_named(self):
+        folder = self.dir / "registration"
+        before = {name: (folder / name).read_text() for name in ("registration.md", "osf.json")}
+        for name in before:
+            self.fill_in(name)
+            filled = (folder / name).read_text()
+            for old, new in (("paired.cone.p_holm < 0.05", "paired.cone.p_holm < 0.15"), ("alpha = 0.05", "alpha = 0.15"),
+                             ("0.2 s", "0.5 s")):
+                self.assertIn(old, filled, name)
+                (folder / name).write_text(filled.replace(old, new))
+                done = self.check(status=1)
+                self.assertIn("outside of the fields", done.stdout, (name, old))
+                self.assertNotIn("as requested", done.stdout)
+                self.assertIn(name, done.stdout)
+                (folder / name).write_text(filled)
+            (folder / name).write_text(before[name])
+
+    def test_a_field_cannot_hide_what_follows(self):
+        for answer in ("<!-- hidden", "<details>", "```", "~~~text", "## 19. Inference", "> ```"):
+            shutil.rmtree(self.dir / "registration")
+            shutil.copytree(self.base / "registration", self.dir / "registration")
+            self.fill_in("registration.md", lambda prompt: f"Fine.\n\n{answer}")
+            self.assertIn("expected plain text in a field", self.check(status=1).stdout, answer)
+        shutil.rmtree(self.dir / "registration")
+        shutil.copytree(self.base / "registration", self.dir / "registration")
+        self.fill_in("registration.md", lambda prompt: "Age < 40, n > 3.\n\n* a list\n\n1. more")
+        self.check()
+
+    def test_added_and_lost_text_is_named(self):
+        path = self.dir / "registration/registration.md"
+        text = path.read_text()
+        for changed in (text + "\nMore.\n", text.replace("# Registration", "More.\n\n# Registration", 1),
+                        text.replace("\n### 19", "\nMore.\n\n### 19"), text[:len(text) // 2], ""):
+            path.write_text(changed)
+            self.assertIn("registration.md", self.check(status=1).stdout)
+        path.write_text(text)
+        osf = self.dir / "registration/osf.json"
+        answers = json.loads(osf.read_text())
+        for changed in (answers | {"q24": "x"}, answers | {"q3": "Other"}, answers | {"q4": []}, answers | {"q2": 1},
+                        {k: v for k, v in answers.items() if k != "q19"}, [], 3):
+            osf.write_text(json.dumps(changed))
+            self.assertIn("osf.json", self.check(status=1).stdout)
+        osf.write_text("nonsense")
+        self.assertIn("osf.json", self.check(status=1).stdout)
+
+    def test_a_relaxed_hypothesis_has_another_digest(self):
+        digest = self.digest()
+        done = self.check("--digest", digest, "--json", "check.json", "--report", "check.html")
+        self.assertIn(digest, done.stdout)
+        self.assertEqual(json.loads((self.dir / "check.json").read_text())["registration"]["digest"], digest)
+        self.assertIn(digest, (self.dir / "check.html").read_text())
+        relaxed = json.loads((self.dir / "registration/hypotheses.json").read_text())
+        relaxed[0]["corroborated"] = "paired.cone.reduction > -50"
+        self.write("registration/hypotheses.json", relaxed)
+        self.make_checksums_again()
+        done = self.check("--digest", digest, status=1)
+        self.assertIn("given " + digest, done.stdout)
+        self.assertIn("found " + self.digest(), done.stdout)
+        # Without the digest of the registry the texts betray it.
+        self.assertIn("form.json does not say", self.check(status=1).stdout)
+        for bad in ("", "abc", digest.upper(), digest + "0"):
+            self.assertIn("--digest", self.check("--digest", bad, status=2).stderr)
+
+    def test_more_hypotheses_than_were_registered_are_named(self):
+        more = json.loads((self.dir / "registration/hypotheses.json").read_text())
+        self.write("registration/hypotheses.json", more + [more[0] | {"id": "H2"}])
+        self.make_checksums_again()
+        self.assertIn("other hypotheses than registration.json", self.check(status=1).stdout)
+
+    def test_a_changed_plan_with_new_checksums_is_named(self):
+        plan = json.loads((self.dir / "registration/plan.json").read_text())
+        plan["settings"]["alpha"] = 0.2
+        self.write("registration/plan.json", plan)
+        self.make_checksums_again()
+        self.assertIn("plan.json is not the one", self.check(status=1).stdout)
+
+    def test_a_registration_of_version_1(self):
+        folder = self.dir / "registration"
+        made = json.loads((folder / "registration.json").read_text()) | {"version": 1, "to_fill_in": [
+            {"file": name, "sha256_when_made": hashlib.sha256((folder / name).read_bytes()).hexdigest()}
+            for name in ("registration.md", "osf.json")]}
+        self.write("registration/registration.json", made)
+        (folder / "form.json").unlink()
+        self.make_checksums_again()
+        self.check()
+        self.fill_in("registration.md")
+        done = self.check()
+        self.assertIn("compare them with what the registry holds", done.stdout)
+        self.assertNotIn("as requested", done.stdout)
 
     def test_a_study_simulated_from_the_plan_passes(self):
         done = self.check("--json", "check.json", "--report", "check.html")
@@ -277,7 +427,7 @@ class Check(Study):
         check = json.loads((self.dir / "check.json").read_text())
         self.assertEqual((check["deviations"], check["simulated"]), (0, "SIMULATED PARTICIPANTS"))
         self.assertEqual({p["id"] for p in check["points"]}, {
-            "registration", "protocol", "order", "participants", "trials", "people", "dates", "exclusion", "alpha",
+            "registration", "digest", "protocol", "order", "participants", "trials", "people", "dates", "exclusion", "alpha",
             "versions", "calibration", "noise", "sounds", "torque", "levels"})
         self.assertRegex(next(p["sentence"] for p in check["points"] if p["id"] == "people"), r"version \d")
         for one in check["hypotheses"]:
