@@ -43,23 +43,29 @@ ProtocolText protocol_text(const data::ProtocolInfo& info) {
   return {info.name, info.sha256, info.text, stored.title, stored.seed};
 }
 
-void add_trial(const data::TrialRecord& record, ServoQuality& servo) {
+}  // namespace
+
+void add_trial(const ServoTrial& trial, std::vector<ServoQuality>& all) {
+  auto at = std::ranges::lower_bound(all, trial.renderer, {}, &ServoQuality::renderer);
+  if (at == all.end() || at->renderer != trial.renderer) {
+    at = all.insert(at, ServoQuality());
+    at->renderer = trial.renderer;
+  }
+  ServoQuality& servo = *at;
   ++servo.n_trials;
-  servo.n_with_missed += record.missed_ticks > 0 ? 1 : 0;
-  servo.n_with_faults += record.faults != 0 ? 1 : 0;
-  servo.n_started_inside += record.started_inside ? 1 : 0;
-  servo.ticks += record.ticks;
-  servo.missed_ticks += record.missed_ticks;
-  servo.max_force = std::max(servo.max_force, record.max_force);
-  const double period = 1e-9 * static_cast<double>(record.longest_period_ns);
-  if (!(period > 0)) return;
-  servo.longest_period = std::max(servo.longest_period, period);
-  const double bin = ServoQuality::kBinsPerDecade * std::log10(period / ServoQuality::kLowest);
+  servo.n_with_missed += trial.missed_ticks > 0 ? 1 : 0;
+  servo.n_with_faults += trial.faults ? 1 : 0;
+  servo.n_started_inside += trial.started_inside ? 1 : 0;
+  servo.ticks += trial.ticks;
+  servo.missed_ticks += trial.missed_ticks;
+  servo.max_force = std::max(servo.max_force, trial.max_force);
+  if (!(trial.longest_period > 0)) return;
+  servo.longest_period = std::max(servo.longest_period, trial.longest_period);
+  const double bin =
+      ServoQuality::kBinsPerDecade * std::log10(trial.longest_period / ServoQuality::kLowest);
   ++servo.longest_periods[static_cast<std::size_t>(
       std::clamp(bin + 1e-9, 0.0, ServoQuality::kBins - 1.0))];
 }
-
-}  // namespace
 
 StudyRecord read_study_record(const std::string& database, const std::string& protocol) {
   data::Store store = data::Store::open(database, data::Store::Mode::read_only);
@@ -82,14 +88,12 @@ StudyRecord read_study_record(const std::string& database, const std::string& pr
   }
   store.for_each_trial([&](const data::StoredTrial& trial) {
     if (trial.record.practice || !wanted.contains(trial.protocol_sha256)) return;
-    auto servo = std::ranges::find(record.servo, trial.record.renderer, &ServoQuality::renderer);
-    if (servo == record.servo.end()) {
-      record.servo.emplace_back().renderer = trial.record.renderer;
-      servo = std::prev(record.servo.end());
-    }
-    add_trial(trial.record, *servo);
+    const data::TrialRecord& one = trial.record;
+    add_trial({one.renderer, one.ticks, one.missed_ticks,
+               static_cast<double>(one.longest_period_ns) / 1e9, one.faults != 0,
+               one.started_inside, one.max_force},
+              record.servo);
   });
-  std::ranges::sort(record.servo, {}, &ServoQuality::renderer);
   store.for_each_cut_off([&](const data::StoredTrial& attempt) {
     record.n_cut_off += wanted.contains(attempt.protocol_sha256) ? 1 : 0;
   });

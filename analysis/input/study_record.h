@@ -65,6 +65,17 @@ struct StudyRecord {
   std::string check_page;  ///< file name of the page beside the report
 };
 
+/// As a trial of a table of trials has it.
+struct ServoTrial {
+  std::string_view renderer;
+  std::uint64_t ticks = 0, missed_ticks = 0;
+  double longest_period = 0;  ///< s
+  bool faults = false, started_inside = false;
+  double max_force = 0;  ///< N
+};
+/// Adds a trial to the servo quality of its renderer; the list stays sorted.
+void add_trial(const ServoTrial& trial, std::vector<ServoQuality>& servo);
+
 /// \param database path \param protocol  the one that is wanted (is_protocol)
 /// \throws as data::Store::open
 StudyRecord read_study_record(const std::string& database, const std::string& protocol = "");

@@ -373,9 +373,9 @@ class Faults {
 class CsvTrials {
  public:
   /// \param stimuli  names that are answers although they look like missing values
-  CsvTrials(const std::string& path, const std::string& protocol,
+  CsvTrials(const std::string& path, const std::vector<std::string>& wanted,
             const std::set<std::string>& stimuli = {})
-      : path_(path), protocol_(protocol), faults_(path) {
+      : path_(path), wanted_(wanted), faults_(path) {
     for (const std::string& name : stimuli) stimuli_.number(name);
   }
 
@@ -443,7 +443,7 @@ class CsvTrials {
                                       hint_for(kColumns[i], alike));
       }
     }
-    if (!protocol_.empty() && at_[protocol_sha256] == kAbsent)
+    if (!wanted_.empty() && at_[protocol_sha256] == kAbsent)
       faults_.add(line(reader), "expected a column 'protocol_sha256', as --protocol is given");
   }
 
@@ -512,7 +512,10 @@ class CsvTrials {
     }
     reader_ = &reader;
     fields_ = &reader.fields();
-    if (!protocol_.empty() && !is_protocol(protocol_, "", field(protocol_sha256))) return;
+    const auto is_shown = [&](const std::string& one) {
+      return is_protocol(one, "", field(protocol_sha256));
+    };
+    if (!wanted_.empty() && std::ranges::none_of(wanted_, is_shown)) return;
     ok_ = true;
     RawTrial raw;
     raw.participant = name(participant_id, names_);
@@ -580,8 +583,8 @@ class CsvTrials {
       torque_.warn(table.warnings);
       return table;
     } catch (const std::runtime_error& error) {
-      faults_.add("file", protocols_.empty() && !protocol_.empty()
-                              ? "expected trials of the protocol " + printable(protocol_) +
+      faults_.add("file", protocols_.empty() && !wanted_.empty()
+                              ? "expected trials of the protocol " + printable(wanted_.front()) +
                                     "; a table has the checksums of protocols, not their names"
                               : error.what());
     }
@@ -589,7 +592,8 @@ class CsvTrials {
     return {};
   }
 
-  std::string path_, protocol_;
+  std::string path_;
+  std::vector<std::string> wanted_;  ///< protocols; empty: all
   Faults faults_;
   const CsvReader* reader_ = nullptr;
   const std::vector<std::string_view>* fields_ = nullptr;
@@ -606,11 +610,16 @@ class CsvTrials {
 
 }  // namespace
 
-TrialTable read_trials_csv(const std::string& path, const std::string& protocol) {
-  CsvTrials trials(path, protocol);
+TrialTable read_trials_csv(const std::string& path, const std::vector<std::string>& protocols) {
+  CsvTrials trials(path, protocols);
   TrialTable table = trials.read();
   const std::set<std::string> misread = trials.misread_answers();
-  return misread.empty() ? std::move(table) : CsvTrials(path, protocol, misread).read();
+  return misread.empty() ? std::move(table) : CsvTrials(path, protocols, misread).read();
+}
+
+TrialTable read_trials_csv(const std::string& path, const std::string& protocol) {
+  return read_trials_csv(
+      path, protocol.empty() ? std::vector<std::string>() : std::vector<std::string>{protocol});
 }
 
 void order_shapes(TrialTable& table, const std::vector<std::string>& order) {

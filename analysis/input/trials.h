@@ -89,6 +89,8 @@ struct TrialTable {
 /// one begins with; "": all \throws protocols::InputError with every fault (beyond kMaxFaults their
 /// number).
 TrialTable read_trials_csv(const std::string& path, const std::string& protocol = "");
+/// The same, of several protocols together. \param protocols  empty: all
+TrialTable read_trials_csv(const std::string& path, const std::vector<std::string>& protocols);
 
 /// Puts the shapes into this order; does nothing if it has other names. A table from CSV has them
 /// in another order than one from a database, which knows the protocol's.

@@ -4,6 +4,7 @@ Usage: bundle_test.py PALPATE SOURCE_DIR
 """
 
 import csv
+import hashlib
 import json
 import os
 import pathlib
@@ -191,7 +192,10 @@ class Bundle(unittest.TestCase):
         shutil.rmtree(self.bundle)
         (self.dir / "study.db").unlink()
         done = run("bundle", "--verify", elsewhere)
-        self.assertEqual(done.stdout.count("same "), 2, done.stdout)
+        self.assertNotIn("DIFFERS", done.stdout)
+        for name in ("analysis.json", "check.json", "check.html", "report.html", "README.md", "reproduce.sh",
+                     "ro-crate-metadata.json", "figures/", "data/psych-ds/"):
+            self.assertIn(f"same     {name}", done.stdout)
         before = files(elsewhere)
         script = subprocess.run(["sh", elsewhere / "reproduce.sh"], capture_output=True, text=True,
                                 env=os.environ | {"PALPATE": PALPATE})
@@ -227,6 +231,7 @@ class Bundle(unittest.TestCase):
         done = run("bundle", "--verify", self.bundle, status=1)
         self.assertIn("data/trials.csv has changed", done.stdout)
         self.assertIn("DIFFERS  analysis.json", done.stdout)
+        self.assertIn("DIFFERS  data/psych-ds/", done.stdout)
         trials.write_bytes(text)
         run("bundle", "--verify", self.bundle)
         (self.bundle / "more.txt").write_text("x")
@@ -234,7 +239,108 @@ class Bundle(unittest.TestCase):
         done = run("bundle", "--verify", self.bundle, status=1)
         self.assertIn("more.txt is not listed", done.stdout)
         self.assertIn("about.json is missing", done.stdout)
-        self.assertIn("same     analysis.json", done.stdout)
+
+    def forge(self, name, change, bundle=None):
+        """Changes a file and makes the checksums again, also those of the crate."""
+        folder = bundle or self.bundle
+        path = folder / name
+        before = path.read_text(encoding="utf-8")
+        after = change(before)
+        self.assertNotEqual(before, after, name)
+        path.write_text(after, encoding="utf-8", newline="")
+        crate = folder / "ro-crate-metadata.json"
+        if name != crate.name:
+            graph = json.loads(crate.read_text())
+            for entity in graph["@graph"]:
+                if "sha256" in entity:
+                    content = (folder / urllib.parse.unquote(entity["@id"])).read_bytes()
+                    entity |= {"contentSize": str(len(content)), "sha256": hashlib.sha256(content).hexdigest()}
+            crate.write_text(json.dumps(graph, indent=2, ensure_ascii=False) + "\n")
+        (folder / "SHA256SUMS").write_text("".join(
+            f"{hashlib.sha256((folder / one).read_bytes()).hexdigest()}  {one}\n"
+            for one in sorted(files(folder) - {"SHA256SUMS"}, key=os.fsencode)))
+
+    def refused(self, words, folder=None):
+        done = run("bundle", "--verify", folder or self.bundle, status=1)
+        self.assertIn("same     every file, by its checksum", done.stdout)
+        self.assertIn(words, done.stdout)
+
+    def again(self):
+        shutil.rmtree(self.bundle)
+        shutil.copytree(self.base / "bundle", self.bundle)
+
+    def test_forgeries_with_new_checksums_are_named(self):
+        verdict = json.loads((self.bundle / "check.json").read_text())["hypotheses"][0]["verdict"]
+        other = "refuted" if verdict == "corroborated" else "corroborated"
+        table = "data/psych-ds/data/subject-S001/study-quick_subject-S001_data.csv"
+        for name, change, words in (
+                ("check.json", lambda t: t.replace(f'"verdict": "{verdict}"', f'"verdict": "{other}"'), "check.json, made"),
+                ("check.json", lambda t: t.replace('"deviations": 0', '"deviations": 1'), "check.json, made again"),
+                ("check.json", lambda t: t.replace("nobody was removed", "nobody was ever removed"), "check.json, made"),
+                ("check.html", lambda t: t.replace(verdict, other), "check.html, made again"),
+                ("README.md", lambda t: t.replace(verdict, other), "README.md, made again"),
+                ("report.html", lambda t: re.sub(r"(\d)(?=\d* %)", lambda m: str((int(m[1]) + 1) % 10), t, count=1), "report.html"),
+                ("report.html", lambda t: t.replace(f"is {verdict}", f"is {other}"), "report.html, made again"),
+                ("figures/figure15.svg", lambda t: t.replace("</svg>", "<!-- --></svg>"), "figures/figure15.svg"),
+                ("reproduce.sh", lambda t: t.replace("cmp ", "true "), "reproduce.sh, made again"),
+                ("analysis.json", lambda t: t.replace('"n_trials": 72', '"n_trials": 73'), "analysis.json, made again"),
+                (table, lambda t: t.replace(",sphere,sphere,1,", ",sphere,cone,0,", 1), "response is cone"),
+                (table, lambda t: "".join(t.splitlines(True)[:-1]), "is not in the dataset"),
+                (table, lambda t: t + t.splitlines(True)[-1], "twice in the dataset"),
+                ("about.json", lambda t: t.replace("CC-BY-4.0", "CC0-1.0"), "by about.json"),
+                ("data/psych-ds/dataset_description.json", lambda t: t.replace("CC-BY-4.0", "CC0-1.0"), "by about.json"),
+                ("data/psych-ds/README.md", lambda t: t.replace("CC-BY-4.0", "CC0-1.0"), "authors or terms"),
+                ("data/psych-ds/materials/quick_protocol.json", lambda t: t + " ", "is no protocol of"),
+                ("ro-crate-metadata.json", lambda t: t.replace("CC-BY-4.0", "CC0-1.0"), "ro-crate-metadata.json, made"),
+                ("data/record.json", lambda t: t.replace('"removed": 0', '"removed": 1'), "check.json, made again"),
+                ("data/record.json", lambda t: t.replace('"devices"', '"devises"'), "did you mean 'devices'"),
+                ("registration/hypotheses.json", lambda t: t.replace("> 0", "> -99"), "check.json, made again")):
+            with self.subTest(name=name, words=words):
+                self.forge(name, change)
+                self.refused(words)
+            self.again()
+        (self.bundle / "figures/more.svg").write_text("<svg/>")
+        self.forge("README.md", lambda t: t + " ")
+        self.refused("figures/more.svg is none of the analysis")
+
+    def test_forgeries_of_bids_are_named(self):
+        self.make(self.dir, "--format", "bids", out="bids")
+        table = "data/bids/sub-S001/ses-1/beh/sub-S001_ses-1_task-quick_beh.tsv"
+        for name, change, words in (
+                (table, lambda t: t.replace("\tsphere\tsphere\t1\t", "\tsphere\tcone\t0\t", 1), "response is cone"),
+                (table, lambda t: "".join(t.splitlines(True)[:-1]), "is not in the dataset"),
+                (table, lambda t: re.sub(r"(?m)^0\t", "9\t", t, count=1), "onset is"),
+                ("data/bids/participants.tsv", lambda t: t.replace("\t1", "\t0", 1), "other participants"),
+                ("data/bids/dataset_description.json", lambda t: t.replace("Bo Example", "Cy Example"), "Authors is"),
+                ("data/bids/sourcedata/quick_protocol.json", lambda t: t + " ", "is no protocol of")):
+            with self.subTest(name=name, words=words):
+                self.forge(name, change, self.dir / "bids")
+                self.refused(words, self.dir / "bids")
+            shutil.rmtree(self.dir / "bids")
+            self.make(self.dir, "--format", "bids", out="bids")
+
+    def test_a_bundle_with_a_pilot_and_a_removal_verifies(self):
+        quick = json.loads((self.base / "quick.json").read_text())
+        (self.dir / "pilot.json").write_text(json.dumps({**quick, "name": "pilot", "repetitions": 4}))
+        run("simulate", "pilot.json", "--db", "study.db", "--participants", 2, "--seed", 5, folder=self.dir)
+        run("forget", "--db", "study.db", "--participant", "S003", "--yes", folder=self.dir)
+        for format in ("psych-ds", "bids"):
+            self.make(self.dir, "--format", format, out=format)
+            done = run("bundle", "--verify", self.dir / format)
+            self.assertIn("1 deviation", done.stdout.replace("2 deviations", "1 deviation"))
+
+    def test_the_digest_is_compared(self):
+        digest = hashlib.sha256((self.dir / "registration/SHA256SUMS").read_bytes()).hexdigest()
+        self.assertIn(digest, self.make(self.dir, "--digest", digest, out="new").stdout)
+        for name in ("README.md", "report.html", "check.html", "check.json"):
+            self.assertIn(digest, (self.dir / "new" / name).read_text(), name)
+        done = run("bundle", "--verify", self.dir / "new", "--digest", digest)
+        self.assertIn(digest, done.stdout)
+        run("bundle", "--verify", self.dir / "new", "--digest", "0" * 64, status=1)
+        run("bundle", "--verify", self.dir / "new", "--digest", "0", status=2)
+        self.make(self.dir, "--digest", "0" * 64, out="other")
+        self.assertEqual(json.loads((self.dir / "other/check.json").read_text())["deviations"], 1)
+        run("bundle", "--verify", self.dir / "other")
 
     def test_links_are_not_followed(self):
         (self.bundle / "about.json").unlink()
