@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
+#include "data/base/json_text.h"
 #include "data/files/atomic_file.h"
 #include "protocols/json_document.h"
 
@@ -15,7 +16,7 @@ using nlohmann::ordered_json;
 
 constexpr int kVersion = 1;
 constexpr std::size_t kMostChains = 100;
-constexpr double kMostTime = 1e12;  // ns
+constexpr double kMostTime = 1e9;  // ns; beyond a second no chain is usable
 
 ordered_json to_json(const Percentiles& of) {
   return {{"median", of.median}, {"p99", of.p99}, {"p99.9", of.p999}, {"max", of.max}};
@@ -32,6 +33,8 @@ void read_percentiles(protocols::ObjectReader& root, const char* key, Percentile
     number("p99", out.p99);
     number("p99.9", out.p999);
     number("max", out.max);
+    if (out.median > out.p99 || out.p99 > out.p999 || out.p999 > out.max)
+      object.faults().add(object.pointer(), "expected median, p99, p99.9 and max to ascend");
   };
   root.section(key, read, protocols::Presence::required);
 }
@@ -42,10 +45,16 @@ void read_count(protocols::ObjectReader& root, const char* key, std::uint64_t& o
   out = static_cast<std::uint64_t>(std::llround(read));
 }
 
-ChainTiming read_chain(protocols::ObjectReader& root) {
+ChainTiming read_chain(protocols::ObjectReader& root, bool unsealed) {
+  constexpr std::size_t kMostWord = 200;
   ChainTiming out;
-  root.text("device", out.device);
-  root.text("serial", out.serial);
+  out.sealed = root.sealed();
+  if (!out.sealed && !unsealed)
+    root.faults().add(root.pointer("sha256"),
+                      "missing, since an older version of palpate stored it; measure again with "
+                      "palpate devices --timing --calibration");
+  root.text("device", out.device, kMostWord);
+  root.text("serial", out.serial, kMostWord);
   root.number("rate_hz", out.rate, {1, 1e5, "Hz"}, protocols::Presence::required);
   read_count(root, "ticks", out.ticks);
   read_count(root, "lost_readings", out.lost);
@@ -87,11 +96,10 @@ std::string chain_file(const std::string& calibration) {
   return std::filesystem::path(calibration).replace_extension(".timing.json").string();
 }
 
-std::vector<ChainTiming> stored_chains(const std::string& path) {
-  if (!std::filesystem::exists(path)) return {};
+std::vector<ChainTiming> parse_chains(const std::string& text, const std::string& path,
+                                      bool unsealed) {
   protocols::FaultList faults(path);
-  const nlohmann::json read = protocols::read_json(protocols::read_text_file(path), faults);
-  faults.throw_if_any();
+  const nlohmann::json read = protocols::read_json(text, faults);
   protocols::ObjectReader root(read, "", faults);
   int version = 0;
   root.integer("version", version, {kVersion, kVersion}, protocols::Presence::required);
@@ -99,7 +107,7 @@ std::vector<ChainTiming> stored_chains(const std::string& path) {
   if (const auto* list = root.array("chains", 0, kMostChains, protocols::Presence::required)) {
     for (std::size_t i = 0; i < list->size(); ++i) {
       protocols::ObjectReader one((*list)[i], protocols::child_pointer("/chains", i), faults);
-      out.push_back(read_chain(one));
+      out.push_back(read_chain(one, unsealed));
       one.refuse_unknown_keys();
     }
   }
@@ -108,14 +116,28 @@ std::vector<ChainTiming> stored_chains(const std::string& path) {
   return out;
 }
 
+std::string to_json(const std::vector<ChainTiming>& all) {
+  ordered_json chains = ordered_json::array();
+  for (const ChainTiming& one : all) {
+    ordered_json& object = chains.emplace_back(to_json(one));
+    if (one.sealed) object["sha256"] = json_checksum(nlohmann::json(object));
+  }
+  return ordered_json{{"version", kVersion}, {"chains", chains}}.dump(2) + "\n";
+}
+
+std::vector<ChainTiming> stored_chains(const std::string& path) {
+  if (!std::filesystem::exists(path)) return {};
+  return parse_chains(protocols::read_text_file(path), path);
+}
+
 void store_chain(const std::string& path, const ChainTiming& timing) {
-  std::vector<ChainTiming> all = stored_chains(path);
+  std::vector<ChainTiming> all;
+  if (std::filesystem::exists(path))
+    all = parse_chains(protocols::read_text_file(path), path, true);
   std::erase_if(all, [&timing](const ChainTiming& one) { return one.device == timing.device; });
   all.push_back(timing);
-  ordered_json chains = ordered_json::array();
-  for (const ChainTiming& one : all) chains.push_back(to_json(one));
   data::AtomicFile file(path);
-  file.write(ordered_json{{"version", kVersion}, {"chains", chains}}.dump(2) + "\n");
+  file.write(to_json(all));
   file.sync();
   file.commit(true);
 }

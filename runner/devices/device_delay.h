@@ -28,6 +28,7 @@ struct ChainTiming {
   Percentiles wait;          ///< from a command until its force is sent
   Percentiles delay;         ///< age + wait of each tick
   std::string made_utc;      ///< time of the measurement
+  bool sealed = true;        ///< false: of an older version, without a checksum
 
   /// s, the delay that 99 % of ticks keep.
   double counted() const { return static_cast<double>(delay.p99) * 1e-9; }
@@ -45,7 +46,13 @@ std::string chain_file(const std::string& calibration);
 /// Replaces the stored measurement of this kind of device and keeps the others.
 /// \throws std::runtime_error; protocols::InputError: the file at this path is something else
 void store_chain(const std::string& path, const ChainTiming& timing);
-/// Empty where there is no such file. \throws protocols::InputError
+/// Empty where there is no such file. \throws protocols::InputError with every fault; also where a
+/// measurement has no checksum, as those of older versions
 std::vector<ChainTiming> stored_chains(const std::string& path);
+/// The text of such a file. \param unsealed  accepts measurements without a checksum
+/// \throws protocols::InputError with every fault
+std::vector<ChainTiming> parse_chains(const std::string& text, const std::string& path,
+                                      bool unsealed = false);
+std::string to_json(const std::vector<ChainTiming>& chains);
 
 }  // namespace palpate::runner::devices

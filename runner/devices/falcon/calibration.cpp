@@ -15,6 +15,7 @@
 #include <sstream>
 #include <string_view>
 
+#include "data/base/json_text.h"
 #include "protocols/json_document.h"
 #include "runner/devices/falcon/parameters.h"
 
@@ -46,6 +47,7 @@ namespace {
 constexpr int kVersion = 1;
 constexpr std::size_t kMany = 10'000;
 constexpr double kNsPerDay = 86400e9;
+constexpr double kMostForce = 20, kMostWeight = 20;  // N, kg; a Falcon holds 1 kg at most
 
 /// Parses "2026-05-01T09:30:00Z", with any fraction of a second, to ns since 1970.
 std::optional<std::int64_t> parse_utc(const std::string& text) {
@@ -80,24 +82,26 @@ void read_date(protocols::ObjectReader& reader, std::string& out) {
   }
 }
 
+void read_serial(protocols::ObjectReader& reader, const char* key, std::string& out) {
+  constexpr std::size_t kMostSerial = 100;
+  reader.text(key, out, kMostSerial);
+}
+
 ForceCalibration read_force(protocols::ObjectReader& reader) {
   ForceCalibration force;
-  reader.text("serial", force.serial);
+  force.sealed = reader.sealed();
+  read_serial(reader, "serial", force.serial);
   reader.number("counts_per_newton_metre", force.counts_per_torque,
                 {kCountsPerTorque * kMostSlope, kCountsPerTorque * kLeastSlope, "1/(N m)"},
                 protocols::Presence::required);
-  reader.number("residual_n", force.residual, {0, 1e3, "N"});
-  reader.number("sideways_n_per_n", force.sideways, {0, 1e3, "N/N"});
-  reader.number("arm_weight_n", force.arm_weight, {-1e3, 1e3, "N"});
+  reader.number("residual_n", force.residual, {0, kMostForce, "N"});
+  reader.number("sideways_n_per_n", force.sideways, {0, kMostForce, "N/N"});
+  reader.number("arm_weight_n", force.arm_weight, {-kMostForce, kMostForce, "N"});
   if (const auto* weights = reader.array("weights_kg", 0, kMany)) {
     for (std::size_t i = 0; i < weights->size(); ++i) {
-      const auto& weight = (*weights)[i];
-      if (weight.is_number()) {
-        force.weights.push_back(weight.get<double>());
-      } else {
-        reader.faults().add(protocols::child_pointer(reader.pointer("weights_kg"), i),
-                            "expected a mass in kg");
-      }
+      protocols::read_number(
+          (*weights)[i], protocols::child_pointer(reader.pointer("weights_kg"), i),
+          force.weights.emplace_back(), {0, kMostWeight, "kg", true}, reader.faults());
     }
   }
   read_date(reader, force.made_utc);
@@ -106,9 +110,11 @@ ForceCalibration read_force(protocols::ObjectReader& reader) {
 
 PairRegistration read_pair(protocols::ObjectReader& reader) {
   PairRegistration pair;
-  reader.text("tip_serial", pair.tip_serial);
-  reader.text("tail_serial", pair.tail_serial);
-  reader.vector("tail_position_m", pair.tail_in_tip.position, {-2, 2, "m"});
+  pair.sealed = reader.sealed();
+  read_serial(reader, "tip_serial", pair.tip_serial);
+  read_serial(reader, "tail_serial", pair.tail_serial);
+  reader.vector("tail_position_m", pair.tail_in_tip.position, {-2, 2, "m"},
+                protocols::Presence::required);
   reader.quaternion("tail_orientation_wxyz", pair.tail_in_tip.orientation);
   reader.number("stylus_length_m", pair.stylus_length, {0.02, 1, "m"},
                 protocols::Presence::required);
@@ -130,11 +136,19 @@ void read_list(protocols::ObjectReader& root, const char* key, std::vector<T>& o
   }
 }
 
-CalibrationVerdict judge(const std::string& what, const std::string& made_utc, bool known,
-                         std::int64_t unix_ns) {
-  if (!known) {
+/// \param one  nullptr: none is stored
+template <class Stored>
+CalibrationVerdict judge(const std::string& what, const Stored* one, std::int64_t unix_ns) {
+  if (one == nullptr) {
     return {CalibrationState::missing, what + ": none is stored; run palpate devices --calibrate"};
   }
+  if (!one->sealed) {
+    return {CalibrationState::stale,
+            what +
+                ": has no checksum, since an older version of palpate stored it; run palpate "
+                "devices --calibrate again"};
+  }
+  const std::string& made_utc = one->made_utc;
   const auto made = parse_utc(made_utc);
   const double days = made ? static_cast<double>(unix_ns - *made) / kNsPerDay : NAN;
   std::ostringstream age;
@@ -227,6 +241,9 @@ Calibration read_calibration(const std::string& path) {
 
 std::string to_json(const Calibration& calibration) {
   using nlohmann::ordered_json;
+  const auto seal = [](ordered_json& object, bool sealed) {
+    if (sealed) object["sha256"] = json_checksum(nlohmann::json(object));
+  };
   ordered_json forces = ordered_json::array(), pairs = ordered_json::array();
   for (const ForceCalibration& force : calibration.forces) {
     forces.push_back({{"serial", force.serial},
@@ -236,6 +253,7 @@ std::string to_json(const Calibration& calibration) {
                       {"arm_weight_n", force.arm_weight},
                       {"weights_kg", force.weights},
                       {"made_utc", force.made_utc}});
+    seal(forces.back(), force.sealed);
   }
   for (const PairRegistration& pair : calibration.pairs) {
     const Vec3& p = pair.tail_in_tip.position;
@@ -248,6 +266,7 @@ std::string to_json(const Calibration& calibration) {
                      {"residual_m", pair.residual},
                      {"points", pair.points},
                      {"made_utc", pair.made_utc}});
+    seal(pairs.back(), pair.sealed);
   }
   const ordered_json all = {{"version", kVersion}, {"forces", forces}, {"pairs", pairs}};
   return all.dump(2) + "\n";
@@ -264,10 +283,8 @@ CalibrationVerdict judge_forces(const Calibration& calibration,
   for (const std::string& serial : serials) {
     const ForceCalibration* force = calibration.force_of(serial);
     const std::string what = "force of the Falcon " + serial;
-    verdict = both(verdict, force != nullptr && !plausible(*force)
-                                ? implausible(what, *force)
-                                : judge(what, force != nullptr ? force->made_utc : "",
-                                        force != nullptr, unix_ns));
+    verdict = both(verdict, force != nullptr && !plausible(*force) ? implausible(what, *force)
+                                                                   : judge(what, force, unix_ns));
   }
   return verdict;
 }
@@ -275,8 +292,8 @@ CalibrationVerdict judge_forces(const Calibration& calibration,
 CalibrationVerdict judge_pair(const Calibration& calibration, const std::string& tip,
                               const std::string& tail, std::int64_t unix_ns) {
   const PairRegistration* pair = calibration.pair_of(tip, tail);
-  return judge("registration of the devices " + tip + " (tip) and " + tail + " (tail)",
-               pair != nullptr ? pair->made_utc : "", pair != nullptr, unix_ns);
+  return judge("registration of the devices " + tip + " (tip) and " + tail + " (tail)", pair,
+               unix_ns);
 }
 
 namespace {

@@ -46,6 +46,7 @@ struct ForceCalibration {
   double arm_weight = 0;  ///< N, apparent weight of the device's arms; negative: they rise
   std::vector<double> weights;  ///< kg
   std::string made_utc;         ///< ISO 8601
+  bool sealed = true;           ///< false: of an older version, without a checksum
 };
 
 /// Relative pose of two devices that hold a stylus.
@@ -56,6 +57,7 @@ struct PairRegistration {
   double residual = 0;       ///< m, root mean square of the paired points
   int points = 0;
   std::string made_utc;
+  bool sealed = true;  ///< as above
 };
 
 struct Calibration {
@@ -69,6 +71,7 @@ struct Calibration {
   void put(const PairRegistration& pair);
 };
 
+/// Each calibration has a checksum: a changed one is a fault, one without is stale.
 /// A missing file gives an empty calibration. \throws InputError with every fault; also if another
 /// user could have written the file, because it scales the forces on a hand.
 Calibration read_calibration(const std::string& path);

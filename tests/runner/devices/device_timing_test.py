@@ -16,6 +16,9 @@ import unittest
 
 from stub_state import StubState
 
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "shared"))
+from sealed_json import sealed  # noqa: E402
+
 PALPATE, SERVICE, DRD, HD, *FALCONS = sys.argv[1:6]
 PATIENCE = 120  # s; only a hang reaches it
 RATE = 100  # Hz, that a busy machine keeps
@@ -96,6 +99,15 @@ class Timing(unittest.TestCase):
         self.time("inverse3", *service)
         kept = json.loads((self.folder / "lab.timing.json").read_text())["chains"]
         self.assertEqual(sorted(one["device"] for one in kept), ["inverse3", "touch"])
+        stored = (self.folder / "lab.timing.json").read_text()
+        changed = json.loads(stored)
+        changed["chains"][0]["delay_ns"] = dict.fromkeys(changed["chains"][0]["delay_ns"], 0)
+        (self.folder / "lab.timing.json").write_text(json.dumps(changed))
+        self.assertIn("/chains/0/sha256: expected the checksum",
+                      self.palpate("validate", file, "--calibration", self.calibration, status=2))
+        del changed["chains"][0]["sha256"]
+        (self.folder / "lab.timing.json").write_text(json.dumps(changed))
+        self.assertIn("/chains/0/sha256: missing", self.palpate("validate", file, "--calibration", self.calibration, status=2))
         (self.folder / "lab.timing.json").write_text('{"version": 1, "chains": [{"device": 3}]}')
         self.assertIn("/chains/0", self.palpate("validate", file, "--calibration", self.calibration, status=2))
 
@@ -103,7 +115,7 @@ class Timing(unittest.TestCase):
     def test_a_falcon(self):
         made = datetime.datetime.now(datetime.timezone.utc).strftime("%Y-%m-%dT%H:%M:%SZ")
         self.calibration.write_text(json.dumps({"version": 1, "forces": [
-            {"serial": "EMU1", "counts_per_newton_metre": -10000, "weights_kg": [0.1], "made_utc": made}]}))
+            sealed({"serial": "EMU1", "counts_per_newton_metre": -10000, "weights_kg": [0.1], "made_utc": made})]}))
         self.time("falcon", under=FALCONS)
 
     def test_wrong_use(self):

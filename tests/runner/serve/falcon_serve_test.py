@@ -21,6 +21,8 @@ PALPATE, CLIENT = sys.argv[1:3]
 sys.argv.insert(2, str(pathlib.Path(__file__).resolve().parents[3] / "protocols"))
 from emulator_control import EmulatorControl, read_record  # noqa: E402
 from serve_case import PATIENCE, ServeCase, ServeError  # noqa: E402
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "shared"))
+from sealed_json import sealed  # noqa: E402
 
 RATE = 100  # Hz, that a busy machine keeps
 RAMP = 20  # ticks: 0.2 s
@@ -59,7 +61,7 @@ class Falcon(ServeCase):
         made = datetime.datetime.now(datetime.timezone.utc).strftime("%Y-%m-%dT%H:%M:%SZ")
         calibration = self.dir / "lab.json"
         calibration.write_text(json.dumps({"version": 1, "forces": [
-            {"serial": "EMU1", "counts_per_newton_metre": -10000, "weights_kg": [0.1], "made_utc": made}]}))
+            sealed({"serial": "EMU1", "counts_per_newton_metre": -10000, "weights_kg": [0.1], "made_utc": made})]}))
         self.last, self.heard = self.dir / "last.json", self.dir / "heard.csv"
         self.emulator = self.run_server([
             EMULATED, "--last", self.last, "--record", self.heard, "--control", self.control.fifo, PALPATE, "serve",

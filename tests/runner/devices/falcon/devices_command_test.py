@@ -17,6 +17,9 @@ import unittest
 
 from emulator_control import EmulatorControl
 
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[3] / "shared"))
+from sealed_json import sealed  # noqa: E402
+
 EMULATED, PALPATE = sys.argv[1:3]
 GRAVITY = 9.80665
 PATIENCE = 60  # s
@@ -167,6 +170,7 @@ class Devices(unittest.TestCase):
         # The mocked bus drops ticks on a busy machine; another test limits the procedure's own error to 2 %.
         self.assertAlmostEqual(force["counts_per_newton_metre"] / -5000, 1, delta=0.1)
         self.assertEqual(force["weights_kg"], [0.25])
+        self.assertEqual(force, sealed(force))
 
         _, out, _ = self.run_devices([], "--device", "falcon", "--calibration", self.calibration)
         self.assertIn("0 days ago", out)

@@ -91,6 +91,31 @@ TEST(FalconCalibration, OnlyScalesPossibleByWeighingAreAccepted) {
   for (const double counts : {-2e5, -1e4, -500.0}) EXPECT_EQ(refusal(scaled(counts)), "") << counts;
 }
 
+TEST(FalconCalibration, AChangedNumberIsRefusedByItsChecksum) {
+  const std::string text = to_json(example());
+  for (const auto& [there, other] : {std::pair("-4812.5", "-4912.5"),
+                                     {"\"A1\"", "\"A2\""},
+                                     {"0.12,", "0.13,"},
+                                     {"2026-10-31", "2026-11-01"}}) {
+    std::string changed = text;
+    changed.replace(changed.find(there), std::string(there).size(), other);
+    EXPECT_NE(refusal(changed).find("/sha256: expected the checksum"), std::string::npos) << there;
+  }
+}
+
+TEST(FalconCalibration, OneWithoutAChecksumIsStaleAndStaysSo) {
+  Calibration calibration = example();
+  calibration.forces[0].sealed = calibration.pairs[0].sealed = false;
+  Calibration back = parse_calibration(to_json(calibration), "c.json");
+  for (const CalibrationVerdict& verdict :
+       {judge_forces(back, {"A1"}, kNow), judge_pair(back, "A1", "B2", kNow)}) {
+    EXPECT_EQ(verdict.state, CalibrationState::stale);
+    EXPECT_NE(verdict.text.find("no checksum"), std::string::npos) << verdict.text;
+  }
+  back.put({"B2", -5000, 0.01, 0.02, 0.3, {0.1}, "2026-11-01T00:00:00Z"});
+  EXPECT_EQ(to_json(back).find("sha256"), to_json(back).rfind("sha256"));  // that of B2 alone
+}
+
 TEST(FalconCalibration, AScaleFarFromAFalconsIsImplausible) {
   for (const auto& [counts, state] :
        {std::pair(-1e4, CalibrationState::good), std::pair(-2500.0, CalibrationState::good),

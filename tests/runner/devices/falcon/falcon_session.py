@@ -14,6 +14,8 @@ from emulator_control import EmulatorControl
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "session"))
 from terminal import Terminal  # noqa: E402
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[3] / "shared"))
+from sealed_json import sealed  # noqa: E402
 
 EMULATED, PALPATE = sys.argv[1:3]
 PATIENCE = 120  # s; only a hang reaches it
@@ -43,8 +45,8 @@ class FalconSession(unittest.TestCase):
         made = datetime.datetime.now(datetime.timezone.utc) - datetime.timedelta(days=days_ago)
         path = self.folder / "lab.json"
         path.write_text(json.dumps({"version": 1, "forces": [
-            {"serial": serial, "counts_per_newton_metre": counts, "weights_kg": [0.1],
-             "made_utc": made.strftime("%Y-%m-%dT%H:%M:%SZ")}]}))
+            sealed({"serial": serial, "counts_per_newton_metre": counts, "weights_kg": [0.1],
+                    "made_utc": made.strftime("%Y-%m-%dT%H:%M:%SZ")})]}))
         return path
 
     def run_session(self, *options, emulator=()):
