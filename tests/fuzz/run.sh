@@ -7,7 +7,7 @@ seconds="${1:-10}"
 shift || true
 targets=("$@")
 [ ${#targets[@]} -gt 0 ] || targets=(protocol scene unions surface csv obj stl ply off 3mf packets samples database settings printable trajectory
-  gltf msh pattern sweep_space advisor haply serve_messages)
+  gltf msh pattern sweep_space advisor haply serve_messages study_files)
 
 cmake --preset asan > /dev/null
 cmake --build --preset asan --target "${targets[@]/#/fuzz_}"
