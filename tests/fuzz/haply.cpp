@@ -32,6 +32,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       try {
         const std::string said = haply::command(one.id, {1, -2, 3}, haply::Dialect::vector, true);
         if (!nlohmann::json::parse(said).is_object()) std::abort();
+        const std::string set = haply::configuration(one.id, haply::PresetForm::object);
+        if (!nlohmann::json::parse(set).is_object()) std::abort();
       } catch (const std::runtime_error&) {  // so long a name
       }
     }

@@ -79,14 +79,65 @@ void each(const Json& message, const char* array, Take take) {
     if (!text(one, "device_id").empty()) take(one);
 }
 
-/// Whether a mount or transform moves positions: it has numbers other than 0 and 1.
-bool moves(const Json& transform) {
-  if (transform.is_structured()) {
-    for (const Json& part : transform)
-      if (moves(part)) return true;
+constexpr double kTurned = 1e-3, kScaled = 1e-3, kShifted = 1e-4;  // rad/2, of 1, m; rounding
+
+/// Whether a number that is left out, as those of an identity are, or given differs from
+/// `identity`.
+bool differs(const Json& of, const char* name, double identity, double tolerance) {
+  const Json* const found = member(of, name);
+  return found != nullptr &&
+         !(found->is_number() && std::abs(found->get<double>() - identity) <= tolerance);
+}
+
+/// How a mount or transform changes positions: "turned", "scaled", "moved"; empty: not at all.
+/// \param shifts  whether a position other than zero counts
+std::string change_of(const Json& transform, bool shifts) {
+  const auto any = [&transform](const char* part, double identity, double tolerance) {
+    const Json* const found = member(transform, part);
+    if (found == nullptr) return false;
+    for (const char* axis : {"x", "y", "z"})
+      if (differs(*found, axis, identity, tolerance)) return true;
     return false;
+  };
+  // A half turn has w = 0, which is left out or told; an identity has x = y = z = 0 and w = 1 or
+  // -1.
+  const Json* const rotation = member(transform, "rotation");
+  if (any("rotation", 0, kTurned) || (rotation != nullptr && differs(*rotation, "w", 1, kTurned) &&
+                                      differs(*rotation, "w", -1, kTurned)))
+    return "turned";
+  if (any("scale", 1, kScaled)) return "scaled";
+  if (shifts && any("position", 0, kShifted)) return "moved";
+  return "";
+}
+
+/// How an arm's workspace, basis or mount change positions; empty: they are the world's.
+std::string change_of_arm(const Json& arm) {
+  if (const Json* const state = member(arm, "state")) {
+    if (const Json* const workspace = member(*state, "transform")) {
+      const std::string change = change_of(*workspace, true);
+      if (!change.empty()) return "its workspace is " + change + " (\"transform\")";
+    }
   }
-  return transform.is_number() && transform.get<double>() != 0 && transform.get<double>() != 1;
+  const Json* const config = member(arm, "config");
+  if (config == nullptr) return "";
+  if (const Json* const basis = member(*config, "basis")) {
+    const std::string order = text(*basis, "permutation", "XYZ");
+    if (order != "XYZ" && order != "+X+Y+Z") return "its axes are permuted (basis " + order + ")";
+  }
+  if (const Json* const mount = member(*config, "mount")) {
+    // The preset places the origin by it.
+    const std::string change = change_of(*mount, false);
+    if (!change.empty()) return "its mount is " + change;
+  }
+  return "";
+}
+
+/// Why the arm's weight is not compensated as it should; empty: it is, or is not told.
+std::string trouble_of_gravity(const Json& config) {
+  const Json* const gravity = member(config, "gravity_compensation");
+  if (gravity == nullptr) return "";
+  if (!flag(*gravity, "enabled", true)) return "off";
+  return differs(*gravity, "scaling_factor", 1, kScaled) ? "scaled" : "";
 }
 
 std::uint8_t buttons_of(const Json& state) {
@@ -139,12 +190,12 @@ Inventory parse_inventory(std::string_view message) {
     Listed one;
     one.id = text(arm, "device_id");
     if (const Json* const config = member(arm, "config")) {
-      if (const Json* const basis = member(*config, "basis"))
-        one.basis = text(*basis, "permutation", "XYZ");
-      if (const Json* const mount = member(*config, "mount")) one.mounted = moves(*mount);
+      one.preset = text(*config, "preset");
+      one.gravity = trouble_of_gravity(*config);
       if (const Json* const filters = member(*config, "filters"))
         one.filters = filters->dump(-1, ' ', true, Json::error_handler_t::replace);
     }
+    one.moved = change_of_arm(arm);
     if (const Json* const status = member(arm, "status")) {
       one.in_use = flag(*status, "in_use", false);
       one.calibrated = flag(*status, "calibrated", true);
@@ -171,6 +222,9 @@ State parse_state(std::string_view message, const std::string& arm, const std::s
     out.has_arm = true;
     out.position = *position;
     out.force = vector(*state, "current_cursor_force").value_or(Vec3(std::nan("")));
+    const Json* const config = member(one, "config");
+    const std::string preset = config != nullptr ? text(*config, "preset", kPreset) : kPreset;
+    out.moved = preset != kPreset || !change_of_arm(one).empty();
     if (const Json* const status = member(one, "status")) {
       out.calibrated = flag(*status, "calibrated", true);
       out.powered = flag(*status, "power_supply", true);
@@ -195,20 +249,28 @@ State parse_state(std::string_view message, const std::string& arm, const std::s
   return out;
 }
 
-std::string command(const std::string& arm, const Vec3& force, Dialect dialect, bool first) {
+std::string command(const std::string& arm, const Vec3& force, Dialect dialect, bool full) {
   std::array<char, 512> out{};
   // The id comes from the service's list; escape it for JSON.
   const std::string id = Json(arm).dump(-1, ' ', true, Json::error_handler_t::replace);
   const char* const key = dialect == Dialect::vector ? "vector" : "values";
   const int size = std::snprintf(
       out.data(), out.size(),
-      R"({%s"inverse3":[{"device_id":%s,%s"commands":{"set_cursor_force":{"%s":{"x":%.6g,"y":%.6g,"z":%.6g}}}}]})",
-      first ? R"("session":{"configure":{"profile":{"name":"palpate"}}},)" : "", id.c_str(),
-      first ? R"("configure":{"preset":"arm_front_centered"},)" : "", key, force.x, force.y,
+      R"({%s"inverse3":[{"device_id":%s,"commands":{"set_cursor_force":{"%s":{"x":%.6g,"y":%.6g,"z":%.6g}}}}]})",
+      full ? R"("session":{"force_render_full_state":{}},)" : "", id.c_str(), key, force.x, force.y,
       force.z);
   if (size < 0 || static_cast<std::size_t>(size) >= out.size())
     throw std::runtime_error("the device's name is too long for a command");
   return {out.data(), static_cast<std::size_t>(size)};
+}
+
+std::string configuration(const std::string& arm, PresetForm form) {
+  const Json preset = form == PresetForm::object ? Json{{"preset", kPreset}} : Json(kPreset);
+  const Json session = {{"configure", {{"profile", {{"name", "palpate"}}}}},
+                        {"force_render_full_state", Json::object()}};
+  const Json one = {{"device_id", arm}, {"configure", {{"preset", preset}}}};
+  return Json{{"session", session}, {"inverse3", Json::array({one})}}.dump(
+      -1, ' ', true, Json::error_handler_t::replace);
 }
 
 namespace {
@@ -223,6 +285,8 @@ constexpr double kMaxSpeed = 5, kJump = 1e-3;        // m/s and m
 constexpr auto kPatience = std::chrono::seconds(2);  // for the list of devices
 constexpr auto kWait = std::chrono::milliseconds(5);  // for a reply, before a look at quit_
 constexpr int kWaitsUntilZero = 3;                    // without a reply the force becomes zero
+constexpr std::int64_t kFullState_ns = 100'000'000;   // between two looks at the configuration
+constexpr int kFullStates = 20;                       // asked for before a preset counts as ignored
 constexpr int kMostUnanswered = 20;                   // zeros sent to such a service
 
 // A reseller's numbers; the reach is the limit in the maker's tutorials.
@@ -242,6 +306,51 @@ Inventory inventory_of(Link& link) {
   std::string_view message;
   if (!link.receive(message, kPatience)) throw LinkError("it sent no list of devices");
   return parse_inventory(message);
+}
+
+/// What the service tells of the arm after a message; none: nothing of its configuration.
+std::optional<Listed> asked(Link& link, const std::string& message, const std::string& arm) {
+  link.send(message);
+  std::string_view reply;
+  if (!link.receive(reply, kPatience)) throw LinkError("it does not answer");
+  const Json all = parsed(reply, "a state");
+  bool told = false;
+  each(all, "inverse3", [&](const Json& one) {
+    told = told || (text(one, "device_id") == arm && member(one, "config") != nullptr);
+  });
+  if (!told) return std::nullopt;
+  for (Listed& one : parse_inventory(reply).arms)
+    if (one.id == arm) return std::move(one);
+  return std::nullopt;
+}
+
+/// Sets the preset in the form of the service's version, else in the other, and reads it back.
+/// Nothing is commanded meanwhile. \throws std::runtime_error naming what is not as it must be
+Listed configure(Link& link, const std::string& arm, const ServiceVersion& version,
+                 Dialect dialect) {
+  const bool documented = version.major > 3 || version.minor >= 5;
+  std::optional<Listed> told;
+  for (const bool first : {true, false}) {
+    const PresetForm form = documented == first ? PresetForm::object : PresetForm::name;
+    std::string message = configuration(arm, form);
+    for (int i = 0; i < kFullStates; ++i) {
+      if (std::optional<Listed> now = asked(link, message, arm)) told = std::move(now);
+      // An older service may report no preset: then send both forms, and look at the rest.
+      if (told && told->preset == kPreset) return *told;
+      message = command(arm, Vec3(0), dialect, true);
+      servo::RealClock clock;
+      clock.wait_until(clock.now_ns() + 5'000'000);
+    }
+  }
+  if (!told)
+    throw std::runtime_error("it does not tell the configuration of the Inverse3 '" +
+                             printable(arm) + "', so its axes and its origin are unknown");
+  if (told->preset.empty() && !documented) return *told;
+  throw std::runtime_error("the Inverse3 '" + printable(arm) + "' does not take the preset '" +
+                           kPreset + "' and stays in '" +
+                           (told->preset.empty() ? "not told" : printable(told->preset)) +
+                           "', so its origin is not in the middle of its reach: set that preset "
+                           "in the maker's program");
 }
 
 servo::DeviceCapabilities capabilities_of(bool grip) {
@@ -281,14 +390,13 @@ void Pump::run() noexcept {
   servo::RealClock clock;
   std::int64_t due = clock.now_ns();
   try {
-    exchange(true);
     while (!quit_.load()) {
-      exchange(false);
+      exchange();
       due = std::max(due + kExchange_ns, clock.now_ns() - kExchange_ns);
       clock.wait_until(due);
     }
     wanted_.write({});
-    exchange(false);
+    exchange(true);
   } catch (const LinkError&) {
     give_up();
   } catch (const std::exception&) {  // of a message: the connection may still carry a command
@@ -307,8 +415,8 @@ void Pump::give_up() noexcept {
   newest_.write(last_);
 }
 
-void Pump::send(const Vec3& force, bool first) {
-  link_->send(command(settings_.arm, force, settings_.dialect, first));
+void Pump::send(const Vec3& force, bool full) {
+  link_->send(command(settings_.arm, force, settings_.dialect, full));
 }
 
 std::optional<Pump::Reply> Pump::receive() {
@@ -330,7 +438,7 @@ std::optional<Pump::Reply> Pump::receive() {
   return newest;
 }
 
-void Pump::exchange(bool first) {
+void Pump::exchange(bool last) {
   servo::RealClock clock;
   Wanted wanted;
   while (!wanted_.read(wanted)) {
@@ -338,7 +446,10 @@ void Pump::exchange(bool first) {
   const std::int64_t asked_ns = clock.now_ns(), age = asked_ns - wanted.time_ns;
   Vec3 force(wanted.x, wanted.y, wanted.z);
   if (static_cast<double>(age) * 1e-9 > settings_.silence || !finite(force)) force = Vec3(0);
-  send(force, first);
+  // Another program may change the configuration at any time, by HTTP.
+  const bool full = !last && asked_ns - asked_full_ns_ > kFullState_ns;
+  if (full) asked_full_ns_ = asked_ns;
+  send(force, full);
   if (wanted.time_ns != sent_wanted_ns_) {
     sent_wanted_ns_ = wanted.time_ns;
     force_ns_.store(clock.now_ns());
@@ -352,7 +463,8 @@ void Pump::exchange(bool first) {
   } else if (before == servo::DeviceTrouble::unplugged) {
     last_.trouble = servo::DeviceTrouble::none;
   }
-  watch(force, reply->hash);
+  if (reply->state.moved) last_.trouble = servo::DeviceTrouble::in_use;
+  watch(force, full ? last_message_ : reply->hash);  // a full state always differs from the others
   newest_.write(last_);
 }
 
@@ -411,10 +523,6 @@ void Inverse3Device::open() {
     if (arm->in_use)
       throw std::runtime_error("another program commands the Inverse3 '" + arm->id +
                                "', and the forces of both would add up: end that program");
-    if (arm->basis != "XYZ" || arm->mounted)
-      throw std::runtime_error(
-          "the axes of the Inverse3 '" + arm->id +
-          "' are permuted or moved by the service: set its basis to XYZ, without mount");
     Pump::Settings settings;
     settings.arm = arm->id;
     has_grip_ = may_have_grip_ && !found.grips.empty();
@@ -422,11 +530,21 @@ void Inverse3Device::open() {
     const bool vector = (dialect_of(version) == Dialect::vector) != other_dialect_;
     settings.dialect = vector ? Dialect::vector : Dialect::values;
     settings.silence = std::max(0.005, 5 / config_.rate);
+    const Listed now = configure(*link, arm->id, version, settings.dialect);
+    if (!now.moved.empty())
+      throw std::runtime_error("positions of the Inverse3 '" + printable(arm->id) +
+                               "' are changed by another program's settings: " + now.moved +
+                               "; end that program and reset them in the maker's program");
+    if (!now.gravity.empty())
+      throw std::runtime_error("the gravity compensation of the Inverse3 '" + printable(arm->id) +
+                               "' is " + now.gravity +
+                               ", so the hand would carry the arm: switch it on, with factor 1");
     capabilities_ = capabilities_of(has_grip_);
     capabilities_.serial = arm->id;
     capabilities_.calibration = "maker's: Inverse3 " + arm->id + ", Inverse Service " +
-                                version.text + ", filters " +
-                                (arm->filters.empty() ? "not told" : arm->filters);
+                                version.text + ", preset " +
+                                (now.preset.empty() ? "not told" : now.preset) + ", filters " +
+                                (now.filters.empty() ? "not told" : now.filters);
     pump_ = std::make_unique<Pump>(std::move(link), settings);
   } catch (const std::runtime_error& error) {
     throw std::runtime_error(advice_for(service, error.what()));

@@ -40,11 +40,17 @@ Dialect dialect_of(const ServiceVersion& version);
 /// From the reply to GET /settings/devices/force_scale; none: the service does not report it.
 std::optional<double> parse_force_scale(std::string_view reply);
 
-/// One arm or grip in the list of the first message.
+/// How a service expects a preset: 3.5 documents an object; older ones may take the name alone. An
+/// unknown form is ignored without an error.
+enum class PresetForm { object, name };
+inline constexpr const char* kPreset = "arm_front_centered";  ///< origin in the middle of the reach
+
+/// One arm or grip in a full state.
 struct Listed {
   std::string id;
-  std::string basis = "XYZ";  ///< of an arm: order of its axes
-  bool mounted = false;       ///< of an arm: positions are transformed
+  std::string preset;   ///< of an arm; empty: not told
+  std::string moved;    ///< of an arm: how positions are turned, scaled or moved; empty: not
+  std::string gravity;  ///< of an arm: why its weight is not compensated; empty: it is
   bool in_use = false, calibrated = true;
   std::string filters;  ///< of an arm: the service's filters of forces as JSON; for the record
 };
@@ -62,13 +68,16 @@ struct State {
   std::uint8_t buttons = 0;
   bool has_arm = false, has_grip = false;
   bool calibrated = true, powered = true;
+  bool moved = false;  ///< another program has changed the arm's preset, basis or transform
 };
 /// The newest state of the arm and, unless `grip` is empty, the grip. Values missing from the
 /// message are missing from the result. \throws std::runtime_error if it is not such a message
 State parse_state(std::string_view message, const std::string& arm, const std::string& grip);
 
-/// A command with a force on the hand, N. \param first  with the session's configuration
-std::string command(const std::string& arm, const Vec3& force, Dialect dialect, bool first);
+/// A command with a force on the hand, N. \param full  asks for the full state
+std::string command(const std::string& arm, const Vec3& force, Dialect dialect, bool full);
+/// Names the session, sets the preset, and asks for the full state.
+std::string configuration(const std::string& arm, PresetForm form);
 
 inline constexpr const char* kService = "127.0.0.1:10001";
 
@@ -111,8 +120,8 @@ class Pump {
   };
   void run() noexcept;
   void give_up() noexcept;
-  void exchange(bool first);
-  void send(const Vec3& force, bool first = false);
+  void exchange(bool last = false);
+  void send(const Vec3& force, bool full = false);
   /// The reply to the last command; none: the pump ends. Sends zeros while it does not arrive.
   std::optional<Reply> receive();
   void watch(const Vec3& sent, std::size_t hash) noexcept;
@@ -131,6 +140,7 @@ class Pump {
   std::size_t last_message_ = 0;     ///< hash
   std::int64_t changed_ns_ = 0;      ///< time of the last message that differed from the one before
   bool sent_changed_ = false;        ///< since changed_ns_
+  std::int64_t asked_full_ns_ = 0;   ///< time of the last request for the full state
   std::int64_t unanswered_ns_ = 0;   ///< start of sending a force that the service does not report
   std::thread thread_;
 };

@@ -1,11 +1,12 @@
 // An emulated Inverse Service, to try palpate without a device:
 //   emulated_inverse_service [PORT]      then: palpate run ... --device inverse3 --service
 //   127.0.0.1:PORT Lines on standard input change it: "hand X Y Z" (m), "grip W X Y Z", "stiffness
-//   N_PER_M", "version TEXT", "set NAME 0|1" (present, in_use, calibrated, powered, awake, button,
-//   mute, frozen), "delay S", "second LINE" (the same for the second arm, which exists once
-//   "present" is set), "service 0|1" (0 ends all connections), "stroke" (the hand moves to and fro
-//   by itself), "state" (prints force and commands as JSON). It ends with its input, unless the
-//   hand strokes.
+//   N_PER_M", "version TEXT", "preset TEXT",
+//   "workspace SCALE" (left behind by another program), "set NAME 0|1" (present, in_use,
+//   calibrated, powered, awake, button, mute, frozen), "delay S", "second LINE" (the same for the
+//   second arm, which exists once "present" is set), "service 0|1" (0 ends all connections),
+//   "stroke" (the hand moves to and fro by itself), "state" (prints force and commands as JSON). It
+//   ends with its input, unless the hand strokes.
 
 #include <chrono>
 #include <cmath>
@@ -66,6 +67,8 @@ int main(int argc, char** argv) {
       if (word == "stiffness") words >> arm.hand_stiffness;
       if (word == "delay") words >> arm.delay;
       if (word == "version") words >> arm.version;
+      if (word == "preset") words >> arm.preset;
+      if (word == "workspace") words >> arm.workspace_scale;
       std::string name;
       if (word == "set" && words >> name && flags.count(name) > 0) words >> arm.*flags.at(name);
       if (word == "state")

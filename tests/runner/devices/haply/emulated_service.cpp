@@ -29,7 +29,54 @@ struct EmulatedService::Sockets {
 
 namespace {
 
+constexpr double kBase_y = 0.208;  // m, from the base of the arm to the middle of its reach
+
+bool starts(const std::string& preset, const char* how) { return preset.rfind(how, 0) == 0; }
+bool ends(const std::string& preset) { return preset.find("_centered") != std::string::npos; }
+
 Json vector(const std::array<double, 3>& v) { return {{"x", v[0]}, {"y", v[1]}, {"z", v[2]}}; }
+
+/// Numbers of an identity are left out of a state.
+Json transform_of(const EmulatedArm& arm) {
+  Json out = Json::object();
+  if (arm.workspace_y != 0) out["position"] = vector({0, arm.workspace_y, 0});
+  if (arm.workspace_scale != 1)
+    out["scale"] = vector({arm.workspace_scale, arm.workspace_scale, arm.workspace_scale});
+  return out;
+}
+
+Json config_of(const EmulatedArm& arm) {
+  const bool turned = starts(arm.preset, "led");
+  Json mount = {{"position", vector({0, ends(arm.preset) ? -kBase_y : 0, 0})},
+                {"rotation", {{"w", turned ? 0 : 1}, {"x", 0}, {"y", 0}, {"z", turned ? 1 : 0}}},
+                {"scale", vector({arm.mount_scale, arm.mount_scale, arm.mount_scale})}};
+  Json out = {{"type", "inverse3"},
+              {"gravity_compensation", {{"enabled", arm.gravity}, {"scaling_factor", 1.0}}},
+              {"basis", {{"permutation", arm.basis}}},
+              {"mount", mount},
+              {"filters", {{"force_gate", {{"gain", 0.3}}}}}};
+  if (arm.tells_preset) out["preset"] = arm.preset;
+  return out;
+}
+
+/// What a client reads for a place of the hand in the world.
+std::array<double, 3> cursor_of(const EmulatedArm& arm, std::array<double, 3> at) {
+  if (!ends(arm.preset)) at[1] += kBase_y;
+  if (starts(arm.preset, "led")) at[0] = -at[0], at[1] = -at[1];
+  for (double& part : at) part *= arm.workspace_scale * arm.mount_scale;
+  at[1] += arm.workspace_y;
+  return at;
+}
+
+/// A preset in one of its forms; another form is ignored.
+void configure(EmulatedArm& arm, const Json& wanted) {
+  using Takes = EmulatedArm::Takes;
+  const bool object = wanted.is_object() && wanted.contains("preset");
+  if (object && (arm.takes == Takes::object || arm.takes == Takes::both))
+    arm.preset = wanted["preset"];
+  if (wanted.is_string() && (arm.takes == Takes::name || arm.takes == Takes::both))
+    arm.preset = wanted;
+}
 
 }  // namespace
 
@@ -103,11 +150,10 @@ void EmulatedService::accept() {
         stream.accept(request);
         stream.text(true);
         stream.write(asio::buffer(inventory()));
-        for (bool first = true;; first = false) {
+        for (;;) {
           beast::flat_buffer message;
           stream.read(message);
           const std::string text = beast::buffers_to_string(message.data());
-          if (first) with([&text](EmulatedArm& changed) { changed.first = text; });
           const double delay = arm().delay;
           if (delay > 0) std::this_thread::sleep_for(std::chrono::duration<double>(delay));
           bool mute = false;
@@ -130,12 +176,8 @@ std::string EmulatedService::inventory() {
     if (!arm.present) continue;
     all["inverse3"].push_back(
         {{"device_id", arm.id},
-         {"config",
-          {{"type", "inverse3"},
-           {"basis", {{"permutation", arm.basis}}},
-           {"mount", Json::object()},
-           {"filters", {{"force_gate", {{"gain", 0.3}}}}}}},
-         {"state", Json::object()},
+         {"config", config_of(arm)},
+         {"state", {{"transform", transform_of(arm)}}},
          {"status", {{"calibrated", arm.calibrated}, {"in_use", arm.in_use}}}});
   }
   if (arms_[0].has_grip)
@@ -147,13 +189,16 @@ std::string EmulatedService::answer(const std::string& message, bool& mute,
                                     std::array<bool, 2>& commanded) {
   const std::scoped_lock lock(mutex_);
   const Json in = Json::parse(message);
+  const bool full = in.contains("session") && in["session"].contains("force_render_full_state");
   Json out = {{"inverse3", Json::array()}, {"verse_grip", Json::array()}};
   for (std::size_t i = 0; i < arms_.size(); ++i) {
     EmulatedArm& arm = arms_[i];
     // Ignore unknown keys; a command counts once, and only this client's.
     std::array<double, 3> force{0, 0, 0};
     for (const Json& one : in.value("inverse3", Json::array())) {
-      if (one.value("device_id", "") != arm.id || !one.contains("commands")) continue;
+      if (one.value("device_id", "") != arm.id) continue;
+      if (one.contains("configure")) configure(arm, one["configure"].value("preset", Json()));
+      if (!one.contains("commands")) continue;
       commanded[i] = true;
       ++arm.commands;
       const Json& wanted = one["commands"].value("set_cursor_force", Json::object());
@@ -171,10 +216,13 @@ std::string EmulatedService::answer(const std::string& message, bool& mute,
     out["inverse3"].push_back(
         {{"device_id", arm.id},
          {"state",
-          {{"cursor_position", vector(at)},
+          {{"cursor_position", vector(cursor_of(arm, at))},
+           {"transform", transform_of(arm)},
            {"cursor_velocity", vector({0, 0, 0})},
            {"current_cursor_force", vector(arm.force)}}},
          {"status", {{"calibrated", arm.calibrated}, {"power_supply", arm.powered}}}});
+    arm.full_states += full ? 1 : 0;
+    if (full) out["inverse3"].back()["config"] = config_of(arm);
   }
   const EmulatedArm& first = arms_[0];
   mute = first.mute;

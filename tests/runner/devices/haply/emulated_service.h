@@ -16,9 +16,17 @@ namespace palpate::runner::devices::testing {
 /// State set and read by a test.
 struct EmulatedArm {
   std::string id = "049D", version = "3.5.0.0", basis = "XYZ";
+  std::string preset = "defaults";  ///< stays when its client has gone
+  enum class Takes { object, name, both, nothing } takes = Takes::object;  ///< form of a preset
   bool vector = true;  ///< the key under which it takes forces; else "values"
+  bool tells_preset = true;
   double force_scale = 1;
-  std::array<double, 3> hand{0, 0, 0};     ///< m
+  double workspace_scale = 1;              ///< of "transform", left behind by another program
+  double workspace_y = 0;                  ///< m, of the same
+  double mount_scale = 1;                  ///< of a mount that no preset replaces
+  bool gravity = true;                     ///< compensated
+  std::uint64_t full_states = 0;           ///< asked for
+  std::array<double, 3> hand{0, 0, 0};     ///< m, about the middle of its reach
   double hand_stiffness = 400;             ///< N/m; 0: rigid
   std::array<double, 4> grip{1, 0, 0, 0};  ///< w, x, y, z
   bool has_grip = true, awake = true, present = true, in_use = false, calibrated = true,
@@ -27,7 +35,6 @@ struct EmulatedArm {
   std::string instead;                   ///< sent instead of a state; "": unused
   std::array<double, 3> force{0, 0, 0};  ///< N, of a real device
   std::uint64_t commands = 0;
-  std::string first;  ///< message of the last connection
 };
 
 class EmulatedService {

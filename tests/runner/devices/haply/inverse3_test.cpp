@@ -76,16 +76,48 @@ TEST(HaplyMessages, VersionsAreReadBareAndWrapped) {
   EXPECT_EQ(parse_force_scale(""), std::nullopt);
 }
 
-TEST(HaplyMessages, TheFirstCommandConfiguresAndTheForceHasTheDialectsKey) {
+TEST(HaplyMessages, TheForceHasTheDialectsKey) {
   EXPECT_EQ(
       command("A\"", {1, -0.5, 0}, Dialect::values, false),
       R"({"inverse3":[{"device_id":"A\"","commands":{"set_cursor_force":{"values":{"x":1,"y":-0.5,"z":0}}}}]})");
-  const std::string first = command("A", {0, 0, 0}, Dialect::vector, true);
-  EXPECT_NE(first.find(R"("session":{"configure":{"profile":{"name":"palpate"}}})"),
-            std::string::npos);
-  EXPECT_NE(first.find("arm_front_centered"), std::string::npos);
-  EXPECT_NE(first.find(R"("vector")"), std::string::npos);
+  EXPECT_EQ(
+      command("A", {0, 0, 0}, Dialect::vector, true),
+      R"({"session":{"force_render_full_state":{}},"inverse3":[{"device_id":"A","commands":{"set_cursor_force":{"vector":{"x":0,"y":0,"z":0}}}}]})");
   EXPECT_THROW(command(std::string(600, 'a'), {}, Dialect::vector, false), std::runtime_error);
+}
+
+TEST(HaplyMessages, ThePresetHasTheDocumentedForm) {
+  EXPECT_EQ(
+      configuration("A", PresetForm::object),
+      R"({"inverse3":[{"configure":{"preset":{"preset":"arm_front_centered"}},"device_id":"A"}],"session":{"configure":{"profile":{"name":"palpate"}},"force_render_full_state":{}}})");
+  EXPECT_NE(
+      configuration("A", PresetForm::name).find(R"("configure":{"preset":"arm_front_centered"},)"),
+      std::string::npos);
+}
+
+TEST(HaplyMessages, ATurnedScaledOrMovedArmIsNamed) {
+  const auto change = [](const std::string& config, const std::string& transform = "{}") {
+    return parse_inventory(R"({"inverse3":[{"device_id":"A","config":)" + config +
+                           R"(,"state":{"transform":)" + transform + "}}]}")
+        .arms.at(0)
+        .moved;
+  };
+  EXPECT_EQ(change("{}"), "");
+  EXPECT_EQ(
+      change(
+          R"({"mount":{"position":{"x":0,"y":-0.2,"z":0},"rotation":{"w":-1,"x":0,"y":0,"z":0}}})"),
+      "")
+      << "the preset places the origin; -1 is no turn either";
+  EXPECT_EQ(change(R"({"mount":{"rotation":{"w":0,"x":0,"y":0,"z":1}}})"), "its mount is turned");
+  EXPECT_EQ(change(R"({"mount":{"rotation":{"z":1}}})"), "its mount is turned");
+  EXPECT_EQ(change(R"({"mount":{"rotation":{"w":0}}})"), "its mount is turned");
+  EXPECT_EQ(change(R"({"mount":{"scale":{"x":-1,"y":1,"z":1}}})"), "its mount is scaled");
+  EXPECT_EQ(change(R"({"mount":{"scale":{"x":0,"y":1,"z":1}}})"), "its mount is scaled");
+  EXPECT_EQ(change(R"({"basis":{"permutation":"XZY"}})"), "its axes are permuted (basis XZY)");
+  EXPECT_EQ(change("{}", R"({"scale":{"x":2}})"), "its workspace is scaled (\"transform\")");
+  EXPECT_EQ(change("{}", R"({"position":{"y":0.01}})"), "its workspace is moved (\"transform\")");
+  EXPECT_EQ(change("{}", R"({"rotation":{"w":"north"}})"),
+            "its workspace is turned (\"transform\")");
 }
 
 class Inverse3 : public ::testing::Test {
@@ -139,7 +171,7 @@ TEST_F(Inverse3, AStylusIsReadAndItsForcesAddUpAtTheCursor) {
   EXPECT_TRUE(until(*device,
                     [this](const servo::DeviceReading&) { return service_.arm().force[0] == 1; },
                     {1, 0, 0}));
-  EXPECT_NE(service_.arm().first.find("arm_front_centered"), std::string::npos);
+  EXPECT_EQ(service_.arm().preset, "arm_front_centered");
 }
 
 TEST_F(Inverse3, WithoutAGripItIsAPoint) {
@@ -285,6 +317,26 @@ TEST_F(Inverse3, WhatCannotBeOpenedSaysWhy) {
   };
   EXPECT_NE(said([](auto& a) { a.in_use = true; }).find("would add up"), std::string::npos);
   EXPECT_NE(said([](auto& a) { a.basis = "ZXY"; }).find("permuted"), std::string::npos);
+  EXPECT_NE(said([](auto& a) { a.workspace_scale = 2; }).find("its workspace is scaled"),
+            std::string::npos);
+  EXPECT_NE(said([](auto& a) { a.workspace_y = 0.05; }).find("its workspace is moved"),
+            std::string::npos);
+  EXPECT_NE(said([](auto& a) { a.mount_scale = 0.5; }).find("its mount is scaled"),
+            std::string::npos);
+  EXPECT_NE(said([](auto& a) { a.gravity = false; }).find("gravity compensation"),
+            std::string::npos);
+  EXPECT_NE(
+      said([](auto& a) { a.takes = EmulatedArm::Takes::nothing; }).find("stays in 'defaults'"),
+      std::string::npos);
+  EXPECT_NE(said([](auto& a) {
+              a.takes = EmulatedArm::Takes::nothing;
+              a.preset = "led_front";
+            }).find("stays in 'led_front'"),
+            std::string::npos);
+  EXPECT_NE(said([](auto& a) { a.tells_preset = false; }).find("stays in 'not told'"),
+            std::string::npos);
+  EXPECT_EQ(service_.arm().commands, 2U * 20 - 2) << "zero forces alone, that ask for the state";
+  EXPECT_EQ(service_.arm().force[0], 0);
   EXPECT_NE(said([](auto& a) { a.force_scale = 0.5; }).find("force_scale"), std::string::npos);
   EXPECT_NE(said([](auto& a) { a.version = "3.0.1"; }).find("3.1 or newer"), std::string::npos);
   EXPECT_NE(said([](auto& a) { a.present = false; }).find("lists no Inverse3"), std::string::npos);
@@ -295,6 +347,73 @@ TEST_F(Inverse3, WhatCannotBeOpenedSaysWhy) {
   EXPECT_NE(refusal().find("--service"), std::string::npos) << refusal();
   config_.service = "nowhere";
   EXPECT_NE(refusal().find("HOST:PORT"), std::string::npos) << refusal();
+}
+
+TEST_F(Inverse3, ThePresetIsSetInTheFormThatTheServiceTakes) {
+  using Takes = EmulatedArm::Takes;
+  for (const char* version : {"3.5.0.0", "3.4.0.0"}) {
+    for (const Takes takes : {Takes::object, Takes::name, Takes::both}) {
+      service_.with([&](EmulatedArm& arm) {
+        arm = EmulatedArm{};
+        arm.takes = takes;
+        arm.version = version;
+        arm.vector = arm.version == "3.5.0.0";
+        arm.hand = {0.01, 0.02, 0.03};
+        arm.hand_stiffness = 0;
+        arm.preset = "led_front";  // of the program before
+      });
+      const auto device = open(config_);
+      ASSERT_TRUE(works(*device));
+      EXPECT_LT(glm::length(device->read().stylus.tip - Vec3(0.01, 0.02, 0.03)), 1e-12);
+      EXPECT_GE(service_.arm().full_states, 1U);
+    }
+  }
+}
+
+TEST_F(Inverse3, ItOpensAgainInItsOwnPreset) {
+  for (int opening = 0; opening < 3; ++opening) {
+    const auto device = open(config_);
+    EXPECT_TRUE(works(*device));
+    device->reopen();
+    EXPECT_TRUE(works(*device));
+  }
+}
+
+TEST_F(Inverse3, AnOldServiceMayNotTellItsPreset) {
+  service_.with([](EmulatedArm& arm) {
+    arm.version = "3.2.0.0";
+    arm.vector = arm.tells_preset = false;
+  });
+  const auto device = open(config_);
+  EXPECT_TRUE(works(*device));
+  EXPECT_NE(device->capabilities().calibration.find("preset not told"), std::string::npos);
+}
+
+TEST_F(Inverse3, AnotherProgramThatMovesTheFrameTakesForcesOff) {
+  const struct {
+    const char* name;
+    std::function<void(EmulatedArm&)> change;
+  } cases[] = {{"scaled", [](EmulatedArm& a) { a.workspace_scale = 2; }},
+               {"moved", [](EmulatedArm& a) { a.workspace_y = 0.005; }},
+               {"preset", [](EmulatedArm& a) { a.preset = "led_front_centered"; }},
+               {"basis", [](EmulatedArm& a) { a.basis = "XZY"; }}};
+  for (const auto& [name, change] : cases) {
+    SCOPED_TRACE(name);
+    service_.with([](EmulatedArm& arm) { arm = EmulatedArm{}; });
+    const auto device = open(config_);
+    ASSERT_TRUE(until(*device,
+                      [this](const servo::DeviceReading&) { return service_.arm().force[2] == 1; },
+                      {0, 0, 1}));
+    service_.with(change);
+    EXPECT_TRUE(until(*device,
+                      [](const servo::DeviceReading& r) {
+                        return r.lost && r.trouble == servo::DeviceTrouble::in_use;
+                      },
+                      {0, 0, 1}));
+    EXPECT_TRUE(until(*device,
+                      [this](const servo::DeviceReading&) { return service_.arm().force[2] == 0; },
+                      {0, 0, 1}));
+  }
 }
 
 TEST_F(Inverse3, IsListedWithoutBeingCommanded) {
