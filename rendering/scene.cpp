@@ -131,6 +131,46 @@ void Scene::prepare_for_law(PartGroup& group) {
   }
 }
 
+Feel Scene::feel_of(std::uint32_t part) const {
+  const stimuli::Material& material = material_of(part);
+  return {material.stiffness, material.damping, material.friction_static,
+          material.friction_dynamic};
+}
+
+void Scene::set_feel(std::uint32_t part, const Feel& feel) noexcept {
+  stimuli::Material& material =
+      part < parts_.size() ? parts_[part].material : materials_[part - parts_.size()];
+  material.stiffness = feel.stiffness;
+  material.damping = feel.damping;
+  material.friction_static = feel.friction_static;
+  material.friction_dynamic = feel.friction_dynamic;
+  TickFeatures features = TickFeatures::of(features_index_);
+  features.damping |= material.damping != 0;
+  features.friction |= material.has_friction();
+  features_index_ = features.index();
+}
+
+bool Scene::differs_in_feel_only(const Scene& other) const {
+  const auto same_place = [](const auto& a, const auto& b) {
+    return a.to_world == b.to_world && a.position == b.position && a.object == b.object &&
+           a.group == b.group;
+  };
+  const auto same_part = [&](const ScenePart& a, const ScenePart& b) {
+    return same_place(a, b) && a.layer == b.layer && a.break_force == b.break_force &&
+           a.breaking == b.breaking && std::ranges::equal(a.mesh->vertices(), b.mesh->vertices());
+  };
+  const auto same_surface = [&](const PlacedSurface& a, const PlacedSurface& b) {
+    return same_place(a, b) && a.first_material == b.first_material &&
+           std::ranges::equal(a.surface->vertices(), b.surface->vertices()) &&
+           a.surface->triangles().size() == b.surface->triangles().size();
+  };
+  return motion_ == nullptr && other.motion_ == nullptr &&
+         features().unions == other.features().unions && groups_.size() == other.groups_.size() &&
+         materials() == other.materials() && segments() == other.segments() &&
+         std::ranges::equal(parts_, other.parts_, same_part) &&
+         std::ranges::equal(surfaces_, other.surfaces_, same_surface);
+}
+
 void Scene::add_surfaces(std::vector<SceneSurface> surfaces, TickFeatures& features) {
   constexpr double kRounding = 1e-12, kSkin = 1e-9, kThickestSkin = 1e-3;  // of the size
   constexpr double kOverSeam = 1.5;                                        // times its width

@@ -141,7 +141,16 @@ struct RenderState {
   OwnedMotion motion;                   ///< empty where nothing moves
 };
 
-/// Immutable; shared by the servo and the display.
+/// What of a material may change while it is touched: not the depths and strengths of layers.
+struct Feel {
+  double stiffness = 0;         ///< N/m
+  double damping = 0;           ///< N s/m
+  double friction_static = 0;   ///< coefficient
+  double friction_dynamic = 0;  ///< coefficient
+  bool operator==(const Feel&) const = default;
+};
+
+/// Immutable except for set_feel; shared by the servo and the display.
 class Scene {
  public:
   /// \param side_contact  false: leaves out the tree of edges, which only a segment needs
@@ -158,6 +167,14 @@ class Scene {
   const stimuli::Material& material_of(std::uint32_t part) const {
     return part < parts_.size() ? parts_[part].material : materials_[part - parts_.size()];
   }
+  /// Number of materials: of convex parts, then of surfaces' shells.
+  std::size_t materials() const { return parts_.size() + materials_.size(); }
+  Feel feel_of(std::uint32_t part) const;
+  /// In a scene without motion(). By the thread that renders it, between two ticks.
+  void set_feel(std::uint32_t part, const Feel& feel) noexcept;
+  /// Whether a tick of the other scene may continue a state of this one: nothing moves, and shapes,
+  /// poses, layers and tool are equal. Reads no material.
+  bool differs_in_feel_only(const Scene& other) const;
   const SceneMotion* motion() const { return motion_.get(); }
   /// Selects the tick that a renderer runs; from TickFeatures::kCount on, that of motion().
   TickFeatures features() const { return TickFeatures::of(features_index_); }

@@ -307,16 +307,15 @@ double place_on(const Surface& surface, const SurfacePatch& patch, const Vec3& t
 void SurfaceTool::add_contact(const SurfacePlane& plane, const Vec3& shift) {
   const PosedTool::Segment& segment = turned_.segments[plane.patch.segment];
   const SurfaceTriangle& triangle = surface_.triangles()[plane.patch.triangle()];
-  const stimuli::Material& material = surface_.materials()[triangle.shell];
   PlacedContact out;
   LoadedContact& c = out.loaded;
   c.contact.normal = placed_.world_vector(plane.normal);
   c.contact.depth = glm::dot(plane.normal, shift);
   c.normal_displacement = plane.multiplier;
-  c.stiffness = material.stiffness;
+  c.part = placed_.first_material + triangle.shell;
+  c.stiffness = tick_.scene.material_of(c.part).stiffness;
   c.force = c.stiffness * plane.multiplier;
   c.object = placed_.object;
-  c.part = placed_.first_material + triangle.shell;
   c.contact.type = ContactType::point_polygon;
   const Vec3 tip = segment.start + shift;
   if (tick_.sides && segment.along != Vec3(0)) {

@@ -146,10 +146,11 @@ void ServedScene::load(json scene) {
 
 void ServedScene::show(const protocols::SceneSpec& spec, const rendering::Renderer& renderer) {
   try {
-    servo_.prepare(SceneBuilder().build(
-                       spec.objects, renderer.side_contact(), tool_of(spec.tool), spec.gravity,
-                       spec.tool.radius > 0 ? spec.tool.radius : protocols::kSoftRadius),
-                   renderer, kFromHere);
+    const rendering::Scene scene = SceneBuilder().build(
+        spec.objects, renderer.side_contact(), tool_of(spec.tool), spec.gravity,
+        spec.tool.radius > 0 ? spec.tool.radius : protocols::kSoftRadius);
+    if (trial_ && servo_.change_feel(scene)) return;
+    servo_.prepare(scene, renderer, kFromHere);
   } catch (const stimuli::MeshError& error) {
     throw MessageRefused("bad-scene", error.what());
   }
@@ -177,7 +178,8 @@ void ServedScene::start(std::uint64_t client, const Message& message) {
       .asked_ns = clock_.now_ns(), .client = client, .id = message.id, .number = message.trial};
 }
 
-/// Restarts the scene with the value; its forces rise by the ramp.
+/// A material changes gradually under the hand. Anything else restarts the scene with the value:
+/// its forces rise by the ramp, once the stylus is outside.
 void ServedScene::set(std::uint64_t client, const Message& message) {
   if (scene_.is_null()) throw MessageRefused("no-scene", "load a scene first");
   if (trial_ && !trial_->holds) throw MessageRefused("running", "the scene is about to begin");

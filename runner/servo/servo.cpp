@@ -224,6 +224,8 @@ const Sample& Servo::tick() noexcept {
     limiter_.release();  // the ramp begins when forces go on
     return sample_;
   }
+  if (shown_->ramp != nullptr && !shown_->ramp->advance(shown_->scene, period_))
+    shown_->ramp = nullptr;
   // Construct it in place: an assignment would copy it.
   std::destroy_at(&sample_.rendering);
   ::new (&sample_.rendering) rendering::Rendering(shown_->renderer->tick(

@@ -13,6 +13,7 @@
 #include "rendering/bodies/soft/soft_scene.h"
 #include "rendering/renderer.h"
 #include "runner/servo/device.h"
+#include "runner/servo/feel_ramp.h"
 #include "runner/servo/force_limiter.h"
 #include "runner/servo/passivity.h"
 #include "runner/servo/ring.h"
@@ -39,8 +40,9 @@ struct TrialScene {
     poses = std::make_unique<Ring<rendering::BodyPose>>(std::min(ticks, kept) * bodies);
   }
 
-  const rendering::Scene scene;
+  rendering::Scene scene;
   const rendering::Renderer* renderer;
+  FeelRamp* ramp = nullptr;  ///< of the scene's materials; used only by the servo. Null: none
   rendering::RenderState state;  ///< used only by the servo while the scene is shown
   std::optional<rendering::RenderState> shadow;  ///< likewise; one tick behind, for keep_warm()
   HomeZone home;

@@ -267,7 +267,18 @@ void ServoThread::run() noexcept {
   servo_.stop();
 }
 
+void ServoThread::begin_ramp(FeelRamp* ramp) noexcept {
+  if (ramp == nullptr || current_ == nullptr) return;
+  current_->ramp = ramp;
+  ramp->begin(current_->scene);
+  ramp_taken_.store(ramp->number(), std::memory_order_release);
+}
+
 void ServoThread::take_requests() noexcept {
+  // First, so that the scene that it belongs to has been taken when it begins.
+  FeelRamp* const ramp = incoming_ramp_.load(std::memory_order_relaxed) != nullptr
+                             ? incoming_ramp_.exchange(nullptr, std::memory_order_acquire)
+                             : nullptr;
   if (incoming_.load(std::memory_order_relaxed) != nullptr) {
     current_ = incoming_.exchange(nullptr, std::memory_order_acquire);
     servo_.begin(*current_);
@@ -275,6 +286,7 @@ void ServoThread::take_requests() noexcept {
     felt_at_.reset();
     steps_left_ = 0;
   }
+  begin_ramp(ramp);
   rendering::BodyPull pull;
   if (servo_.shown() != nullptr && pull_.read(pull)) servo_.pull(pull);
   const std::uint64_t resumed = resume_.load(std::memory_order_relaxed);
@@ -290,6 +302,7 @@ void ServoThread::take_requests() noexcept {
     steps_left_ = 0;
     away_.store(0);
     if (lost_samples_) quality_.faults |= servo_fault::kSamplesLost;
+    begin_ramp(incoming_ramp_.exchange(nullptr));  // after a stop none is on its way
     stops_done_.store(asked, std::memory_order_release);
     bell_.ring();
   }
@@ -361,6 +374,7 @@ void ServoThread::publish_places(const Sample& sample) noexcept {
 void ServoThread::prepare(const rendering::Scene& scene, const rendering::Renderer& renderer,
                           const HomeZone& home) {
   auto shown = std::make_unique<ShownScene>(scene, renderer, home, realtime_, ring_.capacity());
+  scene_set_ |= ramp_taken_.load() != newest_ramp_;
   if (scene_set_) stop();
   if (!scene_set_) scenes_.clear();
   while (ring_.pop(popped_)) {
@@ -370,6 +384,27 @@ void ServoThread::prepare(const rendering::Scene& scene, const rendering::Render
   scenes_.push_back(std::move(shown));
   scene_set_ = true;
   incoming_.store(&scenes_.back()->trial, std::memory_order_release);
+}
+
+bool ServoThread::change_feel(const rendering::Scene& to) {
+  if (scenes_.empty()) return false;
+  ShownScene& shown = *scenes_.back();
+  if (!shown.soft.empty() || !rendering::soft_objects(to).empty() ||
+      !shown.trial.scene.differs_in_feel_only(to))
+    return false;
+  std::vector<FeelRamp::Change> changes;
+  for (std::uint32_t part = 0; part < to.materials(); ++part) {
+    const rendering::Feel feel = to.feel_of(part);
+    shown.changed[part] = shown.changed[part] || feel != shown.feel[part];
+    if (shown.changed[part]) changes.push_back({part, feel, {}});
+    shown.feel[part] = feel;
+  }
+  std::deque<FeelRamp>& ramps = shown.ramps;
+  while (!ramps.empty() && ramps.front().number() < ramp_taken_.load(std::memory_order_acquire))
+    ramps.pop_front();
+  ramps.emplace_back(++newest_ramp_, std::move(changes));
+  incoming_ramp_.store(&ramps.back(), std::memory_order_release);
+  return true;
 }
 
 const Sample& ServoThread::next() noexcept {

@@ -10,6 +10,7 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <deque>
 #include <memory>
 #include <optional>
 #include <span>
@@ -209,6 +210,10 @@ class ServoThread final : public TickSource {
 
   void prepare(const rendering::Scene& scene, const rendering::Renderer& renderer,
                const HomeZone& home) override;
+  /// Changes the materials of the scene of prepare() to those of this one by a ramp (FeelRamp),
+  /// while it is touched or stopped. \return false: more than materials differ, or something moves
+  /// in it: prepare it instead
+  bool change_feel(const rendering::Scene& to);
   /// Every sample since prepare, in order. If the ring overflowed, the first sample after the gap
   /// has kSamplesLost. If the thread is silent for too long (Patience), returns its last sample
   /// with kStalled and kTripped.
@@ -264,6 +269,7 @@ class ServoThread final : public TickSource {
   static int current_thread() noexcept;
   void run() noexcept;
   void take_requests() noexcept;
+  void begin_ramp(FeelRamp* ramp) noexcept;
   void go_on_when_back(const rendering::LineProbe& probe) noexcept;
   void count_step() noexcept;
   void publish(const Sample& sample) noexcept;
@@ -281,15 +287,23 @@ class ServoThread final : public TickSource {
   struct ShownScene {
     ShownScene(const rendering::Scene& what, const rendering::Renderer& how, const HomeZone& where,
                const RealtimeSettings& realtime, std::size_t ticks)
-        : trial(what, how, where, ticks), soft(trial.scene, realtime) {
+        : trial(what, how, where, ticks), soft(trial.scene, realtime), changed(what.materials()) {
       if (!soft.empty()) soft.attach(trial.state);
+      for (std::uint32_t part = 0; part < what.materials(); ++part)
+        feel.push_back(what.feel_of(part));
     }
     TrialScene trial;
     SoftThreads soft;
+    std::vector<rendering::Feel> feel;  ///< asked for last, by part; the servo's may be on the way
+    std::vector<bool> changed;          ///< by part
+    std::deque<FeelRamp> ramps;         ///< the last of them, until the servo has taken the next
   };
   std::vector<std::unique_ptr<ShownScene>>
       scenes_;  ///< owned by the session's thread; freed once the servo no longer uses them
   std::atomic<TrialScene*> incoming_{nullptr};
+  std::atomic<FeelRamp*> incoming_ramp_{nullptr};
+  std::atomic<std::uint64_t> ramp_taken_{0};  ///< number of the newest in use
+  std::uint64_t newest_ramp_ = 0;             ///< used by the session's thread
   std::atomic<std::uint32_t> stops_asked_{0}, stops_done_{0};
   std::atomic<std::uint64_t> resume_{0};  ///< ticks + 1; 0: no request
   std::atomic<double> away_{0};

@@ -357,14 +357,13 @@ void LiveTouch::stop_or_go_on(std::optional<std::vector<stimuli::ObjectSpec>> wa
   if (wanted) {
     const std::vector<stimuli::ObjectSpec> before = std::exchange(shown_, std::move(*wanted));
     try {
-      if (held) {
-        SceneBuilder builder;
-        static_cast<void>(
-            build_scene(builder, settings_.scene_path, with_objects(shown_), *settings_.renderer));
-        anew_ = true;
-      } else {
+      SceneBuilder builder;
+      const bool restarts = !servo_.change_feel(
+          build_scene(builder, settings_.scene_path, with_objects(shown_), *settings_.renderer));
+      anew_ = held && restarts;
+      if (restarts && !held) {
         prepare(shown_);
-        anew_ = stepping_ = false;
+        stepping_ = false;
       }
     } catch (const std::exception& fault) {
       shown_ = before;

@@ -538,6 +538,32 @@ class Serve(ServeCase):
             self.refused("bad-message", hand.ask, "answer", response="x", t_ns=zero - 3_000_000_000)
             self.refused("bad-message", hand.ask, "answer", response="x", t_ns=zero + 3_000_000_000)
 
+    def test_a_material_changes_under_the_hand(self):
+        self.serve()
+        with self.client() as hand:
+            hand.subscribe(1000, ("rendered", "depth", "faults"))
+            while True:
+                hand.samples()
+                self.touch(hand)
+                hand.set("/objects/0/stiffness_n_per_m", 20)
+                time.sleep(0.5)
+                hand.stop()
+                time.sleep(0.1)
+                got = hand.samples()
+                if not (got["faults"].astype(int) & 64).any():  # on a busy machine ticks are missed
+                    break
+                hand.clear()
+            begin = len(got["tick"]) - 1 - list(got["tick"][::-1]).index(0)
+            self.assertGreater(len(got["tick"]) - begin, 40)  # it was not begun again
+            depth, force = got["depth"][begin:], (got["rendered"][begin:] ** 2).sum(axis=1) ** 0.5
+            touched = depth > 1e-4
+            self.assertGreater(touched.sum(), 20)
+            stiffness = force[touched] / depth[touched]
+            self.assertAlmostEqual(stiffness[0], 50, places=3)
+            self.assertAlmostEqual(stiffness[-1], 20, places=3)
+            self.assertGreater(stiffness.min(), 19.99)
+            self.assertLess(abs(stiffness[1:] - stiffness[:-1]).max(), 30 * 0.1)  # a ramp of 20 ticks
+
     def test_set_reaches_only_members_of_the_scene(self):
         server = self.serve(scene=False)
         memory = pathlib.Path(f"/proc/{server.pid}/statm")

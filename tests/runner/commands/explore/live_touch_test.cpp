@@ -265,6 +265,34 @@ TEST_F(LiveTouchTest, AfterAPauseTheSceneResumesOnceTheHandIsBack) {
   expect_no_gap(moments);
 }
 
+/// The hand stays in the cube.
+TEST_F(LiveTouchTest, AnotherMaterialIsFeltByARamp) {
+  LiveTouch touch(device_, clock_, settings_of());
+  clock_.start();
+  std::vector<double> stiffness;
+  const auto becomes = [&](double wanted) {
+    return comes_true([&] {
+      std::vector<display::SceneMoment> moments;
+      touch.take(moments);
+      for (const display::SceneMoment& moment : moments) {
+        const rendering::Rendering& r = moment.sample.rendering;
+        if (r.deepest.depth < 0.003 - 1e-9) continue;
+        stiffness.push_back(glm::length(r.force) / r.deepest.depth);
+      }
+      return !stiffness.empty() && std::abs(stiffness.back() - wanted) < 1e-6;
+    });
+  };
+  ASSERT_TRUE(becomes(500));
+  std::vector<stimuli::ObjectSpec> softer = settings_of().spec.objects;
+  softer[0].material.stiffness = 200;
+  touch.show(softer);
+  ASSERT_TRUE(becomes(200));
+  EXPECT_EQ(touch.trouble(), "");
+  for (std::size_t i = 1; i < stiffness.size(); ++i)
+    ASSERT_LE(std::abs(stiffness[i] - stiffness[i - 1]), 300 * 0.001 / 0.2 + 1e-6) << i;
+}
+
+/// Of layers more changes than a number.
 TEST_F(LiveTouchTest, AnotherMaterialActsOnceTheHandHasLeft) {
   // Down and up again, so that the hand leaves the object.
   runner::testing::FakeDevice device([](int tick) {
