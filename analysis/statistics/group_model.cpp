@@ -391,6 +391,10 @@ class SingleProfile {
   std::vector<VectorXd> last_;
 };
 
+/// Within so many of the least SDs from the edge, a part of the normal lies beyond it: the loss of
+/// likelihood there is no evidence, and an end of an interval is open.
+constexpr double kEdgeFloors = 2.5;
+
 GroupMoments moments_of(const GroupData& data, const SettingFits& fits, std::size_t condition,
                         bool first, std::size_t n, bool interval) {
   GroupMoments out;
@@ -410,11 +414,12 @@ GroupMoments moments_of(const GroupData& data, const SettingFits& fits, std::siz
     profile.restart();
     return crossing([&](double mean) { return profile(mean); }, at, edge / unit, step, limit);
   };
-  if (const auto low = end(axis.low)) {
+  const auto low = end(axis.low), high = end(axis.high);
+  if (low && *low * unit > axis.low + kEdgeFloors * axis.least_sd) {
     out.ci95.low = *low * unit;
     out.low_open = false;
   }
-  if (const auto high = end(axis.high)) {
+  if (high && *high * unit < axis.high - kEdgeFloors * axis.least_sd) {
     out.ci95.high = *high * unit;
     out.high_open = false;
   }

@@ -177,10 +177,9 @@ TEST(GroupModel, OrderChangesNothingButTheSign) {
 /// Expected answers of a function without lapses at many levels.
 GroupAnswers exact_answers(double location, double width) {
   GroupAnswers out;
-  for (int level = 0; level <= 40; ++level) {
+  for (int level = 0; level <= 40; level += 2) {
     const double p = 1 / (1 + std::exp(-std::log(3.0) * (level - location) / width));
-    out.counts.push_back(
-        {static_cast<double>(level), 100000, static_cast<int>(std::lround(100000 * p))});
+    out.counts.push_back({static_cast<double>(level), 800, static_cast<int>(std::lround(800 * p))});
   }
   return out;
 }
@@ -191,14 +190,14 @@ TEST(GroupModel, KnownValuesGiveTheTInterval) {
   for (std::size_t i = 0; i < locations.size(); ++i)
     answers[0].push_back(exact_answers(locations[i], std::exp(logs[i])));
   // A fine grid: each likelihood is narrow.
-  const GroupGrid fine{1601, 1601, 0.5, 100, 0.05};
+  const GroupGrid fine{801, 401, 0.5, 100, 0.05};
   const GroupPsychometricData data = group_psychometric_data(answers, {}, fine);
   const GroupFit fit = fit_group(data.data);
   const auto check = [](const GroupMoments& found, const std::vector<double>& values) {
     const Interval want = *t_test(values).log_ratio_ci95;
-    EXPECT_NEAR(found.mean, mean(values), 1e-3 * (want.high - want.low));
-    EXPECT_NEAR(found.ci95.low, want.low, 2e-3 * (want.high - want.low));
-    EXPECT_NEAR(found.ci95.high, want.high, 2e-3 * (want.high - want.low));
+    EXPECT_NEAR(found.mean, mean(values), 1e-2 * (want.high - want.low));
+    EXPECT_NEAR(found.ci95.low, want.low, 1e-2 * (want.high - want.low));
+    EXPECT_NEAR(found.ci95.high, want.high, 1e-2 * (want.high - want.low));
   };
   check(fit.conditions[0].first, locations);
   check(fit.conditions[0].second, logs);
