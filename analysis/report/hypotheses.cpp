@@ -15,7 +15,7 @@ namespace palpate::analysis {
 
 namespace {
 
-constexpr std::size_t kMostHypotheses = 100, kMostExpression = 2'000, kMostText = 5'000;
+constexpr std::size_t kMostHypotheses = 100, kMostExpression = 2'000, kMostWords = 5'000;
 
 void put_numbers(const std::string& name, const nlohmann::json& value, NamedResults& out) {
   if (value.is_object()) {
@@ -148,7 +148,7 @@ std::vector<Hypothesis> read_hypotheses(const std::string& text, const std::stri
     } else if (!one.id.empty() && !ids.insert(one.id).second) {
       faults.add(reader.pointer("id"), "expected each id once, found '" + one.id + "' again");
     }
-    one.text = read_text("text", kMostText, reader);
+    one.text = read_text("text", kMostWords, reader);
     one.corroborated = read_condition("corroborated", known, reader);
     one.refuted = read_condition("refuted", known, reader);
     reader.refuse_unknown_keys();

@@ -92,7 +92,7 @@ using protocols::Presence;
 // Limits of what is read; those of 'palpate plan' are narrower or the same.
 constexpr double kMostSd = 100;  // log seconds
 constexpr double kMostParticipants = 10'000, kMostTrials = 10'000, kMostStudies = 10'000'000;
-constexpr std::size_t kMostShapes = 1'000, kMostCurves = 10'000, kMostText = 10'000;
+constexpr std::size_t kMostShapes = 1'000, kMostCurves = 10'000, kMostLabel = 10'000;
 
 /// A point of a plan as its file has it.
 struct StatedPoint {
@@ -220,12 +220,12 @@ void read_settings(ObjectReader& settings, PlanRecord& plan) {
 void read_words(ObjectReader& reader, PlanRecord& plan) {
   if (const auto* label = reader.member("pilot_label", Presence::required);
       label != nullptr && !label->is_null())
-    protocols::read_text(*label, reader.pointer("pilot_label"), plan.pilot_label, kMostText,
+    protocols::read_text(*label, reader.pointer("pilot_label"), plan.pilot_label, kMostLabel,
                          reader.faults());
   const auto* notes = reader.array("notes", 0, kMostCurves, Presence::required);
   for (std::size_t i = 0; notes != nullptr && i < notes->size(); ++i)
     protocols::read_text((*notes)[i], protocols::child_pointer("/notes", i),
-                         plan.notes.emplace_back(), kMostText, reader.faults());
+                         plan.notes.emplace_back(), kMostLabel, reader.faults());
 }
 
 void read_curves(ObjectReader& reader, PlanRecord& plan) {

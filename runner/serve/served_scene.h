@@ -116,7 +116,7 @@ class ServedScene {
   std::string picture_ = R"("objects":[])";
   const rendering::Renderer* renderer_ = nullptr;  ///< of the trial
   std::optional<Trial> trial_;
-  std::int64_t last_ns_ = 0;  ///< of the newest processed sample
+  std::int64_t last_ns_ = 0;       ///< of the newest processed sample
   std::optional<WhyOff> held_by_;  ///< reason why forces are off, until `clear`
   Emergencies emergencies_;
   TickStream ticks_;

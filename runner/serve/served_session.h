@@ -134,8 +134,8 @@ class ServedSession final : public participants::Respondent, public session::Ses
   std::int64_t waits_since_ns_ = 0;
 
   std::optional<nlohmann::ordered_json> timed_out_;  ///< what was told of it; until the next start
-  std::optional<data::TrialRecord> stored_;  ///< the trial stored last, without samples
-  std::uint64_t controller_ = 0;  ///< the client that sent a command last; 0: none, or it has left
+  std::optional<data::TrialRecord> stored_;          ///< the trial stored last, without samples
+  std::uint64_t controller_ = 0;   ///< the client that sent a command last; 0: none, or it has left
   std::optional<WhyOff> held_by_;  ///< reason why forces are off, until `clear`
   Emergencies emergencies_;
   std::atomic<bool> silent_{false};

@@ -42,7 +42,7 @@ struct TrialScene {
 
   rendering::Scene scene;
   const rendering::Renderer* renderer;
-  FeelRamp* ramp = nullptr;  ///< of the scene's materials; used only by the servo. Null: none
+  FeelRamp* ramp = nullptr;      ///< of the scene's materials; used only by the servo. Null: none
   rendering::RenderState state;  ///< used only by the servo while the scene is shown
   std::optional<rendering::RenderState> shadow;  ///< likewise; one tick behind, for keep_warm()
   HomeZone home;

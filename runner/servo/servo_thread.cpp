@@ -205,7 +205,7 @@ using std::chrono::steady_clock;
 
 constexpr std::int64_t kNap_ns = 4'000'000;  // the session waits while no sample is new
 constexpr auto kShortNap = std::chrono::microseconds(250);  // the same, once it has news
-constexpr std::size_t kPlaces = 4096;                // ticks
+constexpr std::size_t kPlaces = 4096;                       // ticks
 constexpr auto kPatience = std::chrono::seconds(1);
 constexpr auto kPatienceWithoutMotors = std::chrono::seconds(10);
 constexpr auto kLongestWait =
