@@ -115,8 +115,8 @@ struct PageItem {
   std::vector<std::string> choices;   ///< choice, and labels of a scale's steps
   std::optional<double> least, most;  ///< number
   bool required = true;
-  std::string column{};  ///< of the table of participants, that the answer fills; "": none
   std::vector<std::string> shown{};  ///< on the screen instead of `choices`; `choices` are stored
+  std::string column{};  ///< of the table of participants, that the answer fills; "": none
 };
 /// A PNG file that a page shows.
 struct PagePicture {

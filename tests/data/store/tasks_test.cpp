@@ -182,7 +182,7 @@ TEST(PageAnswers, StayOnRecordWhenTheyAreCorrected) {
   {
     Store store = Store::open(folder / "a.db", Store::Mode::write_or_create);
     const Participant person = store.page_answers().front().participant;
-    const Run run = store.begin_run(person, a_run(1));
+    const data::Run run = store.begin_run(person, a_run(1));
     PageAnswer corrected = an_answer("age", "38");
     corrected.at_ns = 9'000'000'000;
     store.add_page_answers(run, {corrected});
