@@ -1,5 +1,6 @@
 #pragma once
-// Wakes a thread that waits for news of the servo or of other threads.
+// Wakes the session's thread for news of other threads than the servo's: a tick calls the system
+// only to sleep.
 
 #include <semaphore.h>
 
@@ -9,8 +10,7 @@
 
 namespace palpate::runner::servo {
 
-/// One thread waits; any thread may ring, also the servo's: it never waits. Rings before a wait are
-/// kept, several as one.
+/// One thread waits; any but the servo's may ring. Rings before a wait are kept, several as one.
 class Bell {
  public:
   Bell() { sem_init(&rung_, 0, 0); }

@@ -304,7 +304,6 @@ void ServoThread::take_requests() noexcept {
     if (lost_samples_) quality_.faults |= servo_fault::kSamplesLost;
     begin_ramp(incoming_ramp_.exchange(nullptr));  // after a stop none is on its way
     stops_done_.store(asked, std::memory_order_release);
-    bell_.ring();
   }
 }
 
@@ -346,8 +345,6 @@ void ServoThread::publish(const Sample& sample) noexcept {
   off_.store((sample.faults & servo_fault::kTripped) != 0 || sample.phase != Phase::feeling);
   health_.add(sample, servo_.period_ns());
   latest_.write(sample);
-  const bool begins = sample.phase == Phase::feeling && !feels_;
-  feels_ = sample.phase == Phase::feeling;
   if (sample.phase == Phase::idle) return;
   if (!gap_) {
     gap_ = !hand_over(sample);
@@ -356,7 +353,6 @@ void ServoThread::publish(const Sample& sample) noexcept {
     after_gap.faults |= servo_fault::kSamplesLost;
     gap_ = !hand_over(after_gap);
   }
-  if (begins) bell_.ring();
   if (!gap_) return;
   lost_samples_ = true;
   health_.add_lost_sample();
@@ -446,7 +442,8 @@ ServoQuality ServoThread::stop() noexcept {
       stalled.faults = servo_fault::kStalled | servo_fault::kTripped;
       return stalled;
     }
-    bell_.wait(kNap_ns);
+    // The servo must not call the system to wake anybody, and a stop takes a tick or two.
+    std::this_thread::sleep_for(kShortNap);
   }
   scene_set_ = false;
   return quality_;

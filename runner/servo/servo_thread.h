@@ -320,7 +320,6 @@ class ServoThread final : public TickSource {
   std::optional<rendering::LineProbe> felt_at_;  ///< m, the stylus in its last tick
   bool waits_ = false;                           ///< waits for the stylus to resume
   std::uint32_t steps_left_ = 0;                 ///< 0: no limit
-  bool feels_ = false;                           ///< in the last tick
   bool gap_ = false;           ///< samples were lost since the last one in the ring
   bool lost_samples_ = false;  ///< in this trial
   std::atomic<bool> off_{true}, quit_{false};
