@@ -313,8 +313,9 @@ void compare_copies(const std::string& folder, const BundleFacts& facts, Compari
     return nlohmann::json(facts.format == "bids" ? data::bids_fields(about)
                                                  : data::schema_org_terms(about));
   };
-  const nlohmann::json expected = terms(facts.about);
-  for (const auto& [key, unused] : terms(whole).items()) {
+  // items() refers to its value, which must outlive the loop.
+  const nlohmann::json expected = terms(facts.about), every = terms(whole);
+  for (const auto& [key, unused] : every.items()) {
     const nlohmann::json found =
         stated.is_object() ? stated.value(key, nlohmann::json()) : nlohmann::json();
     if (found != expected.value(key, nlohmann::json()))
