@@ -163,7 +163,7 @@ class Tasks(TaskStudy):
         self.assertIn("SIMULATED PARTICIPANTS", page)
         self.assertIn("Psychometric functions: compare, stiffness, ball, point", page)
         self.assertFalse("\\u000a" in page)
-        self.assertTrue("<pre tabindex=\"0\">SIMULATED PARTICIPANTS\n" in page)
+        self.assertTrue("<div class=\"flag\" role=\"note\">SIMULATED PARTICIPANTS" in page)
         for link, words in re.findall(r'<li><a href="#([^"]*)">([^<]*)</a></li>', page):
             self.assertNotRegex(words, r"^[a-z]+[0-9]+$", link)
         self.assertIn("Results over participants", page)

@@ -149,7 +149,7 @@ TEST(TaskText, GroupResultsSayWhoWasLeftOut) {
   EXPECT_EQ(
       task_report_text(analysis),
       std::string("Weber fraction (ball, point): 0.25, 95 % interval 0.125 to 0.5, 2 participants. "
-                  "Weber fraction (ball,\nray): 0.75, 1 participant.\n\n"
+                  "Weber fraction\n(ball, ray): 0.75, 1 participant.\n\n"
                   "Weber fractions over participants, compare, ball (geometric means)\n"
                   "  point       0.25 [0.125, 0.5] (2 participants, 1 not determined and left "
                   "out)\n"

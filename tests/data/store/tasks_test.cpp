@@ -178,11 +178,11 @@ TEST(PageAnswers, AreKeptInTheirOrderAndSealed) {
 
 TEST(PageAnswers, StayOnRecordWhenTheyAreCorrected) {
   const TemporaryFolder folder;
-  record_study(folder / "a.db", "P1", 1);
   {
     Store store = Store::open(folder / "a.db", Store::Mode::write_or_create);
-    const Participant person = store.page_answers().front().participant;
+    const Participant person = store.enrol(a_protocol(), "P1", 1);
     const data::Run run = store.begin_run(person, a_run(1));
+    store.add_page_answers(run, {an_answer("age", "37"), an_answer("more", "")});
     PageAnswer corrected = an_answer("age", "38");
     corrected.at_ns = 9'000'000'000;
     store.add_page_answers(run, {corrected});

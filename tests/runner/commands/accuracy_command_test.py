@@ -81,8 +81,10 @@ class Results(unittest.TestCase):
 
     def test_the_figure_has_a_dot_for_each_tessellation_and_method(self):
         drawn = xml.etree.ElementTree.parse(self.figure).getroot()
-        dots = list(drawn.iter("{http://www.w3.org/2000/svg}circle"))
-        self.assertEqual(len(dots), len(self.seen) + len(self.methods))  # both panels of a shape, and the legend
+        said = [title.text for title in drawn.iter("{http://www.w3.org/2000/svg}title")]
+        dots = [text for text in said if " triangles: " in text]
+        self.assertEqual(len(dots), len(self.seen))  # both panels of a shape
+        self.assertEqual({text.split(",")[0] for text in dots}, self.methods)
 
     def test_the_page_has_the_figure_and_every_table_and_loads_nothing(self):
         as_xml = re.sub(r"<!DOCTYPE html>|<script>.*?</script>", "", self.page, flags=re.S)

@@ -305,7 +305,7 @@ class Bundle(unittest.TestCase):
 
     def test_forgeries_of_bids_are_named(self):
         self.make(self.dir, "--format", "bids", out="bids")
-        table = "data/bids/sub-S001/ses-1/beh/sub-S001_ses-1_task-quick_beh.tsv"
+        table = "data/bids/sub-S001/ses-1/beh/sub-S001_ses-1_task-quick_run-1_beh.tsv"
         for name, change, words in (
                 (table, lambda t: t.replace("\tsphere\tsphere\t1\t", "\tsphere\tcone\t0\t", 1), "response is cone"),
                 (table, lambda t: "".join(t.splitlines(True)[:-1]), "is not in the dataset"),

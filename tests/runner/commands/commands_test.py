@@ -48,7 +48,10 @@ class Words(CommandCase):
         if os.geteuid() == 0:
             os.symlink(self.dir / "theirs", self.dir / "link")
             os.chown(self.dir / "link", 65534, 65534, follow_symlinks=False)
-            self.file("t.csv", "")
+            rows = [f"P{p},1,1,{t},{renderer},{shape},{shape},1,{2 + p + 0.1 * t}" for p in (1, 2, 3)
+                    for renderer in ("point", "ray") for shape in ("ball", "box") for t in (1, 2, 3)]
+            self.file("t.csv", "\n".join(["participant_id,session,block,trial,renderer,shape,response,correct,response_time",
+                                          *rows]) + "\n")
             self.assertIn("a link of another user", self.said("cluster", "plan", "--csv", "t.csv", "--trials", "10", "--no-submit",
                                                              "--participants", "2-3", "--dir", self.dir / "link/new"))
             self.assertFalse((self.dir / "theirs").exists())

@@ -74,7 +74,9 @@ class Outputs(unittest.TestCase):
         ]
 
     def everything(self):
-        return {str(p): (p.lstat().st_mode, p.read_bytes() if p.is_file() else b"") for p in self.dir.rglob("*")}
+        # A database with two names is only read, and SQLite then leaves its empty log and index.
+        return {str(p): (p.lstat().st_mode, p.read_bytes() if p.is_file() else b"") for p in self.dir.rglob("*")
+                if not p.name.endswith((".db-shm", ".db-wal"))}
 
     def refused(self, command, option, out, *more, status=2):
         before = self.everything()
@@ -191,14 +193,14 @@ class Outputs(unittest.TestCase):
             self.assertEqual(stat.S_IMODE(figure.stat().st_mode), 0o600)
         self.refused(["analyze", "--csv", self.csv], "figures", self.dir / "figures")
 
-    def test_a_killed_writer_leaves_the_old_file_and_the_next_one_cleans_up(self):
+    def test_a_stopped_writer_leaves_the_old_file_and_the_next_one_cleans_up(self):
         kept = self.write("a.json", "kept")
         command = [PALPATE, "analyze", "--csv", self.csv, "--json", kept, "--force"]
         done = subprocess.run(["prlimit", "--fsize=1000", *command], capture_output=True)
-        self.assertLess(done.returncode, 0, "killed by SIGXFSZ")
+        self.assertEqual(done.returncode, 1, "a limit on file size")
         self.assertEqual(kept.read_text(), "kept")
-        drafts = [p.name for p in self.dir.iterdir() if ".palpate-" in p.name]
-        self.assertEqual(len(drafts), 1)
+        self.assertEqual([p.name for p in self.dir.iterdir() if ".palpate-" in p.name], [])
+        self.write(".a.json.palpate-abcdef", "of a killed writer")
         self.write(".b.json.palpate-abcdef", "of another file")
         subprocess.run(command, check=True, capture_output=True)
         self.assertGreater(kept.stat().st_size, 1000)

@@ -175,9 +175,11 @@ class TaskStudies(CommandCase):
         said = self.palpate("analyze", "--db", db, "--report", self.dir / "stairs.html").stdout
         self.assertIn("mean of its reversals, converging to 70.7 % successes", said)
         page = (self.dir / "stairs.html").read_text()
-        self.assertTrue("converging to 70.7 % successes" in page)
+        self.assertTrue(">converges at</th>" in page)
+        self.assertEqual(page.count('<td class="name">staircase</td>'), 6, "three participants, two renderers")
+        self.assertTrue("<td>70.7 %</td>" in page)
         title = json.loads((PROTOCOLS / "stiffness-2afc.json").read_text())["title"]
-        self.assertTrue(f"<h1>{title}</h1>" in page, "the study's title heads its report")
+        self.assertTrue(f'<p class="study">{title}' in page, "the study's title heads its report")
         for axis in ("level (N/m)", "JND (N/m)", "PSE (N/m)", "Weber fraction"):
             self.assertTrue(f">{axis}</text>" in page, axis)
         self.assertFalse(">level</text>" in page)

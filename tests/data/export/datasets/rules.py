@@ -47,7 +47,7 @@ class Rules(Study):
             readme = (self.dir / f"about-{form}" / ("README" if form == "bids" else "README.md")).read_text()
             for words in ("Authors: Example, Ada (Ü); Bo\n\n", "License: CC-BY-4.0\n\n",
                           "Funding: Own means; Council, C-1; Council, C-2\n\n", "Ethics approvals: Committee, 2026-17\n\n",
-                          "References: https://osf.io/abcde; Bo (2026)\n\n", "DOI: https://doi.org/10.5281/zenodo.1234\n\n",
+                          "References: https\\://osf.io/abcde; Bo (2026)\n\n", "DOI: https\\://doi.org/10.5281/zenodo.1234\n\n",
                           "Acknowledgements: Thanks.\n\n", "How to acknowledge: Cite.\n\n"):
                 self.assertIn(words, readme)
         self.assertEqual(said["bids"], {

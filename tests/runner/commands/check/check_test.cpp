@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <fstream>
 #include <functional>
+#include <iterator>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
@@ -53,6 +54,11 @@ std::string plan_text() {
 
 void write(const std::string& path, const std::string& text) {
   std::ofstream(path, std::ios::binary) << text;
+}
+
+std::string text_of(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
 }
 
 constexpr std::int64_t kHour_ns = 3'600'000'000'000;
@@ -331,7 +337,12 @@ TEST_F(Check, AnAddedOrMissingFileOfTheRegistrationIsReported) {
 
 TEST_F(Check, FillingInTheRequestedFieldsIsNoDeviation) {
   run();
-  std::ofstream(registration() + "/registration.md", std::ios::app) << "Answers.\n";
+  const std::string path = registration() + "/registration.md";
+  std::string text = text_of(path);
+  const std::size_t field = text.find("\n**FILL IN:**");
+  ASSERT_NE(field, std::string::npos) << text;
+  text.replace(field + 1, text.find('\n', field + 1) - field - 1, "Answers.");
+  write(path, text);
   const StudyCheck found = check();
   EXPECT_EQ(deviating(found), std::vector<std::string>{});
   EXPECT_NE(found.points[0].sentence.find("registration.md"), std::string::npos);
