@@ -134,10 +134,13 @@ bool may_write(const std::string& file) {
 void open_for_reading(std::optional<SQLite::Database>& db, const std::string& file,
                       bool for_export) {
   if (may_write(file)) {
+    const bool has_log = std::filesystem::exists(file + "-wal");
     db.emplace(file, kOpenWrite, kBusyTimeoutMs);
-    // Under another name of the file there may be another log: leave both as they are.
+    // Under another name of the file there may be another log: leave both as they are. A log that
+    // this opening creates is empty, and closing removes it.
     const bool one_name = names_of_file(file) <= 1;
-    if (!one_name) sqlite3_db_config(db->getHandle(), SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 1, nullptr);
+    if (!one_name && has_log)
+      sqlite3_db_config(db->getHandle(), SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 1, nullptr);
     if (for_export && one_name) db->tryExec("PRAGMA journal_mode = WAL");
     db->exec("PRAGMA query_only = ON");
   } else if (std::filesystem::exists(file + "-wal")) {
