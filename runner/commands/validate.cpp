@@ -168,14 +168,20 @@ void print_verdict(const std::string& what, const std::vector<std::string>& reas
     out << "      " << printable(one.text) << "\n";
 }
 
-/// Prints whether each kind of device and simulated participants can run the protocol, or why not.
-/// \param measured  delays of devices, which lower the stiffness that they can show
-void print_fitness(const protocols::Protocol& protocol, const StimulusLibrary& library,
-                   const std::vector<devices::ChainTiming>& measured, std::ostream& out) {
+/// What a device is told of a protocol before it is opened.
+servo::DeviceConfig config_for(const protocols::Protocol& protocol) {
   servo::DeviceConfig config;
   config.rate = protocol.servo_rate;
   config.stylus_length = protocol.stylus.length;
   config.stylus_grip = protocol.stylus.grip;
+  return config;
+}
+
+/// Prints whether each kind of device and simulated participants can run the protocol, or why not.
+/// \param measured  delays of devices, which lower the stiffness that they can show
+void print_fitness(const protocols::Protocol& protocol, const StimulusLibrary& library,
+                   const std::vector<devices::ChainTiming>& measured, std::ostream& out) {
+  const servo::DeviceConfig config = config_for(protocol);
   out << "  can be shown by (run --device NAME)\n";
   for (const devices::DeviceKind& kind : devices::device_kinds()) {
     servo::DeviceCapabilities can = kind.nominal(config);
@@ -222,10 +228,7 @@ void add_buzzing(const stimuli::ObjectSpec& object, const std::string& place,
 void print_scene_fitness(const protocols::SceneSpec& spec, std::ostream& out) {
   const protocols::Protocol shown =
       serve::protocol_of(spec, renderer_for(protocols::RendererKind::ray));
-  servo::DeviceConfig config;
-  config.rate = shown.servo_rate;
-  config.stylus_length = shown.stylus.length;
-  config.stylus_grip = shown.stylus.grip;
+  const servo::DeviceConfig config = config_for(shown);
   out << "  materials can be shown by (explore, serve --device NAME)\n";
   for (const devices::DeviceKind& kind : devices::device_kinds()) {
     const servo::DeviceCapabilities can = kind.nominal(config);
