@@ -46,7 +46,7 @@ TEST(Bids, TellsPeopleFromSimulatedParticipantsAndFromBoth) {
   EXPECT_TRUE(result.simulated);
 }
 
-TEST(Bids, KeepsTheOrderWhenTheClockIsSetBack) {
+TEST(Bids, KeepsTheOrderOfASetClock) {
   const TemporaryFolder folder;
   Store store = Store::open(folder / "s.db", Store::Mode::write_or_create);
   const Participant person = store.enrol(a_protocol(), "P1");

@@ -73,7 +73,7 @@ TEST_F(Forgetting, ExportsOfACopyThatHasNoWriteAheadLogAreRecorded) {
   EXPECT_EQ(store.participant_summary(kGone).exports.size(), 1u);
 }
 
-TEST_F(Forgetting, NoExportIsRecordedInADatabaseOfTwoNames) {
+TEST_F(Forgetting, TwoNamesRecordNoExport) {
   std::int64_t person = open().participants(a_protocol().sha256)[0].id;
   std::filesystem::create_hard_link(path_, folder_ / "second.db");
   const std::string before = contents_of(path_);

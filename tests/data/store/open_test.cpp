@@ -220,7 +220,7 @@ TEST_F(StoreOpen, AReaderOfTwoNamesLeavesTheLog) {
   EXPECT_TRUE(fs::exists(path_ + "-wal")) << "it may belong to the other name";
 }
 
-TEST_F(StoreOpen, ANewNameOfAnOpenDatabaseIsRefused) {
+TEST_F(StoreOpen, RefusesANewNameWhileOpen) {
   make_study(1);
   ChildProcess holder({"hold", path_});
   ASSERT_EQ(holder.read_line(), "held");
@@ -237,7 +237,7 @@ TEST_F(StoreOpen, ANewNameOfAnOpenDatabaseIsRefused) {
   EXPECT_NO_THROW(write(path_));
 }
 
-TEST_F(StoreOpen, ALinkMadeInASessionLosesNoTrial) {
+TEST_F(StoreOpen, LinksMadeMeanwhileLoseNoTrial) {
   const std::string second = folder_ / "second.db";
   {
     Store store = write(path_);

@@ -68,7 +68,7 @@ TEST_F(Sweeps, AFileOfTwoNamesIsReadOnly) {
   EXPECT_EQ(contents_of(path_), before);
 }
 
-TEST_F(Sweeps, ANewNameOfAnOpenFileIsRefused) {
+TEST_F(Sweeps, RefusesANewNameOfAnOpenFile) {
   const std::string second = folder_ / "b.sweep";
   SweepFile file = SweepFile::open(path_, a_sweep_plan());
   file.record({a_sweep_row(7)});

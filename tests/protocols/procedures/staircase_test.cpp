@@ -160,7 +160,7 @@ TEST(Staircase, ALongRunHoversAboutItsConvergencePoint) {
   }
 }
 
-TEST(ExpectedTrials, OfAStaircaseAreItsCourseNotItsLimit) {
+TEST(ExpectedTrials, FollowTheCourseOfAStaircase) {
   Staircase spec = simple_staircase();
   spec.stop_trials = 200;
   spec.stop_reversals = 8;

@@ -103,7 +103,7 @@ TEST(FalconCalibration, AChangedNumberIsRefusedByItsChecksum) {
   }
 }
 
-TEST(FalconCalibration, OneWithoutAChecksumIsStaleAndStaysSo) {
+TEST(FalconCalibration, StaysStaleWithoutAChecksum) {
   Calibration calibration = example();
   calibration.forces[0].sealed = calibration.pairs[0].sealed = false;
   Calibration back = parse_calibration(to_json(calibration), "c.json");

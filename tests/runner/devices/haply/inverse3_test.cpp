@@ -349,7 +349,7 @@ TEST_F(Inverse3, WhatCannotBeOpenedSaysWhy) {
   EXPECT_NE(refusal().find("HOST:PORT"), std::string::npos) << refusal();
 }
 
-TEST_F(Inverse3, ThePresetIsSetInTheFormThatTheServiceTakes) {
+TEST_F(Inverse3, SetsThePresetInTheServicesForm) {
   using Takes = EmulatedArm::Takes;
   for (const char* version : {"3.5.0.0", "3.4.0.0"}) {
     for (const Takes takes : {Takes::object, Takes::name, Takes::both}) {
