@@ -196,7 +196,8 @@ class SessionTest(WindowCase):
             self.assertIsNone(self.program.poll(), self.messages())
             self.screen.keep(self.console, "session_closing")
             self.screen.key("F12")
-            wait_for("zero force", lambda: "EMERGENCY by the key F12" in self.messages())
+            wait_for("zero force", self.halted)
+            self.assertIn(("emergency zero: the key F12",), self.rows("SELECT text FROM notes"))
             if window == self.console:
                 break
             self.screen.ask_to_close(window)
