@@ -88,8 +88,7 @@ struct TaskBlock {
   std::optional<int> max_run, min_distance;  ///< of equal stimulus, renderer and level
   double catch_trials = 0;  ///< share of all trials: detect: absent; same_different: both standard
 
-  // compare
-  int intervals = 2;
+  int intervals = 2;  ///< compare: 2 or 3; external: 1 to 10
   bool same_different = false;
   bool asks_smaller = false;    ///< the question asks for the interval with the smaller level
   double inter_interval = 0.5;  ///< s, forces off and the stylus at rest at home

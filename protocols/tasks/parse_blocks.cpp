@@ -194,10 +194,16 @@ void read_answer_keys(ObjectReader& reader, const Protocol& protocol, TaskBlock&
             [](const TaskAnswer& a, const TaskAnswer& b) { return a.key < b.key; });
 }
 
-/// Reads the answers that another program may give; by default the names of the stimuli.
+/// Reads the answers that another program may give; by default the names of the stimuli, or the
+/// numbers of the intervals where there are several.
 void read_external_answers(ObjectReader& reader, const Protocol& protocol, TaskBlock& block) {
   constexpr std::size_t kMostAnswers = 100;
   const json* const list = reader.array("answers", 1, kMostAnswers);
+  if (list == nullptr && block.intervals > 1) {
+    for (int i = 1; i <= block.intervals; ++i)
+      block.answers.push_back({"", std::to_string(i), std::to_string(i), 0});
+    return;
+  }
   if (list == nullptr) {
     for (const int i : block.stimuli) {
       const std::string& name = protocol.stimuli[static_cast<std::size_t>(i)].name;
@@ -521,7 +527,14 @@ void read_adjust(ObjectReader& reader, const Protocol& protocol, TaskBlock& bloc
 
 /// Reads the levels that a program may ask for.
 void read_external(ObjectReader& reader, TaskBlock& block) {
+  constexpr int kMostIntervals = 10;
   reader.integer("trials", block.repetitions, kManyTimes, Presence::required);
+  block.intervals = 1;
+  reader.integer("intervals", block.intervals, {1, kMostIntervals});
+  if (block.intervals > 1) {
+    reader.number("inter_interval_s", block.inter_interval, kWait);
+    reader.number("interval_limit_s", block.interval_limit, kPresentation);
+  }
   read_level(reader, block);
   const Presence presence = block.level ? Presence::required : Presence::optional;
   double least = 0, most = 0;

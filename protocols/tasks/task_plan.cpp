@@ -593,6 +593,7 @@ void TaskPlan::choose(const TrialChoice& choice) {
       next_->track = static_cast<int>(i) + 1;
   }
   set_intervals(block(), 0, *next_);
+  if (!choice.intervals.empty()) next_->intervals = choice.intervals;
 }
 
 void TaskPlan::answered(const TrialOutcome& outcome) {

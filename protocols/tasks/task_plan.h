@@ -50,12 +50,15 @@ struct TrialOutcome {
   std::optional<double> level = std::nullopt;
 };
 
-/// The stimulus of a trial of an external block.
+/// The contents of a trial of an external block.
 struct TrialChoice {
   int stimulus = 0;  ///< index into Protocol::stimuli, one of the block's
   RendererKind renderer = RendererKind::point;
   std::optional<double> level = std::nullopt;      ///< within the block's
   std::optional<Quat> orientation = std::nullopt;  ///< none: the plan's
+  /// In order, where the block has several; stimulus, renderer and level above are those of the
+  /// judged one. Empty: one interval.
+  std::vector<Interval> intervals = {};
 };
 
 class TaskPlan {

@@ -26,6 +26,9 @@ export const info = {
     renderer: {type: TEXT, default: null},
     level: {type: NUMBER, default: null},
     orientation_wxyz: {type: NUMBER, array: true, default: []},
+    intervals: {type: 'COMPLEX', array: true, default: []},  // of one trial: {stimulus, renderer, level, standard}
+    go_on: {type: TEXT, default: 'Next'},                    // the button between intervals; of timed ones none is shown
+    timed_intervals: {type: YES, default: false},            // the protocol has interval_limit_s
     try_again: {type: YES, default: true},                   // where forces went off before the answer
   },
   data: {
@@ -55,15 +58,25 @@ export function palpate_plugin(hand) {
 
     async trial(display, trial, on_load, simulated_rt = null) {
       const what = {};
-      for (const name of ['stimulus', 'renderer', 'level', 'orientation_wxyz'])
-        if (trial[name] !== null && trial[name].length !== 0) what[name] = trial[name];
+      for (const name of ['stimulus', 'renderer', 'level', 'orientation_wxyz', 'intervals'])
+        if ((trial[name] ?? null) !== null && trial[name].length !== 0) what[name] = trial[name];
       if (hand.next) what.trial = hand.next.trial;
       on_load?.();
       for (;;) {
         try {
           display.innerHTML = trial.waiting;
           await hand.clock(5);
+          const asked = trial.timed_intervals ? hand.wait_for('question') : null;
+          asked?.catch(() => {});
           await hand.start(what);
+          const intervals = hand.next?.intervals ?? 1;
+          for (let i = 1; i < intervals && !asked; ++i) {
+            await this.#choice(display, {...trial, choices: [trial.go_on], labels: [], keys: []},
+                               simulated_rt && {...simulated_rt, response: trial.go_on});
+            display.innerHTML = trial.waiting;
+            await hand.next_interval();
+          }
+          if (asked) await Promise.race([asked, this.#stopped()]);
           const {choice, at_ms, stored} = await this.#choice(display, trial, simulated_rt);
           if (stored) return this.#finish(display, stored, {});
           const said = await hand.answer(choice, {at_ms});
@@ -133,6 +146,13 @@ export function palpate_plugin(hand) {
           display.querySelector(`[data-choice="${CSS.escape(simulated.response)}"]`)?.click();
         }, simulated.rt);
         hand.addEventListener('closed', gone);
+      });
+    }
+
+    /** Rejects when forces go off. */
+    #stopped() {
+      return hand.wait_for('forces_off').then(said => {
+        throw Object.assign(new Error(said.reason), {code: said.code === 'emergency' ? 'emergency' : 'forces-off'});
       });
     }
 

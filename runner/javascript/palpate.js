@@ -118,8 +118,12 @@ export class Hand extends EventTarget {
 
   /** A scene, as in scene.schema.json; every fault is in ServeError.faults. */
   load(scene) { return this.ask('load', {scene}); }
-  /** Forces on: {stimulus, renderer, trial, level, orientation_wxyz}, each may be left out. Resolves once they are. */
+  /** Forces on: {stimulus, renderer, trial, level, orientation_wxyz}, each may be left out, or `intervals`, a list of
+      {stimulus, renderer, level, standard}. Resolves once they are. */
   start(what = {}) { return this.ask('start', what); }
+  /** On to the next interval of the trial; resolves once its forces are on. The answer is due in the last. Intervals that
+      the protocol limits follow by themselves: events 'interval', and 'question' for the answer. */
+  next_interval() { return this.ask('next'); }
   /** Ends the trial; resolves with what it was like. `more`: {correct, at_ms, t_ns}. `at_ms`: when it was given, by the
       page's clock, as event.timeStamp; `t_ns`: by the server's. The server takes the time if it knows the page's clock
       within 1 ms: `stamped` says 'client', else 'arrival'. */

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <string_view>
 #include <utility>
@@ -21,21 +22,15 @@ struct NamedType {
   const char* name;
   MessageType type;
 };
-constexpr NamedType kTypes[] = {{"hello", MessageType::hello},
-                                {"load", MessageType::load},
-                                {"start", MessageType::start},
-                                {"set", MessageType::set},
-                                {"answer", MessageType::answer},
-                                {"stop", MessageType::stop},
-                                {"subscribe", MessageType::subscribe},
-                                {"mark", MessageType::mark},
-                                {"note", MessageType::note},
-                                {"clock", MessageType::clock},
-                                {"alive", MessageType::alive},
-                                {"emergency", MessageType::emergency},
-                                {"clear", MessageType::clear},
-                                {"picture", MessageType::picture},
-                                {"bye", MessageType::bye}};
+constexpr NamedType kTypes[] = {
+    {"hello", MessageType::hello},         {"load", MessageType::load},
+    {"start", MessageType::start},         {"set", MessageType::set},
+    {"next", MessageType::next},           {"answer", MessageType::answer},
+    {"stop", MessageType::stop},           {"subscribe", MessageType::subscribe},
+    {"mark", MessageType::mark},           {"note", MessageType::note},
+    {"clock", MessageType::clock},         {"alive", MessageType::alive},
+    {"emergency", MessageType::emergency}, {"clear", MessageType::clear},
+    {"picture", MessageType::picture},     {"bye", MessageType::bye}};
 
 constexpr std::pair<const char*, StreamField> kFields[] = {
     {"tip", StreamField::tip},          {"tail", StreamField::tail},
@@ -50,7 +45,9 @@ constexpr double kMostRate = 1000;          // Hz
 /// Reads the members of one message and collects their faults.
 class MemberReader {
  public:
-  explicit MemberReader(const json& object) : object_(object) {}
+  /// \param pointer  of the object in the message
+  explicit MemberReader(const json& object, std::string pointer = "")
+      : object_(object), pointer_(std::move(pointer)) {}
 
   const json* member(const char* key, bool required) {
     known_.emplace_back(key);
@@ -95,7 +92,7 @@ class MemberReader {
   }
   bool has(const char* key) const { return object_.contains(key); }
   void fault(const std::string& key, const std::string& expected) {
-    faults_.push_back({"bad-message", expected, protocols::child_pointer("", key)});
+    faults_.push_back({"bad-message", expected, protocols::child_pointer(pointer_, key)});
   }
   void refuse_unknown() {
     for (const auto& [key, value] : object_.items())
@@ -105,6 +102,7 @@ class MemberReader {
 
  private:
   const json& object_;
+  const std::string pointer_;
   std::vector<std::string> known_;
   std::vector<Refusal> faults_;
 };
@@ -156,6 +154,43 @@ void read_orientation(MemberReader& reader, Message& out) {
   out.orientation = Quat(q[0] / scale, q[1] / scale, q[2] / scale, q[3] / scale);
 }
 
+void read_wanted(MemberReader& reader, Wanted& out) {
+  reader.text("stimulus", out.stimulus, false);
+  reader.text("renderer", out.renderer, false);
+  if (reader.has("renderer") && out.renderer != "point" && out.renderer != "ray")
+    reader.fault("renderer", "expected point or ray");
+  out.level = reader.number("level", -1e9, 1e9);
+}
+
+void read_intervals(MemberReader& reader, Message& out) {
+  constexpr std::size_t kMostIntervals = 10;
+  const json* const list = reader.member("intervals", false);
+  if (list == nullptr) return;
+  if (!list->is_array() || list->empty() || list->size() > kMostIntervals)
+    return reader.fault("intervals", "expected a list of 1 to 10 intervals");
+  for (const char* const key : {"stimulus", "renderer", "level"}) {
+    if (reader.has(key)) reader.fault(key, "expected in each of the intervals instead");
+  }
+  for (std::size_t i = 0; i < list->size(); ++i) {
+    const std::string place = protocols::child_pointer("/intervals", i);
+    if (!(*list)[i].is_object()) {
+      reader.faults().push_back({"bad-message", "expected an object", place});
+      continue;
+    }
+    MemberReader interval((*list)[i], place);
+    Wanted& wanted = out.intervals.emplace_back();
+    read_wanted(interval, wanted);
+    if (const json* const standard = interval.member("standard", false)) {
+      if (standard->is_boolean())
+        wanted.standard = standard->get<bool>();
+      else
+        interval.fault("standard", "expected true or false");
+    }
+    interval.refuse_unknown();
+    std::ranges::move(interval.faults(), std::back_inserter(reader.faults()));
+  }
+}
+
 void read_rest(MemberReader& reader, Message& out) {
   constexpr std::int64_t kMost = INT64_MAX;
   switch (out.type) {
@@ -171,11 +206,8 @@ void read_rest(MemberReader& reader, Message& out) {
       }
       break;
     case MessageType::start:
-      reader.text("stimulus", out.stimulus, false);
-      reader.text("renderer", out.renderer, false);
-      if (reader.has("renderer") && out.renderer != "point" && out.renderer != "ray")
-        reader.fault("renderer", "expected point or ray");
-      out.level = reader.number("level", -1e9, 1e9);
+      read_wanted(reader, out.wanted);
+      read_intervals(reader, out);
       read_orientation(reader, out);
       out.trial = reader.integer("trial", false, 1, 1'000'000'000);
       break;
@@ -224,6 +256,7 @@ void read_rest(MemberReader& reader, Message& out) {
       }
       out.seen = reader.integer("t_seen_ns", false, 0, kMost);
       break;
+    case MessageType::next:
     case MessageType::alive:
     case MessageType::emergency:
     case MessageType::clear:

@@ -44,6 +44,7 @@ enum class MessageType {
   load,
   start,
   set,
+  next,
   answer,
   stop,
   subscribe,
@@ -62,14 +63,21 @@ enum class StreamField { tip, tail, force, rendered, contact, depth, object, fau
 /// The field with the name used in messages; empty: none.
 std::optional<StreamField> stream_field(const std::string& name);
 
+/// What a program wants to be felt in a trial or in one of its intervals.
+struct Wanted {
+  std::string stimulus, renderer;  ///< empty: not given
+  std::optional<double> level;
+  bool standard = false;  ///< of an interval: the others are compared with it
+};
+
 struct Message {
   MessageType type = MessageType::alive;
   std::int64_t id = 0;
   bool control = true;                ///< hello; false: it watches
   std::string token;                  ///< hello
   nlohmann::json scene;               ///< load
-  std::string stimulus, renderer;     ///< start; empty: not given
-  std::optional<double> level;        ///< start
+  Wanted wanted;                      ///< start
+  std::vector<Wanted> intervals;      ///< start; empty: not given
   std::optional<Quat> orientation;    ///< start, unit
   std::optional<std::int64_t> trial;  ///< start
   std::string path;                   ///< set: a JSON pointer into the scene

@@ -161,10 +161,12 @@ void ServedScene::start(std::uint64_t client, const Message& message) {
   if (trial_) throw MessageRefused("running", "a scene is running: stop it first");
   if (scene_.is_null()) throw MessageRefused("no-scene", "load a scene first");
   if (held_by_ || emergencies_.any()) throw forces_off();
-  if (!message.stimulus.empty() || message.level || message.orientation)
-    throw MessageRefused("bad-message", "stimulus, level and orientation are for --protocol only");
+  if (!message.wanted.stimulus.empty() || message.wanted.level || message.orientation ||
+      !message.intervals.empty())
+    throw MessageRefused("bad-message",
+                         "stimulus, level, orientation and intervals are for --protocol only");
   const rendering::Renderer& renderer =
-      named_renderer(message.renderer.empty() ? "ray" : message.renderer);
+      named_renderer(message.wanted.renderer.empty() ? "ray" : message.wanted.renderer);
   const protocols::SceneSpec spec = read(scene_.dump(), renderer);
   shown_.store(true);
   try {
@@ -224,6 +226,16 @@ ordered_json ServedScene::end_trial() {
   return out;
 }
 
+void ServedScene::mark(session::Marker::Kind kind, std::int64_t t_ns, const std::string& response,
+                       int code) {
+  if (settings_.markers == nullptr) return;
+  marker_.kind = kind;
+  marker_.time_ns = t_ns;
+  marker_.response = response;
+  marker_.code = code;
+  settings_.markers->send(marker_);
+}
+
 void ServedScene::drop_pending(const std::string& code, const std::string& why) {
   servo_.stop();
   shown_.store(false);
@@ -270,10 +282,12 @@ void ServedScene::obey(std::uint64_t client, const Message& message) {
         out["response_time_s"] =
             static_cast<double>(at - out["zero_t_ns"].get<std::int64_t>()) * 1e-9;
         tell("answered", at, out);
+        mark(session::Marker::Kind::response, at, message.text);
         return output_->reply(client, accepted(message.id, out));
       }
       case MessageType::stop: {
         if (trial_ && !trial_->holds) drop_pending("stopped", "stopped before forces were on");
+        if (trial_) mark(session::Marker::Kind::cut_off, clock_.now_ns());
         ordered_json out = trial_ ? end_trial() : ordered_json::object();
         tell("stopped", clock_.now_ns(), {{"reason", message.text}});
         return output_->reply(client, accepted(message.id, out));
@@ -281,9 +295,10 @@ void ServedScene::obey(std::uint64_t client, const Message& message) {
       case MessageType::mark:
       case MessageType::note: {
         const std::int64_t now = clock_.now_ns();
-        const bool mark = message.type == MessageType::mark;
+        const bool is_mark = message.type == MessageType::mark;
         const ordered_json out = remark(message);
-        tell(mark ? "mark" : "note", now, out);
+        tell(is_mark ? "mark" : "note", now, out);
+        if (is_mark) mark(session::Marker::Kind::mark, now, "", message.code);
         return output_->reply(client, accepted(message.id, {{"t_ns", now}}));
       }
       case MessageType::clear:
@@ -298,10 +313,12 @@ void ServedScene::obey(std::uint64_t client, const Message& message) {
 
 void ServedScene::controller_left() {
   if (!trial_) return;
-  if (trial_->holds)
+  if (trial_->holds) {
+    mark(session::Marker::Kind::cut_off, clock_.now_ns());
     end_trial();
-  else
+  } else {
     drop_pending("stopped", "stopped before forces were on");
+  }
   tell("stopped", clock_.now_ns(), {{"reason", "the controller has left"}});
 }
 
@@ -330,6 +347,9 @@ void ServedScene::take_first(const servo::Sample& sample) {
   output_->reply(trial_->client, accepted(trial_->id, out));
   out.erase("t_ns");
   tell("started", sample.time_ns, out);
+  marker_.trial = static_cast<int>(trial_->number.value_or(marker_.trial + 1));
+  marker_.renderer = renderer_->side_contact() ? "ray" : "point";
+  mark(session::Marker::Kind::trial_start, sample.time_ns);
 }
 
 void ServedScene::take(const servo::Sample& sample) {
@@ -340,6 +360,7 @@ void ServedScene::take(const servo::Sample& sample) {
     trial_->forces_off_sent = true;
     shown_.store(false);
     held_by_ = reason_of(sample);
+    mark(session::Marker::Kind::cut_off, sample.time_ns);
     tell("forces_off", sample.time_ns, {{"code", held_by_->code}, {"reason", held_by_->words}});
   }
   if (sample.rendering.contacts > 0) {
@@ -348,12 +369,14 @@ void ServedScene::take(const servo::Sample& sample) {
     if (trial_->first_contact_ns == 0) {
       trial_->first_contact_ns = sample.time_ns;
       tell("first_contact", sample.time_ns, {{"object", sample.rendering.object}});
+      mark(session::Marker::Kind::first_contact, sample.time_ns);
     }
   } else if (trial_->in_contact && ++trial_->without_contact == kLeft) {
     trial_->in_contact = false;
     tell("left", sample.time_ns);
   }
   ticks_.push(sample);
+  if (settings_.stream != nullptr) settings_.stream->push(sample);
 }
 
 void ServedScene::attend() {

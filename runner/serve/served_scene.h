@@ -17,6 +17,7 @@
 #include "runner/serve/why_off.h"
 #include "runner/servo/servo_thread.h"
 #include "runner/session/live_forces.h"
+#include "runner/session/recorders.h"
 
 namespace palpate::runner::serve {
 
@@ -33,6 +34,8 @@ class ServedScene {
     std::string scene;       ///< JSON; empty: none yet
     servo::ServoSettings servo;
     PictureOf picture;
+    session::Markers* markers = nullptr;      ///< each `start` is a trial; null: none
+    session::SampleStream* stream = nullptr;  ///< of the ticks of trials; null: none
   };
 
   /// \param guard  may be null. \throws InputError, MeshError, MessageRefused: the first scene
@@ -101,6 +104,8 @@ class ServedScene {
   void take_first(const servo::Sample& sample);
   WhyOff reason_of(const servo::Sample& sample);
   MessageRefused forces_off() const;
+  void mark(session::Marker::Kind kind, std::int64_t t_ns, const std::string& response = "",
+            int code = 0);
   void drop_pending(const std::string& code, const std::string& why);
   void tell(const std::string& name, std::int64_t t_ns,
             const nlohmann::ordered_json& more = nlohmann::ordered_json::object());
@@ -116,6 +121,7 @@ class ServedScene {
   std::string picture_ = R"("objects":[])";
   const rendering::Renderer* renderer_ = nullptr;  ///< of the trial
   std::optional<Trial> trial_;
+  session::Marker marker_;         ///< of the trial, or of the one before
   std::int64_t last_ns_ = 0;       ///< of the newest processed sample
   std::optional<WhyOff> held_by_;  ///< reason why forces are off, until `clear`
   Emergencies emergencies_;

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "data/base/text.h"
+#include "protocols/json_document.h"
 #include "runner/safety/fault_signals.h"
 #include "runner/session/session_plan.h"
 #include "stimuli/shapes.h"
@@ -45,8 +46,7 @@ std::string unserved(const protocols::Protocol& protocol) {
   for (const TaskBlock& block : protocol.blocks) {
     const std::string name = "block '" + block.name + "' ";
     if (block.confidence) return name + "asks for confidence, which needs palpate run";
-    if (block.task == TaskKind::compare || block.task == TaskKind::adjust || block.standard)
-      return name + "has trials of several intervals, which need palpate run";
+    if (block.task == TaskKind::adjust) return name + "is an adjustment, which needs palpate run";
   }
   return "";
 }
@@ -55,6 +55,10 @@ ServedSession::ServedSession(const Parts& parts)
     : parts_(parts),
       clock_(parts.station.clock),
       forces_(parts.servo, parts.guard, parts.station.clock),
+      noise_(parts.station, parts.noise,
+             [this](const std::string& trouble) { sound_trouble_ = trouble; }),
+      signals_(parts.station, parts.markers, noise_, parts.record.participant().code,
+               parts.record.session()),
       session_(parts.station, *this, this, largest_reach(parts.station)) {
   for (const data::TrialRecord& record : parts.stored) trials_.push_back(short_json(record));
   keep_state();
@@ -122,6 +126,7 @@ ordered_json ServedSession::next_trial() const {
     out["stimuli"] = ordered_json::array();
     for (const int i : block.stimuli) out["stimuli"].push_back(name(i));
     if (block.level) out["level_range"] = {*block.least, *block.most};
+    if (block.intervals > 1) out["intervals"] = block.intervals;
     return out;
   }
   const Quat& q = trial.orientation;
@@ -129,6 +134,7 @@ ordered_json ServedSession::next_trial() const {
   out["renderer"] = protocols::to_string(trial.renderer);
   out["orientation_wxyz"] = {q.w, q.x, q.y, q.z};
   if (trial.level) out["level"] = *trial.level;
+  if (trial.intervals.size() > 1) out["intervals"] = trial.intervals.size();
   return out;
 }
 
@@ -143,6 +149,7 @@ ServedSession::Outcome ServedSession::run(ServeOutput& output,
     forces_.off();
     throw;
   }
+  noise_.stop();
   const std::int64_t now = clock_.now_ns();
   if (!outcome.reason.empty()) parts_.record.note(now, "ended: " + outcome.reason);
   parts_.record.note(
@@ -226,10 +233,12 @@ MessageRefused ServedSession::forces_off() const {
 
 void ServedSession::held(const WhyOff& why) {
   held_by_ = why;
+  noise_.stop();
   const Refusal off = forces_off().why().front();
   refuse(std::exchange(start_, {}), off.code, off.message);
   keep_under_way();
   refuse(std::exchange(answer_, {}), off.code, off.message);
+  refuse(std::exchange(next_, {}), off.code, off.message);
   tell("forces_off", clock_.now_ns(), {{"code", why.code}, {"reason", why.words}});
 }
 
@@ -256,11 +265,13 @@ void ServedSession::attend() {
   }
   forces_.newest();
   forces_.end_without_guard();
+  if (noise_.has_failed() && in_trial_) throw participants::TrialCutOff(sound_trouble_);
 }
 
 void ServedSession::left() {
   start_.reset();
   answer_.reset();
+  next_.reset();
   keep_under_way();
   if (in_trial_) throw participants::TrialCutOff("the controller has left");
 }
@@ -270,6 +281,8 @@ void ServedSession::obey(const Asked& asked) {
   switch (message.type) {
     case MessageType::start:
       return start(asked);
+    case MessageType::next:
+      return go_on(asked);
     case MessageType::answer:
       return answer(asked);
     case MessageType::stop:
@@ -293,6 +306,7 @@ void ServedSession::obey(const Asked& asked) {
         throw MessageRefused("bad-message", error.what(), "/text");
       }
       tell(mark ? "mark" : "note", now, out);
+      if (mark) signals_.mark(message.code, now);
       return output_->reply(asked.client, accepted(message.id, {{"t_ns", now}}));
     }
     case MessageType::clear:
@@ -306,6 +320,9 @@ void ServedSession::obey(const Asked& asked) {
 void ServedSession::start(const Asked& asked) {
   if (session_.plan().finished()) throw MessageRefused("over", "the last trial is on record");
   if (in_trial_ || start_) throw MessageRefused("running", "a trial is under way");
+  const servo::Sample& newest = forces_.newest();
+  const bool tripped = (newest.faults & servo::servo_fault::kTripped) != 0;  // between two trials
+  if (tripped && !held_by_ && !emergencies_.any()) held(why_off(newest.faults, newest.trouble));
   if (held_by_ || emergencies_.any()) throw forces_off();
   choice_of(asked.message, session_.plan().next());  // refuse a bad choice at once, even in a break
   start_ = asked;
@@ -325,36 +342,72 @@ std::optional<protocols::TrialChoice> ServedSession::choice_of(const Message& me
   const auto named = [&](int i) { return stimuli[static_cast<std::size_t>(i)].name; };
   const TaskBlock& block = session_.task_of(next);
   if (block.task != TaskKind::external) {
-    if (!message.stimulus.empty() && message.stimulus != named(next.stimulus))
+    const Wanted& wanted = message.wanted;
+    if (!wanted.stimulus.empty() && wanted.stimulus != named(next.stimulus))
       throw refused_as("/stimulus", named(next.stimulus) + ", as the protocol has it");
-    if (!message.renderer.empty() && message.renderer != protocols::to_string(next.renderer))
+    if (!wanted.renderer.empty() && wanted.renderer != protocols::to_string(next.renderer))
       throw refused_as("/renderer", std::string(protocols::to_string(next.renderer)) +
                                         ", as the protocol has it");
-    if (message.level && message.level != next.level) throw refused_as("/level", "the protocol's");
+    if (wanted.level && wanted.level != next.level) throw refused_as("/level", "the protocol's");
     if (message.orientation)
       throw refused_as("/orientation_wxyz", "none: the protocol sets the orientations");
+    if (!message.intervals.empty())
+      throw refused_as("/intervals", "none: the protocol sets the intervals");
     return std::nullopt;
   }
+  const auto count = static_cast<std::size_t>(block.intervals);
+  if (message.intervals.size() != (count > 1 ? count : 0))
+    throw refused_as("/intervals", count > 1
+                                       ? std::to_string(count) + " intervals, as the block has"
+                                       : "none: the block has one interval");
   protocols::TrialChoice choice;
-  const auto wanted =
-      std::ranges::find_if(block.stimuli, [&](int i) { return named(i) == message.stimulus; });
-  if (wanted == block.stimuli.end() && (!message.stimulus.empty() || block.stimuli.size() > 1))
-    throw refused_as("/stimulus", "a stimulus of the block");
-  choice.stimulus = wanted == block.stimuli.end() ? block.stimuli.front() : *wanted;
-  const auto renderer = std::ranges::find_if(block.renderers, [&](protocols::RendererKind kind) {
-    return protocols::to_string(kind) == message.renderer;
-  });
-  if (renderer == block.renderers.end() &&
-      (!message.renderer.empty() || block.renderers.size() > 1))
-    throw refused_as("/renderer", "a renderer of the block");
-  choice.renderer = renderer == block.renderers.end() ? block.renderers.front() : *renderer;
-  if (block.level.has_value() != message.level.has_value())
-    throw refused_as("/level", block.level ? "a level" : "none: the block has no level");
-  if (message.level && !(*message.level >= *block.least && *message.level <= *block.most))
-    throw refused_as("/level", "a level from min to max of the block");
-  choice.level = message.level;
+  for (std::size_t i = 0; i < message.intervals.size(); ++i)
+    choice.intervals.push_back(
+        interval_of(message.intervals[i], protocols::child_pointer("/intervals", i), block));
+  protocols::Interval judged;
+  if (choice.intervals.empty()) {
+    judged = interval_of(message.wanted, "", block);
+  } else {
+    const auto asked = std::ranges::find(choice.intervals, false, &protocols::Interval::standard);
+    if (asked == choice.intervals.end())
+      throw refused_as("/intervals", "one interval that is no standard");
+    judged = *asked;
+  }
+  choice.stimulus = judged.stimulus;
+  choice.renderer = judged.renderer;
+  choice.level = judged.level;
   choice.orientation = message.orientation;
   return choice;
+}
+
+/// \param place  JSON pointer of `wanted` in the message. \throws MessageRefused: the block has
+/// none such
+protocols::Interval ServedSession::interval_of(const Wanted& wanted, const std::string& place,
+                                               const TaskBlock& block) const {
+  const auto refused_as = [&](const char* key, const std::string& expected) {
+    return MessageRefused("bad-trial", "expected " + expected, place + key);
+  };
+  const auto& stimuli = parts_.station.protocol.stimuli;
+  protocols::Interval out;
+  const auto stimulus = std::ranges::find_if(block.stimuli, [&](int i) {
+    return stimuli[static_cast<std::size_t>(i)].name == wanted.stimulus;
+  });
+  if (stimulus == block.stimuli.end() && (!wanted.stimulus.empty() || block.stimuli.size() > 1))
+    throw refused_as("/stimulus", "a stimulus of the block");
+  out.stimulus = stimulus == block.stimuli.end() ? block.stimuli.front() : *stimulus;
+  const auto renderer = std::ranges::find_if(block.renderers, [&](protocols::RendererKind kind) {
+    return protocols::to_string(kind) == wanted.renderer;
+  });
+  if (renderer == block.renderers.end() && (!wanted.renderer.empty() || block.renderers.size() > 1))
+    throw refused_as("/renderer", "a renderer of the block");
+  out.renderer = renderer == block.renderers.end() ? block.renderers.front() : *renderer;
+  if (block.level.has_value() != wanted.level.has_value())
+    throw refused_as("/level", block.level ? "a level" : "none: the block has no level");
+  if (wanted.level && !(*wanted.level >= *block.least && *wanted.level <= *block.most))
+    throw refused_as("/level", "a level from min to max of the block");
+  out.level = wanted.level;
+  out.standard = wanted.standard;
+  return out;
 }
 
 participants::Answer ServedSession::answer_of(const Message& message) const {
@@ -383,14 +436,27 @@ participants::Answer ServedSession::answer_of(const Message& message) const {
   return out;
 }
 
+void ServedSession::go_on(const Asked& asked) {
+  if (!in_trial_ || !begun_ || goes_on_)
+    throw MessageRefused("nothing-felt", "no interval is felt that another one follows");
+  if (view_.answers) throw MessageRefused("last-interval", "the trial has no more intervals");
+  goes_on_ = true;
+  next_ = asked;
+}
+
 void ServedSession::answer(const Asked& asked) {
   if (!in_trial_ && timed_out_) {
     const Refusal late{"timed-out", "the time for the answer was over: the trial is on record", ""};
     const ordered_json more = {{"stored", *timed_out_}, {"next", (*timed_out_)["next"]}};
     return output_->reply(asked.client, refused(asked.message.id, {late}, more));
   }
-  if (!in_trial_ || onset_ns_ == 0)
-    throw MessageRefused("nothing-felt", "no trial is running: start first");
+  if (!in_trial_ || !begun_)
+    throw MessageRefused("nothing-felt",
+                         in_trial_ ? "forces are not on yet" : "no trial is running: start first");
+  if (!view_.answers)
+    throw MessageRefused("not-yet", "interval " + std::to_string(view_.interval) + " of " +
+                                        std::to_string(view_.intervals) +
+                                        ": the answer comes after the last");
   if (given_) throw MessageRefused("answered", "the trial is answered");
   participants::Answer given = answer_of(asked.message);
   const std::int64_t now = clock_.now_ns();
@@ -426,10 +492,12 @@ void ServedSession::clear(const Asked& asked) {
 }
 
 void ServedSession::read(const std::string& text) {
+  noise_.stop();
   if (!text.empty()) tell("text", clock_.now_ns(), {{"text", text}});
 }
 
 void ServedSession::rest(const std::string& text, std::int64_t until_ns) {
+  noise_.stop();
   tell("rest", clock_.now_ns(), {{"text", text}, {"until_ns", until_ns}});
   while (clock_.now_ns() < until_ns) {
     attend();
@@ -437,12 +505,20 @@ void ServedSession::rest(const std::string& text, std::int64_t until_ns) {
   }
 }
 
+void ServedSession::feedback(bool correct) {
+  noise_.cue(correct ? participants::SoundCue::right : participants::SoundCue::wrong);
+}
+
 /// Waits for `start` in every block.
 std::optional<protocols::TrialChoice> ServedSession::choose(const protocols::Trial& next) {
   while (true) {
     attend();
     try {
-      if (start_) return choice_of(start_->message, next);
+      if (start_) {
+        std::optional<protocols::TrialChoice> choice = choice_of(start_->message, next);
+        if (!noise_.start()) throw MessageRefused("no-sound", sound_trouble_);
+        return choice;
+      }
     } catch (const MessageRefused& error) {  // practice may have continued with another trial
       output_->reply(start_->client, refused(start_->message.id, error.why()));
       start_.reset();
@@ -456,43 +532,74 @@ void ServedSession::begin_trial(const protocols::Trial& trial) {
   in_trial_ = true;
   trial_ = trial;
   onset_ns_ = 0;
+  view_ = {};
+  begun_ = goes_on_ = false;
   draw(trial);
   given_.reset();
   waits_for_ = servo::Waiting::nothing;
 }
 
+void ServedSession::begin_interval(const protocols::Trial&,
+                                   const participants::IntervalView& view) {
+  signals_.interval(view.continues);
+  view_ = view;
+  begun_ = goes_on_ = false;
+  waits_for_ = servo::Waiting::nothing;
+}
+
+/// The first tick of an interval, or of the question after the last.
+void ServedSession::begin_feeling(const servo::Sample& sample) {
+  begun_ = true;
+  if (view_.felt) onset_ns_ = sample.time_ns;
+  const ordered_json trial = {{"trial", trial_.trial}};
+  if (view_.interval == 1 && view_.felt) {
+    ordered_json reply = {{"t_ns", onset_ns_}};
+    reply.update(trial);
+    if (start_) output_->reply(start_->client, accepted(start_->message.id, reply));
+    start_.reset();
+    return tell("started", onset_ns_, trial);
+  }
+  ordered_json more = trial;
+  if (view_.felt) more["interval"] = view_.interval;
+  tell(view_.felt ? "interval" : "question", sample.time_ns, more);
+  if (!next_) return;
+  more["t_ns"] = sample.time_ns;
+  output_->reply(next_->client, accepted(next_->message.id, more));
+  next_.reset();
+}
+
 std::optional<participants::Answer> ServedSession::step(const servo::Sample& sample) {
   ticks_.push(sample);
-  if (sample.phase == servo::Phase::feeling && onset_ns_ == 0) {
-    onset_ns_ = sample.time_ns;
-    const ordered_json more = {{"trial", trial_.trial}};
-    if (start_) {
-      output_->reply(start_->client,
-                     accepted(start_->message.id, {{"t_ns", onset_ns_}, {"trial", trial_.trial}}));
-    }
-    start_.reset();
-    tell("started", onset_ns_, more);
-  }
-  if (onset_ns_ == 0 && sample.waiting != waits_for_ &&
+  if (sample.phase == servo::Phase::feeling && !begun_) begin_feeling(sample);
+  if (!begun_ && sample.waiting != waits_for_ &&
       sample.time_ns - waits_since_ns_ > kSteadyWait_ns) {
     waits_for_ = sample.waiting;
     waits_since_ns_ = sample.time_ns;
-    tell("waiting", sample.time_ns,
-         {{"for", sample.waiting == servo::Waiting::for_distance ? "distance" : "rest"}});
+    const bool far = sample.waiting == servo::Waiting::for_distance;
+    if (sample.waiting == servo::Waiting::for_rest) noise_.cue(participants::SoundCue::ready);
+    tell("waiting", sample.time_ns, {{"for", far ? "distance" : "rest"}});
   }
   attend();
   if (given_ && sample.time_ns >= given_->time_ns) return given_;
+  if (goes_on_ && begun_) {
+    participants::Answer on;
+    on.time_ns = sample.time_ns;
+    on.continues = true;
+    return on;
+  }
   return std::nullopt;
 }
 
-void ServedSession::onset(const data::TrialRecord&) {}
+void ServedSession::onset(const data::TrialRecord& so_far) { signals_.onset(so_far); }
 
 void ServedSession::first_contact(const data::TrialRecord& so_far, std::int64_t time_ns) {
+  signals_.first_contact(time_ns);
   tell("first_contact", time_ns, {{"trial", so_far.trial}});
 }
 
 void ServedSession::cut_off(const std::string& reason) {
   in_trial_ = false;
+  signals_.cut_off();
   const std::int64_t now = clock_.now_ns();
   tell("cut_off", now, {{"trial", trial_.trial}, {"reason", reason}});
   if (stop_) output_->reply(stop_->client, accepted(stop_->message.id, {{"t_ns", now}}));
@@ -501,6 +608,7 @@ void ServedSession::cut_off(const std::string& reason) {
   keep_under_way();
   if (answer_ && !held_by_)
     refuse(std::exchange(answer_, {}), "stopped", "the trial was cut off: " + reason);
+  if (!held_by_) refuse(std::exchange(next_, {}), "stopped", "the trial was cut off: " + reason);
 }
 
 void ServedSession::recorded(const data::TrialRecord& record) {

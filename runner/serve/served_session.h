@@ -16,12 +16,13 @@
 #include "runner/serve/why_off.h"
 #include "runner/session/live_forces.h"
 #include "runner/session/session.h"
+#include "runner/session/signals.h"
 #include "runner/session/station.h"
 
 namespace palpate::runner::serve {
 
 /// The reason why a program cannot run this protocol, in words; empty: it can. Questions on pages,
-/// confidence and trials of several intervals need the displays of `palpate run`.
+/// confidence and adjustment need the displays of `palpate run`.
 std::string unserved(const protocols::Protocol& protocol);
 
 /// Call all functions in one thread, the session's, unless stated otherwise.
@@ -33,6 +34,8 @@ class ServedSession final : public participants::Respondent, public session::Ses
     session::RunRecord& record;
     servo::ServoThread& servo;
     safety::GuardedDevice* guard;  ///< null without force feedback
+    session::Markers& markers;
+    sound::NoisePlayer* noise;  ///< null: none
     std::function<int()> end_requested;
     const std::vector<data::TrialRecord>& stored;  ///< completed trials of the session
     PictureOf picture;
@@ -75,15 +78,17 @@ class ServedSession final : public participants::Respondent, public session::Ses
   // As Respondent:
   void read(const std::string& text) override;
   void rest(const std::string& text, std::int64_t until_ns) override;
-  void feedback(bool /*correct*/) override {}  // the reply to `answer` has it
+  void feedback(bool correct) override;  ///< the sound; the reply to `answer` has it as well
   std::optional<protocols::TrialChoice> choose(const protocols::Trial& next) override;
   void begin_trial(const protocols::Trial& trial) override;
+  void begin_interval(const protocols::Trial& trial,
+                      const participants::IntervalView& view) override;
   std::optional<participants::Answer> step(const servo::Sample& sample) override;
   // As SessionEvents:
-  void began(const protocols::Trial& /*trial*/) override {}
+  void began(const protocols::Trial& trial) override { signals_.began(trial); }
   void onset(const data::TrialRecord& so_far) override;
   void first_contact(const data::TrialRecord& so_far, std::int64_t time_ns) override;
-  void answered(const data::TrialRecord& /*record*/) override {}
+  void answered(const data::TrialRecord& record) override { signals_.answered(record); }
   void cut_off(const std::string& reason) override;
   void recorded(const data::TrialRecord& record) override;
 
@@ -98,12 +103,16 @@ class ServedSession final : public participants::Respondent, public session::Ses
   void attend();
   void obey(const Asked& asked);
   void start(const Asked& asked);
+  void go_on(const Asked& asked);
   void answer(const Asked& asked);
   void clear(const Asked& asked);
   void left();
   std::optional<protocols::TrialChoice> choice_of(const Message& message,
                                                   const protocols::Trial& next) const;
+  protocols::Interval interval_of(const Wanted& wanted, const std::string& place,
+                                  const protocols::TaskBlock& block) const;
   participants::Answer answer_of(const Message& message) const;
+  void begin_feeling(const servo::Sample& sample);
   nlohmann::ordered_json next_trial() const;
   void keep_state();
   void keep_under_way() noexcept { under_way_.store(start_.has_value() || in_trial_); }
@@ -117,6 +126,9 @@ class ServedSession final : public participants::Respondent, public session::Ses
   const Parts parts_;
   servo::Clock& clock_;
   session::LiveForces forces_;
+  std::string sound_trouble_;
+  session::SessionNoise noise_;
+  session::TrialSignals signals_;
   session::Session session_;
   TickStream ticks_;
   ServeOutput* output_ = nullptr;
@@ -128,8 +140,12 @@ class ServedSession final : public participants::Respondent, public session::Ses
   std::optional<Asked> start_;   ///< waits for forces
   std::optional<Asked> answer_;  ///< waits until the trial is on record
   std::optional<Asked> stop_;    ///< waits for forces off
+  std::optional<Asked> next_;    ///< waits for the next interval
   std::optional<participants::Answer> given_;
-  std::int64_t onset_ns_ = 0;  ///< 0: not yet
+  participants::IntervalView view_;  ///< the current interval
+  bool begun_ = false;               ///< its forces are on, or its question is asked
+  bool goes_on_ = false;             ///< to the next interval
+  std::int64_t onset_ns_ = 0;        ///< of the last interval with forces; 0: not yet
   servo::Waiting waits_for_ = servo::Waiting::nothing;
   std::int64_t waits_since_ns_ = 0;
 

@@ -48,8 +48,8 @@ SessionMonitor::SessionMonitor(const LiveStation& station, const Sources& source
     : station_(station), sources_(sources), started_ns_(station.clock.now_ns()) {
   state_.study = station.protocol.name;
   state_.tool = tool_of(station.protocol.tool);
-  state_.participant = marker_.participant = station.record.participant().code;
-  state_.session = marker_.session = station.record.session();
+  state_.participant = station.record.participant().code;
+  state_.session = station.record.session();
   for (const protocols::StimulusSpec& stimulus : station.protocol.stimuli)
     state_.scores.push_back({stimulus.name, 0, 0});
   state_.takes_answers = station.answer_by == participants::AnswerBy::experimenter;
@@ -149,7 +149,7 @@ void SessionMonitor::count(const data::TrialRecord& record) {
 void SessionMonitor::interval(const protocols::Trial& trial,
                               const participants::IntervalView& view) {
   const auto& block = *protocols::block_of(station_.protocol, trial);
-  turned_ = view.continues;
+  sources_.signals.interval(view.continues);
   feeling_ = feeling_ && view.continues;
   state_.task = to_string(block.task);
   state_.counts_right =
@@ -186,7 +186,7 @@ void SessionMonitor::began(const protocols::Trial& trial) {
   const protocols::StimulusSpec& stimulus =
       station_.protocol.stimuli[static_cast<std::size_t>(trial.stimulus)];
   in_trial_ = true;
-  feeling_ = began_feeling_ = turned_ = touched_ = false;
+  feeling_ = touched_ = false;
   trial_began_ns_ = station_.clock.now_ns();
   stimuli::ObjectSpec object = stimulus.object;
   object.pose = stimuli::compose({Vec3(0), trial.orientation}, object.pose);
@@ -194,32 +194,20 @@ void SessionMonitor::began(const protocols::Trial& trial) {
   state_.shape = stimulus.name;
   state_.practice = trial.practice;
   state_.renderer = protocols::to_string(trial.renderer);
-  state_.block = marker_.block = trial.block;
-  state_.trial = marker_.trial = trial.trial;
-  marker_.shape = state_.shape;
-  marker_.renderer = state_.renderer;
-  marker_.attempt = 0;
-  marker_.response.clear();
+  state_.block = trial.block;
+  state_.trial = trial.trial;
+  sources_.signals.began(trial);
   show();
 }
 
 void SessionMonitor::onset(const data::TrialRecord& so_far) {
   feeling_ = true;
-  if (turned_) return;  // a turn changes the forces within one interval
-  sources_.noise.go_tone();
-  marker_.kind = began_feeling_ ? Marker::Kind::interval : Marker::Kind::trial_start;
-  began_feeling_ = true;
-  marker_.attempt = so_far.attempt;
-  marker_.time_ns = so_far.onset_ns;
-  station_.markers.send(marker_);
+  sources_.signals.onset(so_far);
 }
 
 void SessionMonitor::first_contact(const data::TrialRecord&, std::int64_t time_ns) {
   touched_ = true;
-  if (turned_) return;
-  marker_.kind = Marker::Kind::first_contact;
-  marker_.time_ns = time_ns;
-  station_.markers.send(marker_);
+  sources_.signals.first_contact(time_ns);
 }
 
 void SessionMonitor::unrated(const data::TrialRecord& so_far) {
@@ -233,18 +221,13 @@ void SessionMonitor::unrated(const data::TrialRecord& so_far) {
 
 void SessionMonitor::answered(const data::TrialRecord& record) {
   in_trial_ = asking_ = false;
-  marker_.kind = record.timed_out ? Marker::Kind::time_out : Marker::Kind::response;
-  marker_.response = record.response;
-  marker_.time_ns = record.response_ns;
-  station_.markers.send(marker_);
+  sources_.signals.answered(record);
 }
 
 void SessionMonitor::cut_off(const std::string& reason) {
   in_trial_ = asking_ = false;
-  marker_.kind = Marker::Kind::cut_off;
-  marker_.time_ns = station_.clock.now_ns();
-  station_.markers.send(marker_);
-  say("trial " + std::to_string(marker_.trial) + " was cut off: " + reason);
+  sources_.signals.cut_off();
+  say("trial " + std::to_string(state_.trial) + " was cut off: " + reason);
 }
 
 /// For the experimenter; the record has every digit of an adjusted level.
@@ -303,8 +286,10 @@ LiveSession::LiveSession(const LiveStation& station)
     : station_(station),
       forces_(station.servo_thread, station.guard, station.clock),
       hold_(station, forces_, [this](const std::string& message) { say(message); }),
-      noise_(station, [this](const std::string& message) { say(message); }),
-      monitor_(station, {session_, respondent_, hold_, forces_, noise_}),
+      noise_(station, station.noise, [this](const std::string& message) { say(message); }),
+      signals_(station, station.markers, noise_, station.record.participant().code,
+               station.record.session()),
+      monitor_(station, {session_, respondent_, hold_, forces_, signals_}),
       respondent_(station.protocol, station.screen, *this, station.clock, station.answer_by),
       session_(station, respondent_, &monitor_, largest_reach(station)) {}
 

@@ -11,6 +11,7 @@
 #include "runner/session/live_forces.h"
 #include "runner/session/recorders.h"
 #include "runner/session/session.h"
+#include "runner/session/signals.h"
 #include "runner/session/station.h"
 
 namespace palpate::runner::session {
@@ -28,7 +29,7 @@ class SessionMonitor final : public SessionEvents {
     const participants::KeyboardRespondent& respondent;
     const SessionHold& hold;
     LiveForces& forces;
-    SessionNoise& noise;
+    TrialSignals& signals;
   };
   SessionMonitor(const LiveStation& station, const Sources& sources);
 
@@ -74,15 +75,12 @@ class SessionMonitor final : public SessionEvents {
   const LiveStation& station_;
   const Sources sources_;
   display::ConsoleState state_;
-  Marker marker_;  ///< of the current trial, to be filled in
   std::int64_t started_ns_, trial_began_ns_ = 0, shown_ns_ = 0;  ///< session clock
   double seconds_per_trial_ = 0;                                 ///< mean, since the session began
   std::optional<std::size_t> expected_at_;  ///< the trials done when they were expected last
   std::size_t expected_ = 0;
   int timed_trials_ = 0;  ///< in that mean
   bool in_trial_ = false, feeling_ = false;
-  bool began_feeling_ = false;  ///< the first interval of the trial has begun
-  bool turned_ = false;   ///< the interval follows a turn: it is no new event for other recordings
   bool touched_ = false;  ///< in any interval of the trial
   bool asking_ = false;
   std::string page_;  ///< on show, as the state in words; empty: none
@@ -133,6 +131,7 @@ class LiveSession final : public participants::Attendant {
   LiveForces forces_;
   SessionHold hold_;
   SessionNoise noise_;
+  TrialSignals signals_;
   SessionMonitor monitor_;
   participants::KeyboardRespondent respondent_;
   Session session_;

@@ -94,11 +94,14 @@ const char* to_string(Marker::Kind kind) {
       return "interval";
     case Marker::Kind::sync:
       return "sync";
+    case Marker::Kind::mark:
+      return "mark";
   }
   return "";
 }
 
 int code_of(const Marker& marker, const protocols::EventCodes& codes) {
+  if (marker.kind == Marker::Kind::mark) return marker.code;
   if (marker.kind == Marker::Kind::response) {
     const auto own = codes.find("response:" + marker.response);
     if (own != codes.end()) return own->second;

@@ -30,16 +30,17 @@ struct Marker {
     cut_off,   ///< the trial will be shown again
     interval,  ///< forces go on again, in a later interval of the trial
     sync,      ///< a second has passed; belongs to no trial
+    mark,      ///< of the program that drives palpate serve, with a code of its own
   };
   Kind kind = Kind::trial_start;
-  int code = 0;              ///< 1 to 255, from code_of(): the byte for a port
+  int code = 0;              ///< 1 to 255, from code_of(): the byte for a port; of a mark its own
   std::int64_t time_ns = 0;  ///< CLOCK_MONOTONIC, of the event itself
   std::string participant;
   int session = 0, block = 0, trial = 0, attempt = 0;
   std::string renderer, shape, response;  ///< response: empty except for Kind::response
 };
 const char* to_string(Marker::Kind kind);  ///< "trial_start", ...
-/// The code of the answer if it has one, else of the kind.
+/// The code of the answer if it has one, else of the kind; a mark's own.
 int code_of(const Marker& marker, const protocols::EventCodes& codes);
 /// Who may read a participant's code in a marker: network data is unencrypted.
 enum class MarkerCodes {

@@ -121,54 +121,6 @@ void SessionHold::go_on() {
   }
 }
 
-bool SessionNoise::start() {
-  if (station_.noise == nullptr || on_record_) return true;
-  try {
-    station_.noise->turn_on();
-  } catch (const sound::SoundError& error) {
-    say_(error.what());
-    return false;
-  }
-  on_record_ = true;
-  station_.record.note(station_.clock.now_ns(), sound::to_json_text(*station_.noise));
-  return true;
-}
-
-void SessionNoise::stop() {
-  if (!on_record_) return;
-  on_record_ = false;
-  station_.noise->turn_off();
-  const sound::NoiseReport heard = station_.noise->report();
-  if (station_.noise->has_noise())
-    station_.record.note(station_.clock.now_ns(), sound::to_json_text(heard));
-  if (heard.underruns > 0)
-    say_("the masking noise had " + std::to_string(heard.underruns) + " gaps");
-}
-
-bool SessionNoise::has_failed() {
-  if (!on_record_ || !station_.noise->failed()) return false;
-  say_(station_.noise->report().trouble);
-  stop();
-  return true;
-}
-
-void SessionNoise::go_tone() {
-  const auto& sounds = station_.protocol.sounds;
-  if (station_.noise != nullptr && (station_.protocol.masking_noise || (sounds && sounds->go)))
-    station_.noise->tone();
-}
-
-void SessionNoise::cue(participants::SoundCue cue) {
-  const auto& sounds = station_.protocol.sounds;
-  if (station_.noise == nullptr || !sounds) return;
-  if (cue == participants::SoundCue::ready && sounds->ready)
-    station_.noise->tone(sound::Tone::ready);
-  if (cue == participants::SoundCue::right && sounds->feedback)
-    station_.noise->tone(sound::Tone::right);
-  if (cue == participants::SoundCue::wrong && sounds->feedback)
-    station_.noise->tone(sound::Tone::wrong);
-}
-
 namespace {
 
 using protocols::PageItem;
@@ -185,6 +137,14 @@ bool comparison_is_right(const protocols::TaskBlock& block, const data::TaskReco
   if (side != 0) return (side > 0) != block.asks_smaller;
   return block.asks_smaller ? *task.level <= *task.standard_level
                             : *task.level >= *task.standard_level;
+}
+
+/// Whether the response is the stimulus, or with several intervals the number of the one that is no
+/// standard.
+bool names_what_is_asked(const protocols::Trial& trial, const data::TrialRecord& record) {
+  if (trial.intervals.size() == 1) return record.response == record.shape;
+  const auto asked = std::ranges::find(trial.intervals, false, &protocols::Interval::standard);
+  return record.response == std::to_string(asked - trial.intervals.begin() + 1);
 }
 
 const protocols::TaskAnswer& chosen(const protocols::TaskBlock& block,
@@ -225,6 +185,9 @@ void Session::plan_task(const protocols::Trial& trial, data::TrialRecord& record
   task.catch_trial = trial.catch_trial;
   if (block.standard)
     task.standard_level = protocols::own_level(station_.protocol, block, *block.standard);
+  if (block.task != TaskKind::external) return;
+  const auto standard = std::ranges::find(trial.intervals, true, &protocols::Interval::standard);
+  if (standard != trial.intervals.end()) task.standard_level = standard->level;
 }
 
 void Session::prepare_interval(const protocols::Trial& trial, const protocols::Interval& interval,
@@ -405,7 +368,7 @@ void Session::judge(const protocols::Trial& trial, const participants::Answer& a
       break;
     case TaskKind::external:
       record_.response = chosen(block, answer).name;
-      record_.correct = task.success = answer.correct.value_or(record_.response == record_.shape);
+      record_.correct = task.success = answer.correct.value_or(names_what_is_asked(trial, record_));
       break;
     case TaskKind::rate:
       task.number = block.answers.empty() ? answer.number : chosen(block, answer).number;

@@ -1,6 +1,6 @@
 #pragma once
 // The trial loop: a session as a state machine, the same for simulated and live participants. Also
-// its holds (pauses and faults), its masking noise and its events.
+// its holds (pauses and faults) and its events.
 
 #include <functional>
 #include <memory>
@@ -86,34 +86,6 @@ class SessionHold {
   std::string fault_;
   std::string fault_state_, reason_;  ///< of the last fault
   std::string zero_asked_by_;         ///< " by the key F12"
-};
-
-// Masking noise in a live session: it plays while trials run, and its start and end are recorded.
-
-/// Belongs to the session's thread. Does nothing if the station has no noise.
-class SessionNoise {
- public:
-  /// \param say  takes messages for the experimenter. The station must outlive it.
-  SessionNoise(const LiveStation& station, std::function<void(const std::string&)> say)
-      : station_(station), say_(std::move(say)) {}
-
-  /// Starts the noise, unless it plays. False: the sound output cannot be opened, which is
-  /// reported.
-  bool start();
-  /// Stops the noise if it plays.
-  void stop();
-  /// True if the output has failed since start(), as when headphones are pulled out: reports it and
-  /// stops the noise.
-  bool has_failed();
-  /// Plays the tone for "go": forces are on.
-  void go_tone();
-  /// Plays the protocol's sound for the cue, if it has one.
-  void cue(participants::SoundCue cue);
-
- private:
-  const LiveStation& station_;
-  std::function<void(const std::string&)> say_;
-  bool on_record_ = false;  ///< its start is on record, its end is not yet
 };
 
 /// A trial could not continue: the device was lost or forces went off. The attempt is recorded as

@@ -329,7 +329,7 @@ ViewAngles parse_view(const std::string& text) {
 
 namespace po = boost::program_options;
 
-void add_explore_options(CommandLine& line) {
+void add_explore_options(CommandLine& line, RunSettings& device) {
   line.positional_names = {"SCENE.json"};
   line.options.add_options()  //
       ("device", po::value<std::string>()->value_name("NAME"),
@@ -352,15 +352,9 @@ void add_explore_options(CommandLine& line) {
       ("labels", po::bool_switch(), "number and shape at each object")    //
       ("pictures", po::value<std::string>()->value_name("DIR"),
        "where the window keeps pictures: scene-1.png and so on")  //
-      ("serial", po::value<std::vector<std::string>>()->composing()->value_name("NUMBER"),
-       "which device; two of a stylus: twice, tip first")                                   //
-      ("firmware", po::value<std::string>()->value_name("FILE"), "as for palpate run")      //
-      ("library", po::value<std::string>()->value_name("FILE"), "as for palpate run")       //
-      ("service", po::value<std::string>()->value_name("HOST:PORT"), "as for palpate run")  //
-      ("calibration", po::value<std::string>()->value_name("FILE"),
-       "of the device, as for palpate run")                                                       //
-      ("without-calibration", po::bool_switch(), "a device that was not calibrated may be used")  //
       ("force", "replace existing files and frames");
+  add_device_options(line.options, device);
+  add_recorder_options(line.options, device);
 }
 
 int draw_pictures(const po::variables_map& values, const rendering::Renderer& renderer) {
@@ -399,23 +393,18 @@ int draw_pictures(const po::variables_map& values, const rendering::Renderer& re
   return 0;
 }
 
-int open_window(const po::variables_map& values, const rendering::Renderer& renderer) {
+int open_window(const po::variables_map& values, const rendering::Renderer& renderer,
+                const RunSettings& device) {
   HandsOnSettings settings{.scene_path = text_of(values, "SCENE.json"),
                            .trajectory = text_of(values, "trajectory"),
-                           .device = text_of(values, "device"),
                            .pictures = text_of(values, "pictures"),
-                           .calibration = text_of(values, "calibration"),
-                           .firmware = text_of(values, "firmware"),
-                           .library = text_of(values, "library"),
-                           .service = text_of(values, "service"),
-                           .without_calibration = values["without-calibration"].as<bool>(),
                            .labels = values["labels"].as<bool>(),
-                           .serials = {}};
-  if (values.count("serial") > 0)
-    settings.serials = values["serial"].as<std::vector<std::string>>();
-  if (!settings.trajectory.empty() && !settings.device.empty())
+                           .run = device};
+  settings.run.device = text_of(values, "device");
+  check_recorders(settings.run);
+  if (!settings.trajectory.empty() && !settings.run.device.empty())
     throw UsageError("--device and --trajectory: expected one of them");
-  if (settings.trajectory.empty() && settings.device.empty()) settings.device = "mouse";
+  if (settings.trajectory.empty() && settings.run.device.empty()) settings.run.device = "mouse";
   return explore_hands_on(protocols::parse_scene(settings.scene_path), renderer, settings);
 }
 
@@ -443,7 +432,8 @@ int explore_command(const std::vector<std::string>& args) {
       "  palpate explore protocols/scenes/fig17a-engine.json \\\n"
       "      --trajectory protocols/scenes/fig17a-engine.csv --frames engine --every 100ms\n"
       "  palpate explore scene.json --trajectory path.csv --animation scene.webp --size 640x360\n";
-  add_explore_options(line);
+  RunSettings device;
+  add_explore_options(line, device);
   const auto values = line.parse(args);
   if (!values) return 0;
   const rendering::Renderer& renderer = renderer_named(text_of(*values, "renderer"));
@@ -453,7 +443,7 @@ int explore_command(const std::vector<std::string>& args) {
     if (!(*values)[option].defaulted())
       throw UsageError("--" + std::string(option) +
                        " goes with pictures: expected --frames or --animation");
-  return open_window(*values, renderer);
+  return open_window(*values, renderer, device);
 }
 
 }  // namespace palpate::runner::commands

@@ -169,19 +169,15 @@ int explore_live(const protocols::SceneSpec& spec, const rendering::Renderer& re
                  const HandsOnSettings& settings) {
   protocols::Protocol protocol = serve::protocol_of(spec, renderer);
   protocol.material_limit = protocols::MaterialLimit::limit;
-  RunSettings run;
-  run.device = settings.device;
-  run.calibration = settings.calibration;
-  run.without_calibration = settings.without_calibration;
-  run.firmware = settings.firmware;
-  run.library = settings.library;
-  run.service = settings.service;
-  run.serials = settings.serials;
-  const devices::DeviceKind& kind = find_device_kind(settings.device);
+  const RunSettings& run = settings.run;
+  const devices::DeviceKind& kind = find_device_kind(run.device);
   display::ExploreSettings window = window_settings(spec, renderer, settings);
+  auto sinks = open_markers(run);
   safety::FaultSignals signals;
   const OpenDevice open = open_device(kind, run, protocol);
   signals.watch(open.guard);
+  session::Markers markers(std::move(sinks), protocols::usual_event_codes(), run.sync);
+  const auto stream = open_stream(run, protocol.servo_rate);
   const servo::DeviceCapabilities& device = open.device->capabilities();
   if (open.guard != nullptr) check_fitness(open, run, protocol, StimulusLibrary(protocol));
   servo::RealClock clock;
@@ -204,14 +200,18 @@ int explore_live(const protocols::SceneSpec& spec, const rendering::Renderer& re
                    .renderer = &renderer,
                    .servo = servo,
                    .limit = limit,
-                   .emergency = [guard = open.guard] {
-                     if (guard != nullptr) guard->emergency_zero();
-                   }});
+                   .emergency =
+                       [guard = open.guard] {
+                         if (guard != nullptr) guard->emergency_zero();
+                       },
+                   .markers = &markers,
+                   .stream = stream.get()});
   const WatchedForces watched(signals, touch.servo());
   display::explore_in_window(std::move(window), touch);
   const servo::ServoHealth& health = touch.servo().health();
   std::cout << health.ticks() << " ticks, " << health.missed_ticks() << " missed, "
             << health.lost_samples() << " not shown\n";
+  print_dropped(markers, stream.get());
   return 0;
 }
 
@@ -265,6 +265,8 @@ protocols::SceneSpec LiveTouch::with_objects(
 
 void LiveTouch::prepare(const std::vector<stimuli::ObjectSpec>& objects) {
   SceneBuilder builder;
+  begun_ = touched_once_ = false;
+  marker_.renderer = settings_.renderer->side_contact() ? "ray" : "point";
   servo_.prepare(
       build_scene(builder, settings_.scene_path, with_objects(objects), *settings_.renderer),
       *settings_.renderer, kAnywhere);
@@ -278,6 +280,7 @@ void LiveTouch::keep(const servo::Sample& sample, std::span<const rendering::Bod
   if (sample.time_ns == last_ns_) return;  // the servo has stopped and repeats its last sample
   last_ns_ = sample.time_ns;
   patience_.begin();
+  tell_recorders(sample);
   display::SceneMoment moment{.sample = sample, .contacts = {}};
   if (stepping_) {  // the hand got almost no force: show the full one
     moment.sample.device1 = sample.rendering.device1;
@@ -302,6 +305,24 @@ void LiveTouch::keep(const servo::Sample& sample, std::span<const rendering::Bod
     fresh_.erase(fresh_.begin(), fresh_.begin() + static_cast<std::ptrdiff_t>(fresh_.size() / 4));
   fresh_.push_back(std::move(moment));
   recorded_.fetch_add(1);
+}
+
+void LiveTouch::tell_recorders(const servo::Sample& sample) {
+  if (settings_.stream != nullptr) settings_.stream->push(sample);
+  if (settings_.markers == nullptr || sample.phase != servo::Phase::feeling) return;
+  const auto send = [&](session::Marker::Kind kind) {
+    marker_.kind = kind;
+    marker_.time_ns = sample.time_ns;
+    settings_.markers->send(marker_);
+  };
+  if (!begun_) {
+    ++marker_.trial;
+    send(session::Marker::Kind::trial_start);
+  }
+  begun_ = true;
+  if (touched_once_ || sample.rendering.contacts == 0) return;
+  touched_once_ = true;
+  send(session::Marker::Kind::first_contact);
 }
 
 /// Where forces are off or limited, what was rendered is not what the hand got: one place then,

@@ -16,8 +16,10 @@
 #include "protocols/parse.h"
 #include "rendering/renderer.h"
 #include "runner/commands/render/forces.h"
+#include "runner/commands/run/settings.h"
 #include "runner/display/display.h"
 #include "runner/servo/servo_thread.h"
+#include "runner/session/recorders.h"
 
 namespace palpate::runner::commands {
 
@@ -56,12 +58,10 @@ class RecordedTouch final : public display::TouchSource {
 // The window of `palpate explore`.
 
 struct HandsOnSettings {
-  std::string scene_path, trajectory, device;  ///< a path or a device
-  std::string pictures;                        ///< folder for those that are kept; empty: none
-  std::string calibration;                     ///< file of calibrations; empty: the usual one
-  std::string firmware, library, service;      ///< as of palpate run; empty: the usual ones
-  bool without_calibration = false, labels = false;
-  std::vector<std::string> serials;  ///< empty: any device
+  std::string scene_path, trajectory;  ///< trajectory: recorded path; empty: a device's
+  std::string pictures;                ///< folder for those that are kept; empty: none
+  bool labels = false;
+  RunSettings run;  ///< the device, and other recorders
 };
 
 /// Touches the scene in a window until that is closed. \return exit status
@@ -83,6 +83,8 @@ class LiveTouch final : public display::TouchSource {
     std::function<void(std::vector<stimuli::ObjectSpec>&)> limit;
     /// Called by emergency_zero() beside the servo's own, such as a guard's; may be empty.
     std::function<void()> emergency;
+    session::Markers* markers = nullptr;      ///< each scene is a trial; null: none
+    session::SampleStream* stream = nullptr;  ///< null: none
   };
 
   /// \param device, clock  the servo's alone; must outlive this. \throws MeshError
@@ -111,6 +113,7 @@ class LiveTouch final : public display::TouchSource {
   void stop_or_go_on(std::optional<std::vector<stimuli::ObjectSpec>> wanted);
   void keep_what_is_there();
   void tell_trouble(const std::string& trouble);
+  void tell_recorders(const servo::Sample& sample);
   protocols::SceneSpec with_objects(const std::vector<stimuli::ObjectSpec>& objects) const;
   void prepare(const std::vector<stimuli::ObjectSpec>& objects);
   std::int64_t period_ns() const;
@@ -126,14 +129,16 @@ class LiveTouch final : public display::TouchSource {
   std::atomic<bool> held_{false};
   std::atomic<int> steps_{0};  ///< requested while held
   std::atomic<std::uint64_t> recorded_{0};
-  std::vector<stimuli::ObjectSpec> shown_;   ///< the recorder's; so the next
-  bool running_ = true, anew_ = false;       ///< anew: the scene restarts
-  bool stepping_ = false;                    ///< the next samples come from step()
-  bool gap_ = false;                         ///< the next sample comes after a pause
-  std::int64_t last_ns_ = 0, shown_ns_ = 0;  ///< of the last sample: the servo's, without pauses
-  std::int64_t paused_ns_ = 0;               ///< of all pauses
-  servo::Patience patience_;                 ///< with the servo
-  servo::TouchedPlaces touched_;             ///< touched places without a sample yet
+  std::vector<stimuli::ObjectSpec> shown_;     ///< the recorder's; so the next
+  bool running_ = true, anew_ = false;         ///< anew: the scene restarts
+  bool stepping_ = false;                      ///< the next samples come from step()
+  bool gap_ = false;                           ///< the next sample comes after a pause
+  session::Marker marker_;                     ///< of the scene under the hand
+  bool begun_ = false, touched_once_ = false;  ///< that scene
+  std::int64_t last_ns_ = 0, shown_ns_ = 0;    ///< of the last sample: the servo's, without pauses
+  std::int64_t paused_ns_ = 0;                 ///< of all pauses
+  servo::Patience patience_;                   ///< with the servo
+  servo::TouchedPlaces touched_;               ///< touched places without a sample yet
   std::vector<std::shared_ptr<const display::SoftSurfaceNow>>
       soft_;                  ///< the newest, by soft object
   std::int64_t soft_ns_ = 0;  ///< when they were requested

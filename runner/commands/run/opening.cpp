@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <cstdint>
 #include <cstdio>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <stdexcept>
 
 #include "data/base/text.h"
+#include "protocols/answer_keys.h"
 #include "protocols/tasks/texts.h"
 #include "runner/commands/shared/command.h"
 #include "runner/display/text_display.h"
@@ -83,6 +85,42 @@ std::vector<std::unique_ptr<session::MarkerSink>> open_markers(const RunSettings
     }
   }
   return sinks;
+}
+
+std::unique_ptr<session::SampleStream> open_stream(const RunSettings& settings, double rate) {
+  if (settings.stream.empty()) return nullptr;
+  try {
+    return std::make_unique<session::SampleStream>(settings.stream, rate);
+  } catch (const std::invalid_argument& error) {
+    throw UsageError(std::string("--stream: ") + error.what());
+  }
+}
+
+std::vector<std::string> notes_on_outlets(const RunSettings& settings,
+                                          const protocols::Protocol& protocol,
+                                          const sound::NoisePlayer* player) {
+  using nlohmann::ordered_json;
+  std::vector<std::string> notes;
+  if (protocol.sounds && player == nullptr) notes.emplace_back(R"({"sounds":"left out"})");
+  if (protocol.masking_noise && player == nullptr)
+    notes.emplace_back(R"({"masking_noise":"left out"})");
+  if (!settings.markers.empty()) {
+    const ordered_json sent = {{"markers", settings.markers},
+                               {"codes", protocols::event_codes(protocol)},
+                               {"sync", settings.sync}};
+    notes.push_back(sent.dump());
+  }
+  if (!settings.stream.empty()) notes.push_back(ordered_json{{"stream", settings.stream}}.dump());
+  return notes;
+}
+
+void print_dropped(const session::Markers& markers, const session::SampleStream* stream) {
+  if (markers.dropped() > 0)
+    std::fprintf(stderr, "%llu markers were not taken by their receivers\n",
+                 static_cast<unsigned long long>(markers.dropped()));
+  if (stream != nullptr && stream->dropped() > 0)
+    std::fprintf(stderr, "%llu samples were not taken by the stream\n",
+                 static_cast<unsigned long long>(stream->dropped()));
 }
 
 std::unique_ptr<sound::NoisePlayer> open_noise(const RunSettings& settings,

@@ -40,6 +40,18 @@ servo::ServoSettings servo_settings_of(const protocols::Protocol& protocol);
 /// \throws UsageError: --markers has an unknown form; std::runtime_error: it cannot be opened
 std::vector<std::unique_ptr<session::MarkerSink>> open_markers(const RunSettings& settings);
 
+/// Null if not requested. \param rate  Hz, of the servo. \throws UsageError: --stream has an
+/// unknown form; std::runtime_error where liblsl is missing
+std::unique_ptr<session::SampleStream> open_stream(const RunSettings& settings, double rate);
+
+/// For the record, each a line of JSON: where markers and samples go, and the protocol's sounds
+/// that are left out. \param player  null: no noise and sounds
+std::vector<std::string> notes_on_outlets(const RunSettings& settings,
+                                          const protocols::Protocol& protocol,
+                                          const sound::NoisePlayer* player);
+/// To standard error: what other recorders did not take. \param stream  may be null
+void print_dropped(const session::Markers& markers, const session::SampleStream* stream);
+
 /// Null with --without-noise, or if the protocol has neither noise nor sounds. \throws SoundError
 std::unique_ptr<sound::NoisePlayer> open_noise(const RunSettings& settings,
                                                const protocols::Protocol& protocol);

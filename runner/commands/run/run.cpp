@@ -84,9 +84,6 @@ void print_outcome(const session::LiveStation& station, const data::Participant&
     std::fprintf(stderr, "%s\n", printable_lines(outcome.reason).c_str());
   if (outcome.end == data::RunEnd::paused || outcome.end == data::RunEnd::aborted)
     std::fprintf(stderr, "the same command resumes from here\n");
-  if (station.markers.dropped() > 0)
-    std::fprintf(stderr, "%llu markers were not taken by their receivers\n",
-                 static_cast<unsigned long long>(station.markers.dropped()));
 }
 
 // `palpate run`: a live session with a person and a device. Opens the station, runs the session in
@@ -172,22 +169,12 @@ void tell(session::LiveSession& session, const session::LiveStation& station,
     session.say("torque is left out: this device drives force alone");
     record.note(began_ns, data::kTorqueLeftOutNote);
   }
-  if (station.protocol.sounds && station.noise == nullptr) {
+  if (station.protocol.sounds && station.noise == nullptr)
     session.say("WITHOUT the protocol's sounds");
-    record.note(began_ns, R"({"sounds":"left out"})");
-  }
-  if (station.protocol.masking_noise && station.noise == nullptr) {
+  if (station.protocol.masking_noise && station.noise == nullptr)
     session.say("WITHOUT the protocol's masking noise");
-    record.note(began_ns, R"({"masking_noise":"left out"})");
-  }
-  if (!known.settings.markers.empty()) {
-    const nlohmann::ordered_json sent = {{"markers", known.settings.markers},
-                                         {"codes", protocols::event_codes(station.protocol)},
-                                         {"sync", known.settings.sync}};
-    record.note(began_ns, sent.dump());
-  }
-  if (!known.settings.stream.empty())
-    record.note(began_ns, nlohmann::ordered_json{{"stream", known.settings.stream}}.dump());
+  for (const std::string& note : notes_on_outlets(known.settings, station.protocol, station.noise))
+    record.note(began_ns, note);
   const std::string& missing = station.servo_thread.rights().missing;
   if (!missing.empty()) session.say(missing);
 }
@@ -276,17 +263,6 @@ bool has_joystick(const RunSettings& settings, const protocols::Protocol& protoc
   return !protocol.responses.joystick.empty() && !settings.no_window;
 }
 
-/// Null if not requested.
-std::unique_ptr<session::SampleStream> open_stream(const RunSettings& settings,
-                                                   const protocols::Protocol& protocol) {
-  if (settings.stream.empty()) return nullptr;
-  try {
-    return std::make_unique<session::SampleStream>(settings.stream, protocol.servo_rate);
-  } catch (const std::invalid_argument& error) {
-    throw UsageError(std::string("--stream: ") + error.what());
-  }
-}
-
 /// Replaces the texts by a translation; the shown texts are recorded whole.
 void translate_texts(const RunSettings& settings, Admission& admission) {
   protocols::Protocol& protocol = admission.protocol;
@@ -327,7 +303,7 @@ int run_command(const std::vector<std::string>& args) {
   const ZeroOnSignal guard_on_signal(signals, open.guard);
   session::Markers markers(std::move(marker_sinks), protocols::event_codes(protocol),
                            settings.sync);
-  const auto stream = open_stream(settings, protocol);
+  const auto stream = open_stream(settings, protocol.servo_rate);
   const servo::DeviceCapabilities& device = open.device->capabilities();
   const std::vector<session::LimitedMaterial> limited = session::limit_materials(protocol, device);
   const StimulusLibrary library(protocol);
@@ -404,9 +380,7 @@ int run_command(const std::vector<std::string>& args) {
       station,
       store.look_up(admission.enrolled, participant.code, std::nullopt, participant.simulated),
       outcome);
-  if (stream && stream->dropped() > 0)
-    std::fprintf(stderr, "%llu samples were not taken by the stream\n",
-                 static_cast<unsigned long long>(stream->dropped()));
+  print_dropped(markers, stream.get());
   return outcome.failed ? 1 : 0;
 }
 

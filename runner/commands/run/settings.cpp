@@ -8,9 +8,57 @@
 #include "runner/commands/shared/study_options.h"
 
 namespace palpate::runner::commands {
-namespace {
 
 namespace po = boost::program_options;
+
+void add_device_options(po::options_description& options, RunSettings& settings) {
+  options.add_options()  //
+      ("serial", po::value(&settings.serials)->composing()->value_name("NUMBER"),
+       "which device; two of a stylus: twice, tip first")  //
+      ("firmware", po::value(&settings.firmware)->value_name("FILE"),
+       "uploaded where the device needs it")  //
+      ("library", po::value(&settings.library)->value_name("FILE"),
+       "the maker's library, where --device is reached through one; default: looked for")  //
+      ("service", po::value(&settings.service)->value_name("HOST:PORT"),
+       "the maker's program, where --device is reached through one; default: its own port here")  //
+      ("calibration", po::value(&settings.calibration)->value_name("FILE"),
+       "what 'palpate devices --calibrate' stored")  //
+      ("without-calibration", po::bool_switch(&settings.without_calibration),
+       "run although the calibration is missing or stale");
+}
+
+void add_recorder_options(po::options_description& options, RunSettings& settings) {
+  options.add_options()  //
+      ("markers", po::value(&settings.markers)->composing()->value_name("WHERE"),
+       "udp:HOST:PORT, serial:PATH[:BAUD[:PULSE_MS]], parport:PATH[:PULSE_MS] or lsl[:NAME]; may "
+       "be given several times; 'palpate devices --markers WHERE' tries it. Their bytes: the "
+       "protocol's codes")  //
+      ("sync", po::bool_switch(&settings.sync),
+       "send the marker sync (128: a parallel port's highest data line) once a second to what "
+       "--markers names")  //
+      ("stream", po::value(&settings.stream)->value_name("lsl[:NAME]"),
+       "send every tick of a trial, 20 channels of pose and force, to Lab Streaming Layer, where "
+       "liblsl is installed; anyone on the network can listen")  //
+      ("marker-codes", po::bool_switch(&settings.marker_codes),
+       "markers that leave this computer (udp to another one, lsl) carry the participant's code, "
+       "in clear; without it participant_id is null there");
+}
+
+void add_sound_options(po::options_description& options, RunSettings& settings) {
+  options.add_options()  //
+      ("sound-device",
+       po::value(&settings.sound_device)->default_value("default")->value_name("NAME"),
+       "ALSA device of the headphones, where the protocol has masking noise or sounds")  //
+      ("without-noise", po::bool_switch(&settings.without_noise),
+       "run without the protocol's masking noise and sounds");
+}
+
+void check_recorders(const RunSettings& settings) {
+  if (settings.sync && settings.markers.empty())
+    throw UsageError("--sync: name a receiver with --markers");
+}
+
+namespace {
 
 /// Checks a language code: it becomes part of a file's name.
 void check_language(const std::string& language) {
@@ -40,8 +88,7 @@ void check(RunSettings& settings) {
   if (settings.spoken && settings.buttons)
     throw UsageError("--spoken: the experimenter types the answers; leave out --buttons");
   check_language(settings.language);
-  if (settings.sync && settings.markers.empty())
-    throw UsageError("--sync: name a receiver with --markers");
+  check_recorders(settings);
   if (settings.device == "mouse" && settings.no_window)
     throw UsageError("--device mouse needs the window: leave out --no-window");
 }
@@ -104,22 +151,9 @@ std::optional<RunSettings> parse_run_settings(const std::vector<std::string>& ar
       ("language", po::value(&settings.language)->value_name("CODE"),
        "show the texts of NAME.texts.CODE.json, or texts.CODE.json, beside the protocol")  //
       ("response-latency", po::value(&latency)->value_name("SECONDS"),
-       "of keyboard or buttons, where it was measured; recorded, never subtracted")  //
-      ("markers", po::value(&settings.markers)->composing()->value_name("WHERE"),
-       "udp:HOST:PORT, serial:PATH[:BAUD[:PULSE_MS]], parport:PATH[:PULSE_MS] or lsl[:NAME]; may "
-       "be "
-       "given several times; 'palpate devices --markers WHERE' tries it. Their bytes: the "
-       "protocol's codes")  //
-      ("sync", po::bool_switch(&settings.sync),
-       "send the marker sync (128: a parallel port's highest data line) once a second to what "
-       "--markers names")  //
-      ("stream", po::value(&settings.stream)->value_name("lsl[:NAME]"),
-       "send every tick of a trial, 20 channels of pose and force, to Lab Streaming Layer, where "
-       "liblsl is installed; anyone on the network can listen")  //
-      ("marker-codes", po::bool_switch(&settings.marker_codes),
-       "markers that leave this computer (udp to another one, lsl) carry the participant's code, "
-       "in "
-       "clear; without it participant_id is null there")                //
+       "of keyboard or buttons, where it was measured; recorded, never subtracted");
+  add_recorder_options(line.options, settings);
+  line.options.add_options()                                            //
       ("no-window", po::bool_switch(&settings.no_window), "text only")  //
       ("full-screen", po::bool_switch(&settings.full_screen),
        "the participant's window, on a monitor of its own")  //
@@ -127,24 +161,9 @@ std::optional<RunSettings> parse_run_settings(const std::vector<std::string>& ar
        "from 1")                                                                            //
       ("console-monitor", po::value(&settings.console_monitor)->value_name("N"), "from 1")  //
       ("ui-scale", po::value(&scale)->value_name("FACTOR"),
-       "of letters and buttons, 0.5 to 4; default: from each window's monitor")  //
-      ("serial", po::value(&settings.serials)->composing()->value_name("NUMBER"),
-       "which device; two of a stylus: twice, tip first")  //
-      ("firmware", po::value(&settings.firmware)->value_name("FILE"),
-       "uploaded where the device needs it")  //
-      ("library", po::value(&settings.library)->value_name("FILE"),
-       "the maker's library, where --device is reached through one; default: looked for")  //
-      ("service", po::value(&settings.service)->value_name("HOST:PORT"),
-       "the maker's program, where --device is reached through one; default: its own port here")  //
-      ("calibration", po::value(&settings.calibration)->value_name("FILE"),
-       "what 'palpate devices --calibrate' stored")  //
-      ("without-calibration", po::bool_switch(&settings.without_calibration),
-       "run although the calibration is missing or stale")  //
-      ("sound-device", po::value(&settings.sound_device)->value_name("NAME"),
-       "ALSA device of the headphones, where the protocol has masking noise or sounds; default: "
-       "default")  //
-      ("without-noise", po::bool_switch(&settings.without_noise),
-       "run without the protocol's masking noise and sounds");
+       "of letters and buttons, 0.5 to 4; default: from each window's monitor");
+  add_device_options(line.options, settings);
+  add_sound_options(line.options, settings);
   line.positional_names = {"PROTOCOL.json"};
   const auto values = line.parse(args);
   if (!values) return std::nullopt;

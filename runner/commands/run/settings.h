@@ -1,6 +1,7 @@
 #pragma once
 // The settings of `palpate run` from its command line.
 
+#include <boost/program_options/options_description.hpp>
 #include <optional>
 #include <string>
 #include <vector>
@@ -26,6 +27,17 @@ struct RunSettings {
   std::string advisor;          ///< socket of a program that proposes levels; empty: none
   double advisor_time_out = 1;  ///< s
 };
+
+/// The options that name and prepare a device: --serial, --firmware, --library, ...
+void add_device_options(boost::program_options::options_description& options,
+                        RunSettings& settings);
+/// Those for other recorders: --markers, --sync, --stream, --marker-codes.
+void add_recorder_options(boost::program_options::options_description& options,
+                          RunSettings& settings);
+/// \throws UsageError: options of other recorders that do not go together
+void check_recorders(const RunSettings& settings);
+/// Those for the participant's headphones: --sound-device, --without-noise.
+void add_sound_options(boost::program_options::options_description& options, RunSettings& settings);
 
 /// None where --help was asked for and printed. \throws UsageError
 std::optional<RunSettings> parse_run_settings(const std::vector<std::string>& args);

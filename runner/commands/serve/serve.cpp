@@ -213,6 +213,20 @@ void tell_of_servo(const servo::ServoThread& servo) {
 
 constexpr std::int64_t kNap_ns = 2'000'000;  // between two looks at the servo's samples
 
+/// Markers and stream of a served scene or session.
+struct Recorders {
+  /// \param sinks  opened before the device's watchdog is forked. \param rate  Hz, of the servo
+  Recorders(std::vector<std::unique_ptr<session::MarkerSink>> sinks,
+            const protocols::EventCodes& codes, const RunSettings& settings, double rate)
+      : markers(std::move(sinks), codes, settings.sync), stream(open_stream(settings, rate)) {}
+  ~Recorders() { print_dropped(markers, stream.get()); }
+  Recorders(const Recorders&) = delete;
+  Recorders& operator=(const Recorders&) = delete;
+
+  session::Markers markers;
+  std::unique_ptr<session::SampleStream> stream;
+};
+
 int serve_scene(const po::variables_map& values, const RunSettings& run) {
   const devices::DeviceKind& kind = find_device_kind(run.device);
   const std::string path = text_of(values, "scene");
@@ -226,11 +240,13 @@ int serve_scene(const po::variables_map& values, const RunSettings& run) {
   if (!(rate >= 100 && rate <= 4000))
     throw UsageError("--rate: expected a number from 100 to 4000");
 
+  auto sinks = open_markers(run);
   safety::FaultSignals signals;
   protocols::Protocol protocol = serve::protocol_of(spec, renderer_named("point"));
   protocol.servo_rate = rate;
   const OpenDevice open = open_device(kind, run, protocol);  // forks: before there are threads
   signals.watch(open.guard);
+  Recorders recorders(std::move(sinks), protocols::usual_event_codes(), run, rate);
   if (open.guard != nullptr) check_fitness(open, run, protocol, StimulusLibrary(protocol));
   servo::RealClock clock;
   servo::ServoSettings servo;
@@ -240,7 +256,9 @@ int serve_scene(const po::variables_map& values, const RunSettings& run) {
                            {.scene_path = path.empty() ? "scene" : path,
                             .scene = text,
                             .servo = servo,
-                            .picture = picture_of});
+                            .picture = picture_of,
+                            .markers = &recorders.markers,
+                            .stream = recorders.stream.get()});
   Server server(values, signals);
   scene.answer_through(server);
   scene.give_up_when([&signals] { return signals.end_requested() != 0; });
@@ -273,6 +291,7 @@ int serve_session(const RunSettings& settings, const po::variables_map& values) 
   if (const std::string why = serve::unserved(protocol); !why.empty())
     throw UsageError("--protocol: " + why);
 
+  auto sinks = open_markers(settings);
   safety::FaultSignals signals;
   const OpenDevice open = open_device(kind, settings, protocol);  // forks: before there are threads
   signals.watch(open.guard);
@@ -280,6 +299,9 @@ int serve_session(const RunSettings& settings, const po::variables_map& values) 
   const std::vector<session::LimitedMaterial> limited = session::limit_materials(protocol, device);
   const StimulusLibrary library(protocol);
   check_fitness(open, settings, protocol, library);
+  Recorders recorders(std::move(sinks), protocols::event_codes(protocol), settings,
+                      protocol.servo_rate);
+  const auto noise = open_noise(settings, protocol);
 
   data::Store store = data::Store::open(settings.database, data::Store::Mode::write_or_create);
   warn_of_exposure(store.path());
@@ -301,23 +323,24 @@ int serve_session(const RunSettings& settings, const po::variables_map& values) 
     std::cerr << resumed << "\n";
 
   record.note(clock.now_ns(), R"({"served":{"preflight":"left out"}})");
-  if (protocol.masking_noise) {
-    std::cerr << "WITHOUT the protocol's masking noise, which needs palpate run\n";
-    record.note(clock.now_ns(), R"({"masking_noise":"left out"})");
-  }
-  if (protocol.sounds) {
-    std::cerr << "WITHOUT the protocol's sounds, which need palpate run\n";
-    record.note(clock.now_ns(), R"({"sounds":"left out"})");
-  }
+  if (noise == nullptr && (protocol.masking_noise || protocol.sounds))
+    std::cerr << "WITHOUT the protocol's masking noise and sounds\n";
+  for (const std::string& note : notes_on_outlets(settings, protocol, noise.get()))
+    record.note(clock.now_ns(), note);
   for (const std::string& note : admission.notes) record.note(clock.now_ns(), note);
   if (!limited.empty())
     record.note(clock.now_ns(), session::to_json_text(limited, device, protocol.servo_rate));
   servo::ServoThread servo(*open.device, clock, servo_settings_of(protocol));
-  const session::Station station{protocol, library, plan, servo, clock, began, record};
+  std::optional<session::StreamedServo> streamed;
+  if (recorders.stream) streamed.emplace(servo, *recorders.stream);
+  servo::TickSource& ticks = streamed ? static_cast<servo::TickSource&>(*streamed) : servo;
+  const session::Station station{protocol, library, plan, ticks, clock, began, record};
   serve::ServedSession served({.station = station,
                                .record = record,
                                .servo = servo,
                                .guard = open.guard,
+                               .markers = recorders.markers,
+                               .noise = noise.get(),
                                .end_requested = [&signals] { return signals.end_requested(); },
                                .stored = progress.completed,
                                .picture = picture_of});
@@ -331,15 +354,9 @@ int serve_session(const RunSettings& settings, const po::variables_map& values) 
   return outcome.failed ? 1 : 0;
 }
 
-int serve(const po::variables_map& values) {
-  RunSettings run;
+int serve(const po::variables_map& values, RunSettings run) {
   run.device = text_of(values, "device");
-  run.calibration = text_of(values, "calibration");
-  run.without_calibration = values["without-calibration"].as<bool>();
-  run.firmware = text_of(values, "firmware");
-  run.library = text_of(values, "library");
-  run.service = text_of(values, "service");
-  if (values.count("serial") > 0) run.serials = values["serial"].as<std::vector<std::string>>();
+  check_recorders(run);
   const int port = values["port"].as<int>();
   if (port < 0 || port > 65535) throw UsageError("--port: expected a number from 0 to 65535");
   const bool recorded = values.count("protocol") > 0;
@@ -350,6 +367,10 @@ int serve(const po::variables_map& values) {
   for (const char* const option : {"number", "session", "consent"}) {
     if (values.count(option) > 0 && !recorded)
       throw UsageError(std::string("--") + option + ": goes with --protocol");
+  }
+  for (const char* const option : {"sound-device", "without-noise"}) {
+    if (!recorded && !values[option].defaulted())
+      throw UsageError(std::string("--") + option + ": goes with --protocol, which has the sounds");
   }
   if (!recorded) return serve_scene(values, run);
   if (values.count("scene") > 0 || !values["rate"].defaulted())
@@ -379,7 +400,7 @@ int serve_command(const std::vector<std::string>& args) {
       "their times; palpate renders, limits and guards the forces. They end if the program\n"
       "disconnects or is silent for 0.5 s. Ctrl-C ends serving. With a protocol it is a recorded\n"
       "session: the program begins each trial and gives the answer, and in blocks of the task\n"
-      "'external' chooses the stimulus.";
+      "'external' chooses the stimuli.";
   line.example =
       "  palpate serve --device simulated --scene scene.json\n"
       "  palpate serve --device inverse3 --socket /run/user/1000/palpate --token-file token.json\n"
@@ -408,19 +429,15 @@ int serve_command(const std::vector<std::string>& args) {
       ("allow-origin", po::value<std::vector<std::string>>()->value_name("URL"),
        "pages from there may connect; repeatable")  //
       ("rate", po::value<double>()->value_name("HZ")->default_value(1000, "1000"),
-       "of the servo; with --protocol the protocol's")  //
-      ("serial", po::value<std::vector<std::string>>()->composing()->value_name("NUMBER"),
-       "which device; two of a stylus: twice, tip first")                                   //
-      ("firmware", po::value<std::string>()->value_name("FILE"), "as for palpate run")      //
-      ("library", po::value<std::string>()->value_name("FILE"), "as for palpate run")       //
-      ("service", po::value<std::string>()->value_name("HOST:PORT"), "as for palpate run")  //
-      ("calibration", po::value<std::string>()->value_name("FILE"),
-       "of the device, as for palpate run")  //
-      ("without-calibration", po::bool_switch(), "a device that was not calibrated may be used");
+       "of the servo; with --protocol the protocol's");
+  RunSettings settings;
+  add_device_options(line.options, settings);
+  add_recorder_options(line.options, settings);
+  add_sound_options(line.options, settings);
   const auto values = line.parse(args);
   if (!values) return 0;
   try {
-    return serve(*values);
+    return serve(*values, settings);
   } catch (const serve::MessageRefused& error) {  // of the first scene
     std::string reasons;
     for (const serve::Refusal& why : error.why())

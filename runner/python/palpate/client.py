@@ -280,9 +280,11 @@ def _given(**values: Any) -> Dict[str, Any]:
 
 
 def _started(stimulus: Optional[str], renderer: Optional[str], trial: Optional[int], level: Optional[float],
-             orientation_wxyz: Optional[Sequence[float]]) -> Dict[str, Any]:
+             orientation_wxyz: Optional[Sequence[float]],
+             intervals: Optional[Sequence[Mapping[str, Any]]]) -> Dict[str, Any]:
     turned = None if orientation_wxyz is None else [float(value) for value in orientation_wxyz]
-    return _given(stimulus=stimulus, renderer=renderer, trial=trial, level=level, orientation_wxyz=turned)
+    return _given(stimulus=stimulus, renderer=renderer, trial=trial, level=level, orientation_wxyz=turned,
+                  intervals=None if intervals is None else [dict(interval) for interval in intervals])
 
 
 def _check_clock(t_ns: Optional[int], best: Optional[Clock]) -> None:
@@ -408,17 +410,26 @@ class Client(_Inbox):
 
     def start(self, stimulus: Optional[str] = None, renderer: Optional[str] = None, trial: Optional[int] = None, *,
               level: Optional[float] = None, orientation_wxyz: Optional[Sequence[float]] = None,
-              time_out: Optional[float] = None) -> int:
+              intervals: Optional[Sequence[Mapping[str, Any]]] = None, time_out: Optional[float] = None) -> int:
         """Forces on; returns their time in ns of the server's clock once they are.
 
         Of a scene `renderer` is "ray" where it is left out. With a protocol, `trial` must be the one that is due, and
         the rest is for blocks of the task "external"; forces begin once the stylus rests at home, for which this waits,
-        at most `time_out` s (default: an hour).
+        at most `time_out` s (default: an hour). Where the block has several `intervals`, each is a mapping of
+        stimulus, renderer, level and standard (whether the others are compared with it).
         """
-        said = _started(stimulus, renderer, trial, level, orientation_wxyz)
+        said = _started(stimulus, renderer, trial, level, orientation_wxyz, intervals)
         if time_out is None and "record" in self.server:
             time_out = START_TIME_OUT
         return int(self._ask("start", said, time_out)["t_ns"])
+
+    def next_interval(self, time_out: Optional[float] = START_TIME_OUT) -> Dict[str, Any]:
+        """On to the next interval of the trial; returns once its forces are on: t_ns, and which it is.
+
+        The answer is due in the last one. Where the protocol limits the intervals (interval_limit_s) they follow by
+        themselves, each with the event "interval", and the event "question" asks for the answer.
+        """
+        return self._ask("next", {}, time_out)
 
     def set(self, path: str, value: Any) -> None:
         """Changes the scene at a JSON pointer."""
@@ -675,12 +686,16 @@ class AsyncClient(_Inbox):
 
     async def start(self, stimulus: Optional[str] = None, renderer: Optional[str] = None, trial: Optional[int] = None, *,
                     level: Optional[float] = None, orientation_wxyz: Optional[Sequence[float]] = None,
-                    time_out: Optional[float] = None) -> int:
+                    intervals: Optional[Sequence[Mapping[str, Any]]] = None, time_out: Optional[float] = None) -> int:
         """As Client.start."""
-        said = _started(stimulus, renderer, trial, level, orientation_wxyz)
+        said = _started(stimulus, renderer, trial, level, orientation_wxyz, intervals)
         if time_out is None and "record" in self.server:
             time_out = START_TIME_OUT
         return int((await self._ask("start", said, time_out))["t_ns"])
+
+    async def next_interval(self, time_out: Optional[float] = START_TIME_OUT) -> Dict[str, Any]:
+        """As Client.next_interval."""
+        return await self._ask("next", {}, time_out)
 
     async def set(self, path: str, value: Any) -> None:
         """As Client.set."""

@@ -228,6 +228,30 @@ window.ready = true;
         self.assertEqual([(one["stimulus"], one["response"]) for one in self.browser.run("window.data")], [("ball", "yes")])
         self.assertEqual(process.wait(PATIENCE), 0)
 
+    def run_pairs(self, timed):
+        """A block of two pairs, of which the second interval is always the answer; what jsPsych kept."""
+        pairs = {"name": "pairs", "task": "external", "stimuli": ["ball"], "trials": 2, "intervals": 2, "inter_interval_s": 0.1,
+                 **({"interval_limit_s": 0.3} if timed else {})}
+        shown = PAGE[PAGE.index("  const shown"):PAGE.index("  await hand.close()")]
+        page = PAGE.replace(shown, """
+  const pair = [{stimulus: 'ball', renderer: 'ray', standard: true}, {stimulus: 'ball', renderer: 'ray'}];
+  const trial = {type, intervals: pair, choices: ['1', '2'], timed_intervals: TIMED};
+  await jsPsych.run([trial, trial]);
+""".replace("TIMED", json.dumps(timed)))
+        process = self.open_block(page, {**PROTOCOL, "blocks": [pairs]})
+        self.run_block()
+        self.until("""window.failed || window.data || (document.querySelector('[data-choice="go on"]') ??
+            document.querySelector('[data-choice=Next]') ?? document.querySelector('[data-choice="2"]'))?.click(), window.data""")
+        self.assertIsNone(self.browser.run("window.failed ?? null"))
+        self.assertEqual(process.wait(PATIENCE), 0)
+        return self.browser.run("window.data")
+
+    def test_pairs_are_trials_of_two_intervals(self):
+        for timed in (False, True):
+            with self.subTest(timed=timed):
+                self.assertEqual([(one["response"], one["correct"]) for one in self.run_pairs(timed)], [("2", True)] * 2)
+                (self.dir / "page.db").unlink()
+
     def test_foreign_pages_cannot_connect(self):
         mine, other = self.pages({"index.html": PAGE.encode()}), self.pages({"index.html": PAGE.encode()})
         self.serve("--allow-origin", mine)

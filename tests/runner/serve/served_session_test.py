@@ -8,6 +8,7 @@ import csv
 import json
 import pathlib
 import signal
+import socket
 import sqlite3
 import subprocess
 import sys
@@ -206,10 +207,111 @@ class Served(ServeCase):
         self.assertIn("together", self.run_palpate(*serve, status=2))
         self.assertIn("--scene", self.run_palpate(*serve, "--db", self.db, "--participant", "P01", "--scene", self.scene, status=2))
         self.assertIn("--consent", self.run_palpate("serve", "--device", "simulated", "--consent", "1", status=2))
-        pairs = {"name": "pairs", "task": "compare", "stimuli": ["ball"], "standard": "ball", "repetitions": 1}
-        serve[-1] = self.protocol(pairs)
-        self.assertIn("several intervals", self.run_palpate(*serve, "--db", self.db, "--participant", "P01", status=2))
+        turns = {"name": "turns", "task": "adjust", "stimuli": ["ball"], "standard": "box", "repetitions": 1, "turn": 1,
+                 "starts": [30], **LEVEL}
+        serve[-1] = self.protocol(turns)
+        self.assertIn("an adjustment", self.run_palpate(*serve, "--db", self.db, "--participant", "P01", status=2))
         self.assertFalse(self.db.exists())
+
+    def pair(self, hand, *levels):
+        """Feels both intervals of a pair, again where a busy machine turned the forces off."""
+        while True:
+            try:
+                hand.start(intervals=[{"stimulus": "ball", "renderer": "ray", "level": level, "standard": level == 30}
+                                      for level in levels])
+                self.refused("not-yet", hand.answer, "1")
+                self.assertEqual(hand.next_interval()["interval"], 2)
+                self.refused("last-interval", hand.next_interval)
+                return
+            except ServeError as error:
+                if error.code not in ("forces-off", "stopped"):
+                    raise
+                hand.clear()
+
+    def test_external_pairs_are_on_record_with_both_intervals(self):
+        self.begin(self.protocol(EXTERNAL | LEVEL | {"intervals": 2, "inter_interval_s": 0.1}))
+        with self.client() as hand:
+            self.assertEqual((hand.next["intervals"], hand.next["answers"]), (2, ["1", "2"]))
+            ball = {"stimulus": "ball", "renderer": "ray", "level": 30}
+            self.assertEqual(self.refused("bad-trial", hand.start, **ball).place, "/intervals")
+            self.assertEqual(self.refused("bad-trial", hand.start, intervals=[ball]).place, "/intervals")
+            self.assertEqual(self.refused("bad-trial", hand.start, intervals=[ball, ball | {"level": 61}]).place,
+                             "/intervals/1/level")
+            self.assertEqual(self.refused("bad-message", hand.start, intervals=[ball, {"levels": 3}]).place,
+                             "/intervals/1/levels")
+            standards = [ball | {"standard": True}] * 2
+            self.assertEqual(self.refused("bad-trial", hand.start, intervals=standards).place, "/intervals")
+            self.refused("nothing-felt", hand.next_interval)
+            self.pair(hand, 30, 50)
+            first = hand.answer("2")
+            self.assertTrue(first["correct"])
+            self.assertLess(0, first["response_time_s"])
+            self.pair(hand, 50, 30)
+            self.assertFalse(hand.answer("2")["correct"])
+            self.pair(hand, 30, 40)
+            hand.stop("between")
+        rows = self.rows()
+        self.assertEqual([(row["interval_levels"], row["level"], row["standard_level"], row["response"], row["correct"])
+                          for row in rows], [("30;50", "50", "30", "2", "1"), ("50;30", "50", "30", "2", "0")])
+        self.run_palpate("replay", "--db", self.db, "--trial", "P01/1/1", "--compare")
+        self.run_palpate("analyze", "--db", self.db)
+
+    def test_timed_intervals_follow_by_themselves(self):
+        self.begin(self.protocol(EXTERNAL | {"intervals": 3, "interval_limit_s": 0.3, "inter_interval_s": 0.1}))
+        with self.client() as hand:
+            while True:
+                hand.start(intervals=[{"stimulus": "ball", "renderer": "ray", "standard": i < 2} for i in range(3)])
+                came = [self.one_of(hand, "interval", "question", "forces_off") for _ in range(3)]
+                if "forces_off" not in [one["event"] for one in came]:
+                    break
+                hand.clear()
+            self.assertEqual([(one["event"], one.get("interval")) for one in came],
+                             [("interval", 2), ("interval", 3), ("question", None)])
+            self.assertTrue(hand.answer("3")["correct"])
+
+    def test_a_comparison_comes_as_the_protocol_plans_it(self):
+        pairs = {"name": "pairs", "task": "compare", "stimuli": ["ball"], "standard": "ball", "level": LEVEL["level"],
+                 "procedure": {"kind": "constant", "levels": [30, 70], "repetitions": 1}, "renderers": ["ray"],
+                 "inter_interval_s": 0.1}
+        self.begin(self.protocol(pairs))
+        with self.client() as hand:
+            while hand.next is not None:
+                self.assertEqual(hand.next["intervals"], 2)
+                try:
+                    hand.start()
+                    hand.next_interval()
+                    hand.answer("1")
+                except ServeError as error:
+                    if error.code not in ("forces-off", "stopped", "nothing-felt"):
+                        raise
+                    hand.clear()
+        self.assertEqual(len(self.rows()), 2)
+
+    def test_markers_and_sounds_go_out_as_in_a_session(self):
+        receiver = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.addCleanup(receiver.close)
+        receiver.bind(("127.0.0.1", 0))
+        receiver.settimeout(PATIENCE)
+        sound = self.dir / "sound.raw"
+        markers = f"udp:127.0.0.1:{receiver.getsockname()[1]}"
+        process = self.begin(self.protocol(EXTERNAL, masking_noise={"kind": "pink", "level_db": -24}), "--markers", markers,
+                             "--sound-device", f"file:{sound},raw")
+        with self.client() as hand:
+            self.trial(hand, "ball", stimulus="ball", renderer="ray")
+            hand.mark(77, "flash")
+        process.send_signal(signal.SIGTERM)
+        self.assertEqual(process.wait(PATIENCE), 0)
+        lines = []
+        while not lines or lines[-1]["marker"] != "mark":
+            lines.append(json.loads(receiver.recv(4096)))
+        answered = next(line for line in lines if line["marker"] == "response")
+        self.assertEqual((answered["trial"], answered["shape"], answered["response"]), (1, "ball", "ball"))
+        self.assertEqual(lines[0]["marker"], "trial_start")
+        self.assertEqual(lines[-1]["code"], 77)
+        self.assertTrue(any(sound.read_bytes()))
+        notes = [text for (text,) in self.sql("SELECT text FROM notes ORDER BY id")]
+        self.assertTrue(any(text.startswith('{"markers"') for text in notes), notes)
+        self.assertTrue(any('"masking_noise":"on"' in text for text in notes), notes)
 
     def test_silence_cuts_the_trial_off(self):
         self.begin(self.protocol(EXTERNAL))

@@ -103,6 +103,50 @@ TEST_F(LiveTouchTest, AStalledDisplayNeitherDelaysNorLosesTicks) {
   EXPECT_NEAR(moments.back().contacts[0].place.y, 0.025, 1e-9);
 }
 
+/// Keeps what it is sent.
+class Kept final : public session::MarkerSink {
+ public:
+  /// \param count  of `markers`, for another thread
+  Kept(std::vector<session::Marker>& markers, std::atomic<std::size_t>& count)
+      : markers_(markers), count_(count) {}
+  bool send(const session::Marker& marker) noexcept override {
+    markers_.push_back(marker);
+    count_.store(markers_.size());
+    return true;
+  }
+
+ private:
+  std::vector<session::Marker>& markers_;
+  std::atomic<std::size_t>& count_;
+};
+
+TEST_F(LiveTouchTest, EachSceneIsATrialForOtherRecorders) {
+  std::vector<session::Marker> kept;
+  std::atomic<std::size_t> count{0};
+  {
+    std::vector<std::unique_ptr<session::MarkerSink>> sinks;
+    sinks.push_back(std::make_unique<Kept>(kept, count));
+    session::Markers markers(std::move(sinks));
+    LiveTouch::Settings settings = settings_of();
+    settings.markers = &markers;
+    LiveTouch touch(device_, clock_, settings);
+    clock_.start();
+    ASSERT_TRUE(comes_true([&] { return count.load() >= 2; }));
+    std::vector<stimuli::ObjectSpec> other = settings.spec.objects;
+    other[0].edge = 0.04;
+    touch.show(other);
+    ASSERT_TRUE(comes_true([&] { return count.load() >= 3; }));
+  }
+  using Kind = session::Marker::Kind;
+  ASSERT_GE(kept.size(), 3U);
+  EXPECT_EQ(kept[0].kind, Kind::trial_start);
+  EXPECT_EQ(kept[1].kind, Kind::first_contact);
+  EXPECT_EQ(kept[2].kind, Kind::trial_start);
+  EXPECT_EQ(kept[2].trial, 2);
+  EXPECT_EQ(kept[2].renderer, "ray");
+  EXPECT_GT(kept[1].time_ns, kept[0].time_ns);
+}
+
 /// A cube that drifts with 10 mm/s, far from the hand.
 LiveTouch::Settings with_drifting_cube() {
   LiveTouch::Settings settings = settings_of();
