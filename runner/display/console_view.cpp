@@ -476,9 +476,9 @@ void draw_status(const ConsoleState& state, bool hidden, bool compact) {
     table_row("Level", state.level.empty() ? "-" : hidden ? "hidden" : level_text(state));
   }
   table_row("Last answer", state.answer.empty() ? "-" : hidden ? "hidden" : state.answer);
-  table_row("Elapsed", duration_text(state.elapsed));
-  table_row("Remaining",
-            state.remaining > 0 ? "about " + duration_text(state.remaining) : "not known yet");
+  table_row("Time",
+            duration_text(state.elapsed) +
+                (state.remaining > 0 ? ", about " + duration_text(state.remaining) + " left" : ""));
   ImGui::EndTable();
 }
 
@@ -620,6 +620,10 @@ void draw_forces_off(const ConsoleState& state, double silence,
   ImGui::EndDisabled();
 }
 
+float health_height() {
+  return 6 * (ImGui::GetTextLineHeight() + 2 * ImGui::GetStyle().CellPadding.y);
+}
+
 void draw_health(const ConsoleState& state, bool compact) {
   const servo::Sample& sample = state.sample;
   if (!begin_values("health", compact)) return;
@@ -715,7 +719,8 @@ void ConsoleView::draw_picture(const Modifiers& modifiers, bool with_plots,
   const ImVec2 room = ImGui::GetContentRegionAvail();
   const float plots = with_plots ? std::clamp(0.22F * room.y, 6 * font, 12 * font) : 0;
   const float width = std::max(room.x, 40.0F);
-  const float height = std::max(room.y - (with_plots ? plots + spacing.y : 0), 40.0F);
+  const float readings = readings_are_in_picture(with_plots) ? health_height() + spacing.y : 0;
+  const float height = std::max(room.y - readings - (with_plots ? plots + spacing.y : 0), 40.0F);
   if (!state_.checklist.steps.empty()) {
     ImGui::BeginChild("checklist", {width, height});
     draw_checklist(state_.checklist, end_request_, commands);
@@ -725,6 +730,7 @@ void ConsoleView::draw_picture(const Modifiers& modifiers, bool with_plots,
   } else {
     draw_view(modifiers, width, height);
   }
+  if (readings > 0) draw_health(state_, false);
   if (!with_plots) return;
   const float plots_beside = hidden_ ? 2 : 3;
   const float part = (room.x - spacing.x * (plots_beside - 1)) / plots_beside;
@@ -794,9 +800,15 @@ void ConsoleView::draw_view(const Modifiers& modifiers, float width, float heigh
   const float last = (height / font - 2.1F) / 1.4F;
   const ImU32 quiet = IM_COL32(150, 158, 168, 255);
   if (control_) {
-    label(last - 1, "pointer: the tip, on what is under it     wheel or Shift: press harder",
+    const float wide = width - 1.6F * font;
+    label(last - 1,
+          fitting({"pointer: the tip, on what is under it     wheel or Shift: press harder",
+                   "pointer: the tip     wheel or Shift: press harder", "wheel or Shift: press"},
+                  wide),
           quiet);
-    label(last, "Ctrl or left button: turn     right button: look around", quiet);
+    label(last,
+          fitting({"Ctrl or left button: turn     right button: look around", "Ctrl: turn"}, wide),
+          quiet);
   } else {
     label(last, "drag: look around", quiet);
   }
@@ -811,6 +823,13 @@ float ConsoleView::min_notes_height() {
          ImGui::GetStyle().ItemSpacing.y;
 }
 
+// The readings of the servo stand below the picture, where all buttons stay in sight beside them;
+// in a low or narrow window they follow the buttons.
+bool ConsoleView::readings_are_in_picture(bool wide) {
+  constexpr float kLeastLines = 36;
+  return wide && ImGui::GetMainViewport()->WorkSize.y > kLeastLines * ImGui::GetFontSize();
+}
+
 // In a small window the controls scroll; the newest message stays visible.
 void ConsoleView::draw_side(double now, bool narrow, std::vector<ConsoleCommand>& commands) {
   const float room = ImGui::GetContentRegionAvail().y;
@@ -822,7 +841,7 @@ void ConsoleView::draw_side(double now, bool narrow, std::vector<ConsoleCommand>
   draw_buttons(state_, narrow, end_request_, correction_, commands);
   const bool crowded =
       narrow && (end_request_.open || correction_.open || !state_.checklist.steps.empty());
-  if (!crowded) draw_health(state_, narrow);
+  if (!crowded && !readings_are_in_picture(!narrow)) draw_health(state_, narrow);
   ImGui::Dummy({0, 2});
   controls_ = ImGui::GetCursorPosY();
   ImGui::EndChild();

@@ -174,6 +174,7 @@ class ConsoleView {
   void draw_side(double now, bool narrow, std::vector<ConsoleCommand>& commands);
   void draw_notes(std::vector<ConsoleCommand>& commands);
   void draw_answer(std::vector<ConsoleCommand>& commands);
+  static bool readings_are_in_picture(bool wide);
   static float min_notes_height();  ///< px, space for the newest messages and the note field
 
   SceneView scene_;
@@ -216,6 +217,7 @@ void draw_forces_off(const ConsoleState& state, double silence,
                      std::vector<ConsoleCommand>& commands);
 /// \param compact  as for the status
 void draw_health(const ConsoleState& state, bool compact);
+float health_height();  ///< px, of that which is not compact
 /// \param height  px
 void draw_forces(const std::deque<ForcePoint>& forces, float width, float height);
 void draw_times(const std::vector<double>& times, float width, float height);

@@ -38,6 +38,18 @@ const char* in_words(Session::State state) {
   return "";
 }
 
+/// Whether answers judge the stimulus; a standard is felt only.
+bool is_asked_for(const protocols::Protocol& protocol, int stimulus) {
+  return protocol.blocks.empty() ||
+         std::ranges::any_of(protocol.blocks, [&](const protocols::TaskBlock& block) {
+           return std::ranges::find(block.stimuli, stimulus) != block.stimuli.end();
+         });
+}
+
+bool has_right_answers(const protocols::TaskBlock& block) {
+  return block.task != protocols::TaskKind::rate && block.task != protocols::TaskKind::adjust;
+}
+
 std::string milliseconds(std::int64_t ns) {
   return std::to_string((ns + 500'000) / 1'000'000) + " ms";
 }
@@ -50,8 +62,12 @@ SessionMonitor::SessionMonitor(const LiveStation& station, const Sources& source
   state_.tool = tool_of(station.protocol.tool);
   state_.participant = station.record.participant().code;
   state_.session = station.record.session();
-  for (const protocols::StimulusSpec& stimulus : station.protocol.stimuli)
-    state_.scores.push_back({stimulus.name, 0, 0});
+  for (std::size_t i = 0; i < station.protocol.stimuli.size(); ++i) {
+    if (is_asked_for(station.protocol, static_cast<int>(i)))
+      state_.scores.push_back({station.protocol.stimuli[i].name, 0, 0});
+  }
+  state_.counts_right = station.protocol.blocks.empty() ||
+                        std::ranges::any_of(station.protocol.blocks, has_right_answers);
   state_.takes_answers = station.answer_by == participants::AnswerBy::experimenter;
   show_answers();
 }
@@ -152,8 +168,7 @@ void SessionMonitor::interval(const protocols::Trial& trial,
   sources_.signals.interval(view.continues);
   feeling_ = feeling_ && view.continues;
   state_.task = to_string(block.task);
-  state_.counts_right =
-      block.task != protocols::TaskKind::rate && block.task != protocols::TaskKind::adjust;
+  state_.counts_right = has_right_answers(block);
   state_.level_name = block.level ? protocols::level_name(block.level->pointer) : "";
   state_.interval = view.interval;
   state_.intervals = view.intervals;

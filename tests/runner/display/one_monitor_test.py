@@ -33,7 +33,7 @@ class OneMonitor(unittest.TestCase):
         self.assertTrue(self.top(self.screen.settled_picture(windows.console), windows) ==
                         self.top(hidden, windows))
         width, height = self.screen.size(windows.console)
-        self.screen.click(windows.console, 100, 374)
+        self.screen.click(windows.console, 100, 310)
         shown = self.screen.settled_picture(windows.console, differs_from=hidden)
         self.screen.keep(windows.console, "console_shown")
         windows.say("state cone 0")
@@ -43,7 +43,7 @@ class OneMonitor(unittest.TestCase):
     def top(self, picture, windows):
         """Without the messages."""
         width, _ = self.screen.size(windows.console)
-        return picture[:3 * width * 640]
+        return picture[:3 * width * 510]
 
     def test_the_newest_message_is_visible_in_a_small_window(self):
         windows = self.open("--no-mouse", size="1024x768")

@@ -51,13 +51,15 @@ class SessionTest(WindowCase):
 
     def start(self, device="mouse", to_the_first_trial=True):
         """Starts or resumes a session, up to its first trial."""
+        search = "search", "--onlyvisible", "--name", "^windows, P01$"
+        wait_for("the end of the windows before", lambda: not self.screen.do(*search))
         with open(self.folder / "messages.txt", "a") as messages:
             self.program = subprocess.Popen(
                 [PALPATE, "run", self.folder / "protocol.json", "--db", self.database,
                  "--participant", "P01", "--device", device],
                 env=self.screen.environment, stdout=messages, stderr=messages)
         wait_for("the windows", lambda: self.program.poll() is not None or
-                 self.screen.do("search", "--onlyvisible", "--name", "^windows, P01$"))
+                 self.screen.do(*search))
         self.assertIsNone(self.program.poll(), self.messages())
         self.participant = self.screen.window("windows, P01")
         self.console = self.screen.window("windows, P01 - console")
@@ -94,7 +96,7 @@ class SessionTest(WindowCase):
     def clear_and_go_on(self):
         width, _ = self.screen.size(self.console)
         self.screen.click(self.console, width - 60, 90)  # clear the fault
-        self.screen.click(self.console, width - 100, 420)  # go on
+        self.screen.click(self.console, width - 100, 400)  # go on
 
     def attempts(self):
         return self.rows("SELECT trial, attempt, shape, state FROM attempts ORDER BY id")
@@ -188,9 +190,10 @@ class SessionTest(WindowCase):
 
     def test_closing_a_window_in_a_session_asks_first(self):
         self.start()
-        for window in (self.participant, self.console):
+        for name in ("participant", "console"):
             self.answer()
             self.wait_for_trial()
+            window = getattr(self, name)  # of this run
             self.screen.ask_to_close(window)
             time.sleep(1)
             self.assertIsNone(self.program.poll(), self.messages())
@@ -198,7 +201,7 @@ class SessionTest(WindowCase):
             self.screen.key("F12")
             wait_for("zero force", self.halted)
             self.assertIn(("emergency zero: the key F12",), self.rows("SELECT text FROM notes"))
-            if window == self.console:
+            if name == "console":
                 break
             self.screen.ask_to_close(window)
             wait_for("the end", lambda: self.program.poll() is not None)
@@ -307,7 +310,7 @@ class SessionTest(WindowCase):
         missed, longest, faults = self.rows("SELECT missed_ticks, longest_period_ns, faults FROM attempts "
                                             "WHERE state = 'completed'")[0]
         self.assertGreaterEqual(missed, 500, "2.5 s at 200 Hz")
-        self.assertGreaterEqual(longest, 2_500_000_000)
+        self.assertGreaterEqual(longest, 2_490_000_000)  # it stood still within a period
         self.assertTrue(faults & 64, "missed-ticks")
         self.assertFalse(faults & 128, "forces-off")
         self.screen.keep(self.console, "session_stood_still")
@@ -351,9 +354,8 @@ class SessionTest(WindowCase):
 
     def forces_are_shown_off(self):
         """The word beside "Servo" on the console is red."""
-        width, _ = self.screen.size(self.console)
         return any(red > 180 and green < 140
-                   for red, green, _ in self.screen.pixels(self.console, width - 234, 537, 120, 16))
+                   for red, green, _ in self.screen.pixels(self.console, 140, 598, 120, 16))
 
     def click_emergency(self):
         """Its record waits in memory until the first trial has begun."""
@@ -365,11 +367,11 @@ class SessionTest(WindowCase):
     def click_button(self, row, column):
         """One of the six buttons: rows and columns from 0."""
         width, _ = self.screen.size(self.console)
-        self.screen.click(self.console, width - (250 if column == 0 else 60), 420 + 40 * row)
+        self.screen.click(self.console, width - (250 if column == 0 else 60), 400 + 40 * row)
 
     def write_a_reason(self):
         self.click_button(2, 1)
-        self.screen.click(self.console, self.screen.size(self.console)[0] - 200, 475)
+        self.screen.click(self.console, self.screen.size(self.console)[0] - 200, 455)
         self.screen.do("type", "--delay", 100, "why 1")
 
     def emergencies_on_pages(self):
@@ -400,7 +402,7 @@ class SessionTest(WindowCase):
                                        "IS NOT NULL ORDER BY id DESC LIMIT 1"),
                              [("zero force was asked for",)], name)
             if name in ("end", "reason"):
-                self.screen.click(self.console, self.screen.size(self.console)[0] - 60, 513)  # back
+                self.screen.click(self.console, self.screen.size(self.console)[0] - 60, 493)  # back
             self.clear_and_go_on()
 
     def emergencies_after_answers(self):

@@ -182,7 +182,7 @@ class TaskWindows(WindowCase):
         self.screen.keep(self.console, "rate_emergency")
         width, _ = self.screen.size(self.console)
         self.screen.click(self.console, width - 60, 90)  # clear the fault
-        self.screen.click(self.console, width - 100, 460)  # go on
+        self.screen.click(self.console, width - 100, 440)  # go on
         wait_for("the trial again", lambda: len(self.rows("SELECT 1 FROM attempts")) == 2)
         self.screen.focus(self.participant)
         time.sleep(1)

@@ -81,7 +81,7 @@ class Soak:
         """Clicks a button of the console: the six are in two columns; in a small window they span its width."""
         wide, _ = self.screen.size(self.console)
         row, column = {"pause": (0, 0), "go on": (0, 1)}[words]
-        for top in (430, 450):
+        for top in (410, 430):
             self.screen.click(self.console, wide - (250 if column == 0 else 60), top + 40 * row)
 
     def round(self):

@@ -222,9 +222,9 @@ class WindowsTest(unittest.TestCase):
             time.sleep(1)
             return math.dist(self.windows.where()[0], (0, 0, 0))
 
-        middle = (289, 395)  # of the view, and of the sphere
+        middle = (289, 331)  # of the view, and of the sphere
         self.assertGreater(distance_at(40, 120), 0.075, "beside the object it floats off")
-        for place in [middle, (310, 380), (270, 410)]:
+        for place in [middle, (310, 316), (270, 346)]:
             self.assertAlmostEqual(distance_at(*place), 0.03 - 0.0015, delta=0.0008)
         for _ in range(5):
             self.screen.do("click", 4)  # the wheel, away from the viewer
