@@ -93,7 +93,7 @@ class LiveSession:
         """The tip goes over the object in the middle of the view, from left to right and back."""
         end, step = time.monotonic() + seconds, 0
         while time.monotonic() < end:
-            self.point(0.29 + 0.003 * abs(8 - step % 16), 0.41 + 0.002 * (step % 12))
+            self.point(0.29 + 0.003 * abs(8 - step % 16), 0.345 + 0.002 * (step % 12))
             time.sleep(0.08)
             step += 1
 
@@ -115,7 +115,7 @@ def live_session(palpate, folder):
             session.wait_for_trial()
             session.feel(1 + 0.4 * (trial * 7 % 5))
             session.answer(wrong=trial == 3)
-            session.point(0.1, 0.65)
+            session.point(0.06, 0.5)
         session.wait_for_trial()
         session.feel(4)
         session.check()
