@@ -537,6 +537,7 @@ void ServedSession::begin_trial(const protocols::Trial& trial) {
   draw(trial);
   given_.reset();
   waits_for_ = servo::Waiting::nothing;
+  parts_.servo.bell().ring();  // a client waits for forces
 }
 
 void ServedSession::begin_interval(const protocols::Trial&,
@@ -580,6 +581,9 @@ std::optional<participants::Answer> ServedSession::step(const servo::Sample& sam
     tell("waiting", sample.time_ns, {{"for", far ? "distance" : "rest"}});
   }
   attend();
+  // A client waits for the next tick: take it when it comes, without a nap.
+  if (given_ || goes_on_ || (start_ && sample.waiting == servo::Waiting::nothing))
+    parts_.servo.bell().ring();
   if (given_ && sample.time_ns >= given_->time_ns) return given_;
   if (goes_on_ && begun_) {
     participants::Answer on;
