@@ -587,7 +587,7 @@ void LiveSession::plan_stop(display::ConsoleCommand::Kind kind) {
 void LiveSession::note(std::int64_t at_ns, const std::string& text) {
   try {
     station_.record.note(at_ns, text);
-    say("note: " + text);
+    say(station_.record.confirmed(text));
   } catch (const data::StoreRefused& refused) {  // empty, or invalid UTF-8
     say(refused.what());
   }

@@ -77,6 +77,10 @@ class RunRecord final : public TrialLog {
   void begin();
   /// \param at_ns  session clock. \throws StoreRefused: the text cannot be stored.
   void note(std::int64_t at_ns, const std::string& text) override;
+  /// What the experimenter reads of a note that was taken.
+  std::string confirmed(const std::string& note) const {
+    return "note: " + note + (begun() ? "" : " (on record once the first trial begins)");
+  }
   /// Ends the run; without a run, records nothing.
   void end(data::RunEnd how, std::int64_t ended_ns);
   /// Notes that will be written when the run begins.

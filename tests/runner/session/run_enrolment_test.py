@@ -38,7 +38,7 @@ class Enrolment(Live):
         self.addCleanup(terminal.__exit__)
         terminal.wait_for("[space bar: go on]")
         terminal.type(":note wears a ring\n")
-        terminal.wait_for("note: wears a ring")
+        terminal.wait_for("note: wears a ring (on record once the first trial begins)")
         self.assertEqual(self.codes(self.db), [])
         terminal.type(" ")
         self.finish(terminal)
