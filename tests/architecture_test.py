@@ -102,12 +102,12 @@ PUBLIC = {
     "data/merge": "merge",
     "analysis": "text",
     "analysis/input": "csv_reader trials study_record sweep_table task_trials",
-    "analysis/statistics": "analysis comparison conclusions describe interval_coverage mixed_model "
-                           "paired pattern power plan quantiles sensitivity "
+    "analysis/statistics": "analysis comparison conclusions describe group_simulation interval_coverage mixed_model "
+                           "paired paired_evidence pattern power plan quantiles sensitivity "
                            "sweep_analysis task_analysis threshold_plan",
     "analysis/movement": "comparison measures pictures",
     "analysis/figures": "panel_drawing figures svg",
-    "analysis/report": "html_page hypotheses plan_report report tables",
+    "analysis/report": "coverage_report html_page hypotheses plan_report report tables",
     "runner": "",
     "runner/servo": "device force_limiter passivity realtime ring sample servo servo_thread "
                     "shared_value tick_source touched_places triple_buffer",

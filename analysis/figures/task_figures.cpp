@@ -119,7 +119,11 @@ std::pair<Role, MarkerShape> group_style(const std::string& renderer, std::size_
 }
 
 /// Of two participants an interval is some thirteen times their distance: it would hide them.
-bool may_be_cut(const GroupMean& one) { return one.participants.size() < 3; }
+bool may_be_cut(const GroupMean& one) { return !one.of_model && one.participants.size() < 3; }
+
+bool first_of_model(const TaskGroup& group) {
+  return !group.renderers.empty() && group.renderers.front().of_model;
+}
 
 /// Spans the participants' figures and the intervals; those of two participants at most by half the
 /// range beyond.
@@ -129,6 +133,10 @@ FigureAxis group_axis(const TaskGroup& group) {
     for (const NamedFigure& figure : one.participants) {
       low = std::min(low, figure.value);
       high = std::max(high, figure.value);
+    }
+    if (one.mean) {
+      low = std::min(low, *one.mean);
+      high = std::max(high, *one.mean);
     }
   }
   double range = std::max(high - low, 1e-3 * std::abs(high));
@@ -160,7 +168,7 @@ void add_participants_of(Panel& panel, const TaskGroup& group) {
           symbol(role, shape, line.x.back(), figure.value, 2.6,
                  printable(figure.participant) + ", " + printable(group.renderers[r].renderer) +
                      ": " + short_number(figure.value));
-      dot.opacity = 0.7;
+      dot.opacity = group.renderers[r].of_model ? 0.45 : 0.7;
       panel.marks.push_back(std::move(dot));
     }
   }
@@ -217,6 +225,18 @@ std::string difference_sentence(const TaskComparison& one) {
   return text;
 }
 
+/// "JNDs, ray / point: 0.5 [0.3, 0.86], p 0.012 (hierarchical model, 8 participants)"
+std::string difference_sentence(const TaskGroupComparison& one) {
+  if (!one.estimate) return "";
+  std::string text = measure_plural(one.measure) + ", " + printable(one.compared) +
+                     (one.ratio ? " / " : " - ") + printable(one.reference) + ": " +
+                     short_number(*one.estimate);
+  text += " [" + (one.low ? short_number(*one.low) : "open") + ", " +
+          (one.high ? short_number(*one.high) : "open") + "]";
+  return text + ", p " + p_text(*one.p) + " (hierarchical model, " +
+         counted(one.n, "participant", "participants") + "). ";
+}
+
 void add_group_figures(const TaskAnalysis& analysis, std::vector<Figure>& figures) {
   const auto same = [](const auto& a, const auto& b) {
     return a.task == b.task && a.block_name == b.block_name && a.shape == b.shape;
@@ -231,8 +251,12 @@ void add_group_figures(const TaskAnalysis& analysis, std::vector<Figure>& figure
     }
     if (analysis.table.simulated) figure.label = "SIMULATED PARTICIPANTS";
     figure.notes.push_back(
-        "Large symbols: means over participants with their 95 % intervals (t), geometric if all "
-        "values are ratios. Small symbols: participants, joined by a line.");
+        first_of_model(first)
+            ? "Large symbols: the group by a hierarchical model of all answers, with 95 % "
+              "intervals. "
+              "Small symbols: functions fitted singly, not used for it."
+            : "Large symbols: means over participants with their 95 % intervals (t), geometric if "
+              "all values are ratios. Small symbols: participants, joined by a line.");
     std::size_t most = 0;
     bool cut = false;
     for (; i < analysis.groups.size() && same(analysis.groups[i], first); ++i) {
@@ -241,7 +265,7 @@ void add_group_figures(const TaskAnalysis& analysis, std::vector<Figure>& figure
       std::size_t shown = 0;
       figure.description += measure_plural(group.measure) + ": ";
       for (const GroupMean& one : group.renderers) {
-        shown = std::max(shown, one.participants.size());
+        shown = std::max({shown, one.participants.size(), one.n_of_model});
         figure.description +=
             printable(one.renderer) + " " + (one.mean ? short_number(*one.mean) : "no mean") + ". ";
       }
@@ -253,8 +277,11 @@ void add_group_figures(const TaskAnalysis& analysis, std::vector<Figure>& figure
     if (cut)
       figure.notes.push_back("An arrow: the interval of two participants goes on beyond the axis.");
     std::string differences;
-    for (const TaskComparison& one : analysis.renderers) {
+    for (const TaskGroupComparison& one : analysis.group_models.comparisons) {
       if (same(one, first)) differences += difference_sentence(one);
+    }
+    for (const TaskComparison& one : analysis.renderers) {
+      if (same(one, first) && !first_of_model(first)) differences += difference_sentence(one);
     }
     if (!differences.empty()) figure.notes.push_back(differences);
     figure.subtitle = counted(most, "participant", "participants");

@@ -1,6 +1,7 @@
+#include "analysis/report/coverage_report.h"
+
 #include <nlohmann/json.hpp>
 
-#include "analysis/statistics/interval_coverage.h"
 #include "analysis/text.h"
 
 namespace palpate::analysis {
@@ -25,6 +26,69 @@ nlohmann::ordered_json counts_json(const CoverageCounts& counts, std::size_t stu
     const Interval ends = coverage_interval(count, studies);
     out[name] = {{"held", count}, {"ci95", {ends.low, ends.high}}};
   }
+  return out;
+}
+
+}  // namespace
+
+namespace {
+
+std::string tally_text(const GroupTally& sum) {
+  return pad_left(fixed(sum.bias(), 3), 9) + pad_left(percent_of(sum.held, sum.results), 7);
+}
+
+nlohmann::ordered_json tally_json(const GroupTally& sum) {
+  const Interval ends = coverage_interval(sum.held, sum.results);
+  return {{"n", sum.results},   {"bias", sum.bias()},
+          {"held", sum.held},   {"ci95", {ends.low, ends.high}},
+          {"n_open", sum.open}, {"n_not_determined", sum.both_open}};
+}
+
+nlohmann::ordered_json difference_json(const GroupTally& sum) {
+  nlohmann::ordered_json out = tally_json(sum);
+  out["n_found"] = sum.found;
+  return out;
+}
+
+}  // namespace
+
+std::string group_coverage_text(const std::vector<GroupCoverage>& results,
+                                const GroupCoverageSettings& settings) {
+  std::string text =
+      "\nThe group's model, " + std::to_string(settings.studies) + " studies per line, seed " +
+      std::to_string(settings.seed) +
+      ". Bias of the group's value, % of 95 % intervals that hold it; of the\ndifference between "
+      "renderers (none), % of intervals that hold it and % of tests with p < 0.05\n\n" +
+      pad_right("", 68) + "location      log width     location   log ratio     not\n" +
+      pad_right("", 68) + "bias   holds   bias   holds holds found holds found determined\n";
+  for (const GroupCoverage& one : results) {
+    text +=
+        "  " + pad_right(one.study.name, 62) + tally_text(one.location) + tally_text(one.log_width);
+    for (const GroupTally* sum : {&one.location_difference, &one.log_width_difference})
+      text += pad_left(percent_of(sum->held, sum->results), 6) +
+              pad_left(percent_of(sum->found, sum->results), 6);
+    text +=
+        pad_left(percent_of(one.log_width_difference.both_open, one.log_width_difference.results),
+                 6) +
+        "\n";
+  }
+  return text +
+         "\nLocations of forced choice and yes/no are natural logarithms. Not determined: both "
+         "ends of "
+         "the interval\nof the ratio of JNDs (or widths) are open.\n";
+}
+
+namespace {
+
+nlohmann::ordered_json group_coverage_json(const std::vector<GroupCoverage>& results) {
+  nlohmann::ordered_json out = nlohmann::ordered_json::array();
+  for (const GroupCoverage& one : results)
+    out.push_back({{"design", one.study.name},
+                   {"n_studies", one.studies},
+                   {"location", tally_json(one.location)},
+                   {"log_width", tally_json(one.log_width)},
+                   {"location_difference", difference_json(one.location_difference)},
+                   {"log_width_difference", difference_json(one.log_width_difference)}});
   return out;
 }
 
@@ -60,7 +124,8 @@ std::string coverage_text(const std::vector<CoverageResult>& results,
 }
 
 std::string coverage_json(const std::vector<CoverageResult>& results,
-                          const CoverageSettings& settings) {
+                          const CoverageSettings& settings,
+                          const std::vector<GroupCoverage>& groups) {
   nlohmann::ordered_json out{{"version", 1},
                              {"simulated", true},
                              {"seed", settings.seed},
@@ -85,6 +150,7 @@ std::string coverage_json(const std::vector<CoverageResult>& results,
                               {"likelihood", counts_json(one.likelihood, one.studies)},
                               {"bayes", counts_json(one.bayes, one.bayes_studies)}});
   }
+  out["group_designs"] = group_coverage_json(groups);
   return out.dump(1) + "\n";
 }
 

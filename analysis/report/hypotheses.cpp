@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 #include <string_view>
+#include <utility>
 
 #include "analysis/text.h"
 #include "data/base/json_text.h"
@@ -35,6 +36,10 @@ void put_short_names(NamedResults& out) {
   for (const ShortName& one : kShortNames) {
     const std::string_view key = one.key, name = one.name;
     const std::size_t star = key.find('*'), name_star = name.find('*');
+    if (star == std::string_view::npos) {
+      if (const auto at = out.find(key); at != out.end()) found[one.name] = at->second;
+      continue;
+    }
     const std::string_view begin = key.substr(0, star), end = key.substr(star + 1);
     for (auto at = out.lower_bound(begin); at != out.end() && at->first.starts_with(begin); ++at) {
       const std::string_view full = at->first;
@@ -118,7 +123,12 @@ const char* to_string(Verdict verdict) {
 
 NamedResults named_results(const std::string& analysis, double alpha) {
   NamedResults out;
-  put_numbers("", read_json(analysis), out);
+  const nlohmann::json json = read_json(analysis);
+  if (json.contains("identification")) put_numbers("", json["identification"], out);
+  NamedResults own;
+  put_numbers("", json, own);
+  own.merge(out);
+  out = std::move(own);
   put_short_names(out);
   out["alpha"] = alpha;
   return out;

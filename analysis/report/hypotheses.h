@@ -20,7 +20,9 @@ using NamedResults = std::map<std::string, double, std::less<>>;
 /// The numbers of analysis.json by name: the keys that lead to a number, joined by dots
 /// ("paired_by_shape.cone.t_test.p_holm"; true and false are 1 and 0, elements of lists have no
 /// name), the short names of kShortNames, and "alpha".
-/// \param analysis  text of report_json() \param alpha  of the tests, as registered
+/// Names of the identification of a study with tasks need not begin with "identification.".
+/// \param analysis  text of report_json() or task_report_json() \param alpha  of the tests, as
+/// registered
 NamedResults named_results(const std::string& analysis, double alpha);
 
 /// A short name and its long name; * is the name of a shape, renderer or effect.
@@ -50,6 +52,21 @@ inline constexpr ShortName kShortNames[] = {
     {"anova.*.F", "rm_anova.effects.*.F"},
     {"anova.*.p", "rm_anova.effects.*.p"},
     {"accuracy_change.*", "speed_accuracy.*.accuracy_change"},
+    {"accuracy.difference", "accuracy_comparison.primary.difference"},
+    {"accuracy.ci95_low", "accuracy_comparison.primary.ci95_low"},
+    {"accuracy.ci95_high", "accuracy_comparison.primary.ci95_high"},
+    {"accuracy.p", "accuracy_comparison.primary.p"},
+    {"accuracy.ci90_low", "accuracy_comparison.primary.ci90_low"},
+    {"accuracy.ci90_high", "accuracy_comparison.primary.ci90_high"},
+    {"accuracy.answered_difference", "accuracy_comparison.answered.difference"},
+    {"accuracy.answered_p", "accuracy_comparison.answered.p"},
+    {"accuracy.log_odds_ratio", "accuracy_comparison.primary.model.log_odds_ratio"},
+    {"accuracy.model_p", "accuracy_comparison.primary.model.p"},
+    {"accuracy.bf10", "accuracy_comparison.primary.bf10"},
+    {"equivalence.accuracy.least_bound", "accuracy_comparison.primary.least_bound"},
+    {"equivalence.answered.least_bound", "accuracy_comparison.answered.least_bound"},
+    {"equivalence.*.least_bound", "paired_by_shape.*.t_test.least_bound"},
+    {"paired.*.bf10", "paired_by_shape.*.t_test.bf10"},
 };
 
 enum class Verdict {

@@ -226,6 +226,22 @@ Json anova_json(const RmAnova& anova, const TrialTable& table) {
   return out;
 }
 
+Json shape_slope_json(const Analysis& analysis) {
+  const ShapeSlopeModel& model = analysis.shape_slope_model;
+  Json out;
+  put_status(out, model.undefined);
+  if (!model.undefined.empty()) return out;
+  out["taken_out"] = model.taken_out;
+  out["logLik_REML"] = number(model.log_likelihood_reml);
+  out["variance_components"] = {{"participant_level_sd", number(model.participant_level_sd)},
+                                {"participant_gain_sd", number(model.participant_gain_sd)},
+                                {"participant_shape_level_sd", number(model.shape_level_sd)},
+                                {"participant_shape_gain_sd", number(model.shape_gain_sd)},
+                                {"residual_sd", number(model.residual_sd)}};
+  out["contrasts"] = contrasts_json(model.contrasts, analysis.table);
+  return out;
+}
+
 Json mixed_model_json(const Analysis& analysis) {
   const MixedModel& model = analysis.mixed_model;
   const TrialTable& table = analysis.table;
@@ -259,7 +275,7 @@ Json mixed_model_json(const Analysis& analysis) {
                                   {"by_shape", std::move(by_shape)}});
     }
   }
-  out["note"] = kModelNote;
+  if (!analysis.shape_slope_model.undefined.empty()) out["note"] = kModelNote;
   return out;
 }
 

@@ -31,6 +31,7 @@ Json censored_json(const CensoredEstimate& censored);
 Json time_outs_json(const Analysis& analysis);
 Json anova_json(const RmAnova& anova, const TrialTable& table);
 Json mixed_model_json(const Analysis& analysis);
+Json shape_slope_json(const Analysis& analysis);
 /// Change of accuracy and of time by shape.
 Json speed_accuracy_json(const Comparison& comparison, const TrialTable& table);
 /// Adds the practice effects of a comparison to `out`.

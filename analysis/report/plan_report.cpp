@@ -15,7 +15,7 @@
 #include "analysis/figures/panel_drawing.h"
 #include "analysis/figures/svg.h"
 #include "analysis/statistics/paired.h"
-#include "analysis/statistics/threshold_plan.h"
+#include "analysis/statistics/paired_evidence.h"
 #include "analysis/text.h"
 #include "data/base/json_text.h"
 #include "protocols/json_document.h"
@@ -531,59 +531,154 @@ std::string conclusion_of(const ThresholdPlan& plan, std::size_t trials) {
 
 }  // namespace
 
+namespace {
+
+const char* measure_name(PlannedMeasure measure) {
+  switch (measure) {
+    case PlannedMeasure::jnd:
+      return "jnd";
+    case PlannedMeasure::pse:
+      return "pse";
+    case PlannedMeasure::threshold:
+      return "threshold";
+    case PlannedMeasure::accuracy:
+      return "accuracy";
+    case PlannedMeasure::rating:
+      break;
+  }
+  return "rating";
+}
+
+bool is_log(PlannedMeasure measure) {
+  return measure == PlannedMeasure::jnd || measure == PlannedMeasure::threshold;
+}
+
+/// "20.0 % smaller", "0.5 JNDs higher"
+std::string size_of(PlannedMeasure measure, double effect) {
+  if (is_log(measure))
+    return fixed(100 * std::abs(std::expm1(effect)), 1) +
+           (effect <= 0 ? " % smaller" : " % larger");
+  const std::string way = effect <= 0 ? " lower" : " higher";
+  if (measure == PlannedMeasure::accuracy)
+    return fixed(100 * std::abs(effect), 1) + " percentage points" + way;
+  return fixed(std::abs(effect), 2) + (measure == PlannedMeasure::pse ? " JNDs" : " steps") + way;
+}
+
+std::string subject_of(const ThresholdStudy& study) {
+  switch (study.measure) {
+    case PlannedMeasure::jnd:
+      return "A JND";
+    case PlannedMeasure::pse:
+      return "A PSE";
+    case PlannedMeasure::threshold:
+      return "A threshold";
+    case PlannedMeasure::accuracy:
+      return "An accuracy";
+    case PlannedMeasure::rating:
+      break;
+  }
+  return "A mean rating";
+}
+
+std::string bound_text(const ThresholdStudy& study) {
+  if (!study.bound) return "";
+  const double bound = *study.bound;
+  if (is_log(study.measure))
+    return fixed(100 * std::expm1(-bound), 1) + " to +" + fixed(100 * std::expm1(bound), 1) + " %";
+  if (study.measure == PlannedMeasure::accuracy)
+    return "+-" + fixed(100 * bound, 1) + " percentage points";
+  return "+-" + fixed(bound, 2) + (study.measure == PlannedMeasure::pse ? " JNDs" : " steps");
+}
+
+/// How a study is made and tested.
+std::string method_of(const ThresholdStudy& study) {
+  switch (study.measure) {
+    case PlannedMeasure::accuracy:
+      return "Four shapes; t-test of participants' shares correct, mean over shapes.";
+    case PlannedMeasure::rating:
+      return "Steps 1 to 7; t-test of participants' mean ratings.";
+    case PlannedMeasure::threshold:
+      return "Forced choice of two, constant stimuli, seven levels by equal ratios; the group's "
+             "model of all answers.";
+    case PlannedMeasure::jnd:
+    case PlannedMeasure::pse:
+      break;
+  }
+  return "Constant stimuli, two intervals, seven levels around the standard; the group's model of "
+         "all answers.";
+}
+
+}  // namespace
+
 std::string threshold_plan_text(const ThresholdPlan& plan) {
   const ThresholdStudy& study = plan.study;
-  std::string text = "SIMULATED STUDIES\n\nA JND that is " +
-                     fixed(100 * std::abs(1 - study.ratio), 1) +
-                     (study.ratio <= 1 ? " % smaller" : " % larger") +
-                     " with the second condition, within participants; paired t-test of log "
-                     "JNDs, alpha " +
-                     fixed(study.alpha, 3) + "\n\n";
+  std::string text = "SIMULATED STUDIES\n\n" + subject_of(study) + " that is " +
+                     (study.effect == 0 ? "the same" : size_of(study.measure, study.effect)) +
+                     " with the second condition, within participants; " +
+                     (study.bound ? "equivalence within " + bound_text(study) + " at 5 %"
+                                  : "alpha " + fixed(study.alpha, 3)) +
+                     "\n\n";
   for (const std::size_t trials : plan.settings.trials) text += conclusion_of(plan, trials);
   text +=
-      "\n  trials  participants  power  95 % of the simulation  bias of the ratio  coverage  "
-      "left out\n";
+      "\n  trials  participants  power  standard error  95 % of the simulation      bias  not "
+      "determined\n";
   for (const ThresholdPower& one : plan.powers) {
-    const double pairs = static_cast<double>(one.participants * one.studies);
-    text +=
-        "  " + pad_left(std::to_string(one.trials), 6) + "  " +
-        pad_left(std::to_string(one.participants), 12) + "  " + pad_left(fixed(one.power, 2), 5) +
-        "  " + pad_left(fixed(one.ci95.low, 2) + " to " + fixed(one.ci95.high, 2), 22) + "  " +
-        pad_left(fixed(100 * (std::exp(one.bias) - 1), 1) + " %", 17) + "  " +
-        pad_left(fixed(one.coverage, 2), 8) + "  " +
-        pad_left(fixed(100 * static_cast<double>(one.undetermined) / pairs, 1) + " %", 8) + "\n";
+    const double bias = is_log(study.measure)                       ? 100 * std::expm1(one.bias)
+                        : study.measure == PlannedMeasure::accuracy ? 100 * one.bias
+                                                                    : one.bias;
+    text += "  " + pad_left(std::to_string(one.trials), 6) + "  " +
+            pad_left(std::to_string(one.participants), 12) + "  " +
+            pad_left(fixed(one.power, 2), 5) + "  " + pad_left(fixed(one.se, 3), 14) + "  " +
+            pad_left(fixed(one.ci95.low, 2) + " to " + fixed(one.ci95.high, 2), 22) + "  " +
+            pad_left(fixed(bias, 2) + (is_log(study.measure) ? " %" : ""), 8) + "  " +
+            pad_left(fixed(100 * static_cast<double>(one.undetermined) /
+                               static_cast<double>(one.studies),
+                           1) +
+                         " %",
+                     14) +
+            "\n";
   }
-  return text +
-         "\nConstant stimuli, two intervals, seven levels around the standard; each JND is fitted "
-         "as "
-         "analyze does.\nLeft out: JNDs that a participant's data do not determine.\n";
+  text += "\n" + method_of(study) +
+          " Not determined: studies\nwhose interval is open at both ends, or without a test.\n";
+  const bool few = std::ranges::any_of(plan.settings.participants,
+                                       [](std::size_t n) { return n < kLeastForBayes; });
+  if (few)
+    text +=
+        "With fewer than nine participants a Bayes factor can never support \"no difference\" "
+        "(below "
+        "1/3).\n";
+  return text;
 }
 
 std::string threshold_plan_json(const ThresholdPlan& plan) {
   const ThresholdStudy& study = plan.study;
   nlohmann::ordered_json out{{"version", 1},
                              {"simulated", true},
-                             {"weber_fraction", study.weber_fraction},
-                             {"jnd_ratio", study.ratio},
-                             {"participant_sd", study.participant_sd},
+                             {"measure", measure_name(study.measure)},
+                             {"effect", study.effect},
                              {"effect_sd", study.effect_sd},
+                             {"participant_sd", study.participant_sd},
+                             {"weber_fraction", study.weber_fraction},
                              {"pse_sd_jnd", study.pse_sd},
+                             {"accuracy", study.accuracy},
                              {"lapse", study.lapse},
                              {"reach_jnd", study.reach},
                              {"alpha", study.alpha},
+                             {"equivalence_bound", nullptr},
                              {"wanted_power", plan.settings.power},
                              {"seed", plan.settings.seed},
                              {"powers", nlohmann::ordered_json::array()}};
+  if (study.bound) out["equivalence_bound"] = *study.bound;
   for (const ThresholdPower& one : plan.powers)
     out["powers"].push_back({{"trials", one.trials},
                              {"participants", one.participants},
                              {"found", one.found},
                              {"studies", one.studies},
                              {"power", one.power},
+                             {"power_se", one.se},
                              {"power_ci95", {one.ci95.low, one.ci95.high}},
-                             {"log_ratio_bias", one.bias},
-                             {"coverage", one.coverage},
-                             {"n_undetermined", one.undetermined}});
+                             {"bias", one.bias},
+                             {"n_not_determined", one.undetermined}});
   return out.dump(1) + "\n";
 }
 

@@ -1,5 +1,5 @@
 #pragma once
-// A sample size plan as text, JSON and a figure.
+// Sample size plans as text and JSON, that of times also as a figure.
 
 #include <map>
 #include <optional>
@@ -8,6 +8,7 @@
 
 #include "analysis/figures/figures.h"
 #include "analysis/statistics/plan.h"
+#include "analysis/statistics/threshold_plan.h"
 
 namespace palpate::analysis {
 
@@ -38,5 +39,8 @@ struct PlanRecord {
 PlanRecord read_plan(const std::string& text, const std::string& file);
 /// Power (%) over the number of participants, a line for each number of trials.
 Figure plan_figure(const Plan& plan);
+
+std::string threshold_plan_text(const ThresholdPlan& plan);
+std::string threshold_plan_json(const ThresholdPlan& plan);
 
 }  // namespace palpate::analysis

@@ -14,6 +14,7 @@
 #include "analysis/report/inference_json.h"
 #include "analysis/report/tables.h"
 #include "analysis/statistics/conclusions.h"
+#include "analysis/statistics/paired_evidence.h"
 #include "analysis/text.h"
 
 namespace palpate::analysis {
@@ -176,6 +177,15 @@ Json times(const TimesCell& cell) {
   return out;
 }
 
+/// What the test says for no difference. \param name  of the 90 % interval
+void put_evidence(Json& out, const std::string& name, const std::optional<double>& mean,
+                  const TTest& test) {
+  const PairedEvidence found = mean ? evidence_of(*mean, test) : PairedEvidence{};
+  put_interval(out, name, found.ci90);
+  out["least_bound"] = number(found.least_bound);
+  out["bf10"] = number(found.bayes_factor);
+}
+
 Json paired(const PairedShape& shape, const TrialTable& table) {
   Json out;
   put_status(out, shape.undefined);
@@ -193,6 +203,7 @@ Json paired(const PairedShape& shape, const TrialTable& table) {
   t["p"] = number(shape.t_test.p);
   put_log_ratio_ci95(t, shape.t_test.log_ratio_ci95);
   t["p_holm"] = number(shape.t_test.p_holm);
+  put_evidence(t, "log_ratio_ci90", shape.mean_log_ratio, shape.t_test);
 
   Json& effect = out["effect_size"];
   put_status(effect, shape.effect_size.undefined);
@@ -238,6 +249,53 @@ Json paired_shapes(const Comparison& comparison, const TrialTable& table) {
   return out;
 }
 
+Json accuracy_model_json(const AccuracyModel& model) {
+  Json out{{"model", "logit = intercept + b r + shape + u + s r, r = -1/2, +1/2"},
+           {"status", model.undefined.empty() ? "ok" : "undefined"}};
+  if (!model.undefined.empty()) out["reason"] = model.undefined;
+  out["n"] = model.participants;
+  out["left_out"] = model.left_out;
+  out["log_odds_ratio"] = number(model.log_odds_ratio);
+  out["ci95_low"] = number(model.ci95_low);
+  out["ci95_high"] = number(model.ci95_high);
+  out["participant_sd"] = model.participant_sd;
+  out["slope_sd"] = model.slope_sd;
+  out["lr"] = number(model.likelihood_ratio);
+  out["t"] = number(model.t);
+  out["p"] = number(model.p);
+  return out;
+}
+
+Json accuracy_difference_json(const AccuracyDifference& one,
+                              const std::vector<std::string>& shapes) {
+  const auto put = [](Json& out, const std::optional<double>& difference, const TTest& test) {
+    out["status"] = test.undefined.empty() ? "ok" : "undefined";
+    if (!test.undefined.empty()) out["reason"] = test.undefined;
+    out["difference"] = number(difference);
+    put_interval(out, "ci95", test.log_ratio_ci95);
+    out["t"] = number(test.t);
+    out["df"] = number(test.df);
+    out["p"] = number(test.p);
+    put_evidence(out, "ci90", difference, test);
+  };
+  Json out{{"n", one.n}};
+  put(out, one.difference, one.test);
+  for (std::size_t s = 0; s < shapes.size(); ++s) {
+    Json& shape = out["by_shape"][shapes[s]];
+    put(shape, one.difference_by_shape[s], one.by_shape[s]);
+    shape["p_holm"] = number(one.by_shape[s].p_holm);
+  }
+  out["model"] = accuracy_model_json(one.model);
+  return out;
+}
+
+void put_accuracy_differences(Json& out, const AccuracyComparison& compared,
+                              const std::vector<std::string>& shapes) {
+  out["primary"] = accuracy_difference_json(compared.all, shapes);
+  out["answered"] = accuracy_difference_json(compared.answered, shapes);
+  out["depends_on_time_outs"] = compared.depends_on_time_outs;
+}
+
 /// paired_by_shape is the first comparison (ray with point if both are in the data); it names its
 /// renderers unless they are ray and point. All further comparisons are in a list.
 void put_comparisons(Json& out, const Analysis& analysis) {
@@ -253,6 +311,7 @@ void put_comparisons(Json& out, const Analysis& analysis) {
   for (std::size_t c = 1; c < all.size(); ++c) {
     Json one = of(all[c].pair);
     one["by_shape"] = paired_shapes(all[c], table);
+    put_accuracy_differences(one["accuracy_comparison"], all[c].accuracy, table.shapes);
     one["speed_accuracy"] = speed_accuracy_json(all[c], table);
     put_pair_practice(one["practice"], analysis.practice.pairs[c], all[c].pair, table);
     out["further_comparisons"].push_back(std::move(one));
@@ -301,10 +360,13 @@ std::string report_json(const Analysis& analysis) {
       out["times"][renderer][shape] = times(description.times[r][s]);
     }
   }
+  put_accuracy_differences(out["accuracy_comparison"], analysis.comparisons.front().accuracy,
+                           table.shapes);
   if (analysis.time_outs.any) out["time_outs"] = time_outs_json(analysis);
   put_comparisons(out, analysis);
   out["rm_anova"] = anova_json(analysis.rm_anova, table);
   out["mixed_model"] = mixed_model_json(analysis);
+  out["mixed_model_by_shape"] = shape_slope_json(analysis);
   out["speed_accuracy"] = speed_accuracy_json(analysis.comparisons.front(), table);
   out["practice"] = practice_json(analysis);
   for (std::size_t r = 0; r < table.renderers.size(); ++r) {
@@ -552,6 +614,8 @@ class Report {
     }
     std::vector<Table> answers = confusion_tables(analysis_);
     answers.push_back(accuracy_table(analysis_));
+    if (analysis_.table.renderers.size() > 1)
+      answers.push_back(accuracy_difference_table(analysis_));
     figure_section({"confusion", "Shapes shown and answered", "Confusion"}, answers, "");
     if (both) {
       figure_section({"speed-accuracy", "Speed-accuracy trade-off", "Speed and accuracy"},
@@ -571,8 +635,8 @@ class Report {
     if (analysis_.time_outs.any) lost.push_back(time_outs_table(analysis_));
     figure_section({"exclusions", "Trials excluded from the times", "Exclusions"}, lost, "");
     begin({"tests", "The tests", "Tests"});
-    for (const Table& table :
-         {tests_table(analysis_), anova_table(analysis_), mixed_model_table(analysis_)}) {
+    for (const Table& table : {tests_table(analysis_), anova_table(analysis_),
+                               mixed_model_table(analysis_), shape_slope_table(analysis_)}) {
       put_table(page_.body(), table);
     }
     page_.end_section();

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "analysis/statistics/conclusions.h"
+#include "analysis/statistics/paired_evidence.h"
 #include "analysis/text.h"
 
 namespace palpate::analysis {
@@ -67,6 +68,27 @@ std::string test_sentence(const TTest& test, const EffectSize& effect, std::size
   return text + ", n = " + std::to_string(pairs);
 }
 
+namespace {
+
+/// "Accuracy, ray − point: 12.1 percentage points, 95 % CI [...], t(5) = 1.30, p = 0.250, n = 6
+/// ..."
+std::string accuracy_sentence(const Comparison& comparison, const std::string& label) {
+  const AccuracyDifference& all = comparison.accuracy.all;
+  const auto& ends = all.test.log_ratio_ci95;
+  if (!all.test.p || !ends) return "";
+  return "Accuracy, " + printable(comparison.pair.renderer) + " − " +
+         printable(comparison.pair.reference) + ": " + fixed(100 * *all.difference, 1) +
+         " percentage points, 95 % CI [" + fixed(100 * ends->low, 1) + ", " +
+         fixed(100 * ends->high, 1) + "], " + test_text(all.test) +
+         ", n = " + std::to_string(all.n) +
+         " (paired t-test of shares correct, mean over shapes; a time-out is wrong" +
+         (comparison.accuracy.depends_on_time_outs ? "; the difference depends on the time-outs"
+                                                   : "") +
+         (label.empty() ? "" : "; " + label) + ").";
+}
+
+}  // namespace
+
 std::vector<std::string> sentences_to_quote(const Analysis& analysis) {
   const std::size_t tests = number_of_tests(analysis.comparisons);
   const std::string label = simulated_label(analysis.table.simulated);
@@ -87,6 +109,10 @@ std::vector<std::string> sentences_to_quote(const Analysis& analysis) {
           "], " + test_sentence(shape.t_test, shape.effect_size, shape.n_pairs, tests) +
           " (paired t-test of log times" + (label.empty() ? "" : "; " + label) + ").");
     }
+  }
+  for (const Comparison& comparison : analysis.comparisons) {
+    if (std::string one = accuracy_sentence(comparison, label); !one.empty())
+      sentences.push_back(std::move(one));
   }
   return sentences;
 }
@@ -237,6 +263,116 @@ Table times_table(const Analysis& analysis) {
   return table;
 }
 
+namespace {
+
+std::string percentage_points(const std::optional<double>& share) {
+  return share ? fixed(100 * *share, 1) : kMissing;
+}
+
+/// "3.2": how many times more likely the differences are with an effect than with none.
+std::string bayes_cell(const std::optional<double>& factor) {
+  return factor ? short_number(*factor) : kMissing;
+}
+
+const char* const kBayesNote =
+    "90 % interval: equivalent within registered bounds if it lies inside (two one-sided tests at "
+    "5 %). BF10: Bayes factor for a difference (Rouder et al. 2009, scale 0.707); below 1/3 it "
+    "supports none.";
+
+/// Below nine pairs a Bayes factor cannot support "no difference".
+void add_bayes_notes(std::size_t fewest, Table& table) {
+  table.notes.emplace_back(kBayesNote);
+  if (fewest < kLeastForBayes)
+    table.notes.emplace_back(
+        "With fewer than nine participants BF10 cannot fall below 1/3: it can never support \"no "
+        "difference\".");
+}
+
+std::string odds_ratio(const AccuracyModel& model) {
+  const auto ratio = [](double log_odds) { return number(std::exp(log_odds), 2); };
+  if (!model.undefined.empty()) return kMissing;
+  const std::string value = model.log_odds_ratio ? ratio(*model.log_odds_ratio) : kMissing;
+  if (model.ci95_low && model.ci95_high)
+    return value + " (" + ratio(*model.ci95_low) + " to " + ratio(*model.ci95_high) + ")";
+  if (model.ci95_low) return value + " (at least " + ratio(*model.ci95_low) + ")";
+  if (model.ci95_high) return value + " (at most " + ratio(*model.ci95_high) + ")";
+  return value + " (not determined)";
+}
+
+void add_accuracy_row(const Comparison& comparison, const char* trials,
+                      const AccuracyDifference& one, Table& table) {
+  const auto range = [](const std::optional<Interval>& ends) {
+    return ends ? fixed(100 * ends->low, 1) + " to " + fixed(100 * ends->high, 1)
+                : std::string(kMissing);
+  };
+  const PairedEvidence evidence =
+      one.difference ? evidence_of(*one.difference, one.test) : PairedEvidence{};
+  table.rows.push_back({difference_name(comparison.pair), trials, percentage_points(one.difference),
+                        range(one.test.log_ratio_ci95), range(evidence.ci90),
+                        bayes_cell(evidence.bayes_factor), number(one.test.t, 2),
+                        number(one.test.df, 0), p_or_missing(one.test.p), odds_ratio(one.model),
+                        p_or_missing(one.model.p), std::to_string(one.n)});
+  const std::string name = difference_name(comparison.pair) + ", " + trials + ": ";
+  if (!one.test.undefined.empty()) table.notes.push_back(name + one.test.undefined + ".");
+  if (!one.model.undefined.empty())
+    table.notes.push_back(name + "no model, " + one.model.undefined + ".");
+  std::string left_out;
+  for (const std::string& shape : one.model.left_out)
+    left_out += (left_out.empty() ? "" : "; ") + shape;
+  if (!left_out.empty()) table.notes.push_back(name + "left out of the model: " + left_out + ".");
+}
+
+}  // namespace
+
+Table accuracy_difference_table(const Analysis& analysis) {
+  Table table;
+  table.caption = caption(analysis, "Difference of accuracy between renderers");
+  table.n_names = 2;
+  table.header = {
+      "compared", "trials", "percentage points", "95 % interval",  "90 % interval", "BF10", "t",
+      "df",       "p",      "odds ratio",        "p of the model", "participants"};
+  table.notes = {
+      "Primary: t-test over participants of the difference of shares correct, mean over shapes. "
+      "Beside it: a logistic model with a random slope; interval and p by the likelihood ratio. A "
+      "time-out is wrong in all trials, and left out of answered trials."};
+  for (const Comparison& comparison : analysis.comparisons) {
+    add_accuracy_row(comparison, "all trials", comparison.accuracy.all, table);
+    add_accuracy_row(comparison, "answered trials", comparison.accuracy.answered, table);
+    if (comparison.accuracy.depends_on_time_outs)
+      table.notes.push_back(difference_name(comparison.pair) +
+                            ": the difference depends on the time-outs.");
+  }
+  std::size_t fewest = kLeastForBayes;
+  for (const Comparison& comparison : analysis.comparisons)
+    fewest = std::min(fewest, comparison.accuracy.all.n);
+  add_bayes_notes(fewest, table);
+  return table;
+}
+
+Table no_difference_table(const Analysis& analysis) {
+  Table table;
+  table.caption = caption(analysis, "Times: what speaks for no difference");
+  table.n_names = 2;
+  table.header = {"compared", "shape", "percent less time", "90 % interval", "BF10", "pairs"};
+  std::size_t fewest = kLeastForBayes;
+  for (const Comparison& comparison : analysis.comparisons) {
+    for (std::size_t s = 0; s < comparison.shapes.size(); ++s) {
+      const PairedShape& shape = comparison.shapes[s];
+      if (!shape.mean_log_ratio) continue;
+      const PairedEvidence evidence = evidence_of(*shape.mean_log_ratio, shape.t_test);
+      if (!evidence.ci90) continue;
+      const Interval ends = percent_reduction(*evidence.ci90);
+      table.rows.push_back({difference_name(comparison.pair), analysis.table.shapes[s],
+                            fixed(*shape.percent_reduction_geometric, 1),
+                            fixed(ends.low, 1) + " to " + fixed(ends.high, 1),
+                            bayes_cell(evidence.bayes_factor), std::to_string(shape.n_pairs)});
+      fewest = std::min(fewest, shape.n_pairs);
+    }
+  }
+  add_bayes_notes(fewest, table);
+  return table;
+}
+
 Table accuracy_table(const Analysis& analysis) {
   Table table;
   table.caption = caption(analysis, "Accuracy in all trials");
@@ -370,11 +506,15 @@ std::vector<Table> all_tables(const Analysis& analysis) {
   if (!censored.rows.empty()) tables.push_back(std::move(censored));
   tables.push_back(times_table(analysis));
   tables.push_back(accuracy_table(analysis));
+  if (analysis.table.renderers.size() > 1) tables.push_back(accuracy_difference_table(analysis));
   if (analysis.table.renderers.size() > 1) tables.push_back(speed_accuracy_table(analysis));
   std::ranges::move(confusion_tables(analysis), std::back_inserter(tables));
   tables.push_back(tests_table(analysis));
+  if (Table evidence = no_difference_table(analysis); !evidence.rows.empty())
+    tables.push_back(std::move(evidence));
   tables.push_back(anova_table(analysis));
   tables.push_back(mixed_model_table(analysis));
+  if (analysis.shape_slope_model.undefined.empty()) tables.push_back(shape_slope_table(analysis));
   tables.push_back(learning_table(analysis));
   if (analysis.table.renderers.size() > 1) tables.push_back(renderer_order_table(analysis));
   tables.push_back(exclusions_table(analysis));
@@ -506,6 +646,42 @@ Table anova_table(const Analysis& analysis) {
   return table;
 }
 
+Table shape_slope_table(const Analysis& analysis) {
+  const ShapeSlopeModel& model = analysis.shape_slope_model;
+  const Comparison& first = analysis.comparisons.front();
+  Table table = comparison_table(
+      analysis,
+      "Mixed model with participant × shape: log time ~ renderer * shape + (1 + renderer | "
+      "participant) + (1 + renderer || participant:shape), REML",
+      {"reduction", "95 % interval", difference_name(first.pair), "se", "df", "t", "p",
+       "p (Holm)"});
+  if (!model.undefined.empty()) {
+    table.notes = {sentence("Not fitted", model.undefined)};
+    return table;
+  }
+  Reasons reasons;
+  for (std::size_t s = 0; s < analysis.table.shapes.size(); ++s) {
+    const ModelEstimate& value = model.contrasts[s];
+    const std::string& name = analysis.table.shapes[s];
+    std::optional<double> reduction;
+    if (value.estimate) reduction = percent_reduction(*value.estimate);
+    auto& row = table.rows.emplace_back(row_names(analysis, first.pair, name));
+    row.insert(row.end(),
+               {percent(reduction), reduction_interval(value.ci95), number(value.estimate, 4),
+                number(value.se, 4), number(value.df_satterthwaite, 1), number(value.t, 2),
+                p_or_missing(value.p), p_or_missing(value.p_holm)});
+    reasons.add(value.undefined, listed_shape(analysis, first.pair, name));
+  }
+  table.notes.push_back("SD of participants' levels " + fixed(model.participant_level_sd, 3) +
+                        ", gains " + fixed(model.participant_gain_sd, 3) + "; by shape, levels " +
+                        fixed(model.shape_level_sd, 3) + ", gains " +
+                        fixed(model.shape_gain_sd, 3) + "; residual " +
+                        fixed(model.residual_sd, 3) + " (log s). df: Satterthwaite.");
+  for (const std::string& one : model.taken_out) table.notes.push_back(sentence("Taken out", one));
+  reasons.put(table.notes);
+  return table;
+}
+
 Table mixed_model_table(const Analysis& analysis) {
   const MixedModel& model = analysis.mixed_model;
   const std::vector<Comparison>& all = analysis.comparisons;
@@ -537,9 +713,15 @@ Table mixed_model_table(const Analysis& analysis) {
     table.notes.push_back(sentence("Undefined", model.undefined));
     return table;
   }
-  table.notes.push_back(
-      "Complements the paired t-tests: the model has no participant × shape variance, so its "
-      "intervals are too narrow and p too small if there is such a variance. df: Satterthwaite.");
+  // Where the next model stands, it tells what this one leaves out.
+  table.notes.emplace_back(
+      analysis.shape_slope_model.undefined.empty()
+          ? "Complements the paired t-tests. One gain for each participant; gains that differ "
+            "between "
+            "shapes are in the model below. df: Satterthwaite."
+          : "Complements the paired t-tests: the model has no participant × shape variance, so its "
+            "intervals are too narrow and p too small if there is such a variance. df: "
+            "Satterthwaite.");
   if (!model.singular.empty()) {
     table.notes.push_back(
         sentence("Singular fit, on the boundary of the parameter space", model.singular) +

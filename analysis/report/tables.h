@@ -34,6 +34,10 @@ Table time_outs_table(const Analysis& analysis);
 Table times_table(const Analysis& analysis);
 /// Accuracy by cell, with and without time-outs.
 Table accuracy_table(const Analysis& analysis);
+/// Difference of accuracy, per comparison, of all and of answered trials: shares and model.
+Table accuracy_difference_table(const Analysis& analysis);
+/// 90 % intervals and Bayes factors of the paired tests of times.
+Table no_difference_table(const Analysis& analysis);
 /// Change of time and of accuracy, per comparison and shape: speed-accuracy trade-off.
 Table speed_accuracy_table(const Analysis& analysis);
 /// Confusion matrix of each renderer.
@@ -47,6 +51,8 @@ Table anova_table(const Analysis& analysis);
 /// Contrasts of the mixed model with Satterthwaite tests; standard deviations of the random effects
 /// in a note.
 Table mixed_model_table(const Analysis& analysis);
+/// The same with effects of participant and shape, of two renderers.
+Table shape_slope_table(const Analysis& analysis);
 /// Geometric mean times (s) over eighths of the trials with each renderer; slopes in notes.
 Table learning_table(const Analysis& analysis);
 /// Percent reduction by which renderer came first, per comparison.

@@ -10,6 +10,7 @@
 #include "analysis/report/html_page.h"
 #include "analysis/report/report.h"
 #include "analysis/report/task_tables.h"
+#include "analysis/statistics/paired_evidence.h"
 #include "analysis/statistics/task_analysis.h"
 #include "analysis/text.h"
 #include "data/base/json_text.h"
@@ -314,11 +315,19 @@ TaskJson procedure_json(const TrackProcedure& procedure) {
   return out;
 }
 
-TaskJson function_json(const ParticipantFunction& one) {
+/// \param alternatives  of a forced choice; 0: of another task
+TaskJson function_json(const ParticipantFunction& one, int alternatives) {
   TaskJson out{{"participant_id", one.participant}};
-  for (const LevelCount& count : one.counts)
-    out["levels"].push_back(
-        {{"level", count.level}, {"trials", count.trials}, {"successes", count.successes}});
+  for (const LevelCount& count : one.counts) {
+    TaskJson level{
+        {"level", count.level}, {"trials", count.trials}, {"successes", count.successes}};
+    if (alternatives > 0 && count.trials > 0) {
+      const auto found = forced_choice_detectability(count.successes, count.trials, alternatives);
+      level["d_prime"] = finite(found.d_prime);
+      level["d_prime_ci95"] = ends_json(found.d_prime_ci95);
+    }
+    out["levels"].push_back(std::move(level));
+  }
   out["fit"] = fit_json(one);
   out["bayes"] = posterior_json(one.posterior);
   for (const Track& track : one.tracks) {
@@ -447,7 +456,8 @@ TaskJson cell_json(const TaskCell& cell) {
                {"same_different", cell.same_different},
                {"n_intervals", cell.task == "compare" ? TaskJson(cell.intervals) : TaskJson()}};
   for (const ParticipantFunction& one : cell.functions)
-    out["psychometric_functions"].push_back(function_json(one));
+    out["psychometric_functions"].push_back(
+        function_json(one, cell.forced_choice ? cell.intervals : 0));
   if (cell.magnitude) out["magnitude_estimation"] = magnitude_json(cell);
   if (cell.ratings) out["ratings"] = ratings_json(cell);
   for (const Adjustment& one : cell.adjustments)
@@ -461,8 +471,11 @@ TaskJson cell_json(const TaskCell& cell) {
                                   {"start_effect", maybe(one.start_effect)}});
   if (cell.information) {
     TaskJson& bits = out["information_transfer"] = information_json(*cell.information);
-    bits["mean_of_participants_bits_corrected"] = maybe(cell.information_mean);
-    bits["mean_of_participants_ci95"] = ends_json(cell.information_ci95);
+    bits["most_bits"] = finite(cell.information_most);
+    bits["mean_of_participants_bits_corrected"] = maybe(cell.information_mean.mean);
+    bits["mean_of_participants_ci95"] = ends_json(cell.information_mean.ci95);
+    if (!cell.information_mean.undefined.empty())
+      bits["mean_of_participants_reason"] = cell.information_mean.undefined;
     for (std::size_t i = 0; i < cell.informations.size(); ++i) {
       TaskJson one{{"participant_id", cell.participants[i]}};
       one.update(information_json(cell.informations[i]));
@@ -474,6 +487,11 @@ TaskJson cell_json(const TaskCell& cell) {
   if (cell.confidence.area) {
     confidence["type2_roc_area"] = *cell.confidence.area;
     confidence["ci95"] = ends_json(cell.confidence.area_ci95);
+    const TransformedMean& mean = cell.confidence_mean;
+    confidence["mean_of_participants"] = {{"n_participants", mean.n},
+                                          {"n_left_out", mean.left_out},
+                                          {"type2_roc_area", maybe(mean.mean)},
+                                          {"ci95", ends_json(mean.ci95)}};
   }
   out["confidence"] = confidence;
   return out;
@@ -488,7 +506,8 @@ TaskJson group_json(const TaskGroup& group) {
                {"mean_is", group.geometric ? "geometric" : "arithmetic"}};
   for (const GroupMean& one : group.renderers) {
     TaskJson renderer{{"renderer", one.renderer},
-                      {"n_participants", one.participants.size()},
+                      {"from", one.of_model ? "hierarchical model" : "participants"},
+                      {"n_participants", one.of_model ? one.n_of_model : one.participants.size()},
                       {"n_undetermined", one.n_undetermined},
                       {"mean", maybe(one.mean)},
                       {"ci95", ends_json(one.ci95)},
@@ -531,31 +550,148 @@ TaskJson comparison_json(const TaskComparison& one, bool of_renderers) {
                                   {"dz", maybe(difference.effect_size.dz)},
                                   {"mixed_estimate", maybe(difference.mixed_estimate)},
                                   {"mixed_se", maybe(difference.mixed_se)}});
+    const PairedEvidence evidence = evidence_of(difference.mean, difference.t_test);
+    out["differences"].back()["ci90"] = ends_json(evidence.ci90);
+    out["differences"].back()["least_bound"] = maybe(evidence.least_bound);
+    out["differences"].back()["bf10"] = maybe(evidence.bayes_factor);
     if (one.measure == "rating")
       out["differences"].back()["wilcoxon"] = wilcoxon_json(difference.wilcoxon);
   }
   return out;
 }
 
-/// As R's lme4 prints it: correct ~ renderer + shape + (1 | participant).
-TaskJson accuracy_json(const MixedLogistic& model) {
-  TaskJson out{{"model", "correct ~ renderer + shape + (1 | participant)"}};
-  out["status"] = !model.undefined.empty() ? "undefined" : model.singular ? "singular" : "ok";
-  if (!model.undefined.empty()) {
-    out["reason"] = model.undefined;
-    return out;
+TaskJson maybe_ends(const std::optional<double>& low, const std::optional<double>& high) {
+  return {maybe(low), maybe(high)};
+}
+
+TaskJson group_model_json(const TaskGroupModel& one) {
+  TaskJson out{{"block", one.block_name},        {"task", one.task},         {"shape", one.shape},
+               {"measure", one.measure},         {"renderer", one.renderer}, {"n", one.n},
+               {"estimate", maybe(one.estimate)}};
+  if (one.level) out["level"] = *one.level;
+  out["ci95"] = maybe_ends(one.low, one.high);
+  out["sd_between"] = maybe(one.sd_between);
+  out["lapse_mean"] = maybe(one.lapse_mean);
+  out["status"] = one.status();
+  if (!one.undefined.empty()) out["reason"] = one.undefined;
+  out["notes"] = one.notes;
+  return out;
+}
+
+TaskJson group_comparison_json(const TaskGroupComparison& one) {
+  TaskJson out{{"block", one.block_name},
+               {"task", one.task},
+               {"shape", one.shape},
+               {"measure", one.measure},
+               {"reference", one.reference},
+               {"compared", one.compared},
+               {"scale", one.ratio ? "ratio" : "difference"},
+               {"n", one.n},
+               {"estimate", maybe(one.estimate)}};
+  if (one.level) out["level"] = *one.level;
+  out["ci95"] = maybe_ends(one.low, one.high);
+  out["ci90"] = maybe_ends(one.low90, one.high90);
+  out["p"] = maybe(one.p);
+  out["p_holm"] = maybe(one.p_holm);
+  out["lr"] = maybe(one.likelihood_ratio);
+  out["status"] = one.status();
+  if (!one.undefined.empty()) out["reason"] = one.undefined;
+  const IndividualFits& fits = one.individual_fits;
+  out["individual_fits"] = {{"n", fits.n},
+                            {"left_out", fits.left_out},
+                            {"left_out_participants", fits.left_out_names},
+                            {"t", maybe(fits.t)},
+                            {"df", maybe(fits.df)},
+                            {"p", maybe(fits.p)}};
+  return out;
+}
+
+/// Where a result stands by name: MEASURE.BLOCK, of several stimuli in a block
+/// MEASURE.BLOCK.STIMULUS.
+TaskJson& named_place(TaskJson& out, const TaskAnalysis& analysis, const std::string& measure,
+                      const std::string& task, const std::string& block, const std::string& shape) {
+  const bool several = std::ranges::any_of(analysis.cells, [&](const TaskCell& cell) {
+    return cell.task == task && cell.block_name == block && cell.shape != shape;
+  });
+  TaskJson& place = out[measure][block.empty() ? task : block];
+  return several ? place[shape] : place;
+}
+
+/// "d_prime_at_2.5": a measure at a level.
+std::string leveled(const std::string& measure, const std::optional<double>& level) {
+  return level ? measure + "_at_" + short_number(*level) : measure;
+}
+
+/// The least bound of equivalence: of ratios, on the scale of logarithms.
+TaskJson least_bound(const TaskGroupComparison& one) {
+  if (!one.low90 || !one.high90) return nullptr;
+  const auto size = [&](double end) { return std::abs(one.ratio ? std::log(end) : end); };
+  return std::max(size(*one.low90), size(*one.high90));
+}
+
+/// Results by name, for hypotheses: objects, as elements of lists have no names. Of more than two
+/// renderers the compared one is a part of the name.
+TaskJson named_json(const TaskAnalysis& analysis) {
+  TaskJson out = TaskJson::object();
+  for (const TaskGroupModel& one : analysis.group_models.models) {
+    TaskJson& place = named_place(out, analysis, leveled(one.measure, one.level), one.task,
+                                  one.block_name, one.shape)[one.renderer];
+    place = {{"estimate", maybe(one.estimate)},
+             {"ci95_low", maybe(one.low)},
+             {"ci95_high", maybe(one.high)},
+             {"n", one.n}};
   }
-  out["n_participants"] = model.participants;
-  out["n_trials"] = model.trials;
-  out["logLik"] = finite(model.log_likelihood);
-  out["participant_sd"] = model.random_sds.empty() ? TaskJson() : finite(model.random_sds[0]);
-  for (const LogisticCoefficient& one : model.coefficients)
-    out["fixed_effects"][one.name] = {{"log_odds", finite(one.estimate)},
-                                      {"se", finite(one.se)},
-                                      {"z", finite(one.z)},
-                                      {"p", finite(one.p)},
-                                      {"ci95", ends_json(one.ci95)},
-                                      {"odds_ratio", finite(std::exp(one.estimate))}};
+  for (const TaskGroupComparison& one : analysis.group_models.comparisons) {
+    const bool several = std::ranges::any_of(
+        analysis.group_models.comparisons, [&](const TaskGroupComparison& other) {
+          return other.task == one.task && other.block_name == one.block_name &&
+                 other.shape == one.shape && other.compared != one.compared;
+        });
+    TaskJson values{{one.ratio ? "ratio" : "difference", maybe(one.estimate)},
+                    {"ci95_low", maybe(one.low)},
+                    {"ci95_high", maybe(one.high)},
+                    {"ci90_low", maybe(one.low90)},
+                    {"ci90_high", maybe(one.high90)},
+                    {"lr", maybe(one.likelihood_ratio)},
+                    {"p", maybe(one.p)},
+                    {"p_holm", maybe(one.p_holm)},
+                    {"n", one.n}};
+    const std::string measure = leveled(one.measure, one.level);
+    TaskJson& place = named_place(out, analysis, measure, one.task, one.block_name, one.shape);
+    (several ? place[one.compared] : place).update(values);
+    TaskJson& bound =
+        named_place(out["equivalence"], analysis, measure, one.task, one.block_name, one.shape);
+    (several ? bound[one.compared] : bound)["least_bound"] = least_bound(one);
+  }
+  for (const TaskComparison& one : analysis.renderers) {
+    if (has_model(analysis, one)) continue;
+    for (const ConditionDifference& difference : one.comparison.differences) {
+      const bool several = one.conditions.size() > 2;
+      const std::string& compared = one.conditions[difference.condition];
+      const auto back = [&](double value) { return one.logarithms ? std::exp(value) : value; };
+      const PairedEvidence evidence = evidence_of(difference.mean, difference.t_test);
+      const auto& ends = difference.t_test.log_ratio_ci95;
+      const auto end = [&](const std::optional<Interval>& of, bool low) {
+        return of ? finite(back(low ? of->low : of->high)) : TaskJson(nullptr);
+      };
+      TaskJson& place =
+          named_place(out, analysis, one.measure, one.task, one.block_name, one.shape);
+      (several ? place[compared] : place)
+          .update({{one.logarithms ? "ratio" : "difference", finite(back(difference.mean))},
+                   {"ci95_low", end(ends, true)},
+                   {"ci95_high", end(ends, false)},
+                   {"ci90_low", end(evidence.ci90, true)},
+                   {"ci90_high", end(evidence.ci90, false)},
+                   {"t", maybe(difference.t_test.t)},
+                   {"p", maybe(difference.t_test.p)},
+                   {"p_holm", maybe(difference.t_test.p_holm)},
+                   {"bf10", maybe(evidence.bayes_factor)},
+                   {"n", difference.n_pairs}});
+      TaskJson& bound = named_place(out["equivalence"], analysis, one.measure, one.task,
+                                    one.block_name, one.shape);
+      (several ? bound[compared] : bound)["least_bound"] = maybe(evidence.least_bound);
+    }
+  }
   return out;
 }
 
@@ -580,7 +716,13 @@ std::string task_report_json(const TaskAnalysis& analysis, const std::string& pr
     out["renderer_comparisons"].push_back(comparison_json(one, true));
   for (const TaskComparison& one : analysis.conditions)
     out["condition_comparisons"].push_back(comparison_json(one, false));
-  if (analysis.accuracy) out["accuracy_model"] = accuracy_json(*analysis.accuracy);
+  out["group_model"] = TaskJson::array();
+  for (const TaskGroupModel& one : analysis.group_models.models)
+    out["group_model"].push_back(group_model_json(one));
+  out["group_comparisons"] = TaskJson::array();
+  for (const TaskGroupComparison& one : analysis.group_models.comparisons)
+    out["group_comparisons"].push_back(group_comparison_json(one));
+  out.update(named_json(analysis));
   if (analysis.identification)
     out["identification"] = read_ordered_json(report_json(*analysis.identification));
   return out.dump(1, ' ', false, TaskJson::error_handler_t::replace) + "\n";
@@ -780,9 +922,11 @@ std::string cell_text(const TaskCell& cell) {
             "; corrected for the bias of few trials " +
             short_number(std::max(0.0, *cell.information->corrected)) + " bit, " +
             short_number(*cell.information->categories) + " categories";
-    if (cell.information_mean)
+    if (cell.information_mean.mean)
       text += "; mean of the participants' " +
-              optional_interval(cell.information_mean, cell.information_ci95);
+              optional_interval(cell.information_mean.mean, cell.information_mean.ci95) +
+              " of at most " + short_number(cell.information_most) +
+              " (mean of arcsin sqrt, transformed back)";
     text += "\n";
   }
   if (cell.confidence.area)
@@ -792,6 +936,14 @@ std::string cell_text(const TaskCell& cell) {
                  ? " (BELOW 0.5: is the scale reversed?)"
                  : "") +
             "\n";
+  if (const TransformedMean& mean = cell.confidence_mean; mean.n > 1 || mean.left_out > 0) {
+    text += "  confidence, mean of participants: " + optional_interval(mean.mean, mean.ci95) +
+            " (" + counted(mean.n, "participant", "participants");
+    if (mean.left_out > 0)
+      text +=
+          ", " + std::to_string(mean.left_out) + " without both correct and wrong answers left out";
+    text += ")\n";
+  }
   return text + "\n";
 }
 
@@ -800,13 +952,18 @@ std::string group_text(const TaskGroup& group) {
   for (const std::string* name : {&group.task, &group.block_name, &group.shape}) {
     if (!name->empty()) text += ", " + printable(*name);
   }
+  const bool modelled =
+      std::ranges::any_of(group.renderers, [](const GroupMean& one) { return one.of_model; });
   text += group.geometric ? " (geometric means" : " (means";
+  if (modelled) text += " of a hierarchical model of all answers";
   text += (group.unit.empty() ? "" : ", " + group.unit) + ")\n";
   for (const GroupMean& one : group.renderers) {
     text += "  " + pad_right(printable(one.renderer), 12) +
             (one.mean ? optional_interval(one.mean, one.ci95) : "no mean") + " (" +
-            counted(one.participants.size(), "participant", "participants");
-    if (one.n_undetermined > 0)
+            counted(one.of_model ? one.n_of_model : one.participants.size(), "participant",
+                    "participants");
+    for (const std::string& note : one.notes) text += "; " + note;
+    if (!one.of_model && one.n_undetermined > 0)
       text += ", " + std::to_string(one.n_undetermined) + " not determined and left out";
     text += ")\n";
   }
@@ -863,21 +1020,40 @@ std::string comparison_text(const TaskComparison& one, bool of_renderers) {
   return text + "\n";
 }
 
-std::string accuracy_text(const MixedLogistic& model) {
-  std::string text =
-      "Accuracy of identification, mixed logistic model: correct ~ renderer + shape + (1 | "
-      "participant)\n";
-  if (!model.undefined.empty()) return text + "  undefined: " + model.undefined + "\n\n";
-  for (const LogisticCoefficient& one : model.coefficients) {
-    const bool intercept = one.name == "(Intercept)";
-    text +=
-        "  " + pad_right(printable(one.name), 18) + (intercept ? "odds " : "odds ratio ") +
-        with_interval(std::exp(one.estimate), {std::exp(one.ci95.low), std::exp(one.ci95.high)}) +
-        ", p " + p_text(one.p) + "\n";
+/// The group's d' and criterion, level by level.
+std::string group_detection_text(const TaskAnalysis& analysis) {
+  std::string text;
+  for (const TaskGroupModel& one : analysis.group_models.models) {
+    if (!one.level) continue;
+    if (text.empty()) text = "Detection over participants (hierarchical model of all answers)\n";
+    text += "  " + measure_plural(one.measure) + " at " + short_number(*one.level) + ", " +
+            printable(one.renderer) + ": " + short_number(*one.estimate) + " [" +
+            (one.low ? short_number(*one.low) : "open") + ", " +
+            (one.high ? short_number(*one.high) : "open") + "] (" +
+            counted(one.n, "participant", "participants") + ")\n";
   }
-  if (!model.random_sds.empty())
-    text += "  standard deviation of the participants' log odds " +
-            short_number(model.random_sds[0]) + (model.singular ? " (singular)" : "") + "\n";
+  return text.empty() ? text : text + "\n";
+}
+
+/// The group's differences between renderers.
+std::string group_model_text(const TaskAnalysis& analysis) {
+  const TaskGroupResults& results = analysis.group_models;
+  if (results.comparisons.empty()) return "";
+  std::string text = "The group compared between renderers (hierarchical model of all answers)\n";
+  for (const TaskGroupComparison& one : results.comparisons) {
+    text += "  " + group_sentence(one) + "\n";
+    const IndividualFits& fits = one.individual_fits;
+    if (fits.n == 0 && fits.left_out == 0) continue;
+    text += "    individual fits: ";
+    if (fits.t)
+      text += "t(" + short_number(*fits.df) + ") = " + fixed(*fits.t, 2) + ", " +
+              p_phrase(*fits.p) + ", ";
+    text += counted(fits.n, "pair", "pairs") + ", " +
+            counted(fits.left_out, "function", "functions") + " left out";
+    if (!fits.left_out_names.empty())
+      text += " (" + printable(joined(fits.left_out_names), 400) + ")";
+    text += "\n";
+  }
   return text + "\n";
 }
 
@@ -892,9 +1068,9 @@ std::string task_report_text(const TaskAnalysis& analysis) {
   if (!analysis.table.warnings.empty()) text += "\n";
   for (const TaskCell& cell : analysis.cells) text += cell_text(cell);
   for (const TaskGroup& group : analysis.groups) text += group_text(group);
+  text += group_detection_text(analysis) + group_model_text(analysis);
   for (const TaskComparison& one : analysis.renderers) text += comparison_text(one, true);
   for (const TaskComparison& one : analysis.conditions) text += comparison_text(one, false);
-  if (analysis.accuracy) text += accuracy_text(*analysis.accuracy);
   const std::vector<std::string> sentences = sentences_to_quote(analysis);
   if (!sentences.empty()) text += "To quote\n";
   for (const std::string& sentence : sentences) text += paragraph_text(sentence);

@@ -8,6 +8,7 @@
 #include <variant>
 
 #include "analysis/statistics/conclusions.h"
+#include "analysis/statistics/paired_evidence.h"
 #include "analysis/text.h"
 
 namespace palpate::analysis {
@@ -32,6 +33,8 @@ std::string short_or_missing(const std::optional<double>& value) {
 
 std::string interval_cell(const std::optional<Interval>& interval) {
   if (!interval) return kMissing;
+  if (!std::isfinite(interval->low)) return "below " + short_number(interval->high);
+  if (!std::isfinite(interval->high)) return "above " + short_number(interval->low);
   return short_number(interval->low) + " to " + short_number(interval->high);
 }
 
@@ -54,6 +57,13 @@ std::optional<Interval> ends_in_units(const TaskComparison& one, const TTest& te
                   in_units(one, test.log_ratio_ci95->high)};
 }
 
+std::optional<Interval> ends90_in_units(const TaskComparison& one,
+                                        const ConditionDifference& difference) {
+  const auto ends = evidence_of(difference.mean, difference.t_test).ci90;
+  if (!ends) return std::nullopt;
+  return Interval{in_units(one, ends->low), in_units(one, ends->high)};
+}
+
 std::string pair_of(const TaskComparison& one, const ConditionDifference& difference) {
   return printable(one.conditions[difference.condition]) + (one.logarithms ? " / " : " − ") +
          printable(one.conditions[0]);
@@ -64,27 +74,111 @@ bool any_adjusted(const std::vector<TaskComparison>& comparisons) {
   return std::ranges::any_of(comparisons, [](const auto& one) { return one.n_tests > 1; });
 }
 
+std::string remarks_on(const GroupMean& one) {
+  std::string text;
+  for (const std::string& note : one.notes) text += (text.empty() ? "" : "; ") + note;
+  return text;
+}
+
 Table means_table(const TaskAnalysis& analysis) {
   Table table;
   table.caption = labelled("Means over participants", label_of(analysis));
   table.header = {"measure",       "task, block, stimulus", "renderer", "mean",
-                  "95 % interval", "participants",          "left out"};
+                  "95 % interval", "participants",          "left out", "remark"};
   table.n_names = 3;
+  bool modelled = false;
   for (const TaskGroup& group : analysis.groups) {
     std::string measure = measure_plural(group.measure);
     if (!group.unit.empty()) measure += " (" + group.unit + ")";
-    for (const GroupMean& one : group.renderers)
+    for (const GroupMean& one : group.renderers) {
       table.rows.push_back({measure, stimulus_of(group.task, group.block_name, group.shape),
                             one.renderer, short_or_missing(one.mean), interval_cell(one.ci95),
-                            std::to_string(one.participants.size()),
-                            std::to_string(one.n_undetermined)});
+                            std::to_string(one.of_model ? one.n_of_model : one.participants.size()),
+                            one.of_model ? "0" : std::to_string(one.n_undetermined),
+                            remarks_on(one)});
+      modelled |= one.of_model;
+    }
   }
   table.notes = {
       "Means are geometric if all values are positive and have a true zero, except for exponents "
-      "and ratings; t intervals from two participants on. Left out: functions without a threshold "
-      "among the levels shown, with a slope too steep for them, or with reversed answers."};
+      "and ratings."};
+  if (modelled)
+    table.notes.emplace_back(
+        "Of psychometric functions: a hierarchical model of all participants' answers, with "
+        "intervals by profile likelihood. Nobody is left out for a function that cannot be fitted "
+        "singly.");
   return table;
 }
+
+/// "0.3 to 0.86", "above 0.3"
+std::string ends_of(const std::optional<double>& low, const std::optional<double>& high) {
+  if (!low && !high) return "not determined";
+  if (!low) return "below " + short_number(*high);
+  if (!high) return "above " + short_number(*low);
+  return short_number(*low) + " to " + short_number(*high);
+}
+
+/// d' and criterion at each level.
+Table detection_model_table(const TaskAnalysis& analysis) {
+  Table table;
+  table.caption = labelled("Detection over participants, level by level", label_of(analysis));
+  table.header = {"measure",       "task, block, stimulus",   "level",       "renderer", "value",
+                  "95 % interval", "SD between participants", "participants"};
+  table.n_names = 4;
+  for (const TaskGroupModel& one : analysis.group_models.models) {
+    if (!one.level) continue;
+    table.rows.push_back(
+        {measure_plural(one.measure), stimulus_of(one.task, one.block_name, one.shape),
+         short_number(*one.level), one.renderer, short_or_missing(one.estimate),
+         ends_of(one.low, one.high), short_or_missing(one.sd_between), std::to_string(one.n)});
+  }
+  table.notes = {"A hierarchical model of all answers, without corrected counts."};
+  return table;
+}
+
+std::string pair_of(const TaskGroupComparison& one) {
+  return printable(one.compared) + (one.ratio ? " / " : " − ") + printable(one.reference);
+}
+
+Table model_differences_table(const TaskAnalysis& analysis) {
+  const auto& comparisons = analysis.group_models.comparisons;
+  Table table;
+  table.caption = labelled("Comparison of the group between renderers", label_of(analysis));
+  table.header = {"measure",       "task, block, stimulus", "compared", "value",    "95 % interval",
+                  "90 % interval", "likelihood ratio",      "p",        "p (Holm)", "of tests",
+                  "participants",  "individual fits: p",    "pairs",    "left out"};
+  table.n_names = 3;
+  for (const TaskGroupComparison& one : comparisons) {
+    const IndividualFits& fits = one.individual_fits;
+    table.rows.push_back(
+        {measure_plural(one.measure) + (one.level ? " at " + short_number(*one.level) : ""),
+         stimulus_of(one.task, one.block_name, one.shape), pair_of(one),
+         short_or_missing(one.estimate), one.estimate ? ends_of(one.low, one.high) : one.undefined,
+         one.estimate ? ends_of(one.low90, one.high90) : kMissing, number(one.likelihood_ratio, 3),
+         p_or_missing(one.p), p_or_missing(one.p_holm), std::to_string(one.n_tests),
+         std::to_string(one.n), p_or_missing(fits.p), std::to_string(fits.n),
+         std::to_string(fits.left_out) +
+             (fits.left_out_names.empty() ? "" : " (" + joined(fits.left_out_names) + ")")});
+  }
+  table.notes = {
+      "Likelihood ratios of the hierarchical model, with p and interval as of a t-test. Individual "
+      "fits: the paired t-test of functions fitted singly, which leaves out those without a "
+      "threshold among the levels shown, with a slope too steep for them, or with reversed "
+      "answers."};
+  return table;
+}
+
+}  // namespace
+
+bool has_model(const TaskAnalysis& analysis, const TaskComparison& one) {
+  return std::ranges::any_of(
+      analysis.group_models.comparisons, [&](const TaskGroupComparison& other) {
+        return other.task == one.task && other.block_name == one.block_name &&
+               other.shape == one.shape && other.measure == one.measure;
+      });
+}
+
+namespace {
 
 /// Why a Wilcoxon test beside a t-test may say nothing; empty: it has enough pairs.
 std::string few_pairs_note(const std::vector<TaskComparison>& comparisons) {
@@ -114,6 +208,10 @@ Table differences_table(const TaskAnalysis& analysis, bool of_renderers) {
                   "compared",
                   "value",
                   "95 % interval",
+                  "90 % interval",
+                  "BF10",
+                  "90 % interval",
+                  "BF10",
                   "t",
                   "df",
                   "p"};
@@ -123,6 +221,7 @@ Table differences_table(const TaskAnalysis& analysis, bool of_renderers) {
   table.header.emplace_back("pairs");
   table.n_names = 3;
   for (const TaskComparison& one : comparisons) {
+    if (of_renderers && has_model(analysis, one)) continue;
     for (const ConditionDifference& difference : one.comparison.differences) {
       const TTest& test = difference.t_test;
       auto& row = table.rows.emplace_back(std::vector<std::string>{
@@ -130,8 +229,9 @@ Table differences_table(const TaskAnalysis& analysis, bool of_renderers) {
           stimulus_of(one.task, one.block_name, of_renderers ? one.shape : one.renderer),
           pair_of(one, difference),
           difference.n_pairs > 0 ? short_number(in_units(one, difference.mean)) : kMissing,
-          interval_cell(ends_in_units(one, test)), number(test.t, 2), number(test.df, 0),
-          p_or_missing(test.p)});
+          interval_cell(ends_in_units(one, test)), interval_cell(ends90_in_units(one, difference)),
+          short_or_missing(evidence_of(difference.mean, test).bayes_factor), number(test.t, 2),
+          number(test.df, 0), p_or_missing(test.p)});
       if (adjusted) {
         row.push_back(p_or_missing(test.p_holm));
         row.push_back(std::to_string(one.n_tests));
@@ -147,7 +247,10 @@ Table differences_table(const TaskAnalysis& analysis, bool of_renderers) {
   }
   table.notes = {
       "Paired t-tests: of ratios (/) on natural logarithms if all values are positive and have a "
-      "true zero, otherwise of differences (−). Intervals are not adjusted."};
+      "true zero, otherwise of differences (−). Intervals are not adjusted. Equivalent within "
+      "registered bounds if the 90 % interval lies inside. BF10: Bayes factor for a difference "
+      "(Rouder et al. 2009); with fewer than nine pairs it cannot fall below 1/3, so it can never "
+      "support \"no difference\"."};
   if (rated)
     table.notes.emplace_back(
         "Ratings: of participants' means, p adjusted over all tests of a block; V: positive rank "
@@ -160,17 +263,41 @@ Table differences_table(const TaskAnalysis& analysis, bool of_renderers) {
 }  // namespace
 
 std::vector<Table> group_tables(const TaskAnalysis& analysis) {
-  std::vector<Table> tables{means_table(analysis), differences_table(analysis, true),
+  std::vector<Table> tables{means_table(analysis), model_differences_table(analysis),
+                            detection_model_table(analysis), differences_table(analysis, true),
                             differences_table(analysis, false)};
   std::erase_if(tables, [](const Table& table) { return table.rows.empty(); });
   return tables;
+}
+
+std::string group_sentence(const TaskGroupComparison& one) {
+  const std::string where = stimulus_of(one.task, one.block_name, one.shape);
+  std::string text = measure_plural(one.measure) +
+                     (one.level ? " at " + short_number(*one.level) : "") +
+                     (where.empty() ? "" : " (" + where + ")") + ", " + pair_of(one) + ": ";
+  if (!one.estimate) return text + "undefined, " + one.undefined;
+  text += short_number(*one.estimate);
+  if (one.low && one.high) {
+    text += ", 95 % CI [" + short_number(*one.low) + ", " + short_number(*one.high) + "]";
+  } else {
+    text += ", 95 % CI " + ends_of(one.low, one.high);
+  }
+  text += ", likelihood ratio " + fixed(*one.likelihood_ratio, 2) + ", " + p_phrase(*one.p);
+  if (one.p_holm && *one.p_holm != *one.p) text += " (" + p_phrase(*one.p_holm) + ", Holm)";
+  return text + ", n = " + std::to_string(one.n);
 }
 
 std::vector<std::string> sentences_to_quote(const TaskAnalysis& analysis) {
   std::vector<std::string> sentences;
   const bool of_renderers = !analysis.renderers.empty();
   const std::string label = label_of(analysis);
+  for (const TaskGroupComparison& one : analysis.group_models.comparisons) {
+    if (!one.p) continue;
+    sentences.push_back(group_sentence(one) + " (hierarchical model of all answers" +
+                        (label.empty() ? "" : "; " + label) + ").");
+  }
   for (const TaskComparison& one : of_renderers ? analysis.renderers : analysis.conditions) {
+    if (of_renderers && has_model(analysis, one)) continue;
     for (const ConditionDifference& difference : one.comparison.differences) {
       const TTest& test = difference.t_test;
       const auto ends = ends_in_units(one, test);
@@ -204,31 +331,58 @@ bool is_clear(const ConditionDifference& difference) {
 }
 
 /// "35 % lower", "0.8 higher"
-std::string how_far(const TaskComparison& one, double mean) {
-  const double away = one.logarithms ? 100 * std::abs(std::expm1(mean)) : std::abs(mean);
-  return (one.logarithms ? fixed(away, 0) + " %" : fixed(away, away < 0.1 ? 3 : 1)) +
+std::string how_far(bool logarithms, double mean) {
+  const double away = logarithms ? 100 * std::abs(std::expm1(mean)) : std::abs(mean);
+  return (logarithms ? fixed(away, 0) + " %" : fixed(away, away < 0.1 ? 3 : 1)) +
          (mean < 0 ? " lower" : " higher");
+}
+
+/// A difference between two renderers.
+struct Told {
+  std::string place, compared, reference, how_far;
+  double p = 1;
+};
+
+std::string place_of(const std::string& measure, const std::string& block,
+                     const std::string& shape) {
+  const std::string where = stimulus_of(block, shape, "");
+  return measure_word(measure) + (where.empty() ? "" : " (" + where + ")");
+}
+
+/// The ratio of JNDs stands for that of Weber fractions.
+std::vector<Told> differences_of_renderers(const TaskAnalysis& analysis) {
+  std::vector<Told> all;
+  for (const TaskGroupComparison& one : analysis.group_models.comparisons) {
+    if (!one.p_holm || one.measure == "weber_fraction" || one.level) continue;
+    const double value = one.ratio ? std::log(*one.estimate) : *one.estimate;
+    all.push_back({place_of(one.measure, one.block_name, one.shape), one.compared, one.reference,
+                   how_far(one.ratio, value), *one.p_holm});
+  }
+  for (const TaskComparison& one : analysis.renderers) {
+    if (has_model(analysis, one)) continue;
+    for (const ConditionDifference& difference : one.comparison.differences) {
+      if (!difference.t_test.p_holm) continue;
+      all.push_back({place_of(one.measure, one.block_name, one.shape),
+                     one.conditions[difference.condition], one.conditions[0],
+                     how_far(one.logarithms, difference.mean), *difference.t_test.p_holm});
+    }
+  }
+  return all;
 }
 
 /// What differs clearly between renderers, and in what there is no clear difference.
 std::string finding_on_renderers(const TaskAnalysis& analysis) {
   std::vector<std::string> clear, unclear;
   std::size_t more = 0;
-  for (const TaskComparison& one : analysis.renderers) {
-    for (const ConditionDifference& difference : one.comparison.differences) {
-      if (!difference.t_test.p_holm) continue;
-      const std::string where = stimulus_of(one.block_name, one.shape, "");
-      const std::string place =
-          measure_word(one.measure) + (where.empty() ? "" : " (" + where + ")");
-      if (!is_clear(difference)) {
-        unclear.push_back(place);
-      } else if (clear.size() == kMostTold) {
-        ++more;
-      } else {
-        clear.push_back(place + " are " + how_far(one, difference.mean) + " with " +
-                        with_article(printable(one.conditions[difference.condition], 40)) +
-                        " than with " + with_article(printable(one.conditions[0], 40)));
-      }
+  for (const Told& one : differences_of_renderers(analysis)) {
+    if (!(one.p < kClear)) {
+      unclear.push_back(one.place);
+    } else if (clear.size() == kMostTold) {
+      ++more;
+    } else {
+      clear.push_back(one.place + " are " + one.how_far + " with " +
+                      with_article(printable(one.compared, 40)) + " than with " +
+                      with_article(printable(one.reference, 40)));
     }
   }
   std::string text;
@@ -281,10 +435,11 @@ std::string finding_on_means(const TaskAnalysis& analysis) {
       text += what + " (" + stimulus_of(group.block_name, group.shape, one.renderer) +
               "): " + short_number(*one.mean) +
               (group.unit.empty() ? "" : " " + printable(group.unit));
-      if (one.ci95)
-        text += ", 95 % interval " + short_number(one.ci95->low) + " to " +
-                short_number(one.ci95->high);
-      text += ", " + counted(one.participants.size(), "participant", "participants") + ". ";
+      if (one.ci95) text += ", 95 % interval " + interval_cell(one.ci95);
+      text += ", " +
+              counted(one.of_model ? one.n_of_model : one.participants.size(), "participant",
+                      "participants") +
+              ". ";
     }
   }
   return text;
@@ -518,7 +673,8 @@ Table information_table(const TaskAnalysis& analysis) {
   Table table;
   table.caption = labelled("Information transfer", label_of(analysis));
   table.header = {"task, block", "renderer",   "bits, pooled",         "of",
-                  "corrected",   "categories", "mean of participants", "95 % interval"};
+                  "corrected",   "categories", "mean of participants", "95 % interval",
+                  "at most"};
   table.n_names = 2;
   for (const TaskCell& cell : analysis.cells) {
     if (!cell.information || !cell.information->plain) continue;
@@ -526,49 +682,40 @@ Table information_table(const TaskAnalysis& analysis) {
         {stimulus_of(cell.task, cell.block_name, ""), cell.renderer,
          short_number(*cell.information->plain), short_number(cell.information->stimulus_entropy),
          short_number(std::max(0.0, *cell.information->corrected)),
-         short_or_missing(cell.information->categories), short_or_missing(cell.information_mean),
-         interval_cell(cell.information_ci95)});
+         short_or_missing(cell.information->categories),
+         short_or_missing(cell.information_mean.mean), interval_cell(cell.information_mean.ci95),
+         cell.information_most > 0 ? short_number(cell.information_most) : kMissing});
   }
-  table.notes = {"Corrected for the bias of few trials (Miller and Madow)."};
+  table.notes = {
+      "Corrected for the bias of few trials (Miller and Madow). The mean of participants is of "
+      "arcsin sqrt(corrected / most), transformed back, with the t interval on that scale."};
   return table;
 }
 
 Table confidence_table(const TaskAnalysis& analysis) {
   Table table;
   table.caption = labelled("Confidence: area under the type 2 ROC", label_of(analysis));
-  table.header = {"task, block, stimulus", "renderer", "area", "95 % interval", "remark"};
+  table.header = {
+      "task, block, stimulus", "renderer",     "area",     "95 % interval", "mean of participants",
+      "95 % interval",         "participants", "left out", "remark"};
   table.n_names = 2;
   for (const TaskCell& cell : analysis.cells) {
     if (!cell.confidence.area) continue;
     const auto& ends = cell.confidence.area_ci95;
-    table.rows.push_back({stimulus_of(cell.task, cell.block_name, cell.shape), cell.renderer,
-                          short_number(*cell.confidence.area), interval_cell(ends),
-                          ends && ends->high < 0.5 ? "below 0.5: is the scale reversed?" : ""});
+    table.rows.push_back(
+        {stimulus_of(cell.task, cell.block_name, cell.shape), cell.renderer,
+         short_number(*cell.confidence.area), interval_cell(ends),
+         short_or_missing(cell.confidence_mean.mean), interval_cell(cell.confidence_mean.ci95),
+         std::to_string(cell.confidence_mean.n), std::to_string(cell.confidence_mean.left_out),
+         ends && ends->high < 0.5 ? "below 0.5: is the scale reversed?" : ""});
   }
-  return table;
-}
-
-Table accuracy_model_table(const TaskAnalysis& analysis) {
-  Table table;
-  table.caption = labelled(
-      "Accuracy of identification, mixed logistic model: correct ~ renderer + shape + (1 | "
-      "participant)",
-      label_of(analysis));
-  table.header = {"effect", "odds ratio", "95 % interval", "z", "p"};
-  if (!analysis.accuracy) return table;
-  for (const LogisticCoefficient& one : analysis.accuracy->coefficients)
-    table.rows.push_back({one.name, short_number(std::exp(one.estimate)),
-                          interval_cell(Interval{std::exp(one.ci95.low), std::exp(one.ci95.high)}),
-                          fixed(one.z, 2), p_text(one.p)});
-  table.notes = {"(Intercept): odds."};
   return table;
 }
 
 }  // namespace
 
 std::vector<Table> summary_tables(const TaskAnalysis& analysis) {
-  std::vector<Table> tables{information_table(analysis), confidence_table(analysis),
-                            accuracy_model_table(analysis)};
+  std::vector<Table> tables{information_table(analysis), confidence_table(analysis)};
   std::erase_if(tables, [](const Table& table) { return table.rows.empty(); });
   return tables;
 }

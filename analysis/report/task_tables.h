@@ -27,7 +27,12 @@ std::vector<std::string> sentences_to_quote(const TaskAnalysis& analysis);
 /// The tables of one cell: ratings and their steps, each participant's function, tracks, detection,
 /// exponents, settings; those without rows are left out.
 std::vector<Table> cell_tables(const TaskCell& cell, const std::string& label);
-/// Over all cells: information transfer, confidence, the model of accuracy.
+/// Whether the group's model has the comparison; then the test of individual fits stands beside it.
+bool has_model(const TaskAnalysis& analysis, const TaskComparison& one);
+
+/// "JND, ray / point: 0.51, 95 % CI [0.30, 0.86], likelihood ratio 7.2, p = 0.021, n = 8"
+std::string group_sentence(const TaskGroupComparison& one);
+/// Over all cells: information transfer, confidence.
 std::vector<Table> summary_tables(const TaskAnalysis& analysis);
 
 }  // namespace palpate::analysis

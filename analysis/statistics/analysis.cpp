@@ -499,6 +499,14 @@ Analysis analyze(TrialTable table, const AnalysisSettings& settings,
   out.comparisons = compare_renderers(table, out.description, out.time_outs, settings.seed);
   out.rm_anova = rm_anova(out.description.participant_cells);
   out.mixed_model = mixed_model(out.description.participant_cells, table.renderers, table.shapes);
+  const RendererPair& first = out.comparisons.front().pair;
+  if (table.renderers.size() == 2 && first.in_data()) {
+    const ParticipantCells& cells = out.description.participant_cells;
+    out.shape_slope_model =
+        shape_slope_model({cells[*first.reference_at], cells[*first.renderer_at]});
+  } else {
+    out.shape_slope_model.undefined = "for two renderers";
+  }
   out.practice = practice_effects(table, out.description, settings.too_fast);
   for (std::size_t r = 0; r < table.renderers.size(); ++r) {
     out.exclusions.push_back(count_exclusions(out.description, r));

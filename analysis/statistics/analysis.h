@@ -14,6 +14,7 @@
 #include "analysis/statistics/describe.h"
 #include "analysis/statistics/mixed_model.h"
 #include "analysis/statistics/paired.h"
+#include "analysis/statistics/shape_slope_model.h"
 
 namespace palpate::analysis {
 
@@ -110,6 +111,7 @@ struct Analysis {
   std::vector<Comparison> comparisons;  ///< at least one
   RmAnova rm_anova;
   MixedModel mixed_model;
+  ShapeSlopeModel shape_slope_model;  ///< of the first comparison
   Practice practice;
   std::vector<Exclusions> exclusions;  ///< one for each of table.renderers
   std::vector<std::string> warnings;   ///< of the table, and limits of the conclusions

@@ -63,9 +63,10 @@ std::vector<Comparison> compare_renderers(const TrialTable& table, const Descrip
                                           const TimeOuts& time_outs, std::uint64_t seed) {
   std::vector<Comparison> all;
   for (const RendererPair& pair : renderer_pairs(table.renderers)) {
-    Comparison one{pair, compare_by_shape(table, description, pair), {}, {}};
+    Comparison one{pair, compare_by_shape(table, description, pair), {}, {}, {}};
     one.speed_accuracy = speed_accuracy(table, description, pair, one.shapes);
     one.censored = censored_by_shape(description, time_outs, pair);
+    one.accuracy = compare_accuracy(table, pair);
     all.push_back(std::move(one));
   }
   std::vector<PairedShape*> tests;

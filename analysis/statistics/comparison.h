@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "analysis/input/trials.h"
+#include "analysis/statistics/accuracy_inference.h"
 #include "analysis/statistics/censored.h"
 #include "analysis/statistics/describe.h"
 #include "analysis/statistics/paired.h"
@@ -59,6 +60,7 @@ struct Comparison {
   std::vector<PairedShape> shapes;            ///< one for each of table.shapes
   std::vector<SpeedAccuracy> speed_accuracy;  ///< likewise
   std::vector<CensoredEstimate> censored;     ///< likewise; empty without time-outs
+  AccuracyComparison accuracy;
 };
 
 /// Compares each of renderer_pairs(). Holm's adjustment is over all shapes of all comparisons.

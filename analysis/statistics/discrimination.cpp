@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "analysis/statistics/quantiles.h"
+#include "analysis/statistics/sensitivity.h"
 
 namespace palpate::analysis {
 namespace {
@@ -141,23 +142,37 @@ Detectability detectability(const DetectionCounts& counts, DetectionTask task) {
   return result;
 }
 
+double forced_choice_share(double d_prime, int alternatives) {
+  constexpr int kSteps = 400;
+  double sum = 0;
+  // Trapezoids over the relevant range: error below 1e-12.
+  for (int i = 0; i <= kSteps; ++i) {
+    const double x = -9 + d_prime + 18.0 * i / kSteps;
+    sum += normal_density(x - d_prime) * std::pow(cumulative(x), alternatives - 1);
+  }
+  return sum * 18.0 / kSteps;
+}
+
 std::optional<double> forced_choice_d_prime(double share, int alternatives) {
-  if (!(share > 1.0 / alternatives) || !(share < 1)) return std::nullopt;
-  const auto correct = [&](double d) {
-    constexpr int kSteps = 2000;
-    double sum = 0;
-    for (int i = 0; i <= kSteps; ++i) {  // trapezoids over the relevant range: error below 1e-12
-      const double x = -9 + d + 18.0 * i / kSteps;
-      sum += normal_density(x - d) * std::pow(cumulative(x), alternatives - 1);
-    }
-    return sum * 18.0 / kSteps;
-  };
-  double low = 0, high = 20;
-  for (int i = 0; i < 50; ++i) {
+  if (!(share > 0) || !(share < 1)) return std::nullopt;
+  double low = -20, high = 20;
+  for (int i = 0; i < 55; ++i) {
     const double middle = 0.5 * (low + high);
-    (correct(middle) < share ? low : high) = middle;
+    (forced_choice_share(middle, alternatives) < share ? low : high) = middle;
   }
   return 0.5 * (low + high);
+}
+
+ForcedChoiceDetectability forced_choice_detectability(int correct, int trials, int alternatives) {
+  ForcedChoiceDetectability out;
+  out.share = (correct + 0.5) / (trials + 1.0);
+  out.d_prime = *forced_choice_d_prime(out.share, alternatives);
+  const Interval shares =
+      wilson_interval(static_cast<std::size_t>(correct), static_cast<std::size_t>(trials));
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  out.d_prime_ci95 = {forced_choice_d_prime(shares.low, alternatives).value_or(-kInfinity),
+                      forced_choice_d_prime(shares.high, alternatives).value_or(kInfinity)};
+  return out;
 }
 
 namespace {

@@ -58,10 +58,23 @@ struct Detectability {
 
 Detectability detectability(const DetectionCounts& counts, DetectionTask task);
 
-/// d' of m-alternative forced choice without bias from the share correct: the d' with
-/// integral phi(x - d') Phi(x)^(m - 1) dx = share (Green & Swets 1966). nullopt: at most chance,
-/// or 1.
+/// Share correct of m-alternative forced choice without bias: integral phi(x - d') Phi(x)^(m - 1)
+/// dx (Hacker & Ratcliff 1979; Green & Dai 1991). A d' below 0 is worse than chance.
+double forced_choice_share(double d_prime, int alternatives);
+/// Its inverse. nullopt: a share of 0 or 1.
 std::optional<double> forced_choice_d_prime(double share, int alternatives);
+
+/// d' of a participant from the corrected share (k + 1/2) / (n + 1); its interval is Wilson's of
+/// the share, mapped to d'. With few trials a large d' is too small: of 2 alternatives and 20
+/// trials by 0.06 at 2, by 0.43 at 3.
+struct ForcedChoiceDetectability {
+  double share = 0;  ///< corrected
+  double d_prime = 0;
+  Interval d_prime_ci95;
+};
+
+/// \param trials  above 0
+ForcedChoiceDetectability forced_choice_detectability(int correct, int trials, int alternatives);
 
 /// Correctness of an answer, and the participant's confidence in it.
 struct ConfidenceTrial {

@@ -8,6 +8,8 @@
 #include <limits>
 #include <utility>
 
+#include "analysis/statistics/bounded_search.h"
+
 namespace palpate::analysis {
 namespace {
 
@@ -58,103 +60,47 @@ double group_limit(std::size_t n, double confidence) {
   return count * std::log1p(t * t / (count - 1));
 }
 
+std::optional<double> likelihood_ratio_end(const std::function<double(double)>& likelihood_ratio,
+                                           double from, double edge, double first_step,
+                                           double limit) {
+  const double side = edge > from ? 1 : -1, most = std::abs(edge - from);
+  const auto excess = [&](double distance) {
+    return std::sqrt(std::max(0.0, likelihood_ratio(from + side * distance))) - std::sqrt(limit);
+  };
+  double low = 0, at_low = -std::sqrt(limit), high = std::min(first_step, most), at_high = 0;
+  if (most == 0) return std::nullopt;
+  for (;;) {
+    at_high = excess(high);
+    if (at_high > 0) break;
+    if (high >= most) return std::nullopt;
+    const double slope = (at_high + std::sqrt(limit)) / high;
+    const double guess = slope > 0 ? 1.1 * std::sqrt(limit) / slope : 0;
+    low = high;
+    at_low = at_high;
+    high = std::min(most, std::clamp(guess, 1.15 * high, 3 * high));
+  }
+  // Ridders' relative of false position that halves a stuck end (Dowell & Jarratt 1971).
+  int stuck = 0;
+  for (int i = 0; i < 60 && high - low > 1e-9 * most; ++i) {
+    const double middle = (low * at_high - high * at_low) / (at_high - at_low);
+    const double value = excess(middle);
+    if (std::abs(value) < 1e-9) return from + side * middle;
+    if (value > 0) {
+      high = middle;
+      at_high = value;
+      at_low *= stuck == 1 ? 0.5 : 1;
+      stuck = 1;
+    } else {
+      low = middle;
+      at_low = value;
+      at_high *= stuck == -1 ? 0.5 : 1;
+      stuck = -1;
+    }
+  }
+  return from + side * 0.5 * (low + high);
+}
+
 namespace {
-
-/// Value and gradient.
-using Objective = std::function<double(const VectorXd&, VectorXd&)>;
-
-struct Minimum {
-  VectorXd place;
-  double value = std::numeric_limits<double>::infinity();
-};
-
-struct Bounds {
-  VectorXd low, high;
-  VectorXd clamped(const VectorXd& x) const { return x.cwiseMax(low).cwiseMin(high); }
-};
-
-/// Zero where a bound stops the descent.
-VectorXd free_part(const VectorXd& x, const VectorXd& gradient, const Bounds& bounds) {
-  VectorXd part = gradient;
-  for (Index i = 0; i < x.size(); ++i) {
-    const bool stopped =
-        (x[i] <= bounds.low[i] && gradient[i] >= 0) || (x[i] >= bounds.high[i] && gradient[i] <= 0);
-    if (stopped) part[i] = 0;
-  }
-  return part;
-}
-
-void update_inverse(MatrixXd& inverse, const VectorXd& step, const VectorXd& change, bool first) {
-  const double curvature = step.dot(change);
-  if (!(curvature > 1e-14 * step.norm() * change.norm())) return;
-  if (first) inverse *= curvature / change.squaredNorm();
-  const VectorXd product = inverse * change;
-  const double ratio = (1 + change.dot(product) / curvature) / curvature;
-  inverse += ratio * step * step.transpose() -
-             (product * step.transpose() + step * product.transpose()) / curvature;
-}
-
-/// A local minimum within bounds: Broyden, Fletcher, Goldfarb & Shanno's method with steps
-/// projected on the bounds.
-Minimum minimize_within(const Objective& objective, const VectorXd& start, const Bounds& bounds) {
-  Minimum now{bounds.clamped(start), 0};
-  const Index n = start.size();
-  VectorXd gradient(n), next_gradient(n);
-  now.value = objective(now.place, gradient);
-  MatrixXd inverse = MatrixXd::Identity(n, n);
-  bool first = true;
-  for (int i = 0, idle = 0; i < 300 && idle < 2; ++i) {
-    const VectorXd free = free_part(now.place, gradient, bounds);
-    if (free.lpNorm<Eigen::Infinity>() < 1e-9) break;
-    VectorXd direction = -(inverse * free);
-    for (Index k = 0; k < n; ++k) {
-      if (free[k] == 0) direction[k] = 0;
-    }
-    if (!(direction.dot(free) < 0)) {
-      inverse.setIdentity();
-      first = true;
-      direction = -free;
-    }
-    const double most = direction.lpNorm<Eigen::Infinity>();
-    if (most > 1) direction /= most;
-    double length = 1;
-    Minimum next;
-    VectorXd step;
-    for (int halved = 0; halved < 40; ++halved) {
-      next.place = bounds.clamped(now.place + length * direction);
-      step = next.place - now.place;
-      next.value = objective(next.place, next_gradient);
-      const double slope = gradient.dot(step);
-      if (next.value <= now.value + 1e-4 * slope) break;
-      // The minimum of the parabola through both values and the slope.
-      const double share = -slope / (2 * (next.value - now.value - slope));
-      length *= std::isfinite(share) ? std::clamp(share, 0.1, 0.5) : 0.1;
-    }
-    if (!(next.value < now.value)) {
-      if (first) break;
-      inverse.setIdentity();
-      first = true;
-      ++idle;
-      continue;
-    }
-    idle = now.value - next.value < 1e-12 * (1 + std::abs(now.value)) ? idle + 1 : 0;
-    update_inverse(inverse, step, next_gradient - gradient, first);
-    first = false;
-    now = next;
-    gradient = next_gradient;
-  }
-  return now;
-}
-
-Minimum best_of(const Objective& objective, const std::vector<VectorXd>& starts,
-                const Bounds& bounds) {
-  Minimum best;
-  for (const VectorXd& start : starts) {
-    Minimum one = minimize_within(objective, start, bounds);
-    if (one.value < best.value) best = std::move(one);
-  }
-  return best;
-}
 
 // Parameters of a normal coordinate: its mean in units of an axis, and the log of its SD.
 
@@ -256,6 +202,7 @@ Spread spread_of_means(const GroupData& data, const Likelihoods& participants, b
     sum += mean;
     squares += mean * mean;
   }
+  if (n == 0) return {(axis.low + axis.high) / 2, 0};
   return {sum / n, std::sqrt(std::max(0.0, squares / n - sum / n * (sum / n)))};
 }
 
@@ -272,47 +219,6 @@ std::vector<VectorXd> single_starts(const GroupData& data, const Likelihoods& pa
           start(4 * data.first.least_sd, 4 * data.second.least_sd),
           start(std::max(first.sd, 2 * data.first.least_sd),
                 std::max(second.sd, 2 * data.second.least_sd))};
-}
-
-/// Finds where a rising function of the distance from `from` towards `edge` reaches `limit`. The
-/// root of the function is nearly straight. \return none: it stays below up to the edge
-std::optional<double> crossing(const std::function<double(double)>& likelihood_ratio, double from,
-                               double edge, double first_step, double limit) {
-  const double side = edge > from ? 1 : -1, most = std::abs(edge - from);
-  const auto excess = [&](double distance) {
-    return std::sqrt(std::max(0.0, likelihood_ratio(from + side * distance))) - std::sqrt(limit);
-  };
-  double low = 0, at_low = -std::sqrt(limit), high = std::min(first_step, most), at_high = 0;
-  if (most == 0) return std::nullopt;
-  for (;;) {
-    at_high = excess(high);
-    if (at_high > 0) break;
-    if (high >= most) return std::nullopt;
-    const double slope = (at_high + std::sqrt(limit)) / high;
-    const double guess = slope > 0 ? 1.1 * std::sqrt(limit) / slope : 0;
-    low = high;
-    at_low = at_high;
-    high = std::min(most, std::clamp(guess, 1.15 * high, 3 * high));
-  }
-  // Ridders' relative of false position that halves a stuck end (Dowell & Jarratt 1971).
-  int stuck = 0;
-  for (int i = 0; i < 60 && high - low > 1e-9 * most; ++i) {
-    const double middle = (low * at_high - high * at_low) / (at_high - at_low);
-    const double value = excess(middle);
-    if (std::abs(value) < 1e-9) return from + side * middle;
-    if (value > 0) {
-      high = middle;
-      at_high = value;
-      at_low *= stuck == 1 ? 0.5 : 1;
-      stuck = 1;
-    } else {
-      low = middle;
-      at_low = value;
-      at_high *= stuck == -1 ? 0.5 : 1;
-      stuck = -1;
-    }
-  }
-  return from + side * 0.5 * (low + high);
 }
 
 /// Fits of a condition with each setting; settings too unlikely are left out.
@@ -412,7 +318,8 @@ GroupMoments moments_of(const GroupData& data, const SettingFits& fits, std::siz
   const double step = 2 * out.sd / std::sqrt(static_cast<double>(n)) / unit;
   const auto end = [&](double edge) {
     profile.restart();
-    return crossing([&](double mean) { return profile(mean); }, at, edge / unit, step, limit);
+    return likelihood_ratio_end([&](double mean) { return profile(mean); }, at, edge / unit, step,
+                                limit);
   };
   const auto low = end(axis.low), high = end(axis.high);
   if (low && *low * unit > axis.low + kEdgeFloors * axis.least_sd) {
@@ -704,20 +611,31 @@ GroupDifference compare_group(const GroupData& data, const GroupFit& fit,
   if (out.pairs < 3) return out;
   out.likelihood_ratio = profile(0);
   out.p = group_p(out.likelihood_ratio, out.pairs);
-  if (!settings.interval) return out;
-  const double limit = group_limit(out.pairs, settings.confidence);
   const double width = axis.high - axis.low;
+  if (!settings.interval && settings.open_ends) {
+    const double limit = group_limit(out.pairs, 0.95);
+    profile.restart();
+    out.low_open = profile(-width) < limit;
+    profile.restart();
+    out.high_open = profile(width) < limit;
+  }
+  if (!settings.interval) return out;
   const double step = 2 * std::hypot(out.sd_of_difference, axis.least_sd) /
                       std::sqrt(static_cast<double>(out.pairs));
+  const auto end_of = [&](bool low, double confidence) {
+    profile.restart();
+    return likelihood_ratio_end([&](double d) { return profile(d); }, out.difference,
+                                low ? -width : width, step, group_limit(out.pairs, confidence));
+  };
   out.ci95 = Interval{-width, width};
   for (const bool low : {true, false}) {
-    profile.restart();
-    const auto end = crossing([&](double d) { return profile(d); }, out.difference,
-                              low ? -width : width, step, limit);
+    const auto end = end_of(low, 0.95);
     (low ? out.low_open : out.high_open) = !end;
     if (end) (low ? out.ci95->low : out.ci95->high) = *end;
   }
   put_open_ends(fit, coordinate, reference, compared, out);
+  if (settings.interval90)
+    out.ci90 = Interval{end_of(true, 0.9).value_or(-width), end_of(false, 0.9).value_or(width)};
   return out;
 }
 

@@ -75,6 +75,12 @@ double group_p(double likelihood_ratio, std::size_t n);
 /// The likelihood ratio at the ends of an interval. \param confidence  0.95, ...
 double group_limit(std::size_t n, double confidence);
 
+/// Where a likelihood ratio reaches `limit` on the way from its zero at `from` to `edge`.
+/// \return none: it stays below up to the edge
+std::optional<double> likelihood_ratio_end(const std::function<double(double)>& likelihood_ratio,
+                                           double from, double edge, double first_step,
+                                           double limit);
+
 /// Difference of a coordinate between two conditions within participants: second minus first
 /// condition. All eight parameters are free.
 struct GroupDifference {
@@ -85,11 +91,14 @@ struct GroupDifference {
   double likelihood_ratio = 0, p = 1;  ///< of no difference
   std::optional<Interval> ci95;
   bool low_open = false, high_open = false;
+  /// For equivalence, if it was asked for; an end at the edge of the box is open, as above.
+  std::optional<Interval> ci90;
 };
 
 struct GroupDifferenceSettings {
   bool interval = true;
-  double confidence = 0.95;
+  bool interval90 = false;
+  bool open_ends = false;  ///< without an interval: whether its ends are open
 };
 
 /// \param fit  of the same data; its setting is used \param conditions  reference and compared

@@ -68,9 +68,22 @@ Rates rates_of(const GroupPsychometricModel& model) {
 /// Place of a level: rising towards the easier ones.
 double place_of(const GroupPsychometricModel& model, double level) {
   const bool linear = model.function.scale == protocols::LevelScale::linear;
-  if (model.standard) return std::abs(level - *model.standard);
   const double place = linear ? level : std::log(level);
   return model.function.easier == protocols::Easier::higher ? place : -place;
+}
+
+/// Places of the locations of a grid.
+ArrayXd places_of(const GroupPsychometricModel& model, const ArrayXd& locations) {
+  if (!model.standard) return locations;
+  const double side = model.function.easier == protocols::Easier::higher ? 1 : -1;
+  // Below a standard above 0, no level reaches 0.
+  constexpr double kLeastLevel = 1e-9;
+  const double standard = *model.standard;
+  return locations.exp().unaryExpr([&](double distance) {
+    const double level = standard + side * distance;
+    const bool linear = model.function.scale == protocols::LevelScale::linear;
+    return place_of(model, linear ? level : std::max(level, kLeastLevel * standard));
+  });
 }
 
 /// Share of successes without guesses and lapses. \param z  distance from the location in widths,
@@ -141,8 +154,8 @@ std::vector<ArrayXd> shares_at_levels(const GroupAnswers& answers,
                                       const GroupPsychometricModel& model, const Axes& axes) {
   const auto rows = static_cast<Index>(axes.location.points);
   const auto columns = static_cast<Index>(axes.width.points);
-  ArrayXd locations = ArrayXd::LinSpaced(rows, axes.location.low, axes.location.high);
-  if (model.standard) locations = locations.exp();
+  const ArrayXd locations =
+      places_of(model, ArrayXd::LinSpaced(rows, axes.location.low, axes.location.high));
   std::vector<ArrayXd> out;
   for (const LevelCount& count : answers.counts) {
     const double x = place_of(model, count.level);
@@ -207,27 +220,43 @@ std::vector<GroupLikelihood> likelihoods_of(const GroupAnswers& answers,
 }
 
 /// Places of all levels of all participants, in order.
-std::set<double> places_of(const std::vector<std::vector<GroupAnswers>>& answers,
-                           const GroupPsychometricModel& model) {
+std::set<double> all_places(const std::vector<std::vector<GroupAnswers>>& answers,
+                            const GroupPsychometricModel& model) {
   std::set<double> places;
   for (const auto& condition : answers) {
     for (const GroupAnswers& one : condition) {
-      for (const LevelCount& count : one.counts) places.insert(place_of(model, count.level));
+      for (const LevelCount& count : one.counts) {
+        // Level 0 has no place on a logarithmic scale.
+        const double place = place_of(model, count.level);
+        if (std::isfinite(place)) places.insert(place);
+      }
     }
   }
   return places;
+}
+
+double greatest_distance(const std::vector<std::vector<GroupAnswers>>& answers, double standard) {
+  double most = 0;
+  for (const auto& condition : answers) {
+    for (const GroupAnswers& one : condition) {
+      for (const LevelCount& count : one.counts)
+        most = std::max(most, std::abs(count.level - standard));
+    }
+  }
+  return most;
 }
 
 GroupAxis log_axis(double range, std::size_t points, double floor) {
   return {std::log(range / 200), std::log(2 * range), points, floor, 1.5};
 }
 
-Axes axes_of(double low, double high, const GroupPsychometricModel& model, const GroupGrid& grid) {
+Axes axes_of(double low, double high, double most_distance, const GroupPsychometricModel& model,
+             const GroupGrid& grid) {
   const double range = high - low;
   Axes axes;
   axes.width = log_axis(range, grid.widths, grid.width_floor);
   if (model.standard) {
-    axes.location = log_axis(high, grid.locations, grid.width_floor);
+    axes.location = log_axis(most_distance, grid.locations, grid.width_floor);
     return axes;
   }
   axes.location = {low - grid.beyond * range, high + grid.beyond * range, grid.locations,
@@ -246,7 +275,7 @@ GroupPsychometricData group_psychometric_data(const std::vector<std::vector<Grou
                                               const GroupPsychometricModel& model,
                                               const GroupGrid& grid) {
   GroupPsychometricData out;
-  const std::set<double> places = places_of(answers, model);
+  const std::set<double> places = all_places(answers, model);
   if (places.size() < 2) {
     out.undefined = "fewer than two levels";
     return out;
@@ -254,7 +283,8 @@ GroupPsychometricData group_psychometric_data(const std::vector<std::vector<Grou
   out.least_spacing = std::numeric_limits<double>::infinity();
   for (auto next = std::next(places.begin()); next != places.end(); ++next)
     out.least_spacing = std::min(out.least_spacing, *next - *std::prev(next));
-  const Axes axes = axes_of(*places.begin(), *places.rbegin(), model, grid);
+  const double distance = model.standard ? greatest_distance(answers, *model.standard) : 0;
+  const Axes axes = axes_of(*places.begin(), *places.rbegin(), distance, model, grid);
   const Rates rates = rates_of(model);
   out.data.first = axes.location;
   out.data.second = axes.width;

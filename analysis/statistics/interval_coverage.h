@@ -61,9 +61,4 @@ struct CoverageSettings {
 /// The result does not depend on the number of jobs.
 std::vector<CoverageResult> interval_coverage(const CoverageSettings& settings);
 
-std::string coverage_text(const std::vector<CoverageResult>& results,
-                          const CoverageSettings& settings);
-std::string coverage_json(const std::vector<CoverageResult>& results,
-                          const CoverageSettings& settings);
-
 }  // namespace palpate::analysis

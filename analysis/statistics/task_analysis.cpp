@@ -8,6 +8,7 @@
 #include <limits>
 #include <map>
 #include <numeric>
+#include <set>
 #include <tuple>
 #include <utility>
 #include <variant>
@@ -519,6 +520,7 @@ ParticipantFunction function_of(const std::string& participant, const Trials& tr
   result.tracks = tracks_of(trials, context.table);
   const bool catches = cell.task == "detect" || cell.same_different;
   const DetectionCounts detections = detections_of(trials);
+  if (catches) result.catches = detections;
   const DetectionTask asked =
       cell.same_different ? DetectionTask::same_different : DetectionTask::yes_no;
   if (catches) result.detectability = detectability(detections, asked);
@@ -697,21 +699,40 @@ void add_information(TaskCell& cell, const Trials& trials) {
     cell.informations.push_back(transfer_of(own));
     if (cell.informations.back().corrected) bits.push_back(*cell.informations.back().corrected);
   }
-  if (bits.size() < 2) return;
-  cell.information_mean =
-      std::accumulate(bits.begin(), bits.end(), 0.0) / static_cast<double>(bits.size());
-  cell.information_ci95 = t_test(bits).log_ratio_ci95;
+  std::set<std::string> stimuli, answers;
+  for (const TaskTrial* trial : trials) {
+    if (!trial->answered) continue;
+    stimuli.insert(trial->shape);
+    answers.insert(trial->response);
+  }
+  const std::size_t fewest = std::min(stimuli.size(), answers.size());
+  if (fewest < 2) return;
+  cell.information_most = std::log2(static_cast<double>(fewest));
+  cell.information_mean = mean_information(bits, cell.information_most);
 }
 
-Type2Roc confidence_of(const Trials& trials) {
+std::vector<ConfidenceTrial> confident_answers(const Trials& trials) {
   std::vector<ConfidenceTrial> sure;
   for (const TaskTrial* trial : trials) {
     if (trial->answered && trial->confidence && trial->correct)
       sure.push_back({*trial->correct, *trial->confidence});
   }
-  Type2Roc roc = type2_roc(sure);
-  if (sure.empty()) roc.undefined = "nobody was asked";
-  return roc;
+  return sure;
+}
+
+void add_confidence(TaskCell& cell, const Trials& trials) {
+  const std::vector<ConfidenceTrial> all = confident_answers(trials);
+  cell.confidence = type2_roc(all);
+  if (all.empty()) {
+    cell.confidence.undefined = "nobody was asked";
+    return;
+  }
+  std::vector<Type2Roc> curves;
+  for (const auto& [participant, own] : by_participant(trials)) {
+    const std::vector<ConfidenceTrial> answers = confident_answers(own);
+    if (!answers.empty()) curves.push_back(type2_roc(answers));
+  }
+  cell.confidence_mean = mean_type2_area(curves);
 }
 
 TaskCell cell_of(const CellKey& key, const Trials& trials, const Context& context) {
@@ -732,7 +753,7 @@ TaskCell cell_of(const CellKey& key, const Trials& trials, const Context& contex
   if (cell.task == "rate" && !add_ratings(cell, trials, context.table)) add_magnitude(cell, trials);
   if (cell.task == "adjust") add_adjustments(cell, trials);
   if (cell.task == "identify") add_information(cell, trials);
-  cell.confidence = confidence_of(trials);
+  add_confidence(cell, trials);
   return cell;
 }
 
@@ -756,8 +777,10 @@ TaskAnalysis analyze_tasks(TaskTable table, const FunctionSettings& functions,
   result.groups = group_results(result.cells);
   result.renderers = compare_renderers(result.cells);
   result.conditions = compare_conditions(result.cells);
+  result.group_models = group_models(result.cells, result.renderers);
+  name_left_out(result.cells, result.groups, result.group_models);
+  put_model_values(result.group_models.models, result.groups);
   if (auto shapes = identification_of(result.table)) {
-    result.accuracy = accuracy_model(*shapes);
     result.identification = analyze(std::move(*shapes), settings, program_version);
   }
   return result;

@@ -15,6 +15,8 @@
 #include "analysis/statistics/psychometric_fit.h"
 #include "analysis/statistics/ratings.h"
 #include "analysis/statistics/task_comparisons.h"
+#include "analysis/statistics/task_group.h"
+#include "analysis/statistics/transformed_means.h"
 
 namespace palpate::analysis {
 
@@ -186,6 +188,7 @@ struct ParticipantFunction {
   LevelFigures figures;
   PsychometricPosterior posterior;  ///< of the same counts and model
   std::vector<Track> tracks;        ///< of more than one trial
+  DetectionCounts catches;          ///< likewise; without catch trials, no noise trials
   Detectability detectability;      ///< detect and same/different with catch trials; else undefined
 };
 
@@ -212,10 +215,10 @@ struct TaskCell {
   std::vector<Adjustment> adjustments;             ///< adjust
   std::optional<InformationTransfer> information;  ///< identify: over all its stimuli, pooled
   std::vector<InformationTransfer> informations;   ///< of each participant
-  /// Mean of the participants' corrected bits, and its t interval.
-  std::optional<double> information_mean;
-  std::optional<Interval> information_ci95;
-  Type2Roc confidence;  ///< undefined: nobody was asked
+  double information_most = 0;  ///< log2 of the number of stimuli or of answers, the lesser, bit
+  TransformedMean information_mean;  ///< of the participants' corrected bits
+  Type2Roc confidence;               ///< of all answers; undefined: nobody was asked
+  TransformedMean confidence_mean;   ///< of the participants' areas
 };
 
 struct TaskAnalysis {
@@ -224,9 +227,9 @@ struct TaskAnalysis {
   std::vector<TaskCell> cells;
   std::vector<TaskGroup> groups;
   std::vector<TaskComparison> renderers, conditions;
+  TaskGroupResults group_models;
   /// The report of version 1 on identification, over all its blocks; none: no identification.
   std::optional<Analysis> identification;
-  std::optional<MixedLogistic> accuracy;  ///< likewise
 };
 
 /// \param settings, program_version  of the analysis of identification

@@ -412,6 +412,8 @@ std::string measure_plural(const std::string& measure) {
   if (measure == "jnd") return "JNDs";
   if (measure == "weber_fraction") return "Weber fractions";
   if (measure == "rating") return "Mean ratings";
+  if (measure == "d_prime") return "d'";
+  if (measure == "criterion") return "Criteria";
   return measure == "pse" ? "PSEs" : "Exponents";
 }
 

@@ -53,14 +53,20 @@ struct NamedFigure {
   double value = 0;
 };
 
-/// Mean of the participants with a renderer.
+/// The group's value with a renderer: the mean of the participants' figures, or the group's model
+/// of all answers (see task_group.h).
 struct GroupMean {
   std::string renderer;
   std::vector<NamedFigure> participants;
   std::size_t n_undetermined = 0;  ///< functions whose threshold is undetermined: left out
   std::optional<double> mean;      ///< none: nobody has a figure
   std::optional<double> sd;        ///< n - 1; of natural logarithms where the mean is geometric
-  std::optional<Interval> ci95;    ///< t over participants; none below two, or without variance
+  /// t over participants; none below two, or without variance. Of the model: an open end is
+  /// infinite, none: not determined.
+  std::optional<Interval> ci95;
+  bool of_model = false;
+  std::size_t n_of_model = 0;      ///< participants with trials
+  std::vector<std::string> notes;  ///< of the model
 };
 
 /// A measure of a stimulus in a block, with each renderer.

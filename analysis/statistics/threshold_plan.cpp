@@ -1,12 +1,15 @@
 #include "analysis/statistics/threshold_plan.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
-#include <optional>
+#include <thread>
 #include <utility>
 
-#include "analysis/statistics/discrimination.h"
-#include "analysis/statistics/psychometric_fit.h"
+#include "analysis/statistics/describe.h"
+#include "analysis/statistics/group_psychometric.h"
+#include "analysis/statistics/group_simulation.h"
+#include "analysis/statistics/paired_evidence.h"
 #include "analysis/statistics/sensitivity.h"
 #include "data/base/random.h"
 
@@ -14,64 +17,208 @@ namespace palpate::analysis {
 namespace {
 
 constexpr int kPlanLevels = 7;
-constexpr double kStandard = 1;  // levels are relative to it
+constexpr std::size_t kPlanShapes = 4;
 
-/// The JND of a participant with a condition, as measured in a study.
-std::optional<double> measured_jnd(const ThresholdStudy& study, double jnd, double assumed,
-                                   double pse, std::size_t trials, Random& random) {
-  PsychometricModel model;
-  model.lapse = {0, true, kMostLapse};
-  model.guess_is_lapse = true;
-  const double slope = std::log(3.0) / jnd;  // F = 0.75 at a JND
-  std::vector<LevelCount> counts;
-  for (int i = 0; i < kPlanLevels; ++i) {
-    const double place = 2.0 * i / (kPlanLevels - 1) - 1;
-    LevelCount count{kStandard + place * study.reach * assumed, 0, 0};
-    const double p =
-        0.5 * study.lapse + (1 - study.lapse) / (1 + std::exp(-slope * (count.level - pse)));
-    const auto index = static_cast<std::size_t>(i);
-    count.trials = static_cast<int>(trials / kPlanLevels + (index < trials % kPlanLevels ? 1 : 0));
-    for (int k = 0; k < count.trials; ++k) count.successes += random.unit() < p ? 1 : 0;
-    if (count.trials > 0) counts.push_back(count);
-  }
-  const PsychometricFit fit = quick_fit(counts, model);
-  if (!fit.undefined.empty() || fit.slope_at_bound) return std::nullopt;
-  const double threshold = fit.parameters.threshold;
-  if (threshold < counts.front().level || threshold > counts.back().level) return std::nullopt;
-  return discrimination(fit, model.function, kStandard).jnd;
+/// What a study says about the difference.
+struct PlannedOutcome {
+  bool determined = false, found = false;
+  double estimate = 0;
+};
+
+// Functions: the group's model.
+
+/// As many trials at each level as there are; what is left over goes to the first ones.
+protocols::ConstantStimuli constant_levels(std::vector<double> levels, std::size_t trials) {
+  protocols::ConstantStimuli spec;
+  const std::size_t each = std::max<std::size_t>(1, trials / levels.size());
+  spec.levels = std::move(levels);
+  spec.repetitions = static_cast<int>(each);
+  return spec;
 }
 
-/// Log ratio of a participant's JNDs; nullopt: one is not determined.
-std::optional<double> log_ratio_of(const ThresholdStudy& study, std::size_t trials, Random random) {
-  const double first =
-      study.weber_fraction * std::exp(study.participant_sd * random.normal()) * kStandard;
-  const double ratio = study.ratio * std::exp(study.effect_sd * random.normal());
-  const double assumed = study.weber_fraction * kStandard;
-  const double pse = kStandard + study.pse_sd * assumed * random.normal();
-  const auto one = measured_jnd(study, first, assumed, pse, trials, random);
-  const auto two = measured_jnd(study, first * ratio, assumed, pse, trials, random);
-  if (!one || !two || !(*one > 0) || !(*two > 0)) return std::nullopt;
-  return std::log(*two / *one);
+GroupStudy group_study_of(const ThresholdStudy& study, std::size_t trials) {
+  GroupStudy out;
+  out.lapse = study.lapse;
+  std::vector<double> levels;
+  const auto place = [](int i) { return 2.0 * i / (kPlanLevels - 1) - 1; };
+  if (study.measure == PlannedMeasure::threshold) {
+    out.model.asymptotes = GroupAsymptotes::fixed_guess;
+    out.model.function.scale = protocols::LevelScale::log10;
+    out.location_sd = study.participant_sd;
+    out.location_difference = study.effect;
+    out.location_difference_sd = study.effect_sd;
+    out.log_width = std::log(study.width);
+    for (int i = 0; i < kPlanLevels; ++i)
+      levels.push_back(std::exp(place(i) * study.reach * study.width));
+  } else {
+    const double jnd = study.weber_fraction;  // levels are relative to the standard
+    const bool of_pse = study.measure == PlannedMeasure::pse;
+    out.location = 1;
+    out.location_sd = study.pse_sd * jnd;
+    out.location_difference = of_pse ? study.effect * jnd : 0;
+    out.location_difference_sd = of_pse ? study.effect_sd * jnd : 0;
+    out.log_width = std::log(jnd);
+    out.log_width_sd = study.participant_sd;
+    out.log_ratio = of_pse ? 0 : study.effect;
+    out.log_ratio_sd = of_pse ? 0 : study.effect_sd;
+    for (int i = 0; i < kPlanLevels; ++i) levels.push_back(1 + place(i) * study.reach * jnd);
+  }
+  out.tracks = {constant_levels(std::move(levels), trials)};
+  return out;
 }
 
-void add_study(const ThresholdStudy& study, const std::vector<std::optional<double>>& ratios,
-               ThresholdPower& power, double& bias, double& covered, std::size_t& results) {
-  std::vector<double> known;
-  for (std::size_t i = 0; i < power.participants; ++i) {
-    if (ratios[i]) known.push_back(*ratios[i]);
-    power.undetermined += ratios[i] ? 0 : 1;
+PlannedOutcome outcome_of_functions(const ThresholdStudy& study, const GroupStudy& group,
+                                    const std::vector<std::vector<GroupAnswers>>& answers) {
+  PlannedOutcome out;
+  const GroupPsychometricData data =
+      group_psychometric_data(answers, group.model, kCoarseGroupGrid);
+  if (!data.undefined.empty()) return out;
+  const GroupFit fit = fit_group(data.data, false);
+  const bool of_width = study.measure == PlannedMeasure::jnd;
+  GroupDifferenceSettings how;
+  how.interval = how.interval90 = study.bound.has_value();
+  how.open_ends = true;
+  const GroupDifference found = compare_group(
+      data.data, fit, of_width ? GroupCoordinate::second : GroupCoordinate::first, 0, 1, how);
+  if (found.pairs < 3) return out;
+  const double unit = study.measure == PlannedMeasure::pse ? study.weber_fraction : 1;
+  out.estimate = found.difference / unit;
+  out.determined = !(found.low_open && found.high_open);
+  out.found = found.p < study.alpha;
+  if (study.bound) {
+    out.found = found.ci90 && !found.low_open && !found.high_open &&
+                found.ci90->low > -*study.bound * unit && found.ci90->high < *study.bound * unit;
   }
-  ++power.studies;
-  const TTest test = t_test(known);
-  if (!test.p || !test.log_ratio_ci95) return;
-  const double truth = std::log(study.ratio);
-  double mean = 0;
-  for (const double one : known) mean += one / static_cast<double>(known.size());
-  ++results;
-  bias += mean - truth;
-  covered += test.log_ratio_ci95->low <= truth && truth <= test.log_ratio_ci95->high ? 1 : 0;
-  const bool right = study.ratio == 1 || (mean < 0) == (truth < 0);
-  power.found += *test.p < study.alpha && right ? 1 : 0;
+  return out;
+}
+
+// Shares and ratings: the t-test of participants' differences.
+
+PlannedOutcome outcome_of_differences(const ThresholdStudy& study,
+                                      const std::vector<double>& differences) {
+  PlannedOutcome out;
+  const TTest test = t_test(differences);
+  if (differences.empty()) return out;
+  out.estimate = mean(differences);
+  out.determined = test.p.has_value();
+  if (!test.p) return out;
+  out.found =
+      study.bound ? *equivalence(differences, *study.bound).p < 0.05 : *test.p < study.alpha;
+  return out;
+}
+
+double logit(double share) { return std::log(share / (1 - share)); }
+
+/// The expected share at given log odds over participants, by the trapezoid rule.
+double expected_share(double middle, double sd) {
+  double sum = 0, weights = 0;
+  for (int i = -40; i <= 40; ++i) {
+    const double z = i / 8.0, weight = std::exp(-0.5 * z * z);
+    sum += weight / (1 + std::exp(-(middle + sd * z)));
+    weights += weight;
+  }
+  return sum / weights;
+}
+
+/// Log odds of the second condition with which the expected share differs by the effect.
+double shifted_log_odds(const ThresholdStudy& study) {
+  const double first = logit(study.accuracy);
+  const double sd = std::hypot(study.participant_sd, study.effect_sd / 2);
+  const double want = expected_share(first, sd) + study.effect;
+  double low = -20, high = 20;
+  for (int i = 0; i < 60; ++i) {
+    const double middle = 0.5 * (low + high);
+    (expected_share(middle, sd) < want ? low : high) = middle;
+  }
+  return 0.5 * (low + high) - first;
+}
+
+double share_difference(const ThresholdStudy& study, double shift, std::size_t trials,
+                        Random& random) {
+  const double level = logit(study.accuracy) + study.participant_sd * random.normal();
+  const double own = study.effect_sd * random.normal();
+  const std::size_t each = std::max<std::size_t>(1, trials / kPlanShapes);
+  double difference = 0;
+  for (std::size_t shape = 0; shape < kPlanShapes; ++shape) {
+    for (const bool second : {false, true}) {
+      const double log_odds = level + (second ? shift + own / 2 : -own / 2);
+      const double p = 1 / (1 + std::exp(-log_odds));
+      double correct = 0;
+      for (std::size_t i = 0; i < each; ++i) correct += random.unit() < p ? 1 : 0;
+      difference += (second ? 1 : -1) * correct / static_cast<double>(each * kPlanShapes);
+    }
+  }
+  return difference;
+}
+
+double rating_difference(const ThresholdStudy& study, std::size_t trials, Random& random) {
+  const double level = 4 + study.participant_sd * random.normal();
+  const double own = study.effect + study.effect_sd * random.normal();
+  double difference = 0;
+  for (const bool second : {false, true}) {
+    for (std::size_t i = 0; i < trials; ++i) {
+      const double felt = level + (second ? own / 2 : -own / 2) + study.rating_sd * random.normal();
+      difference +=
+          (second ? 1 : -1) * std::clamp(std::round(felt), 1.0, 7.0) / static_cast<double>(trials);
+    }
+  }
+  return difference;
+}
+
+/// Outcomes of a study for each number of participants.
+std::vector<PlannedOutcome> outcomes_of(const ThresholdStudy& study, std::size_t trials,
+                                        const std::vector<std::size_t>& participants,
+                                        std::uint64_t seed, std::size_t number) {
+  std::vector<PlannedOutcome> out;
+  const std::size_t most = participants.back();
+  if (study.measure == PlannedMeasure::accuracy || study.measure == PlannedMeasure::rating) {
+    const bool of_shares = study.measure == PlannedMeasure::accuracy;
+    const double shift = of_shares ? shifted_log_odds(study) : 0;
+    std::vector<double> differences;
+    for (std::size_t i = 0; i < most; ++i) {
+      Random random(seed, {0x7a, trials, number, i});
+      differences.push_back(of_shares ? share_difference(study, shift, trials, random)
+                                      : rating_difference(study, trials, random));
+    }
+    for (const std::size_t n : participants)
+      out.push_back(outcome_of_differences(
+          study, {differences.begin(), differences.begin() + static_cast<std::ptrdiff_t>(n)}));
+    return out;
+  }
+  GroupStudy group = group_study_of(study, trials);
+  group.participants = most;
+  const auto all = simulated_answers(group, seed, number);
+  for (const std::size_t n : participants) {
+    std::vector<std::vector<GroupAnswers>> some;
+    for (const auto& condition : all)
+      some.emplace_back(condition.begin(), condition.begin() + static_cast<std::ptrdiff_t>(n));
+    out.push_back(outcome_of_functions(study, group, some));
+  }
+  return out;
+}
+
+ThresholdPower power_of(const ThresholdStudy& study, std::size_t trials, std::size_t participants,
+                        const std::vector<PlannedOutcome>& outcomes) {
+  ThresholdPower out;
+  out.trials = trials;
+  out.participants = participants;
+  out.studies = outcomes.size();
+  double error = 0, determined = 0;
+  for (const PlannedOutcome& one : outcomes) {
+    // A difference in the wrong direction is no finding.
+    const bool right = study.bound || study.effect == 0 || (one.estimate < 0) == (study.effect < 0);
+    out.found += one.determined && one.found && right ? 1 : 0;
+    out.undetermined += one.determined ? 0 : 1;
+    if (!one.determined) continue;
+    determined += 1;
+    error += one.estimate - study.effect;
+  }
+  out.bias = determined > 0 ? error / determined : 0;
+  const auto n = static_cast<double>(out.studies);
+  out.power = static_cast<double>(out.found) / n;
+  out.se = std::sqrt(out.power * (1 - out.power) / n);
+  out.ci95 = wilson_interval(out.found, out.studies);
+  return out;
 }
 
 }  // namespace
@@ -79,34 +226,29 @@ void add_study(const ThresholdStudy& study, const std::vector<std::optional<doub
 ThresholdPlan plan_thresholds(const ThresholdStudy& study, ThresholdPlanSettings settings) {
   ThresholdPlan plan{study, std::move(settings), {}};
   const ThresholdPlanSettings& asked = plan.settings;
-  const std::size_t most = asked.participants.back();
-  for (std::size_t t = 0; t < asked.trials.size(); ++t) {
-    std::vector<ThresholdPower> powers(asked.participants.size());
-    std::vector<double> bias(powers.size(), 0), covered(powers.size(), 0);
-    std::vector<std::size_t> results(powers.size(), 0);
-    for (std::size_t s = 0; s < asked.studies; ++s) {
-      std::vector<std::optional<double>> ratios;
-      for (std::size_t i = 0; i < most; ++i)
-        ratios.push_back(log_ratio_of(study, asked.trials[t],
-                                      Random(asked.seed, {0x7a, asked.trials[t], s, i})));
-      for (std::size_t n = 0; n < powers.size(); ++n) {
-        powers[n].trials = asked.trials[t];
-        powers[n].participants = asked.participants[n];
-        add_study(study, ratios, powers[n], bias[n], covered[n], results[n]);
-      }
-      if (asked.progress)
-        asked.progress((static_cast<double>(t) +
-                        static_cast<double>(s + 1) / static_cast<double>(asked.studies)) /
-                       static_cast<double>(asked.trials.size()));
+  const std::size_t all = asked.trials.size() * asked.studies;
+  std::vector<std::vector<PlannedOutcome>> outcomes(all);
+  std::atomic<std::size_t> next{0}, done{0};
+  const auto work = [&](bool reports) {
+    for (std::size_t i = next++; i < all; i = next++) {
+      outcomes[i] = outcomes_of(study, asked.trials[i / asked.studies], asked.participants,
+                                asked.seed, i % asked.studies);
+      const std::size_t so_far = ++done;
+      if (reports && asked.progress)
+        asked.progress(static_cast<double>(so_far) / static_cast<double>(all));
     }
-    for (std::size_t n = 0; n < powers.size(); ++n) {
-      ThresholdPower& power = powers[n];
-      power.power = static_cast<double>(power.found) / static_cast<double>(power.studies);
-      power.ci95 = wilson_interval(power.found, power.studies);
-      const auto count = static_cast<double>(std::max<std::size_t>(1, results[n]));
-      power.bias = bias[n] / count;
-      power.coverage = covered[n] / count;
-      plan.powers.push_back(power);
+  };
+  {
+    std::vector<std::jthread> threads;
+    for (std::size_t i = 1; i < asked.jobs; ++i) threads.emplace_back([&work] { work(false); });
+    work(true);
+  }
+  for (std::size_t t = 0; t < asked.trials.size(); ++t) {
+    for (std::size_t n = 0; n < asked.participants.size(); ++n) {
+      std::vector<PlannedOutcome> own;
+      for (std::size_t s = 0; s < asked.studies; ++s)
+        own.push_back(outcomes[t * asked.studies + s][n]);
+      plan.powers.push_back(power_of(study, asked.trials[t], asked.participants[n], own));
     }
   }
   return plan;

@@ -1,28 +1,41 @@
 #pragma once
-// Numbers of participants and trials needed to detect a difference between the JNDs (or thresholds)
-// of two renderers or conditions, from simulated studies analysed as in `analyze`.
+// Numbers of participants and trials needed to detect a difference between two renderers or
+// conditions in JNDs, PSEs, thresholds, accuracy or ratings, or to show equivalence, from simulated
+// studies analysed as in `analyze`.
 
 #include <cstddef>
 #include <cstdint>
 #include <functional>
-#include <string>
+#include <optional>
 #include <vector>
 
 #include "analysis/statistics/paired.h"
 
 namespace palpate::analysis {
 
-/// Constant stimuli, two intervals, levels on both sides of the standard: seven levels evenly over
-/// `reach` JNDs on either side, logistic. The same participants under both conditions.
+enum class PlannedMeasure { jnd, pse, threshold, accuracy, rating };
+
+/// The same participants under both conditions. JND, PSE: two intervals, constant stimuli, seven
+/// levels evenly over `reach` JNDs on either side of the standard. Threshold: forced choice of two,
+/// seven levels by equal ratios over `reach` widths (of the log threshold) on either side.
+/// Accuracy: four shapes of equal difficulty. Ratings: steps 1 to 7.
 struct ThresholdStudy {
+  PlannedMeasure measure = PlannedMeasure::jnd;
+  /// Second minus first condition: of log JNDs and log thresholds, of PSEs in JNDs, of shares
+  /// correct, of ratings in steps.
+  double effect = -0.22314355131420976;
+  double effect_sd = 0.2;       ///< of participants' differences, likewise; accuracy: of log odds
+  double participant_sd = 0.3;  ///< of log JND or threshold; accuracy: of log odds; ratings: steps
   double weber_fraction = 0.1;  ///< JND / standard with the first condition, median participant
-  double ratio = 0.8;           ///< JND with the second / with the first, median participant
-  double participant_sd = 0.3;  ///< of the participants' log JND
-  double effect_sd = 0.2;       ///< of the participants' log ratio
-  double pse_sd = 0.5;          ///< of their PSE, in JNDs
-  double lapse = 0.02;          ///< half of it at either asymptote
-  double reach = 2.5;           ///< JNDs
-  double alpha = 0.05;          ///< two-sided
+  double pse_sd = 0.5;          ///< of the PSE, in JNDs
+  double width = 0.35;          ///< threshold: of the function, in logs of the level
+  double accuracy = 0.8;        ///< share correct with the first condition, median participant
+  double rating_sd = 1;         ///< of single ratings, steps
+  double lapse = 0.02;          ///< at either end
+  double reach = 2.5;
+  double alpha = 0.05;  ///< two-sided
+  /// On the scale of `effect`: equivalence is to be shown; none: a difference.
+  std::optional<double> bound;
 };
 
 struct ThresholdPower {
@@ -30,16 +43,16 @@ struct ThresholdPower {
   std::size_t participants = 0;
   std::size_t found = 0, studies = 0;
   double power = 0;
-  Interval ci95;  ///< Wilson's, of the simulation
-  /// Over studies with a result: mean of the estimated log ratios minus the true one, and coverage
-  /// of its 95 % interval.
-  double bias = 0, coverage = 0;
-  std::size_t undetermined = 0;  ///< undetermined JNDs of all studies, left out
+  double se = 0;                 ///< of the simulation
+  Interval ci95;                 ///< Wilson's, of the simulation
+  double bias = 0;               ///< mean of the estimates minus the true difference
+  std::size_t undetermined = 0;  ///< studies whose interval is open at both ends, or without a test
 };
 
 struct ThresholdPlanSettings {
   std::vector<std::size_t> trials, participants;  ///< each ascending
-  std::size_t studies = 1000;
+  std::size_t studies = 200;
+  std::size_t jobs = 1;
   std::uint64_t seed = 2000;
   double power = 0.8;                    ///< wanted
   std::function<void(double)> progress;  ///< called with the share done; may be empty
@@ -51,9 +64,8 @@ struct ThresholdPlan {
   std::vector<ThresholdPower> powers;  ///< by trials, then participants
 };
 
+/// A study of fewer participants is the first of a study of more. The result does not depend on the
+/// number of jobs.
 ThresholdPlan plan_thresholds(const ThresholdStudy& study, ThresholdPlanSettings settings);
-
-std::string threshold_plan_text(const ThresholdPlan& plan);
-std::string threshold_plan_json(const ThresholdPlan& plan);
 
 }  // namespace palpate::analysis

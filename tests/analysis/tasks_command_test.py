@@ -97,7 +97,11 @@ class Tasks(TaskStudy):
         for group in found["group_results"]:
             if (group["task"], group["measure"]) in (("compare", "jnd"), ("compare", "weber_fraction")):
                 for one in group["renderers"]:
-                    self.assertEqual((one["n_participants"], one["n_undetermined"]), (5, 1), group["measure"])
+                    # The group's model has a use for who makes no errors.
+                    self.assertEqual((one["n_participants"], one["n_undetermined"]), (6, 1), group["measure"])
+                    self.assertEqual(len(one["participants"]), 5)
+        fits = [one["individual_fits"] for one in found["group_comparisons"] if one["measure"] == "jnd"]
+        self.assertEqual([(one["n"], one["left_out"], one["left_out_participants"]) for one in fits], [(5, 2, ["T2"])])
         jnd, = [one for one in found["renderer_comparisons"] if (one["task"], one["measure"]) == ("compare", "jnd")]
         self.assertEqual((jnd["n_undetermined"], jnd["differences"][0]["n_pairs"]), (2, 5))
 
@@ -183,14 +187,20 @@ class Tasks(TaskStudy):
             text = self.analyze().stdout
             cells = {(cell["task"], cell["renderer"]): cell for cell in found["cells"]}
             for (task, measure), group in groups.items():
-                geometric = measure != "exponent"
+                geometric = measure not in ("exponent", "threshold") and (task, measure) != ("compare", "pse")
                 self.assertEqual(group["mean_is"], "geometric" if geometric else "arithmetic")
                 self.assertEqual([one["renderer"] for one in group["renderers"]], ["point", "ray"] if task == "compare" else ["ray"])
                 for one in group["renderers"]:
                     values = figures_of(cells[task, one["renderer"]], measure)
                     self.assertEqual({each["participant_id"]: each["value"] for each in one["participants"]}, values)
-                    self.assertEqual(one["n_participants"] + one["n_undetermined"], 6)
-                    self.check_mean(one, values.values(), geometric, text)
+                    modelled = task in ("compare", "detect")
+                    self.assertEqual(one["from"], "hierarchical model" if modelled else "participants")
+                    self.assertEqual(one["n_participants"] + (0 if modelled else one["n_undetermined"]), 6)
+                    if modelled:
+                        self.assertLess(one["ci95"][0], statistics.median(values.values()))
+                        self.assertGreater(one["ci95"][1], statistics.median(values.values()))
+                    else:
+                        self.check_mean(one, values.values(), geometric, text)
             for one in found["renderer_comparisons"]:
                 self.check_comparison(one, groups)
 

@@ -115,8 +115,12 @@ def study_lines():
                   "plan --csv relative.csv --studies 100 --trials 3 --participants 4-40 --seed 3 --json plan3.json",
                   "plan --csv relative.csv --studies 100 --trials 3 --participants 4-40 --seed 3 --json plan3.json --force")]
     yield steps(
-        "plan --jnd-effect 20 --studies 100 --participants 6-12",
-        "plan --jnd-effect 30 --weber 0.2 --jnd-sd 0.2 --jnd-effect-sd 0.1 --pse-sd 0.3 --reach 2 --trials 70 --studies 100 --participants 6-8",
+        "plan --jnd-effect 40 --studies 100 --trials 42 --participants 6-7",
+        "plan --pse-effect 1 --studies 100 --trials 42 --participants 6-6 --json pse.json",
+        "plan --threshold-effect 40 --studies 100 --trials 42 --participants 6-6",
+        "plan --accuracy-effect 10 --accuracy 0.7 --studies 100 --trials 40 --participants 6-12",
+        "plan --rating-effect 0 --equivalence 1 --studies 100 --participants 6-12",
+        "plan --jnd-effect 30 --weber 0.2 --jnd-sd 0.2 --jnd-effect-sd 0.1 --pse-sd 0.3 --reach 2 --trials 42 --studies 100 --participants 6-7",
         "plan --gain-sd 0.15 --residual-sd 0.5 --effect cone=15 --studies 200 --trials 20",
         "plan --gain-sd 0.15 --shape-gain-sd 0.1 --residual-sd 0.5 --intercept-sd 0.4 --correlation 0.3 --share-used 0.9 --effect cone=40"
         " --test model --studies 100 --participants 4-8 --trials 5",

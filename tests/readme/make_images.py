@@ -161,6 +161,17 @@ def power(palpate, folder):
                     "--figure", IMAGES / "power.svg", "--force"], stdout=subprocess.DEVNULL, check=True)
 
 
+def group(palpate, folder):
+    """JNDs and PSEs of eight simulated participants with both renderers."""
+    database, both = folder / "tasks.db", folder / "both.json"
+    protocol = json.loads((PROTOCOLS / "stiffness-2afc.json").read_text())
+    protocol["renderers"] = ["point", "ray"]
+    both.write_text(json.dumps(protocol))
+    subprocess.run([palpate, "simulate", both, "--db", database, "--participants", "8"], check=True)
+    subprocess.run([palpate, "analyze", "--db", database, "--figures", folder / "tasks"], stdout=subprocess.DEVNULL, check=True)
+    shutil.copyfile(folder / "tasks" / "group1.svg", IMAGES / "group.svg")
+
+
 def sweep_gains(palpate, folder):
     """The sweep of runner/participants/README.md, which takes half an hour."""
     database = folder / "participants.sweep"
@@ -220,7 +231,7 @@ SCENES = ["fig3b-extended-probe", "fig13-two-objects", "fig14-dumbbells", "fig16
 PICTURES = {**{name: scene(name) for name in SCENES},
             "contact-patches": lambda palpate, folder: (IMAGES / "contact-patches.svg").write_text(contact_patches()),
             "explore-window": explore_window, "live-session": lambda *arguments: undisturbed(live_session, *arguments), "figure15": figure("figure15"),
-            "speedup": figure("speedup"), "power": power, "sweep-gains": sweep_gains, "soft-stability": soft_stability,
+            "speedup": figure("speedup"), "power": power, "group": group, "sweep-gains": sweep_gains, "soft-stability": soft_stability,
             "recover-parameters": example("recover_parameters"), "choose-sizes": example("choose_sizes")}
 
 

@@ -14,11 +14,10 @@
 #include <vector>
 
 #include "analysis/figures/svg.h"
+#include "analysis/report/coverage_report.h"
 #include "analysis/report/plan_report.h"
 #include "analysis/statistics/analysis.h"
 #include "analysis/statistics/comparison.h"
-#include "analysis/statistics/interval_coverage.h"
-#include "analysis/statistics/threshold_plan.h"
 #include "analysis/text.h"
 #include "protocols/json_document.h"
 #include "protocols/parse.h"
@@ -32,11 +31,28 @@ namespace palpate::runner::commands {
 // The part of 'palpate plan' for thresholds.
 
 struct ThresholdOptions {
-  double effect = 0, weber = 0.1, participant_sd = 0.3, effect_sd = 0.2, pse_sd = 0.5, reach = 2.5;
+  /// Of one of kMeasureOptions.
+  double jnd = 0, pse = 0, threshold = 0, accuracy_points = 0, rating = 0;
+  double weber = 0.1, participant_sd = 0.3, effect_sd = 0.2, pse_sd = 0.5, reach = 2.5;
+  double accuracy = 0.8, equivalence = 0;
 };
+
+/// Each plans another measure than times.
+struct MeasureOption {
+  const char* name;
+  analysis::PlannedMeasure measure;
+  double ThresholdOptions::*effect;
+};
+constexpr MeasureOption kMeasureOptions[] = {
+    {"jnd-effect", analysis::PlannedMeasure::jnd, &ThresholdOptions::jnd},
+    {"pse-effect", analysis::PlannedMeasure::pse, &ThresholdOptions::pse},
+    {"threshold-effect", analysis::PlannedMeasure::threshold, &ThresholdOptions::threshold},
+    {"accuracy-effect", analysis::PlannedMeasure::accuracy, &ThresholdOptions::accuracy_points},
+    {"rating-effect", analysis::PlannedMeasure::rating, &ThresholdOptions::rating}};
 void add_threshold_options(CommandLine& line, ThresholdOptions& options);
 /// Prints the plan, and writes its JSON. \throws UsageError
-void plan_thresholds_of(const ThresholdOptions& thresholds, const PlanOptions& options,
+void plan_thresholds_of(const ThresholdOptions& thresholds, const MeasureOption& measure,
+                        const PlanOptions& options,
                         const boost::program_options::variables_map& values, Outputs& outputs);
 
 /// Prints how often the intervals of thresholds contain the true value, and writes its JSON.
@@ -316,11 +332,46 @@ void require(bool right, const char* option, const char* expected) {
   if (!right) throw UsageError(std::string("--") + option + ": expected " + expected);
 }
 
-analysis::ThresholdStudy study_of(const ThresholdOptions& thresholds, const PlanOptions& options) {
+/// A percentage as a log ratio, points as a share, others as they are.
+double on_scale(analysis::PlannedMeasure measure, double effect) {
+  switch (measure) {
+    case analysis::PlannedMeasure::jnd:
+    case analysis::PlannedMeasure::threshold:
+      return std::log1p(-effect / 100);
+    case analysis::PlannedMeasure::accuracy:
+      return effect / 100;
+    case analysis::PlannedMeasure::pse:
+    case analysis::PlannedMeasure::rating:
+      break;
+  }
+  return effect;
+}
+
+/// The greatest effect that makes sense: of percentages smaller and larger.
+void require_effect(const MeasureOption& option, double effect, double accuracy) {
+  const auto within = [effect](double low, double high) { return effect >= low && effect <= high; };
+  switch (option.measure) {
+    case analysis::PlannedMeasure::jnd:
+    case analysis::PlannedMeasure::threshold:
+      return require(within(-400, 95), option.name, "percent from -400 to 95");
+    case analysis::PlannedMeasure::accuracy:
+      return require(within(-100 * accuracy + 1, 100 * (1 - accuracy) - 1), option.name,
+                     "percentage points that leave the accuracy between 1 and 99 %");
+    case analysis::PlannedMeasure::pse:
+      return require(within(-5, 5), option.name, "-5 to 5 JNDs");
+    case analysis::PlannedMeasure::rating:
+      return require(within(-6, 6), option.name, "-6 to 6 steps");
+  }
+}
+
+analysis::ThresholdStudy study_of(const ThresholdOptions& thresholds, const MeasureOption& measure,
+                                  const PlanOptions& options, const po::variables_map& values) {
   const auto within = [](double value, double low, double high) {
     return value >= low && value <= high;  // false for NaN
   };
-  require(within(thresholds.effect, -400, 95), "jnd-effect", "percent from -400 to 95");
+  require(within(thresholds.accuracy, 0.05, 0.98), "accuracy", "a share from 0.05 to 0.98");
+  const double effect = thresholds.*measure.effect;
+  require_effect(measure, effect, thresholds.accuracy);
   require(within(thresholds.weber, 0.001, 1), "weber", "a JND / standard from 0.001 to 1");
   require(within(thresholds.participant_sd, 0, 2), "jnd-sd", "0 to 2");
   require(within(thresholds.effect_sd, 0, 2), "jnd-effect-sd", "0 to 2");
@@ -330,18 +381,30 @@ analysis::ThresholdStudy study_of(const ThresholdOptions& thresholds, const Plan
   require(within(options.power, 0.01, 0.999), "power", "0.01 to 0.999");
   analysis::ThresholdStudy study;
   study.weber_fraction = thresholds.weber;
-  study.ratio = 1 - thresholds.effect / 100;
+  study.measure = measure.measure;
+  study.effect = on_scale(measure.measure, effect);
+  study.accuracy = thresholds.accuracy;
   study.participant_sd = thresholds.participant_sd;
   study.effect_sd = thresholds.effect_sd;
+  // Between people, odds and ratings differ more than log JNDs.
+  const bool wider = measure.measure == analysis::PlannedMeasure::accuracy ||
+                     measure.measure == analysis::PlannedMeasure::rating;
+  if (wider && values["jnd-sd"].defaulted()) study.participant_sd = 0.7;
+  if (wider && values["jnd-effect-sd"].defaulted()) study.effect_sd = 0.5;
+  if (values.count("equivalence")) {
+    require(thresholds.equivalence > 0 && thresholds.equivalence < 400, "equivalence",
+            "a bound above 0, in the unit of the effect");
+    study.bound = std::abs(on_scale(measure.measure, -thresholds.equivalence));
+  }
   study.pse_sd = thresholds.pse_sd;
   study.reach = thresholds.reach;
   study.alpha = options.alpha;
   return study;
 }
 
-/// At most twelve numbers of participants over the range.
+/// At most so many numbers of participants over the range: each study is fitted for each.
 std::vector<std::size_t> numbers_over(std::size_t least, std::size_t most) {
-  constexpr std::size_t kMost = 12;
+  constexpr std::size_t kMost = 5;
   std::vector<std::size_t> numbers;
   const std::size_t steps = std::min(kMost - 1, most - least);
   for (std::size_t i = 0; i <= steps; ++i)
@@ -353,22 +416,35 @@ std::vector<std::size_t> numbers_over(std::size_t least, std::size_t most) {
 
 void add_threshold_options(CommandLine& line, ThresholdOptions& options) {
   auto add = line.options.add_options();
-  add("jnd-effect", po::value(&options.effect)->value_name("PERCENT"),
-      "of thresholds instead of times: how much smaller the JND is with the second renderer or "
+  add("jnd-effect", po::value(&options.jnd)->value_name("PERCENT"),
+      "of JNDs instead of times: how much smaller the JND is with the second renderer or "
       "condition; --trials are those of a participant with each, --participants a range");
+  add("pse-effect", po::value(&options.pse)->value_name("JNDS"),
+      "of PSEs: how much higher with the second");
+  add("threshold-effect", po::value(&options.threshold)->value_name("PERCENT"),
+      "of thresholds of a forced choice: how much lower with the second");
+  add("accuracy-effect", po::value(&options.accuracy_points)->value_name("POINTS"),
+      "of accuracy: how many percentage points higher with the second");
+  add("rating-effect", po::value(&options.rating)->value_name("STEPS"),
+      "of mean ratings on seven steps: how much higher with the second");
+  add("equivalence", po::value(&options.equivalence)->value_name("BOUND"),
+      "show equivalence within this bound instead, in the unit of the effect; with an effect of 0");
+  add("accuracy", po::value(&options.accuracy)->default_value(0.8, "0.8")->value_name("SHARE"),
+      "correct with the first condition");
   add("weber", po::value(&options.weber)->default_value(0.1, "0.1")->value_name("W"),
       "JND / standard with the first condition");
   add("jnd-sd", po::value(&options.participant_sd)->default_value(0.3, "0.3")->value_name("SD"),
-      "of participants' log JND");
+      "of participants' log JND or threshold; of log odds and ratings 0.7");
   add("jnd-effect-sd", po::value(&options.effect_sd)->default_value(0.2, "0.2")->value_name("SD"),
-      "of participants' log ratio of their JNDs");
+      "of participants' differences: log ratios, JNDs; of log odds and ratings 0.5");
   add("pse-sd", po::value(&options.pse_sd)->default_value(0.5, "0.5")->value_name("SD"),
       "of participants' PSE, in JNDs");
   add("reach", po::value(&options.reach)->default_value(2.5, "2.5")->value_name("JNDS"),
       "how far the levels reach from the standard");
   add("coverage",
       "how often the 95 % intervals of thresholds, slopes and lapses hold the truth, after each "
-      "procedure, with lapses and without; takes --studies (200), --seed, --jobs, --json");
+      "procedure, with lapses and without, and those of the group's model; takes --studies (200), "
+      "--seed, --jobs, --json");
 }
 
 void print_coverage(const PlanOptions& options, const po::variables_map& values, Outputs& outputs) {
@@ -394,27 +470,40 @@ void print_coverage(const PlanOptions& options, const po::variables_map& values,
   ProgressLine progress("simulated studies");
   settings.progress = [&progress](double share) { progress.show(share); };
   const auto results = analysis::interval_coverage(settings);
+  progress.begin("simulated studies of groups");
+  analysis::GroupCoverageSettings of_groups;
+  of_groups.studies = settings.studies;
+  of_groups.seed = settings.seed;
+  of_groups.jobs = settings.jobs;
+  of_groups.progress = settings.progress;
+  const auto groups = analysis::group_coverage(analysis::group_coverage_studies(), of_groups);
   progress.clear();
-  if (outputs.wanted("json")) outputs.put("json", analysis::coverage_json(results, settings));
+  if (outputs.wanted("json"))
+    outputs.put("json", analysis::coverage_json(results, settings, groups));
   outputs.write();
-  std::cout << analysis::coverage_text(results, settings);
+  std::cout << analysis::coverage_text(results, settings)
+            << analysis::group_coverage_text(groups, of_groups);
 }
 
-void plan_thresholds_of(const ThresholdOptions& thresholds, const PlanOptions& options,
-                        const po::variables_map& values, Outputs& outputs) {
+void plan_thresholds_of(const ThresholdOptions& thresholds, const MeasureOption& measure,
+                        const PlanOptions& options, const po::variables_map& values,
+                        Outputs& outputs) {
   for (const char* other : {"db", "csv", "effect", "gain-sd", "residual-sd", "figure", "reuse"}) {
     if (values.count(other))
-      throw UsageError(std::string("--") + other + ": is of response times; not with --jnd-effect");
+      throw UsageError(std::string("--") + other + ": is of response times; not with --" +
+                       measure.name);
   }
-  const analysis::ThresholdStudy study = study_of(thresholds, options);
+  const analysis::ThresholdStudy study = study_of(thresholds, measure, options, values);
   analysis::ThresholdPlanSettings settings;
   PlanOptions own = options;
-  if (values["trials"].defaulted()) own.trials = "70,140,280";
-  if (values["participants"].defaulted()) own.participants = "4-40";
+  const bool of_ratings = measure.measure == analysis::PlannedMeasure::rating;
+  if (values["trials"].defaulted()) own.trials = of_ratings ? "2,4" : "84,168";
+  if (values["participants"].defaulted()) own.participants = "4-24";
   const analysis::PlanSettings asked = settings_of(own, values);
   settings.trials = asked.trials;
   settings.participants = numbers_over(asked.min_participants, asked.max_participants);
-  constexpr std::size_t kStudies = 500;
+  settings.jobs = asked.simulation.jobs;
+  constexpr std::size_t kStudies = 200;
   settings.studies = values.count("studies") ? asked.simulation.studies : kStudies;
   settings.seed = own.seed;
   settings.power = own.power;
@@ -447,7 +536,8 @@ int plan_command(const std::vector<std::string>& args) {
   line.usage =
       R"(palpate plan ((--db FILE | --csv FILE) [--protocol NAME] | --gain-sd SD --residual-sd SD)
            [--effect SHAPE=PERCENT,...]
-       palpate plan --jnd-effect PERCENT [--weber W]
+       palpate plan (--jnd-effect PERCENT | --pse-effect JNDS | --threshold-effect PERCENT |
+           --accuracy-effect POINTS | --rating-effect STEPS) [--equivalence BOUND]
        palpate plan --coverage [--studies N] [--seed S])";
   line.summary =
       "Sample size planning: the number of participants and trials that find an effect with a\n"
@@ -484,10 +574,19 @@ int plan_command(const std::vector<std::string>& args) {
     print_coverage(options, *values, outputs);
     return 0;
   }
-  if (values->count("jnd-effect")) {
-    plan_thresholds_of(thresholds, options, *values, outputs);
+  for (const MeasureOption& one : kMeasureOptions) {
+    if (values->count(one.name) == 0) continue;
+    for (const MeasureOption& other : kMeasureOptions) {
+      if (other.name != one.name && values->count(other.name))
+        throw UsageError(std::string("--") + other.name + ": not with --" + one.name);
+    }
+    plan_thresholds_of(thresholds, one, options, *values, outputs);
     return 0;
   }
+  if (values->count("equivalence"))
+    throw UsageError(
+        "--equivalence: expected one of --jnd-effect, --pse-effect, --threshold-effect, "
+        "--accuracy-effect and --rating-effect");
   analysis::PlanSettings settings = settings_of(options, *values);
   analysis::Pilot pilot = starting_point(options, *values);
   analysis::StudyModel model = model_of(pilot, options, *values);

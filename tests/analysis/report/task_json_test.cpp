@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "analysis/report/report.h"
+#include "analysis/statistics/paired_evidence.h"
 #include "analysis/statistics/task_analysis.h"
 #include "tests/analysis/report/task_report_fixture.h"
 
@@ -39,7 +40,7 @@ TEST(TaskJson, HeadCountsWhatWasRead) {
   Expected expected = Expected::parse(R"({"version": 1, "simulated": false, "source": "study.csv",
       "title": "Which ball?", "warnings": ["one", "two"], "group_results": [],
       "program_version": "1.2", "n_trials": 3, "n_practice": 2, "cells": [],
-      "renderer_comparisons": [], "condition_comparisons": []})");
+      "renderer_comparisons": [], "condition_comparisons": [], "group_model": [], "group_comparisons": []})");
   EXPECT_EQ(json_of(analysis), expected);
   analysis.table.simulated = true;
   expected["simulated"] = true;
@@ -85,7 +86,18 @@ TEST(TaskJson, AFunctionWithEverything) {
       "detectability": {"status": "ok", "d_prime": 1.625, "d_prime_ci95": [1.125, 2.125],
                         "criterion": -0.375, "criterion_ci95": [-0.625, -0.25]}}],
     "confidence": {"status": "undefined", "reason": "nobody was asked"}})");
-  EXPECT_EQ(json_of_cell(cell), expected);
+  Expected found = json_of_cell(cell);
+  // 9 of 12 in a forced choice of three.
+  Expected& level = found["psychometric_functions"][0]["levels"][1];
+  const ForcedChoiceDetectability detected = forced_choice_detectability(9, 12, 3);
+  EXPECT_EQ(level["d_prime"], detected.d_prime);
+  EXPECT_EQ(level["d_prime_ci95"],
+            (Expected{detected.d_prime_ci95.low, detected.d_prime_ci95.high}));
+  for (Expected& one : found["psychometric_functions"][0]["levels"]) {
+    one.erase("d_prime");
+    one.erase("d_prime_ci95");
+  }
+  EXPECT_EQ(found, expected);
 }
 
 TEST(TaskJson, WhatIsNotDefinedSaysWhyAndInfiniteEndsAreNull) {
@@ -171,11 +183,13 @@ TEST(TaskJson, NumbersSettingsAnswersAndConfidence) {
   cell.information = pooled;
   cell.informations = {{"", 20, 1.75, 1.5, 1.375, 2.5, 0.125},
                        {"", 20, 1.875, 0.5, -0.25, 1, 0.25}};
-  cell.information_mean = 0.5625;
-  cell.information_ci95 = Interval{-0.5, 1.625};
+  cell.information_mean.mean = 0.5625;
+  cell.information_mean.ci95 = Interval{-0.5, 1.625};
+  cell.information_most = 2;
   cell.confidence = {};
   cell.confidence.area = 0.6875;
   cell.confidence.area_ci95 = Interval{0.5625, 0.8125};
+  cell.confidence_mean = {"", 2, 1, 0.75, Interval{0.625, 0.875}};
   cell.same_different = true;
   const Expected found = json_of_cell(cell);
   EXPECT_EQ(found["same_different"], true);
@@ -190,7 +204,7 @@ TEST(TaskJson, NumbersSettingsAnswersAndConfidence) {
     "pse": 502.5, "pse_ci95": [490.0, 515.0], "constant_error": 2.25, "sd": 11.0, "jnd": 7.5,
     "start_effect": 5.5}])"));
   EXPECT_EQ(found["information_transfer"], Expected::parse(R"({"bits": 1.25,
-    "bits_corrected": 1.125, "se": 0.0625, "stimulus_entropy_bits": 2.0, "categories": 2.25,
+    "bits_corrected": 1.125, "se": 0.0625, "stimulus_entropy_bits": 2.0, "categories": 2.25, "most_bits": 2.0,
     "mean_of_participants_bits_corrected": 0.5625, "mean_of_participants_ci95": [-0.5, 1.625],
     "participants": [
       {"participant_id": "A", "bits": 1.5, "bits_corrected": 1.375, "se": 0.125,
@@ -198,7 +212,8 @@ TEST(TaskJson, NumbersSettingsAnswersAndConfidence) {
       {"participant_id": "B", "bits": 0.5, "bits_corrected": -0.25, "se": 0.25,
        "stimulus_entropy_bits": 1.875, "categories": 1.0}]})"));
   EXPECT_EQ(found["confidence"], Expected::parse(R"({"status": "ok", "type2_roc_area": 0.6875,
-    "ci95": [0.5625, 0.8125]})"));
+    "ci95": [0.5625, 0.8125], "mean_of_participants": {"n_participants": 2, "n_left_out": 1,
+      "type2_roc_area": 0.75, "ci95": [0.625, 0.875]}})"));
 }
 
 TEST(TaskJson, GroupResultsHaveEveryFigure) {
@@ -209,17 +224,26 @@ TEST(TaskJson, GroupResultsHaveEveryFigure) {
   group.measure = "jnd";
   group.unit = "N/m";
   group.geometric = true;
-  group.renderers = {{"point", {{"A", 20.5}, {"B", 24}}, 1, 22.25, 0.125, Interval{19, 26}},
-                     {"ray", {}, 3, {}, {}, {}}};
+  group.renderers.resize(2);
+  group.renderers[0].renderer = "point";
+  group.renderers[0].participants = {{"A", 20.5}, {"B", 24}};
+  group.renderers[0].n_undetermined = 1;
+  group.renderers[0].mean = 22.25;
+  group.renderers[0].sd = 0.125;
+  group.renderers[0].ci95 = Interval{19, 26};
+  group.renderers[1].renderer = "ray";
+  group.renderers[1].n_undetermined = 3;
+  group.renderers[1].of_model = true;
+  group.renderers[1].n_of_model = 4;
   TaskAnalysis analysis;
   analysis.groups = {group};
   EXPECT_EQ(json_of(analysis)["group_results"], Expected::parse(R"([{"task": "compare",
     "block_name": "stiff", "shape": "ball", "measure": "jnd", "unit": "N/m", "mean_is": "geometric",
-    "renderers": [{"renderer": "point", "n_participants": 2, "n_undetermined": 1, "mean": 22.25,
+    "renderers": [{"renderer": "point", "from": "participants", "n_participants": 2, "n_undetermined": 1, "mean": 22.25,
         "ci95": [19.0, 26.0], "sd_of_natural_logs": 0.125,
         "participants": [{"participant_id": "A", "value": 20.5},
                          {"participant_id": "B", "value": 24.0}]},
-      {"renderer": "ray", "n_participants": 0, "n_undetermined": 3, "mean": null, "ci95": null,
+      {"renderer": "ray", "from": "hierarchical model", "n_participants": 4, "n_undetermined": 3, "mean": null, "ci95": null,
        "sd_of_natural_logs": null, "participants": []}]}])"));
   analysis.groups[0].geometric = false;
   analysis.groups[0].unit.clear();
@@ -254,7 +278,16 @@ TEST(TaskJson, ComparisonsHaveEveryFigure) {
   one.comparison.undefined = "nothing";
   one.logarithms = false;
   analysis.conditions = {one};
-  const Expected found = json_of(analysis);
+  Expected found = json_of(analysis);
+  Expected& shown = found["renderer_comparisons"][0]["differences"][0];
+  const PairedEvidence evidence =
+      evidence_of(-0.75, analysis.renderers[0].comparison.differences[0].t_test);
+  EXPECT_EQ(shown["ci90"], (Expected{evidence.ci90->low, evidence.ci90->high}));
+  EXPECT_EQ(shown["least_bound"], *evidence.least_bound);
+  EXPECT_EQ(shown["bf10"], *evidence.bayes_factor);
+  EXPECT_EQ(found["jnd"]["stiff"]["ratio"], std::exp(-0.75));
+  EXPECT_EQ(found["equivalence"]["jnd"]["stiff"]["least_bound"], *evidence.least_bound);
+  for (const char* key : {"ci90", "least_bound", "bf10"}) shown.erase(key);
   EXPECT_EQ(found["renderer_comparisons"], Expected::parse(R"([{"task": "compare",
     "measure": "jnd", "block_name": "stiff", "shape": "ball", "reference": "first",
     "natural_logarithms": true, "n_undetermined": 2, "status": "ok", "participant_sd": 0.5,
@@ -269,30 +302,45 @@ TEST(TaskJson, ComparisonsHaveEveryFigure) {
   EXPECT_EQ(json_of(analysis)["condition_comparisons"][0]["differences"][0]["condition"], "second");
 }
 
-TEST(TaskJson, AccuracyOfIdentification) {
+TEST(TaskJson, GroupModelAndComparison) {
   TaskAnalysis analysis;
-  MixedLogistic& model = analysis.accuracy.emplace();
-  model.undefined = "all were right";
-  Expected expected = Expected::parse(R"j({"status": "undefined", "reason": "all were right",
-    "model": "correct ~ renderer + shape + (1 | participant)"})j");
-  EXPECT_EQ(json_of(analysis)["accuracy_model"], expected);
-  model.undefined = "";
-  model.participants = 7;
-  model.trials = 70;
-  model.log_likelihood = -12.5;
-  model.coefficients = {{"rendererray", 0, 0.25, 2.5, 0.03125, {-0.5, 0.75}}};
-  expected = Expected::parse(R"j({"model": "correct ~ renderer + shape + (1 | participant)",
-    "status": "ok", "n_participants": 7, "n_trials": 70, "logLik": -12.5, "participant_sd": null,
-    "fixed_effects": {"rendererray": {"log_odds": 0.0, "se": 0.25, "z": 2.5, "p": 0.03125,
-      "ci95": [-0.5, 0.75], "odds_ratio": 1.0}}})j");
-  EXPECT_EQ(json_of(analysis)["accuracy_model"], expected);
-  model.coefficients[0].estimate = std::log(3);
-  model.random_sds = {0.875};
-  model.singular = true;
-  const Expected found = json_of(analysis)["accuracy_model"];
-  EXPECT_EQ(found["status"], "singular");
-  EXPECT_EQ(found["participant_sd"], 0.875);
-  EXPECT_NEAR(found["fixed_effects"]["rendererray"]["odds_ratio"].get<double>(), 3, 1e-12);
+  TaskGroupModel model;
+  model.block_name = "b";
+  model.task = "compare";
+  model.shape = "ball";
+  model.measure = "jnd";
+  model.renderer = "ray";
+  model.unit = "N/m";
+  model.n = 6;
+  model.estimate = 2.5;
+  model.high = 4.5;
+  model.sd_between = 0.25;
+  model.lapse_mean = 0.02;
+  model.notes = {"JND below 4.5"};
+  analysis.group_models.models.push_back(model);
+  EXPECT_EQ(json_of(analysis)["group_model"][0],
+            Expected::parse(R"({"block": "b", "task": "compare",
+    "shape": "ball", "measure": "jnd", "renderer": "ray", "n": 6, "estimate": 2.5,
+    "ci95": [null, 4.5], "sd_between": 0.25, "lapse_mean": 0.02, "status": "low open",
+    "notes": ["JND below 4.5"]})"));
+  TaskGroupComparison one;
+  one.measure = "jnd";
+  one.reference = "point";
+  one.compared = "ray";
+  one.ratio = true;
+  one.n = 6;
+  one.estimate = 0.5;
+  one.low = 0.25;
+  one.high = 0.75;
+  one.low90 = 0.3125;
+  one.p = one.p_holm = 0.125;
+  one.likelihood_ratio = 3.5;
+  one.individual_fits = {5, 1, 2.5, 4, 0.25, {"B"}};
+  analysis.group_models.comparisons.push_back(one);
+  EXPECT_EQ(json_of(analysis)["group_comparisons"][0], Expected::parse(R"({"block": "", "task": "",
+    "shape": "", "measure": "jnd", "reference": "point", "compared": "ray", "scale": "ratio",
+    "n": 6, "estimate": 0.5, "ci95": [0.25, 0.75], "ci90": [0.3125, null], "p": 0.125, "p_holm": 0.125, "lr": 3.5,
+    "status": "ok", "individual_fits": {"n": 5, "left_out": 1, "left_out_participants": ["B"], "t": 2.5, "df": 4.0, "p": 0.25}})"));
 }
 
 }  // namespace

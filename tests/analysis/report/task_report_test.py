@@ -192,19 +192,37 @@ class TaskReport(unittest.TestCase):
                     for each in one["participants"]:
                         self.assertIn(f"{each['participant_id']}, {one['renderer']}: {short(each['value'])}", titles)
             compared = [one for one in self.json["renderer_comparisons"] if [one[k] for k in ("task", "block_name", "shape")] == place]
+            modelled = {one["measure"] for one in self.json["group_comparisons"]
+                        if [one["task"], one["block"], one["shape"]] == place}
             for one in compared:
-                difference, = one["differences"]
-                self.assertIn(short(math.exp(difference["mean"])) + " [", " ".join(texts))
+                if one["measure"] not in modelled:
+                    difference, = one["differences"]
+                    self.assertIn(short(math.exp(difference["mean"])) + " [", " ".join(texts))
+            for one in self.json["group_comparisons"]:
+                if [one["task"], one["block"], one["shape"]] == place:
+                    self.assertIn(short(one["estimate"]) + " [", " ".join(texts))
 
-    def test_accuracy_of_identification(self):
-        model = self.json["accuracy_model"]
-        self.assertIn("(Intercept)", model["fixed_effects"])
-        self.assertIn(f"standard deviation of the participants' log odds {short(model['participant_sd'])}", self.text)
-        for name, effect in model["fixed_effects"].items():
-            (line,) = [x for x in self.text.splitlines() if x.startswith(f"  {name} ") and "odds" in x]
-            self.assertIn(("odds " if name == "(Intercept)" else "odds ratio ") +
-                          with_interval(effect["odds_ratio"], [math.exp(end) for end in effect["ci95"]]), line)
-            self.assertTrue(line.endswith("p " + p_text(effect["p"])), line)
+    def test_group_comparisons_stand_in_the_text_and_are_quoted(self):
+        self.assertTrue(self.json["group_comparisons"])
+        for one in self.json["group_comparisons"]:
+            sign = "/" if one["scale"] == "ratio" else "\u2212"
+            low, high = map(short, one["ci95"])
+            sentence = f"{one['compared']} {sign} {one['reference']}: {short(one['estimate'])}, 95 % CI [{low}, {high}]"
+            unwrapped = self.text.replace("\n", " ")
+            self.assertGreaterEqual(unwrapped.count(sentence), 2, sentence)
+
+    def test_group_values_come_from_the_model_and_have_names(self):
+        compared = [group for group in self.json["group_results"] if group["task"] == "compare"]
+        for group in compared:
+            for one in group["renderers"]:
+                self.assertEqual(one["from"], "hierarchical model")
+                named = self.json[group["measure"]][group["block_name"]][one["renderer"]]
+                self.assertEqual((named["estimate"], [named["ci95_low"], named["ci95_high"]]), (one["mean"], one["ci95"]))
+        for one in self.json["group_comparisons"]:
+            named = self.json[one["measure"]][one["block"]]
+            self.assertEqual(named[one["scale"]], one["estimate"])
+            bound = self.json["equivalence"][one["measure"]][one["block"]]["least_bound"]
+            self.assertAlmostEqual(bound, max(abs(math.log(end) if one["scale"] == "ratio" else end) for end in one["ci90"]))
 
     def test_figures_name_every_participant_and_draw_every_level(self):
         drawn = [cell for cell in self.json["cells"] if "psychometric_functions" in cell]

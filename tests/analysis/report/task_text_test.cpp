@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "analysis/report/report.h"
+#include "analysis/report/task_tables.h"
 #include "analysis/statistics/task_analysis.h"
 #include "tests/analysis/report/task_report_fixture.h"
 
@@ -141,9 +142,10 @@ TEST(TaskText, GroupResultsSayWhoWasLeftOut) {
   group.shape = "ball";
   group.measure = "weber_fraction";
   group.geometric = true;
-  group.renderers = {{"point", {{"A", 1}, {"B", 2}}, 1, 0.25, 0.5, Interval{0.125, 0.5}},
-                     {"ray", {{"A", 1}}, 0, 0.75, {}, {}},
-                     {"other", {}, 2, {}, {}, {}}};
+  group.renderers = {
+      {"point", {{"A", 1}, {"B", 2}}, 1, 0.25, 0.5, Interval{0.125, 0.5}, false, 0, {}},
+      {"ray", {{"A", 1}}, 0, 0.75, {}, {}, false, 0, {}},
+      {"other", {}, 2, {}, {}, {}, false, 0, {}}};
   TaskAnalysis analysis;
   analysis.groups = {group};
   EXPECT_EQ(
@@ -261,9 +263,13 @@ TEST(TaskText, CellsOfNumbersSettingsAnswersAndConfidence) {
       "  information transfer 1.25 bit of 2; corrected for the bias of few trials 1.125 bit, 2.182 "
       "categories";
   EXPECT_EQ(text_of_cell(named), bits + "\n\n");
-  named.information_mean = 1.5;
-  named.information_ci95 = Interval{1.375, 1.75};
-  EXPECT_EQ(text_of_cell(named), bits + "; mean of the participants' 1.5 [1.375, 1.75]\n\n");
+  named.information_mean.mean = 1.5;
+  named.information_mean.ci95 = Interval{1.375, 1.75};
+  named.information_most = 2;
+  EXPECT_EQ(text_of_cell(named),
+            bits +
+                "; mean of the participants' 1.5 [1.375, 1.75] of at most 2 (mean of arcsin "
+                "sqrt, transformed back)\n\n");
   named.information->corrected = -0.5;  // no information is not less than none
   EXPECT_NE(text_of_cell(named).find("few trials 0 bit"), std::string::npos);
 }
@@ -391,26 +397,32 @@ TEST(TaskText, RatingsHaveAWilcoxonTestWithItsWarning) {
   EXPECT_NE(text.find("SIMULATED PARTICIPANTS)."), std::string::npos) << text;
 }
 
-TEST(TaskText, AccuracyOfIdentification) {
+TEST(TaskText, RatioOfTheGroupHasItsInterval) {
   TaskAnalysis analysis;
-  MixedLogistic& model = analysis.accuracy.emplace();
-  const std::string head =
-      "Accuracy of identification, mixed logistic model: correct ~ renderer + shape + (1 | "
-      "participant)\n";
-  model.undefined = "all were right";
-  EXPECT_EQ(task_report_text(analysis), head + "  undefined: all were right\n\n" + kLogisticText);
-  model.undefined = "";
-  model.coefficients = {{"(Intercept)", std::log(3), 9, 9, 0.0004, {std::log(2), std::log(5)}},
-                        {"rendererray", std::log(1.5), 9, 9, 0.2, {std::log(0.75), std::log(2.5)}}};
-  const std::string odds = head +
-                           "  (Intercept)       odds 3 [2, 5], p <0.001\n"
-                           "  rendererray       odds ratio 1.5 [0.75, 2.5], p 0.200\n";
-  EXPECT_EQ(task_report_text(analysis), odds + "\n" + kLogisticText);
-  model.random_sds = {0.875, 5};
-  const std::string spread = "  standard deviation of the participants' log odds 0.875";
-  EXPECT_EQ(task_report_text(analysis), odds + spread + "\n\n" + kLogisticText);
-  model.singular = true;
-  EXPECT_EQ(task_report_text(analysis), odds + spread + " (singular)\n\n" + kLogisticText);
+  TaskGroupComparison& one = analysis.group_models.comparisons.emplace_back();
+  one.task = "compare";
+  one.measure = "jnd";
+  one.reference = "point";
+  one.compared = "ray";
+  one.ratio = true;
+  one.n = 6;
+  one.estimate = 0.5;
+  one.low = 0.25;
+  one.p = one.p_holm = 0.03125;
+  one.likelihood_ratio = 3.5;
+  const std::string sentence =
+      "JNDs (compare), ray / point: 0.5, 95 % CI above 0.25, likelihood ratio 3.50, p = 0.031, n "
+      "= 6";
+  EXPECT_EQ(group_sentence(one), sentence);
+  one.individual_fits = {5, 1, 2.5, 4, 0.25, {"B"}};
+  const std::string text = task_report_text(analysis);
+  EXPECT_NE(text.find("  " + sentence +
+                      "\n    individual fits: t(4) = 2.50, p = 0.250, 5 pairs, 1 "
+                      "function left out (B)\n"),
+            std::string::npos)
+      << text;
+  EXPECT_NE(text.find("To quote\nJNDs (compare), ray / point"), std::string::npos) << text;
+  EXPECT_TRUE(conclusion(analysis).starts_with("JNDs are 50 % lower with the ray than with the"));
 }
 
 }  // namespace

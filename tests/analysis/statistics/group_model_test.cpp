@@ -174,30 +174,36 @@ TEST(GroupModel, OrderChangesNothingButTheSign) {
   }
 }
 
-/// Expected answers of a function without lapses at many levels.
+/// Expected answers of a function without lapses at many levels, 100,000 at each.
 GroupAnswers exact_answers(double location, double width) {
   GroupAnswers out;
   for (int level = 0; level <= 40; level += 2) {
     const double p = 1 / (1 + std::exp(-std::log(3.0) * (level - location) / width));
-    out.counts.push_back({static_cast<double>(level), 800, static_cast<int>(std::lround(800 * p))});
+    out.counts.push_back(
+        {static_cast<double>(level), 100000, static_cast<int>(std::lround(1e5 * p))});
   }
   return out;
 }
 
+// Each likelihood is narrower than a step of the grid, so the values lie on its points.
 TEST(GroupModel, KnownValuesGiveTheTInterval) {
-  const std::vector<double> locations{14, 17, 19.5, 21, 26}, logs{0.9, 1.3, 1.6, 1.75, 2.2};
+  const GroupAxis first{-20, 60, 201, 0.4, 80};
+  const GroupAxis second{std::log(0.2), std::log(80), 121, 0.05, 1.5};
+  std::vector<double> locations, logs;
   Conditions answers(1);
-  for (std::size_t i = 0; i < locations.size(); ++i)
+  const std::vector<std::size_t> rows{85, 93, 99, 103, 115}, columns{50, 58, 64, 67, 76};
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    locations.push_back(first.at(rows[i]));
+    logs.push_back(second.at(columns[i]));
     answers[0].push_back(exact_answers(locations[i], std::exp(logs[i])));
-  // A fine grid: each likelihood is narrow.
-  const GroupGrid fine{801, 401, 0.5, 100, 0.05};
-  const GroupPsychometricData data = group_psychometric_data(answers, {}, fine);
+  }
+  const GroupPsychometricData data = group_psychometric_data(answers, {});
   const GroupFit fit = fit_group(data.data);
   const auto check = [](const GroupMoments& found, const std::vector<double>& values) {
     const Interval want = *t_test(values).log_ratio_ci95;
-    EXPECT_NEAR(found.mean, mean(values), 1e-2 * (want.high - want.low));
-    EXPECT_NEAR(found.ci95.low, want.low, 1e-2 * (want.high - want.low));
-    EXPECT_NEAR(found.ci95.high, want.high, 1e-2 * (want.high - want.low));
+    EXPECT_NEAR(found.mean, mean(values), 1e-6);
+    EXPECT_NEAR(found.ci95.low, want.low, 1e-6);
+    EXPECT_NEAR(found.ci95.high, want.high, 1e-6);
   };
   check(fit.conditions[0].first, locations);
   check(fit.conditions[0].second, logs);

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "analysis/report/coverage_report.h"
 #include "analysis/statistics/sensitivity.h"
 
 namespace palpate::analysis {
@@ -43,9 +44,10 @@ TEST(IntervalCoverage, IsTheSameOfOneJobAndOfThree) {
   settings.jobs = 3;
   const auto three = interval_coverage(settings);
   ASSERT_EQ(one.size(), coverage_designs({0.05}).size());
-  EXPECT_EQ(coverage_json(one, settings), coverage_json(three, settings));
+  EXPECT_EQ(coverage_json(one, settings, {}), coverage_json(three, settings, {}));
   settings.seed = 2;
-  EXPECT_NE(coverage_json(interval_coverage(settings), settings), coverage_json(one, settings));
+  EXPECT_NE(coverage_json(interval_coverage(settings), settings, {}),
+            coverage_json(one, settings, {}));
   for (const CoverageResult& result : one) {
     EXPECT_EQ(result.studies + result.unfitted, 4U);
     EXPECT_GT(result.mean_trials, 60);
@@ -71,7 +73,7 @@ TEST(IntervalCoverage, TextAndJsonSayTheCounts) {
   EXPECT_NE(text.find("0.02    96.0   90.0  100.0   90.0   80.0   70.0      4.0   2.0\n"),
             std::string::npos)
       << text;
-  const auto json = nlohmann::json::parse(coverage_json({result}, settings));
+  const auto json = nlohmann::json::parse(coverage_json({result}, settings, {}));
   const auto& design = json["designs"][0];
   EXPECT_EQ(json["seed"], 77);
   EXPECT_EQ(json["n_studies"], 50);

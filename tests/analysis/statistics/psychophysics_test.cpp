@@ -7,7 +7,6 @@
 #include <nlohmann/json.hpp>
 
 #include "analysis/statistics/discrimination.h"
-#include "analysis/statistics/mixed_model.h"
 #include "analysis/statistics/task_analysis.h"
 #include "analysis/statistics/task_comparisons.h"
 #include "data/base/random.h"
@@ -222,59 +221,6 @@ TEST(Information, CorrectionTakesMostOfTheBiasOfSmallSamplesAway) {
     EXPECT_NEAR(many.plain - truth, 0.0204, 0.007);
     EXPECT_NEAR(many.corrected - truth, 0.0042, 0.007);
   }
-}
-
-std::vector<BinomialCell> glmm_cells(const DetectionJson& rows, bool slope) {
-  std::vector<BinomialCell> cells;
-  for (const auto& row : rows) {
-    BinomialCell cell;
-    cell.participant = row["participant"];
-    cell.trials = row["trials"];
-    cell.successes = row["successes"];
-    const double renderer = row["renderer"];
-    const int shape = row["shape"];
-    cell.fixed = {1, renderer, shape == 1 ? 1.0 : 0, shape == 2 ? 1.0 : 0};
-    cell.random = {1};
-    if (slope) cell.random.push_back(renderer);
-    cells.push_back(cell);
-  }
-  return cells;
-}
-
-TEST(MixedLogisticModel, AgreesWithGlmer) {
-  const DetectionJson fixture = detection_fixture()["glmm"];
-  for (const bool slope : {false, true}) {
-    const auto& expected = fixture[slope ? "slope" : "intercept"];
-    const MixedLogistic model =
-        mixed_logistic(glmm_cells(fixture["cells"], slope), {"a", "b", "c", "d"});
-    ASSERT_EQ(model.undefined, "");
-    EXPECT_FALSE(model.singular);
-    EXPECT_NEAR(model.log_likelihood, expected["log_likelihood"].get<double>(), 1e-4);
-    for (std::size_t i = 0; i < 4; ++i) {
-      EXPECT_NEAR(model.coefficients[i].estimate, expected["estimate"][i].get<double>(), 1e-3);
-      EXPECT_NEAR(model.coefficients[i].se / expected["se"][i].get<double>(), 1, 5e-3);
-    }
-    const auto& sds = expected["sds"];
-    for (std::size_t i = 0; i < model.random_sds.size(); ++i) {
-      EXPECT_NEAR(model.random_sds[i], (sds.is_array() ? sds[i] : sds).get<double>(), 1e-3);
-    }
-    if (slope) {
-      EXPECT_NEAR(*model.random_correlation, expected["correlation"].get<double>(), 3e-3);
-    }
-  }
-}
-
-TEST(MixedLogisticModel, SaysWhereItIsNotDefined) {
-  BinomialCell one;
-  one.trials = 4;
-  one.successes = 2;
-  one.fixed = one.random = {1};
-  EXPECT_EQ(mixed_logistic({one}, {"a"}).undefined, "fewer than two participants");
-  BinomialCell two = one;
-  two.participant = 1;
-  EXPECT_TRUE(mixed_logistic({one, two}, {"a"}).singular);  // all participants are alike
-  one.successes = two.successes = 4;
-  EXPECT_EQ(mixed_logistic({one, two}, {"a"}).undefined, "all answers are alike");
 }
 
 TEST(CompareThresholds, AgreesWithLmerAndPairedTests) {

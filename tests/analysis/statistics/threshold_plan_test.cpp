@@ -1,5 +1,5 @@
 // Power for a difference of JNDs, against studies of what is drawn directly: log ratios that are
-// normal about the true one.
+// normal about the true one. Other measures by their level and truth.
 
 #include "analysis/statistics/threshold_plan.h"
 
@@ -48,55 +48,94 @@ double power_of_six(double mean) {
 }
 
 TEST(ThresholdPlan, OfMeasuredJndsIsThatOfTheirTrueRatios) {
-  for (const double ratio : {0.8, 1.25, 1.0}) {
+  for (const double ratio : {0.8, 1.0}) {
     ThresholdStudy study;
-    study.ratio = ratio;
-    const ThresholdPlan plan = plan_thresholds(study, asked(kManyTrials, {6}, 150));
+    study.effect = std::log(ratio);
+    const ThresholdPlan plan = plan_thresholds(study, asked(kManyTrials, {6}, 100));
     ASSERT_EQ(plan.powers.size(), 1U);
     const ThresholdPower& power = plan.powers[0];
     EXPECT_EQ(power.trials, kManyTrials);
     EXPECT_EQ(power.participants, 6U);
-    EXPECT_EQ(power.studies, 150U);
-    EXPECT_LE(power.undetermined, 150U * 6 * 2 / 20);
-    EXPECT_DOUBLE_EQ(power.power, static_cast<double>(power.found) / 150);
+    EXPECT_EQ(power.studies, 100U);
+    EXPECT_EQ(power.undetermined, 0U);
+    EXPECT_DOUBLE_EQ(power.power, static_cast<double>(power.found) / 100);
     const double expected = power_of_six(std::log(ratio));
-    EXPECT_NEAR(power.power, expected, 4 * std::sqrt(expected * (1 - expected) / 150)) << ratio;
+    EXPECT_NEAR(power.power, expected, 4 * std::sqrt(expected * (1 - expected) / 100)) << ratio;
+    EXPECT_NEAR(power.se, std::sqrt(power.power * (1 - power.power) / 100), 1e-12);
     EXPECT_LT(power.ci95.low, power.power);
     EXPECT_GT(power.ci95.high, power.power);
-    // The mean of 150 means of six: sd 0.2 / 30.
-    EXPECT_NEAR(power.bias, 0, 4 * 0.2 / 30) << ratio;
-    EXPECT_NEAR(power.coverage, 0.95, 4 * std::sqrt(0.95 * 0.05 / 150)) << ratio;
+    // The mean of 100 means of six: sd 0.2 / sqrt(600).
+    EXPECT_NEAR(power.bias, 0, 4 * 0.2 / std::sqrt(600)) << ratio;
   }
 }
 
 // The more participants are the fewer and some more: a study of four is the first four of twelve.
-TEST(ThresholdPlan, MoreParticipantsAndMoreTrialsFindMore) {
-  ThresholdPlanSettings settings = asked(70, {1, 4, 12}, 40);
-  settings.trials.push_back(280);
+TEST(ThresholdPlan, MoreParticipantsFindMore) {
+  ThresholdStudy study;
+  study.effect = std::log(0.6);
+  ThresholdPlanSettings settings = asked(84, {1, 4, 12}, 20);
   std::vector<double> shares;
   settings.progress = [&shares](double share) { shares.push_back(share); };
-  const ThresholdPlan plan = plan_thresholds({}, settings);
-  ASSERT_EQ(plan.powers.size(), 6U);
-  const auto at = [&plan](std::size_t trials, std::size_t participants) -> const ThresholdPower& {
-    return plan.powers[trials * 3 + participants];
-  };
-  for (std::size_t t = 0; t < 2; ++t) {
-    EXPECT_EQ(at(t, 0).power, 0) << "of one participant nothing is concluded";
-    EXPECT_EQ(at(t, 0).bias, 0);
-    EXPECT_EQ(at(t, 0).coverage, 0);
-    EXPECT_EQ(at(t, 0).studies, 40U);
-    EXPECT_GT(at(t, 2).power, at(t, 1).power);
-    for (std::size_t n = 0; n < 3; ++n) EXPECT_EQ(at(t, n).trials, t == 0 ? 70U : 280U);
-    EXPECT_LE(at(t, 1).undetermined, at(t, 2).undetermined);
+  const ThresholdPlan plan = plan_thresholds(study, settings);
+  ASSERT_EQ(plan.powers.size(), 3U);
+  EXPECT_EQ(plan.powers[0].power, 0) << "of one participant nothing is concluded";
+  EXPECT_EQ(plan.powers[0].undetermined, 20U);
+  EXPECT_GT(plan.powers[2].power, plan.powers[1].power);
+  settings = asked(84, {4}, 20);
+  settings.jobs = 3;
+  const ThresholdPlan few = plan_thresholds(study, settings);
+  EXPECT_EQ(few.powers[0].found, plan.powers[1].found);
+  EXPECT_EQ(few.powers[0].bias, plan.powers[1].bias);
+  ASSERT_EQ(shares.size(), 20U);
+  EXPECT_DOUBLE_EQ(shares.back(), 1);
+}
+
+TEST(ThresholdPlan, ShiftsAndThresholdsAreFound) {
+  ThresholdStudy study;
+  study.measure = PlannedMeasure::pse;
+  study.effect = 1.5;
+  const ThresholdPower pse = plan_thresholds(study, asked(84, {8}, 20)).powers[0];
+  EXPECT_GE(pse.found, 18U);
+  EXPECT_NEAR(pse.bias, 0, 0.15);
+  study.measure = PlannedMeasure::threshold;
+  study.effect = std::log(0.5);
+  const ThresholdPower threshold = plan_thresholds(study, asked(84, {8}, 20)).powers[0];
+  EXPECT_GE(threshold.found, 17U);
+  EXPECT_NEAR(threshold.bias, 0, 0.15);
+}
+
+TEST(ThresholdPlan, SharesAndRatingsKeepTheirLevelAndTruth) {
+  for (const PlannedMeasure measure : {PlannedMeasure::accuracy, PlannedMeasure::rating}) {
+    ThresholdStudy study;
+    study.measure = measure;
+    study.participant_sd = 0.7;
+    study.effect_sd = 0.5;
+    study.effect = 0;
+    const ThresholdPower none = plan_thresholds(study, asked(40, {8}, 1000)).powers[0];
+    EXPECT_NEAR(none.power, 0.05, 4 * std::sqrt(0.05 * 0.95 / 1000));
+    EXPECT_NEAR(none.bias, 0, 0.03);
+    study.effect = measure == PlannedMeasure::accuracy ? 0.12 : 0.8;
+    const ThresholdPower some = plan_thresholds(study, asked(40, {8}, 1000)).powers[0];
+    EXPECT_GT(some.power, 0.5);
+    EXPECT_NEAR(some.bias, 0, 0.04);
+    EXPECT_LT(some.undetermined, 10U);
   }
-  EXPECT_GT(at(1, 1).power + at(1, 2).power, at(0, 1).power + at(0, 2).power);
-  EXPECT_GT(at(0, 2).undetermined, at(1, 2).undetermined);
-  const ThresholdPlan few = plan_thresholds({}, asked(70, {4}, 40));
-  EXPECT_EQ(few.powers[0].found, at(0, 1).found);
-  EXPECT_EQ(few.powers[0].bias, at(0, 1).bias);
-  ASSERT_EQ(shares.size(), 80U);
-  for (std::size_t i = 0; i < shares.size(); ++i)
-    EXPECT_DOUBLE_EQ(shares[i], static_cast<double>(i + 1) / 80);
+}
+
+// Two one-sided tests of six people, D = 1.5 SD of differences: 86 %.
+TEST(ThresholdPlan, EquivalenceNeedsAWideBound) {
+  ThresholdStudy study;
+  study.measure = PlannedMeasure::rating;
+  study.effect = 0;
+  study.effect_sd = 1;
+  study.participant_sd = 0;
+  study.rating_sd = 0.01;
+  study.bound = 2;
+  const double wide = plan_thresholds(study, asked(500, {6}, 400)).powers[0].power;
+  study.bound = 0.2;
+  const double narrow = plan_thresholds(study, asked(500, {6}, 400)).powers[0].power;
+  EXPECT_GT(wide, 0.8);
+  EXPECT_LT(narrow, 0.1);
 }
 
 }  // namespace

@@ -34,22 +34,27 @@ class TaskPlans(CommandCase):
             self.assertEqual(one["studies"], 100)
         return {(one["trials"], one["participants"]): one for one in found}
 
-    def test_power_for_a_difference_of_jnds_grows_with_participants_and_trials(self):
-        found = self.powers("--jnd-effect", 30, "--trials", "70,210", "--participants", "4-12")
-        self.assertGreater(found[210, 12]["power"], 0.6)
-        self.assertGreater(found[210, 12]["power"], found[210, 4]["power"] + 0.15)
-        self.assertGreaterEqual(found[210, 12]["power"], found[70, 12]["power"])
-        self.assertEqual(self.powers("--jnd-effect", 30, "--trials", "70,210", "--participants", "4-12", name="b.json"), found)
+    def test_power_for_a_difference_of_jnds_grows_with_participants(self):
+        arguments = "--jnd-effect", 50, "--trials", "84", "--participants", "4-8"
+        found = self.powers(*arguments)
+        self.assertGreater(found[84, 8]["power"], 0.6)
+        self.assertGreater(found[84, 8]["power"], found[84, 4]["power"] + 0.1)
+        self.assertEqual(self.powers(*arguments, name="b.json"), found)
 
-    def test_without_a_difference_the_error_rate_is_alpha(self):
-        found = self.powers("--jnd-effect", 0, "--trials", "105", "--participants", "8-8")[105, 8]
+    def test_other_measures_have_a_power_as_well(self):
+        found = self.powers("--accuracy-effect", 15, "--trials", "80", "--participants", "8-8")[80, 8]
+        self.assertGreater(found["power"], 0.5)
+        self.assertEqual(found["n_not_determined"], 0)
+        found = self.powers("--rating-effect", 0, "--equivalence", 2, "--trials", "4", "--participants", "12-12")[4, 12]
+        self.assertGreater(found["power"], 0.8)
+        found = self.powers("--pse-effect", 0, "--trials", "42", "--participants", "6-6")[42, 6]
         self.assertLessEqual(found["power"], 0.12)  # 0.05, apart from the error of 100 studies
-        self.assertGreaterEqual(found["coverage"], 0.88)
 
     def test_wrong_usage_is_refused(self):
         for wrong in (["--jnd-effect", 99], ["--jnd-effect", "nan"], ["--jnd-effect", 20, "--weber", 0],
                       ["--jnd-effect", 20, "--gain-sd", 1], ["--jnd-effect", 20, "--participants", "1-4"],
-                      ["--jnd-effect", 20, "--trials", "0"]):
+                      ["--jnd-effect", 20, "--trials", "0"], ["--jnd-effect", 20, "--pse-effect", 1],
+                      ["--accuracy-effect", 30], ["--equivalence", 1], ["--rating-effect", 0, "--equivalence", 0]):
             self.palpate("plan", *wrong, status=2)
 
     def test_a_sweep_has_the_figures_of_every_cell(self):

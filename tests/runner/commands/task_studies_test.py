@@ -286,7 +286,7 @@ class TaskStudies(CommandCase):
                     self.assertEqual(again[key], plain[key], key)
                 from_csv = self.numbers("--csv", self.dir / f"two{seed}.csv")
                 self.assertEqual(from_csv["identification"]["times"], plain["times"])
-                self.assertEqual(from_csv["accuracy_model"], tasks["accuracy_model"])
+                self.assertEqual(from_csv["group_model"], tasks["group_model"])
 
     def test_shards_merge_to_the_whole_study(self):
         _, two = self.identification()
