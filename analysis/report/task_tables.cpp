@@ -522,7 +522,7 @@ Table functions_table(const TaskCell& cell, const std::string& label) {
                       ? "the untransformed levels"
                       : "the logarithm (base 10) of the levels") +
                  ". fit p: goodness of fit, from refitted simulations. Bayes: posterior mean of "
-                 "the threshold."};
+                 "the threshold. The group's values do not use these fits singly."};
   if (!cell.no_function.empty()) table.notes = {cell.no_function + "."};
   return table;
 }

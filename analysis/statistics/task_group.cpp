@@ -66,7 +66,10 @@ GroupPsychometricModel model_of(const TaskCell& cell) {
   if (own.guess_is_lapse) return model;
   model.asymptotes = own.guess.free ? GroupAsymptotes::own_guess : GroupAsymptotes::fixed_guess;
   model.guess = own.guess.value;
-  if (cell.forced_choice) model.standard = cell.standard_level;
+  // The log of the distance from 0 is the log of the level.
+  const bool from_zero =
+      cell.standard_level == 0.0 && model.function.scale != protocols::LevelScale::linear;
+  if (cell.forced_choice && !from_zero) model.standard = cell.standard_level;
   return model;
 }
 
@@ -131,7 +134,8 @@ std::vector<GroupMeasure> measures_of(const GroupTask& task) {
     return out;
   }
   if (task.model.asymptotes != GroupAsymptotes::both_lapse) {
-    out.push_back({"threshold", GroupCoordinate::first, log_scale});
+    const bool from_zero = cell.forced_choice && standard.has_value();
+    out.push_back({from_zero ? "jnd" : "threshold", GroupCoordinate::first, log_scale});
     return out;
   }
   out.push_back({"pse", GroupCoordinate::first, log_scale});
