@@ -88,6 +88,24 @@ TEST(Hypotheses, ANameThatTheAnalysisDoesNotHaveIsRefused) {
   EXPECT_EQ(std::count(said.begin(), said.end(), '\n'), 1) << "a line for each fault\n" << said;
 }
 
+TEST(Hypotheses, ReachAccuracyEquivalenceAndTasksByName) {
+  const NamedResults found = named_results(R"({
+    "accuracy_comparison": {"primary": {"difference": 0.125, "least_bound": 0.25, "p": null}},
+    "paired_by_shape": {"cone": {"t_test": {"least_bound": 0.375, "bf10": 3}}},
+    "identification": {"counts": {"accuracy": 0.5}},
+    "jnd": {"stiff": {"ratio": 0.75}}, "equivalence": {"jnd": {"stiff": {"least_bound": 0.625}}}})",
+                                           0.05);
+  EXPECT_EQ(found.at("accuracy.difference"), 0.125);
+  EXPECT_EQ(found.at("equivalence.accuracy.least_bound"), 0.25);
+  EXPECT_TRUE(std::isnan(found.at("accuracy.p")));
+  EXPECT_EQ(found.at("equivalence.cone.least_bound"), 0.375);
+  EXPECT_EQ(found.at("paired.cone.bf10"), 3);
+  EXPECT_EQ(found.at("counts.accuracy"), 0.5);
+  EXPECT_EQ(found.at("identification.counts.accuracy"), 0.5);
+  EXPECT_EQ(found.at("jnd.stiff.ratio"), 0.75);
+  EXPECT_EQ(found.at("equivalence.jnd.stiff.least_bound"), 0.625);
+}
+
 TEST(Hypotheses, EveryFaultOfAFileIsSaid) {
   const std::string good = R"("text": "t", "corroborated": "alpha < 1", "refuted": "alpha > 1")";
   EXPECT_EQ(faults_of(R"([{"id": "H1", )" + good + "}]"), "");
