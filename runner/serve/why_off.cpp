@@ -43,6 +43,8 @@ const char* code_of(servo::DeviceTrouble trouble) {
       return "service-gone";
     case DeviceTrouble::in_use:
       return "in-use";
+    case DeviceTrouble::unreadable:
+      return "unreadable";
   }
   return "device-lost";
 }

@@ -37,6 +37,9 @@ const char* advice(DeviceTrouble trouble) noexcept {
       return "the maker's service through which the device is reached has ended: start it again";
     case DeviceTrouble::in_use:
       return "another program commands the device: end that program";
+    case DeviceTrouble::unreadable:
+      return "the maker's service sends messages that cannot be read: restart it, or install a "
+             "version that palpate knows";
   }
   return "";
 }
@@ -44,7 +47,7 @@ const char* advice(DeviceTrouble trouble) noexcept {
 bool needs_reopening(DeviceTrouble trouble) noexcept {
   return trouble == DeviceTrouble::unplugged || trouble == DeviceTrouble::silent ||
          trouble == DeviceTrouble::stopped_by_device || trouble == DeviceTrouble::service_gone ||
-         trouble == DeviceTrouble::in_use;
+         trouble == DeviceTrouble::in_use || trouble == DeviceTrouble::unreadable;
 }
 
 }  // namespace palpate::runner::servo

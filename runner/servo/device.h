@@ -70,6 +70,7 @@ enum class DeviceTrouble : std::uint8_t {
   stopped_by_device,  ///< it has switched its forces off: too fast, too warm, its watchdog
   service_gone,       ///< the program that connects to it has ended
   in_use,             ///< another program commands it
+  unreadable,         ///< the maker's service sends what is no message of its form
 };
 /// In words, with the remedy for the experimenter; empty for none.
 const char* advice(DeviceTrouble trouble) noexcept;

@@ -398,9 +398,9 @@ void Pump::run() noexcept {
     wanted_.write({});
     exchange(true);
   } catch (const LinkError&) {
-    give_up();
+    give_up(servo::DeviceTrouble::service_gone);
   } catch (const std::exception&) {  // of a message: the connection may still carry a command
-    give_up();
+    give_up(servo::DeviceTrouble::unreadable);
     try {
       send(Vec3(0));
     } catch (const LinkError&) {  // closed below
@@ -409,8 +409,8 @@ void Pump::run() noexcept {
   link_.reset();  // a service that has lost its client idles the arm
 }
 
-void Pump::give_up() noexcept {
-  last_.trouble = servo::DeviceTrouble::service_gone;
+void Pump::give_up(servo::DeviceTrouble trouble) noexcept {
+  last_.trouble = trouble;
   last_.time_ns = servo::RealClock().now_ns();
   newest_.write(last_);
 }

@@ -119,7 +119,7 @@ class Pump {
     std::size_t hash = 0;  ///< of the message
   };
   void run() noexcept;
-  void give_up() noexcept;
+  void give_up(servo::DeviceTrouble trouble) noexcept;
   void exchange(bool last = false);
   void send(const Vec3& force, bool full = false);
   /// The reply to the last command; none: the pump ends. Sends zeros while it does not arrive.

@@ -218,7 +218,7 @@ TEST_F(Inverse3, EveryFaultGivesTroubleAndZeroForceAndAllowsReopening) {
                {"no replies", [](auto& a) { a.mute = true; }, [](auto& a) { a.mute = false; },
                 servo::DeviceTrouble::silent},
                {"no JSON", [](auto& a) { a.instead = "{{{"; }, [](auto& a) { a.instead = ""; },
-                servo::DeviceTrouble::service_gone},
+                servo::DeviceTrouble::unreadable},
                {"too long", [](auto& a) { a.instead = std::string(10 << 20, ' '); },
                 [](auto& a) { a.instead = ""; }, servo::DeviceTrouble::service_gone}};
   for (const auto& [name, fault, mend, trouble] : cases) {
