@@ -121,7 +121,7 @@ PUBLIC = {
     "runner/participants": "keyboard respondent simulated_settings simulated "
                            "task_participant",
     "runner/session": "device_check live_forces session_plan live_session recorders signals "
-                      "preflight run_record replay session simulated_study "
+                      "preflight run_record replay session session_end simulated_study "
                       "socket_advisor station",
     "runner/serve": "network served_scene served_session",
     "runner/sweep": "swept_study",

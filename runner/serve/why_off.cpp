@@ -3,7 +3,7 @@
 #include "rendering/render_fault.h"
 #include "runner/serve/messages.h"
 #include "runner/servo/sample.h"
-#include "runner/session/session.h"
+#include "runner/session/session_end.h"
 
 namespace palpate::runner::serve {
 namespace {

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
-#include "runner/session/session.h"
+#include "runner/session/session_end.h"
 #include "runner/session/station.h"
 
 namespace palpate::runner::session {

@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "runner/session/live_forces.h"
-#include "runner/session/session.h"
+#include "runner/session/session_end.h"
 
 namespace palpate::runner::session {
 namespace {

@@ -5,122 +5,15 @@
 #include <cmath>
 #include <cstddef>
 #include <nlohmann/json.hpp>
-#include <string_view>
 #include <utility>
 
 #include "data/base/checksum.h"
 #include "data/files/utc.h"
 #include "protocols/tasks/levels.h"
 #include "protocols/tasks/task_plan.h"
-#include "runner/safety/fault_signals.h"
 #include "runner/session/run_record.h"
 
 namespace palpate::runner::session {
-namespace {
-
-constexpr std::array<std::string_view, 5> kWithdrawals = {"withdrawn", "withdraws", "withdraw",
-                                                          "withdrew", "withdrawal"};
-
-bool is_letter(char c) { return (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z'); }
-
-bool says_withdrawn(const std::string& word) {
-  std::string lower;
-  for (const char c : word) lower += static_cast<char>(c | 0x20);  // a letter
-  return std::find(kWithdrawals.begin(), kWithdrawals.end(), lower) != kWithdrawals.end();
-}
-
-}  // namespace
-
-EndOfSession end_by_experimenter(const std::string& words) {
-  for (auto begin = words.begin(), end = begin; begin != words.end(); begin = end) {
-    begin = std::find_if(begin, words.end(), is_letter);
-    end = std::find_if_not(begin, words.end(), is_letter);
-    const std::string word(begin, end);
-    if (!says_withdrawn(word)) continue;
-    return {data::RunEnd::withdrawn,
-            "the participant withdrew" + (word == words ? "" : ": " + words)};
-  }
-  return {data::RunEnd::aborted, "ended by the experimenter" + (words.empty() ? "" : ": " + words)};
-}
-
-namespace {
-
-std::string emergency_reason() {
-  return trip_reason(servo::servo_fault::kEmergency, servo::DeviceTrouble::none);
-}
-
-}  // namespace
-
-void SessionHold::pause(const std::string& reason) {
-  kind_ = std::max(kind_, Kind::pause);
-  if (kind_ == Kind::pause && !reason.empty()) reason_ = reason;
-}
-
-void SessionHold::hold(const std::string& reason, bool transient, servo::DeviceTrouble trouble) {
-  kind_ = transient ? Kind::transient_fault : Kind::fault;
-  fault_state_ = trouble == servo::DeviceTrouble::guard_late ? "paused" : "fault";
-  reason_ = reason + (reason == emergency_reason() ? zero_asked_by_ : "");
-  fault_ = reason_;
-}
-
-void SessionHold::emergency_zero(const std::string& by, bool in_trial) {
-  forces_.off();
-  zero_asked_by_ = " by " + by;
-  fault_ = emergency_reason() + zero_asked_by_;
-  if (!in_trial) hold(emergency_reason(), false, servo::DeviceTrouble::none);
-}
-
-std::string SessionHold::how_to_continue() const {
-  const std::string go = station_.console.name_of(display::ConsoleCommand::Kind::go_on);
-  if (kind_ != Kind::fault) return "to continue: " + go;
-  return "to continue: " + station_.console.name_of(display::ConsoleCommand::Kind::clear_fault) +
-         ", then " + go;
-}
-
-std::string SessionHold::held_by() const {
-  return reason_ + (reason_.empty() ? "" : "; ") + how_to_continue();
-}
-
-bool SessionHold::allow_forces() {
-  const servo::DeviceTrouble before = forces_.newest().trouble;
-  if (station_.guard != nullptr &&
-      (before == servo::DeviceTrouble::unplugged || before == servo::DeviceTrouble::silent))
-    say_("reopening the device");
-  const std::string trouble = forces_.allow([this] { return station_.end_requested() != 0; });
-  const servo::DeviceTrouble now = forces_.newest().trouble;
-  forces_.end_without_guard();
-  if (trouble.empty()) {
-    fault_.clear();
-    return true;
-  }
-  hold(trouble, false, now);
-  say_("not cleared, forces stay off: " + trouble + "; after that, " + how_to_continue());
-  return false;
-}
-
-bool SessionHold::clear_fault() {
-  if (kind_ < Kind::transient_fault) {
-    say_("there is no fault to clear");
-    return false;
-  }
-  if (!allow_forces()) return false;
-  kind_ = Kind::pause;
-  reason_.clear();
-  return true;
-}
-
-void SessionHold::go_on() {
-  if (kind_ == Kind::none) {
-    say_("nothing is paused");
-  } else if (kind_ == Kind::fault) {
-    say_("forces are off: clear the fault first (" +
-         station_.console.name_of(display::ConsoleCommand::Kind::clear_fault) + ")");
-  } else if (kind_ == Kind::pause || allow_forces()) {
-    kind_ = Kind::none;
-    say_("going on");
-  }
-}
-
 namespace {
 
 using protocols::PageItem;
@@ -516,28 +409,6 @@ namespace {
 std::array<double, 3> values(const Vec3& v) { return {v.x, v.y, v.z}; }
 
 }  // namespace
-
-bool SessionFault::is_transient() const {
-  if (faults & (servo::servo_fault::kEmergency | rendering::render_fault::kNonFinite)) return false;
-  if (faults & servo::servo_fault::kDeviceLost)
-    return trouble == servo::DeviceTrouble::guard_late || trouble == servo::DeviceTrouble::guarded;
-  return (faults & (servo::servo_fault::kMissedTicks | servo::servo_fault::kStalled)) != 0;
-}
-
-std::string trip_reason(std::uint32_t faults, servo::DeviceTrouble trouble) {
-  using namespace servo::servo_fault;
-  for (const std::uint32_t bit :
-       {kEmergency, kStalled, kDeviceLost, kMissedTicks, rendering::render_fault::kNonFinite,
-        rendering::render_fault::kSoftStalled}) {
-    if ((faults & bit) == 0) continue;
-    std::string why = bit == kDeviceLost ? servo::advice(trouble) : "";
-    if (trouble == servo::DeviceTrouble::guard_late || trouble == servo::DeviceTrouble::guarded) {
-      if (!why.empty()) return why;
-    }
-    return safety::fault_row(bit).why + (why.empty() ? why : ": " + why);
-  }
-  return safety::fault_row(kTripped).why;
-}
 
 Session::Session(const Station& station, participants::Respondent& participant,
                  SessionEvents* events, double least_reach)
