@@ -43,7 +43,9 @@ TEST(SignalDetection, AgreesWithPsyphy) {
     EXPECT_NEAR(forced_choice_d_prime(one["share"], one["alternatives"]).value(),
                 one["d_prime"].get<double>(), 2e-4);
   }
-  EXPECT_EQ(forced_choice_d_prime(0.5, 2), std::nullopt);
+  EXPECT_NEAR(forced_choice_d_prime(0.5, 2).value(), 0, 1e-12);
+  EXPECT_LT(forced_choice_d_prime(0.3, 2).value(), 0);
+  EXPECT_EQ(forced_choice_d_prime(0, 2), std::nullopt);
   EXPECT_EQ(forced_choice_d_prime(1, 2), std::nullopt);
   for (const auto& one : fixture["same_different"]) {
     const Detectability d =
