@@ -120,7 +120,7 @@ PUBLIC = {
                             "scene_renderer",
     "runner/participants": "keyboard respondent simulated_settings simulated "
                            "task_participant",
-    "runner/session": "device_check live_forces session_plan live_session recorders signals "
+    "runner/session": "device_check live_forces session_plan live_session markers sample_stream signals "
                       "preflight run_record replay session session_end simulated_study "
                       "socket_advisor station",
     "runner/serve": "network served_scene served_session",

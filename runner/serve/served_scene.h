@@ -17,7 +17,8 @@
 #include "runner/serve/why_off.h"
 #include "runner/servo/servo_thread.h"
 #include "runner/session/live_forces.h"
-#include "runner/session/recorders.h"
+#include "runner/session/markers.h"
+#include "runner/session/sample_stream.h"
 
 namespace palpate::runner::serve {
 

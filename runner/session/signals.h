@@ -9,7 +9,7 @@
 
 #include "data/record.h"
 #include "runner/participants/respondent.h"
-#include "runner/session/recorders.h"
+#include "runner/session/markers.h"
 #include "runner/session/station.h"
 #include "runner/sound/masking_noise.h"
 

@@ -14,7 +14,7 @@
 #include "runner/scene_builder.h"
 #include "runner/servo/servo_thread.h"
 #include "runner/session/device_check.h"
-#include "runner/session/recorders.h"
+#include "runner/session/markers.h"
 #include "runner/session/run_record.h"
 #include "runner/session/session_plan.h"
 #include "runner/session/socket_advisor.h"

@@ -36,7 +36,7 @@
 #include "runner/safety/shared_memory.h"
 #include "runner/servo/realtime.h"
 #include "runner/servo/servo_thread.h"
-#include "runner/session/recorders.h"
+#include "runner/session/markers.h"
 #include "stimuli/primitives.h"
 
 namespace palpate::runner::commands {

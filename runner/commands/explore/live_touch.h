@@ -19,7 +19,8 @@
 #include "runner/commands/run/settings.h"
 #include "runner/display/display.h"
 #include "runner/servo/servo_thread.h"
-#include "runner/session/recorders.h"
+#include "runner/session/markers.h"
+#include "runner/session/sample_stream.h"
 
 namespace palpate::runner::commands {
 

@@ -15,7 +15,8 @@
 #include "runner/safety/guarded_device.h"
 #include "runner/scene_builder.h"
 #include "runner/servo/servo_thread.h"
-#include "runner/session/recorders.h"
+#include "runner/session/markers.h"
+#include "runner/session/sample_stream.h"
 #include "runner/sound/masking_noise.h"
 
 namespace palpate::runner::commands {

@@ -28,7 +28,8 @@
 #include "runner/session/device_check.h"
 #include "runner/session/live_session.h"
 #include "runner/session/preflight.h"
-#include "runner/session/recorders.h"
+#include "runner/session/markers.h"
+#include "runner/session/sample_stream.h"
 #include "runner/session/socket_advisor.h"
 #include "runner/session/station.h"
 

@@ -21,7 +21,7 @@
 #include <utility>
 #include <vector>
 
-#include "runner/session/recorders.h"
+#include "runner/session/markers.h"
 
 namespace {
 

@@ -1,25 +1,19 @@
 #pragma once
-// For other recorders (EEG, motion capture): event markers, and the servo's samples as a stream.
-// The session never waits for a receiver.
+// Event markers for other recorders (EEG, motion capture), sent as they happen. The session never
+// waits for a receiver: what it does not take is counted and dropped.
 
 #include <atomic>
 #include <condition_variable>
 #include <cstdint>
-#include <functional>
 #include <memory>
 #include <mutex>
-#include <span>
 #include <string>
 #include <thread>
 #include <vector>
 
 #include "protocols/answer_keys.h"
-#include "runner/servo/sample.h"
-#include "runner/servo/tick_source.h"
 
 namespace palpate::runner::session {
-
-// Event markers, sent as they happen. Those that a receiver does not take are counted and dropped.
 
 struct Marker {
   enum class Kind : std::uint8_t {
@@ -90,52 +84,6 @@ class Markers {
   bool quit_ = false;
   std::atomic<std::uint64_t> dropped_{0};
   std::jthread thread_;  ///< not running without sinks
-};
-
-// The servo's samples, sent live to other recorders as a regular stream of Lab Streaming Layer.
-// Nothing waits for it: samples that it cannot take are counted and dropped.
-
-class SampleStream {
- public:
-  /// \param name  "lsl" or "lsl:NAME". \param rate  Hz, of the servo
-  /// \throws std::invalid_argument for another text; std::runtime_error where liblsl is missing
-  SampleStream(const std::string& name, double rate);
-  /// Sends the remaining samples.
-  ~SampleStream();
-  SampleStream(const SampleStream&) = delete;
-  SampleStream& operator=(const SampleStream&) = delete;
-
-  /// Call from one thread. Returns at once.
-  void push(const servo::Sample& sample) noexcept;
-  /// The number of samples that found no room or that liblsl did not take.
-  std::uint64_t dropped() const noexcept;
-
- private:
-  class Sender;
-  std::unique_ptr<Sender> sender_;
-};
-
-/// A servo whose samples also go into a stream when the session takes them: the servo's thread does
-/// no work for it.
-class StreamedServo final : public servo::TickSource {
- public:
-  StreamedServo(servo::TickSource& servo, SampleStream& stream) : servo_(servo), stream_(stream) {}
-
-  void prepare(const rendering::Scene& scene, const rendering::Renderer& renderer,
-               const servo::HomeZone& home) override {
-    servo_.prepare(scene, renderer, home);
-  }
-  const servo::Sample& next() noexcept override {
-    const servo::Sample& sample = servo_.next();
-    stream_.push(sample);
-    return sample;
-  }
-  std::span<const rendering::BodyPose> bodies() const noexcept override { return servo_.bodies(); }
-  servo::ServoQuality stop() noexcept override { return servo_.stop(); }
-
- private:
-  servo::TickSource& servo_;
-  SampleStream& stream_;
 };
 
 }  // namespace palpate::runner::session
