@@ -3,11 +3,8 @@
 // device. Scenes are passed in by exchange of pointers. Every sample is passed out through a ring
 // of fixed size, the newest also through a triple buffer. No locks.
 
-#include <semaphore.h>
-
 #include <array>
 #include <atomic>
-#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <deque>
@@ -19,154 +16,19 @@
 #include <utility>
 #include <vector>
 
-#include "rendering/bodies/soft/soft_scene.h"
 #include "runner/servo/bell.h"
+#include "runner/servo/patience.h"
 #include "runner/servo/realtime.h"
 #include "runner/servo/ring.h"
 #include "runner/servo/sample.h"
 #include "runner/servo/servo.h"
+#include "runner/servo/servo_health.h"
 #include "runner/servo/shared_value.h"
+#include "runner/servo/soft_threads.h"
 #include "runner/servo/touched_places.h"
 #include "runner/servo/triple_buffer.h"
 
 namespace palpate::runner::servo {
-
-// Timing statistics of the servo loop over every tick: lateness, computing time, missed ticks.
-
-/// A histogram of times in steps of 1/8 of their size (12.5 % wide at most; exact below 16 ns),
-/// from 0 to hours. One thread adds; any may read at the same time.
-class TimeHistogram {
- public:
-  void add(std::int64_t ns) noexcept;
-  std::uint64_t count() const noexcept { return count_.load(std::memory_order_relaxed); }
-  std::int64_t longest() const noexcept { return longest_.load(std::memory_order_relaxed); }
-  /// The `p` quantile, as the upper edge of its step, ns.
-  std::int64_t quantile(double p) const noexcept;
-  /// Share of counts in steps above `ns`.
-  double fraction_above(std::int64_t ns) const noexcept;
-  /// The steps that are not empty, as upper edge (ns) and count, in order.
-  std::vector<std::pair<std::int64_t, std::uint64_t>> steps() const;
-
- private:
-  static constexpr int kSteps = 8;   ///< number of steps in each doubling
-  static constexpr int kBins = 352;  ///< up to 2^45 ns
-  static int bin(std::int64_t ns) noexcept;
-  static std::int64_t upper_edge(int bin) noexcept;
-
-  std::array<std::atomic<std::uint64_t>, kBins> bins_{};
-  std::atomic<std::uint64_t> count_{0};
-  std::atomic<std::int64_t> longest_{0};
-};
-
-/// Ticks against the clock: elapsed_ns / period = ticks - 1 + missed_ticks, all whole numbers.
-struct TimeKept {
-  std::uint64_t ticks = 0;
-  std::uint64_t missed_ticks = 0;  ///< whole periods that passed without a tick
-  /// By the clock, from the due time of the first tick to the start of the last one.
-  std::int64_t elapsed_ns = 0;
-};
-
-/// Timing statistics of all ticks of a servo thread.
-class ServoHealth {
- public:
-  /// Call it in the servo's thread.
-  void add(const Sample& sample, std::int64_t period_ns) noexcept;
-  void add_lost_sample() noexcept;
-
-  /// All three values at the same moment.
-  TimeKept time_kept() const noexcept;
-  std::uint64_t ticks() const noexcept { return lateness_.count(); }
-  std::uint64_t missed_ticks() const noexcept { return time_kept().missed_ticks; }
-  std::uint64_t lost_samples() const noexcept { return lost_.load(std::memory_order_relaxed); }
-  std::uint32_t faults() const noexcept { return faults_.load(std::memory_order_relaxed); }
-  std::int64_t longest_period_ns() const noexcept {
-    return longest_period_.load(std::memory_order_relaxed);
-  }
-  const TimeHistogram& lateness() const { return lateness_; }
-  const TimeHistogram& compute() const { return compute_; }
-
- private:
-  TimeHistogram lateness_, compute_;
-  TimeKept counted_;               ///< the servo's own
-  std::int64_t first_due_ns_ = 0;  ///< likewise
-  SharedValue<TimeKept> time_kept_;
-  std::atomic<std::uint64_t> lost_{0};
-  std::atomic<std::uint32_t> faults_{0};
-  std::atomic<std::int64_t> longest_period_{0};
-};
-
-/// JSON for a session's record: counts, quantiles, and the histograms of all ticks' lateness and
-/// computing time.
-std::string to_json_text(const ServoHealth& health, double rate);
-
-// Threads that step soft objects, one for each object, beside the servo's.
-
-/// The surface of a soft object at its last step, for drawing.
-struct SoftSnapshot {
-  std::vector<Vec3> now;  ///< m, of the nodes of the surface; empty: it has not been stepped
-  std::uint64_t steps = 0;
-};
-
-/// The thread of one object. The servo asks for a step and takes its result, one at a time, by
-/// exchange of buffers. It never waits, and the thread does not touch the servo's data in between.
-/// The thread's priority is below the servo's.
-class SoftThread final : public rendering::SoftStepper {
- public:
-  /// \param realtime  the servo's. \throws std::system_error if no thread can be created
-  SoftThread(std::shared_ptr<const rendering::SoftObject> object, const RealtimeSettings& realtime);
-  ~SoftThread() override;  ///< waits for the current step. The servo must no longer use it
-  SoftThread(const SoftThread&) = delete;
-  SoftThread& operator=(const SoftThread&) = delete;
-
-  // Called by the servo:
-  void ask(std::span<const rendering::NodeForce> forces) noexcept override;
-  bool ready() const noexcept override {
-    return phase_.load(std::memory_order_acquire) == Phase::made;
-  }
-  bool take(rendering::SoftView& view) noexcept override;
-
-  /// For one other thread. False: nothing is new.
-  bool latest(SoftSnapshot& snapshot) noexcept { return drawn_.read(snapshot); }
-  int object() const { return object_->object; }  ///< index in the scene
-  /// Holds all steps, as if the thread had no processor. From any thread; for tests.
-  void stall(bool stalled) noexcept { stalled_.store(stalled); }
-
- private:
-  enum class Phase : std::uint8_t { idle, asked, made };
-  void run() noexcept;
-
-  const std::shared_ptr<const rendering::SoftObject> object_;
-  const RealtimeSettings realtime_;
-  sem_t asked_{};
-  std::atomic<Phase> phase_{Phase::idle};
-  static_assert(std::atomic<Phase>::is_always_lock_free);
-  std::atomic<bool> quit_{false}, stalled_{false};
-  // Owned by the servo in phases idle and made, by the thread in phase asked.
-  std::vector<rendering::NodeForce> forces_;
-  rendering::SoftView view_;
-  bool good_ = true;
-  // The thread's own:
-  rendering::SoftState body_;
-  SoftSnapshot snapshot_;
-  TripleBuffer<SoftSnapshot> drawn_;
-  std::jthread thread_;  ///< last: ends first
-};
-
-/// The threads of a scene; empty if it has no soft objects.
-class SoftThreads {
- public:
-  SoftThreads(const rendering::Scene& scene, const RealtimeSettings& realtime);
-  /// Makes the state's steps run here from now on. Call it right after initial_state().
-  void attach(rendering::RenderState& state);
-
-  bool empty() const { return threads_.empty(); }
-  /// In the order of soft_objects().
-  SoftThread& operator[](std::size_t i) { return *threads_[i]; }
-  std::size_t size() const { return threads_.size(); }
-
- private:
-  std::vector<std::unique_ptr<SoftThread>> threads_;
-};
 
 struct ServoSettings {
   double rate = 1000;  ///< Hz
@@ -176,24 +38,6 @@ struct ServoSettings {
   RealtimeSettings realtime;
   std::size_t ring = 16384;     ///< samples that can wait for the session; more are lost
   bool touched_places = false;  ///< also publish contact places of every tick
-};
-
-/// The time until a silent servo counts as stalled: one second with motors. Without motors zero
-/// force is not urgent, so it is ten seconds, and time in which the whole program stood still does
-/// not count.
-class Patience {
- public:
-  explicit Patience(bool has_motors) noexcept : has_motors_(has_motors) { begin(); }
-  /// Restarts the time: a sample has arrived.
-  void begin() noexcept;
-  /// Call it every few milliseconds.
-  bool is_over() noexcept;
-
- private:
-  using Time = std::chrono::steady_clock::time_point;
-  bool has_motors_;
-  Time heard_, asked_;
-  std::chrono::nanoseconds waited_{0};  ///< only while the program ran
 };
 
 /// Call prepare, next and stop in one thread, the session's; latest in one thread, which may be
