@@ -22,11 +22,12 @@
 #include <string>
 #include <vector>
 
-#include "runner/display/console_view.h"
+#include "runner/display/console_elements.h"
 #include "runner/display/fonts.h"
 #include "runner/display/scene/camera.h"
 #include "runner/display/scene/image_file.h"
 #include "runner/display/scene/scene_renderer.h"
+#include "runner/display/scene_view.h"
 #include "runner/display/timeline.h"
 #include "runner/display/window_layout.h"
 #include "runner/display/x11_errors.h"

@@ -11,7 +11,7 @@
 #include <memory>
 #include <set>
 
-#include "runner/display/console_view.h"
+#include "runner/display/console_elements.h"
 
 namespace palpate::runner::display {
 namespace {

@@ -1,6 +1,6 @@
 // Up in the world is up in the picture, and the stylus follows the pointer. The tests check drawn
 // pixels, not the camera's own projection. The view of a live session has the same camera, ground
-// and light (runner/display/console_view.h).
+// and light (runner/display/scene_view.h).
 
 #include <gtest/gtest.h>
 
@@ -12,9 +12,9 @@
 #include <utility>
 
 #include "runner/devices/mouse.h"
-#include "runner/display/console_view.h"
 #include "runner/display/scene/painter.h"
 #include "runner/display/scene/scene_drawing.h"
+#include "runner/display/scene_view.h"
 
 namespace palpate::runner::display {
 namespace {
