@@ -639,7 +639,7 @@ std::string threshold_plan_text(const ThresholdPlan& plan) {
             "\n";
   }
   text += "\n" + method_of(study) +
-          " Not determined: studies\nwhose interval is open at both ends, or without a test.\n";
+          "\nNot determined: studies whose interval is open at both ends, or without a test.\n";
   const bool few = std::ranges::any_of(plan.settings.participants,
                                        [](std::size_t n) { return n < kLeastForBayes; });
   if (few)

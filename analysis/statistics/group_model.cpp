@@ -639,17 +639,4 @@ GroupDifference compare_group(const GroupData& data, const GroupFit& fit,
   return out;
 }
 
-std::vector<double> group_likelihood_ratios(const GroupData& data, const GroupFit& fit,
-                                            GroupCoordinate coordinate, std::size_t reference,
-                                            std::size_t compared,
-                                            const std::vector<double>& differences) {
-  PairProfile profile(data, fit, coordinate, reference, compared);
-  std::vector<double> ratios;
-  for (const double difference : differences) {
-    profile.restart();
-    ratios.push_back(profile(difference));
-  }
-  return ratios;
-}
-
 }  // namespace palpate::analysis

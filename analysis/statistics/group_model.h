@@ -106,10 +106,4 @@ GroupDifference compare_group(const GroupData& data, const GroupFit& fit,
                               GroupCoordinate coordinate, std::size_t reference,
                               std::size_t compared, const GroupDifferenceSettings& settings = {});
 
-/// Likelihood ratio of given differences, as compare_group() has for no difference.
-std::vector<double> group_likelihood_ratios(const GroupData& data, const GroupFit& fit,
-                                            GroupCoordinate coordinate, std::size_t reference,
-                                            std::size_t compared,
-                                            const std::vector<double>& differences);
-
 }  // namespace palpate::analysis

@@ -199,7 +199,6 @@ void tally(GroupTally& sum, const GroupEstimate& one, double alpha) {
   sum.both_open += one.low_open && one.high_open ? 1 : 0;
   sum.found += one.p < alpha ? 1 : 0;
   sum.error += one.estimate - one.truth;
-  sum.squares += (one.estimate - one.truth) * (one.estimate - one.truth);
 }
 
 void add(GroupTally& sum, const GroupTally& one) {
@@ -209,7 +208,6 @@ void add(GroupTally& sum, const GroupTally& one) {
   sum.both_open += one.both_open;
   sum.found += one.found;
   sum.error += one.error;
-  sum.squares += one.squares;
 }
 
 void add_mean(GroupTally& sum, const GroupMoments& found, double truth) {

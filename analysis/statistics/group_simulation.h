@@ -47,7 +47,7 @@ struct GroupTally {
   std::size_t open = 0;       ///< an end of the interval is open
   std::size_t both_open = 0;  ///< both: not determined
   std::size_t found = 0;      ///< differences: p below alpha
-  double error = 0, squares = 0;  ///< sum of (estimate - truth), and of its squares
+  double error = 0;           ///< sum of (estimate - truth)
 
   double bias() const { return results == 0 ? 0 : error / static_cast<double>(results); }
 };
