@@ -1,12 +1,11 @@
 #include "analysis/statistics/group_simulation.h"
 
-#include <atomic>
 #include <cmath>
 #include <map>
-#include <thread>
 #include <utility>
 
 #include "analysis/statistics/group_psychometric.h"
+#include "analysis/statistics/jobs.h"
 #include "data/base/random.h"
 #include "protocols/procedures/procedure.h"
 
@@ -252,20 +251,12 @@ std::vector<GroupCoverage> group_coverage(const std::vector<GroupStudy>& studies
                                           const GroupCoverageSettings& settings) {
   const std::size_t all = studies.size() * settings.studies;
   std::vector<GroupCoverage> single(all);
-  std::atomic<std::size_t> next{0}, done{0};
-  const auto work = [&](bool reports) {
-    for (std::size_t i = next++; i < all; i = next++) {
-      single[i] = one_study(studies[i / settings.studies], i % settings.studies, settings);
-      const std::size_t so_far = ++done;
-      if (reports && settings.progress)
-        settings.progress(static_cast<double>(so_far) / static_cast<double>(all));
-    }
-  };
-  {
-    std::vector<std::jthread> threads;
-    for (std::size_t i = 1; i < settings.jobs; ++i) threads.emplace_back([&work] { work(false); });
-    work(true);
-  }
+  do_jobs(
+      all, settings.jobs,
+      [&](std::size_t i) {
+        single[i] = one_study(studies[i / settings.studies], i % settings.studies, settings);
+      },
+      settings.progress);
   std::vector<GroupCoverage> out;
   for (std::size_t s = 0; s < studies.size(); ++s) {
     GroupCoverage& sum = out.emplace_back();

@@ -1,12 +1,11 @@
 #include "analysis/statistics/interval_coverage.h"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <limits>
-#include <thread>
 #include <utility>
 
+#include "analysis/statistics/jobs.h"
 #include "analysis/statistics/psychometric_fit.h"
 #include "analysis/statistics/sensitivity.h"
 #include "data/base/random.h"
@@ -254,22 +253,14 @@ std::vector<CoverageResult> interval_coverage(const CoverageSettings& settings) 
   const std::vector<CoverageDesign> designs = coverage_designs(settings.lapses);
   const std::size_t all = designs.size() * settings.studies;
   std::vector<CoverageStudy> studies(all);
-  std::atomic<std::size_t> next{0}, done{0};
-  const auto work = [&](bool reports) {
-    for (std::size_t i = next++; i < all; i = next++) {
-      const std::size_t design = i / settings.studies;
-      studies[i] = one_study(designs[design], settings.seed, design, i % settings.studies,
-                             settings.simulations);
-      const std::size_t so_far = ++done;
-      if (reports && settings.progress)
-        settings.progress(static_cast<double>(so_far) / static_cast<double>(all));
-    }
-  };
-  {
-    std::vector<std::jthread> threads;
-    for (std::size_t i = 1; i < settings.jobs; ++i) threads.emplace_back([&work] { work(false); });
-    work(true);
-  }
+  do_jobs(
+      all, settings.jobs,
+      [&](std::size_t i) {
+        const std::size_t design = i / settings.studies;
+        studies[i] = one_study(designs[design], settings.seed, design, i % settings.studies,
+                               settings.simulations);
+      },
+      settings.progress);
   std::vector<CoverageResult> results;
   for (std::size_t i = 0; i < designs.size(); ++i)
     results.push_back(result_of(designs[i], &studies[i * settings.studies], settings.studies));

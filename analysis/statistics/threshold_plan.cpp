@@ -1,14 +1,13 @@
 #include "analysis/statistics/threshold_plan.h"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
-#include <thread>
 #include <utility>
 
 #include "analysis/statistics/describe.h"
 #include "analysis/statistics/group_psychometric.h"
 #include "analysis/statistics/group_simulation.h"
+#include "analysis/statistics/jobs.h"
 #include "analysis/statistics/paired_evidence.h"
 #include "analysis/statistics/sensitivity.h"
 #include "data/base/random.h"
@@ -228,21 +227,13 @@ ThresholdPlan plan_thresholds(const ThresholdStudy& study, ThresholdPlanSettings
   const ThresholdPlanSettings& asked = plan.settings;
   const std::size_t all = asked.trials.size() * asked.studies;
   std::vector<std::vector<PlannedOutcome>> outcomes(all);
-  std::atomic<std::size_t> next{0}, done{0};
-  const auto work = [&](bool reports) {
-    for (std::size_t i = next++; i < all; i = next++) {
-      outcomes[i] = outcomes_of(study, asked.trials[i / asked.studies], asked.participants,
-                                asked.seed, i % asked.studies);
-      const std::size_t so_far = ++done;
-      if (reports && asked.progress)
-        asked.progress(static_cast<double>(so_far) / static_cast<double>(all));
-    }
-  };
-  {
-    std::vector<std::jthread> threads;
-    for (std::size_t i = 1; i < asked.jobs; ++i) threads.emplace_back([&work] { work(false); });
-    work(true);
-  }
+  do_jobs(
+      all, asked.jobs,
+      [&](std::size_t i) {
+        outcomes[i] = outcomes_of(study, asked.trials[i / asked.studies], asked.participants,
+                                  asked.seed, i % asked.studies);
+      },
+      asked.progress);
   for (std::size_t t = 0; t < asked.trials.size(); ++t) {
     for (std::size_t n = 0; n < asked.participants.size(); ++n) {
       std::vector<PlannedOutcome> own;
