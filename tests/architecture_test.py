@@ -102,7 +102,7 @@ PUBLIC = {
     "data/merge": "merge",
     "analysis": "text",
     "analysis/input": "csv_reader trials study_record sweep_table task_trials",
-    "analysis/statistics": "analysis comparison conclusions describe group_simulation interval_coverage mixed_model "
+    "analysis/statistics": "analysis comparison conclusions describe group_simulation interval_coverage jobs mixed_model "
                            "paired paired_evidence pattern power plan quantiles sensitivity "
                            "sweep_analysis task_analysis threshold_plan",
     "analysis/movement": "comparison measures pictures",

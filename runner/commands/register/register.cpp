@@ -1,12 +1,10 @@
 // `palpate register`: a registration of a study, before its first session.
 
 #include <algorithm>
-#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <exception>
 #include <filesystem>
 #include <functional>
 #include <iostream>
@@ -23,6 +21,7 @@
 #include "analysis/report/plan_report.h"
 #include "analysis/report/report.h"
 #include "analysis/statistics/analysis.h"
+#include "analysis/statistics/jobs.h"
 #include "analysis/statistics/power.h"
 #include "analysis/statistics/sensitivity.h"
 #include "analysis/text.h"
@@ -72,11 +71,12 @@ class PlannedStudies {
 
   /// Verdicts on hypotheses in studies with the planned effect and in as many without; the first of
   /// each are those of write(). The result does not depend on `jobs`.
-  /// \param first  the trials of the first study \param progress  called with the finished studies
+  /// \param first  the trials of the first study \param progress  called with the share that is
+  /// done
   std::vector<Rehearsal> rehearse(const analysis::TrialTable& first,
                                   const Registration& registration, std::size_t studies,
                                   std::size_t jobs,
-                                  const std::function<void(std::size_t)>& progress) const;
+                                  const std::function<void(double)>& progress) const;
 
  private:
   struct Outcome {
@@ -235,46 +235,30 @@ analysis::TrialTable PlannedStudies::table(const analysis::TrialTable& like, std
   return out;
 }
 
-std::vector<Rehearsal> PlannedStudies::rehearse(
-    const analysis::TrialTable& first, const Registration& registration, std::size_t studies,
-    std::size_t jobs, const std::function<void(std::size_t)>& progress) const {
+std::vector<Rehearsal> PlannedStudies::rehearse(const analysis::TrialTable& first,
+                                                const Registration& registration,
+                                                std::size_t studies, std::size_t jobs,
+                                                const std::function<void(double)>& progress) const {
   const std::vector<analysis::Hypothesis>& hypotheses = registration.hypotheses;
   std::vector<Rehearsal> out(hypotheses.size());
   analysis::AnalysisSettings settings;
   settings.too_fast = registration.too_fast;
-  std::atomic<std::size_t> next{0}, done{0};
   std::mutex mutex;
-  std::exception_ptr failed;
-  const auto work = [&](bool reports) {
-    for (std::size_t i = next++; i < 2 * studies; i = next++) {
-      try {
-        const bool with_effect = i < studies;
-        const analysis::Analysis analysis = analysis::analyze(
-            table(first, i % studies, with_effect, registration.typical_time), settings, "");
-        const analysis::NamedResults results =
-            analysis::named_results(analysis::report_json(analysis), registration.alpha);
-        std::vector<analysis::Verdict> verdicts;
-        verdicts.reserve(hypotheses.size());
-        for (const analysis::Hypothesis& one : hypotheses)
-          verdicts.push_back(analysis::judge(one, results).verdict);
-        const std::lock_guard lock(mutex);
-        for (std::size_t h = 0; h < out.size(); ++h)
-          (with_effect ? out[h].with_effect : out[h].without_effect).add(verdicts[h]);
-      } catch (...) {
-        const std::lock_guard lock(mutex);
-        if (!failed) failed = std::current_exception();
-        next = 2 * studies;
-      }
-      ++done;
-      if (reports && progress) progress(done);
-    }
+  const auto one_study = [&](std::size_t i) {
+    const bool with_effect = i < studies;
+    const analysis::Analysis analysis = analysis::analyze(
+        table(first, i % studies, with_effect, registration.typical_time), settings, "");
+    const analysis::NamedResults results =
+        analysis::named_results(analysis::report_json(analysis), registration.alpha);
+    std::vector<analysis::Verdict> verdicts;
+    verdicts.reserve(hypotheses.size());
+    for (const analysis::Hypothesis& one : hypotheses)
+      verdicts.push_back(analysis::judge(one, results).verdict);
+    const std::lock_guard lock(mutex);
+    for (std::size_t h = 0; h < out.size(); ++h)
+      (with_effect ? out[h].with_effect : out[h].without_effect).add(verdicts[h]);
   };
-  {
-    std::vector<std::jthread> threads;
-    for (std::size_t i = 1; i < jobs; ++i) threads.emplace_back([&work] { work(false); });
-    work(true);
-  }
-  if (failed) std::rethrow_exception(failed);
+  analysis::do_jobs(2 * studies, jobs, one_study, progress);
   return out;
 }
 
@@ -508,10 +492,8 @@ void put_simulated(const RegisterOptions& options, const data::AtomicFolder& dra
   made.hypotheses = analysis::read_hypotheses(made.hypotheses_text, options.hypotheses,
                                               analysis::named_results(with, made.alpha));
   ProgressLine line("simulated studies");
-  made.rehearsals =
-      studies.rehearse(first, made, options.studies, options.jobs, [&](std::size_t n) {
-        line.show(static_cast<double>(n) / static_cast<double>(2 * options.studies));
-      });
+  made.rehearsals = studies.rehearse(first, made, options.studies, options.jobs,
+                                     [&](double share) { line.show(share); });
   line.clear();
 }
 
