@@ -210,8 +210,6 @@ Table differences_table(const TaskAnalysis& analysis, bool of_renderers) {
                   "95 % interval",
                   "90 % interval",
                   "BF10",
-                  "90 % interval",
-                  "BF10",
                   "t",
                   "df",
                   "p"};
