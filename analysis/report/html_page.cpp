@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <nlohmann/json.hpp>
+#include <stdexcept>
 #include <utility>
 
 #include "analysis/figures/svg.h"
@@ -16,8 +17,13 @@ namespace {
 
 constexpr std::size_t kMostRows = 400, kMostColumns = 60;
 
-void put_row(std::string& out, const std::vector<std::string>& cells, std::size_t n_names,
+/// \throws std::logic_error: its cells are not those of the header
+void put_row(std::string& out, const std::vector<std::string>& cells, const Table& table,
              bool header) {
+  if (cells.size() != table.header.size())
+    throw std::logic_error("table '" + table.caption + "': a row of " +
+                           std::to_string(cells.size()) + " cells under " +
+                           std::to_string(table.header.size()) + " headings");
   out += "<tr>";
   const std::size_t n = std::min(cells.size(), kMostColumns);
   for (std::size_t c = 0; c < n; ++c) {
@@ -29,7 +35,7 @@ void put_row(std::string& out, const std::vector<std::string>& cells, std::size_
     } else if (c == 0) {
       out += " scope=\"row\"";
     }
-    if (c < n_names) out += " class=\"name\"";
+    if (c < table.n_names || c + table.n_remarks >= cells.size()) out += " class=\"name\"";
     out += '>';
     out += escaped(printable(cells[c], 2000));
     out += "</";
@@ -85,10 +91,10 @@ void put_table(std::string& out, const Table& table) {
   out += "<div class=\"wide\" tabindex=\"0\" role=\"region\" aria-label=\"";
   out += escaped(table.caption) + "\">\n<table>\n<caption>" + escaped_sentence(table.caption) +
          "</caption>\n<thead>\n";
-  put_row(out, table.header, table.n_names, true);
+  put_row(out, table.header, table, true);
   out += "</thead>\n<tbody>\n";
   const std::size_t n = std::min(table.rows.size(), kMostRows);
-  for (std::size_t r = 0; r < n; ++r) put_row(out, table.rows[r], table.n_names, false);
+  for (std::size_t r = 0; r < n; ++r) put_row(out, table.rows[r], table, false);
   out += "</tbody>\n</table>\n</div>\n";
   put_table_tools(out, table.caption);
   const auto note = [&](std::string_view text) {

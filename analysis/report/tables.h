@@ -16,7 +16,8 @@ namespace palpate::analysis {
 struct Table {
   std::string caption;  ///< with "SIMULATED PARTICIPANTS" where it applies
   std::vector<std::string> header;
-  std::size_t n_names = 1;  ///< number of leading columns with names; the others hold numbers
+  std::size_t n_names = 1;    ///< number of leading columns with names; the others hold numbers
+  std::size_t n_remarks = 0;  ///< number of columns at the end with words
   std::vector<std::vector<std::string>> rows;  ///< each as long as the header
   std::vector<std::string> notes;              ///< definitions and reasons for missing values
 };

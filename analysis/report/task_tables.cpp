@@ -86,6 +86,7 @@ Table means_table(const TaskAnalysis& analysis) {
   table.header = {"measure",       "task, block, stimulus", "renderer", "mean",
                   "95 % interval", "participants",          "left out", "remark"};
   table.n_names = 3;
+  table.n_remarks = 1;
   bool modelled = false;
   for (const TaskGroup& group : analysis.groups) {
     std::string measure = measure_plural(group.measure);
@@ -488,6 +489,7 @@ Table functions_table(const TaskCell& cell, const std::string& label) {
                          {"participant", pse ? "PSE" : "threshold", "95 % interval", "JND",
                           "95 % interval", "Weber fraction", "slope", "95 % interval", "lapses",
                           "95 % interval", "fit p", "Bayes", "95 % interval", "remark"});
+  table.n_remarks = 1;
   for (const ParticipantFunction& one : cell.functions) {
     std::vector<std::string> row(table.header.size(), kMissing);
     row[0] = one.participant;
@@ -697,6 +699,7 @@ Table confidence_table(const TaskAnalysis& analysis) {
       "task, block, stimulus", "renderer",     "area",     "95 % interval", "mean of participants",
       "95 % interval",         "participants", "left out", "remark"};
   table.n_names = 2;
+  table.n_remarks = 1;
   for (const TaskCell& cell : analysis.cells) {
     if (!cell.confidence.area) continue;
     const auto& ends = cell.confidence.area_ci95;
