@@ -1,5 +1,6 @@
 #include "analysis/report/coverage_report.h"
 
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "analysis/text.h"
@@ -111,7 +112,8 @@ std::string coverage_text(const std::vector<CoverageResult>& results,
             pad_left(percent_of(one.called_bad, one.studies), 9) +
             pad_left(percent_of(one.open, one.studies), 6) + "\n";
   }
-  const auto held = static_cast<std::size_t>(0.95 * static_cast<double>(settings.studies) + 0.5);
+  const auto held =
+      static_cast<std::size_t>(std::lround(0.95 * static_cast<double>(settings.studies)));
   const Interval noise = coverage_interval(held, settings.studies);
   return text + "\nThe simulation's own 95 % interval about 95 %: " + fixed(100 * noise.low, 1) +
          " to " + fixed(100 * noise.high, 1) +

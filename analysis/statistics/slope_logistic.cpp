@@ -154,7 +154,7 @@ Bounds bounds_of(Index size) {
 
 }  // namespace
 
-SlopeLogistic::SlopeLogistic(std::vector<RenderedAnswers> answers) {
+SlopeLogistic::SlopeLogistic(const std::vector<RenderedAnswers>& answers) {
   for (const RenderedAnswers& one : answers) {
     if (one.trials == 0) continue;
     participants_.resize(std::max(participants_.size(), one.participant + 1));

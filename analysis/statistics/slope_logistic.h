@@ -28,7 +28,7 @@ inline constexpr double kMostLogOdds = 12;
 /// normal over participants.
 class SlopeLogistic {
  public:
-  explicit SlopeLogistic(std::vector<RenderedAnswers> answers);
+  explicit SlopeLogistic(const std::vector<RenderedAnswers>& answers);
 
   const SlopeLogisticFit& best() const { return best_; }
   /// Twice the loss of log likelihood with the log odds ratio held.

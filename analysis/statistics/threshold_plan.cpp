@@ -189,6 +189,7 @@ std::vector<PlannedOutcome> outcomes_of(const ThresholdStudy& study, std::size_t
   const auto all = simulated_answers(group, seed, number);
   for (const std::size_t n : participants) {
     std::vector<std::vector<GroupAnswers>> some;
+    some.reserve(all.size());
     for (const auto& condition : all)
       some.emplace_back(condition.begin(), condition.begin() + static_cast<std::ptrdiff_t>(n));
     out.push_back(outcome_of_functions(study, group, some));

@@ -29,6 +29,7 @@ TransformedMean mean_on_scale(const std::vector<double>& values,
 
 TransformedMean mean_information(const std::vector<double>& bits, double most) {
   std::vector<double> values;
+  values.reserve(bits.size());
   for (const double one : bits)
     values.push_back(std::asin(std::sqrt(std::clamp(one / most, 0.0, 1.0))));
   TransformedMean out = mean_on_scale(values, [most](double value) {
