@@ -54,9 +54,6 @@ LiveSession::Outcome LiveSession::run() {
   RunRecord& record = station_.record;
   if (outcome.end == data::RunEnd::withdrawn) record.begin();  // at any time
   const std::int64_t now = station_.clock.now_ns();
-  for (const std::string& text : record.pending_notes()) {
-    if (text.front() != '{') outcome.unkept.push_back(text);
-  }
   if (!outcome.reason.empty()) record.note(now, "ended: " + outcome.reason);
   record.note(now,
               servo::to_json_text(station_.servo_thread.health(), station_.protocol.servo_rate));
@@ -317,8 +314,8 @@ void LiveSession::plan_stop(display::ConsoleCommand::Kind kind) {
 
 void LiveSession::note(std::int64_t at_ns, const std::string& text) {
   try {
-    station_.record.note(at_ns, text);
-    say(station_.record.confirmed(text));
+    station_.record.write_down(at_ns, text);
+    say("note: " + text);
   } catch (const data::StoreRefused& refused) {  // empty, or invalid UTF-8
     say(refused.what());
   }

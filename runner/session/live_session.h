@@ -24,8 +24,7 @@ class LiveSession final : public participants::Attendant {
     data::RunEnd end = data::RunEnd::done;
     std::string reason;  ///< empty when done
     std::size_t recorded = 0, trials = 0;
-    bool failed = false;                ///< ended by a signal or fault
-    std::vector<std::string> unkept{};  ///< the experimenter's notes, if no run was begun
+    bool failed = false;  ///< ended by a signal or fault
   };
 
   /// \param station  must outlive it

@@ -283,8 +283,8 @@ class PreflightDialogue {
 
   void take_note(const display::ConsoleCommand& note) {
     try {
-      station_.record.note(note.time_ns, note.text);
-      say(station_.record.confirmed(note.text));
+      station_.record.write_down(note.time_ns, note.text);
+      say("note: " + note.text);
     } catch (const data::StoreRefused& refused) {  // empty, or invalid UTF-8
       say(refused.what());
     }

@@ -52,6 +52,12 @@ void RunRecord::begin() {
     store_.add_note(*run_, note.at_ns, note.text);
 }
 
+void RunRecord::write_down(std::int64_t at_ns, const std::string& text) {
+  store_.validate_note(text);
+  begin();
+  note(at_ns, text);
+}
+
 void RunRecord::note(std::int64_t at_ns, const std::string& text) {
   if (run_) {
     store_.add_note(*run_, at_ns, text);
@@ -63,12 +69,6 @@ void RunRecord::note(std::int64_t at_ns, const std::string& text) {
 
 void RunRecord::end(data::RunEnd how, std::int64_t ended_ns) {
   if (run_) store_.end_run(*run_, how, ended_ns);
-}
-
-std::vector<std::string> RunRecord::pending_notes() const {
-  std::vector<std::string> texts;
-  for (const Note& note : pending_) texts.push_back(note.text);
-  return texts;
 }
 
 int RunRecord::begin(const data::TrialRecord& planned, std::int64_t began_ns) {

@@ -59,8 +59,9 @@ class TrialLog {
 };
 
 /// The log of a live session. A new participant is enrolled, and takes a number of the
-/// counterbalancing, when the first trial begins, not when the pre-flight was abandoned or a
-/// display did not open. Earlier notes are kept here and written with the run.
+/// counterbalancing, with the first answer to a page, note of the experimenter or trial, not when
+/// the pre-flight was abandoned or a display did not open. The program's own earlier notes are kept
+/// here and written with the run.
 class RunRecord final : public TrialLog {
  public:
   /// \param participant  from Store::look_up. \throws StoreRefused: the store refuses such a run.
@@ -77,14 +78,11 @@ class RunRecord final : public TrialLog {
   void begin();
   /// \param at_ns  session clock. \throws StoreRefused: the text cannot be stored.
   void note(std::int64_t at_ns, const std::string& text) override;
-  /// What the experimenter reads of a note that was taken.
-  std::string confirmed(const std::string& note) const {
-    return "note: " + note + (begun() ? "" : " (on record once the first trial begins)");
-  }
+  /// A note of the experimenter: on disk when this returns, so it begins the run. \throws
+  /// StoreRefused: the text cannot be stored.
+  void write_down(std::int64_t at_ns, const std::string& text);
   /// Ends the run; without a run, records nothing.
   void end(data::RunEnd how, std::int64_t ended_ns);
-  /// Notes that will be written when the run begins.
-  std::vector<std::string> pending_notes() const;
 
   int begin(const data::TrialRecord& planned, std::int64_t began_ns) override;
   void finish(const data::TrialRecord& record) override { store_.finish_attempt(*run_, record); }

@@ -56,8 +56,9 @@ void print_participant(const data::Participant& participant, int session, int se
                  "renumbered when databases were merged: the trials are those of number %d\n",
                  participant.enrolled_number);
   if (participant.id == 0)
-    std::fprintf(
-        stderr, "the participant is enrolled, and the number taken, when the first trial begins\n");
+    std::fprintf(stderr,
+                 "the participant is enrolled, and the number taken, with the first answer, note "
+                 "or trial\n");
   if (simulated) std::fprintf(stderr, "SIMULATED device: the data are labelled so\n");
 }
 
@@ -78,9 +79,6 @@ void print_outcome(const session::LiveStation& station, const data::Participant&
               station.protocol.name.c_str(), who.code.c_str(), number.c_str(),
               station.record.session(), outcome.recorded, outcome.trials,
               data::to_string(outcome.end));
-  for (const std::string& note : outcome.unkept)
-    std::fprintf(stderr, "not recorded, as no participant was enrolled: %s\n",
-                 printable_lines(note).c_str());
   if (!outcome.reason.empty())
     std::fprintf(stderr, "%s\n", printable_lines(outcome.reason).c_str());
   if (outcome.end == data::RunEnd::paused || outcome.end == data::RunEnd::aborted)
@@ -126,17 +124,13 @@ servo::ForceLimits limits_of(const servo::ServoSettings& settings,
   return limits;
 }
 
-/// Ends before the first trial. Begins a run only for events that must be kept: a withdrawal, and
-/// notes on a participant who has a number already.
+/// Ends before the first trial. Begins a run only for a withdrawal.
 session::LiveSession::Outcome end_before_trials(const session::LiveStation& station,
                                                 const session::EndOfSession& end) {
   session::RunRecord& record = station.record;
   session::LiveSession::Outcome outcome{end.end, end.what(), station.plan.done(),
                                         station.plan.size(), end.failed};
-  if (end.end == data::RunEnd::withdrawn ||
-      (record.participant().id != 0 && !record.pending_notes().empty()))
-    record.begin();
-  outcome.unkept = record.pending_notes();
+  if (end.end == data::RunEnd::withdrawn) record.begin();
   const std::int64_t now = station.clock.now_ns();
   if (record.begun()) record.note(now, "ended: " + outcome.reason);
   record.end(end.end, now);

@@ -102,8 +102,8 @@ std::optional<RunSettings> parse_run_settings(const std::vector<std::string>& ar
       "A live session: resumes an unfinished one, else begins the next. Every trial is on disk\n"
       "before the next one starts. The participant answers with the protocol's keys; Escape or\n"
       "F12 turns the forces off (emergency). 'palpate devices' lists the devices. A new\n"
-      "participant is enrolled when the first trial begins; palpate asks first if the code is not\n"
-      "in the database.";
+      "participant is enrolled with the first answer, note or trial; palpate asks first if the\n"
+      "code is not in the database.";
   line.example =
       R"(  palpate run protocols/ho2000.json --db study.db --participant P03 --device falcon2 --hand right --consent 2024-05
   palpate run protocols/quick.json --db try.db --participant T1 --device mouse

@@ -17,14 +17,12 @@ from live_case import FEELING, PALPATE, PROTOCOL, Live
 
 class Enrolment(Live):
     def test_a_number_is_taken_when_the_first_trial_begins(self):
-        for end in (":quit\n", ":note came late\n:quit feels unwell\n"):
-            with self.run_session(code="P01") as terminal:
-                terminal.wait_for("participant P01 has number 1", "[space bar: go on]")
-                terminal.wait_for("[space bar: go on]")
-                terminal.type(end)
-                self.finish(terminal)
-                self.assertIn("participant P01 (not enrolled), session 1: 0 of 4 trials on record", terminal.text)
-        self.assertIn("not recorded, as no participant was enrolled: came late", terminal.text)
+        with self.run_session(code="P01") as terminal:
+            terminal.wait_for("participant P01 has number 1", "[space bar: go on]")
+            terminal.wait_for("[space bar: go on]")
+            terminal.type(":quit\n")
+            self.finish(terminal)
+            self.assertIn("participant P01 (not enrolled), session 1: 0 of 4 trials on record", terminal.text)
         self.assertEqual(self.codes(self.db), [])
         self.assertEqual(self.sql("SELECT count(*) FROM protocols"), [(0,)])
         terminal = self.begin(code="P02")
@@ -33,16 +31,18 @@ class Enrolment(Live):
         self.finish(terminal)
         self.assertIn("participant P02 (number 1)", terminal.text)
 
-    def test_notes_before_the_first_trial_are_stored_when_it_begins(self):
-        terminal = self.run_session()
-        self.addCleanup(terminal.__exit__)
-        terminal.wait_for("[space bar: go on]")
-        terminal.type(":note wears a ring\n")
-        terminal.wait_for("note: wears a ring (on record once the first trial begins)")
-        self.assertEqual(self.codes(self.db), [])
-        terminal.type(" ")
-        self.finish(terminal)
+    def test_a_note_before_the_first_trial_survives_a_kill(self):
+        with self.run_session() as terminal:
+            terminal.wait_for("[space bar: go on]")
+            terminal.type(":note wears a ring\n")
+            terminal.wait_for("note: wears a ring")
+            terminal.kill()
+        self.assertEqual(self.codes(self.db), ["P01"])
         self.assertEqual(self.notes(), ["wears a ring"])
+        terminal = self.begin(sure=False)
+        terminal.type(":quit\n")
+        self.finish(terminal)
+        self.assertEqual(self.notes()[0], "wears a ring")
 
     def test_a_withdrawal_before_the_first_trial_is_recorded(self):
         with self.run_session() as terminal:
