@@ -41,7 +41,7 @@ TEST(ConsoleWords, AQuestionOfAPageShowsItsNumber) {
   EXPECT_EQ(state_detail(in("page: welcome")), "welcome");
 }
 
-TEST(ConsoleWords, ATrialStandsAmongAllOrAboutAsMany) {
+TEST(ConsoleWords, TrialsAreCountedOrEstimated) {
   ConsoleState state;
   EXPECT_EQ(trial_of(state), "-");
   state.trial = 3;
@@ -61,7 +61,7 @@ TEST(ConsoleWords, ALevelHasTheNameOfWhatVaries) {
   EXPECT_EQ(level_text(state), "stiffness 80 N/m");
 }
 
-TEST(ConsoleWords, APauseInATrialSaysThatItComesAfterIt) {
+TEST(ConsoleWords, APauseComesAfterTheTrial) {
   ConsoleState state = in("trial");
   state.pauses = true;
   EXPECT_EQ(state_detail(state), "pauses after this trial");

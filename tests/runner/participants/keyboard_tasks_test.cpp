@@ -277,7 +277,7 @@ const protocols::PageItem kHand{protocols::PageItem::Kind::choice,
                                 {"left", "right"}};
 const protocols::PageItem kAge{protocols::PageItem::Kind::number, "age", "AGE?", {}, 18, 120};
 
-TEST_F(KeyboardTasks, LeftAndBackspaceGoBackToTheQuestionBefore) {
+TEST_F(KeyboardTasks, LeftAndBackspaceGoBackAQuestion) {
   person();
   for (const char* const key : {"left", "backspace"}) {
     how_ = {.can_go_back = true};
@@ -291,7 +291,7 @@ TEST_F(KeyboardTasks, LeftAndBackspaceGoBackToTheQuestionBefore) {
   }
 }
 
-TEST_F(KeyboardTasks, AQuestionAgainShowsItsAnswerAndKeepsIt) {
+TEST_F(KeyboardTasks, AQuestionShownAgainKeepsItsAnswer) {
   person();
   how_ = {.can_go_back = true, .given = "r"};
   screen_.script = {{}, {"enter"}};

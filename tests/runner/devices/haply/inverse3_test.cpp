@@ -389,7 +389,7 @@ TEST_F(Inverse3, AnOldServiceMayNotTellItsPreset) {
   EXPECT_NE(device->capabilities().calibration.find("preset not told"), std::string::npos);
 }
 
-TEST_F(Inverse3, AnotherProgramThatMovesTheFrameTakesForcesOff) {
+TEST_F(Inverse3, ForcesEndWhenAnotherProgramMovesTheFrame) {
   const struct {
     const char* name;
     std::function<void(EmulatedArm&)> change;

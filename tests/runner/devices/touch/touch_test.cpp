@@ -148,7 +148,7 @@ TEST_F(Touch, ACalibrationThatIsDueIsUpdated) {
   EXPECT_EQ(one().reset, 0);
 }
 
-TEST_F(Touch, ACalibrationIsUpdatedByOneStyleAtATime) {
+TEST_F(Touch, OneStyleUpdatesACalibration) {
   constexpr int kEncoderReset = 1, kAuto = 2, kInkwell = 4;
   const struct {
     int styles, taken;
@@ -185,7 +185,7 @@ TEST_F(Touch, ForcesThatStayOffAreRefused) {
   EXPECT_TRUE(works(*open(config_))) << "and it is closed again";
 }
 
-TEST_F(Touch, AWorkspaceThatIsNotInMillimetresIsRefused) {
+TEST_F(Touch, AWorkspaceNotInMillimetresIsRefused) {
   one().metres = 1;
   EXPECT_NE(refusal().find("not in millimetres"), std::string::npos) << refusal();
 }
