@@ -47,6 +47,50 @@ void put_row(std::string& out, const std::vector<std::string>& cells, const Tabl
 
 int digit_of(char hex) { return hex <= '9' ? hex - '0' : hex - 'a' + 10; }
 
+/// Buttons that the script shows: it reads the table above them.
+void put_table_tools(std::string& out, std::string_view caption) {
+  out += "<div class=\"tools of-table\">\n";
+  for (const auto& [kind, name] : {std::pair{"copy", "Copy"}, std::pair{"csv", "Save as CSV"}}) {
+    out += std::string("<button type=\"button\" data-table=\"") + kind +
+           "\" hidden=\"hidden\" aria-label=\"" + name + ": the table “" + escaped(caption) +
+           "”\">" + name + "</button>\n";
+  }
+  out += "</div>\n";
+}
+
+std::string colours(const Palette& palette) {
+  std::string out = ":root {";
+  for (std::size_t r = 0; r < kRoles; ++r) {
+    out += " --";
+    out += to_string(static_cast<Role>(r));
+    out += ": " + palette[r] + ";";
+  }
+  return out + " }\n";
+}
+
+std::string style() {
+  return colours(light_palette()) + "@media screen and (prefers-color-scheme: dark) {\n" +
+         colours(dark_palette()) + "}\n" + std::string(report_style());
+}
+
+/// The light palette as JSON, for figures that the script saves.
+std::string saved_colours() {
+  nlohmann::ordered_json json;
+  const Palette light = light_palette();
+  for (std::size_t r = 0; r < kRoles; ++r) json[to_string(static_cast<Role>(r))] = light[r];
+  return json.dump();
+}
+
+void put_choice(std::string& out, const std::vector<std::string>& participants) {
+  out +=
+      "<label hidden=\"hidden\">Highlight a participant <select id=\"person\"><option "
+      "value=\"\">none</option>";
+  for (const std::string& name : participants) {
+    out += "<option value=\"" + escaped(name) + "\">" + escaped(name) + "</option>";
+  }
+  out += "</select></label>\n";
+}
+
 }  // namespace
 
 std::string escaped_sentence(std::string_view text) {
@@ -71,21 +115,6 @@ std::string escaped_lines(std::string_view text) {
   }
   return out;
 }
-
-namespace {
-
-/// Buttons that the script shows: it reads the table above them.
-void put_table_tools(std::string& out, std::string_view caption) {
-  out += "<div class=\"tools of-table\">\n";
-  for (const auto& [kind, name] : {std::pair{"copy", "Copy"}, std::pair{"csv", "Save as CSV"}}) {
-    out += std::string("<button type=\"button\" data-table=\"") + kind +
-           "\" hidden=\"hidden\" aria-label=\"" + name + ": the table “" + escaped(caption) +
-           "”\">" + name + "</button>\n";
-  }
-  out += "</div>\n";
-}
-
-}  // namespace
 
 void put_table(std::string& out, const Table& table) {
   out += "<div class=\"wide\" tabindex=\"0\" role=\"region\" aria-label=\"";
@@ -130,43 +159,6 @@ std::string script_hash(std::string_view script) {
   }
   return out;
 }
-
-namespace {
-
-std::string colours(const Palette& palette) {
-  std::string out = ":root {";
-  for (std::size_t r = 0; r < kRoles; ++r) {
-    out += " --";
-    out += to_string(static_cast<Role>(r));
-    out += ": " + palette[r] + ";";
-  }
-  return out + " }\n";
-}
-
-std::string style() {
-  return colours(light_palette()) + "@media screen and (prefers-color-scheme: dark) {\n" +
-         colours(dark_palette()) + "}\n" + std::string(report_style());
-}
-
-/// The light palette as JSON, for figures that the script saves.
-std::string saved_colours() {
-  nlohmann::ordered_json json;
-  const Palette light = light_palette();
-  for (std::size_t r = 0; r < kRoles; ++r) json[to_string(static_cast<Role>(r))] = light[r];
-  return json.dump();
-}
-
-void put_choice(std::string& out, const std::vector<std::string>& participants) {
-  out +=
-      "<label hidden=\"hidden\">Highlight a participant <select id=\"person\"><option "
-      "value=\"\">none</option>";
-  for (const std::string& name : participants) {
-    out += "<option value=\"" + escaped(name) + "\">" + escaped(name) + "</option>";
-  }
-  out += "</select></label>\n";
-}
-
-}  // namespace
 
 HtmlPage::HtmlPage(std::string title, std::string label)
     : title_(std::move(title)), label_(std::move(label)) {}
