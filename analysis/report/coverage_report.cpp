@@ -30,10 +30,6 @@ nlohmann::ordered_json counts_json(const CoverageCounts& counts, std::size_t stu
   return out;
 }
 
-}  // namespace
-
-namespace {
-
 std::string tally_text(const GroupTally& sum) {
   return pad_left(fixed(sum.bias(), 3), 9) + pad_left(percent_of(sum.held, sum.results), 7);
 }
@@ -48,6 +44,18 @@ nlohmann::ordered_json tally_json(const GroupTally& sum) {
 nlohmann::ordered_json difference_json(const GroupTally& sum) {
   nlohmann::ordered_json out = tally_json(sum);
   out["n_found"] = sum.found;
+  return out;
+}
+
+nlohmann::ordered_json group_coverage_json(const std::vector<GroupCoverage>& results) {
+  nlohmann::ordered_json out = nlohmann::ordered_json::array();
+  for (const GroupCoverage& one : results)
+    out.push_back({{"design", one.study.name},
+                   {"n_studies", one.studies},
+                   {"location", tally_json(one.location)},
+                   {"log_width", tally_json(one.log_width)},
+                   {"location_difference", difference_json(one.location_difference)},
+                   {"log_width_difference", difference_json(one.log_width_difference)}});
   return out;
 }
 
@@ -78,22 +86,6 @@ std::string group_coverage_text(const std::vector<GroupCoverage>& results,
          "ends of "
          "the interval\nof the ratio of JNDs (or widths) are open.\n";
 }
-
-namespace {
-
-nlohmann::ordered_json group_coverage_json(const std::vector<GroupCoverage>& results) {
-  nlohmann::ordered_json out = nlohmann::ordered_json::array();
-  for (const GroupCoverage& one : results)
-    out.push_back({{"design", one.study.name},
-                   {"n_studies", one.studies},
-                   {"location", tally_json(one.location)},
-                   {"log_width", tally_json(one.log_width)},
-                   {"location_difference", difference_json(one.location_difference)},
-                   {"log_width_difference", difference_json(one.log_width_difference)}});
-  return out;
-}
-
-}  // namespace
 
 std::string coverage_text(const std::vector<CoverageResult>& results,
                           const CoverageSettings& settings) {
