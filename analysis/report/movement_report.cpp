@@ -210,6 +210,13 @@ Json measure_json(const MovementAnalysis& analysis, const MeasureComparison& mea
   return out;
 }
 
+std::vector<std::string> movement_warnings(const TrialTable& trials) {
+  std::vector<std::string> warnings = trials.warnings;
+  if (trials.provenance.protocol_sha256.size() > 1)
+    warnings.push_back(pooled_protocols(trials.provenance));
+  return warnings;
+}
+
 }  // namespace
 
 MovementAnalysis analyze_movement(MovementTable table, const std::string& program_version) {
@@ -220,17 +227,6 @@ MovementAnalysis analyze_movement(MovementTable table, const std::string& progra
   analysis.program_version = program_version;
   return analysis;
 }
-
-namespace {
-
-std::vector<std::string> movement_warnings(const TrialTable& trials) {
-  std::vector<std::string> warnings = trials.warnings;
-  if (trials.provenance.protocol_sha256.size() > 1)
-    warnings.push_back(pooled_protocols(trials.provenance));
-  return warnings;
-}
-
-}  // namespace
 
 std::string movement_text(const MovementAnalysis& analysis) {
   const TrialTable& trials = analysis.table.trials;
