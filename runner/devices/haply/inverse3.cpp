@@ -80,6 +80,7 @@ void each(const Json& message, const char* array, Take take) {
 }
 
 constexpr double kTurned = 1e-3, kScaled = 1e-3, kShifted = 1e-4;  // rad/2, of 1, m; rounding
+constexpr double kDamped = 1e-3;                                   // N s/m; rounding
 
 /// Whether a number that is left out, as those of an identity are, or given differs from
 /// `identity`.
@@ -110,7 +111,8 @@ std::string change_of(const Json& transform, bool shifts) {
   return "";
 }
 
-/// How an arm's workspace, basis or mount change positions; empty: they are the world's.
+/// What changes an arm's positions (workspace, basis, mount) or what the hand feels of forces
+/// (damping, N s/m); empty: nothing.
 std::string change_of_arm(const Json& arm) {
   if (const Json* const state = member(arm, "state")) {
     if (const Json* const workspace = member(*state, "transform")) {
@@ -128,6 +130,11 @@ std::string change_of_arm(const Json& arm) {
     // The preset places the origin by it.
     const std::string change = change_of(*mount, false);
     if (!change.empty()) return "its mount is " + change;
+  }
+  if (const Json* const filters = member(*config, "filters")) {
+    const Json* const damping = member(*filters, "damping");
+    if (damping != nullptr && differs(*damping, "scalar", 0, kDamped))
+      return "its motion is damped (\"filters\")";
   }
   return "";
 }
@@ -195,7 +202,7 @@ Inventory parse_inventory(std::string_view message) {
       if (const Json* const filters = member(*config, "filters"))
         one.filters = filters->dump(-1, ' ', true, Json::error_handler_t::replace);
     }
-    one.moved = change_of_arm(arm);
+    one.changed = change_of_arm(arm);
     if (const Json* const status = member(arm, "status")) {
       one.in_use = flag(*status, "in_use", false);
       one.calibrated = flag(*status, "calibrated", true);
@@ -224,7 +231,7 @@ State parse_state(std::string_view message, const std::string& arm, const std::s
     out.force = vector(*state, "current_cursor_force").value_or(Vec3(std::nan("")));
     const Json* const config = member(one, "config");
     const std::string preset = config != nullptr ? text(*config, "preset", kPreset) : kPreset;
-    out.moved = preset != kPreset || !change_of_arm(one).empty();
+    out.changed = preset != kPreset || !change_of_arm(one).empty();
     if (const Json* const status = member(one, "status")) {
       out.calibrated = flag(*status, "calibrated", true);
       out.powered = flag(*status, "power_supply", true);
@@ -463,7 +470,7 @@ void Pump::exchange(bool last) {
   } else if (before == servo::DeviceTrouble::unplugged) {
     last_.trouble = servo::DeviceTrouble::none;
   }
-  if (reply->state.moved) last_.trouble = servo::DeviceTrouble::in_use;
+  if (reply->state.changed) last_.trouble = servo::DeviceTrouble::in_use;
   watch(force, full ? last_message_ : reply->hash);  // a full state always differs from the others
   newest_.write(last_);
 }
@@ -531,9 +538,9 @@ void Inverse3Device::open() {
     settings.dialect = vector ? Dialect::vector : Dialect::values;
     settings.silence = std::max(0.005, 5 / config_.rate);
     const Listed now = configure(*link, arm->id, version, settings.dialect);
-    if (!now.moved.empty())
-      throw std::runtime_error("positions of the Inverse3 '" + printable(arm->id) +
-                               "' are changed by another program's settings: " + now.moved +
+    if (!now.changed.empty())
+      throw std::runtime_error("another program's settings change the Inverse3 '" +
+                               printable(arm->id) + "': " + now.changed +
                                "; end that program and reset them in the maker's program");
     if (!now.gravity.empty())
       throw std::runtime_error("the gravity compensation of the Inverse3 '" + printable(arm->id) +

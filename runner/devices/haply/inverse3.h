@@ -49,7 +49,7 @@ inline constexpr const char* kPreset = "arm_front_centered";  ///< origin in the
 struct Listed {
   std::string id;
   std::string preset;   ///< of an arm; empty: not told
-  std::string moved;    ///< of an arm: how positions are turned, scaled or moved; empty: not
+  std::string changed;  ///< of an arm: how positions or forces are changed; empty: not
   std::string gravity;  ///< of an arm: why its weight is not compensated; empty: it is
   bool in_use = false, calibrated = true;
   std::string filters;  ///< of an arm: the service's filters of forces as JSON; for the record
@@ -68,7 +68,7 @@ struct State {
   std::uint8_t buttons = 0;
   bool has_arm = false, has_grip = false;
   bool calibrated = true, powered = true;
-  bool moved = false;  ///< another program has changed the arm's preset, basis or transform
+  bool changed = false;  ///< another program has changed the arm's preset, axes or damping
 };
 /// The newest state of the arm and, unless `grip` is empty, the grip. Values missing from the
 /// message are missing from the result. \throws std::runtime_error if it is not such a message

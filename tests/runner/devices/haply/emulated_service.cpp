@@ -50,11 +50,12 @@ Json config_of(const EmulatedArm& arm) {
   Json mount = {{"position", vector({0, ends(arm.preset) ? -kBase_y : 0, 0})},
                 {"rotation", {{"w", turned ? 0 : 1}, {"x", 0}, {"y", 0}, {"z", turned ? 1 : 0}}},
                 {"scale", vector({arm.mount_scale, arm.mount_scale, arm.mount_scale})}};
-  Json out = {{"type", "inverse3"},
-              {"gravity_compensation", {{"enabled", arm.gravity}, {"scaling_factor", 1.0}}},
-              {"basis", {{"permutation", arm.basis}}},
-              {"mount", mount},
-              {"filters", {{"force_gate", {{"gain", 0.3}}}}}};
+  Json out = {
+      {"type", "inverse3"},
+      {"gravity_compensation", {{"enabled", arm.gravity}, {"scaling_factor", 1.0}}},
+      {"basis", {{"permutation", arm.basis}}},
+      {"mount", mount},
+      {"filters", {{"force_gate", {{"gain", 0.3}}}, {"damping", {{"scalar", arm.damping}}}}}};
   if (arm.tells_preset) out["preset"] = arm.preset;
   return out;
 }

@@ -24,6 +24,7 @@ struct EmulatedArm {
   double workspace_scale = 1;              ///< of "transform", left behind by another program
   double workspace_y = 0;                  ///< m, of the same
   double mount_scale = 1;                  ///< of a mount that no preset replaces
+  double damping = 0;                      ///< N s/m, left behind by another program
   bool gravity = true;                     ///< compensated
   std::uint64_t full_states = 0;           ///< asked for
   std::array<double, 3> hand{0, 0, 0};     ///< m, about the middle of its reach

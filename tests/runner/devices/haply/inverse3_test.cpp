@@ -95,12 +95,12 @@ TEST(HaplyMessages, ThePresetHasTheDocumentedForm) {
       std::string::npos);
 }
 
-TEST(HaplyMessages, ATurnedScaledOrMovedArmIsNamed) {
+TEST(HaplyMessages, AnArmThatOthersChangedIsNamed) {
   const auto change = [](const std::string& config, const std::string& transform = "{}") {
     return parse_inventory(R"({"inverse3":[{"device_id":"A","config":)" + config +
                            R"(,"state":{"transform":)" + transform + "}}]}")
         .arms.at(0)
-        .moved;
+        .changed;
   };
   EXPECT_EQ(change("{}"), "");
   EXPECT_EQ(
@@ -116,6 +116,9 @@ TEST(HaplyMessages, ATurnedScaledOrMovedArmIsNamed) {
   EXPECT_EQ(change(R"({"basis":{"permutation":"XZY"}})"), "its axes are permuted (basis XZY)");
   EXPECT_EQ(change("{}", R"({"scale":{"x":2}})"), "its workspace is scaled (\"transform\")");
   EXPECT_EQ(change("{}", R"({"position":{"y":0.01}})"), "its workspace is moved (\"transform\")");
+  EXPECT_EQ(change(R"({"filters":{"damping":{"scalar":0.0},"force_gate":{"gain":0.3}}})"), "");
+  EXPECT_EQ(change(R"({"filters":{"damping":{"scalar":6}}})"),
+            "its motion is damped (\"filters\")");
   EXPECT_EQ(change("{}", R"({"rotation":{"w":"north"}})"),
             "its workspace is turned (\"transform\")");
 }
@@ -323,6 +326,7 @@ TEST_F(Inverse3, WhatCannotBeOpenedSaysWhy) {
             std::string::npos);
   EXPECT_NE(said([](auto& a) { a.mount_scale = 0.5; }).find("its mount is scaled"),
             std::string::npos);
+  EXPECT_NE(said([](auto& a) { a.damping = 6; }).find("its motion is damped"), std::string::npos);
   EXPECT_NE(said([](auto& a) { a.gravity = false; }).find("gravity compensation"),
             std::string::npos);
   EXPECT_NE(
@@ -396,6 +400,7 @@ TEST_F(Inverse3, ForcesEndWhenAnotherProgramMovesTheFrame) {
   } cases[] = {{"scaled", [](EmulatedArm& a) { a.workspace_scale = 2; }},
                {"moved", [](EmulatedArm& a) { a.workspace_y = 0.005; }},
                {"preset", [](EmulatedArm& a) { a.preset = "led_front_centered"; }},
+               {"damping", [](EmulatedArm& a) { a.damping = 6; }},
                {"basis", [](EmulatedArm& a) { a.basis = "XZY"; }}};
   for (const auto& [name, change] : cases) {
     SCOPED_TRACE(name);
